@@ -1,0 +1,150 @@
+"""Contractor: rings -> contracted cloud (Wen et al. 2024, section II-B; Cao et al. 2010)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from .filter import Filter, documented, parameter
+from .numerics.cotangent import cotangent_laplacian
+from .numerics.solver import SolveError, solve_contraction
+from .report import IterationRecord
+from .state import Contraction
+from .stopping import ExplainedScore, StopRule
+
+BOX_SLACK = 1.2
+FLAT = 0.01
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Contractor(Filter):
+    r"""Contract a cloud onto its curve skeleton, reducing it on the way.
+
+    Each iteration solves :math:`(w_L^2 L^T M^{-2} L + M^2 W_H^2) P' = M^2 W_H^2 P` with the cotangent Laplacian L of the
+    current points, raises :math:`w_L`, sets :math:`W_H = s(0) / s(t)`, and lets the reducer merge points. M is the
+    diagonal of the survivors' masses; it is the identity unless the reducer conserves mass.
+
+    A late, ill-conditioned solve can throw points out of the cloud. It is detected (a point beyond 1.2 times the
+    bounding box, or a solve without a trustworthy solution) and dropped: the last sound state is kept, and the report
+    says so.
+
+    References
+    ----------
+    Wen et al. 2024, equations 3 to 5 and figure 2; Cao et al. 2010, section 4. Equation 5 reads as a cumulative
+    product; both published codes take the ratio to the first cloud, and so does this filter.
+    """
+
+    consumes: ClassVar[str] = "Contraction"
+
+    reducer: Callable[[Contraction], Contraction] | None = parameter(
+        None, "Merges redundant points after each solve; None keeps them all.", type="reducer?"
+    )
+    stop: StopRule = parameter(ExplainedScore(), "Decides after each solve whether to stop.", type="stop")
+    max_iterations: int = parameter(10, "Most solves.", type="int", unit="solves", low=1)
+    initial_contraction: float = parameter(
+        0.2, "w_L of the first solve times the mean ring edge in the working frame.", type="float", low=0, open_low=True
+    )
+    amplification: float = parameter(3.0, "Factor on w_L after each solve.", type="float", low=1)
+    max_contraction: float = parameter(2048.0, "Cap of w_L.", type="float", low=0, open_low=True)
+    max_attraction: float = parameter(1e4, "Cap of W_H.", type="float", low=0, open_low=True)
+
+    def _run(self, state, on_iteration):
+        reducing = self.reducer is not None
+        for _ in range(self.max_iterations):
+            start = time.perf_counter()
+            try:
+                state, error = self._solve(state)
+            except SolveError as problem:
+                return _finished(state, f"solve {len(state.report.iterations) + 1} refused, last sound state kept: {problem}")
+            state = _record(state, error, time.perf_counter() - start)
+            reason = self.stop(state.report.iterations)
+            if reason is None and reducing:
+                before = len(state)
+                state = self.reducer(state)
+                reducing = len(state) < before  # the published code, too, gives up after a pass without a merge
+                state = _amend(state, n_merged=before - len(state), seconds=time.perf_counter() - start)
+            if on_iteration is not None and on_iteration(state.report.iterations[-1]) is False and reason is None:
+                return _finished(state, "stopped by the caller")
+            if reason is not None:
+                return _finished(state, reason, converged=True)
+        return _finished(state, f"reached max_iterations = {self.max_iterations}")
+
+    def _solve(self, state):
+        """One contraction step: equations 3 to 5."""
+        contraction = state.contraction_weight * self.amplification or self.initial_contraction / state.mean_ring_edge
+        contraction = min(contraction, self.max_contraction)
+        with np.errstate(divide="ignore"):
+            attraction = np.minimum(state.ring_size0 / state.ring_size, self.max_attraction)
+        laplacian = cotangent_laplacian(state.positions, state.rings)
+        positions, error = solve_contraction(
+            laplacian, contraction / state.mass, attraction * state.mass, state.positions
+        )
+        limit = np.maximum(BOX_SLACK * state.frame.half_extent, FLAT * state.frame.diagonal)
+        outside = int((np.abs(positions) > limit).any(axis=1).sum())
+        if outside:
+            raise SolveError(f"it would throw {outside} of {len(state)} points out of {BOX_SLACK:g} times the bounding box")
+        _, ring_size = state.rings.nearest(positions)
+        contracted = replace(
+            state,
+            positions=positions,
+            previous=state.positions,
+            laplacian_coordinates=laplacian @ state.positions,
+            ring_size=ring_size,
+            contraction_weight=contraction,
+        )
+        # In the first pass the published code takes a(1) itself for the drop, not 1 - a(1); so does this one.
+        done = state.report.iterations
+        drop = done[-1].ring_ratio - contracted.ring_ratio if done else contracted.ring_ratio
+        return replace(contracted, ring_ratio_drop=drop), error
+
+
+def explained_score(points) -> float:
+    """PCA score e = (2 l1 + l2 + l3) / (2 (l1 + l2 + l3)): 1 for a line, 2/3 for a ball (Wen et al. 2024, equation 14).
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        Not all the same.
+
+    Returns
+    -------
+    float
+    """
+    spread = np.linalg.eigvalsh(np.cov(points, rowvar=False))
+    return float((spread.sum() + spread[-1]) / (2 * spread.sum()))
+
+
+def _record(state, error, seconds):
+    iterations = state.report.iterations
+    explained = explained_score(state.positions)
+    if iterations:
+        before, n_before = iterations[-1].explained, iterations[-1].n_points
+    else:
+        before, n_before = explained_score(state.cloud), len(state)
+    kept = 1 - (n_before - len(state)) / state.report.n_distinct
+    record = IterationRecord(
+        iteration=len(iterations) + 1,
+        n_points=len(state),
+        n_merged=0,
+        explained=explained,
+        explained_change=abs(explained - before) / kept,
+        ring_ratio=state.ring_ratio,
+        contraction_weight=state.contraction_weight,
+        solve_error=error,
+        seconds=seconds,
+    )
+    return replace(state, report=replace(state.report, iterations=(*iterations, record)))
+
+
+def _amend(state, **facts):
+    *done, last = state.report.iterations
+    return replace(state, report=replace(state.report, iterations=(*done, replace(last, **facts))))
+
+
+def _finished(state, reason, converged=False):
+    return replace(state, report=replace(state.report, stop_reason=reason, converged=converged))

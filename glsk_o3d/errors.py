@@ -1,0 +1,29 @@
+"""What can go wrong, by name. Every message says what was wrong, where, and what to do."""
+
+
+class GlskError(Exception):
+    """Base of all errors this package raises on purpose."""
+
+
+class InvalidCloudError(GlskError, ValueError):
+    """The input points cannot be skeletonised."""
+
+
+class InvalidParameterError(GlskError, ValueError):
+    """A filter parameter is unknown, of the wrong type, or out of range."""
+
+
+class StageError(GlskError, TypeError):
+    """A filter was given something that another stage should have made first."""
+
+
+class FileFormatError(GlskError, ValueError):
+    """A file cannot be read or written in the format asked for."""
+
+
+class MissingPackageError(GlskError, ImportError):
+    """An optional package, or a system library it needs, is not installed."""
+
+
+class SkeletonWarning(UserWarning):
+    """The skeleton was computed but should not be trusted blindly."""

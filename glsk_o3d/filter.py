@@ -1,0 +1,179 @@
+"""What all filters share: parameters that describe and check themselves, and `|`."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import re
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from .errors import InvalidParameterError, StageError
+
+if TYPE_CHECKING:
+    from .pipeline import Pipeline
+    from .report import IterationRecord
+
+    OnIteration = Callable[[IterationRecord], bool | None]
+
+
+def parameter(
+    default: Any,
+    doc: str,
+    *,
+    type: str,
+    unit: str = "-",
+    low: float | None = None,
+    high: float | None = None,
+    open_low: bool = False,
+    choices: tuple[str, ...] = (),
+) -> Any:
+    """A dataclass field that carries its own documentation and limits.
+
+    Parameters
+    ----------
+    default : object
+    doc : str
+        One sentence; it appears in the class's docstring and in ``glsk filters``.
+    type : {"int", "float", "bool", "length", "choice", "reducer", "stop"}
+        A length is a float in the cloud's units or a string such as ``"2%"`` of the bounding-box diagonal. A trailing
+        ``?`` allows None.
+    unit : str
+    low, high : float, optional
+        Inclusive limits (`low` is exclusive with `open_low`); for a length in percent they limit nothing.
+    open_low : bool
+    choices : tuple of str
+        For the type ``"choice"``.
+    """
+    facts = dict(doc=doc, type=type, unit=unit, low=low, high=high, open_low=open_low, choices=choices)
+    return dataclasses.field(default=default, metadata=facts)
+
+
+def documented(cls):
+    """Class decorator: append the numpydoc "Parameters" section made from the fields' own facts."""
+    lines = []
+    for field in dataclasses.fields(cls):
+        facts = field.metadata
+        kind = " or ".join(repr(c) for c in facts["choices"]) or facts["type"].replace("?", " or None")
+        unit = "" if facts["unit"] == "-" else f" [{facts['unit']}]"
+        lines += [f"{field.name} : {kind}{unit}, default {field.default!r}", f"    {facts['doc']}"]
+    if lines:
+        cls.__doc__ = f"{inspect.cleandoc(cls.__doc__)}\n\nParameters\n----------\n" + "\n".join(lines) + "\n"
+    return cls
+
+
+class Parameters:
+    """Mixin of frozen dataclasses whose fields are made by `parameter`: checked when used, not when made."""
+
+    def check(self) -> None:
+        """Raise InvalidParameterError if a parameter has the wrong type or is out of range."""
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            problem = _problem(value, field.metadata)
+            if problem:
+                raise InvalidParameterError(f"{type(self).__name__}.{field.name} = {value!r}: {problem}")
+            if isinstance(value, Parameters):
+                value.check()
+
+
+def _problem(value, facts) -> str | None:
+    kind, low, high = facts["type"], facts["low"], facts["high"]
+    if kind.endswith("?"):
+        if value is None:
+            return None
+        kind = kind[:-1]
+    if kind == "bool":
+        return None if isinstance(value, bool) else "must be True or False"
+    if kind == "choice":
+        return None if value in facts["choices"] else f"must be one of {', '.join(map(repr, facts['choices']))}"
+    if kind in ("reducer", "stop"):
+        return None if callable(value) else f"must be a {kind}, for example a filter of this package"
+    if kind == "length" and isinstance(value, str):
+        percent = _percent(value)
+        if percent is None:
+            return "must be a number in the cloud's units or a percentage of its diagonal such as '2%'"
+        return None if 0 < percent <= 100 else "a percentage of the diagonal lies above 0% and up to 100%"
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or (kind == "int" and not isinstance(value, int)):
+        return f"must be {'an int' if kind == 'int' else 'a number'}"
+    if not math.isfinite(value):
+        return "must be finite"
+    if low is not None and (value < low or (facts["open_low"] and value == low)):
+        return f"must be {'above' if facts['open_low'] else 'at least'} {low}"
+    if high is not None and value > high:
+        return f"must be at most {high}"
+    return None
+
+
+def _percent(text: str) -> float | None:
+    match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*%\s*", text)
+    return float(match[1]) if match else None
+
+
+def resolve_length(length: float | str, diagonal: float) -> float:
+    """A length in the cloud's units: a number as it is, ``"2%"`` as a share of the bounding-box diagonal.
+
+    Parameters
+    ----------
+    length : float or str
+    diagonal : float
+        Bounding-box diagonal, in the cloud's units.
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> resolve_length("2%", 50.0), resolve_length(0.3, 50.0)
+    (1.0, 0.3)
+    """
+    if isinstance(length, str):
+        percent = _percent(length)
+        if percent is None:
+            raise InvalidParameterError(f"length {length!r}: must be a number or a percentage such as '2%'")
+        return percent / 100 * diagonal
+    return float(length)
+
+
+class Filter(Parameters):
+    """A stage of a pipeline: a frozen, keyword-only dataclass that maps what it `consumes` to something new.
+
+    Filters keep no state between calls and never change their input. They are joined with ``|``.
+    """
+
+    consumes: ClassVar[str] = "cloud"
+    """What the filter takes: ``"cloud"``, ``"Contraction"`` or ``"Skeleton"``."""
+    produces: ClassVar[str] = "Contraction"
+
+    def __call__(self, data, *, on_iteration: OnIteration | None = None):
+        """Run the filter.
+
+        Parameters
+        ----------
+        data : cloud, Contraction or Skeleton
+            See `consumes`. A cloud is anything `glsk_o3d.skeletonize` takes.
+        on_iteration : callable, optional
+            Called with each IterationRecord of a contraction; return False to stop there and keep what is done.
+        """
+        self.check()
+        given = type(data).__name__
+        flows = ("Contraction", "Skeleton")
+        if (self.consumes in flows and given != self.consumes) or (self.consumes == "cloud" and given in flows):
+            raise StageError(
+                f"{type(self).__name__} takes a {self.consumes}, not a {given}: "
+                "the order is RingBuilder | Contractor | Connector | Refiner"
+            )
+        start = time.perf_counter()
+        result = self._run(data, on_iteration)
+        report = result.report.with_stage(self, time.perf_counter() - start)
+        return dataclasses.replace(result, report=report)
+
+    def __or__(self, other: Filter | Pipeline) -> Pipeline:
+        from .pipeline import Pipeline
+
+        return Pipeline(self) | other
+
+    def _run(self, data, on_iteration):
+        raise NotImplementedError

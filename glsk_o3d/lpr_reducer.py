@@ -1,0 +1,178 @@
+"""LPRReducer: local point reduction (Wen et al. 2024, section II-C and algorithm 1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from .errors import StageError
+from .filter import Filter, documented, parameter
+from .numerics.neighbourhoods import plane_axes
+from .numerics.rings import Rings, star_rings
+
+_IN_PLANE = 1e-3  # sine of the angle below which a direction counts as lying in the tangent plane
+_MIN_SIZE = 1e-4  # floor of s - psi' s(0) in the working frame, as in the published code
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class LPRReducer(Filter):
+    r"""Merge each point with its nearest ring neighbour where that costs little: one pass.
+
+    A point i may swallow its nearest ring neighbour m where :math:`F = V_1 - V_2 + 3 U < \varphi s_i^2`. Its new ring is
+    the Delaunay star of i among both rings, on the uncontracted points, projected along the Laplacian coordinate of i;
+    m's entry in every other ring becomes i. A point takes part in at most one merge a pass, so all ring combinations of
+    a pass are independent and made in one batch.
+
+    With `conserve_mass` a survivor takes over the mass of the point it swallows, and the ring sizes s(0) and s(t) are
+    measured anew on the combined rings; without it, a survivor that speaks for eight points pulls with the weight of
+    one on a ring twice as wide, which drags bent parts off their axis.
+
+    Raises
+    ------
+    StageError
+        If the cloud has not been contracted yet.
+
+    Notes
+    -----
+    As in the published code, the Laplacian coordinates are those before the solve, :math:`s_i - \psi' s_i(0)` is at
+    least 1e-4, and V2 lacks the factor :math:`W_H`. As in the paper, the curvature term compares with the point's own
+    Laplacian coordinate. Where that lies in the tangent plane, the ring is projected on the tangent plane instead.
+
+    References
+    ----------
+    Wen et al. 2024, equations 6 to 12 and algorithm 1.
+    """
+
+    consumes: ClassVar[str] = "Contraction"
+
+    phi: float = parameter(1e5, "Merge where F is below phi times the squared ring size.", type="float", low=0, open_low=True)
+    conserve_mass: bool = parameter(True, "Survivors take over the mass of the points they swallow.", type="bool")
+    order: str = parameter(
+        "cheapest",
+        "Which pairs are merged first: those with the least F / s^2, whatever the order of the input, or those of the "
+        "lowest point index, as in the published code.",
+        type="choice",
+        choices=("cheapest", "index"),
+    )
+
+    def _run(self, state, on_iteration):
+        if not state.report.iterations:
+            raise StageError("LPRReducer compares ring sizes before and after a contraction: run Contractor first")
+        nearest, _ = state.rings.nearest(state.positions)
+        energy = merge_energy(state)
+        candidates = np.flatnonzero(energy < self.phi * state.ring_size**2)
+        combined = combine_rings(state, candidates, nearest[candidates])
+        # An umbrella of three or a fan of four is the least that still surrounds a point.
+        feasible = np.flatnonzero(combined.sizes + combined.closed > 3)
+        if self.order == "index":
+            rank = state.point_of_survivor[candidates[feasible]]
+        else:
+            rank = energy[candidates[feasible]] / state.ring_size[candidates[feasible]] ** 2
+        feasible = feasible[np.argsort(rank, kind="stable")]
+        chosen = feasible[match(len(state), candidates[feasible], nearest[candidates[feasible]])]
+        if len(chosen) == 0:
+            return state
+        return self._merge(state, candidates[chosen], nearest[candidates[chosen]], combined.take(chosen))
+
+    def _merge(self, state, keepers, swallowed, combined):
+        n = len(state)
+        into = np.arange(n)
+        into[swallowed] = keepers
+        keep = into == np.arange(n)
+        index = np.cumsum(keep) - 1
+        rings = state.rings.replace(keepers, combined).take(np.flatnonzero(keep)).rename(index[into])
+        mass, ring_size0, ring_size = state.mass, state.ring_size0, state.ring_size
+        if self.conserve_mass:
+            mass = np.bincount(into, mass, n)[keep]
+            _, ring_size0 = rings.nearest(state.cloud[state.survivors[keep]])
+            _, ring_size = rings.nearest(state.positions[keep])
+        else:
+            mass, ring_size0, ring_size = mass[keep], ring_size0[keep], ring_size[keep]
+        return replace(
+            state,
+            survivors=state.survivors[keep],
+            owner=index[into][state.owner],
+            positions=state.positions[keep],
+            previous=state.previous[keep],
+            laplacian_coordinates=state.laplacian_coordinates[keep],
+            rings=rings,
+            mass=mass,
+            ring_size0=ring_size0,
+            ring_size=ring_size,
+        )
+
+
+def merge_energy(state):
+    r"""F of every point: what merging it with its nearest ring neighbour would cost (equations 6 to 12).
+
+    Parameters
+    ----------
+    state : Contraction
+        After a solve.
+
+    Returns
+    -------
+    (n,) float array
+        :math:`V_1 - V_2 + 3 U`, with :math:`\psi' = 1.2 \psi`, :math:`\eta = (s - \psi' s(0)) / s(0)`,
+        :math:`V_1 = (9 w_L |\eta \delta|)^2`,
+        :math:`V_2 = (\psi' s(0) |P' - P| / (\eta (s(0) - s)))^2` and
+        :math:`U = |\delta_i - \bar\delta_j|^2` over the ring. Minus infinity where a ring did not change.
+    """
+    s0, s, delta = state.ring_size0, state.ring_size, state.laplacian_coordinates
+    psi = 1.2 * state.ring_ratio_drop
+    eta = np.maximum(s - psi * s0, _MIN_SIZE) / s0
+    moved = np.linalg.norm(state.positions - state.previous, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        attraction = np.nan_to_num(psi * s0 * moved / (eta * (s0 - s)), nan=0.0, posinf=np.inf, neginf=-np.inf) ** 2
+    contraction = (9 * state.contraction_weight * eta) ** 2 * np.einsum("ij,ij->i", delta, delta)
+    curvature = ((delta - state.rings.mean_over(delta)) ** 2).sum(axis=1)
+    return contraction - attraction + 3 * curvature
+
+
+def combine_rings(state, keepers, swallowed):
+    """Rings of the keepers after a merge: the Delaunay star among both rings, on the uncontracted points.
+
+    Parameters
+    ----------
+    state : Contraction
+    keepers, swallowed : (c,) int array
+        Pairs of survivors.
+
+    Returns
+    -------
+    Rings
+        Of length c.
+    """
+    union = np.concatenate([state.rings.padded(keepers), state.rings.padded(swallowed)], axis=1)
+    union[(union == keepers[:, None]) | (union == swallowed[:, None])] = -1
+    normals = state.normals[state.survivors[keepers]]
+    delta = state.laplacian_coordinates[keepers]
+    length = np.linalg.norm(delta, axis=1, keepdims=True)
+    along = np.abs(np.einsum("ij,ij->i", delta, normals))[:, None] > _IN_PLANE * length
+    direction = np.where(along, np.divide(delta, length, out=np.zeros_like(delta), where=along), normals)
+    return star_rings(state.cloud[state.survivors], keepers, union, plane_axes(direction))
+
+
+def match(n, keepers, swallowed):
+    """Greedy matching in the given order: positions of the pairs whose two points are both still free.
+
+    Parameters
+    ----------
+    n : int
+        Number of points.
+    keepers, swallowed : (c,) int array
+
+    Returns
+    -------
+    (m,) int array
+    """
+    free = [True] * n
+    chosen = []
+    for position, (i, m) in enumerate(zip(keepers.tolist(), swallowed.tolist(), strict=True)):
+        if free[i] and free[m]:
+            free[i] = free[m] = False
+            chosen.append(position)
+    return np.array(chosen, int)

@@ -1,0 +1,167 @@
+"""One-rings of a point cloud: which neighbours surround each point, in rotational order."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .delaunay_star import delaunay_star
+
+_CHUNK = 4096  # rows at a time: the (rows, k) work arrays then stay in the cache
+
+
+@dataclass(frozen=True, eq=False)
+class Rings:
+    """One-rings of n points in compressed-row form.
+
+    Attributes
+    ----------
+    indptr : (n + 1,) int array
+        The ring of point i is ``indices[indptr[i]:indptr[i + 1]]``.
+    indices : (m,) int array
+        Neighbours in rotational order.
+    closed : (n,) bool array
+        A closed ring is an umbrella: its last and first neighbour share a triangle with the point. An open one is a
+        fan, at the border of a scan.
+    """
+
+    indptr: np.ndarray
+    indices: np.ndarray
+    closed: np.ndarray
+
+    def __len__(self):
+        return len(self.closed)
+
+    def __getitem__(self, point):
+        return self.indices[self.indptr[point] : self.indptr[point + 1]]
+
+    @property
+    def sizes(self):
+        """Neighbours per ring, (n,) int array."""
+        return np.diff(self.indptr)
+
+    @property
+    def owners(self):
+        """The point that each entry of `indices` belongs to, (m,) int array."""
+        return np.repeat(np.arange(len(self)), self.sizes)
+
+    @property
+    def triangles(self):
+        """Fan triangles (i, j, k): a point and two consecutive neighbours, (t, 3) int array."""
+        owner = self.owners
+        following = np.arange(1, len(self.indices) + 1)
+        last = self.indptr[1:][self.sizes > 0] - 1
+        following[last] = self.indptr[:-1][self.sizes > 0]
+        has_next = np.ones(len(self.indices), bool)
+        has_next[last] = self.closed[self.sizes > 0]
+        return np.column_stack([owner, self.indices, self.indices[following]])[has_next]
+
+    def edge_lengths(self, points):
+        """Distance from every point to each of its ring neighbours, (m,) float array."""
+        return np.linalg.norm(points[self.indices] - points[self.owners], axis=1)
+
+    def mean_lengths(self, points):
+        """Mean ring edge of every point with a ring, (n,) float array."""
+        return np.add.reduceat(self.edge_lengths(points), self.indptr[:-1]) / self.sizes
+
+    def nearest(self, points):
+        """Nearest ring neighbour of every point and its distance: ((n,) int array, (n,) float array).
+
+        Of equally near neighbours the first in the ring.
+        """
+        length = self.edge_lengths(points)
+        distance = np.minimum.reduceat(length, self.indptr[:-1])
+        hits = np.flatnonzero(length == np.repeat(distance, self.sizes))
+        owner, first = np.unique(self.owners[hits], return_index=True)
+        assert len(owner) == len(self)
+        return self.indices[hits[first]], distance
+
+    def mean_over(self, values):
+        """Mean of the neighbours' values, (n, d) float array from `values` (n, d); 0 for an empty ring."""
+        return self._sum(values[self.indices]) / np.maximum(self.sizes, 1)[:, None]
+
+    def _sum(self, values):
+        """Sum over every ring of values per entry, (n, d) from (m, d)."""
+        total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+        return total[self.indptr[1:]] - total[self.indptr[:-1]]
+
+    def take(self, points):
+        """The rings of some points, in the order given; the indices stay as they are."""
+        sizes = self.sizes[points]
+        indptr = np.concatenate([[0], np.cumsum(sizes)])
+        source = np.repeat(self.indptr[points] - indptr[:-1], sizes) + np.arange(indptr[-1])
+        return Rings(indptr, self.indices[source], self.closed[points])
+
+    def replace(self, points, rings):
+        """These rings with those of `points` replaced by `rings`."""
+        both = Rings.concatenate([self, rings])
+        source = np.arange(len(self))
+        source[points] = len(self) + np.arange(len(rings))
+        return both.take(source)
+
+    def rename(self, index):
+        """These rings with neighbour j called index[j]; neighbours that fall together in a row become one."""
+        indices, owners = index[self.indices], self.owners
+        repeats = np.zeros(len(indices), bool)
+        repeats[1:] = (indices[1:] == indices[:-1]) & (owners[1:] == owners[:-1])
+        several = self.sizes > 1
+        first, last = self.indptr[:-1][several], self.indptr[1:][several] - 1
+        wrapped = self.closed[several] & (indices[first] == indices[last]) & ~repeats[last]
+        repeats[last[wrapped]] = True
+        sizes = np.bincount(owners[~repeats], minlength=len(self))
+        return Rings(np.concatenate([[0], np.cumsum(sizes)]), indices[~repeats], self.closed)
+
+    def padded(self, points):
+        """The rings of some points as rows padded with -1, (c, r) int array."""
+        rings = self.take(points)
+        column = np.arange(rings.sizes.max(initial=0))
+        present = column < rings.sizes[:, None]
+        rows = np.full(present.shape, -1)
+        rows[present] = rings.indices
+        return rows
+
+    @classmethod
+    def from_padded(cls, ring, closed):
+        """Rings from an (n, r) int array padded with -1 and an (n,) bool array."""
+        present = ring >= 0
+        indptr = np.concatenate([[0], np.cumsum(present.sum(axis=1))])
+        return cls(indptr, ring[present], closed)
+
+    @classmethod
+    def concatenate(cls, parts):
+        """One Rings from several, in order."""
+        sizes = np.concatenate([np.zeros(1, int), *(part.sizes for part in parts)])
+        none = [np.empty(0, int)]
+        return cls(
+            np.cumsum(sizes),
+            np.concatenate([part.indices for part in parts] or none),
+            np.concatenate([part.closed for part in parts] or [np.empty(0, bool)]),
+        )
+
+
+def star_rings(points, centres, neighbours, axes):
+    """Ring of each centre among its neighbours: its Delaunay star in the plane it is projected on.
+
+    Parameters
+    ----------
+    points : (m, 3) float array
+    centres : (n,) int array
+        Rows of `points`.
+    neighbours : (n, k) int array
+        Rows of `points`, padded with -1.
+    axes : (n, 3, 2) float array
+        Two orthonormal axes of each centre's plane.
+
+    Returns
+    -------
+    Rings
+        Of length n; the neighbours are rows of `points`.
+    """
+    chunks = []
+    for start in range(0, len(centres), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        candidates = neighbours[part]
+        offsets = np.matmul(points[candidates] - points[centres[part], None], axes[part])
+        position, closed = delaunay_star(offsets, candidates >= 0)
+        ring = np.take_along_axis(candidates, np.maximum(position, 0), axis=1)
+        chunks.append(Rings.from_padded(np.where(position >= 0, ring, -1), closed))
+    return Rings.concatenate(chunks)

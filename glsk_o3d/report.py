@@ -1,0 +1,113 @@
+"""What a run did, and why it stopped."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings as _warnings
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+
+from .errors import SkeletonWarning
+
+
+@dataclass(frozen=True)
+class IterationRecord:
+    """One iteration of a contraction.
+
+    Attributes
+    ----------
+    iteration : int
+        Counted from 1.
+    n_points : int
+        Points that were solved for.
+    n_merged : int
+        Points that the reduction after the solve merged away.
+    explained : float
+        PCA score e of the contracted points, 1 for a straight line (Wen et al. 2024, equation 14).
+    explained_change : float
+        De, the change of e per share of points kept (equation 16).
+    ring_ratio : float
+        a(t), the sum of the ring sizes over that of the uncontracted cloud.
+    contraction_weight : float
+        w_L of the solve.
+    solve_error : float
+        Estimated error of the linear solve, as a share of the cloud's size.
+    seconds : float
+        Wall time, the reduction included.
+    """
+
+    iteration: int
+    n_points: int
+    n_merged: int
+    explained: float
+    explained_change: float
+    ring_ratio: float
+    contraction_weight: float
+    solve_error: float
+    seconds: float
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in ("glsk-o3d", "numpy", "scipy", "open3d"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+@dataclass(frozen=True)
+class Report:
+    """The record of a run; it travels with the result and is saved with it.
+
+    Attributes
+    ----------
+    n_input, n_dropped, n_distinct : int
+        Input points, those dropped as not finite, and those left after removing duplicates.
+    stages : tuple of str
+        The filters that ran, as the expressions that rebuild them.
+    seconds : dict of str to float
+        Wall time per filter.
+    iterations : tuple of IterationRecord
+    converged : bool
+        Whether the stopping rule ended the contraction.
+    stop_reason : str
+    warnings : tuple of str
+    versions : dict of str to str
+    """
+
+    n_input: int = 0
+    n_dropped: int = 0
+    n_distinct: int = 0
+    stages: tuple[str, ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
+    iterations: tuple[IterationRecord, ...] = ()
+    converged: bool = False
+    stop_reason: str = "not contracted"
+    warnings: tuple[str, ...] = ()
+    versions: dict[str, str] = field(default_factory=_versions)
+
+    def with_stage(self, stage, seconds: float) -> Report:
+        """This report with one more filter in it."""
+        name = type(stage).__name__
+        total = self.seconds.get(name, 0.0) + seconds
+        return dataclasses.replace(self, stages=(*self.stages, repr(stage)), seconds={**self.seconds, name: total})
+
+    def with_warning(self, message: str) -> Report:
+        """This report with a warning in it, which is also issued as a SkeletonWarning."""
+        _warnings.warn(message, SkeletonWarning, stacklevel=2)
+        return dataclasses.replace(self, warnings=(*self.warnings, message))
+
+    def to_dict(self) -> dict:
+        """Plain dict of numbers, strings, lists and dicts, as saved in JSON."""
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: dict) -> Report:
+        """Inverse of `to_dict`."""
+        values = dict(data)
+        values["iterations"] = tuple(IterationRecord(**record) for record in values.get("iterations", ()))
+        for name in ("stages", "warnings"):
+            values[name] = tuple(values.get(name, ()))
+        return cls(**values)

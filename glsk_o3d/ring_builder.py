@@ -1,0 +1,137 @@
+"""RingBuilder: cloud -> one-rings (Wen et al. 2024, section II-A)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from .errors import InvalidCloudError
+from .filter import Filter, documented, parameter
+from .interop.open3d import cloud_points
+from .numerics.frame import Frame
+from .numerics.neighbourhoods import nearest_neighbours, tangent_planes
+from .numerics.ordering import morton_order
+from .numerics.rings import star_rings
+from .report import Report
+from .state import Contraction
+
+MIN_POINTS = 8
+
+
+def default_k(n: int) -> int:
+    """Neighbours per point, itself included: 1.2 % of the cloud, between 8 and 30 (Cao et al. 2010)."""
+    return int(np.clip(np.floor(0.012 * n + 0.5), 8, 30))
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class RingBuilder(Filter):
+    """Surround every point of a cloud with its one-ring.
+
+    The ring of a point is its Delaunay star among its k nearest neighbours, projected on their principal plane. The
+    cloud is taken in its own working frame (centred, longest side 1.6), in Morton order and without duplicates; what
+    comes out is mapped back to the user's order and units.
+
+    Raises
+    ------
+    InvalidCloudError
+        For points that are not finite (unless dropped), fewer than 8 distinct points, and anything that is no cloud.
+
+    References
+    ----------
+    Wen et al. 2024, section II-A and figure 3; Cao et al. 2010, section 3.
+    """
+
+    consumes: ClassVar[str] = "cloud"
+
+    k: int | None = parameter(
+        None,
+        "Neighbours per point, itself included. More bridge noise and gaps, fewer keep thin parts apart. None takes "
+        "1.2 % of the points, at least 8 and at most 30.",
+        type="int?",
+        unit="points",
+        low=4,
+        high=256,
+    )
+    drop_invalid: bool = parameter(False, "Drop points with NaN or infinite coordinates instead of refusing.", type="bool")
+
+    def _run(self, cloud, on_iteration):
+        points = cloud_points(cloud)
+        rows, report = self._finite_rows(points)
+        frame, distinct, row_of_valid, neighbours = self._distinct(points[rows])
+        row_of_point = np.full(len(points), -1)
+        row_of_point[rows] = row_of_valid
+
+        n = len(distinct)
+        axes = tangent_planes(distinct, neighbours)
+        rings = star_rings(distinct, np.arange(n), neighbours[:, 1:], axes[:, :, 1:])
+        _, ring_size = rings.nearest(distinct)
+        return Contraction(
+            points=points,
+            row_of_point=row_of_point,
+            frame=frame,
+            cloud=distinct,
+            normals=np.ascontiguousarray(axes[:, :, 0]),
+            survivors=np.arange(n),
+            owner=np.arange(n),
+            positions=distinct,
+            previous=distinct,
+            laplacian_coordinates=np.zeros((n, 3)),
+            rings=rings,
+            mass=np.ones(n),
+            ring_size0=ring_size,
+            ring_size=ring_size,
+            ring_ratio_drop=0.0,
+            mean_ring_edge=float(rings.mean_lengths(distinct).mean()),
+            contraction_weight=0.0,
+            report=report(n_distinct=n),
+        )
+
+    def _finite_rows(self, points):
+        finite = np.isfinite(points).all(axis=1)
+        dropped = int(len(points) - finite.sum())
+        if dropped and not self.drop_invalid:
+            raise InvalidCloudError(
+                f"{dropped} of {len(points)} points have NaN or infinite coordinates, the first at index "
+                f"{int(np.argmin(finite))}: remove them, or let RingBuilder(drop_invalid=True) drop them"
+            )
+
+        def report(**facts):
+            return Report(n_input=len(points), n_dropped=dropped, **facts)
+
+        return np.flatnonzero(finite), report
+
+    def _distinct(self, points):
+        """Frame, distinct points in Morton order, the row of each point among them, and their neighbours."""
+        if len(points) < MIN_POINTS:
+            raise InvalidCloudError(f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones")
+        with np.errstate(over="ignore"):
+            extent = np.ptp(points, axis=0).max()
+        if not np.isfinite(extent):
+            raise InvalidCloudError("the coordinates span more than a float64 can hold: rescale the cloud")
+        if extent <= np.finfo(float).tiny:
+            raise InvalidCloudError(f"all {len(points)} points coincide: there is nothing to skeletonise")
+        frame = Frame.of(points)
+        scaled = frame.into(points)
+        order = morton_order(scaled)
+        cloud, row = scaled[order], np.empty(len(points), int)
+        row[order] = np.arange(len(points))
+        k = min(self.k or default_k(len(cloud)), len(cloud))
+        distance, neighbours = nearest_neighbours(cloud, k)
+        if (distance[:, 1] == 0).any():
+            cloud, inverse = np.unique(cloud, axis=0, return_inverse=True)
+            if len(cloud) < MIN_POINTS:
+                raise InvalidCloudError(
+                    f"{len(points)} points but only {len(cloud)} distinct ones: a skeleton needs at least {MIN_POINTS}"
+                )
+            order = morton_order(cloud)
+            position = np.empty(len(cloud), int)
+            position[order] = np.arange(len(cloud))
+            cloud, row = cloud[order], position[inverse.reshape(-1)[row]]
+            k = min(self.k or default_k(len(cloud)), len(cloud))
+            distance, neighbours = nearest_neighbours(cloud, k)
+        if self.k and self.k > len(cloud):
+            raise InvalidCloudError(f"RingBuilder.k = {self.k} but the cloud has only {len(cloud)} distinct points")
+        return frame, cloud, row, neighbours

@@ -1,0 +1,104 @@
+"""What flows between the filters before there is a graph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .numerics.frame import Frame
+from .numerics.rings import Rings
+from .report import Report
+
+
+@dataclass(frozen=True, eq=False)
+class Contraction:
+    """A cloud on its way to its skeleton.
+
+    Arrays over the N input points are in the user's order and units. Everything else lives in the working frame
+    (`frame`): m distinct points in Morton order, n of which survive.
+
+    Attributes
+    ----------
+    points : (N, 3) float64 array
+        The input.
+    row_of_point : (N,) int array
+        Row of `cloud` that each input point is; -1 if it was dropped as not finite.
+    frame : Frame
+    cloud : (m, 3) float64 array
+        Distinct input points.
+    normals : (m, 3) float64 array
+        Unit normals of the tangent planes, up to their sign.
+    survivors : (n,) int array
+        Rows of `cloud` still there, ascending.
+    owner : (m,) int array
+        The survivor (0 .. n-1) that each distinct point was merged into; itself for a survivor.
+    positions, previous : (n, 3) float64 array
+        Contracted positions, and those before the last solve.
+    laplacian_coordinates : (n, 3) float64 array
+        L P before the last solve.
+    rings : Rings
+        Over the survivors; they keep their indices while the points move.
+    mass : (n,) float64 array
+        Multiplicity: the number of distinct points a survivor speaks for. It grows in reductions that conserve it.
+    ring_size0, ring_size : (n,) float64 array
+        Distance to the nearest ring neighbour in the uncontracted and in the contracted cloud: s(0), s(t).
+    ring_ratio_drop : float
+        psi: a(t-1) - a(t), the drop of the ring ratio in the last solve; a(1) after the first, 0 before it.
+    mean_ring_edge : float
+        Mean over the points of the mean ring edge of the uncontracted cloud.
+    contraction_weight : float
+        w_L of the last solve; 0 before the first.
+    report : Report
+    """
+
+    points: np.ndarray
+    row_of_point: np.ndarray
+    frame: Frame
+    cloud: np.ndarray
+    normals: np.ndarray
+    survivors: np.ndarray
+    owner: np.ndarray
+    positions: np.ndarray
+    previous: np.ndarray
+    laplacian_coordinates: np.ndarray
+    rings: Rings
+    mass: np.ndarray
+    ring_size0: np.ndarray
+    ring_size: np.ndarray
+    ring_ratio_drop: float
+    mean_ring_edge: float
+    contraction_weight: float
+    report: Report
+
+    def __len__(self):
+        return len(self.survivors)
+
+    @property
+    def contracted(self) -> np.ndarray:
+        """Contracted positions of the survivors in the user's units, (n, 3) float64 array."""
+        return self.frame.out_of(self.positions)
+
+    @property
+    def survivor_of_point(self) -> np.ndarray:
+        """For every input point the survivor that speaks for it, (N,) int array; -1 for dropped points."""
+        return np.where(self.row_of_point >= 0, self.owner[self.row_of_point], -1)
+
+    @property
+    def point_of_survivor(self) -> np.ndarray:
+        """For every survivor the first input point that it is, (n,) int array."""
+        valid = np.flatnonzero(self.row_of_point >= 0)
+        first = np.empty(len(self.cloud), int)
+        first[self.row_of_point[valid[::-1]]] = valid[::-1]
+        return first[self.survivors]
+
+    @property
+    def ring_ratio(self) -> float:
+        """a(t): sum of the ring sizes over that of the uncontracted cloud."""
+        return float(self.ring_size.sum() / self.ring_size0.sum())
+
+    def to_point_cloud(self):
+        """The contracted points as an ``open3d.geometry.PointCloud``."""
+        from .interop.open3d import to_point_cloud
+
+        return to_point_cloud(self.contracted)

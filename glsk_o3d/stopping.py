@@ -1,0 +1,50 @@
+"""When to stop contracting: small classes with one method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from .filter import Parameters, documented, parameter
+from .report import IterationRecord
+
+
+class StopRule(Protocol):
+    """Decides after every solve whether the contraction is finished."""
+
+    def __call__(self, iterations: tuple[IterationRecord, ...]) -> str | None:
+        """The reason to stop, or None to go on."""
+
+
+@documented
+@dataclass(frozen=True)
+class ExplainedScore(Parameters):
+    """Stop when the cloud's PCA score settles: De < threshold (Wen et al. 2024, equations 13 to 16).
+
+    De is the change of e between two solves over the share of points kept between them. The published code never stops
+    before the fourth solve, and so does this rule; without that it often stops after two, on an uncontracted cloud.
+    """
+
+    threshold: float = parameter(0.02, "De below which the contraction is finished.", type="float", low=0, open_low=True)
+    min_iterations: int = parameter(4, "Solves before the rule may stop.", type="int", unit="solves", low=1)
+
+    def __call__(self, iterations: tuple[IterationRecord, ...]) -> str | None:
+        change = iterations[-1].explained_change
+        if len(iterations) >= self.min_iterations and change < self.threshold:
+            return f"explained score settled: De = {change:.4f} < {self.threshold:g}"
+        return None
+
+
+@documented
+@dataclass(frozen=True)
+class RingSizeRatio(Parameters):
+    """Stop when the rings no longer shrink: a(t) - a(t+1) < threshold (Cao et al. 2010)."""
+
+    threshold: float = parameter(0.01, "Drop of the ring ratio below which it is finished.", type="float", low=0)
+
+    def __call__(self, iterations: tuple[IterationRecord, ...]) -> str | None:
+        before = iterations[-2].ring_ratio if len(iterations) > 1 else 1.0
+        drop = before - iterations[-1].ring_ratio
+        if drop < self.threshold:
+            return f"rings stopped shrinking: a(t) - a(t+1) = {drop:.4f} < {self.threshold:g}"
+        return None
