@@ -8,6 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from .filter import Filter, documented, parameter, resolve_length
+from .numerics.groups import group_median, group_sum
+from .numerics.neighbourhoods import nearest_neighbours
 from .numerics.sampling import farthest_point_sampling
 from .skeleton import Skeleton, plane_distance_radii
 
@@ -39,13 +41,16 @@ class Connector(Filter):
         open_low=True,
     )
 
+    thickness: float = parameter(
+        0.0, "Ball radius as a share of the local thickness, where that is more than `radius`.", type="float", low=0
+    )
+
     def _run(self, state, on_iteration):
         radius = resolve_length(self.radius, state.frame.diagonal * state.frame.scale) / state.frame.scale
-        samples, owner = farthest_point_sampling(state.positions, radius)
-        mass = np.bincount(owner, state.mass, len(samples))
-        vertices = np.column_stack(
-            [np.bincount(owner, state.mass * x, len(samples)) for x in state.positions.T]
-        ) / mass[:, None]
+        radii = np.maximum(radius, self.thickness * local_thickness(state))
+        samples, owner = farthest_point_sampling(state.positions, radii)
+        mass = group_sum(state.mass, owner, len(samples))[:, None]
+        vertices = group_sum(state.mass[:, None] * state.positions, owner, len(samples)) / mass
         survivor = state.survivor_of_point
         vertex_of_point = np.where(survivor >= 0, owner[survivor], -1)
         normals = np.where(state.row_of_point[:, None] >= 0, state.normals[state.row_of_point], np.nan)
@@ -59,6 +64,24 @@ class Connector(Filter):
             normals=normals,
             report=state.report,
         )
+
+
+def local_thickness(state):
+    """Median distance of the input points that each survivor speaks for to where it was contracted, smoothed over 16.
+
+    Parameters
+    ----------
+    state : Contraction
+
+    Returns
+    -------
+    (n,) float array
+        In the working frame.
+    """
+    distance = np.linalg.norm(state.cloud - state.positions[state.owner], axis=1)
+    thickness = group_median(distance, state.owner, len(state))
+    _, neighbours = nearest_neighbours(state.positions, min(16, len(state)))
+    return np.median(thickness[neighbours], axis=1)
 
 
 def _links(state, owner):

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from .filter import Filter, documented, parameter
+from .numerics.groups import group_sum
 from .skeleton import plane_distance_radii, trust_warnings
 
 
@@ -141,9 +142,8 @@ def medial_vertices(skeleton):
     owned = skeleton.vertex_of_point >= 0
     owner, p, n = skeleton.vertex_of_point[owned], skeleton.points[owned] - centre, skeleton.normals[owned]
     across = np.eye(3) - n[:, :, None] * n[:, None, :]
-    lhs = np.column_stack([np.bincount(owner, a, m) for a in across.reshape(-1, 9).T]).reshape(-1, 3, 3)
-    right = np.einsum("nij,nj->ni", across, p)
-    rhs = np.column_stack([np.bincount(owner, b, m) for b in right.T])
+    lhs = group_sum(across, owner, m)
+    rhs = group_sum(np.einsum("nij,nj->ni", across, p), owner, m)
     count = np.bincount(owner, minlength=m).astype(float)
     a, b = skeleton.edges.T
     lhs, rhs, count = (_with_neighbours(q, a, b) for q in (lhs, rhs, count))

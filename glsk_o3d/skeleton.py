@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .numerics.groups import group_median, group_sum
 from .report import Report
 
 if TYPE_CHECKING:
@@ -200,14 +201,7 @@ def plane_distance_radii(vertices, vertex_of_point, points, normals):
     owner = vertex_of_point[owned]
     offset = points[owned] - vertices[owner]
     distance = np.abs(np.einsum("ij,ij->i", offset, normals[owned]))
-    order = np.lexsort((distance, owner))
-    count = np.bincount(owner, minlength=len(vertices))
-    last = np.cumsum(count)
-    middle = np.stack([last - count + (count - 1) // 2, last - count + count // 2])
-    radii = np.zeros(len(vertices))
-    has = count > 0
-    radii[has] = distance[order][middle[:, has]].mean(axis=0)
-    return radii
+    return group_median(distance, owner, len(vertices))
 
 
 SHEET = 0.9  # share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
@@ -230,7 +224,7 @@ def trust_warnings(skeleton) -> list[str]:
     m = len(skeleton.vertices)
     count = np.bincount(owner, minlength=m)
     scatter = n[:, :, None] * n[:, None, :]
-    total = np.column_stack([np.bincount(owner, s, m) for s in scatter.reshape(-1, 9).T]).reshape(-1, 3, 3)
+    total = group_sum(scatter, owner, m)
     flat = np.linalg.eigvalsh(total)[:, 2] > SHEET * np.maximum(count, 1)
     share = count[flat].sum() / max(count.sum(), 1)
     if share > 0.5:

@@ -4,17 +4,19 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 
-def farthest_point_sampling(points, radius):
-    """Sample points so that every point lies within `radius` of a sample: each sample is the farthest point left.
+def farthest_point_sampling(points, radius, start=None):
+    """Sample points so that every point lies in the ball of a sample: each sample is the point farthest from the others.
 
-    Starts at the point farthest from the centroid, so that the samples depend neither on the order of the points nor on
-    how they are turned.
+    Distances from a sample count in units of its own radius, so that samples are dense where the radii are small.
 
     Parameters
     ----------
     points : (n, 3) float array
-    radius : float
-        Positive.
+    radius : (n,) float array
+        Ball radius of each point should it become a sample; positive.
+    start : int, optional
+        First sample; by default the point farthest from the centroid, so that the samples depend neither on the order
+        of the points nor on how they are turned.
 
     Returns
     -------
@@ -26,18 +28,17 @@ def farthest_point_sampling(points, radius):
     tree = cKDTree(points)
     nearest = np.full(len(points), np.inf)
     owner = np.zeros(len(points), int)
-    sample = int(np.argmax(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
-    reach = np.inf
+    sample = int(np.argmax(((points - points.mean(axis=0)) ** 2).sum(axis=1))) if start is None else start
     samples = []
-    while reach > radius or not samples:
-        # Only points nearer to the new sample than the reach so far can change hands.
-        ball = slice(None) if np.isinf(reach) else np.array(tree.query_ball_point(points[sample], reach))
-        distance = np.linalg.norm(points[ball] - points[sample], axis=1)
+    while nearest[sample] > 1:
+        # Only points nearer to the new sample than the farthest point is to the old ones can change hands.
+        reach = nearest[sample]
+        ball = np.arange(len(points)) if np.isinf(reach) else tree.query_ball_point(points[sample], reach * radius[sample])
+        ball = np.asarray(ball)
+        distance = np.linalg.norm(points[ball] - points[sample], axis=1) / radius[sample]
         closer = distance < nearest[ball]
-        hit = np.flatnonzero(closer) if isinstance(ball, slice) else ball[closer]
-        nearest[hit] = distance[closer]
-        owner[hit] = len(samples)
+        nearest[ball[closer]] = distance[closer]
+        owner[ball[closer]] = len(samples)
         samples.append(sample)
         sample = int(np.argmax(nearest))
-        reach = nearest[sample]
     return np.array(samples), owner

@@ -1,0 +1,54 @@
+# Everything works from a bare clone: each target first makes what it needs, and does so only once.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+PIP    := $(BIN)/python -m pip --disable-pip-version-check -qq
+# One BLAS thread per worker, because more only fight over the cores.
+PYTEST_ARGS ?= -n 2
+
+PYTHON_HINT = glsk-o3d needs Python 3.10 or newer: install it, or say 'make ... PYTHON=/path/to/python3'.
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint format clean system-deps
+
+help: ## show this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: $(VENV)/.installed-demo ## skeletonise the built-in sample object; writes demo/skeleton.{ply,json,png}
+	$(BIN)/glsk demo -o demo
+
+test: $(VENV)/.installed-test ## run the whole test suite (PYTEST_ARGS="-k name" for a part)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MPLBACKEND=Agg $(BIN)/python -m pytest $(PYTEST_ARGS)
+
+lint: $(VENV)/.installed-test ## ruff and mypy
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(VENV)/.installed-test ## let ruff mend what it can
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean: ## remove what the other targets made, the virtual environment too
+	rm -rf $(VENV) demo build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Checked on every run (0.1 s), since the machine may have changed under an old .venv.
+system-deps:
+	@command -v $(PYTHON) >/dev/null || { echo "There is no '$(PYTHON)' here. $(PYTHON_HINT)" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
+		{ echo "This is `$(PYTHON) -V 2>&1`. $(PYTHON_HINT)" >&2; exit 1; }
+	@sh scripts/system-deps.sh $(PYTHON) $(VENV)
+
+$(BIN)/python: | system-deps
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed-demo: pyproject.toml | $(BIN)/python
+	@echo "Installing glsk-o3d and the packages it needs into $(VENV); the first time this takes a minute or more"
+	@$(PIP) install --editable .
+	@touch $@
+
+$(VENV)/.installed-test: pyproject.toml | $(BIN)/python
+	@echo "Installing glsk-o3d and what its tests need into $(VENV); the first time this takes a minute or more"
+	@$(PIP) install --editable '.[dev]'
+	@touch $@ $(VENV)/.installed-demo

@@ -1,0 +1,48 @@
+"""Statistics of groups of values."""
+
+import numpy as np
+
+
+def group_median(values, group, n):
+    """Median of the values of each group.
+
+    Parameters
+    ----------
+    values : (m,) float array
+    group : (m,) int array
+        Group 0 .. n-1 of each value.
+    n : int
+
+    Returns
+    -------
+    (n,) float array
+        0 for an empty group.
+    """
+    order = np.lexsort((values, group))
+    count = np.bincount(group, minlength=n)
+    last = np.cumsum(count)
+    median = np.zeros(n)
+    has = count > 0
+    low, high = (last - count + (count - 1) // 2)[has], (last - count + count // 2)[has]
+    ordered = values[order]
+    median[has] = (ordered[low] + ordered[high]) / 2
+    return median
+
+
+def group_sum(values, group, n):
+    """Sum of the rows of each group.
+
+    Parameters
+    ----------
+    values : (m, ...) float array
+    group : (m,) int array
+        Group 0 .. n-1 of each row.
+    n : int
+
+    Returns
+    -------
+    (n, ...) float array
+    """
+    flat = values.reshape(len(values), -1)
+    total = np.stack([np.bincount(group, column, n) for column in flat.T], axis=1)
+    return total.reshape(n, *values.shape[1:])

@@ -1,0 +1,294 @@
+"""Sample shapes against closed forms and brute force."""
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+from scipy.stats import chisquare, kstest
+
+from glsk_o3d import samples
+from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.samples import SAMPLES, sample_object, signed_distance
+
+UNIONS = ("sauropod", "tube", "y_junction")
+
+
+def components_loops_leaves(sample):
+    n = len(sample.nodes)
+    graph = coo_matrix((np.ones(len(sample.edges)), tuple(sample.edges.T)), shape=(n, n))
+    components = connected_components(graph, directed=False)[0]
+    leaves = np.count_nonzero(np.bincount(sample.edges.ravel(), minlength=n) == 1)
+    return components, len(sample.edges) - n + components, leaves
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+class TestEverySample:
+    @pytest.mark.parametrize("n", [1, 2, 7, 1000])
+    def test_has_exactly_n_finite_points(self, name, n):
+        sample = SAMPLES[name](n=n, noise=0.01)
+        assert sample.points.shape == (n, 3)
+        assert sample.points.dtype == np.float64
+        assert np.isfinite(sample.points).all()
+
+    def test_axis_is_a_sound_graph(self, name):
+        sample = SAMPLES[name](n=10)
+        assert sample.name == name
+        assert sample.nodes.shape == (len(sample.radii), 3)
+        assert sample.edges.shape[1] == 2
+        assert sample.edges.dtype == np.int64
+        assert (sample.edges[:, 0] != sample.edges[:, 1]).all()
+        assert sample.edges.size == 0 or sample.edges.max() < len(sample.nodes)
+        assert (sample.radii > 0).all()
+
+    def test_depends_on_the_seed_alone(self, name):
+        first, again, other = (SAMPLES[name](n=300, noise=0.01, seed=seed).points for seed in (3, 3, 4))
+        np.testing.assert_array_equal(first, again)
+        assert not np.isclose(first, other).all(axis=1).any()
+
+    def test_is_about_one_unit_large(self, name):
+        size = np.ptp(SAMPLES[name](n=2000).points, axis=0).max()
+        assert 0.5 < size < 2
+
+    def test_noise_has_the_size_asked_for(self, name):
+        clean, noisy = (SAMPLES[name](n=4000, noise=noise, seed=1).points for noise in (0, 0.01))
+        expected = 0.01 * np.linalg.norm(np.ptp(clean, axis=0))
+        np.testing.assert_allclose((noisy - clean).std(axis=0), expected, rtol=0.05)
+
+    @pytest.mark.parametrize("wrong", [dict(n=0), dict(n=2.5), dict(n=True), dict(noise=-1), dict(noise=np.nan)])
+    def test_refuses_bad_counts_and_noise(self, name, wrong):
+        with pytest.raises(InvalidParameterError):
+            SAMPLES[name](**wrong)
+
+
+@pytest.mark.parametrize(
+    ("name", "components", "loops", "leaves"),
+    [
+        ("sauropod", 1, 1, 6),
+        ("tube", 1, 0, 2),
+        ("torus", 1, 1, 0),
+        ("helix", 1, 0, 2),
+        ("y_junction", 1, 0, 3),
+        ("two_rings", 2, 2, 0),
+        ("sphere", 1, 0, 0),
+        ("sheet", 0, 0, 0),
+    ],
+)
+def test_topology_of_the_axis(name, components, loops, leaves):
+    assert components_loops_leaves(SAMPLES[name](n=1)) == (components, loops, leaves)
+
+
+# ---- the points lie where the formula says
+
+
+@pytest.mark.parametrize("name", UNIONS)
+def test_points_of_unions_lie_on_the_surface(name):
+    sample = SAMPLES[name](n=5000)
+    distance = signed_distance(sample.points, sample.nodes, sample.edges, sample.radii)
+    np.testing.assert_allclose(distance, 0, atol=2e-9)
+
+
+def test_torus_lies_on_the_torus():
+    x, y, z = samples.torus(n=5000, ring_radius=0.5, radius=0.2).points.T
+    np.testing.assert_allclose(np.hypot(np.hypot(x, y) - 0.5, z), 0.2, rtol=1e-12)
+
+
+def test_two_rings_lie_on_two_tori_that_do_not_touch():
+    sample = samples.two_rings(n=5000, ring_radius=0.3, radius=0.06)
+    x, y, z = sample.points.T
+    first = np.hypot(np.hypot(x, y) - 0.3, z)
+    second = np.hypot(np.hypot(x - 0.3, z) - 0.3, y)
+    np.testing.assert_allclose(np.minimum(first, second), 0.06, rtol=1e-12)
+    assert 0.45 < (first < second).mean() < 0.55
+    assert cKDTree(sample.nodes[:128]).query(sample.nodes[128:])[0].min() > 4 * 0.06
+
+
+def test_open_tube_and_sphere():
+    x, y, z = samples.tube(n=3000, length=2, radius=0.1, capped=False).points.T
+    np.testing.assert_allclose(np.hypot(y, z), 0.1, rtol=1e-12)
+    assert np.abs(x).max() <= 1
+    np.testing.assert_allclose(np.linalg.norm(samples.sphere(n=500, radius=0.3).points, axis=1), 0.3, rtol=1e-12)
+
+
+def test_helix_keeps_its_distance_from_its_axis():
+    sample = samples.helix(n=3000, radius=0.05, turns=1.5)
+    fine = samples.helix(n=1, radius=0.05, turns=1.5)
+    t = np.linspace(0, 3 * np.pi, 40001)
+    axis = np.stack([0.3 * np.cos(t), 0.3 * np.sin(t), 0.35 / (2 * np.pi) * (t - 1.5 * np.pi)], axis=1)
+    np.testing.assert_allclose(cKDTree(axis).query(sample.points)[0], 0.05, atol=1e-6)
+    assert cKDTree(axis).query(fine.nodes)[0].max() < 1e-3 * 0.3
+
+
+@pytest.mark.parametrize("bend", [0, 1, 90, 350])
+def test_sheet_is_bent_but_not_stretched(bend):
+    sample = samples.sheet(n=4000, length=2, width=1, bend=bend)
+    x, y, z = sample.points.T
+    if bend == 0:
+        assert (z == 0).all()
+        along = x
+    else:
+        radius = 2 / np.deg2rad(bend)
+        np.testing.assert_allclose(np.hypot(x, z + radius), radius, rtol=1e-12)
+        along = radius * np.arctan2(x, z + radius)
+    assert kstest(along, "uniform", args=(-1, 2)).pvalue > 1e-3
+    assert kstest(y, "uniform", args=(-0.5, 1)).pvalue > 1e-3
+
+
+# ---- uniform by area
+
+
+def test_capsule_is_uniform_by_area():
+    # by Archimedes the area of a capsule is uniform along its axis, over the half balls too
+    length, radius = 1.0, 0.15
+    x, y, z = samples.tube(n=20000, length=length, radius=radius, seed=5).points.T
+    half = length / 2 + radius
+    assert chisquare(np.histogram(x, 40, (-half, half))[0]).pvalue > 1e-3
+    assert chisquare(np.histogram(np.arctan2(y, z), 36, (-np.pi, np.pi))[0]).pvalue > 1e-3
+
+
+def test_tapered_capsule_is_uniform_by_area():
+    # density over the axis coordinate is the same on both balls, and falls linearly with the radius on the cone between
+    nodes, radii, edges = np.array([[0.0, 0, 0], [1, 0, 0]]), np.array([0.3, 0.1]), np.array([[0, 1]])
+    x = samples._union_sample("cone", nodes, edges, radii, 40000, 0, 7).points[:, 0]
+    slope = 0.2
+    cuts = np.array([-0.3, 0.3 * slope, 1 + 0.1 * slope, 1.1])
+    areas = np.pi * np.array([2 * 0.3**2 * (1 + slope), (1 - slope**2) * 0.4, 2 * 0.1**2 * (1 - slope)])
+    counts = np.histogram(x, cuts)[0]
+    assert chisquare(counts, areas / areas.sum() * len(x)).pvalue > 1e-3
+    share = (x[(x > cuts[1]) & (x < cuts[2])] - cuts[1]) / (cuts[2] - cuts[1])
+    assert kstest(share, lambda s: (0.3 * s - 0.1 * s**2) / 0.2).pvalue > 1e-3
+
+
+def test_torus_is_uniform_by_area():
+    x, y, z = samples.torus(n=20000, ring_radius=0.4, radius=0.2, seed=2).points.T
+    angle = np.arctan2(z, np.hypot(x, y) - 0.4)
+    assert kstest(angle, lambda a: (a + np.pi + 0.5 * np.sin(a)) / (2 * np.pi)).pvalue > 1e-3
+
+
+def test_helix_ends_have_their_share_of_the_area():
+    sample = samples.helix(n=40000, coil_radius=0.3, radius=0.09, pitch=0.4, turns=0.5, seed=3)
+    half = np.pi / 2  # turned by half a turn about x, the helix comes to lie on itself
+    climb = 0.4 / (2 * np.pi)
+    tangent = np.array([0, 0.3, climb]) / np.hypot(0.3, climb)
+    before_start = (sample.points - [0.3, 0, -climb * half]) @ tangent < 0
+    near_start = np.linalg.norm(sample.points - [0.3, 0, -climb * half], axis=1) < 0.0901
+    cap = 2 * np.pi * 0.09**2
+    expected = cap / (2 * cap + 2 * np.pi * 0.09 * np.hypot(0.3, climb) * np.pi)
+    assert (before_start & near_start).mean() == pytest.approx(expected, rel=0.06)
+
+
+def test_union_is_uniform_by_area_where_its_parts_overlap():
+    # three equal arms of a Y, each beyond the middle: the same number of points
+    points = samples.y_junction(n=30000, radii=(0.08, 0.08, 0.08), angle=120).points
+    ends = samples.y_junction(n=1, angle=120).nodes[1:]
+    beyond = (points @ (ends / np.linalg.norm(ends, axis=1, keepdims=True)).T > 0.2).sum(axis=0)
+    assert chisquare(beyond).pvalue > 1e-3
+
+
+# ---- distance and scan
+
+
+def test_signed_distance_of_a_tapered_capsule_against_brute_force():
+    rng = np.random.default_rng(0)
+    nodes, radii, edges = np.array([[0.0, 0, 0], [0.6, 0.5, -0.2]]), np.array([0.3, 0.1]), np.array([[0, 1]])
+    points = rng.uniform(-1, 1.5, (400, 3))
+    share = np.linspace(0, 1, 20001)[:, None]
+    centres, sizes = nodes[0] + share * (nodes[1] - nodes[0]), radii[0] + share[:, 0] * (radii[1] - radii[0])
+    brute = np.array([(np.linalg.norm(centres - point, axis=1) - sizes).min() for point in points])
+    np.testing.assert_allclose(signed_distance(points, nodes, edges, radii), brute, atol=1e-7)
+
+
+def test_signed_distance_of_swallowed_and_lonely_balls():
+    nodes, radii = np.array([[0.0, 0, 0], [0.1, 0, 0], [5, 0, 0]]), np.array([1.0, 0.2, 0.5])
+    points = np.array([[2.0, 0, 0], [5, 2, 0], [0, 0, 0]])
+    for edges in ([[0, 1]], [[1, 0]]):
+        np.testing.assert_allclose(signed_distance(points, nodes, np.array(edges), radii), [1, 1.5, -1])
+
+
+def march(points, camera, sample):
+    """Sphere tracing, by steps as long as the distance to the surface: which rays arrive, and which are stopped before.
+
+    Rays that graze the surface are neither, as they creep.
+    """
+    ray = points - camera
+    reach = np.linalg.norm(ray, axis=1)
+    ray /= reach[:, None]
+    travelled, step = np.zeros(len(points)), np.zeros(len(points))
+    for _ in range(120):
+        here = camera + travelled[:, None] * ray
+        step = np.maximum(signed_distance(here, sample.nodes, sample.edges, sample.radii), 0)
+        travelled += step
+    arrived = travelled > reach - 1e-3
+    return arrived, ~arrived & (step < 1e-6)
+
+
+def test_visibility_against_sphere_tracing():
+    whole = samples.sauropod(n=800, cameras=None)
+    for camera in np.array([*samples.TWO_CAMERAS, (0, 0, 3), (2, 0.1, 0.4), (0.01, -2, 0.02)]):
+        seen = samples._visible(whole.points, camera, whole.nodes, whole.edges, whole.radii)
+        arrived, stopped = march(whole.points, camera, whole)
+        assert (arrived | stopped).mean() > 0.95
+        assert seen.sum() > 80
+        assert seen[arrived].mean() > 0.99  # a grazing ray may arrive within the tolerance
+        assert not seen[stopped].any()
+
+
+def test_scan_misses_what_neither_camera_sees():
+    whole, scan = samples.sauropod(n=20000, cameras=None), samples.sauropod(n=20000)
+    seen = [
+        samples._visible(whole.points, np.array(c), whole.nodes, whole.edges, whole.radii) for c in samples.TWO_CAMERAS
+    ]
+    hidden = ~np.any(seen, axis=0)
+    assert 0.1 < hidden.mean() < 0.3
+    to_scan = cKDTree(scan.points).query(whole.points)[0]
+    assert np.quantile(to_scan[~hidden], 0.999) < 0.03
+    assert to_scan[hidden].max() > 0.05
+    below = (np.abs(whole.points[:, 0]) < 0.1) & (np.abs(whole.points[:, 1]) < 0.02) & (whole.points[:, 2] < 0.3)
+    assert below.sum() > 20
+    assert hidden[below].all()
+
+
+def test_handle_can_be_gripped_and_every_part_is_thick_enough():
+    sample = sample_object()
+    assert sample.radii.min() >= 0.028
+    area_per_point = np.pi * cKDTree(sample.points).query(sample.points, 9)[0][:, -1] ** 2 / 8.5
+    assert 2 * sample.radii.min() > 4 * np.median(np.sqrt(area_per_point))
+    # a ball of four handle radii across goes through the opening
+    middle = np.array([[0.0, 0, 0.6]])
+    assert signed_distance(middle, sample.nodes, sample.edges, sample.radii)[0] > 2 * 0.03
+
+
+def test_stands_on_its_feet_and_is_symmetric_but_for_the_tail():
+    whole = samples.sauropod(n=20000, cameras=None)
+    assert abs(whole.points[:, 2].min()) < 1e-3
+    front = whole.nodes[:, 0] > -0.2
+    mirrored = whole.nodes[front] * [1, -1, 1]
+    assert cKDTree(whole.nodes).query(mirrored)[0].max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("make", "wrong"),
+    [
+        (samples.sauropod, dict(cameras=())),
+        (samples.sauropod, dict(cameras=[(0, 0, 0.36)])),
+        (samples.tube, dict(radius=0)),
+        (samples.tube, dict(length=-1)),
+        (samples.torus, dict(radius=0.5, ring_radius=0.4)),
+        (samples.helix, dict(radius=0.2, pitch=0.3)),
+        (samples.helix, dict(radius=0.65, pitch=1.885)),
+        (samples.two_rings, dict(radius=0.15, ring_radius=0.3)),
+        (samples.y_junction, dict(angle=0)),
+        (samples.y_junction, dict(radii=(0.1, 0.1, 0.7))),
+        (samples.sphere, dict(radius=np.inf)),
+        (samples.sheet, dict(bend=360)),
+        (sample_object, dict(name="teapot")),
+    ],
+)
+def test_refuses_impossible_shapes(make, wrong):
+    with pytest.raises(InvalidParameterError):
+        make(**wrong)
+
+
+def test_sample_object_by_name():
+    assert sample_object().name == "sauropod"
+    np.testing.assert_array_equal(sample_object(50, 0, 9, "torus").points, samples.torus(50, seed=9).points)
