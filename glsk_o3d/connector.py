@@ -19,10 +19,16 @@ from .skeleton import Skeleton, plane_distance_radii
 class Connector(Filter):
     """Sample the contracted points and join samples whose points are ring neighbours.
 
-    Farthest-point sampling leaves a ball of `radius` around every vertex; each contracted point belongs to its nearest
-    vertex, which moves to the mean of its points. Two vertices are joined where a point of one has its nearest foreign
-    ring neighbour in the other. The published codes take the first foreign neighbour in the ring, so that their loops
-    depend on where a ring happens to start; the nearest one depends on nothing but the points.
+    Farthest-point sampling leaves a ball around every vertex, as wide as `radius` or a share of the local thickness.
+    Each contracted point belongs to its nearest vertex, in units of the vertex's ball, and the vertex moves to the mean
+    of its points. Vertices are joined where ring neighbours belong to different ones.
+
+    Notes
+    -----
+    The published codes use one radius of 2 % of the diagonal, and join a point's vertex to that of its first foreign
+    neighbour in the ring, so that their loops depend on where a ring happens to start. ``links="nearest"`` takes the
+    nearest foreign neighbour instead, which depends on nothing but the points; ``links="all"`` takes all of them, so
+    that what is connected by rings stays connected.
 
     References
     ----------
@@ -33,16 +39,24 @@ class Connector(Filter):
     produces: ClassVar[str] = "Skeleton"
 
     radius: float | str = parameter(
-        "2%",
-        "Distance between neighbouring vertices: details smaller than this are lost, parts closer than this fuse.",
+        "1%",
+        "Least distance between vertices: smaller details are lost, and parts closer than this fuse.",
         type="length",
         unit="cloud's units, or % of the diagonal",
         low=0,
         open_low=True,
     )
-
     thickness: float = parameter(
-        0.0, "Ball radius as a share of the local thickness, where that is more than `radius`.", type="float", low=0
+        0.6,
+        "Distance between vertices over the local thickness, where that is more; 0 for `radius` alone.",
+        type="float",
+        low=0,
+    )
+    links: str = parameter(
+        "all",
+        "Join a point's vertex with those of all its foreign ring neighbours, or of the nearest one only.",
+        type="choice",
+        choices=("all", "nearest"),
     )
 
     def _run(self, state, on_iteration):
@@ -57,13 +71,22 @@ class Connector(Filter):
         vertices = state.frame.out_of(vertices)
         return Skeleton(
             vertices=vertices,
-            edges=_links(state, owner),
+            edges=self._edges(state, owner),
             radii=plane_distance_radii(vertices, vertex_of_point, state.points, normals),
             vertex_of_point=vertex_of_point,
             points=state.points,
             normals=normals,
             report=state.report,
         )
+
+    def _edges(self, state, owner):
+        rings = state.rings
+        a, b = owner[rings.owners], owner[rings.indices]
+        link = a != b
+        if self.links == "nearest":
+            length = np.where(link, rings.edge_lengths(state.positions), np.inf)
+            link &= length == np.repeat(np.minimum.reduceat(length, rings.indptr[:-1]), rings.sizes)
+        return np.unique(np.sort(np.column_stack([a[link], b[link]]), axis=1), axis=0)
 
 
 def local_thickness(state):
@@ -82,13 +105,3 @@ def local_thickness(state):
     thickness = group_median(distance, state.owner, len(state))
     _, neighbours = nearest_neighbours(state.positions, min(16, len(state)))
     return np.median(thickness[neighbours], axis=1)
-
-
-def _links(state, owner):
-    """Edges between samples: from every point's sample to that of its nearest foreign ring neighbour."""
-    rings = state.rings
-    a, b = owner[rings.owners], owner[rings.indices]
-    length = np.where(a == b, np.inf, rings.edge_lengths(state.positions))
-    nearest = np.minimum.reduceat(length, rings.indptr[:-1])
-    link = np.flatnonzero((length == np.repeat(nearest, rings.sizes)) & (a != b))
-    return np.unique(np.sort(np.column_stack([a[link], b[link]]), axis=1), axis=0)

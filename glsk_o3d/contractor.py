@@ -25,7 +25,7 @@ FLAT = 0.01
 class Contractor(Filter):
     r"""Contract a cloud onto its curve skeleton, reducing it on the way.
 
-    Each iteration solves :math:`(w_L^2 L^T M^{-2} L + M^2 W_H^2) P' = M^2 W_H^2 P` with the cotangent Laplacian L of the
+    Each iteration solves :math:`(w_L^2 L^T M^{-1} L + M W_H^2) P' = M W_H^2 P` with the cotangent Laplacian L of the
     current points, raises :math:`w_L`, sets :math:`W_H = s(0) / s(t)`, and lets the reducer merge points. M is the
     diagonal of the survivors' masses; it is the identity unless the reducer conserves mass.
 
@@ -51,22 +51,31 @@ class Contractor(Filter):
     )
     amplification: float = parameter(3.0, "Factor on w_L after each solve.", type="float", low=1)
     max_contraction: float = parameter(2048.0, "Cap of w_L.", type="float", low=0, open_low=True)
+    min_attraction: float = parameter(
+        1.0,
+        "Floor of W_H: a point whose ring grows would be held ever less, and run away. 0 as published.",
+        type="float",
+        low=0,
+    )
     max_attraction: float = parameter(1e4, "Cap of W_H.", type="float", low=0, open_low=True)
 
     def _run(self, state, on_iteration):
-        reducing = self.reducer is not None
+        reducer = self.reducer
         for _ in range(self.max_iterations):
             start = time.perf_counter()
             try:
                 state, error = self._solve(state)
             except SolveError as problem:
-                return _finished(state, f"solve {len(state.report.iterations) + 1} refused, last sound state kept: {problem}")
+                return _finished(
+                    state, f"solve {len(state.report.iterations) + 1} refused, last sound state kept: {problem}"
+                )
             state = _record(state, error, time.perf_counter() - start)
             reason = self.stop(state.report.iterations)
-            if reason is None and reducing:
+            if reason is None and reducer is not None:
                 before = len(state)
-                state = self.reducer(state)
-                reducing = len(state) < before  # the published code, too, gives up after a pass without a merge
+                state = reducer(state)
+                if len(state) == before:
+                    reducer = None  # as in the published code, which gives up after a pass without a merge
                 state = _amend(state, n_merged=before - len(state), seconds=time.perf_counter() - start)
             if on_iteration is not None and on_iteration(state.report.iterations[-1]) is False and reason is None:
                 return _finished(state, "stopped by the caller")
@@ -79,15 +88,17 @@ class Contractor(Filter):
         contraction = state.contraction_weight * self.amplification or self.initial_contraction / state.mean_ring_edge
         contraction = min(contraction, self.max_contraction)
         with np.errstate(divide="ignore"):
-            attraction = np.minimum(state.ring_size0 / state.ring_size, self.max_attraction)
+            attraction = np.clip(state.ring_size0 / state.ring_size, self.min_attraction, self.max_attraction)
         laplacian = cotangent_laplacian(state.positions, state.rings)
         positions, error = solve_contraction(
-            laplacian, contraction / state.mass, attraction * state.mass, state.positions
+            laplacian, contraction / np.sqrt(state.mass), attraction * np.sqrt(state.mass), state.positions
         )
         limit = np.maximum(BOX_SLACK * state.frame.half_extent, FLAT * state.frame.diagonal)
         outside = int((np.abs(positions) > limit).any(axis=1).sum())
         if outside:
-            raise SolveError(f"it would throw {outside} of {len(state)} points out of {BOX_SLACK:g} times the bounding box")
+            raise SolveError(
+                f"it would throw {outside} of {len(state)} points out of {BOX_SLACK:g} times the bounding box"
+            )
         _, ring_size = state.rings.nearest(positions)
         contracted = replace(
             state,

@@ -10,7 +10,7 @@ import numpy as np
 from .errors import StageError
 from .filter import Filter, documented, parameter
 from .numerics.neighbourhoods import plane_axes
-from .numerics.rings import Rings, star_rings
+from .numerics.rings import star_rings
 
 _IN_PLANE = 1e-3  # sine of the angle below which a direction counts as lying in the tangent plane
 _MIN_SIZE = 1e-4  # floor of s - psi' s(0) in the working frame, as in the published code
@@ -21,10 +21,10 @@ _MIN_SIZE = 1e-4  # floor of s - psi' s(0) in the working frame, as in the publi
 class LPRReducer(Filter):
     r"""Merge each point with its nearest ring neighbour where that costs little: one pass.
 
-    A point i may swallow its nearest ring neighbour m where :math:`F = V_1 - V_2 + 3 U < \varphi s_i^2`. Its new ring is
-    the Delaunay star of i among both rings, on the uncontracted points, projected along the Laplacian coordinate of i;
-    m's entry in every other ring becomes i. A point takes part in at most one merge a pass, so all ring combinations of
-    a pass are independent and made in one batch.
+    A point i may swallow its nearest ring neighbour m where :math:`F = V_1 - V_2 + 3 U < \varphi s_i^2`. Its new ring
+    is the Delaunay star of i among both rings, on the uncontracted points, projected along the Laplacian coordinate of
+    i; m's entry in every other ring becomes i. A point takes part in at most one merge a pass, so all ring combinations
+    of a pass are independent and made in one batch.
 
     With `conserve_mass` a survivor takes over the mass of the point it swallows, and the ring sizes s(0) and s(t) are
     measured anew on the combined rings; without it, a survivor that speaks for eight points pulls with the weight of
@@ -48,8 +48,16 @@ class LPRReducer(Filter):
 
     consumes: ClassVar[str] = "Contraction"
 
-    phi: float = parameter(1e5, "Merge where F is below phi times the squared ring size.", type="float", low=0, open_low=True)
+    phi: float = parameter(
+        1e5, "Merge where F is below phi times the squared ring size.", type="float", low=0, open_low=True
+    )
     conserve_mass: bool = parameter(True, "Survivors take over the mass of the points they swallow.", type="bool")
+    mend_rings: bool = parameter(
+        True,
+        "Rebuild rings that lost so many neighbours that they no longer surround their point; the published code keeps "
+        "them, and such points later run away.",
+        type="bool",
+    )
     order: str = parameter(
         "cheapest",
         "Which pairs are merged first: those with the least F / s^2, whatever the order of the input, or those of the "
@@ -84,6 +92,8 @@ class LPRReducer(Filter):
         keep = into == np.arange(n)
         index = np.cumsum(keep) - 1
         rings = state.rings.replace(keepers, combined).take(np.flatnonzero(keep)).rename(index[into])
+        if self.mend_rings:
+            rings = mend_rings(rings, state.cloud[state.survivors[keep]], state.normals[state.survivors[keep]])
         mass, ring_size0, ring_size = state.mass, state.ring_size0, state.ring_size
         if self.conserve_mass:
             mass = np.bincount(into, mass, n)[keep]
@@ -154,6 +164,29 @@ def combine_rings(state, keepers, swallowed):
     along = np.abs(np.einsum("ij,ij->i", delta, normals))[:, None] > _IN_PLANE * length
     direction = np.where(along, np.divide(delta, length, out=np.zeros_like(delta), where=along), normals)
     return star_rings(state.cloud[state.survivors], keepers, union, plane_axes(direction))
+
+
+def mend_rings(rings, points, normals):
+    """Rings with those of fewer than three neighbours rebuilt, as Delaunay stars among the rings of these neighbours.
+
+    Parameters
+    ----------
+    rings : Rings
+        Of length n.
+    points, normals : (n, 3) float array
+
+    Returns
+    -------
+    Rings
+    """
+    broken = np.flatnonzero(rings.sizes < 3)
+    if len(broken) == 0:
+        return rings
+    around = rings.padded(broken)
+    beyond = [np.where(side[:, None] >= 0, rings.padded(np.maximum(side, 0)), -1) for side in around.T]
+    union = np.concatenate([around, *beyond], axis=1)
+    union[union == broken[:, None]] = -1
+    return rings.replace(broken, star_rings(points, broken, union, plane_axes(normals[broken])))
 
 
 def match(n, keepers, swallowed):

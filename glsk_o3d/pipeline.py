@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from .connector import Connector
 from .contractor import Contractor
 from .errors import InvalidParameterError
@@ -34,7 +36,7 @@ class Pipeline:
         for stage in stages:
             if not isinstance(stage, Filter):
                 raise InvalidParameterError(f"{stage!r} is not a filter and cannot be part of a pipeline")
-        for before, after in zip(stages[:-1], stages[1:], strict=True):
+        for before, after in pairwise(stages):
             if before.produces != after.consumes:
                 raise InvalidParameterError(
                     f"{type(after).__name__} takes a {after.consumes} but {type(before).__name__} gives a "
@@ -83,9 +85,9 @@ def cao2010() -> Pipeline:
     """The baseline: contraction without reduction, stopped by the ring sizes (Cao et al. 2010)."""
     return (
         RingBuilder()
-        | Contractor(stop=RingSizeRatio(), max_iterations=20)
-        | Connector()
-        | Refiner(recentre=0)
+        | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0)
+        | Connector(radius="2%", thickness=0, links="nearest")
+        | Refiner(spacing=0, recentre=0)
     )
 
 
@@ -97,20 +99,19 @@ def wen2024() -> Pipeline:
     """
     return (
         RingBuilder()
-        | Contractor(reducer=LPRReducer(conserve_mass=False, order="index"), stop=ExplainedScore())
-        | Connector()
-        | Refiner(recentre=0)
+        | Contractor(
+            reducer=LPRReducer(conserve_mass=False, order="index", mend_rings=False),
+            stop=ExplainedScore(),
+            min_attraction=0,
+        )
+        | Connector(radius="2%", thickness=0, links="nearest")
+        | Refiner(spacing=0, recentre=0)
     )
 
 
 def default() -> Pipeline:
     """What we recommend: GLSkeleton with the mass of merged points kept and the vertices centred in the surface."""
-    return (
-        RingBuilder()
-        | Contractor(reducer=LPRReducer(), stop=ExplainedScore())
-        | Connector()
-        | Refiner()
-    )
+    return RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore()) | Connector() | Refiner()
 
 
 PIPELINES = {"default": default, "wen2024": wen2024, "cao2010": cao2010}

@@ -55,7 +55,9 @@ class RingBuilder(Filter):
         low=4,
         high=256,
     )
-    drop_invalid: bool = parameter(False, "Drop points with NaN or infinite coordinates instead of refusing.", type="bool")
+    drop_invalid: bool = parameter(
+        False, "Drop points with NaN or infinite coordinates instead of refusing.", type="bool"
+    )
 
     def _run(self, cloud, on_iteration):
         points = cloud_points(cloud)
@@ -106,7 +108,9 @@ class RingBuilder(Filter):
     def _distinct(self, points):
         """Frame, distinct points in Morton order, the row of each point among them, and their neighbours."""
         if len(points) < MIN_POINTS:
-            raise InvalidCloudError(f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones")
+            raise InvalidCloudError(
+                f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones"
+            )
         with np.errstate(over="ignore"):
             extent = np.ptp(points, axis=0).max()
         if not np.isfinite(extent):

@@ -25,7 +25,9 @@ class ExplainedScore(Parameters):
     before the fourth solve, and so does this rule; without that it often stops after two, on an uncontracted cloud.
     """
 
-    threshold: float = parameter(0.02, "De below which the contraction is finished.", type="float", low=0, open_low=True)
+    threshold: float = parameter(
+        0.02, "De below which the contraction is finished.", type="float", low=0, open_low=True
+    )
     min_iterations: int = parameter(4, "Solves before the rule may stop.", type="int", unit="solves", low=1)
 
     def __call__(self, iterations: tuple[IterationRecord, ...]) -> str | None:

@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 
 def farthest_point_sampling(points, radius, start=None):
-    """Sample points so that every point lies in the ball of a sample: each sample is the point farthest from the others.
+    """Sample points until every one lies in the ball of a sample: each is the point farthest from those before.
 
     Distances from a sample count in units of its own radius, so that samples are dense where the radii are small.
 
@@ -33,7 +33,9 @@ def farthest_point_sampling(points, radius, start=None):
     while nearest[sample] > 1:
         # Only points nearer to the new sample than the farthest point is to the old ones can change hands.
         reach = nearest[sample]
-        ball = np.arange(len(points)) if np.isinf(reach) else tree.query_ball_point(points[sample], reach * radius[sample])
+        ball = (
+            np.arange(len(points)) if np.isinf(reach) else tree.query_ball_point(points[sample], reach * radius[sample])
+        )
         ball = np.asarray(ball)
         distance = np.linalg.norm(points[ball] - points[sample], axis=1) / radius[sample]
         closer = distance < nearest[ball]
