@@ -57,6 +57,12 @@ class Contractor(Filter):
         type="float",
         low=0,
     )
+    retries: int = parameter(
+        3,
+        "Times a solve that throws points out of the box is repeated with these points held. 0 as published.",
+        type="int",
+        low=0,
+    )
     max_attraction: float = parameter(1e4, "Cap of W_H.", type="float", low=0, open_low=True)
 
     def _run(self, state, on_iteration):
@@ -64,12 +70,12 @@ class Contractor(Filter):
         for _ in range(self.max_iterations):
             start = time.perf_counter()
             try:
-                state, error = self._solve(state)
+                state, facts = self._solve(state)
             except SolveError as problem:
                 return _finished(
                     state, f"solve {len(state.report.iterations) + 1} refused, last sound state kept: {problem}"
                 )
-            state = _record(state, error, time.perf_counter() - start)
+            state = _record(state, **facts, seconds=time.perf_counter() - start)
             reason = self.stop(state.report.iterations)
             if reason is None and reducer is not None:
                 before = len(state)
@@ -90,15 +96,20 @@ class Contractor(Filter):
         with np.errstate(divide="ignore"):
             attraction = np.clip(state.ring_size0 / state.ring_size, self.min_attraction, self.max_attraction)
         laplacian = cotangent_laplacian(state.positions, state.rings)
-        positions, error = solve_contraction(
-            laplacian, contraction / np.sqrt(state.mass), attraction * np.sqrt(state.mass), state.positions
-        )
+        mass = np.sqrt(state.mass)
         limit = np.maximum(BOX_SLACK * state.frame.half_extent, FLAT * state.frame.diagonal)
-        outside = int((np.abs(positions) > limit).any(axis=1).sum())
-        if outside:
-            raise SolveError(
-                f"it would throw {outside} of {len(state)} points out of {BOX_SLACK:g} times the bounding box"
-            )
+        held = np.zeros(len(state), bool)
+        for attempt in range(self.retries + 1):
+            attraction[held] = self.max_attraction
+            positions, error = solve_contraction(laplacian, contraction / mass, attraction * mass, state.positions)
+            outside = (np.abs(positions) > limit).any(axis=1)
+            if not outside.any():
+                break
+            if attempt == self.retries:
+                raise SolveError(
+                    f"it would throw {outside.sum()} of {len(state)} points out of {BOX_SLACK:g} times the bounding box"
+                )
+            held |= outside
         _, ring_size = state.rings.nearest(positions)
         contracted = replace(
             state,
@@ -111,7 +122,7 @@ class Contractor(Filter):
         # In the first pass the published code takes a(1) itself for the drop, not 1 - a(1); so does this one.
         done = state.report.iterations
         drop = done[-1].ring_ratio - contracted.ring_ratio if done else contracted.ring_ratio
-        return replace(contracted, ring_ratio_drop=drop), error
+        return replace(contracted, ring_ratio_drop=drop), dict(n_held=int(held.sum()), solve_error=error)
 
 
 def explained_score(points) -> float:
@@ -130,7 +141,7 @@ def explained_score(points) -> float:
     return float((spread.sum() + spread[-1]) / (2 * spread.sum()))
 
 
-def _record(state, error, seconds):
+def _record(state, **facts):
     iterations = state.report.iterations
     explained = explained_score(state.positions)
     if iterations:
@@ -146,8 +157,7 @@ def _record(state, error, seconds):
         explained_change=abs(explained - before) / kept,
         ring_ratio=state.ring_ratio,
         contraction_weight=state.contraction_weight,
-        solve_error=error,
-        seconds=seconds,
+        **facts,
     )
     return replace(state, report=replace(state.report, iterations=(*iterations, record)))
 

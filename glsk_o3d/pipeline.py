@@ -85,9 +85,9 @@ def cao2010() -> Pipeline:
     """The baseline: contraction without reduction, stopped by the ring sizes (Cao et al. 2010)."""
     return (
         RingBuilder()
-        | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0)
+        | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0, retries=0)
         | Connector(radius="2%", thickness=0, links="nearest")
-        | Refiner(spacing=0, recentre=0)
+        | Refiner(opening=0, twig=0, spacing=0, recentre=0)
     )
 
 
@@ -103,9 +103,10 @@ def wen2024() -> Pipeline:
             reducer=LPRReducer(conserve_mass=False, order="index", mend_rings=False),
             stop=ExplainedScore(),
             min_attraction=0,
+            retries=0,
         )
         | Connector(radius="2%", thickness=0, links="nearest")
-        | Refiner(spacing=0, recentre=0)
+        | Refiner(opening=0, twig=0, spacing=0, recentre=0)
     )
 
 

@@ -22,6 +22,8 @@ class IterationRecord:
         Points that were solved for.
     n_merged : int
         Points that the reduction after the solve merged away.
+    n_held : int
+        Points held in place because the solve would have thrown them out of the bounding box.
     explained : float
         PCA score e of the contracted points, 1 for a straight line (Wen et al. 2024, equation 14).
     explained_change : float
@@ -39,6 +41,7 @@ class IterationRecord:
     iteration: int
     n_points: int
     n_merged: int
+    n_held: int
     explained: float
     explained_change: float
     ring_ratio: float

@@ -1,0 +1,246 @@
+"""What the commands say, and where: results on stdout; errors, warnings, logs and progress on stderr."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import typer
+
+from ..errors import GlskError, InvalidParameterError, SkeletonWarning
+
+FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
+_WIDE = 400
+
+# The library speaks Python; these are the same cures on the command line.
+_SAID_HERE = {
+    "let RingBuilder(drop_invalid=True) drop them": "drop them with --drop-invalid",
+    "pass cut_loops=True to drop": "add --cut-loops to drop",
+}
+
+
+class WrongUsage(Exception):
+    """The command line asks for something impossible, whatever the scan holds."""
+
+
+def console(*, stderr: bool = False, wide: bool = False) -> Any:
+    """A rich console that prints text as it is, without markup or highlighting.
+
+    Parameters
+    ----------
+    stderr : bool
+    wide : bool
+        Break lines only for a terminal, not for a file or a pipe.
+
+    Returns
+    -------
+    rich.console.Console
+    """
+    from rich.console import Console
+
+    plain = {"stderr": stderr, "markup": False, "highlight": False, "emoji": False}
+    found = Console(**plain)
+    return found if found.is_terminal or not wide else Console(**plain, width=_WIDE)
+
+
+@contextmanager
+def reporting(*, quiet: bool = False, verbose: bool = False) -> Iterator[None]:
+    """Run a command: errors become one line and an exit code, warnings one line each.
+
+    Parameters
+    ----------
+    quiet : bool
+        Hide the warnings.
+    verbose : bool
+        Show the log, and the traceback of an error before its line.
+
+    Raises
+    ------
+    typer.Exit
+        With code 1, 2 or 130. What is no mistake of the user's passes through with its traceback.
+    """
+    lines: dict[str, None] = {}
+
+    def keep(message, category, filename, lineno, file=None, line=None):
+        if issubclass(category, SkeletonWarning):
+            lines[str(message)] = None
+        else:
+            show(message, category, filename, lineno, file, line)
+
+    with warnings.catch_warnings(), _logging(quiet, verbose):
+        show, warnings.showwarning = warnings.showwarning, keep
+        warnings.simplefilter("always", SkeletonWarning)
+        problem: BaseException | None = None
+        code = 0
+        try:
+            yield
+        except BrokenPipeError:
+            raise  # the reader of our output has gone; typer ends quietly
+        except (WrongUsage, InvalidParameterError) as error:
+            problem, code = error, WRONG_USAGE
+        except (GlskError, OSError, MemoryError) as error:
+            problem, code = error, FAILED
+        except KeyboardInterrupt as error:
+            problem, code = error, INTERRUPTED
+        finally:
+            if not quiet:
+                for line in lines:
+                    say("warning", line)
+    if problem is not None:
+        if verbose:
+            traceback.print_exception(problem)
+        say("error", _message(problem))
+        raise typer.Exit(code)
+
+
+def say(kind: str, message: str) -> None:
+    """Print one line to stderr, yellow for a warning and red for an error.
+
+    Parameters
+    ----------
+    kind : {"error", "warning", "info", "debug"}
+    message : str
+    """
+    from rich.text import Text
+
+    style = {"error": "red", "warning": "yellow"}.get(kind, "dim")
+    prefix = f"glsk: {kind}: " if kind in ("error", "warning") else "glsk: "
+    console(stderr=True).print(Text(prefix + " ".join(message.split()), style=style), soft_wrap=True)
+
+
+@contextmanager
+def progress(shown: bool) -> Iterator[Callable[..., None]]:
+    """A line with a bar on stderr that goes away in the end, if stderr is a terminal.
+
+    Parameters
+    ----------
+    shown : bool
+
+    Yields
+    ------
+    callable
+        ``update(text, done=None, total=None)``; without numbers the bar only moves.
+    """
+    if not (shown and sys.stderr.isatty()):
+        yield lambda text, done=None, total=None: None
+        return
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
+    with Progress(*columns, console=console(stderr=True), transient=True) as bars:
+        task = bars.add_task("", total=None)
+
+        def update(text, done=None, total=None):
+            bars.update(task, description=text, completed=done or 0, total=total)
+
+        yield update
+
+
+def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
+    """Print names and values in two columns on stdout.
+
+    Parameters
+    ----------
+    rows : mapping of str to object
+        Those that are None are left out; floats are printed with six digits.
+    title : str
+    """
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2))
+    for name, value in rows.items():
+        if value is not None:
+            table.add_row(name.replace("_", " "), f"{value:.6g}" if isinstance(value, float) else str(value))
+    out = console(wide=True)
+    if title:
+        out.print(title, style="bold", soft_wrap=True)
+    out.print(table)
+
+
+def print_iterations(records, *, stderr: bool = False) -> None:
+    """Print a contraction's iterations as a table.
+
+    Parameters
+    ----------
+    records : sequence of IterationRecord
+    stderr : bool
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    if not records:
+        return
+    columns = {
+        "solve": ("iteration", "d"),
+        "points": ("n_points", "d"),
+        "merged": ("n_merged", "d"),
+        "e": ("explained", ".4f"),
+        "De": ("explained_change", ".4f"),
+        "rings": ("ring_ratio", ".4f"),
+        "w_L": ("contraction_weight", ".4g"),
+        "error": ("solve_error", ".1e"),
+        "seconds": ("seconds", ".3f"),
+    }
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, header_style="")
+    for head in columns:
+        table.add_column(head, justify="right")
+    for record in records:
+        table.add_row(*(format(getattr(record, name), form) for name, form in columns.values()))
+    console(stderr=stderr).print(table)
+
+
+def print_json(data: Any) -> None:
+    """Print JSON on stdout; numbers that are not finite become null.
+
+    Parameters
+    ----------
+    data : dict, list, str, int, float, bool or None
+    """
+    typer.echo(json.dumps(_finite(data), indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def _finite(data):
+    if isinstance(data, Mapping):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
+
+
+def _message(problem: BaseException) -> str:
+    if isinstance(problem, KeyboardInterrupt):
+        return "interrupted; no file is half-written"
+    if isinstance(problem, MemoryError):
+        return f"out of memory ({problem}): thin the cloud first, for example with voxel_down_sample"
+    if isinstance(problem, OSError) and problem.strerror and problem.filename is not None:
+        return f"{problem.filename}: {problem.strerror}"
+    message = str(problem) or type(problem).__name__
+    for there, here in _SAID_HERE.items():
+        message = message.replace(there, here)
+    return message
+
+
+class _Lines(logging.Handler):
+    def emit(self, record):
+        say(record.levelname.lower(), record.getMessage())
+
+
+@contextmanager
+def _logging(quiet: bool, verbose: bool) -> Iterator[None]:
+    """What the library logs, on stderr: all of it, or its warnings, or only its errors."""
+    log, handler = logging.getLogger("glsk_o3d"), _Lines()
+    before = log.level
+    log.setLevel(logging.DEBUG if verbose else logging.ERROR if quiet else logging.WARNING)
+    log.addHandler(handler)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(before)

@@ -1,0 +1,52 @@
+"""``glsk demo``."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..interop.files import write_atomically
+from ..interop.open3d import import_open3d, to_point_cloud
+from ..pipeline import named_pipeline
+from ..samples import sample_object
+from .console import progress, reporting
+from .options import PipelineName, Quiet, Verbose
+from .running import check_writable, print_results, run, write
+
+
+def demo(
+    folder: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER", help="Made if it is not there.")] = Path(
+        "demo"
+    ),
+    points: Annotated[int, typer.Option("--points", "-n", metavar="N", help="How many points the scan has.")] = 8192,
+    pipeline: PipelineName = "default",
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Skeletonise the built-in sample: a toy dinosaur with a carrying handle, scanned from two sides.
+
+    Writes cloud.ply (the scan), skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
+    """
+    with reporting(quiet=quiet, verbose=verbose):
+        chosen = named_pipeline(pipeline)
+        names = ("skeleton.ply", "skeleton.json", "skeleton.png", "cloud.ply")
+        folder.mkdir(parents=True, exist_ok=True)
+        *outputs, preview, scan = (folder / name for name in names)
+        for path in (*outputs, preview, scan):
+            check_writable(path)
+        with progress(not quiet and not verbose) as update:
+            update("making the sample")
+            sample = sample_object(points)
+            write_atomically(scan, lambda temporary: _write_cloud(temporary, sample.points))
+            skeleton, seconds = run(chosen, sample.points, update)
+            title = f"{sample.name}: a scan and its curve skeleton"
+            written, problems = write(skeleton, outputs, preview, title=title, cut_loops=False, update=update)
+        print_results(skeleton, seconds, [scan, *written], problems, quiet=quiet, verbose=verbose)
+
+
+def _write_cloud(path: Path, points) -> None:
+    if not import_open3d().io.write_point_cloud(os.fspath(path), to_point_cloud(points)):
+        raise OSError(f"{path.parent}: Open3D cannot write a cloud there")

@@ -1,0 +1,151 @@
+"""``glsk filters``: what the code says about itself."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+from typing import Annotated, Any
+
+import typer
+
+from ..filter import Filter, Parameters
+from ..pipeline import PIPELINES
+from .console import WrongUsage, console, print_json, reporting
+from .options import Json
+from .overrides import catalogue, nearest
+
+
+def filters(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="One filter, stopping rule or pipeline, in full.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the filters, the stopping rules and the named pipelines, with every parameter."""
+    with reporting():
+        known = catalogue()
+        if name is not None and name not in known and name not in PIPELINES:
+            raise WrongUsage(nearest(name, [*known, *PIPELINES], "filter or pipeline"))
+        classes = [cls for key, cls in known.items() if name in (None, key)]
+        names = [key for key in PIPELINES if name in (None, key)]
+        if as_json:
+            print_json(
+                {"filters": [facts(cls) for cls in classes], "pipelines": [_pipeline_facts(key) for key in names]}
+            )
+            return
+        for cls in classes:
+            _print_filter(cls, full=name is not None)
+        for key in names:
+            _print_pipeline(key)
+
+
+def facts(cls: type[Parameters]) -> dict[str, Any]:
+    """What a filter or stopping rule says about itself.
+
+    Parameters
+    ----------
+    cls : subclass of Parameters
+
+    Returns
+    -------
+    dict
+        ``name``, ``kind``, ``consumes``, ``produces`` (None for a rule), ``doc`` and ``parameters``: a list of dicts of
+        the field's metadata, with ``name``, ``default`` and ``limits`` in words.
+    """
+    is_filter = issubclass(cls, Filter)
+    return {
+        "name": cls.__name__,
+        "kind": "filter" if is_filter else "stopping rule",
+        "consumes": cls.consumes if is_filter else None,
+        "produces": cls.produces if is_filter else None,
+        "doc": _prose(cls),
+        "parameters": [
+            {
+                "name": field.name,
+                **field.metadata,
+                "default": _plain(field.default),
+                "limits": limits(field.metadata),
+            }
+            for field in dataclasses.fields(cls)  # type: ignore[arg-type]
+        ],
+    }
+
+
+def limits(metadata) -> str:
+    """The limits of a parameter in words, empty if it has none.
+
+    Parameters
+    ----------
+    metadata : mapping
+        As `glsk_o3d.filter.parameter` makes it.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> limits({"low": 0, "high": 1, "open_low": True, "choices": ()})
+    'above 0, at most 1'
+    """
+    words = [f"{choice}" for choice in metadata["choices"]]
+    said = [" or ".join(words)] if words else []
+    if metadata["low"] is not None:
+        said.append(f"{'above' if metadata['open_low'] else 'at least'} {metadata['low']:g}")
+    if metadata["high"] is not None:
+        said.append(f"at most {metadata['high']:g}")
+    return ", ".join(said)
+
+
+def _plain(value):
+    return value if isinstance(value, bool | int | float | str | None) else repr(value)
+
+
+def _prose(cls) -> str:
+    """The docstring up to its first section, with the markup of formulas and code taken off."""
+    text = inspect.cleandoc(cls.__doc__ or "")
+    text = re.split(r"\n\n\w[\w ]*\n-{3,}\n", text, maxsplit=1)[0]
+    text = re.sub(r":math:`([^`]*)`|``([^`]*)``|`([^`]*)`", lambda m: m[1] or m[2] or m[3], text)
+    return re.sub(r"\\(\w+)", r"\1", text)
+
+
+def _print_filter(cls, full: bool) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    told = facts(cls)
+    flow = f"  {told['consumes']} \N{RIGHTWARDS ARROW} {told['produces']}" if told["consumes"] else "  stopping rule"
+    out = console()
+    out.print(Text.assemble((told["name"], "bold"), (flow, "dim")))
+    out.print(told["doc"] if full else told["doc"].partition("\n\n")[0].replace("\n", " "))
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True)
+    table.add_column()
+    for each in told["parameters"]:
+        default = "none" if each["default"] is None else each["default"]
+        kind = each["type"].replace("?", " or none")
+        unit = "" if each["unit"] == "-" else f" [{each['unit']}]"
+        bounds = f", {each['limits']}" if each["limits"] else ""
+        shape = each["limits"] if each["type"] == "choice" else kind + unit + bounds
+        table.add_row(f"  {each['name']}", Text.assemble(each["doc"], "\n", (f"{shape}; default {default}", "dim")))
+    out.print(table)
+    out.print()
+
+
+def _pipeline_facts(name: str) -> dict[str, Any]:
+    make = PIPELINES[name]
+    return {"name": name, "doc": inspect.cleandoc(make.__doc__ or ""), "expression": repr(make())}
+
+
+def _print_pipeline(name: str) -> None:
+    from rich.padding import Padding
+    from rich.text import Text
+
+    told = _pipeline_facts(name)
+    out = console()
+    out.print(Text.assemble((name, "bold"), ("  pipeline", "dim")))
+    out.print(told["doc"].partition("\n\n")[0])
+    for i, stage in enumerate(PIPELINES[name]().stages):
+        out.print(Padding(Text(f"{'|' if i else ' '} {stage!r}"), (0, 0, 0, 2)))
+    out.print()

@@ -1,0 +1,145 @@
+"""``glsk info``: what is in a file."""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from ..interop.files import CLOUD_ENDINGS, MESH_ENDINGS, read_cloud, read_skeleton
+from ..skeleton import Skeleton
+from .console import print_iterations, print_json, print_rows, reporting
+from .options import Json, Verbose
+from .running import structure
+
+
+def info(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="A cloud, a mesh or a skeleton, in any format that is read or written."),
+    ],
+    as_json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Say what is in a cloud or skeleton file."""
+    with reporting(verbose=verbose):
+        if holds_skeleton(file):
+            skeleton = read_skeleton(file)
+            told = skeleton_facts(skeleton)
+            records = skeleton.report.iterations
+        else:
+            told, records = cloud_facts(read_cloud(file)), ()
+        if as_json:
+            iterations = {"iterations": skeleton.report.to_dict()["iterations"]} if records else {}
+            print_json({"file": str(file), **told, **iterations})
+            return
+        print_rows({name: _words(value) for name, value in told.items()}, title=str(file))
+        if records:
+            print_iterations(records)
+
+
+def holds_skeleton(path: Path) -> bool:
+    """Whether a file holds a skeleton: PLY with an element ``edge``, OBJ with lines and no faces, or by the ending.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    bool
+        False also for what does not exist or is unknown: reading it as a cloud says so.
+    """
+    ending = path.suffix.lower()
+    if not path.is_file() or ending not in (".ply", ".obj"):
+        return path.is_file() and ending not in CLOUD_ENDINGS + MESH_ENDINGS
+    with path.open("rb") as stream:
+        if ending == ".obj":
+            keywords = {line.split(maxsplit=1)[0] for line in stream if line.strip()}
+            return b"l" in keywords and b"f" not in keywords
+        for line in islice(stream, 1000):
+            if line.startswith((b"element edge", b"end_header")):
+                return line.startswith(b"element edge")
+    return False
+
+
+def cloud_facts(cloud: Any) -> dict[str, Any]:
+    """What there is to know about a cloud before skeletonising it.
+
+    Parameters
+    ----------
+    cloud : open3d.geometry.PointCloud
+
+    Returns
+    -------
+    dict
+        Lengths in the cloud's units; the spacing is the median distance of a point to the nearest other one.
+    """
+    from scipy.spatial import KDTree
+
+    points = np.asarray(cloud.points)
+    finite = points[np.isfinite(points).all(axis=1)]
+    distinct = np.unique(finite, axis=0)
+    low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (np.full(3, np.nan),) * 2
+    spacing = np.nan
+    if len(distinct) > 1:
+        spacing = np.median(KDTree(distinct).query(distinct, k=2)[0][:, 1])
+    return {
+        "kind": "cloud",
+        "points": len(points),
+        "not_finite": len(points) - len(finite),
+        "duplicates": len(finite) - len(distinct),
+        "lowest": low.tolist(),
+        "highest": high.tolist(),
+        "diagonal": float(np.linalg.norm(high - low)),
+        "median_spacing": float(spacing),
+        "colours": cloud.has_colors(),
+        "normals": cloud.has_normals(),
+    }
+
+
+def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
+    """What there is to know about a skeleton, and about the run that made it if its file says so.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    dict
+        Values that the file lacks are None.
+    """
+    report = skeleton.report
+    radii = skeleton.radii[np.isfinite(skeleton.radii)]
+    told = {
+        "kind": "skeleton",
+        **structure(skeleton),
+        "radii": [float(radii.min()), float(radii.max())] if len(radii) else None,
+        "points": len(skeleton.points) or None,
+    }
+    if not report.stages:
+        return told
+    return {
+        **told,
+        "stages": [stage for i, stage in enumerate(report.stages) if stage not in report.stages[:i]],
+        "converged": report.converged,
+        "stop_reason": report.stop_reason,
+        "warnings": list(report.warnings),
+        "versions": report.versions,
+    }
+
+
+def _words(value):
+    """A value as the table shows it."""
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {text}" for name, text in value.items())
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        strings = all(isinstance(item, str) for item in value)
+        return "\n".join(value) or None if strings else "  ".join(f"{item:.6g}" for item in value)
+    return value

@@ -1,0 +1,51 @@
+"""The command ``glsk``.
+
+Exit codes: 0 all went well; 1 the input or the run failed; 2 the command line is wrong; 130 interrupted with Ctrl-C.
+An error is one line on stderr, ``glsk: error: ...``. Results go to stdout; warnings, logs and progress to stderr.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from .. import __version__
+from .demo import demo
+from .filters import filters
+from .info import info
+from .skeletonize import skeletonize
+
+EPILOG = (
+    "Exit codes: 0 all went well; 1 the input or the run failed; 2 the command line is wrong; 130 interrupted. "
+    "Results go to stdout; errors (one line each), warnings and progress to stderr."
+)
+
+app = typer.Typer(
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["--help", "-h"]},
+    epilog=EPILOG,
+)
+for command in (skeletonize, demo, filters, info):
+    app.command(epilog=EPILOG if command is skeletonize else None)(command)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"glsk-o3d {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Curve skeletons from point clouds."""
+
+
+if __name__ == "__main__":
+    app()

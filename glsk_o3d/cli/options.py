@@ -1,0 +1,28 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..pipeline import PIPELINES
+
+Output = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE",
+        help="Where to write the skeleton: ply, obj, json, npz, swc, graphml, cgal or polylines.txt, by the ending; "
+        "may be repeated.",
+    ),
+]
+PipelineName = Annotated[
+    str,
+    typer.Option("--pipeline", metavar="NAME", help=f"{', '.join(PIPELINES)}.", autocompletion=lambda: list(PIPELINES)),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout instead of tables.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors (and JSON, if asked for).")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print each iteration, the log, and tracebacks.")]

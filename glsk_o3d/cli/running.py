@@ -1,0 +1,248 @@
+"""From a cloud to files: what `skeletonize` and `demo` share."""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import FileFormatError, GlskError
+from ..filter import Filter
+from ..interop.files import _ending as skeleton_ending
+from ..interop.preview import save_preview
+from ..pipeline import Pipeline
+from ..skeleton import Skeleton
+from .console import WrongUsage, print_iterations, print_json, print_rows
+
+_log = logging.getLogger(__name__)
+_DOING = {
+    "RingBuilder": "building rings",
+    "Contractor": "contracting",
+    "LPRReducer": "merging points",
+    "Connector": "connecting",
+    "Refiner": "refining",
+}
+
+
+def check_outputs(outputs: Sequence[Path], preview: Path | None = None, scan: Path | None = None) -> None:
+    """Find out before computing whether the files can be written.
+
+    Parameters
+    ----------
+    outputs : sequence of Path
+        Skeleton files.
+    preview : Path, optional
+    scan : Path, optional
+        The input, which must not be overwritten.
+
+    Raises
+    ------
+    WrongUsage
+        An unknown ending, one file twice, the input among them, or no file at all.
+    OSError
+        A folder is missing, or a file cannot be written.
+    """
+    for path in outputs:
+        try:
+            skeleton_ending(path, None)
+        except FileFormatError as error:
+            hint = "; a picture is made with --preview" if path.suffix.lower() == ".png" else ""
+            raise WrongUsage(f"{error}{hint}") from None
+    if preview is not None and preview.suffix.lower() != ".png":
+        raise WrongUsage(f"{preview}: the preview is a picture and its name ends in .png")
+    files = [*outputs, *([preview] if preview is not None else [])]
+    if not files:
+        raise WrongUsage("nothing to write: give an output with -o, a picture with --preview, or both")
+    seen = {os.path.realpath(scan): "is the scan itself"} if scan is not None else {}
+    for path in files:
+        real = os.path.realpath(path)
+        if real in seen:
+            raise WrongUsage(f"{path}: {seen[real]}: choose another name")
+        seen[real] = "is named twice"
+    for path in files:
+        check_writable(path)
+
+
+def check_writable(path: Path) -> None:
+    """Raise OSError unless the file can be made or replaced.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    path = Path(os.path.realpath(path))
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"{path.parent}: no such folder: make it before writing {path.name}")
+    if path.exists() and not path.is_file():
+        raise OSError(f"{path}: is a folder or a device, not a file to write to")
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise PermissionError(f"{path.parent}: no permission to write {path.name} there")
+
+
+def run(pipeline: Pipeline, cloud: Any, update) -> tuple[Skeleton, float]:
+    """Run a pipeline and show how far it is.
+
+    Parameters
+    ----------
+    pipeline : Pipeline
+    cloud : cloud
+    update : callable
+        From `console.progress`.
+
+    Returns
+    -------
+    Skeleton, float
+        The skeleton, and the seconds it took.
+    """
+    start = time.perf_counter()
+    flow = cloud
+    for stage in pipeline.stages:
+        began = time.perf_counter()
+        doing = _DOING.get(type(stage).__name__, type(stage).__name__)
+        update(doing)
+        flow = stage(flow, on_iteration=_watch(stage, doing, update))
+        _log.info("%s took %.3f s", type(stage).__name__, time.perf_counter() - began)
+    return flow, time.perf_counter() - start
+
+
+def _watch(stage: Filter, doing: str, update):
+    most = getattr(stage, "max_iterations", None)
+
+    def on_iteration(record):
+        left = record.n_points - record.n_merged
+        update(f"{doing}: solve {record.iteration} of at most {most}, {left} points", record.iteration, most)
+        _log.debug(
+            "solve %d: %d points, %d merged, e %.4f, De %.4f, ring ratio %.4f, %.3f s",
+            *(record.iteration, record.n_points, record.n_merged, record.explained, record.explained_change),
+            *(record.ring_ratio, record.seconds),
+        )
+
+    return on_iteration
+
+
+def write(
+    skeleton: Skeleton, outputs: Sequence[Path], preview: Path | None, *, title: str, cut_loops: bool, update
+) -> tuple[list[Path], list[str]]:
+    """Write all files that can be written; one that cannot does not keep the others from it.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    outputs : sequence of Path
+    preview : Path or None
+    title : str
+        Above the preview.
+    cut_loops : bool
+        Cut loops where the format holds only trees.
+    update : callable
+        From `console.progress`.
+
+    Returns
+    -------
+    list of Path, list of str
+        The files that were written, and what was wrong with the others.
+    """
+    written, problems = [], []
+    for path in [*outputs, *([preview] if preview is not None else [])]:
+        update(f"writing {path.name}")
+        try:
+            if path is preview:
+                save_preview(skeleton, path, title=title)
+            else:
+                skeleton.save(path, cut_loops=cut_loops)
+            written.append(path)
+        except OSError as error:
+            problems.append(f"{path}: cannot be written: {error.strerror or error}")
+        except GlskError as error:
+            problems.append(f"{path}: {error}")
+    return written, problems
+
+
+def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
+    """A run in a few numbers.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    seconds : float
+
+    Returns
+    -------
+    dict of str to int, float, bool or str
+    """
+    report = skeleton.report
+    return {
+        "points": report.n_input,
+        "dropped": report.n_dropped,
+        "distinct": report.n_distinct,
+        **structure(skeleton),
+        "iterations": len(report.iterations),
+        "converged": report.converged,
+        "stop_reason": report.stop_reason,
+        "seconds": seconds,
+    }
+
+
+def structure(skeleton: Skeleton) -> dict[str, Any]:
+    """The counts of a skeleton's graph, and its length.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    dict of str to int or float
+    """
+    return {
+        "vertices": len(skeleton.vertices),
+        "edges": len(skeleton.edges),
+        "components": skeleton.n_components,
+        "loops": skeleton.n_loops,
+        "leaves": len(skeleton.leaves),
+        "junctions": len(skeleton.junctions),
+        "length": skeleton.length,
+    }
+
+
+def print_results(
+    skeleton: Skeleton,
+    seconds: float,
+    written: Sequence[Path],
+    problems: Sequence[str],
+    *,
+    quiet,
+    verbose,
+    as_json=False,
+) -> None:
+    """Print the summary and the files written; then raise if some were not.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    seconds : float
+    written : sequence of Path
+    problems : sequence of str
+    quiet, verbose, as_json : bool
+
+    Raises
+    ------
+    OSError
+        If there are problems; the message holds them all.
+    """
+    if verbose:
+        print_iterations(skeleton.report.iterations, stderr=True)
+    facts = summary(skeleton, seconds)
+    if as_json:
+        warnings = list(skeleton.report.warnings)
+        print_json({**facts, "warnings": warnings, "files": [str(path) for path in written]})
+    elif not quiet:
+        hidden = {"dropped": facts["dropped"] or None, "converged": None, "seconds": f"{seconds:.2f}"}
+        print_rows({**facts, **hidden})
+        for path in written:
+            print(f"wrote {path}")
+    if problems:
+        raise OSError("; ".join(problems))

@@ -1,0 +1,184 @@
+"""Cycles of a graph embedded in space, and how wide they open."""
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+
+def minimum_cycle_basis(n, edges, lengths):
+    """Shortest set of cycles that generates all others (Horton 1987).
+
+    Chains of vertices with two neighbours count as one edge, and trees that hang on the graph are cut off first, so
+    that the cost depends on the number of junctions in the cyclic part alone.
+
+    Parameters
+    ----------
+    n : int
+        Number of vertices.
+    edges : (e, 2) int array
+        Each once, no loops.
+    lengths : (e,) float array
+        Positive.
+
+    Returns
+    -------
+    list of (c,) int array
+        The vertices of each cycle in order, shortest cycle first.
+    """
+    chains, chain_lengths = _cyclic_chains(n, edges, lengths)
+    if not chains:
+        return []
+    cycles = []
+    plain = []
+    for chain, length in zip(chains, chain_lengths, strict=True):
+        if chain[0] == chain[-1]:
+            cycles.append((length, chain[:-1]))
+        else:
+            plain.append((length, chain))
+    cycles += _horton(plain)
+    return [np.array(vertices) for _, vertices in sorted(cycles, key=lambda cycle: cycle[0])]
+
+
+def _cyclic_chains(n, edges, lengths):
+    """Paths between junctions of the cyclic part: vertex lists and lengths. A ring of its own starts anywhere."""
+    around = [{} for _ in range(n)]
+    for (a, b), length in zip(edges.tolist(), lengths.tolist(), strict=True):
+        around[a][b] = around[b][a] = length
+    leaves = [v for v in range(n) if len(around[v]) == 1]
+    while leaves:
+        v = leaves.pop()
+        for u in around[v]:
+            del around[u][v]
+            if len(around[u]) == 1:
+                leaves.append(u)
+        around[v] = {}
+    chains, total = [], []
+    degree = [len(links) for links in around]
+    for start in sorted((v for v in range(n) if degree[v]), key=lambda v: degree[v] == 2):
+        for step in list(around[start]):
+            if step not in around[start]:
+                continue  # walked from its other end
+            chain, length = [start], 0.0
+            here, ahead = start, step
+            while True:
+                length += around[here].pop(ahead)
+                del around[ahead][here]
+                chain.append(ahead)
+                if ahead == start or degree[ahead] > 2:
+                    break
+                here, ahead = ahead, next(iter(around[ahead]))
+            chains.append(chain)
+            total.append(length)
+    return chains, total
+
+
+def _horton(chains):
+    """Minimum cycle basis of the multigraph of chains between different junctions: [(length, vertices)]."""
+    if not chains:
+        return []
+    junctions = sorted({v for _, chain in chains for v in (chain[0], chain[-1])})
+    index = {v: i for i, v in enumerate(junctions)}
+    ends = np.array([(index[chain[0]], index[chain[-1]]) for _, chain in chains])
+    lengths = np.array([length for length, _ in chains])
+    order = np.argsort(lengths, kind="stable")
+    shortest = {}
+    for e in order[::-1].tolist():  # of parallel chains the shortest stays
+        a, b = ends[e].tolist()
+        shortest[a, b] = shortest[b, a] = e
+    m = len(junctions)
+    keys = np.array(list(shortest))
+    graph = csr_matrix((lengths[list(shortest.values())], keys.T), shape=(m, m))
+    distance, before = dijkstra(graph, return_predecessors=True)
+    component = len({int(np.argmax(np.isfinite(row))) for row in distance})
+    rank = len(chains) - m + component
+
+    candidates = []
+    masks = []
+    for root in range(m):
+        mask = [0] * m
+        reached = np.argsort(distance[root], kind="stable")
+        for v in reached.tolist():
+            if before[root, v] >= 0:
+                mask[v] = mask[before[root, v]] | 1 << shortest[int(before[root, v]), v]
+        masks.append(mask)
+        total = distance[root, ends[:, 0]] + distance[root, ends[:, 1]] + lengths
+        candidates += [(total[e], root, e) for e in np.flatnonzero(np.isfinite(total)).tolist()]
+    candidates.sort()
+
+    basis, pivots = [], {}
+    for total, root, e in candidates:
+        a, b = ends[e].tolist()
+        if masks[root][a] & masks[root][b] or (masks[root][a] | masks[root][b]) >> e & 1:
+            continue  # not a simple cycle
+        cycle = masks[root][a] | masks[root][b] | 1 << e
+        reduced = cycle
+        while reduced and (top := reduced.bit_length()) in pivots:
+            reduced ^= pivots[top]
+        if reduced:
+            pivots[reduced.bit_length()] = reduced
+            basis.append((total, _walk([chains[i][1] for i in range(len(chains)) if cycle >> i & 1])))
+            if len(basis) == rank:
+                break
+    return basis
+
+
+def _walk(chains):
+    """Join chains that form one cycle, end to end."""
+    first, *rest = chains
+    walk = list(first)
+    while rest:
+        for i, chain in enumerate(rest):
+            if walk[-1] in (chain[0], chain[-1]):
+                walk += chain[1:] if chain[0] == walk[-1] else chain[-2::-1]
+                del rest[i]
+                break
+    return walk[:-1]
+
+
+def inscribed_circle(points):
+    """Largest circle in the plane of a closed curve that the curve does not enter.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        A closed polygon.
+
+    Returns
+    -------
+    centre : (3,) float array
+    radius : float
+        Distance from the centre to the curve. Found on a grid that is refined twice: good to about 1 %.
+    """
+    middle = points.mean(axis=0)
+    axes = np.linalg.svd(points - middle, full_matrices=False)[2]
+    curve = np.concatenate([points, points[:1]])
+    length = np.linalg.norm(np.diff(curve, axis=0), axis=1)
+    pieces = np.maximum(np.ceil(length / length.sum() * 200).astype(int), 1)
+    row = np.repeat(np.arange(len(points)), pieces)
+    t = (np.arange(len(row)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[row]
+    samples = (curve[row] + (curve[row + 1] - curve[row]) * t[:, None] - middle) @ axes.T
+    polygon = (points - middle) @ axes.T
+    low, high = samples[:, :2].min(axis=0), samples[:, :2].max(axis=0)
+    centre, best = np.zeros(3), 0.0
+    span = high - low
+    at = (low + high) / 2
+    for _ in range(3):
+        x, y = (np.linspace(-0.5, 0.5, 21)[:, None] * span + at).T
+        grid = np.stack([*np.meshgrid(x, y), np.zeros((21, 21))], axis=-1).reshape(-1, 3)
+        grid = grid[_inside(grid, polygon)]
+        if len(grid):
+            distance = np.linalg.norm(grid[:, None] - samples[None], axis=2).min(axis=1)
+            if distance.max() > best:
+                best, centre = float(distance.max()), grid[np.argmax(distance)]
+        at, span = centre[:2], span / 5
+    return centre @ axes + middle, best
+
+
+def _inside(points, polygon):
+    """Even-odd test in the first two coordinates."""
+    a, b = polygon, np.roll(polygon, -1, axis=0)
+    x, y = points[:, :1], points[:, 1:2]
+    rises = (a[:, 1] > y) != (b[:, 1] > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = (b[:, 0] - a[:, 0]) * (y - a[:, 1]) / (b[:, 1] - a[:, 1]) + a[:, 0]
+    return ((rises & (x < crossing)).sum(axis=1) % 2).astype(bool)

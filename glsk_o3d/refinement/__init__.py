@@ -1,0 +1,1 @@
+"""The steps of the refiner, one file each: a Skeleton in, a Skeleton out."""

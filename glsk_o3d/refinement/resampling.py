@@ -1,0 +1,56 @@
+"""Subdivide edges, so that chords do not cut corners."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+SUPPORT = 8  # input points that a piece of a subdivided edge needs
+
+
+def resample(skeleton, spacing):
+    """Subdivide the edges to a share of the local thickness; points go to the nearest sample around their vertex.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    spacing : float
+        Longest edge afterwards, over the mean radius of its ends; longer where fewer than 8 points would support it.
+
+    Returns
+    -------
+    Skeleton
+    """
+    ends = skeleton.edges
+    m = len(skeleton.vertices)
+    length = np.maximum(spacing * skeleton.radii[ends].mean(axis=1), np.finfo(float).tiny)
+    count = np.bincount(skeleton.vertex_of_point[skeleton.vertex_of_point >= 0], minlength=m)
+    support = (count / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
+    pieces = np.ceil(np.minimum(skeleton.edge_lengths / length, np.maximum(support / SUPPORT, 1))).astype(int)
+    inner = pieces - 1
+    edge = np.repeat(np.arange(len(ends)), inner)
+    step = np.arange(len(edge)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
+    t = (step / pieces[edge])[:, None]
+    a, b = skeleton.vertices[ends[edge, 0]], skeleton.vertices[ends[edge, 1]]
+    vertices = np.concatenate([skeleton.vertices, (1 - t) * a + t * b])
+
+    first = m + np.cumsum(inner) - inner
+    chain = np.repeat(np.arange(len(ends)), pieces)
+    k = np.arange(len(chain)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    start = np.where(k == 0, ends[chain, 0], first[chain] + k - 1)
+    stop = np.where(k == inner[chain], ends[chain, 1], first[chain] + k)
+    edges = np.sort(np.column_stack([start, stop]), axis=1)
+    edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
+
+    parents = np.concatenate([np.column_stack([np.arange(m)] * 2), ends[edge]])
+    owned = np.flatnonzero(skeleton.vertex_of_point >= 0)
+    owner = skeleton.vertex_of_point[owned]
+    near = cKDTree(vertices).query(skeleton.points[owned], min(16, len(vertices)))[1].reshape(len(owned), -1)
+    related = (parents[near] == owner[:, None, None]).any(axis=2)
+    choice = near[np.arange(len(owned)), np.argmax(related, axis=1)]
+    vertex_of_point = skeleton.vertex_of_point.copy()
+    vertex_of_point[owned] = np.where(related.any(axis=1), choice, owner)
+    radii = np.concatenate(
+        [skeleton.radii, ((1 - t[:, 0]) * skeleton.radii[ends[edge, 0]] + t[:, 0] * skeleton.radii[ends[edge, 1]])]
+    )
+    return replace(skeleton, vertices=vertices, edges=edges, radii=radii, vertex_of_point=vertex_of_point)

@@ -1,0 +1,57 @@
+"""Collapse triangles, so that the graph is one-dimensional."""
+
+import heapq
+
+import numpy as np
+
+from .merging import merge_vertices, support
+
+
+def collapse_triangles(skeleton):
+    """Merge the two ends of edges that lie on a triangle, cheapest first, until there is no triangle.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    Skeleton
+        Without triangles; points of merged vertices belong to the vertex they were merged into.
+    """
+    position = skeleton.vertices.copy()
+    weight = support(skeleton)
+    around: list[set[int]] = [set() for _ in position]
+    for a, b in skeleton.edges.tolist():
+        around[a].add(b)
+        around[b].add(a)
+
+    def cost(a, b):
+        return (len(around[a]) + len(around[b])) / 2, float(np.linalg.norm(position[a] - position[b]))
+
+    queue = [(*cost(a, b), a, b) for a, b in skeleton.edges.tolist() if around[a] & around[b]]
+    heapq.heapify(queue)
+    into = np.arange(len(position))
+    while queue:
+        *priced, a, b = heapq.heappop(queue)
+        if b not in around[a] or not around[a] & around[b]:
+            continue
+        if tuple(priced) != cost(a, b):
+            heapq.heappush(queue, (*cost(a, b), a, b))
+            continue
+        into[b] = a
+        position[a] = (weight[a] * position[a] + weight[b] * position[b]) / (weight[a] + weight[b])
+        weight[a] += weight[b]
+        for c in around[b]:
+            around[c].discard(b)
+            if c != a:
+                around[c].add(a)
+                around[a].add(c)
+        around[b].clear()
+        for c in around[a]:
+            if around[a] & around[c]:
+                heapq.heappush(queue, (*cost(a, c), a, c))
+    for v in range(len(into)):  # a vertex's target may have been merged on
+        while into[into[v]] != into[v]:
+            into[v] = into[into[v]]
+    return merge_vertices(skeleton, into)
