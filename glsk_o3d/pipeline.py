@@ -1,18 +1,13 @@
-"""Pipelines: filters joined with `|`, the named ones, and the one easy door."""
+"""Pipeline: filters joined with `|`, and the one easy door."""
 
 from __future__ import annotations
 
 from itertools import pairwise
 
-from .connector import Connector
-from .contractor import Contractor
 from .errors import InvalidParameterError
 from .filter import Filter
-from .lpr_reducer import LPRReducer
-from .refiner import Refiner
-from .ring_builder import RingBuilder
+from .pipelines import named_pipeline
 from .skeleton import Skeleton
-from .stopping import ExplainedScore, RingSizeRatio
 
 
 class Pipeline:
@@ -26,8 +21,8 @@ class Pipeline:
     Examples
     --------
     >>> from glsk_o3d import RingBuilder, Contractor, Connector, Refiner
-    >>> RingBuilder(k=12) | Contractor() | Connector(radius="3%")
-    RingBuilder(k=12, ...) | Contractor(...) | Connector(radius='3%')
+    >>> RingBuilder(k=12) | Contractor() | Connector(radius="3%")  # doctest: +ELLIPSIS
+    RingBuilder(k=12, ...) | Contractor(...) | Connector(radius='3%', ...)
     """
 
     def __init__(self, *stages: Filter):
@@ -79,56 +74,6 @@ class Pipeline:
 
     def __hash__(self):
         return hash(self.stages)
-
-
-def cao2010() -> Pipeline:
-    """The baseline: contraction without reduction, stopped by the ring sizes (Cao et al. 2010)."""
-    return (
-        RingBuilder()
-        | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0, retries=0)
-        | Connector(radius="2%", thickness=0, links="nearest")
-        | Refiner(opening=0, twig=0, spacing=0, recentre=0)
-    )
-
-
-def wen2024() -> Pipeline:
-    """GLSkeleton as published (Wen et al. 2024), with the choices of the authors' code where it differs from the paper.
-
-    Merges visit the points in the order of the input and drop the mass of what they merge; the stopping rule waits for
-    the fourth solve. The pages of the filters list every difference.
-    """
-    return (
-        RingBuilder()
-        | Contractor(
-            reducer=LPRReducer(conserve_mass=False, order="index", mend_rings=False),
-            stop=ExplainedScore(),
-            min_attraction=0,
-            retries=0,
-        )
-        | Connector(radius="2%", thickness=0, links="nearest")
-        | Refiner(opening=0, twig=0, spacing=0, recentre=0)
-    )
-
-
-def default() -> Pipeline:
-    """What we recommend: GLSkeleton with the mass of merged points kept and the vertices centred in the surface."""
-    return RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore()) | Connector() | Refiner()
-
-
-PIPELINES = {"default": default, "wen2024": wen2024, "cao2010": cao2010}
-
-
-def named_pipeline(name: str) -> Pipeline:
-    """The pipeline of that name.
-
-    Raises
-    ------
-    InvalidParameterError
-        If there is none; the message lists the names.
-    """
-    if name not in PIPELINES:
-        raise InvalidParameterError(f"no pipeline is called {name!r}: there are {', '.join(PIPELINES)}")
-    return PIPELINES[name]()
 
 
 def skeletonize(cloud, pipeline: Pipeline | str = "default", *, on_iteration=None) -> Skeleton:

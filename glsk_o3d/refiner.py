@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from .filter import Filter, documented, parameter
 from .refinement.loops import close_loops
-from .refinement.medial import medial_vertices
+from .refinement.medial import medial_vertices, smooth
 from .refinement.resampling import resample
 from .refinement.triangles import collapse_triangles
 from .refinement.twigs import cut_twigs
@@ -17,11 +17,17 @@ from .skeleton import plane_distance_radii, trust_warnings
 @documented
 @dataclass(frozen=True, kw_only=True)
 class Refiner(Filter):
-    """Collapse triangles until the graph is one-dimensional, then centre its vertices in the surface around them.
+    """Make the graph one-dimensional, close false loops, cut twigs, and centre it in the surface around it.
 
-    Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
-    the shortest. A vertex is then moved to the point nearest to the normal lines of the input points that it and its
-    neighbours own: on the axis, even if only one side was scanned.
+    1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
+       the shortest, until there is no triangle.
+    2. Loops that open less than their tube is thick are zipped up, and branches shorter than the part they grow from is
+       thick are cut.
+    3. Edges are subdivided, so that chords do not cut corners.
+    4. Every vertex moves to the point nearest to the normal lines of the input points that it and its neighbours own:
+       on the axis, even if only one side was scanned.
+
+    The first step is published; with `opening`, `twig`, `spacing` and `recentre` all 0 it is the only one.
 
     Warns
     -----
@@ -61,7 +67,7 @@ class Refiner(Filter):
     )
     recentre: int = parameter(
         2,
-        "Passes that centre the vertices on the normal lines of their points; 0 leaves them.",
+        "Passes that centre the vertices on the normal lines of their points and smooth once; 0 leaves them.",
         type="int",
         unit="passes",
         low=0,
@@ -77,6 +83,7 @@ class Refiner(Filter):
             skeleton = resample(skeleton, self.spacing)
         for _ in range(self.recentre):
             skeleton = replace(skeleton, vertices=medial_vertices(skeleton))
+            skeleton = replace(skeleton, vertices=smooth(skeleton))
         radii = plane_distance_radii(skeleton.vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals)
         skeleton = replace(skeleton, radii=radii)
         report = skeleton.report

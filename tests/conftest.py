@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -21,3 +22,48 @@ def shared_dir() -> Path:
     if not place.is_dir():
         pytest.skip(f"needs the data folder {place}, which is not in the repository (set GLSK_SHARED)")
     return place
+
+
+@pytest.fixture(scope="session")
+def assert_sound():
+    """A check that a skeleton keeps all promises that its class makes."""
+
+    def check(skeleton, n_points, n_dropped=0, triangles=False):
+        vertices, edges, owner = skeleton.vertices, skeleton.edges, skeleton.vertex_of_point
+        m = len(vertices)
+        assert m > 0
+        assert vertices.shape == (m, 3)
+        assert skeleton.radii.shape == (m,)
+        for values in (vertices, skeleton.radii):
+            assert values.dtype == np.float64
+            assert np.isfinite(values).all()
+        assert (skeleton.radii >= 0).all()
+
+        assert edges.shape[1:] == (2,)
+        assert edges.dtype == np.int64
+        assert (edges[:, 0] < edges[:, 1]).all()
+        assert edges.size == 0 or (edges.min() >= 0 and edges.max() < m)
+        np.testing.assert_array_equal(edges, np.unique(edges, axis=0))
+        if not triangles:
+            around = [set() for _ in range(m)]
+            for a, b in edges.tolist():
+                around[a].add(b)
+                around[b].add(a)
+            assert not any(around[a] & around[b] for a, b in edges.tolist())
+
+        assert owner.shape == (n_points,)
+        assert owner.dtype == np.int64
+        assert owner.max() < m
+        assert (owner == -1).sum() == n_dropped
+        assert owner.min() >= -1
+        assert skeleton.points.shape == skeleton.normals.shape == (n_points, 3)
+        lengths = np.linalg.norm(skeleton.normals[owner >= 0], axis=1)
+        np.testing.assert_allclose(lengths, 1, atol=1e-12)
+
+        report = skeleton.report
+        assert report.n_input == n_points
+        assert report.n_dropped == n_dropped
+        assert 0 < report.n_distinct <= n_points - n_dropped
+        assert report.stop_reason
+
+    return check

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import logging
 import math
+import shutil
 import sys
+import textwrap
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -17,7 +19,6 @@ import typer
 from ..errors import GlskError, InvalidParameterError, SkeletonWarning
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
-_WIDE = 400
 
 # The library speaks Python; these are the same cures on the command line.
 _SAID_HERE = {
@@ -30,14 +31,12 @@ class WrongUsage(Exception):
     """The command line asks for something impossible, whatever the scan holds."""
 
 
-def console(*, stderr: bool = False, wide: bool = False) -> Any:
+def console(*, stderr: bool = False) -> Any:
     """A rich console that prints text as it is, without markup or highlighting.
 
     Parameters
     ----------
     stderr : bool
-    wide : bool
-        Break lines only for a terminal, not for a file or a pipe.
 
     Returns
     -------
@@ -45,9 +44,21 @@ def console(*, stderr: bool = False, wide: bool = False) -> Any:
     """
     from rich.console import Console
 
-    plain = {"stderr": stderr, "markup": False, "highlight": False, "emoji": False}
-    found = Console(**plain)
-    return found if found.is_terminal or not wide else Console(**plain, width=_WIDE)
+    return Console(stderr=stderr, markup=False, highlight=False, emoji=False)
+
+
+def print_table(table: Any, *, stderr: bool = False) -> None:
+    """Print a rich table without the spaces that fill its lines.
+
+    Parameters
+    ----------
+    table : rich.table.Table
+    stderr : bool
+    """
+    out = console(stderr=stderr)
+    with out.capture() as captured:
+        out.print(table)
+    typer.echo("\n".join(line.rstrip() for line in captured.get().splitlines()), err=stderr)
 
 
 @contextmanager
@@ -144,7 +155,7 @@ def progress(shown: bool) -> Iterator[Callable[..., None]]:
 
 
 def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
-    """Print names and values in two columns on stdout.
+    """Print names and values in two columns on stdout, broken to the width of a terminal but not in a file or a pipe.
 
     Parameters
     ----------
@@ -152,16 +163,15 @@ def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
         Those that are None are left out; floats are printed with six digits.
     title : str
     """
-    from rich.table import Table
-
-    table = Table.grid(padding=(0, 2))
-    for name, value in rows.items():
-        if value is not None:
-            table.add_row(name.replace("_", " "), f"{value:.6g}" if isinstance(value, float) else str(value))
-    out = console(wide=True)
     if title:
-        out.print(title, style="bold", soft_wrap=True)
-    out.print(table)
+        console().print(title, style="bold", soft_wrap=True)
+    shown = {name.replace("_", " "): value for name, value in rows.items() if value is not None}
+    indent = max(map(len, shown)) + 2
+    room = max(shutil.get_terminal_size().columns - indent, 20) if sys.stdout.isatty() else 10**6
+    for name, value in shown.items():
+        text = f"{value:.6g}" if isinstance(value, float) else str(value)
+        lines = [part for line in text.splitlines() for part in textwrap.wrap(line, room, drop_whitespace=False)]
+        typer.echo(f"{name:<{indent}}" + f"\n{'':<{indent}}".join(lines))
 
 
 def print_iterations(records, *, stderr: bool = False) -> None:
@@ -193,7 +203,7 @@ def print_iterations(records, *, stderr: bool = False) -> None:
         table.add_column(head, justify="right")
     for record in records:
         table.add_row(*(format(getattr(record, name), form) for name, form in columns.values()))
-    console(stderr=stderr).print(table)
+    print_table(table, stderr=stderr)
 
 
 def print_json(data: Any) -> None:

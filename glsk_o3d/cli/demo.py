@@ -26,9 +26,9 @@ def demo(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Skeletonise the built-in sample: a toy dinosaur with a carrying handle, scanned from two sides.
+    """Skeletonise the built-in sample object.
 
-    Writes cloud.ply (the scan), skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
+    It is a toy dinosaur with a carrying handle on its back, scanned from two sides. Writes cloud.ply (the scan), skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
     """
     with reporting(quiet=quiet, verbose=verbose):
         chosen = named_pipeline(pipeline)

@@ -11,18 +11,21 @@ import typer
 
 from ..filter import Filter, Parameters
 from ..pipeline import PIPELINES
-from .console import WrongUsage, console, print_json, reporting
+from .console import WrongUsage, console, print_json, print_table, reporting
 from .options import Json
 from .overrides import catalogue, nearest
 
 
 def filters(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="One filter, stopping rule or pipeline, in full.")
+        str | None, typer.Argument(metavar="NAME", help="One filter, stopping rule or pipeline, in full.")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """List the filters, the stopping rules and the named pipelines, with every parameter."""
+    """List filters and their parameters, and pipelines.
+
+    Everything is taken from the code: the filters, the stopping rules and the named pipelines.
+    """
     with reporting():
         known = catalogue()
         if name is not None and name not in known and name not in PIPELINES:
@@ -37,7 +40,7 @@ def filters(
         for cls in classes:
             _print_filter(cls, full=name is not None)
         for key in names:
-            _print_pipeline(key)
+            _print_pipeline(key, full=name is not None)
 
 
 def facts(cls: type[Parameters]) -> dict[str, Any]:
@@ -102,12 +105,13 @@ def _plain(value):
     return value if isinstance(value, bool | int | float | str | None) else repr(value)
 
 
-def _prose(cls) -> str:
-    """The docstring up to its first section, with the markup of formulas and code taken off."""
-    text = inspect.cleandoc(cls.__doc__ or "")
+def _prose(documented) -> str:
+    """The docstring up to its first section, a line per paragraph, with the markup of formulas and code taken off."""
+    text = inspect.cleandoc(documented.__doc__ or "")
     text = re.split(r"\n\n\w[\w ]*\n-{3,}\n", text, maxsplit=1)[0]
     text = re.sub(r":math:`([^`]*)`|``([^`]*)``|`([^`]*)`", lambda m: m[1] or m[2] or m[3], text)
-    return re.sub(r"\\(\w+)", r"\1", text)
+    text = re.sub(r"\\(\w+)", r"\1", text)
+    return re.sub(r"(?<!\n)\n(?!\n)", " ", text)
 
 
 def _print_filter(cls, full: bool) -> None:
@@ -118,34 +122,36 @@ def _print_filter(cls, full: bool) -> None:
     flow = f"  {told['consumes']} \N{RIGHTWARDS ARROW} {told['produces']}" if told["consumes"] else "  stopping rule"
     out = console()
     out.print(Text.assemble((told["name"], "bold"), (flow, "dim")))
-    out.print(told["doc"] if full else told["doc"].partition("\n\n")[0].replace("\n", " "))
+    out.print(told["doc"] + "\n" if full else told["doc"].partition("\n\n")[0])
     table = Table.grid(padding=(0, 2))
     table.add_column(no_wrap=True)
     table.add_column()
     for each in told["parameters"]:
         default = "none" if each["default"] is None else each["default"]
-        kind = each["type"].replace("?", " or none")
+        kind = each["type"].replace("stop", "stopping rule").replace("?", " or none")
         unit = "" if each["unit"] == "-" else f" [{each['unit']}]"
         bounds = f", {each['limits']}" if each["limits"] else ""
         shape = each["limits"] if each["type"] == "choice" else kind + unit + bounds
         table.add_row(f"  {each['name']}", Text.assemble(each["doc"], "\n", (f"{shape}; default {default}", "dim")))
-    out.print(table)
-    out.print()
+    print_table(table)
+    typer.echo()
 
 
 def _pipeline_facts(name: str) -> dict[str, Any]:
     make = PIPELINES[name]
-    return {"name": name, "doc": inspect.cleandoc(make.__doc__ or ""), "expression": repr(make())}
+    return {"name": name, "doc": _prose(make), "expression": repr(make())}
 
 
-def _print_pipeline(name: str) -> None:
-    from rich.padding import Padding
+def _print_pipeline(name: str, full: bool) -> None:
+    from rich.table import Table
     from rich.text import Text
 
     told = _pipeline_facts(name)
     out = console()
     out.print(Text.assemble((name, "bold"), ("  pipeline", "dim")))
-    out.print(told["doc"].partition("\n\n")[0])
+    out.print(told["doc"] + "\n" if full else told["doc"].partition("\n\n")[0])
+    table = Table.grid(padding=(0, 1))
     for i, stage in enumerate(PIPELINES[name]().stages):
-        out.print(Padding(Text(f"{'|' if i else ' '} {stage!r}"), (0, 0, 0, 2)))
-    out.print()
+        table.add_row("  |" if i else "", repr(stage))
+    print_table(table)
+    typer.echo()

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import typer
+
 from ..errors import FileFormatError, GlskError
 from ..filter import Filter
 from ..interop.files import _ending as skeleton_ending
@@ -243,6 +245,6 @@ def print_results(
         hidden = {"dropped": facts["dropped"] or None, "converged": None, "seconds": f"{seconds:.2f}"}
         print_rows({**facts, **hidden})
         for path in written:
-            print(f"wrote {path}")
+            typer.echo(f"wrote {path}")
     if problems:
         raise OSError("; ".join(problems))

@@ -37,7 +37,24 @@ def medial_vertices(skeleton):
     return np.linalg.solve(lhs + small * np.eye(3), (rhs + small[:, 0] * x0)[:, :, None])[:, :, 0] + centre
 
 
+def smooth(skeleton):
+    """Move every vertex with two neighbours halfway to their midpoint: thin parts have few points per vertex.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    (M, 3) float array
+    """
+    x = skeleton.vertices
+    middle = (_with_neighbours(x, *skeleton.edges.T) - x) / 2
+    return np.where(skeleton.degree[:, None] == 2, (x + middle) / 2, x)
+
+
 def _with_neighbours(values, a, b):
+    """Values of each vertex plus those of its neighbours along the edges (a, b)."""
     total = values.copy()
     np.add.at(total, a, values[b])
     np.add.at(total, b, values[a])

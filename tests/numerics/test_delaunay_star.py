@@ -1,0 +1,274 @@
+"""The ring kernel against scipy's Delaunay triangulation, and against convex hulls in exact arithmetic."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.spatial import Delaunay
+
+from glsk_o3d.numerics.delaunay_star import delaunay_star
+
+
+def star(offsets, valid=None):
+    """Ring of one neighbourhood as a list, and whether it is closed."""
+    valid = None if valid is None else np.asarray(valid)[None]
+    ring, closed = delaunay_star(np.asarray(offsets, float)[None], valid)
+    return ring[0][ring[0] >= 0].tolist(), bool(closed[0])
+
+
+def links(ring, closed):
+    """Unordered pairs of consecutive neighbours."""
+    following = ring[1:] + ring[:1] if closed else ring[1:]
+    return {frozenset(pair) for pair in zip(ring, following, strict=False)}
+
+
+def triangulated_star(offsets):
+    """The same from a Delaunay triangulation: links of the centre, and whether it is off the hull."""
+    triangulation = Delaunay(np.vstack([offsets, [0, 0]]))
+    centre = len(offsets)
+    triangles = triangulation.simplices[(triangulation.simplices == centre).any(axis=1)]
+    opposite = {frozenset(set(triangle) - {centre}) for triangle in triangles.tolist()}
+    return opposite, centre not in triangulation.convex_hull
+
+
+def exact_star(offsets, valid):
+    """The documented star in rational arithmetic, as offsets: counter-clockwise, a fan from its first border neighbour.
+
+    Strict corners of the convex hull of the images 1 / x, and the origin wherever it is not strictly inside.
+    """
+    images = {}
+    for (x, y), use in zip(offsets, valid, strict=True):
+        if use and (x or y):
+            squared = x * x + y * y
+            images[Fraction(x, squared), Fraction(y, squared)] = (x, y)
+    origin = (Fraction(0), Fraction(0))
+    points = sorted([*images, origin])
+
+    def turn(a, b, c):
+        return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+    def chain(path):
+        hull = []
+        for p in path:  # the origin stays a corner where it lies on an edge
+            while (
+                len(hull) > 1
+                and turn(hull[-2], hull[-1], p) <= 0
+                and not (hull[-1] == origin and turn(hull[-2], hull[-1], p) == 0)
+            ):
+                hull.pop()
+            hull.append(p)
+        return hull
+
+    if all(turn(points[0], points[-1], p) == 0 for p in points):
+        ends = [p for p in (points[0], points[-1]) if p != origin]
+        return [images[p] for p in ends], False
+    lower, upper = chain(points), chain(points[::-1])
+    hull = lower[:-1] + upper[:-1]
+    if origin in hull:
+        at = hull.index(origin)
+        return [images[p] for p in hull[at + 1 :] + hull[:at]], False
+    return [images[p] for p in hull], True
+
+
+def turned(sequence):
+    """A cyclic sequence from its least element."""
+    at = sequence.index(min(sequence))
+    return sequence[at:] + sequence[:at]
+
+
+# ---- thousands of neighbourhoods in general position
+
+
+def neighbourhoods(kind, n=700, k=14, seed=0):
+    rng = np.random.default_rng([seed, len(kind)])
+    cloud = rng.normal(size=(n, k, 2))
+    if kind == "stretched":
+        cloud *= [1, 1e-3]
+    elif kind == "border":
+        cloud[..., 1] = np.abs(cloud[..., 1])
+    elif kind == "corner":
+        cloud = np.abs(cloud)
+    elif kind == "graded":
+        cloud *= 10 ** rng.uniform(-4, 0, (n, k, 1))
+    elif kind == "arc":
+        angle = rng.uniform(0, 1.7 * np.pi, (n, k))
+        cloud = np.stack([np.cos(angle), np.sin(angle)], -1) * rng.uniform(0.9, 1.1, (n, k, 1))
+    elif kind == "thin ring":  # all but cocircular
+        cloud /= np.linalg.norm(cloud, axis=2, keepdims=True)
+        cloud += 1e-4 * rng.normal(size=cloud.shape)
+    elif kind == "jittered grid":
+        grid = np.stack(np.meshgrid([-2, -1, 0, 1, 2], [-2, -1, 0, 1, 2]), -1).reshape(-1, 2)
+        grid = grid[np.abs(grid).sum(axis=1) > 0]
+        cloud = grid + 1e-3 * rng.normal(size=(n, len(grid), 2))
+    return cloud
+
+
+KINDS = ("plain", "stretched", "border", "corner", "graded", "arc", "thin ring", "jittered grid")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_against_triangulations(kind):
+    cloud = neighbourhoods(kind)
+    rings, closed = delaunay_star(cloud)
+    n_closed = 0
+    for offsets, row, is_closed in zip(cloud, rings.tolist(), closed.tolist(), strict=True):
+        ring = [j for j in row if j >= 0]
+        expected, inside = triangulated_star(offsets)
+        assert links(ring, is_closed) == expected
+        assert is_closed == inside
+        n_closed += inside
+    expected_closed = {"border": (0, 0), "corner": (0, 0)}.get(kind, (1, len(cloud)))
+    assert expected_closed[0] <= n_closed <= expected_closed[1]
+
+
+@pytest.mark.parametrize("k", [3, 4, 5, 8, 30, 60])
+def test_against_triangulations_of_any_size(k):
+    cloud = neighbourhoods("plain", n=200, k=k, seed=k)
+    rings, closed = delaunay_star(cloud)
+    for offsets, row, is_closed in zip(cloud, rings.tolist(), closed.tolist(), strict=True):
+        assert (links([j for j in row if j >= 0], is_closed), is_closed) == triangulated_star(offsets)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_turns_counter_clockwise_and_starts_where_it_says(kind):
+    cloud = neighbourhoods(kind)
+    rings, closed = delaunay_star(cloud)
+    for offsets, row, is_closed in zip(cloud, rings.tolist(), closed.tolist(), strict=True):
+        ring = offsets[[j for j in row if j >= 0]]
+        following = np.roll(ring, -1, axis=0)
+        cross = ring[:, 0] * following[:, 1] - ring[:, 1] * following[:, 0]
+        assert (cross[: None if is_closed else -1] > 0).all()
+        if is_closed:
+            assert np.linalg.norm(ring[0]) == np.linalg.norm(offsets, axis=1).min()
+        elif len(ring) > 1:
+            # the gap of a fan is at least a half turn wide, or the centre would not be on the hull
+            assert cross[-1] <= 0 or len(ring) == 2
+
+
+def test_rows_do_not_influence_each_other():
+    cloud = np.concatenate([neighbourhoods(kind, n=20) for kind in KINDS if kind != "jittered grid"])
+    together, closed = delaunay_star(cloud)
+    for offsets, row, is_closed in zip(cloud, together.tolist(), closed.tolist(), strict=True):
+        assert ([j for j in row if j >= 0], is_closed) == star(offsets)
+
+
+@pytest.mark.parametrize("kind", ["plain", "border", "arc", "graded"])
+def test_does_not_depend_on_rotation_scale_or_order(kind):
+    cloud = neighbourhoods(kind)
+    ring, closed = delaunay_star(cloud)
+    angle = 0.7
+    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    for moved in (cloud @ rotation.T, cloud * 1e-9, cloud * 1e9, (cloud @ rotation) * 3.7):
+        again, closed_again = delaunay_star(moved)
+        np.testing.assert_array_equal(again, ring)
+        np.testing.assert_array_equal(closed_again, closed)
+    order = np.random.default_rng(1).permutation(cloud.shape[1])
+    again, closed_again = delaunay_star(cloud[:, order])
+    np.testing.assert_array_equal(np.where(again >= 0, order[again], -1), ring)
+    np.testing.assert_array_equal(closed_again, closed)
+
+
+def test_reflection_reverses_the_ring():
+    cloud = neighbourhoods("plain")
+    ring, closed = delaunay_star(cloud)
+    mirrored, closed_again = delaunay_star(cloud * [1, -1])
+    np.testing.assert_array_equal(closed_again, closed)
+    for row, other, is_closed in zip(ring.tolist(), mirrored.tolist(), closed.tolist(), strict=True):
+        a, b = [j for j in row if j >= 0], [j for j in other if j >= 0][::-1]
+        assert (turned(a) == turned(b)) if is_closed else (a == b)
+
+
+def test_masked_neighbours_do_not_exist():
+    cloud = neighbourhoods("plain", k=20)
+    valid = np.random.default_rng(2).random(cloud.shape[:2]) < 0.5
+    ring, closed = delaunay_star(np.where(valid[..., None], cloud, 1e-9), valid)
+    for offsets, use, row, is_closed in zip(cloud, valid, ring.tolist(), closed.tolist(), strict=True):
+        kept = np.flatnonzero(use)
+        expected, expected_closed = star(offsets[kept])
+        assert [j for j in row if j >= 0] == kept[expected].tolist()
+        assert is_closed == expected_closed
+
+
+# ---- degenerate neighbourhoods, by hand
+
+GRID = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
+
+
+@pytest.mark.parametrize(
+    ("offsets", "ring", "closed"),
+    [
+        pytest.param(
+            np.empty((0, 2)),
+            [],
+            False,
+            id="no neighbour",
+            marks=pytest.mark.xfail(strict=True, raises=ValueError, reason="k = 0 columns: argmax of nothing"),
+        ),
+        pytest.param([(0, 0)], [], False, id="only one that coincides"),
+        pytest.param([(0, 0), (2, 1), (0, 0)], [(2, 1)], False, id="one neighbour"),
+        pytest.param([(1, 0), (0, 1)], [(1, 0), (0, 1)], False, id="two neighbours"),
+        pytest.param([(2, 0), (1, 0), (3, 0)], [(1, 0)], False, id="collinear, all on one side"),
+        pytest.param([(1, 0), (-2, 0)], [(-2, 0), (1, 0)], False, id="collinear, on both sides"),
+        pytest.param([(3, 3), (-2, -2), (1, 1), (-4, -4)], [(-2, -2), (1, 1)], False, id="collinear, tilted"),
+        pytest.param([(1, 0), (0, 1), (-1, 0)], [(1, 0), (0, 1), (-1, 0)], False, id="centre on an edge of the hull"),
+        pytest.param([(0, 1), (0, 1), (1, -1), (-1, -1), (1, -1)], [(0, 1), (-1, -1), (1, -1)], True, id="duplicates"),
+        pytest.param(GRID, [(1, 0), (0, 1), (-1, 0), (0, -1)], True, id="square grid"),
+        pytest.param([p for p in GRID if p[1] >= 0], [(1, 0), (0, 1), (-1, 0)], False, id="edge of a square grid"),
+        pytest.param([p for p in GRID if min(p) >= 0], [(1, 0), (0, 1)], False, id="corner of a square grid"),
+        pytest.param([(2, 0), (2, 2), (0, 2)], [(2, 0), (0, 2)], False, id="all on a circle through the centre"),
+    ],
+)
+def test_degenerate(offsets, ring, closed):
+    offsets = np.reshape(np.asarray(offsets, float), (-1, 2))
+    found, is_closed = star(offsets)
+    found = [tuple(offsets[j]) for j in found]
+    assert is_closed == closed
+    if closed:
+        assert turned(found) == turned([tuple(map(float, p)) for p in ring])
+    else:  # a line has no first side
+        assert found == ring or (
+            len(ring) == 2 and found == ring[::-1] and np.cross(*(np.r_[p, 0] for p in ring))[2] == 0
+        )
+
+
+def test_no_neighbourhoods():
+    ring, closed = delaunay_star(np.empty((0, 5, 2)))
+    assert len(ring) == len(closed) == 0
+
+
+# ---- degenerate neighbourhoods, by the thousand: small integers are often collinear, cocircular, doubled
+
+WHOLE = st.integers(-4, 4)
+NEIGHBOURHOOD = st.lists(st.tuples(WHOLE, WHOLE, st.booleans() | st.just(True)), min_size=1, max_size=14)
+
+
+@settings(max_examples=1500, deadline=None)
+@given(NEIGHBOURHOOD)
+def test_against_exact_arithmetic(rows):
+    offsets, valid = [row[:2] for row in rows], [row[2] for row in rows]
+    expected, closed = exact_star(offsets, valid)
+    ring, is_closed = star(offsets, valid)
+    found = [offsets[j] for j in ring]
+    assert is_closed == closed
+    assert all(valid[j] for j in ring)
+    if closed:
+        assert turned(found) == turned(expected)
+        assert sum(c * c for c in found[0]) == min(sum(c * c for c in p) for p in found)
+    else:
+        straight = len(expected) == 2 and expected[0][0] * expected[1][1] == expected[0][1] * expected[1][0]
+        assert found == expected or (straight and found == expected[::-1])
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.tuples(*2 * [st.floats(-1.6, 1.6, allow_subnormal=False)]), min_size=1, max_size=12))
+def test_any_numbers_give_a_proper_ring(offsets):
+    offsets = np.array(offsets)
+    # squares of smaller ones are no longer normal numbers; in the working frame such points coincide
+    assume((np.abs(offsets[offsets != 0]) > 1e-150).all())
+    ring, closed = star(offsets)
+    assert len(set(ring)) == len(ring)
+    assert (len(ring) > 0) == (offsets != 0).any()
+    assert not closed or len(ring) > 2
+    assert all(offsets[j].any() for j in ring)

@@ -1,0 +1,341 @@
+"""Contractor: the solve by its definition, the weights, the guards, and closed forms."""
+
+from dataclasses import replace
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from glsk_o3d import Contractor, ExplainedScore, LPRReducer, RingBuilder, RingSizeRatio, pipelines, samples
+from glsk_o3d import contractor as module
+from glsk_o3d.contractor import explained_score
+from glsk_o3d.numerics.cotangent import cotangent_laplacian
+from glsk_o3d.numerics.solver import SolveError
+
+CAO, WEN, DEFAULT = (named().stages[1] for named in (pipelines.cao2010, pipelines.wen2024, pipelines.default))
+
+
+@pytest.fixture(scope="module")
+def built():
+    return RingBuilder()(samples.torus(n=400).points)
+
+
+def never(_):
+    """A stopping rule."""
+
+
+# ---- one solve
+
+
+@pytest.mark.parametrize("share", [0.2, 1.0])
+def test_first_solve_is_the_least_squares_solution(built, share):
+    state = Contractor(max_iterations=1, initial_contraction=share)(built)
+    weight = share / built.mean_ring_edge
+    laplacian = cotangent_laplacian(built.positions, built.rings).toarray()
+    n = len(built)
+    stacked, right = np.vstack([weight * laplacian, np.eye(n)]), np.vstack([np.zeros((n, 3)), built.positions])
+    np.testing.assert_allclose(state.positions, np.linalg.lstsq(stacked, right, rcond=None)[0], atol=1e-10)
+    np.testing.assert_array_equal(state.previous, built.positions)
+    np.testing.assert_allclose(state.laplacian_coordinates, laplacian @ built.positions, atol=1e-10)
+    np.testing.assert_array_equal(state.ring_size, built.rings.nearest(state.positions)[1])
+    np.testing.assert_array_equal(state.ring_size0, built.ring_size0)
+    assert state.contraction_weight == pytest.approx(weight)
+    # in the first pass the published code takes a(1) for its drop
+    assert state.ring_ratio_drop == pytest.approx(state.ring_ratio)
+
+
+def test_second_solve_weighs_by_the_rings_of_the_first(built):
+    one = replace(CAO, max_iterations=1)(built)
+    two = replace(CAO, max_iterations=1)(one)
+    weight, attraction = 3 * one.contraction_weight, np.minimum(one.ring_size0 / one.ring_size, 1e4)
+    laplacian = cotangent_laplacian(one.positions, one.rings).toarray()
+    n = len(built)
+    stacked = np.vstack([weight * laplacian, np.diag(attraction)])
+    right = np.vstack([np.zeros((n, 3)), attraction[:, None] * one.positions])
+    np.testing.assert_allclose(two.positions, np.linalg.lstsq(stacked, right, rcond=None)[0], atol=1e-8)
+    assert two.ring_ratio_drop == pytest.approx(one.ring_ratio - two.ring_ratio)
+
+
+def test_mass_means_so_many_points_in_one_place(built):
+    """A doubled functional has the same minimum: all masses alike change nothing but the pull between the two terms."""
+    single = Contractor(max_iterations=1)(built)
+    masses = replace(built, mass=np.full(len(built), 4.0), mean_ring_edge=built.mean_ring_edge / 4)
+    np.testing.assert_allclose(Contractor(max_iterations=1)(masses).positions, single.positions, atol=1e-9)
+
+
+def test_weights_grow_up_to_their_cap(built):
+    filter = Contractor(stop=never, max_iterations=6, amplification=2.5, max_contraction=40.0)
+    weights = [record.contraction_weight for record in filter(built).report.iterations]
+    expected = np.minimum(0.2 / built.mean_ring_edge * 2.5 ** np.arange(6), 40)
+    np.testing.assert_allclose(weights, expected[: len(weights)], rtol=1e-12)
+    assert weights[-1] == 40
+
+
+def test_going_on_is_the_same_as_not_having_stopped(built):
+    for reducer in (None, LPRReducer()):
+        through = Contractor(reducer=reducer, stop=never, max_iterations=4)(built)
+        half = Contractor(reducer=reducer, stop=never, max_iterations=2)(built)
+        rest = Contractor(reducer=reducer, stop=never, max_iterations=2)(half)
+        np.testing.assert_array_equal(rest.positions, through.positions)
+        np.testing.assert_array_equal(rest.survivors, through.survivors)
+        drop = [replace(r, seconds=0) for r in rest.report.iterations]
+        assert drop == [replace(r, seconds=0) for r in through.report.iterations]
+        assert [record.iteration for record in drop] == [1, 2, 3, 4]
+
+
+def test_solution_does_not_depend_on_place_size_or_rotation():
+    points = np.round(samples.y_junction(n=500).points * 2**20) / 2**20
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+
+    def contracted(cloud, share=0.2):
+        state = (RingBuilder() | Contractor(max_iterations=2, initial_contraction=share))(cloud)
+        return state.contracted[state.survivor_of_point]
+
+    expected = contracted(points)
+    # offset and factor are exact, but the frame's own rounding is not: digits of the result, not of the solve
+    np.testing.assert_allclose(contracted(points + 2**20) - 2**20, expected, atol=1e-9)
+    np.testing.assert_allclose(contracted(points * 1e-3) * 1e3, expected, atol=1e-11)
+    np.testing.assert_allclose(contracted(points * 1e3) / 1e3, expected, atol=1e-11)
+    order = np.random.default_rng(1).permutation(len(points))
+    np.testing.assert_allclose(contracted(points[order]), expected[order], atol=1e-11)
+    for exact in (np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]]), np.diag([1, -1, -1])):
+        np.testing.assert_allclose(contracted(points @ exact), expected @ exact, atol=1e-11)
+    # any other turn changes the bounding box, and with it the frame that w_L is stated in
+    sides = [np.ptp(cloud, axis=0).max() for cloud in (points, points @ turn)]
+    assert abs(sides[1] / sides[0] - 1) > 0.01
+    same_weight = 0.2 * sides[0] / sides[1]
+    np.testing.assert_allclose(contracted(points @ turn, same_weight), expected @ turn, atol=1e-9)
+    assert 1e-4 < np.abs(contracted(points @ turn) - expected @ turn).max() < 1e-2
+
+
+# ---- closed forms
+
+
+def distance_to_axis(points, sample):
+    """In tube radii."""
+    share = np.linspace(0, 1, 41)[:, None, None]
+    a, b = sample.nodes[sample.edges[:, 0]], sample.nodes[sample.edges[:, 1]]
+    return cKDTree((a + share * (b - a)).reshape(-1, 3)).query(points)[0] / sample.radii.mean()
+
+
+@pytest.mark.parametrize(
+    ("shape", "filter", "mean"),
+    [
+        ("tube", CAO, 0.15),
+        ("tube", WEN, 0.15),
+        ("tube", DEFAULT, 0.15),
+        # a bent tube is pulled inwards: more so where merges spread the rings
+        ("torus", CAO, 0.25),
+        ("torus", DEFAULT, 0.4),
+        ("helix", CAO, 0.2),
+        ("helix", DEFAULT, 0.5),
+        ("y_junction", CAO, 0.2),
+        ("y_junction", DEFAULT, 0.25),
+    ],
+)
+def test_points_come_to_lie_on_the_axis(shape, filter, mean):
+    sample = samples.SAMPLES[shape](n=2048)
+    state = filter(RingBuilder()(sample.points))
+    distance = distance_to_axis(state.contracted, sample)
+    assert distance.mean() < mean
+    assert distance_to_axis(sample.points, sample).mean() > 0.9
+    # all along it: the ends draw back, but by little
+    far = cKDTree(state.contracted).query(sample.nodes)[0].max()
+    assert far < 2.5 * sample.radii.max()
+
+
+def test_conserving_mass_keeps_a_torus_open():
+    """Without it the torus falls into its centre: the reason for the multiplicities."""
+    sample = samples.torus(n=2048, seed=1)
+    built = RingBuilder()(sample.points)
+    kept, lost = (distance_to_axis(filter(built).contracted, sample).mean() for filter in (DEFAULT, WEN))
+    assert kept < 0.4
+    assert lost > 1.5
+
+
+@pytest.mark.parametrize(
+    ("points", "score"),
+    [
+        (np.outer(np.linspace(0, 1, 50), [1, 2, 3]), 1),
+        (np.concatenate([np.eye(3), -np.eye(3)]), 2 / 3),
+        (np.concatenate([np.eye(3)[:2], -np.eye(3)[:2]]), 3 / 4),
+        # variances 4, 1, 0
+        (np.concatenate([np.diag([2.0, 1, 0])[:2], -np.diag([2.0, 1, 0])[:2]]) + 7, (2 * 4 + 1) / (2 * 5)),
+    ],
+    ids=["line", "ball", "disc", "ellipse"],
+)
+def test_explained_score(points, score):
+    assert explained_score(points) == pytest.approx(score, abs=1e-12)
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    assert explained_score(1e-3 * points @ turn - 5) == pytest.approx(score, abs=1e-9)
+
+
+# ---- records, stopping, reducing
+
+
+def test_records_follow_their_definitions(built):
+    filter = Contractor(reducer=LPRReducer(), stop=never, max_iterations=4)
+    state = filter(built)
+    records = state.report.iterations
+    assert [record.iteration for record in records] == [1, 2, 3, 4]
+    n = [record.n_points for record in records]
+    assert n[0] == len(built)
+    assert [before - record.n_merged for before, record in zip(n, records, strict=True)] == [*n[1:], len(state)]
+    e_before, n_before = explained_score(built.cloud), len(built)
+    for record in records:
+        kept = 1 - (n_before - record.n_points) / len(built)
+        assert record.explained_change == pytest.approx(abs(record.explained - e_before) / kept, rel=1e-12)
+        assert 2 / 3 - 1e-9 <= record.explained <= 1 + 1e-9
+        assert 0 <= record.solve_error < 1e-4
+        assert record.seconds > 0
+        e_before, n_before = record.explained, record.n_points
+    final = Contractor(stop=never, max_iterations=1)(built)
+    assert final.report.iterations[0].explained == pytest.approx(explained_score(final.positions))
+    assert final.report.iterations[0].ring_ratio == pytest.approx(final.ring_size.sum() / final.ring_size0.sum())
+
+
+def test_stop_rule_is_asked_after_every_solve_and_its_reason_kept(built):
+    asked = []
+
+    def third(iterations):
+        asked.append(len(iterations))
+        return "three are enough" if len(iterations) == 3 else None
+
+    reducer = Mock(side_effect=LPRReducer())
+    report = Contractor(stop=third, reducer=reducer)(built).report
+    assert asked == [1, 2, 3]
+    assert report.stop_reason == "three are enough"
+    assert report.converged
+    assert report.iterations[-1].n_merged == 0  # nothing is merged after the last solve
+    assert reducer.call_count == 2
+
+
+def test_running_out_of_iterations_is_no_convergence(built):
+    report = Contractor(stop=never, max_iterations=2)(built).report
+    assert report.stop_reason == "reached max_iterations = 2"
+    assert not report.converged
+
+
+def test_reducing_ends_after_a_pass_without_a_merge(built):
+    idle = Mock(side_effect=lambda state: state)
+    Contractor(reducer=idle, stop=never, max_iterations=4)(built)
+    assert idle.call_count == 1
+
+
+def test_no_reducer_keeps_every_point(built):
+    state = Contractor(stop=never, max_iterations=3)(built)
+    np.testing.assert_array_equal(state.survivors, np.arange(len(built)))
+    assert all(record.n_merged == 0 for record in state.report.iterations)
+
+
+@pytest.mark.parametrize("answer", [None, True, 0])
+def test_progress_is_told_once_per_solve(built, answer):
+    told = []
+
+    def listen(record):
+        told.append(record)
+        return answer
+
+    filter = Contractor(reducer=LPRReducer(), stop=ExplainedScore())
+    report = filter(built, on_iteration=listen).report
+    assert tuple(told) == report.iterations
+    assert [record.iteration for record in told] == list(range(1, len(told) + 1))
+    assert report.converged
+
+
+@pytest.mark.parametrize("after", [1, 2])
+def test_progress_can_stop_the_run(built, after):
+    state = Contractor(stop=never)(built, on_iteration=lambda record: record.iteration < after)
+    assert len(state.report.iterations) == after
+    assert state.report.stop_reason == "stopped by the caller"
+    assert not state.report.converged
+    np.testing.assert_array_equal(state.positions, Contractor(stop=never, max_iterations=after)(built).positions)
+
+
+# ---- the guards
+
+
+def same(a, b):
+    for name in ("positions", "previous", "survivors", "owner", "mass", "ring_size", "laplacian_coordinates"):
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
+    assert a.contraction_weight == b.contraction_weight
+    assert [replace(r, seconds=0) for r in a.report.iterations] == [replace(r, seconds=0) for r in b.report.iterations]
+
+
+GRID = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3)
+
+
+def test_solve_that_throws_points_out_is_dropped():
+    """A full cube of points has no surface: as published, the second solve runs away."""
+    built = RingBuilder()(GRID)
+    state = CAO(built)
+    assert len(state.report.iterations) == 1
+    assert state.report.stop_reason.startswith("solve 2 refused, last sound state kept: it would throw ")
+    assert " of 216 points out of 1.2 times the bounding box" in state.report.stop_reason
+    assert not state.report.converged
+    same(state, replace(CAO, max_iterations=1)(built))
+    assert (np.abs(state.positions) <= 1.2 * state.frame.half_extent).all()
+
+
+def test_horse_ends_with_a_sound_state(shared_dir):
+    with np.load(shared_dir / "golden" / "horse_1987.npz") as file:
+        built = RingBuilder()(file["points"])
+    state = WEN(built)
+    done = len(state.report.iterations)
+    assert f"solve {done + 1} refused, last sound state kept" in state.report.stop_reason
+    same(state, replace(WEN, max_iterations=done)(built))
+    assert (np.abs(state.positions) <= 1.2 * state.frame.half_extent).all()
+
+
+@pytest.mark.parametrize("fails_at", [1, 3])
+def test_unsolvable_system_keeps_the_last_sound_state(built, monkeypatch, fails_at):
+    solve, calls = module.solve_contraction, []
+
+    def fail(*system):
+        calls.append(system)
+        if len(calls) == fails_at:
+            raise SolveError("corrections stay at 1e-2")
+        return solve(*system)
+
+    expected = Contractor(stop=never, max_iterations=fails_at - 1)(built) if fails_at > 1 else built
+    monkeypatch.setattr(module, "solve_contraction", fail)
+    state = Contractor(stop=never)(built)
+    same(state, expected)
+    assert state.report.stop_reason == (f"solve {fails_at} refused, last sound state kept: corrections stay at 1e-2")
+    assert not state.report.converged
+
+
+def test_points_thrown_far_out_never_get_through(built, monkeypatch):
+    solve, calls = module.solve_contraction, []
+
+    def throw(*system):
+        positions, error = solve(*system)
+        calls.append(1)
+        if len(calls) > 2:
+            positions = positions.copy()
+            positions[len(calls) % len(positions)] = 50
+        return positions, error
+
+    expected = Contractor(stop=never, max_iterations=2)(built)
+    monkeypatch.setattr(module, "solve_contraction", throw)
+    state = Contractor(stop=never)(built)
+    same(state, expected)
+    assert "solve 3 refused" in state.report.stop_reason
+    assert "out of 1.2 times the bounding box" in state.report.stop_reason
+
+
+@pytest.mark.parametrize("shape", ["sauropod", "two_rings", "sheet", "sphere"])
+@pytest.mark.parametrize("filter", [CAO, WEN, DEFAULT], ids=["cao2010", "wen2024", "default"])
+def test_no_point_leaves_the_box(shape, filter):
+    state = filter(RingBuilder()(samples.SAMPLES[shape](n=700, noise=0.01).points))
+    limit = np.maximum(1.2 * state.frame.half_extent, 0.01 * state.frame.diagonal)
+    assert (np.abs(state.positions) <= limit).all()
+    assert state.report.converged == (" < " in state.report.stop_reason and "refused" not in state.report.stop_reason)
+
+
+def test_ring_size_rule_in_a_run(built):
+    records = Contractor(stop=RingSizeRatio(0.1), max_iterations=20)(built).report.iterations
+    drops = -np.diff([1.0, *(record.ring_ratio for record in records)])
+    assert (drops[:-1] >= 0.1).all()
+    assert drops[-1] < 0.1

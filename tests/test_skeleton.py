@@ -1,0 +1,146 @@
+"""Skeleton: the graph and what can be asked of it."""
+
+import dataclasses
+from itertools import pairwise
+
+import networkx as nx
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glsk_o3d import Skeleton
+from glsk_o3d.skeleton import plane_distance_radii
+
+
+def skeleton_of(m, edges):
+    rng = np.random.default_rng(m)
+    edges = sorted({(min(edge), max(edge)) for edge in edges})
+    return Skeleton(rng.normal(size=(m, 3)), edges, rng.random(m), [0] * 4, rng.normal(size=(4, 3)), np.ones((4, 3)))
+
+
+def cycle(nodes):
+    return list(zip(nodes, [*nodes[1:], nodes[0]], strict=True))
+
+
+def path(nodes):
+    return list(pairwise(nodes))
+
+
+HAND_MADE = {
+    "one vertex": (1, [], dict(components=1, loops=0, leaves=0, junctions=0, branches=[])),
+    "an edge": (2, [(0, 1)], dict(components=1, loops=0, leaves=2, junctions=0, branches=[2])),
+    "a path": (5, path([3, 1, 4, 0, 2]), dict(components=1, loops=0, leaves=2, junctions=0, branches=[5])),
+    "a ring": (6, cycle([0, 3, 1, 5, 2, 4]), dict(components=1, loops=1, leaves=0, junctions=0, branches=[7])),
+    "a star": (4, [(0, 1), (0, 2), (0, 3)], dict(components=1, loops=0, leaves=3, junctions=1, branches=[2, 2, 2])),
+    "a ring on a stick": (
+        7,
+        cycle([0, 1, 2, 3]) + path([0, 4, 5, 6]),
+        dict(components=1, loops=1, leaves=1, junctions=1, branches=[4, 5]),
+    ),
+    "an eight": (
+        7,
+        cycle([0, 1, 2, 3]) + cycle([0, 4, 5, 6]),
+        dict(components=1, loops=2, leaves=0, junctions=1, branches=[5, 5]),
+    ),
+    "a theta": (
+        6,
+        cycle([0, 1, 2, 3, 4, 5]) + [(0, 3)],
+        dict(components=1, loops=2, leaves=0, junctions=2, branches=[2, 4, 4]),
+    ),
+    "dumbbells": (
+        8,
+        [*cycle([0, 1, 2]), *path([2, 3, 4, 5]), *cycle([5, 6, 7])],
+        dict(components=1, loops=2, leaves=0, junctions=2, branches=[4, 4, 4]),
+    ),
+    "a forest": (
+        9,
+        [*path([0, 4, 8]), *cycle([1, 2, 3]), (5, 6)],
+        dict(components=4, loops=1, leaves=4, junctions=0, branches=[2, 3, 4]),
+    ),
+}
+
+
+@pytest.mark.parametrize("which", HAND_MADE)
+def test_hand_made_graphs(which):
+    m, edges, facts = HAND_MADE[which]
+    skeleton = skeleton_of(m, edges)
+    assert skeleton.n_components == facts["components"]
+    assert skeleton.n_loops == facts["loops"]
+    assert len(skeleton.leaves) == facts["leaves"]
+    assert len(skeleton.junctions) == facts["junctions"]
+    assert sorted(map(len, skeleton.branches)) == facts["branches"]
+    for count in ("components", "loops", "leaves", "junctions"):
+        assert f"{facts[count]} {count}" in repr(skeleton)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.integers(1, 14), st.sets(st.tuples(st.integers(0, 13), st.integers(0, 13))))
+def test_random_graphs_against_networkx(m, edges):
+    edges = {(a, b) for a, b in edges if a < b < m}
+    skeleton = skeleton_of(m, edges)
+    graph = nx.Graph()
+    graph.add_nodes_from(range(m))
+    graph.add_edges_from(edges)
+    degree = [graph.degree[i] for i in range(m)]
+    assert skeleton.degree.tolist() == degree
+    assert skeleton.leaves.tolist() == [i for i in range(m) if degree[i] == 1]
+    assert skeleton.junctions.tolist() == [i for i in range(m) if degree[i] > 2]
+    assert skeleton.n_components == nx.number_connected_components(graph)
+    assert skeleton.n_loops == len(nx.cycle_basis(graph))
+    for part in nx.connected_components(graph):
+        assert len({skeleton.component_of_vertex[i] for i in part}) == 1
+
+    covered = []
+    for branch in skeleton.branches:
+        covered += [tuple(sorted(edge)) for edge in path(branch.tolist())]
+        assert all(degree[i] == 2 for i in branch[1:-1])
+        ends = {int(branch[0]), int(branch[-1])}
+        assert all(degree[i] != 2 for i in ends) or len(ends) == 1
+    assert sorted(covered) == sorted(edges)  # every edge in one branch, once
+
+    back = skeleton.to_networkx()
+    assert set(back.nodes) == set(range(m))
+    assert {tuple(sorted(edge)) for edge in back.edges} == edges
+    for i in range(m):
+        assert back.nodes[i] == {"position": tuple(skeleton.vertices[i]), "radius": skeleton.radii[i]}
+    total = sum(length for _, _, length in back.edges(data="length"))
+    assert skeleton.length == pytest.approx(total)
+
+
+def test_lengths_by_hand():
+    skeleton = dataclasses.replace(
+        skeleton_of(4, path([0, 1, 2])), vertices=[[0, 0, 0], [3, 4, 0], [3, 4, 12], [9, 9, 9]]
+    )
+    assert skeleton.edge_lengths.tolist() == [5, 12]
+    assert skeleton.length == 17
+
+
+def test_arrays_are_of_the_promised_kind():
+    skeleton = Skeleton([[0, 0, 0], [1, 0, 0]], [], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
+    assert skeleton.vertices.dtype == skeleton.radii.dtype == skeleton.points.dtype == np.float64
+    assert skeleton.edges.dtype == skeleton.vertex_of_point.dtype == np.int64
+    assert skeleton.edges.shape == (0, 2)
+    assert skeleton.degree.tolist() == [0, 0]
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        skeleton.edges = None
+
+
+def test_nothing():
+    skeleton = Skeleton([], [], [], [], [], [])
+    assert (skeleton.n_components, skeleton.n_loops, skeleton.length, skeleton.branches) == (0, 0, 0, ())
+
+
+def test_radius_of_a_tube_and_of_a_ball():
+    rng = np.random.default_rng(0)
+    angle, along = rng.uniform(0, 2 * np.pi, 400), rng.uniform(-1, 1, 400)
+    normals = np.stack([0 * angle, np.cos(angle), np.sin(angle)], 1)
+    tube = 0.3 * normals + along[:, None] * [1, 0, 0]
+    ball = rng.normal(size=(300, 3))
+    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
+    vertices = np.array([[-0.5, 0, 0], [0.5, 0, 0], [7, 7, 7], [0, 0, 0]])
+    owner = np.concatenate([(along > 0).astype(int), np.full(300, 2), [-1]])
+    points = np.concatenate([tube, 2.5 * ball + 7, [[np.nan] * 3]])
+    signs = rng.choice([-1, 1], (701, 1))  # normals are known up to their sign only
+    radii = plane_distance_radii(vertices, owner, points, signs * np.concatenate([normals, ball, [[np.nan] * 3]]))
+    np.testing.assert_allclose(radii, [0.3, 0.3, 2.5, 0], rtol=1e-12)

@@ -1,0 +1,81 @@
+"""The stopping rules on hand-made records."""
+
+from dataclasses import fields
+
+import pytest
+
+from glsk_o3d import ExplainedScore, InvalidParameterError, IterationRecord, RingSizeRatio
+
+
+def records(**columns):
+    """Iteration records with the given columns; everything else is as far from a stop as can be."""
+    rest = dict.fromkeys((field.name for field in fields(IterationRecord)), 1) | dict(
+        explained_change=9.0, ring_ratio=0.5
+    )
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    return tuple(IterationRecord(**(rest | row | dict(iteration=i))) for i, row in enumerate(rows, start=1))
+
+
+@pytest.mark.parametrize(
+    ("rule", "changes", "stops_after"),
+    [
+        (ExplainedScore(), [0.5, 0.001, 0.5, 0.5, 0.03, 0.019, 0.001], 6),
+        (ExplainedScore(), [0.0, 0.0, 0.0, 0.0], 4),
+        (ExplainedScore(), [0.5, 0.5, 0.5, 0.02], None),
+        (ExplainedScore(0.1), [0.5, 0.09, 0.5, 0.2, 0.09], 5),
+        (ExplainedScore(min_iterations=1), [0.019], 1),
+        (ExplainedScore(min_iterations=2), [0.5, 0.019], 2),
+        (ExplainedScore(0.02, min_iterations=6), [0.0] * 6, 6),
+    ],
+)
+def test_explained_score(rule, changes, stops_after):
+    history = records(explained_change=changes)
+    reasons = [rule(history[: i + 1]) for i in range(len(history))]
+    stops = [i + 1 for i, reason in enumerate(reasons) if reason is not None]
+    assert stops[:1] == ([] if stops_after is None else [stops_after])
+    for reason in filter(None, reasons):
+        assert f"< {rule.threshold:g}" in reason
+
+
+@pytest.mark.parametrize(
+    ("rule", "ratios", "stops_after"),
+    [
+        (RingSizeRatio(), [0.6, 0.4, 0.3, 0.2901], 4),
+        (RingSizeRatio(), [0.995], 1),  # the uncontracted cloud has 1
+        (RingSizeRatio(), [0.98, 0.5], None),
+        (RingSizeRatio(), [0.5, 0.6], 2),  # rings that grow
+        (RingSizeRatio(0.25), [0.5, 0.25], None),  # not below
+        (RingSizeRatio(0.25), [0.5, 0.251], 2),
+        (RingSizeRatio(0), [0.5, 0.5], None),
+        (RingSizeRatio(0), [0.5, 0.5001], 2),
+    ],
+)
+def test_ring_size_ratio(rule, ratios, stops_after):
+    history = records(ring_ratio=ratios)
+    stops = [i + 1 for i in range(len(history)) if rule(history[: i + 1]) is not None]
+    assert stops[:1] == ([] if stops_after is None else [stops_after])
+
+
+def test_reasons_give_the_figures():
+    assert "De = 0.0123 < 0.02" in ExplainedScore()(records(explained_change=[1, 1, 1, 0.0123]))
+    assert "0.0042 < 0.01" in RingSizeRatio()(records(ring_ratio=[0.5, 0.4958]))
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        ExplainedScore(0),
+        ExplainedScore(-1),
+        ExplainedScore(float("nan")),
+        ExplainedScore("0.02"),
+        ExplainedScore(min_iterations=0),
+        ExplainedScore(min_iterations=2.5),
+        RingSizeRatio(-0.1),
+        RingSizeRatio(None),
+        RingSizeRatio(float("inf")),
+    ],
+    ids=repr,
+)
+def test_bad_thresholds(rule):
+    with pytest.raises(InvalidParameterError, match=type(rule).__name__):
+        rule.check()
