@@ -97,19 +97,7 @@ class Contractor(Filter):
             attraction = np.clip(state.ring_size0 / state.ring_size, self.min_attraction, self.max_attraction)
         laplacian = cotangent_laplacian(state.positions, state.rings)
         mass = np.sqrt(state.mass)
-        limit = np.maximum(BOX_SLACK * state.frame.half_extent, FLAT * state.frame.diagonal)
-        held = np.zeros(len(state), bool)
-        for attempt in range(self.retries + 1):
-            attraction[held] = self.max_attraction
-            positions, error = solve_contraction(laplacian, contraction / mass, attraction * mass, state.positions)
-            outside = (np.abs(positions) > limit).any(axis=1)
-            if not outside.any():
-                break
-            if attempt == self.retries:
-                raise SolveError(
-                    f"it would throw {outside.sum()} of {len(state)} points out of {BOX_SLACK:g} times the bounding box"
-                )
-            held |= outside
+        positions, facts = self._solve_in_box(state, laplacian, contraction / mass, attraction, mass)
         _, ring_size = state.rings.nearest(positions)
         contracted = replace(
             state,
@@ -122,7 +110,22 @@ class Contractor(Filter):
         # In the first pass the published code takes a(1) itself for the drop, not 1 - a(1); so does this one.
         done = state.report.iterations
         drop = done[-1].ring_ratio - contracted.ring_ratio if done else contracted.ring_ratio
-        return replace(contracted, ring_ratio_drop=drop), dict(n_held=int(held.sum()), solve_error=error)
+        return replace(contracted, ring_ratio_drop=drop), facts
+
+    def _solve_in_box(self, state, laplacian, row_weight, attraction, mass):
+        """Solve; as long as that throws points out of the box, hold these and solve again."""
+        limit = np.maximum(BOX_SLACK * state.frame.half_extent, FLAT * state.frame.diagonal)
+        held = np.zeros(len(state), bool)
+        for _ in range(self.retries + 1):
+            weight = np.where(held, self.max_attraction, attraction) * mass
+            positions, error = solve_contraction(laplacian, row_weight, weight, state.positions)
+            outside = (np.abs(positions) > limit).any(axis=1)
+            if not outside.any():
+                return positions, dict(n_held=int(held.sum()), solve_error=error)
+            held |= outside
+        raise SolveError(
+            f"it would throw {outside.sum()} of {len(state)} points out of {BOX_SLACK:g} times the bounding box"
+        )
 
 
 def explained_score(points) -> float:

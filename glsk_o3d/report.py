@@ -108,8 +108,9 @@ class Report:
 
     @classmethod
     def from_dict(cls, data: dict) -> Report:
-        """Inverse of `to_dict`."""
-        values = dict(data)
+        """Inverse of `to_dict`; entries of a later version that this one does not know are passed over."""
+        known = {field.name for field in dataclasses.fields(cls)}
+        values = {name: value for name, value in data.items() if name in known}
         values["iterations"] = tuple(IterationRecord(**record) for record in values.get("iterations", ()))
         for name in ("stages", "warnings"):
             values[name] = tuple(values.get(name, ()))

@@ -20,7 +20,7 @@ from .state import Contraction
 MIN_POINTS = 8
 
 
-def default_k(n: int) -> int:
+def published_k(n: int) -> int:
     """Neighbours per point, itself included: 1.2 % of the cloud, between 8 and 30 (Cao et al. 2010)."""
     return int(np.clip(np.floor(0.012 * n + 0.5), 8, 30))
 
@@ -47,9 +47,9 @@ class RingBuilder(Filter):
     consumes: ClassVar[str] = "cloud"
 
     k: int | None = parameter(
-        None,
-        "Neighbours per point, itself included. More bridge noise and gaps, fewer keep thin parts apart. None takes "
-        "1.2 % of the points, at least 8 and at most 30.",
+        16,
+        "Neighbours per point, itself included; at most all points. More bridge noise and gaps, fewer keep thin parts "
+        "apart. None takes 1.2 % of the points, at least 8 and at most 30, as published.",
         type="int?",
         unit="points",
         low=4,
@@ -122,7 +122,7 @@ class RingBuilder(Filter):
         order = morton_order(scaled)
         cloud, row = scaled[order], np.empty(len(points), int)
         row[order] = np.arange(len(points))
-        k = min(self.k or default_k(len(cloud)), len(cloud))
+        k = min(self.k or published_k(len(cloud)), len(cloud))
         distance, neighbours = nearest_neighbours(cloud, k)
         if (distance[:, 1] == 0).any():
             cloud, inverse = np.unique(cloud, axis=0, return_inverse=True)
@@ -134,8 +134,6 @@ class RingBuilder(Filter):
             position = np.empty(len(cloud), int)
             position[order] = np.arange(len(cloud))
             cloud, row = cloud[order], position[inverse.reshape(-1)[row]]
-            k = min(self.k or default_k(len(cloud)), len(cloud))
+            k = min(self.k or published_k(len(cloud)), len(cloud))
             distance, neighbours = nearest_neighbours(cloud, k)
-        if self.k and self.k > len(cloud):
-            raise InvalidCloudError(f"RingBuilder.k = {self.k} but the cloud has only {len(cloud)} distinct points")
         return frame, cloud, row, neighbours

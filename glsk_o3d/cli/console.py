@@ -6,8 +6,10 @@ import json
 import logging
 import math
 import shutil
+import signal
 import sys
 import textwrap
+import threading
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -77,6 +79,8 @@ def reporting(*, quiet: bool = False, verbose: bool = False) -> Iterator[None]:
     typer.Exit
         With code 1, 2 or 130. What is no mistake of the user's passes through with its traceback.
     """
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="replace")  # a file name that the terminal cannot show is no reason to fail
     lines: dict[str, None] = {}
 
     def keep(message, category, filename, lineno, file=None, line=None):
@@ -109,6 +113,22 @@ def reporting(*, quiet: bool = False, verbose: bool = False) -> Iterator[None]:
             traceback.print_exception(problem)
         say("error", _message(problem))
         raise typer.Exit(code)
+
+
+@contextmanager
+def holding_interrupts() -> Iterator[None]:
+    """Let Ctrl-C wait until the block is done: Open3D, interrupted while it is imported, spills pages of text."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    held: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: held.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if held:
+        raise KeyboardInterrupt
 
 
 def say(kind: str, message: str) -> None:
@@ -146,7 +166,7 @@ def progress(shown: bool) -> Iterator[Callable[..., None]]:
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
     with Progress(*columns, console=console(stderr=True), transient=True) as bars:
-        task = bars.add_task("", total=None)
+        task = bars.add_task("starting", total=None)
 
         def update(text, done=None, total=None):
             bars.update(task, description=text, completed=done or 0, total=total)

@@ -8,31 +8,36 @@ from typing import Annotated
 
 import typer
 
-from ..interop.files import write_atomically
-from ..interop.open3d import import_open3d, to_point_cloud
-from ..pipeline import named_pipeline
-from ..samples import sample_object
-from .console import progress, reporting
+from .console import holding_interrupts, progress, reporting
 from .options import PipelineName, Quiet, Verbose
-from .running import check_writable, print_results, run, write
 
 
 def demo(
     folder: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER", help="Made if it is not there.")] = Path(
         "demo"
     ),
-    points: Annotated[int, typer.Option("--points", "-n", metavar="N", help="How many points the scan has.")] = 8192,
+    points: Annotated[
+        int, typer.Option("--points", "-n", metavar="N", min=8, help="How many points the scan has.")
+    ] = 8192,
     pipeline: PipelineName = "default",
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Skeletonise the built-in sample object.
 
-    It is a toy dinosaur with a carrying handle on its back, scanned from two sides. Writes cloud.ply (the scan), skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
+    It is a toy dinosaur with a carrying handle on its back, scanned from two sides. Writes cloud.ply (the scan),
+    skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
     """
     with reporting(quiet=quiet, verbose=verbose):
+        from ..interop.files import write_atomically
+        from ..pipelines import named_pipeline
+        from ..samples import sample_object
+        from .running import check_writable, print_results, run, write
+
         chosen = named_pipeline(pipeline)
         names = ("skeleton.ply", "skeleton.json", "skeleton.png", "cloud.ply")
+        if folder.exists() and not folder.is_dir():
+            raise NotADirectoryError(f"{folder}: is a file, not a folder")
         folder.mkdir(parents=True, exist_ok=True)
         *outputs, preview, scan = (folder / name for name in names)
         for path in (*outputs, preview, scan):
@@ -40,7 +45,8 @@ def demo(
         with progress(not quiet and not verbose) as update:
             update("making the sample")
             sample = sample_object(points)
-            write_atomically(scan, lambda temporary: _write_cloud(temporary, sample.points))
+            with holding_interrupts():
+                write_atomically(scan, lambda temporary: _write_cloud(temporary, sample.points))
             skeleton, seconds = run(chosen, sample.points, update)
             title = f"{sample.name}: a scan and its curve skeleton"
             written, problems = write(skeleton, outputs, preview, title=title, cut_loops=False, update=update)
@@ -48,5 +54,7 @@ def demo(
 
 
 def _write_cloud(path: Path, points) -> None:
+    from ..interop.open3d import import_open3d, to_point_cloud
+
     if not import_open3d().io.write_point_cloud(os.fspath(path), to_point_cloud(points)):
         raise OSError(f"{path.parent}: Open3D cannot write a cloud there")

@@ -5,15 +5,15 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..filter import Filter, Parameters
-from ..pipeline import PIPELINES
 from .console import WrongUsage, console, print_json, print_table, reporting
 from .options import Json
-from .overrides import catalogue, nearest
+
+if TYPE_CHECKING:
+    from ..filter import Parameters
 
 
 def filters(
@@ -27,6 +27,9 @@ def filters(
     Everything is taken from the code: the filters, the stopping rules and the named pipelines.
     """
     with reporting():
+        from ..pipelines import PIPELINES
+        from .overrides import catalogue, nearest
+
         known = catalogue()
         if name is not None and name not in known and name not in PIPELINES:
             raise WrongUsage(nearest(name, [*known, *PIPELINES], "filter or pipeline"))
@@ -56,12 +59,14 @@ def facts(cls: type[Parameters]) -> dict[str, Any]:
         ``name``, ``kind``, ``consumes``, ``produces`` (None for a rule), ``doc`` and ``parameters``: a list of dicts of
         the field's metadata, with ``name``, ``default`` and ``limits`` in words.
     """
-    is_filter = issubclass(cls, Filter)
+    from ..filter import Filter
+
+    flow = (cls.consumes, cls.produces) if issubclass(cls, Filter) else (None, None)
     return {
         "name": cls.__name__,
-        "kind": "filter" if is_filter else "stopping rule",
-        "consumes": cls.consumes if is_filter else None,
-        "produces": cls.produces if is_filter else None,
+        "kind": "filter" if flow[0] else "stopping rule",
+        "consumes": flow[0],
+        "produces": flow[1],
         "doc": _prose(cls),
         "parameters": [
             {
@@ -119,7 +124,7 @@ def _print_filter(cls, full: bool) -> None:
     from rich.text import Text
 
     told = facts(cls)
-    flow = f"  {told['consumes']} \N{RIGHTWARDS ARROW} {told['produces']}" if told["consumes"] else "  stopping rule"
+    flow = f"  {told['consumes']} -> {told['produces']}" if told["consumes"] else "  stopping rule"
     out = console()
     out.print(Text.assemble((told["name"], "bold"), (flow, "dim")))
     out.print(told["doc"] + "\n" if full else told["doc"].partition("\n\n")[0])
@@ -138,8 +143,11 @@ def _print_filter(cls, full: bool) -> None:
 
 
 def _pipeline_facts(name: str) -> dict[str, Any]:
+    from ..pipelines import PIPELINES
+
     make = PIPELINES[name]
-    return {"name": name, "doc": _prose(make), "expression": repr(make())}
+    stages = [repr(stage) for stage in make().stages]
+    return {"name": name, "doc": _prose(make), "expression": repr(make()), "stages": stages}
 
 
 def _print_pipeline(name: str, full: bool) -> None:
@@ -151,7 +159,7 @@ def _print_pipeline(name: str, full: bool) -> None:
     out.print(Text.assemble((name, "bold"), ("  pipeline", "dim")))
     out.print(told["doc"] + "\n" if full else told["doc"].partition("\n\n")[0])
     table = Table.grid(padding=(0, 1))
-    for i, stage in enumerate(PIPELINES[name]().stages):
-        table.add_row("  |" if i else "", repr(stage))
+    for i, stage in enumerate(told["stages"]):
+        table.add_row("  |" if i else "", stage)
     print_table(table)
     typer.echo()

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
-from ..interop.files import CLOUD_ENDINGS, MESH_ENDINGS, read_cloud, read_skeleton
-from ..skeleton import Skeleton
-from .console import print_iterations, print_json, print_rows, reporting
+from .console import holding_interrupts, print_iterations, print_json, print_rows, reporting
 from .options import Json, Verbose
-from .running import structure
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
 
 
 def info(
@@ -26,12 +25,16 @@ def info(
 ) -> None:
     """Say what is in a cloud or skeleton file."""
     with reporting(verbose=verbose):
+        from ..interop.files import read_cloud, read_skeleton
+
         if holds_skeleton(file):
             skeleton = read_skeleton(file)
             told = skeleton_facts(skeleton)
             records = skeleton.report.iterations
         else:
-            told, records = cloud_facts(read_cloud(file)), ()
+            with holding_interrupts():
+                cloud = read_cloud(file)
+            told, records = cloud_facts(cloud), ()
         if as_json:
             iterations = {"iterations": skeleton.report.to_dict()["iterations"]} if records else {}
             print_json({"file": str(file), **told, **iterations})
@@ -53,6 +56,8 @@ def holds_skeleton(path: Path) -> bool:
     bool
         False also for what does not exist or is unknown: reading it as a cloud says so.
     """
+    from ..interop.files import CLOUD_ENDINGS, MESH_ENDINGS
+
     ending = path.suffix.lower()
     if not path.is_file() or ending not in (".ply", ".obj"):
         return path.is_file() and ending not in CLOUD_ENDINGS + MESH_ENDINGS
@@ -78,6 +83,7 @@ def cloud_facts(cloud: Any) -> dict[str, Any]:
     dict
         Lengths in the cloud's units; the spacing is the median distance of a point to the nearest other one.
     """
+    import numpy as np
     from scipy.spatial import KDTree
 
     points = np.asarray(cloud.points)
@@ -113,6 +119,10 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
     dict
         Values that the file lacks are None.
     """
+    import numpy as np
+
+    from .running import structure
+
     report = skeleton.report
     radii = skeleton.radii[np.isfinite(skeleton.radii)]
     told = {

@@ -7,7 +7,12 @@ from typing import Annotated
 
 import typer
 
-from ..pipeline import PIPELINES
+
+def _pipelines():
+    from ..pipelines import PIPELINES
+
+    return PIPELINES
+
 
 Output = Annotated[
     list[Path] | None,
@@ -21,7 +26,12 @@ Output = Annotated[
 ]
 PipelineName = Annotated[
     str,
-    typer.Option("--pipeline", metavar="NAME", help=f"{', '.join(PIPELINES)}.", autocompletion=lambda: list(PIPELINES)),
+    typer.Option(
+        "--pipeline",
+        metavar="NAME",
+        help="One of default, wen2024 and cao2010; 'glsk filters' says what they are.",
+        autocompletion=lambda: list(_pipelines()),
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout instead of tables.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors (and JSON, if asked for).")]

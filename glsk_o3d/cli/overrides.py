@@ -12,7 +12,8 @@ import glsk_o3d
 
 from ..errors import InvalidParameterError
 from ..filter import Filter, Parameters
-from ..pipeline import PIPELINES, Pipeline
+from ..pipeline import Pipeline
+from ..pipelines import PIPELINES
 
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 
@@ -45,8 +46,9 @@ def catalogue() -> dict[str, type[Parameters]]:
     -------
     dict of str to class
     """
-    public = [cls for cls in vars(glsk_o3d).values() if isinstance(cls, type) and issubclass(cls, Parameters)]
-    known = [cls for cls in public if dataclasses.is_dataclass(cls)]
+    public = [getattr(glsk_o3d, name) for name in glsk_o3d.__all__]
+    kinds = [cls for cls in public if isinstance(cls, type) and issubclass(cls, Parameters)]
+    known = [cls for cls in kinds if dataclasses.is_dataclass(cls)]
     order = [type(part) for part in parts(PIPELINES["default"]())]
     known.sort(key=lambda cls: (not issubclass(cls, Filter), order.index(cls) if cls in order else len(order)))
     return {cls.__name__: cls for cls in known}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -75,13 +76,15 @@ def check_writable(path: Path) -> None:
     ----------
     path : Path
     """
-    path = Path(os.path.realpath(path))
-    if not path.parent.is_dir():
+    folder = Path(os.path.realpath(path)).parent
+    if not folder.is_dir():
         raise FileNotFoundError(f"{path.parent}: no such folder: make it before writing {path.name}")
     if path.exists() and not path.is_file():
         raise OSError(f"{path}: is a folder or a device, not a file to write to")
-    if not os.access(path.parent, os.W_OK | os.X_OK):
-        raise PermissionError(f"{path.parent}: no permission to write {path.name} there")
+    try:
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise OSError(f"{path}: no file can be made in this folder: {error.strerror}") from error
 
 
 def run(pipeline: Pipeline, cloud: Any, update) -> tuple[Skeleton, float]:

@@ -7,12 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ..interop.files import read_cloud
-from ..pipeline import named_pipeline
-from .console import progress, reporting
+from .console import holding_interrupts, progress, reporting
 from .options import Json, Output, PipelineName, Quiet, Verbose
-from .overrides import override
-from .running import check_outputs, print_results, run, write
 
 
 def skeletonize(
@@ -50,13 +46,19 @@ def skeletonize(
     Everything that can be checked is checked before the computation starts. Files appear complete or not at all.
     """
     with reporting(quiet=quiet, verbose=verbose):
+        from ..interop.files import read_cloud
+        from ..pipelines import named_pipeline
+        from .overrides import override
+        from .running import check_outputs, print_results, run, write
+
         drop = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
         chosen = override(named_pipeline(pipeline), [*(settings or []), *drop], name=pipeline)
         outputs = output or []
         check_outputs(outputs, preview, scan)
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")
-            cloud = read_cloud(scan)
+            with holding_interrupts():
+                cloud = read_cloud(scan)
             skeleton, seconds = run(chosen, cloud, update)
             written, problems = write(skeleton, outputs, preview, title=scan.name, cut_loops=cut_loops, update=update)
         print_results(skeleton, seconds, written, problems, quiet=quiet, verbose=verbose, as_json=as_json)
