@@ -79,7 +79,7 @@ class Contractor(Filter):
             reason = self.stop(state.report.iterations)
             if reason is None and reducer is not None:
                 before = len(state)
-                state = reducer(state)
+                state = _within(reducer(state), state.report)
                 if len(state) == before:
                     reducer = None  # as in the published code, which gives up after a pass without a merge
                 state = _amend(state, n_merged=before - len(state), seconds=time.perf_counter() - start)
@@ -142,6 +142,11 @@ def explained_score(points) -> float:
     """
     spread = np.linalg.eigvalsh(np.cov(points, rowvar=False))
     return float((spread.sum() + spread[-1]) / (2 * spread.sum()))
+
+
+def _within(state, report):
+    """The state of a reducer that ran inside the contractor: no stage of its own in the report."""
+    return replace(state, report=replace(state.report, stages=report.stages, seconds=report.seconds))
 
 
 def _record(state, **facts):

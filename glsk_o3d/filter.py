@@ -8,6 +8,7 @@ import math
 import re
 import time
 from collections.abc import Callable
+from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from .errors import InvalidParameterError, StageError
@@ -89,15 +90,16 @@ def _problem(value, facts) -> str | None:
     if kind == "choice":
         return None if value in facts["choices"] else f"must be one of {', '.join(map(repr, facts['choices']))}"
     if kind in ("reducer", "stop"):
-        return None if callable(value) else f"must be a {kind}, for example a filter of this package"
+        usable = callable(value) and not isinstance(value, type)
+        return None if usable else f"must be a {kind}: an instance, not a class or a name"
     if kind == "length" and isinstance(value, str):
         percent = _percent(value)
         if percent is None:
             return "must be a number in the cloud's units or a percentage of its diagonal such as '2%'"
         return None if 0 < percent <= 100 else "a percentage of the diagonal lies above 0% and up to 100%"
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or (kind == "int" and not isinstance(value, int)):
+    if isinstance(value, bool) or not isinstance(value, Integral if kind == "int" else Real):
         return f"must be {'an int' if kind == 'int' else 'a number'}"
-    if not math.isfinite(value):
+    if not isinstance(value, Integral) and not math.isfinite(value):
         return "must be finite"
     if low is not None and (value < low or (facts["open_low"] and value == low)):
         return f"must be {'above' if facts['open_low'] else 'at least'} {low}"

@@ -102,6 +102,8 @@ def skeletonize(cloud, pipeline: Pipeline | str = "default", *, on_iteration=Non
         pipeline = named_pipeline(pipeline)
     elif isinstance(pipeline, Filter):
         pipeline = Pipeline(pipeline)
+    elif not isinstance(pipeline, Pipeline):
+        raise InvalidParameterError(f"pipeline = {pipeline!r}: must be a Pipeline or the name of one")
     if pipeline.stages[0].consumes != "cloud" or pipeline.stages[-1].produces != "Skeleton":
         raise InvalidParameterError(f"{pipeline!r} does not lead from a cloud to a skeleton")
     return pipeline(cloud, on_iteration=on_iteration)

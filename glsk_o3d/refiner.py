@@ -10,8 +10,9 @@ from .refinement.loops import close_loops
 from .refinement.medial import medial_vertices, smooth
 from .refinement.resampling import resample
 from .refinement.triangles import collapse_triangles
+from .refinement.trust import trust_warnings
 from .refinement.twigs import cut_twigs
-from .skeleton import plane_distance_radii, trust_warnings
+from .skeleton import plane_distance_radii
 
 
 @documented

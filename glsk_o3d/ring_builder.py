@@ -18,6 +18,7 @@ from .report import Report
 from .state import Contraction
 
 MIN_POINTS = 8
+SMALLEST, LARGEST = 1e-120, 1e120  # lengths whose squares and products a float64 holds
 
 
 def published_k(n: int) -> int:
@@ -113,12 +114,13 @@ class RingBuilder(Filter):
             )
         with np.errstate(over="ignore"):
             extent = np.ptp(points, axis=0).max()
-        if not np.isfinite(extent):
-            raise InvalidCloudError("the coordinates span more than a float64 can hold: rescale the cloud")
-        if extent <= np.finfo(float).tiny:
+        if extent == 0:
             raise InvalidCloudError(f"all {len(points)} points coincide: there is nothing to skeletonise")
+        if not SMALLEST < extent < LARGEST:
+            raise InvalidCloudError(f"the cloud is {extent:g} long, too extreme for its squares: rescale it")
         frame = Frame.of(points)
         scaled = frame.into(points)
+        scaled[np.abs(scaled) < SMALLEST] = 0
         order = morton_order(scaled)
         cloud, row = scaled[order], np.empty(len(points), int)
         row[order] = np.arange(len(points))

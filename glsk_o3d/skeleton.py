@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .numerics.groups import group_median, group_sum
+from .numerics.groups import group_median
 from .report import Report
 
 if TYPE_CHECKING:
@@ -202,44 +202,3 @@ def plane_distance_radii(vertices, vertex_of_point, points, normals):
     offset = points[owned] - vertices[owner]
     distance = np.abs(np.einsum("ij,ij->i", offset, normals[owned]))
     return group_median(distance, owner, len(vertices))
-
-
-SHEET = 0.9  # share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
-
-
-def trust_warnings(skeleton) -> list[str]:
-    """Reasons not to trust a skeleton: the cloud is sphere-like or sheet-like.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-
-    Returns
-    -------
-    list of str
-    """
-    messages = []
-    owned = skeleton.vertex_of_point >= 0
-    owner, n = skeleton.vertex_of_point[owned], skeleton.normals[owned]
-    m = len(skeleton.vertices)
-    count = np.bincount(owner, minlength=m)
-    scatter = n[:, :, None] * n[:, None, :]
-    total = group_sum(scatter, owner, m)
-    flat = np.linalg.eigvalsh(total)[:, 2] > SHEET * np.maximum(count, 1)
-    share = count[flat].sum() / max(count.sum(), 1)
-    if share > 0.5:
-        messages.append(
-            f"sheet-like: around {share:.0%} of the points the surface faces one direction only, "
-            "so that a curve skeleton says little about it"
-        )
-    component = skeleton.component_of_vertex
-    length = np.bincount(component[skeleton.edges[:, 0]], skeleton.edge_lengths, skeleton.n_components)
-    points = np.bincount(component, count, skeleton.n_components)
-    thickness = np.bincount(component, count * skeleton.radii, skeleton.n_components) / np.maximum(points, 1)
-    blobs = points[length < 2 * thickness].sum() / max(points.sum(), 1)
-    if blobs > 0.5:
-        messages.append(
-            f"sphere-like: parts with {blobs:.0%} of the points are thicker than their skeleton is long, "
-            "so that no curve skeleton is meaningful there"
-        )
-    return messages

@@ -13,6 +13,7 @@ from glsk_o3d.contractor import explained_score
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
 from glsk_o3d.numerics.solver import SolveError
 
+BUILDER = pipelines.cao2010().stages[0]
 CAO, WEN, DEFAULT = (named().stages[1] for named in (pipelines.cao2010, pipelines.wen2024, pipelines.default))
 
 
@@ -268,7 +269,7 @@ GRID = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3)
 
 def test_solve_that_throws_points_out_is_dropped():
     """A full cube of points has no surface: as published, the second solve runs away."""
-    built = RingBuilder()(GRID)
+    built = BUILDER(GRID)
     state = CAO(built)
     assert len(state.report.iterations) == 1
     assert state.report.stop_reason.startswith("solve 2 refused, last sound state kept: it would throw ")
@@ -280,7 +281,7 @@ def test_solve_that_throws_points_out_is_dropped():
 
 def test_horse_ends_with_a_sound_state(shared_dir):
     with np.load(shared_dir / "golden" / "horse_1987.npz") as file:
-        built = RingBuilder()(file["points"])
+        built = BUILDER(file["points"])
     state = WEN(built)
     done = len(state.report.iterations)
     assert f"solve {done + 1} refused, last sound state kept" in state.report.stop_reason

@@ -13,15 +13,16 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from glsk_o3d import RingBuilder, pipelines
+from glsk_o3d import pipelines
 from glsk_o3d.lpr_reducer import merge_energy
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.rings import Rings
-from glsk_o3d.ring_builder import default_k
+from glsk_o3d.ring_builder import published_k
 
 GOLDEN = Path(__file__).parent / "golden"
-CAO, WEN = (named().stages[1] for named in (pipelines.cao2010, pipelines.wen2024))
+BUILDER, WEN = pipelines.wen2024().stages[:2]
+CAO = pipelines.cao2010().stages[1]
 FLOOR = 1e-4  # of s - psi' s(0)
 
 
@@ -33,7 +34,7 @@ def golden(request):
         place = request.getfixturevalue("shared_dir") / "golden" / place.name
     with np.load(place) as file:
         recorded = SimpleNamespace(**file)
-    built = RingBuilder()(recorded.points)
+    built = BUILDER(recorded.points)
     start = replace(built, mean_ring_edge=1 / (5 * float(recorded.w_L0)))
     solved = replace(WEN, reducer=None, max_iterations=1)(start)
     return SimpleNamespace(
@@ -73,7 +74,7 @@ def test_normalised(golden):
 
 
 def test_nearest_neighbours(golden):
-    k = default_k(len(golden.row))
+    k = published_k(len(golden.row))
     assert golden.recorded.knn.shape[1] == k
     _, neighbours = nearest_neighbours(golden.built.cloud, k)
     np.testing.assert_array_equal(np.sort(golden.point[neighbours[golden.row]]), np.sort(golden.recorded.knn))

@@ -6,7 +6,7 @@ from scipy.spatial import Delaunay
 
 from glsk_o3d import Contraction, InvalidCloudError, RingBuilder, samples
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
-from glsk_o3d.ring_builder import default_k
+from glsk_o3d.ring_builder import published_k
 
 TORUS = samples.torus(n=600).points
 SHEET = samples.sheet(n=500, bend=0).points
@@ -28,8 +28,8 @@ def named_rings(state):
 @pytest.mark.parametrize(
     ("n", "k"), [(8, 8), (708, 8), (709, 9), (1024, 12), (1987, 24), (2458, 29), (2459, 30), (10**6, 30)]
 )
-def test_default_number_of_neighbours(n, k):
-    assert default_k(n) == k
+def test_published_number_of_neighbours(n, k):
+    assert published_k(n) == k
 
 
 @pytest.mark.parametrize("k", [None, 5, 20])
@@ -37,7 +37,7 @@ def test_default_number_of_neighbours(n, k):
 def test_rings_are_delaunay_stars_in_the_principal_plane(points, k):
     state = RingBuilder(k=k)(points)
     cloud = state.cloud
-    _, neighbours = nearest_neighbours(cloud, k or default_k(len(points)))
+    _, neighbours = nearest_neighbours(cloud, k or published_k(len(points)))
     for i, patch in enumerate(neighbours):
         assert patch[0] == i
         plane = np.linalg.svd(cloud[patch] - cloud[patch].mean(axis=0))[2][:2]
@@ -138,10 +138,11 @@ def test_invalid_points_are_counted_and_dropped_only_when_asked():
     assert 599 not in state.point_of_survivor
 
 
-def test_more_neighbours_than_points():
-    with pytest.raises(InvalidCloudError, match=r"k = 20 but the cloud has only 12 distinct"):
-        RingBuilder(k=20)(np.repeat(TORUS[:12], 5, axis=0))
-    assert len(RingBuilder(k=12)(np.repeat(TORUS[:12], 5, axis=0))) == 12
+def test_more_neighbours_than_points_are_all_points():
+    points = np.repeat(TORUS[:12], 5, axis=0)
+    many, all_of_them = RingBuilder(k=20)(points), RingBuilder(k=12)(points)
+    assert named_rings(many) == named_rings(all_of_them)
+    assert len(many) == 12
 
 
 def test_to_point_cloud():

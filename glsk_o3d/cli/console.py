@@ -117,7 +117,10 @@ def reporting(*, quiet: bool = False, verbose: bool = False) -> Iterator[None]:
 
 @contextmanager
 def holding_interrupts() -> Iterator[None]:
-    """Let Ctrl-C wait until the block is done: Open3D, interrupted while it is imported, spills pages of text."""
+    """Let Ctrl-C wait until the block is done, for code that cannot bear it.
+
+    Open3D, for one: interrupted while it is imported, it spills pages of text.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -159,7 +162,7 @@ def progress(shown: bool) -> Iterator[Callable[..., None]]:
     callable
         ``update(text, done=None, total=None)``; without numbers the bar only moves.
     """
-    if not (shown and sys.stderr.isatty()):
+    if not (shown and sys.stderr is not None and sys.stderr.isatty()):
         yield lambda text, done=None, total=None: None
         return
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -187,7 +190,11 @@ def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
         console().print(title, style="bold", soft_wrap=True)
     shown = {name.replace("_", " "): value for name, value in rows.items() if value is not None}
     indent = max(map(len, shown)) + 2
-    room = max(shutil.get_terminal_size().columns - indent, 20) if sys.stdout.isatty() else 10**6
+    room = (
+        max(shutil.get_terminal_size().columns - indent, 20)
+        if sys.stdout is not None and sys.stdout.isatty()
+        else 10**6
+    )
     for name, value in shown.items():
         text = f"{value:.6g}" if isinstance(value, float) else str(value)
         lines = [part for line in text.splitlines() for part in textwrap.wrap(line, room, drop_whitespace=False)]

@@ -7,13 +7,6 @@ from typing import Annotated
 
 import typer
 
-
-def _pipelines():
-    from ..pipelines import PIPELINES
-
-    return PIPELINES
-
-
 Output = Annotated[
     list[Path] | None,
     typer.Option(
@@ -30,7 +23,6 @@ PipelineName = Annotated[
         "--pipeline",
         metavar="NAME",
         help="One of default, wen2024 and cao2010; 'glsk filters' says what they are.",
-        autocompletion=lambda: list(_pipelines()),
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout instead of tables.")]

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+_COINCIDENT = 1e-300  # squared distance below which a neighbour counts as the origin itself
 _HUGE = np.finfo(float).max
 _COLLINEAR = 1e-12  # sine below which two directions count as one
 
@@ -37,9 +38,12 @@ def delaunay_star(offsets, valid=None):
     each side as a fan. Of coincident neighbours one is kept.
     """
     offsets = np.asarray(offsets, float)
+    if offsets.shape[1] == 0:
+        return np.empty((len(offsets), 0), int), np.zeros(len(offsets), bool)
     n, k = offsets.shape[:2]
     squared = np.einsum("nkc,nkc->nk", offsets, offsets)
-    usable = squared > 0 if valid is None else valid & (squared > 0)
+    apart = squared > _COINCIDENT
+    usable = apart if valid is None else valid & apart
     inverse = np.divide(1.0, squared, out=np.zeros_like(squared), where=usable)
     # Column k is the origin of the inverted plane.
     qx, qy = np.zeros((n, k + 1)), np.zeros((n, k + 1))

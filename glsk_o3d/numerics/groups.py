@@ -1,5 +1,7 @@
 """Statistics of groups of values."""
 
+import math
+
 import numpy as np
 
 
@@ -43,6 +45,6 @@ def group_sum(values, group, n):
     -------
     (n, ...) float array
     """
-    flat = values.reshape(len(values), -1)
+    flat = values.reshape(len(values), math.prod(values.shape[1:]))
     total = np.stack([np.bincount(group, column, n) for column in flat.T], axis=1)
     return total.reshape(n, *values.shape[1:])

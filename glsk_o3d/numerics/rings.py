@@ -103,12 +103,14 @@ class Rings:
         indices, owners = index[self.indices], self.owners
         repeats = np.zeros(len(indices), bool)
         repeats[1:] = (indices[1:] == indices[:-1]) & (owners[1:] == owners[:-1])
-        several = self.sizes > 1
-        first, last = self.indptr[:-1][several], self.indptr[1:][several] - 1
-        wrapped = self.closed[several] & (indices[first] == indices[last]) & ~repeats[last]
-        repeats[last[wrapped]] = True
-        sizes = np.bincount(owners[~repeats], minlength=len(self))
-        return Rings(np.concatenate([[0], np.cumsum(sizes)]), indices[~repeats], self.closed)
+        kept = np.flatnonzero(~repeats)
+        sizes = np.bincount(owners[kept], minlength=len(self))
+        several = self.closed & (sizes > 1)
+        last = np.cumsum(sizes)[several] - 1
+        first = last + 1 - sizes[several]
+        kept = np.delete(kept, last[indices[kept[first]] == indices[kept[last]]])
+        sizes = np.bincount(owners[kept], minlength=len(self))
+        return Rings(np.concatenate([[0], np.cumsum(sizes)]), indices[kept], self.closed)
 
     def padded(self, points):
         """The rings of some points as rows padded with -1, (c, r) int array."""

@@ -65,4 +65,10 @@ def solve_contraction(laplacian, row_weight, position_weight, points):
             break
     if not error < ACCEPTABLE:
         raise SolveError(f"the contraction system is too ill-conditioned: corrections stay at {error:.1e} of the size")
+    # The sum of all equations. The rows of a Laplacian sum to zero, so only W_H keeps the cloud in its place: where
+    # it drowns beside L^T L in rounding, the corrections vanish but the points drift.
+    pull = (attraction * (points - x)).sum(axis=0) - scaled.sum(axis=1).T @ (scaled @ x)
+    drift = np.abs(pull).max() / (attraction.sum() * size)
+    if not drift < ACCEPTABLE:
+        raise SolveError(f"the contraction system is too ill-conditioned: the cloud drifts by {drift:.1e} of its size")
     return x, float(error)

@@ -23,7 +23,7 @@ def resample(skeleton, spacing):
     """
     ends = skeleton.edges
     m = len(skeleton.vertices)
-    length = np.maximum(spacing * skeleton.radii[ends].mean(axis=1), np.finfo(float).tiny)
+    length = np.maximum(spacing * skeleton.radii[ends].mean(axis=1), 1e-3 * skeleton.edge_lengths)
     count = np.bincount(skeleton.vertex_of_point[skeleton.vertex_of_point >= 0], minlength=m)
     support = (count / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
     pieces = np.ceil(np.minimum(skeleton.edge_lengths / length, np.maximum(support / SUPPORT, 1))).astype(int)

@@ -175,7 +175,6 @@ def test_rename_after_merges_of_pairs(rows, keepers):
     assert renamed.closed.tolist() == closed
 
 
-@pytest.mark.xfail(strict=True, reason="a closed ring that ends in a run of its first neighbour keeps one of it")
 def test_rename_merges_around_the_corner_where_the_end_is_a_run_too():
     # two passes: 2 is merged into 0, which leaves 0 twice in the ring, then 3 is merged into 0
     rings = rings_of([[0, 1, 2, 3]], [True]).rename(np.array([0, 1, 0, 3]))

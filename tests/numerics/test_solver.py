@@ -151,10 +151,6 @@ def test_refuses_what_has_no_trustworthy_solution(spoil):
 
 @pytest.mark.parametrize("contraction", [1e5, 1e7])
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.xfail(
-    strict=True,
-    reason="where W_H^2 is lost beside L^T L in rounding, the corrections vanish and the points end in the origin",
-)
 def test_numerically_singular_systems_are_refused_or_solved(shape, contraction):
     laplacian, points, _ = small_system(shape)
     rows, attraction = np.full(len(points), contraction), np.full(len(points), 1e-5)

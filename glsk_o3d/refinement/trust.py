@@ -1,0 +1,59 @@
+"""Tell where no curve skeleton is meaningful: on sheets and balls."""
+
+import numpy as np
+
+from ..numerics.groups import group_sum
+
+SHEET = 0.9  # share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
+BALL = 0.5  # spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
+
+
+def trust_warnings(skeleton):
+    """Reasons not to trust a skeleton: most of the cloud is sheet-like or sphere-like.
+
+    Sheet-like: the normals around a vertex have one direction. Sphere-like: the normal lines of a whole component meet
+    in one point. Both are scale-free and ask the cloud, not the skeleton.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    list of str
+    """
+    owned = skeleton.vertex_of_point >= 0
+    if not owned.any():
+        return []
+    owner, normals = skeleton.vertex_of_point[owned], skeleton.normals[owned]
+    along = normals[:, :, None] * normals[:, None, :]
+
+    count = np.bincount(owner, minlength=len(skeleton.vertices))
+    one_way = np.linalg.eigvalsh(group_sum(along, owner, len(count)))[:, 2] > SHEET * np.maximum(count, 1)
+    sheet = count[one_way].sum() / len(owner)
+    if sheet > 0.5:
+        return [
+            f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
+            "so that a curve skeleton says little about it"
+        ]
+
+    component, n = skeleton.component_of_vertex[owner], skeleton.n_components
+    points = skeleton.points[owned] - skeleton.vertices[0]
+    across = np.eye(3) - along
+    size = np.bincount(component, minlength=n)[:, None]
+    weight = group_sum(across, component, n) + 1e-9 * np.maximum(size, 1)[:, :, None] * np.eye(3)
+    meet = np.linalg.solve(weight, group_sum(np.einsum("nij,nj->ni", across, points), component, n)[:, :, None])[
+        :, :, 0
+    ]
+    offset = points - meet[component]
+    distance = np.einsum("ni,ni->n", offset, offset)
+    miss = np.einsum("ni,nij,nj->n", offset, across, offset)
+    spread = group_sum(np.column_stack([miss, distance]), component, n)
+    ball = spread[:, 0] < BALL**2 * spread[:, 1]
+    share = size[ball].sum() / len(owner)
+    if share > 0.5:
+        return [
+            f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
+            "so that no curve skeleton is meaningful there"
+        ]
+    return []

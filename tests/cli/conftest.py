@@ -1,0 +1,89 @@
+"""Small scans, and two ways to run the command: as a process and in this one."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from glsk_o3d.cli.main import app
+from glsk_o3d.samples import sample_object, sphere, torus
+
+
+def _write_scan(path: Path, points) -> Path:
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+    header += "property double x\nproperty double y\nproperty double z\nend_header\n"
+    path.write_bytes(header.encode() + np.asarray(points, "<f8").tobytes())
+    return path
+
+
+@pytest.fixture(scope="session")
+def scans(tmp_path_factory) -> Path:
+    """A folder with scans of 1000 points each; nothing may be written into it."""
+    folder = tmp_path_factory.mktemp("scans")
+    points = sample_object(1000).points
+    _write_scan(folder / "sample.ply", points)
+    _write_scan(folder / "ring.ply", torus(1000).points)
+    _write_scan(folder / "ball.ply", sphere(1000).points)
+    points[[3, 8]] = [[np.nan, 0, 0], [0, np.inf, 0]]
+    _write_scan(folder / "nan.ply", points)
+    (folder / "empty.ply").touch()
+    return folder
+
+
+@pytest.fixture
+def write_scan():
+    """Write points as a binary PLY file, whatever they are."""
+    return _write_scan
+
+
+@pytest.fixture
+def glsk(tmp_path):
+    """Run the installed command as a process in an empty folder."""
+    script = Path(sys.executable).with_name("glsk")
+
+    def run(*words, **options):
+        return subprocess.run(
+            [script, *map(str, words)],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
+            **options,
+        )
+
+    return run
+
+
+@pytest.fixture
+def invoke(tmp_path, monkeypatch):
+    """Run the command in this process, in an empty folder; only mistakes of ours raise."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words):
+        result = CliRunner().invoke(app, list(map(str, words)))
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        return result
+
+    return run
+
+
+@pytest.fixture
+def refused(invoke, tmp_path):
+    """Run the command in this process; it must fail with one line and leave nothing behind. Gives the line."""
+
+    def run(code, *words):
+        result = invoke(*words)
+        assert result.exit_code == code, result.output
+        assert result.stdout == ""
+        assert result.stderr.startswith("glsk: error: ")
+        assert result.stderr.count("\n") == 1
+        assert list(tmp_path.iterdir()) == []
+        return result.stderr.removeprefix("glsk: error: ").rstrip()
+
+    return run

@@ -1,0 +1,102 @@
+"""`glsk info`: what is in a file."""
+
+import json
+
+import numpy as np
+import pytest
+
+from glsk_o3d import read_skeleton
+
+
+@pytest.fixture
+def told(invoke):
+    """What `glsk info --json` says, and that the table says as much."""
+
+    def info(path):
+        result = invoke("info", path, "--json")
+        assert result.exit_code == 0, result.output
+        facts = json.loads(result.stdout)
+        table = invoke("info", path).stdout
+        assert table.startswith(f"{path}\n")
+        for name in facts.keys() - {"file", "iterations"}:
+            assert name.replace("_", " ") in table or facts[name] in (None, [])
+        return facts
+
+    return info
+
+
+def test_cloud(told, scans):
+    facts = told(scans / "nan.ply")
+    assert facts["kind"] == "cloud"
+    assert (facts["points"], facts["not_finite"], facts["duplicates"]) == (1000, 2, 0)
+    assert (facts["colours"], facts["normals"]) == (False, False)
+    assert 0.005 < facts["median_spacing"] < 0.05
+
+
+def test_numbers_of_a_small_cloud(told, tmp_path):
+    rows = [[x, 2 * y, 0] for x in range(3) for y in range(2)]
+    np.savetxt(tmp_path / "grid.xyz", [*rows, rows[0]])
+    facts = told("grid.xyz")
+    assert (facts["points"], facts["duplicates"], facts["median_spacing"]) == (7, 1, 1)
+    assert (facts["lowest"], facts["highest"]) == ([0, 0, 0], [2, 2, 0])
+    assert facts["diagonal"] == pytest.approx(np.sqrt(8))
+
+
+def test_a_cloud_without_a_finite_point(told, tmp_path, write_scan):
+    write_scan(tmp_path / "bad.ply", np.full((3, 3), np.nan))
+    facts = told("bad.ply")
+    assert (facts["not_finite"], facts["diagonal"], facts["median_spacing"]) == (3, None, None)
+
+
+@pytest.fixture
+def skeleton(invoke, scans, tmp_path):
+    names = ("s.json", "s.npz", "s.ply", "s.obj", "s.swc", "s.graphml", "s.cgal", "s.polylines.txt")
+    words = [word for name in names for word in ("-o", name)]
+    result = invoke("skeletonize", scans / "sample.ply", *words, "--cut-loops", "--set", "Connector.radius=4%")
+    assert result.exit_code == 0
+    return {name: read_skeleton(tmp_path / name) for name in names}
+
+
+def test_skeletons_of_every_format(told, skeleton):
+    for name, it in skeleton.items():
+        facts = told(name)
+        assert facts["kind"] == "skeleton"
+        assert (facts["vertices"], facts["edges"], facts["loops"]) == (len(it.vertices), len(it.edges), it.n_loops)
+        assert (facts["leaves"], facts["junctions"]) == (len(it.leaves), len(it.junctions))
+        assert facts["length"] == pytest.approx(it.length)
+        assert (facts["radii"] is None) == bool(np.isnan(it.radii).all())
+
+
+def test_the_report_of_the_run(told, skeleton, invoke):
+    facts, report = told("s.npz"), skeleton["s.npz"].report
+    assert facts["stop_reason"] == report.stop_reason
+    assert set(facts["stages"]) == set(report.stages)
+    assert [each["n_points"] for each in facts["iterations"]] == [each.n_points for each in report.iterations]
+    table = invoke("info", "s.npz").stdout
+    assert "Connector(radius='4%'" in table
+    assert all(f"{each.explained:.4f}" in table for each in report.iterations)
+
+
+def test_a_mesh_is_a_cloud(told, tmp_path):
+    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert (told("m.obj")["kind"], told("m.obj")["points"]) == ("cloud", 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.ply", "", "a.ply: not a valid .ply file"),
+        ("a.json", "{}", "a.json: not a valid .json skeleton"),
+        ("a.swc", "1 2", "a.swc: not a valid .swc skeleton"),
+        ("a.docx", "x", "a.docx: unknown ending"),
+        ("a.ply", None, "a.ply: no such file"),
+    ],
+)
+def test_refuses(invoke, tmp_path, name, content, message):
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    result = invoke("info", name)
+    assert result.exit_code == 1
+    assert result.stderr.startswith(f"glsk: error: {message}")
+    assert result.stderr.count("\n") == 1
+    assert result.stdout == ""

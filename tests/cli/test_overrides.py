@@ -1,0 +1,152 @@
+"""`--set Filter.parameter=value`: parsing, placing, refusing."""
+
+import dataclasses
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import glsk_o3d
+from glsk_o3d import Contractor, InvalidParameterError, LPRReducer, Pipeline, RingBuilder, RingSizeRatio
+from glsk_o3d.cli.overrides import catalogue, override, parts
+from glsk_o3d.pipelines import PIPELINES, cao2010, default
+
+RULES = {"stop": ["ExplainedScore", "RingSizeRatio"], "reducer": ["LPRReducer"]}
+
+
+def find(pipeline, name):
+    (found,) = [part for part in parts(pipeline) if type(part).__name__ == name]
+    return found
+
+
+def every_field():
+    classes = catalogue().values()
+    return [pytest.param(cls, f, id=f"{cls.__name__}.{f.name}") for cls in classes for f in dataclasses.fields(cls)]
+
+
+def values(facts):
+    """Texts a user may write for a parameter, each with what it means."""
+    kind = facts["type"].rstrip("?")
+    low = facts["low"] if facts["low"] is not None else 0
+    high = facts["high"] if facts["high"] is not None else low + 1e6
+    if kind == "int":
+        plain = st.integers(int(low) + 1, int(high)).map(lambda n: (str(n), n))
+    elif kind == "float":
+        plain = st.floats(low, high, exclude_min=True).flatmap(
+            lambda x: st.sampled_from([(repr(x), x), (f"{x:.17e}", x)])
+        )
+    elif kind == "length":
+        percent = st.floats(0.001, 100).map(lambda x: (f"{x:.6f}%", f"{x:.6f}%"))
+        plain = percent | st.floats(low, high, exclude_min=True).map(lambda x: (repr(x), x))
+    elif kind == "bool":
+        plain = st.sampled_from([("true", True), ("no", False), ("1", True), ("OFF", False)])
+    elif kind == "choice":
+        plain = st.sampled_from([(choice, choice) for choice in facts["choices"]])
+    else:
+        plain = st.sampled_from([(name, catalogue()[name]()) for name in RULES[kind]])
+    return plain | st.sampled_from([("none", None), ("None", None)]) if facts["type"].endswith("?") else plain
+
+
+@pytest.mark.parametrize(("cls", "field"), every_field())
+@given(data=st.data())
+def test_every_parameter_can_be_set(cls, field, data):
+    text, value = data.draw(values(field.metadata))
+    start = default() if cls is not RingSizeRatio else cao2010()
+    changed = override(start, [f" {cls.__name__}.{field.name} = {text}"])
+    got = getattr(find(changed, cls.__name__), field.name)
+    assert got == value
+    assert type(got) is type(value)
+    for before in parts(start):  # and nothing else changed
+        name = type(before).__name__
+        after = next((part for part in parts(changed) if type(part).__name__ == name), None)
+        for other in dataclasses.fields(before):
+            nested = other.metadata["type"].rstrip("?") in RULES
+            if after is not None and (name, other.name) != (cls.__name__, field.name) and not nested:
+                assert getattr(after, other.name) == getattr(before, other.name)
+
+
+def test_round_trip_of_every_pipeline():
+    for make in PIPELINES.values():
+        pipeline = make()
+        settings = [
+            f"{type(part).__name__}.{f.name}={value}"
+            for part in parts(pipeline)
+            for f in dataclasses.fields(part)
+            if dataclasses.is_dataclass(value := getattr(part, f.name)) is False
+        ]
+        start = default() if find(pipeline, "Contractor").reducer else cao2010()
+        changed = override(start, settings)
+        assert changed == pipeline
+        assert eval(repr(changed), vars(glsk_o3d) | {name: getattr(glsk_o3d, name) for name in catalogue()}) == pipeline
+
+
+def test_inner_filters_are_reached_and_the_input_stays():
+    before = default()
+    after = override(before, ["LPRReducer.phi=1e4", "ExplainedScore.threshold=0.01"])
+    assert find(after, "Contractor").reducer.phi == 1e4
+    assert find(after, "Contractor").stop.threshold == 0.01
+    assert before == default()
+
+
+def test_the_order_does_not_matter_but_the_last_word_counts():
+    settings = ["RingSizeRatio.threshold=0.5", "Contractor.stop=RingSizeRatio"]
+    assert override(default(), settings) == override(default(), settings[::-1])
+    assert find(override(default(), ["RingBuilder.k=9", "RingBuilder.k=10"]), "RingBuilder").k == 10
+    assert find(override(default(), ["Contractor.reducer=none"]), "Contractor").reducer is None
+
+
+def test_every_occurrence_is_changed():
+    pipeline = Pipeline(RingBuilder(), Contractor(reducer=LPRReducer()), LPRReducer())
+    changed = override(pipeline, ["LPRReducer.phi=7"])
+    assert [part.phi for part in parts(changed) if isinstance(part, LPRReducer)] == [7, 7]
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("Connector.radius", "write it as Filter.parameter=value"),
+        ("radius=2%", "write it as Filter.parameter=value"),
+        ("Connector.=2%", "write it as Filter.parameter=value"),
+        (".radius=2%", "write it as Filter.parameter=value"),
+        ("Connector.radius=", "write it as Filter.parameter=value"),
+        ("", "write it as Filter.parameter=value"),
+        ("connector.radius=2%", "no filter is called 'connector': did you mean 'Connector'?"),
+        ("LprReducer.phi=1", "did you mean 'LPRReducer'?"),
+        ("ExplainedScor.threshold=1", "did you mean 'ExplainedScore'?"),
+        ("Quux.radius=1", "no filter is called 'Quux': there are RingBuilder, Contractor, LPRReducer,"),
+        ("Connector.Radius=2%", "did you mean 'radius'?"),
+        (
+            "Contractor.max_iteration=2",
+            "no parameter of Contractor is called 'max_iteration': did you mean 'max_iterations'?",
+        ),
+        ("RingBuilder.zzz=2", "no parameter of RingBuilder is called 'zzz': there are k, drop_invalid"),
+        ("RingBuilder.consumes=cloud", "no parameter of RingBuilder is called 'consumes'"),
+        ("RingSizeRatio.threshold=1", "RingSizeRatio is not in the pipeline, which has RingBuilder"),
+        ("RingSizeRatio.threshold=1", "to put it in: --set Contractor.stop=RingSizeRatio"),
+        ("Contractor.stop=RingSizeRati", "no stop is called 'RingSizeRati': did you mean 'RingSizeRatio'?"),
+        ("Contractor.stop=LPRReducer", "no stop is called 'LPRReducer'"),
+        ("Contractor.reducer=Contractor", "no reducer is called 'Contractor'"),
+        ("Contractor.stop=none", "no stop is called 'none'"),
+        ("RingBuilder.k=1.5", "RingBuilder.k = 1.5: must be an int"),
+        ("RingBuilder.k=many", "RingBuilder.k = 'many': must be an int"),
+        ("RingBuilder.k=1", "RingBuilder.k = 1: must be at least 4"),
+        ("LPRReducer.phi=nan", "LPRReducer.phi = nan: must be finite"),
+        ("LPRReducer.phi=0", "LPRReducer.phi = 0.0: must be above 0"),
+        ("LPRReducer.order=random", "LPRReducer.order = 'random': must be one of 'cheapest', 'index'"),
+        ("LPRReducer.conserve_mass=maybe", "LPRReducer.conserve_mass = 'maybe': must be True or False"),
+        ("Connector.radius=101%", "a percentage of the diagonal lies above 0% and up to 100%"),
+        ("Connector.radius=wide", "must be a number in the cloud's units or a percentage"),
+    ],
+)
+def test_refuses(setting, message):
+    with pytest.raises(InvalidParameterError) as caught:
+        override(default(), [setting])
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@given(st.text() | st.from_regex(r"[A-Z][a-z]+\.[a-z]+=.*", fullmatch=True))
+def test_any_text_is_a_setting_or_refused(text):
+    with suppress(InvalidParameterError):
+        override(default(), [text])

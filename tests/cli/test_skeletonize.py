@@ -1,0 +1,152 @@
+"""What `glsk skeletonize` takes, refuses and says."""
+
+import json
+import logging
+from pathlib import Path
+
+import pytest
+
+import glsk_o3d
+from glsk_o3d import read_skeleton
+from glsk_o3d.cli.options import PipelineName
+from glsk_o3d.pipelines import PIPELINES
+
+
+@pytest.fixture
+def no_run(monkeypatch):
+    """Fail if anything is computed."""
+
+    def run(self, data, on_iteration):
+        pytest.fail("computed before everything was checked")
+
+    monkeypatch.setattr(glsk_o3d.RingBuilder, "_run", run)
+
+
+@pytest.mark.usefixtures("no_run")
+@pytest.mark.parametrize(
+    ("code", "words", "message"),
+    [
+        (2, [], "nothing to write"),
+        (2, ["-o", "s.stl"], "s.stl: unknown ending; known are .ply"),
+        (2, ["-o", "s"], "s: unknown ending"),
+        (2, ["-o", "s.png"], "a picture is made with --preview"),
+        (2, ["-o", "s.ply", "--preview", "s.jpg"], "s.jpg: the preview is a picture and its name ends in .png"),
+        (2, ["-o", "s.ply", "-o", "./s.ply"], "s.ply: is named twice"),
+        (2, ["-o", "SCAN"], "is the scan itself"),
+        (1, ["-o", "no/where/s.ply"], "no/where: no such folder"),
+        (1, ["-o", "s.ply", "--preview", "no/s.png"], "no: no such folder"),
+        (1, ["-o", "/proc/s.ply"], "/proc/s.ply: no file can be made in this folder"),
+        (2, ["-o", "s.ply", "--pipeline", "wen2042"], "no pipeline is called 'wen2042': there are default, wen2024"),
+        (2, ["-o", "s.ply", "--set", "Connector.radius=-1"], "Connector.radius = -1.0: must be above 0"),
+        (2, ["-o", "s.ply", "--set", "RingSizeRatio.threshold=1"], "RingSizeRatio is not in the pipeline 'default'"),
+    ],
+)
+def test_typos_cost_no_run(refused, scans, code, words, message):
+    scan = str(scans / "sample.ply")
+    before = Path(scan).read_bytes()
+    assert message in refused(code, "skeletonize", scan, *(scan if word == "SCAN" else word for word in words))
+    assert Path(scan).read_bytes() == before
+
+
+def test_an_output_that_is_a_folder(invoke, scans, tmp_path):
+    (tmp_path / "s.ply").mkdir()
+    result = invoke("skeletonize", scans / "sample.ply", "-o", "s.ply")
+    assert result.exit_code == 1
+    assert result.stderr == "glsk: error: s.ply: is a folder or a device, not a file to write to\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("none.ply", "no such file"), ("empty.ply", "not a valid .ply"), (".", "folder"), ("a.txt", "no such")],
+)
+def test_scans_that_cannot_be_read(refused, scans, name, message):
+    assert message in refused(1, "skeletonize", scans / name, "-o", "s.ply")
+
+
+def test_loops_and_formats_without(invoke, scans, tmp_path):
+    words = ("skeletonize", scans / "ring.ply", "-o", "s.swc", "-o", "s.json")
+    result = invoke(*words)
+    assert result.exit_code == 1
+    assert "s.swc: SWC holds trees only" in result.stderr
+    assert "add --cut-loops" in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["s.json"]  # the run was not for nothing
+    assert "wrote s.json\n" in result.stdout
+    assert read_skeleton(tmp_path / "s.json").n_loops == 1
+    assert invoke(*words, "--cut-loops").exit_code == 0
+    assert read_skeleton(tmp_path / "s.swc").n_loops == 0
+
+
+def test_settings_reach_the_run(invoke, scans, tmp_path):
+    settings = ("Contractor.stop=RingSizeRatio", "RingSizeRatio.threshold=0.2", "Connector.radius=5%")
+    words = [word for setting in settings for word in ("--set", setting)]
+    assert invoke("skeletonize", scans / "sample.ply", "-o", "s.json", *words).exit_code == 0
+    report = read_skeleton(tmp_path / "s.json").report
+    assert any("stop=RingSizeRatio(threshold=0.2)" in stage for stage in report.stages)
+    assert any("Connector(radius='5%'" in stage for stage in report.stages)
+
+
+@pytest.mark.parametrize("name", PIPELINES)
+def test_every_named_pipeline(invoke, scans, tmp_path, name):
+    assert invoke("skeletonize", scans / "sample.ply", "-o", "s.json", "--pipeline", name).exit_code == 0
+    report = read_skeleton(tmp_path / "s.json").report
+    assert set(report.stages) >= {repr(stage) for stage in PIPELINES[name]().stages}
+
+
+def test_the_help_names_every_pipeline():
+    assert all(name in PipelineName.__metadata__[0].help for name in PIPELINES)
+
+
+def test_warnings_are_lines(invoke, scans):
+    result = invoke("skeletonize", scans / "ball.ply", "-o", "s.ply")
+    assert result.exit_code == 0
+    lines = result.stderr.splitlines()
+    assert all(line.startswith("glsk: warning: ") for line in lines)
+    assert len(set(lines)) == len(lines) > 0
+    assert any("sphere-like" in line for line in lines)
+
+
+def test_quiet(invoke, scans, tmp_path):
+    result = invoke("skeletonize", scans / "ball.ply", "-o", "s.ply", "--quiet")
+    assert (result.exit_code, result.output) == (0, "")
+    assert (tmp_path / "s.ply").is_file()
+
+
+def test_verbose(invoke, scans):
+    level = logging.getLogger("glsk_o3d").level
+    result = invoke("skeletonize", scans / "sample.ply", "-o", "s.ply", "--verbose")
+    assert "glsk: Connector took" in result.stderr
+    assert "glsk: solve 1: 1000 points" in result.stderr
+    assert "ring" in result.stderr
+    assert "merged" not in result.stdout
+    assert logging.getLogger("glsk_o3d").level == level
+    assert not logging.getLogger("glsk_o3d").handlers
+
+
+def test_verbose_shows_where_an_error_comes_from(invoke, scans):
+    result = invoke("skeletonize", scans / "nan.ply", "-o", "s.ply", "--verbose")
+    assert result.exit_code == 1
+    assert "Traceback" in result.stderr
+    assert result.stderr.splitlines()[-1].startswith("glsk: error: 2 of 1000 points")
+
+
+def test_json_is_all_there_is_on_stdout(invoke, scans):
+    result = invoke("skeletonize", scans / "ball.ply", "-o", "s.ply", "--json")
+    facts = json.loads(result.stdout)
+    assert facts["points"] == 1000
+    assert facts["files"] == ["s.ply"]
+    assert len(facts["warnings"]) == result.stderr.count("glsk: warning: ")
+    assert facts["components"] - facts["vertices"] + facts["edges"] == facts["loops"]
+
+
+def test_names_are_printed_as_they_are(invoke, scans):
+    name = "[red]s :smile: 'x'.ply"
+    assert f"wrote {name}\n" in invoke("skeletonize", scans / "sample.ply", "-o", name).stdout
+
+
+def test_demo_refuses(refused, invoke, tmp_path):
+    assert "there are default" in refused(2, "demo", "--pipeline", "best")
+    (tmp_path / "file").touch()
+    result = invoke("demo", "-o", "file")
+    assert (result.exit_code, result.stderr) == (1, "glsk: error: file: is a file, not a folder\n")
+    assert invoke("demo", "--points", "0").exit_code == 2

@@ -1,0 +1,267 @@
+"""The table of edge cases, over skeletonize with every named pipeline and over every filter."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import glsk_o3d as glsk
+from glsk_o3d import InvalidCloudError, SkeletonWarning, pipelines, samples, skeletonize
+
+NAMES = tuple(pipelines.PIPELINES)
+RNG = np.random.default_rng(0)
+Y = samples.y_junction(n=300).points
+TORUS = samples.torus(n=300).points
+FEW = RNG.normal(size=(12, 3))
+GRID = np.stack(np.meshgrid(np.arange(16.0), np.arange(12.0), [0.0]), -1).reshape(-1, 3)
+TURN = np.linalg.qr(RNG.normal(size=(3, 3)))[0]
+CORNERS = np.stack(np.meshgrid([-1.0, 1], [-1.0, 1], [-1.0, 1]), -1).reshape(-1, 3)
+READ_ONLY = Y.copy()
+READ_ONLY.setflags(write=False)
+
+# Clouds that have a skeleton, be it worth little.
+SOUND = {
+    **{f"{n} points": FEW[:n] for n in (8, 9, 10, 12)},
+    "corners of a cube": CORNERS,
+    "8 distinct among 160": np.repeat(FEW[:8], 20, axis=0),
+    "every point twice": np.repeat(TORUS, 2, axis=0),
+    "one point 1000 times": np.concatenate([TORUS, np.repeat(TORUS[:1], 1000, axis=0)]),
+    "30 points 100 times": np.repeat(TORUS[:30], 100, axis=0),
+    "nearly doubled": np.concatenate([TORUS, TORUS + 1e-9 * RNG.normal(size=TORUS.shape)]),
+    "doubled but for rounding": np.concatenate([TORUS, TORUS * (1 + 1e-15)]),
+    "collinear": np.outer(np.linspace(0, 1, 100), [1, 2, 3]),
+    "collinear along x": np.outer(RNG.random(100), [1, 0, 0]),
+    "8 collinear": np.outer(np.arange(8), [0, 1, 0]),
+    "two crossing lines": np.concatenate([np.outer(np.arange(-20, 21), axis) for axis in np.eye(3)[:2]]),
+    "circle": np.stack([np.cos(a := np.arange(60) / 60 * 2 * np.pi), np.sin(a), 0 * a], axis=1),
+    "square grid": GRID,
+    "square grid, tilted": GRID @ TURN,
+    "coplanar": Y * [1, 0, 1],
+    "full cubic grid": np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3),
+    "full ball": RNG.normal(size=(300, 3)),
+    "two components": np.concatenate([Y, Y + [3, 0, 0]]),
+    "two distant specks": np.concatenate([Y * 1e-6, Y * 1e-6 + [1, 0, 0]]),
+    "two more distant specks": np.concatenate([Y * 1e-12, Y * 1e-12 + [1, 0, 0]]),
+    "an outlier": np.concatenate([Y, [[100.0, 100, 100]]]),
+    "a far outlier": np.concatenate([Y, [[1e9, 0, 0]]]),
+    "far from the origin": Y + 1e6,
+    "farther": Y + [1e9, -1e9, 0],
+    "1e-12 as large": Y * 1e-12,
+    "1e12 times as large": Y * 1e12,
+    "1e-100 as large": Y * 1e-100,
+    "1e100 times as large": Y * 1e100,
+    "points a subnormal apart": np.concatenate([CORNERS, samples.sphere(n=80).points, Y[:30] * 1e-155]),
+    "float32": Y.astype(np.float32),
+    "float16": Y.astype(np.float16),
+    "big-endian": Y.astype(">f8"),
+    "whole numbers": (Y * 1000).astype(int),
+    "bytes": (Y * 100 + 100).astype(np.uint8),
+    "list": Y.tolist(),
+    "tuple of tuples": tuple(map(tuple, Y.tolist())),
+    "read-only": READ_ONLY,
+    "Fortran order": np.asfortranarray(Y),
+    "not contiguous": np.repeat(Y, 2, axis=0)[::2, ::-1],
+    "backwards": Y[::-1],
+    "minus zero": np.concatenate([Y, [[0.0, 0, 0], [-0.0, 0, -0.0]]]),
+    "sphere": samples.sphere(n=300).points,
+    "sheet": samples.sheet(n=300).points,
+    "flat sheet": samples.sheet(n=300, bend=0).points,
+    "open tube": samples.tube(n=300, capped=False).points,
+}
+
+NAN = Y.copy()
+NAN[[2, 7]] = [[np.nan, 0, 0], [0, 0, -np.inf]]
+MASKED = np.ma.masked_greater(Y, 0)
+
+# What is refused: the error's message.
+REFUSED = {
+    "nothing": (np.empty((0, 3)), "is empty"),
+    "empty list": ([], "is empty"),
+    **{f"{n} points": (FEW[:n], rf"{n} finite points.*at least 8") for n in range(1, 8)},
+    "all equal": (np.full((50, 3), 1e6 + 0.1), "all 50 points coincide"),
+    "zeros": (np.zeros((9, 3)), "all 9 points coincide"),
+    "7 distinct ones": (np.repeat(FEW[:7], 20, axis=0), "140 points but only 7 distinct"),
+    "NaN and infinity": (NAN, "2 of 300 points have NaN or infinite coordinates, the first at index 2.*drop_invalid"),
+    "nothing but NaN": (np.full((20, 3), np.nan), "20 of 20 points"),
+    "too wide for float64": (np.concatenate([Y, [[1.5e308, 0, 0], [-1.5e308, 0, 0]]]), "rescale"),
+    "two columns": (Y[:, :2], r"\(300, 2\)"),
+    "six columns": (np.hstack([Y, Y]), r"\(300, 6\)"),
+    "one dimension": (Y.ravel(), r"\(900,\)"),
+    "three dimensions": (Y[None], r"\(1, 300, 3\)"),
+    "a number": (3.5, "float"),
+    "nothing at all": (None, "NoneType"),
+    "file name": ("scan.ply", "read_cloud"),
+    "complex": (Y * 1j, "complex"),
+    "truth values": (Y > 0, "bool"),
+    "objects": (Y.astype(object), "object"),
+    "text": (Y.astype(str), "<U"),
+    "ragged": ([[1, 2, 3], [4, 5]], "list"),
+    "masked": (MASKED, "masked"),
+    "dictionary": ({"points": Y}, "dict"),
+}
+
+
+def run(cloud, pipeline):
+    """The skeleton; only warnings of our own are allowed, and they must be in the report."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        skeleton = skeletonize(cloud, pipeline)
+    assert [w for w in caught if w.category is not SkeletonWarning] == []
+    assert tuple(str(w.message) for w in caught) == skeleton.report.warnings
+    return skeleton
+
+
+def held_bytes(cloud):
+    return np.asarray(cloud).tobytes()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("case", SOUND)
+def test_sound_clouds(case, name, assert_sound):
+    cloud = SOUND[case]
+    before = held_bytes(cloud)
+    skeleton = run(cloud, name)
+    assert held_bytes(cloud) == before
+    points = np.asarray(cloud, float)
+    assert_sound(skeleton, len(points))
+    np.testing.assert_array_equal(skeleton.points, points)
+    # nothing runs away: the contraction may use 1.2 times the box
+    low, high = points.min(axis=0), points.max(axis=0)
+    slack = 0.1 * np.linalg.norm(high - low) + 1e-15 * np.abs(points).max()
+    assert (skeleton.vertices >= low - slack).all()
+    assert (skeleton.vertices <= high + slack).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("case", REFUSED)
+def test_refused_clouds(case, name):
+    cloud, message = REFUSED[case]
+    with pytest.raises(InvalidCloudError, match=message):
+        run(cloud, name)
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_ring_builder_refuses_the_same(case):
+    cloud, message = REFUSED[case]
+    with pytest.raises(InvalidCloudError, match=message):
+        glsk.RingBuilder()(cloud)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("scale", [1e-300, 1e-130, 1e130, 1e306])
+def test_extreme_sizes_are_refused(name, scale):
+    with pytest.raises(InvalidCloudError, match="rescale"):
+        run(Y * scale, name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("scale", [2.0**-300, 2.0**300])
+def test_odd_sizes_are_like_any(name, scale):
+    plain, odd = run(Y, name), run(Y * scale, name)
+    np.testing.assert_allclose(odd.radii / scale, plain.radii, rtol=1e-6)
+    assert odd.length / scale == pytest.approx(plain.length, rel=1e-6)
+    assert odd.report.warnings == plain.report.warnings
+
+
+STEPWISE = ("8 points", "every point twice", "collinear", "coplanar", "two distant specks", "float32")
+PLAIN = ("float32", "float16", "whole numbers", "bytes", "list", "Fortran order", "big-endian")
+
+
+@pytest.mark.parametrize("case", STEPWISE)
+def test_every_filter_on_its_own(case, assert_sound):
+    """Every stage gives something sound, and leaves what it was given as it was."""
+    cloud = SOUND[case]
+    n = len(cloud)
+    built = glsk.RingBuilder()(cloud)
+    contracted = glsk.Contractor(max_iterations=1)(built)
+    reduced = glsk.LPRReducer()(contracted)
+    again = glsk.Contractor(max_iterations=1)(reduced)
+    for state in (built, contracted, reduced, again):
+        assert np.isfinite(state.positions).all()
+        assert state.survivor_of_point.shape == (n,)
+        assert state.survivor_of_point.min() >= 0
+        assert state.survivor_of_point.max() < len(state)
+        assert state.mass.sum() == state.report.n_distinct
+        assert state.rings.sizes.min() >= 1
+        assert state.rings.indices.max() < len(state)
+    assert_sound(glsk.Connector()(again), n, triangles=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SkeletonWarning)
+        assert_sound(glsk.Refiner()(glsk.Connector()(again)), n)
+    np.testing.assert_array_equal(built.positions, glsk.RingBuilder()(cloud).positions)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_invalid_points_can_be_dropped(name, assert_sound):
+    builder, *others = pipelines.PIPELINES[name]().stages
+    dropping = glsk.Pipeline(replace(builder, drop_invalid=True), *others)
+    skeleton = run(NAN, dropping)
+    assert_sound(skeleton, 300, n_dropped=2)
+    np.testing.assert_array_equal(np.flatnonzero(skeleton.vertex_of_point < 0), [2, 7])
+    assert np.isnan(skeleton.normals[[2, 7]]).all()
+    clean = run(np.delete(Y, [2, 7], axis=0), name)
+    np.testing.assert_array_equal(skeleton.vertices, clean.vertices)
+    np.testing.assert_array_equal(skeleton.edges, clean.edges)
+    np.testing.assert_array_equal(np.delete(skeleton.vertex_of_point, [2, 7]), clean.vertex_of_point)
+    few = NAN.copy()
+    few[7:] = np.inf
+    with pytest.raises(InvalidCloudError, match="6 finite points"):
+        run(few, dropping)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_two_components_are_skeletonised_each(name):
+    skeleton = run(SOUND["two components"], name)
+    assert skeleton.n_components >= 2
+    side = skeleton.vertices[:, 0] > 1.5
+    np.testing.assert_array_equal(side[skeleton.vertex_of_point], np.repeat([False, True], 300))
+    assert (side[skeleton.edges[:, 0]] == side[skeleton.edges[:, 1]]).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("case", ["sphere", "sheet", "flat sheet"])
+def test_warns_where_no_curve_skeleton_is_meaningful(case, name):
+    assert run(SOUND[case], name).report.warnings
+
+
+@pytest.mark.parametrize("name", ["wen2024", "cao2010"])
+def test_duplicates_change_nothing_but_the_owners(name):
+    single, doubled = run(TORUS, name), run(SOUND["every point twice"], name)
+    np.testing.assert_allclose(doubled.vertices, single.vertices, atol=1e-12)
+    np.testing.assert_array_equal(doubled.edges, single.edges)
+    np.testing.assert_array_equal(doubled.vertex_of_point, np.repeat(single.vertex_of_point, 2))
+
+
+def test_duplicates_count_as_support_in_the_refiner():
+    """Subdividing and centring count every copy of a point; the axis stays where it is."""
+    single, doubled = run(TORUS, "default"), run(SOUND["every point twice"], "default")
+    assert doubled.n_loops == single.n_loops == 1
+    apart, _ = cKDTree(single.vertices).query(doubled.vertices)
+    assert apart.max() < single.edge_lengths.max()
+
+
+@pytest.mark.parametrize("case", PLAIN)
+def test_layout_and_type_do_not_matter(case):
+    given, plain = run(SOUND[case], "default"), run(np.array(SOUND[case], float), "default")
+    np.testing.assert_array_equal(given.vertices, plain.vertices)
+    np.testing.assert_array_equal(given.edges, plain.edges)
+
+
+def test_open3d_clouds_are_their_points():
+    o3d = pytest.importorskip("open3d")
+    expected = run(Y, "default")
+    legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(Y))
+    mesh = o3d.geometry.TriangleMesh(legacy.points, o3d.utility.Vector3iVector([[0, 1, 2]]))
+    double = o3d.t.geometry.PointCloud(o3d.core.Tensor(Y))
+    for cloud in (legacy, mesh, double, o3d.core.Tensor(Y), legacy.points):
+        skeleton = run(cloud, "default")
+        np.testing.assert_array_equal(skeleton.vertices, expected.vertices)
+        np.testing.assert_array_equal(skeleton.edges, expected.edges)
+    single = o3d.t.geometry.PointCloud(o3d.core.Tensor(Y.astype(np.float32)))
+    np.testing.assert_array_equal(run(single, "default").vertices, run(SOUND["float32"], "default").vertices)
+    np.testing.assert_array_equal(np.asarray(legacy.points), Y)
+    for empty in (o3d.geometry.PointCloud(), o3d.t.geometry.PointCloud(), o3d.geometry.TriangleMesh()):
+        with pytest.raises(InvalidCloudError, match="is empty"):
+            run(empty, "default")

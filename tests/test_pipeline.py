@@ -1,0 +1,311 @@
+"""Pipelines: composition, the named ones, and what skeletonize promises."""
+
+import dataclasses
+import operator
+import warnings
+from functools import reduce
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import glsk_o3d as glsk
+from glsk_o3d import (
+    Connector,
+    Contraction,
+    Contractor,
+    InvalidCloudError,
+    InvalidParameterError,
+    LPRReducer,
+    Pipeline,
+    Refiner,
+    RingBuilder,
+    RingSizeRatio,
+    Skeleton,
+    StageError,
+    pipelines,
+    samples,
+    skeletonize,
+)
+
+NAMES = tuple(pipelines.PIPELINES)
+PUBLIC = {name: getattr(glsk, name) for name in glsk.__all__}
+POINTS = samples.y_junction(n=500).points
+
+# A cloud stopped after one solve is rightly called sheet-like.
+untrusted = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+
+
+def assert_same(a, b):
+    for field in dataclasses.fields(Skeleton):
+        x, y = getattr(a, field.name), getattr(b, field.name)
+        if isinstance(x, np.ndarray):
+            np.testing.assert_array_equal(x, y, err_msg=field.name)
+    for name in ("stages", "converged", "stop_reason", "warnings", "n_distinct"):
+        assert getattr(a.report, name) == getattr(b.report, name)
+
+
+# ---- composition
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_pipeline_is_its_filters_called_in_turn(name):
+    pipeline = pipelines.PIPELINES[name]()
+    by_hand = POINTS
+    for stage in pipeline.stages:
+        by_hand = stage(by_hand)
+    assert_same(pipeline(POINTS), by_hand)
+    assert_same(skeletonize(POINTS, name), by_hand)
+    assert_same(skeletonize(POINTS, pipeline), by_hand)
+
+
+def test_bars_associate():
+    a, b, c, d = RingBuilder(), Contractor(), Connector(), Refiner()
+    pipeline = a | b | c | d
+    assert isinstance(pipeline, Pipeline)
+    assert pipeline.stages == (a, b, c, d)
+    assert (a | b) | (c | d) == a | (b | (c | d)) == Pipeline(a, b, c, d) == pipeline
+    assert hash((a | b) | (c | d)) == hash(pipeline)
+    assert pipeline != a | b | c
+    assert pipeline != "pipeline"
+
+
+def test_part_of_a_pipeline_gives_what_its_last_filter_gives():
+    state = (RingBuilder() | Contractor(max_iterations=1))(POINTS)
+    assert isinstance(state, Contraction)
+    assert isinstance((Connector() | Refiner())(state), Skeleton)
+
+
+def test_several_contractors_and_a_lonely_reducer():
+    pipeline = RingBuilder() | Contractor(max_iterations=1) | LPRReducer() | Contractor(max_iterations=2) | Connector()
+    skeleton = pipeline(POINTS)
+    assert [record.iteration for record in skeleton.report.iterations] == [1, 2, 3]
+    assert skeleton.report.iterations[1].n_points < 500
+    assert skeleton.report.stages == tuple(map(repr, pipeline.stages))
+
+
+@pytest.mark.parametrize(
+    "pipeline",
+    [
+        *(make() for make in pipelines.PIPELINES.values()),
+        RingBuilder(k=9) | Contractor(reducer=LPRReducer(phi=2e5), stop=RingSizeRatio(1 / 3)) | Connector(radius="7%"),
+        Connector() | Refiner(recentre=0),
+    ],
+    ids=lambda pipeline: f"{len(pipeline.stages)} stages",
+)
+def test_repr_rebuilds_the_pipeline(pipeline):
+    assert eval(repr(pipeline), PUBLIC) == pipeline
+
+
+@pytest.mark.parametrize(
+    "stages",
+    [
+        (RingBuilder(), Connector(), Contractor()),
+        (RingBuilder(), Refiner()),
+        (Contractor(), RingBuilder()),
+        (Connector(), Connector()),
+        (RingBuilder(), RingBuilder()),
+        (Refiner(), Contractor()),
+    ],
+    ids=lambda stages: "-".join(type(stage).__name__ for stage in stages),
+)
+def test_stages_that_do_not_fit_are_refused_when_joined(stages):
+    with pytest.raises(InvalidParameterError, match=r"takes a .* gives a .*the order is RingBuilder \| Contractor"):
+        Pipeline(*stages)
+    with pytest.raises(InvalidParameterError, match="the order is"):
+        reduce(operator.or_, stages)
+
+
+@pytest.mark.parametrize("thing", [3, "Connector", Connector, None, lambda cloud: cloud, RingSizeRatio()])
+def test_only_filters_can_be_joined(thing):
+    with pytest.raises(InvalidParameterError, match="not a filter"):
+        RingBuilder() | thing
+    with pytest.raises(InvalidParameterError, match="not a filter"):
+        Pipeline(RingBuilder(), thing)
+
+
+def test_empty_pipeline():
+    with pytest.raises(InvalidParameterError, match="at least one"):
+        Pipeline()
+
+
+def test_parameters_of_all_stages_are_checked_before_any_work():
+    late = RingBuilder() | Contractor() | Connector() | Refiner(recentre=-1)
+    told = []
+    with pytest.raises(InvalidParameterError, match=r"Refiner\.recentre"):
+        late(POINTS, on_iteration=told.append)
+    assert told == []
+
+
+# ---- skeletonize
+
+
+def test_default_is_the_default():
+    assert_same(skeletonize(POINTS), pipelines.default()(POINTS))
+
+
+def test_unknown_names_list_the_known_ones():
+    with pytest.raises(InvalidParameterError, match=r"'cao2011'.*default, wen2024, cao2010"):
+        skeletonize(POINTS, "cao2011")
+
+
+@pytest.mark.parametrize(
+    "incomplete",
+    [RingBuilder(), RingBuilder() | Contractor(), Connector() | Refiner(), Contractor() | Connector()],
+    ids=lambda made: "-".join(type(stage).__name__ for stage in getattr(made, "stages", [made])),
+)
+def test_incomplete_pipelines_are_refused(incomplete):
+    with pytest.raises(InvalidParameterError, match="does not lead from a cloud to a skeleton"):
+        skeletonize(POINTS, incomplete)
+
+
+@pytest.mark.parametrize("thing", [None, 3, ["default"], pipelines.default], ids=["None", "number", "list", "maker"])
+def test_what_is_no_pipeline_is_refused(thing):
+    with pytest.raises((InvalidParameterError, StageError)):
+        skeletonize(POINTS, thing)
+
+
+@untrusted
+@pytest.mark.parametrize("name", NAMES)
+def test_progress(name):
+    told = []
+    skeleton = skeletonize(POINTS, name, on_iteration=told.append)
+    assert tuple(told) == skeleton.report.iterations
+    assert [record.iteration for record in told] == list(range(1, len(told) + 1))
+    cut = skeletonize(POINTS, name, on_iteration=lambda record: False)
+    assert len(cut.report.iterations) == 1
+    assert cut.report.stop_reason == "stopped by the caller"
+    assert len(cut.vertices) > 0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_report_tells_what_ran(name):
+    pipeline = pipelines.PIPELINES[name]()
+    report = skeletonize(POINTS, name).report
+    assert (report.n_input, report.n_dropped, report.n_distinct) == (500, 0, 500)
+    expected = [repr(stage) for stage in pipeline.stages]
+    assert [stage for stage in report.stages if stage in expected] == expected
+    assert set(report.seconds) >= {type(stage).__name__ for stage in pipeline.stages}
+    assert all(seconds > 0 for seconds in report.seconds.values())
+    assert len(report.iterations) >= 1
+
+
+def test_stages_of_the_report_rebuild_the_pipeline():
+    """As its documentation says: the filters that ran, as the expressions that rebuild them."""
+    stages = skeletonize(POINTS).report.stages
+    assert eval(" | ".join(stages), PUBLIC) == pipelines.default()
+
+
+def test_the_named_pipelines_differ_as_they_say():
+    cao, wen, default = (make().stages for make in (pipelines.cao2010, pipelines.wen2024, pipelines.default))
+    assert cao[1].reducer is None
+    assert isinstance(cao[1].stop, RingSizeRatio)
+    assert not wen[1].reducer.conserve_mass
+    assert wen[1].reducer.order == "index"
+    assert default[1].reducer.conserve_mass
+    assert wen[3].recentre == cao[3].recentre == 0
+    assert default[3].recentre > 0
+
+
+# ---- closed forms, end to end
+
+
+def score(skeleton, sample):
+    """Largest distance between skeleton and axis, both ways, and its mean, in tube radii; ends may draw back."""
+    share = np.linspace(0, 1, 21)[:, None, None]
+    axis = (sample.nodes[sample.edges[:, 0]] * (1 - share) + sample.nodes[sample.edges[:, 1]] * share).reshape(-1, 3)
+    ends = skeleton.vertices[skeleton.edges]
+    drawn = (ends[:, 0] * (1 - share) + ends[:, 1] * share).reshape(-1, 3)
+    radius = sample.radii.mean()
+    return cKDTree(axis).query(drawn)[0].mean() / radius, cKDTree(drawn).query(axis)[0].max() / radius
+
+
+@pytest.mark.parametrize(
+    ("shape", "components", "loops", "leaves"),
+    [("tube", 1, 0, 2), ("torus", 1, 1, 0), ("helix", 1, 0, 2), ("y_junction", 1, 0, 3), ("two_rings", 2, 2, 0)],
+)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_default_on_shapes_with_a_known_axis(shape, components, loops, leaves, seed):
+    sample = samples.SAMPLES[shape](n=2048, seed=seed)
+    skeleton = skeletonize(sample.points)
+    assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (components, loops, leaves)
+    mean, missed = score(skeleton, sample)
+    assert mean < 0.15
+    assert missed < 2
+    assert np.median(skeleton.radii) == pytest.approx(sample.radii.mean(), rel=0.1)
+
+
+@pytest.mark.parametrize(("shape", "loops"), [("tube", 0), ("torus", 1), ("helix", 0), ("two_rings", 2)])
+def test_cao2010_on_shapes_with_a_known_axis(shape, loops):
+    sample = samples.SAMPLES[shape](n=2048)
+    skeleton = skeletonize(sample.points, "cao2010")
+    assert skeleton.n_loops == loops
+    mean, missed = score(skeleton, sample)
+    assert mean < 0.25
+    assert missed < 2
+
+
+# ---- equivariance, end to end
+
+TURNS = {"a quarter about the diagonal": np.eye(3)[[1, 2, 0]], "half about x": np.diag([1.0, -1, -1])}
+MOVES = {
+    "shift": (lambda x: x + 2**20, lambda x: x - 2**20),
+    "shift by 1e6": (lambda x: x + 1e6, lambda x: x - 1e6),
+    "1000 times smaller": (lambda x: x * 1e-3, lambda x: x * 1e3),
+    "1000 times larger": (lambda x: x * 1e3, lambda x: x * 1e-3),
+    **{name: (lambda x, turn=turn: x @ turn, lambda x, turn=turn: x @ turn.T) for name, turn in TURNS.items()},
+}
+
+
+@pytest.fixture(scope="module", params=["torus", "y_junction"])
+def shape(request):
+    """Coordinates rounded, so that the shift by a power of two is exact; 1e6 costs them 1e-10."""
+    return np.round(samples.SAMPLES[request.param](n=1024).points * 2**20) / 2**20
+
+
+@pytest.mark.parametrize("move", MOVES)
+@pytest.mark.parametrize("name", ["cao2010", "default"])
+def test_moves_and_scales_along_with_the_cloud(shape, name, move):
+    """Measured: vertices agree to 1e-7 tube radii, from roundings of 1e-16 that ill-conditioned late solves blow up."""
+    there, back = MOVES[move]
+    still, moved = skeletonize(shape, name), skeletonize(there(shape), name)
+    np.testing.assert_array_equal(moved.edges, still.edges)
+    np.testing.assert_array_equal(moved.vertex_of_point, still.vertex_of_point)
+    np.testing.assert_allclose(back(moved.vertices), still.vertices, atol=1e-6 * 0.1)
+    np.testing.assert_allclose(moved.radii / np.ptp(there(shape)), still.radii / np.ptp(shape), rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["cao2010", "default"])
+def test_order_of_the_points_does_not_matter(shape, name):
+    order = np.random.default_rng(0).permutation(len(shape))
+    still, shuffled = skeletonize(shape, name), skeletonize(shape[order], name)
+    np.testing.assert_array_equal(shuffled.edges, still.edges)
+    np.testing.assert_array_equal(shuffled.vertex_of_point, still.vertex_of_point[order])
+    np.testing.assert_allclose(shuffled.vertices, still.vertices, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["cao2010", "default"])
+def test_any_rotation_keeps_the_shape(shape, name):
+    """It changes the bounding box, and with it the weights: the same topology, within one tube radius."""
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    still, turned = skeletonize(shape, name), skeletonize(shape @ turn, name)
+    for count in ("n_components", "n_loops"):
+        assert getattr(turned, count) == getattr(still, count)
+    assert len(turned.leaves) == len(still.leaves)
+    back = turned.vertices @ turn.T
+    apart = max(cKDTree(a).query(b)[0].max() for a, b in ((back, still.vertices), (still.vertices, back)))
+    assert apart < 0.1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_repeatable_to_the_last_bit(name):
+    assert_same(skeletonize(POINTS, name), skeletonize(POINTS.copy(), name))
+
+
+def test_no_cloud_at_all():
+    with pytest.raises(InvalidCloudError):
+        skeletonize("scan.ply")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(InvalidCloudError):
+            skeletonize(None)
