@@ -7,20 +7,18 @@ import os
 import tempfile
 import time
 from collections.abc import Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import typer
 
-from ..contractor import Contractor
 from ..errors import FileFormatError, GlskError
 from ..filter import Filter
-from ..interop.files import _ending as skeleton_ending
+from ..interop.files import skeleton_ending
 from ..interop.preview import save_preview
 from ..pipeline import Pipeline
 from ..skeleton import Skeleton
-from .console import WrongUsage, holding_interrupts, print_iterations, print_json, print_rows
+from .console import WrongUsage, print_iterations, print_json, print_rows
 
 _log = logging.getLogger(__name__)
 _DOING = {
@@ -52,7 +50,7 @@ def check_outputs(outputs: Sequence[Path], preview: Path | None = None, scan: Pa
     """
     for path in outputs:
         try:
-            skeleton_ending(path, None)
+            skeleton_ending(path)
         except FileFormatError as error:
             hint = "; a picture is made with --preview" if path.suffix.lower() == ".png" else ""
             raise WrongUsage(f"{error}{hint}") from None
@@ -110,9 +108,7 @@ def run(pipeline: Pipeline, cloud: Any, update) -> tuple[Skeleton, float]:
         began = time.perf_counter()
         doing = _DOING.get(type(stage).__name__, type(stage).__name__)
         update(doing)
-        # SciPy's parallel neighbour search crashes the process when it is interrupted: only the long stage can be.
-        with nullcontext() if isinstance(stage, Contractor) else holding_interrupts():
-            flow = stage(flow, on_iteration=_watch(stage, doing, update))
+        flow = stage(flow, on_iteration=_watch(stage, doing, update))
         _log.info("%s took %.3f s", type(stage).__name__, time.perf_counter() - began)
     return flow, time.perf_counter() - start
 

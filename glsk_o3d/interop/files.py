@@ -191,7 +191,7 @@ def save_skeleton(
         The file cannot be written.
     """
     path = Path(path)
-    write, _ = _FORMATS[_ending(path, format)]
+    write, _ = _FORMATS[skeleton_ending(path, format)]
     options = {"cut_loops": cut_loops} if write is _write_swc else {}
     data = write(skeleton, **options)
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
@@ -220,7 +220,7 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
         A folder, an unknown ending, or a file that is damaged or from a newer release.
     """
     path = _existing(path)
-    ending = _ending(path, format)
+    ending = skeleton_ending(path, format)
     data = path.read_bytes()
     try:
         return _FORMATS[ending][1](data)
@@ -269,10 +269,29 @@ def _existing(path) -> Path:
         raise FileFormatError(f"{path}: is a folder, not a file")
     if not path.exists():
         raise FileNotFoundError(f"{path}: no such file")
+    if path.is_file() and path.stat().st_size == 0:
+        raise FileFormatError(f"{path}: the file is empty")
     return path
 
 
-def _ending(path: Path, format: str | None) -> str:
+def skeleton_ending(path: Path, format: str | None = None) -> str:
+    """The ending in the table of formats that a file name has, or that `format` names.
+
+    Parameters
+    ----------
+    path : Path
+    format : str, optional
+        An ending, with or without its dot.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    FileFormatError
+        If there is no such format; the message lists them.
+    """
     name = path.name.lower() if format is None else "." + format.lower().lstrip(".")
     found = [e for e in _FORMATS if (name.endswith(e) if format is None else name == e)]
     if not found:

@@ -20,7 +20,8 @@ def nearest_neighbours(points, k):
     neighbour : (n, k) int array
         Nearest first.
     """
-    return cKDTree(points).query(points, k, workers=-1)
+    # One worker: SciPy's threads outlive their arrays when they are interrupted, and crash the process.
+    return cKDTree(points).query(points, k)
 
 
 def tangent_planes(points, neighbours):

@@ -85,7 +85,7 @@ def test_a_mesh_is_a_cloud(told, tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.ply", "", "a.ply: not a valid .ply file"),
+        ("a.ply", "", "a.ply: the file is empty"),
         ("a.json", "{}", "a.json: not a valid .json skeleton"),
         ("a.swc", "1 2", "a.swc: not a valid .swc skeleton"),
         ("a.docx", "x", "a.docx: unknown ending"),
