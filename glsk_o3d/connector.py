@@ -67,7 +67,8 @@ class Connector(Filter):
         vertices = group_sum(state.mass[:, None] * state.positions, owner, len(samples)) / mass
         survivor = state.survivor_of_point
         vertex_of_point = np.where(survivor >= 0, owner[survivor], -1)
-        normals = np.where(state.row_of_point[:, None] >= 0, state.normals[state.row_of_point], np.nan)
+        known = (state.row_of_point >= 0) & ~state.outlier
+        normals = np.where(known[:, None], state.normals[state.row_of_point], np.nan)
         vertices = state.frame.out_of(vertices)
         return Skeleton(
             vertices=vertices,

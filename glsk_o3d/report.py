@@ -66,8 +66,8 @@ class Report:
 
     Attributes
     ----------
-    n_input, n_dropped, n_distinct : int
-        Input points, those dropped as not finite, and those left after removing duplicates.
+    n_input, n_dropped, n_outliers, n_distinct : int
+        Input points, those dropped as not finite, those set aside as outliers, and the distinct ones among the rest.
     stages : tuple of str
         The filters that ran, as the expressions that rebuild them.
     seconds : dict of str to float
@@ -82,6 +82,7 @@ class Report:
 
     n_input: int = 0
     n_dropped: int = 0
+    n_outliers: int = 0
     n_distinct: int = 0
     stages: tuple[str, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)

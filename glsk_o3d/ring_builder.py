@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .errors import InvalidCloudError
 from .filter import Filter, documented, parameter
 from .interop.open3d import cloud_points
 from .numerics.frame import Frame
-from .numerics.neighbourhoods import nearest_neighbours, tangent_planes
+from .numerics.neighbourhoods import isolation, nearest_neighbours, tangent_planes
 from .numerics.ordering import morton_order
 from .numerics.rings import star_rings
 from .report import Report
@@ -56,16 +57,31 @@ class RingBuilder(Filter):
         low=4,
         high=256,
     )
+    outlier_factor: float = parameter(
+        2.5,
+        "A point this many times farther from its neighbours than these are from theirs is set aside: it goes to the "
+        "nearest vertex but has no say. 0 keeps all.",
+        type="float",
+        low=0,
+    )
     drop_invalid: bool = parameter(
         False, "Drop points with NaN or infinite coordinates instead of refusing.", type="bool"
     )
 
     def _run(self, cloud, on_iteration):
         points = cloud_points(cloud)
-        rows, report = self._finite_rows(points)
-        frame, distinct, row_of_valid, neighbours = self._distinct(points[rows])
-        row_of_point = np.full(len(points), -1)
-        row_of_point[rows] = row_of_valid
+        finite = self._finite(points)
+        frame, distinct, row, distance, neighbours = self._distinct(points[finite])
+        stray = np.zeros(len(row), bool)
+        if self.outlier_factor:
+            stray = isolation(distance, neighbours)[row] > self.outlier_factor
+            if not 0 < stray.sum() <= len(row) - MIN_POINTS:
+                stray[:] = False
+            else:
+                frame, distinct, row[~stray], distance, neighbours = self._distinct(points[finite][~stray])
+                row[stray] = cKDTree(distinct).query(frame.into(points[finite][stray]))[1]
+        row_of_point, outlier = np.full(len(points), -1), np.zeros(len(points), bool)
+        row_of_point[finite], outlier[finite] = row, stray
 
         n = len(distinct)
         axes = tangent_planes(distinct, neighbours)
@@ -74,6 +90,7 @@ class RingBuilder(Filter):
         return Contraction(
             points=points,
             row_of_point=row_of_point,
+            outlier=outlier,
             frame=frame,
             cloud=distinct,
             normals=np.ascontiguousarray(axes[:, :, 0]),
@@ -89,10 +106,15 @@ class RingBuilder(Filter):
             ring_ratio_drop=0.0,
             mean_ring_edge=float(rings.mean_lengths(distinct).mean()),
             contraction_weight=0.0,
-            report=report(n_distinct=n),
+            report=Report(
+                n_input=len(points),
+                n_dropped=int((~finite).sum()),
+                n_outliers=int(stray.sum()),
+                n_distinct=n,
+            ),
         )
 
-    def _finite_rows(self, points):
+    def _finite(self, points):
         finite = np.isfinite(points).all(axis=1)
         dropped = int(len(points) - finite.sum())
         if dropped and not self.drop_invalid:
@@ -100,14 +122,10 @@ class RingBuilder(Filter):
                 f"{dropped} of {len(points)} points have NaN or infinite coordinates, the first at index "
                 f"{int(np.argmin(finite))}: remove them, or let RingBuilder(drop_invalid=True) drop them"
             )
-
-        def report(**facts):
-            return Report(n_input=len(points), n_dropped=dropped, **facts)
-
-        return np.flatnonzero(finite), report
+        return finite
 
     def _distinct(self, points):
-        """Frame, distinct points in Morton order, the row of each point among them, and their neighbours."""
+        """Frame, distinct points in Morton order, the row of each point, and distances and rows of their neighbours."""
         if len(points) < MIN_POINTS:
             raise InvalidCloudError(
                 f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones"
@@ -138,4 +156,4 @@ class RingBuilder(Filter):
             cloud, row = cloud[order], position[inverse.reshape(-1)[row]]
             k = min(self.k or published_k(len(cloud)), len(cloud))
             distance, neighbours = nearest_neighbours(cloud, k)
-        return frame, cloud, row, neighbours
+        return frame, cloud, row, distance, neighbours

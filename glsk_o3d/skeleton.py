@@ -33,7 +33,8 @@ class Skeleton:
     points : (N, 3) float64 array
         The input points, in the order they came in.
     normals : (N, 3) float64 array
-        Unit normals estimated from the neighbourhoods, up to their sign; NaN for dropped points.
+        Unit normals estimated from the neighbourhoods, up to their sign; NaN for points that have no say, because they
+        were dropped as not finite or set aside as outliers.
     report : Report
         What the run did.
     """
@@ -69,6 +70,11 @@ class Skeleton:
     def degree(self) -> np.ndarray:
         """Edges at every vertex, (M,) int array."""
         return np.bincount(self.edges.ravel(), minlength=len(self.vertices))
+
+    @property
+    def witnesses(self) -> np.ndarray:
+        """Input points that have a vertex and a normal, int array: those that say where the skeleton is."""
+        return np.flatnonzero((self.vertex_of_point >= 0) & np.isfinite(self.normals).all(axis=1))
 
     @property
     def leaves(self) -> np.ndarray:
@@ -191,13 +197,14 @@ def plane_distance_radii(vertices, vertex_of_point, points, normals):
     vertex_of_point : (N,) int array
         -1 for points that belong to no vertex.
     points, normals : (N, 3) float array
+        Points without a normal (NaN) do not count.
 
     Returns
     -------
     (M,) float array
         0 for a vertex without points.
     """
-    owned = np.flatnonzero(vertex_of_point >= 0)
+    owned = np.flatnonzero((vertex_of_point >= 0) & np.isfinite(normals).all(axis=1))
     owner = vertex_of_point[owned]
     offset = points[owned] - vertices[owner]
     distance = np.abs(np.einsum("ij,ij->i", offset, normals[owned]))

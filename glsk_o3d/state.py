@@ -24,6 +24,8 @@ class Contraction:
         The input.
     row_of_point : (N,) int array
         Row of `cloud` that each input point is; -1 if it was dropped as not finite.
+    outlier : (N,) bool array
+        Input points that were set aside; `row_of_point` is the distinct point nearest to them.
     frame : Frame
     cloud : (m, 3) float64 array
         Distinct input points.
@@ -54,6 +56,7 @@ class Contraction:
 
     points: np.ndarray
     row_of_point: np.ndarray
+    outlier: np.ndarray
     frame: Frame
     cloud: np.ndarray
     normals: np.ndarray
@@ -87,7 +90,7 @@ class Contraction:
     @property
     def point_of_survivor(self) -> np.ndarray:
         """For every survivor the first input point that it is, (n,) int array."""
-        valid = np.flatnonzero(self.row_of_point >= 0)
+        valid = np.flatnonzero((self.row_of_point >= 0) & ~self.outlier)
         first = np.empty(len(self.cloud), int)
         first[self.row_of_point[valid[::-1]]] = valid[::-1]
         return first[self.survivors]

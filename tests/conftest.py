@@ -57,13 +57,16 @@ def assert_sound():
         assert (owner == -1).sum() == n_dropped
         assert owner.min() >= -1
         assert skeleton.points.shape == skeleton.normals.shape == (n_points, 3)
-        lengths = np.linalg.norm(skeleton.normals[owner >= 0], axis=1)
+        lengths = np.linalg.norm(skeleton.normals[skeleton.witnesses], axis=1)
         np.testing.assert_allclose(lengths, 1, atol=1e-12)
+        silent = np.isnan(skeleton.normals).any(axis=1)
+        assert silent.sum() == n_dropped + skeleton.report.n_outliers
+        assert silent[owner < 0].all()
 
         report = skeleton.report
         assert report.n_input == n_points
         assert report.n_dropped == n_dropped
-        assert 0 < report.n_distinct <= n_points - n_dropped
+        assert 0 < report.n_distinct <= n_points - n_dropped - report.n_outliers
         assert report.stop_reason
 
     return check

@@ -80,8 +80,8 @@ def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pip
     Examples
     --------
     >>> from glsk_o3d import Connector, RingBuilder, pipelines
-    >>> override(pipelines.default(), ["RingBuilder.k=16", "Connector.radius=0.5"]).stages[0]
-    RingBuilder(k=16, drop_invalid=False)
+    >>> override(pipelines.default(), ["RingBuilder.k=20", "Connector.radius=0.5"]).stages[0]
+    RingBuilder(k=20, outlier_factor=2.5, drop_invalid=False)
     """
     changes = [(setting, *_parse(setting)) for setting in settings]
     changes.sort(key=lambda change: not isinstance(change[3], Parameters | None))

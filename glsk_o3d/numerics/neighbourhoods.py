@@ -24,6 +24,25 @@ def nearest_neighbours(points, k):
     return cKDTree(points).query(points, k)
 
 
+def isolation(distance, neighbours):
+    """How much farther a point is from its neighbours than these are from theirs (after Breunig et al. 2000, LOF).
+
+    Near 1 on a surface, whatever its density; an outlier has more.
+
+    Parameters
+    ----------
+    distance : (n, k) float array
+    neighbours : (n, k) int array
+        As from `nearest_neighbours`.
+
+    Returns
+    -------
+    (n,) float array
+    """
+    mean = distance[:, 1:].mean(axis=1)
+    return mean / np.median(mean[neighbours[:, 1:]], axis=1)
+
+
 def tangent_planes(points, neighbours):
     """Principal axes of every neighbourhood.
 

@@ -12,7 +12,7 @@ from .triangles import collapse_triangles
 
 def surface_distance(skeleton):
     """Median distance from each vertex to the input points it owns, (M,) float array."""
-    owned = skeleton.vertex_of_point >= 0
+    owned = skeleton.witnesses
     owner = skeleton.vertex_of_point[owned]
     distance = np.linalg.norm(skeleton.points[owned] - skeleton.vertices[owner], axis=1)
     return group_median(distance, owner, len(skeleton.vertices))

@@ -25,7 +25,7 @@ def medial_vertices(skeleton):
     centre = skeleton.vertices.mean(axis=0)
     x0 = skeleton.vertices - centre
     m = len(x0)
-    owned = skeleton.vertex_of_point >= 0
+    owned = skeleton.witnesses
     owner, p, n = skeleton.vertex_of_point[owned], skeleton.points[owned] - centre, skeleton.normals[owned]
     across = np.eye(3) - n[:, :, None] * n[:, None, :]
     lhs = group_sum(across, owner, m)

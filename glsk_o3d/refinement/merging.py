@@ -9,8 +9,8 @@ from ..numerics.groups import group_sum
 
 def support(skeleton):
     """Input points that each vertex owns, at least 1, (M,) float array."""
-    owner = skeleton.vertex_of_point
-    return np.maximum(np.bincount(owner[owner >= 0], minlength=len(skeleton.vertices)), 1).astype(float)
+    owner = skeleton.vertex_of_point[skeleton.witnesses]
+    return np.maximum(np.bincount(owner, minlength=len(skeleton.vertices)), 1).astype(float)
 
 
 def merge_vertices(skeleton, group):

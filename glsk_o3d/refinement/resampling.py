@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .merging import support
+
 SUPPORT = 8  # input points that a piece of a subdivided edge needs
 
 
@@ -24,9 +26,8 @@ def resample(skeleton, spacing):
     ends = skeleton.edges
     m = len(skeleton.vertices)
     length = np.maximum(spacing * skeleton.radii[ends].mean(axis=1), 1e-3 * skeleton.edge_lengths)
-    count = np.bincount(skeleton.vertex_of_point[skeleton.vertex_of_point >= 0], minlength=m)
-    support = (count / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
-    pieces = np.ceil(np.minimum(skeleton.edge_lengths / length, np.maximum(support / SUPPORT, 1))).astype(int)
+    points = (support(skeleton) / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
+    pieces = np.ceil(np.minimum(skeleton.edge_lengths / length, np.maximum(points / SUPPORT, 1))).astype(int)
     inner = pieces - 1
     edge = np.repeat(np.arange(len(ends)), inner)
     step = np.arange(len(edge)) - np.repeat(np.cumsum(inner) - inner, inner) + 1

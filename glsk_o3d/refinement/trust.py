@@ -22,8 +22,8 @@ def trust_warnings(skeleton):
     -------
     list of str
     """
-    owned = skeleton.vertex_of_point >= 0
-    if not owned.any():
+    owned = skeleton.witnesses
+    if len(owned) == 0:
         return []
     owner, normals = skeleton.vertex_of_point[owned], skeleton.normals[owned]
     along = normals[:, :, None] * normals[:, None, :]
