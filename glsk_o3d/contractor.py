@@ -30,8 +30,8 @@ class Contractor(Filter):
     diagonal of the survivors' masses; it is the identity unless the reducer conserves mass.
 
     A late, ill-conditioned solve can throw points out of the cloud. It is detected (a point beyond 1.2 times the
-    bounding box, or a solve without a trustworthy solution) and dropped: the last sound state is kept, and the report
-    says so.
+    bounding box, or a solve without a trustworthy solution). Such a solve is repeated with the runaway points held;
+    where that does not help it is dropped, the last sound state is kept, and the report says so.
 
     References
     ----------

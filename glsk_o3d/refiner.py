@@ -85,7 +85,9 @@ class Refiner(Filter):
         for _ in range(self.recentre):
             skeleton = replace(skeleton, vertices=medial_vertices(skeleton))
             skeleton = replace(skeleton, vertices=smooth(skeleton))
-        radii = plane_distance_radii(skeleton.vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals)
+        radii = plane_distance_radii(
+            skeleton.vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals, skeleton.radii
+        )
         skeleton = replace(skeleton, radii=radii)
         report = skeleton.report
         for message in trust_warnings(skeleton):

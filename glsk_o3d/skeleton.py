@@ -27,7 +27,8 @@ class Skeleton:
     edges : (E, 2) int64 array
         Pairs i < j, sorted, each once.
     radii : (M,) float64 array
-        Local thickness: the distance from the vertex to the surface around it.
+        Local thickness: the median distance from the vertex to the tangent planes of the points it owns; on the axis of
+        a tube the tube's radius.
     vertex_of_point : (N,) int64 array
         For every input point the vertex it belongs to; -1 only for points that were dropped as not finite.
     points : (N, 3) float64 array
@@ -186,7 +187,7 @@ class Skeleton:
         save_skeleton(self, path, **options)
 
 
-def plane_distance_radii(vertices, vertex_of_point, points, normals):
+def plane_distance_radii(vertices, vertex_of_point, points, normals, otherwise=0.0):
     """Local thickness: median distance from each vertex to the tangent planes of the points it owns.
 
     On the axis of a tube this is the tube's radius, however far along the axis a point lies from its vertex.
@@ -198,14 +199,16 @@ def plane_distance_radii(vertices, vertex_of_point, points, normals):
         -1 for points that belong to no vertex.
     points, normals : (N, 3) float array
         Points without a normal (NaN) do not count.
+    otherwise : (M,) float array or float
+        Radius of the vertices without points.
 
     Returns
     -------
     (M,) float array
-        0 for a vertex without points.
     """
     owned = np.flatnonzero((vertex_of_point >= 0) & np.isfinite(normals).all(axis=1))
     owner = vertex_of_point[owned]
     offset = points[owned] - vertices[owner]
     distance = np.abs(np.einsum("ij,ij->i", offset, normals[owned]))
-    return group_median(distance, owner, len(vertices))
+    radii = group_median(distance, owner, len(vertices))
+    return np.where(np.bincount(owner, minlength=len(vertices)) > 0, radii, otherwise)

@@ -74,6 +74,9 @@ class Contraction:
     contraction_weight: float
     report: Report
 
+    def __repr__(self):
+        return f"Contraction({len(self)} of {len(self.points)} points left after {len(self.report.iterations)} solves)"
+
     def __len__(self):
         return len(self.survivors)
 
