@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 import warnings as _warnings
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -48,6 +49,14 @@ class IterationRecord:
     contraction_weight: float
     solve_error: float
     seconds: float
+
+
+def _outside() -> int:
+    """Stack level, as seen from the caller, of the first frame that is not of this package: the user's line."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith(__package__):
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def _versions() -> dict[str, str]:
@@ -100,7 +109,7 @@ class Report:
 
     def with_warning(self, message: str) -> Report:
         """This report with a warning in it, which is also issued as a SkeletonWarning."""
-        _warnings.warn(message, SkeletonWarning, stacklevel=2)
+        _warnings.warn(message, SkeletonWarning, stacklevel=_outside())
         return dataclasses.replace(self, warnings=(*self.warnings, message))
 
     def to_dict(self) -> dict:

@@ -9,7 +9,7 @@ BALL = 0.5  # spread of the normal lines around where they meet, over the radius
 
 
 def trust_warnings(skeleton):
-    """Reasons not to trust a skeleton: most of the cloud is sheet-like or sphere-like.
+    """Reasons not to trust a skeleton: most of the cloud is sheet-like or sphere-like, or there are no edges.
 
     Sheet-like: the normals around a vertex have one direction. Sphere-like: the normal lines of a whole component meet
     in one point. Both are scale-free and ask the cloud, not the skeleton.
@@ -56,4 +56,6 @@ def trust_warnings(skeleton):
             f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
             "so that no curve skeleton is meaningful there"
         ]
+    if len(skeleton.edges) == 0:
+        return ["no edges: every part became one vertex; is Connector.radius larger than the parts are long?"]
     return []
