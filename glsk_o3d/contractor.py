@@ -57,6 +57,9 @@ class Contractor(Filter):
         type="float",
         low=0,
     )
+    keep_last: bool = parameter(
+        True, "Keep the solve after which the rule says stop; the published codes throw it away.", type="bool"
+    )
     retries: int = parameter(
         3,
         "Times a solve that throws points out of the box is repeated with these points held. 0 as published.",
@@ -69,6 +72,7 @@ class Contractor(Filter):
         reducer = self.reducer
         for _ in range(self.max_iterations):
             start = time.perf_counter()
+            before = state
             try:
                 state, facts = self._solve(state)
             except SolveError as problem:
@@ -78,15 +82,17 @@ class Contractor(Filter):
             state = _record(state, **facts, seconds=time.perf_counter() - start)
             reason = self.stop(state.report.iterations)
             if reason is None and reducer is not None:
-                before = len(state)
+                n = len(state)
                 state = _within(reducer(state), state.report)
-                if len(state) == before:
+                if len(state) == n:
                     reducer = None  # as in the published code, which gives up after a pass without a merge
-                state = _amend(state, n_merged=before - len(state), seconds=time.perf_counter() - start)
+                state = _amend(state, n_merged=n - len(state), seconds=time.perf_counter() - start)
             if on_iteration is not None and on_iteration(state.report.iterations[-1]) is False and reason is None:
                 return _finished(state, "stopped by the caller")
             if reason is not None:
-                return _finished(state, reason, converged=True)
+                keep = self.keep_last or len(state.report.iterations) == 1
+                kept = state if keep else replace(before, report=state.report)
+                return _finished(kept, reason, converged=True)
         return _finished(state, f"reached max_iterations = {self.max_iterations}")
 
     def _solve(self, state):

@@ -159,12 +159,15 @@ class Filter(Parameters):
         on_iteration : callable, optional
             Called with each IterationRecord of a contraction; return False to stop there and keep what is done.
         """
+        from .skeleton import Skeleton
+        from .state import Contraction
+
         self.check()
-        given = type(data).__name__
-        flows = ("Contraction", "Skeleton")
-        if (self.consumes in flows and given != self.consumes) or (self.consumes == "cloud" and given in flows):
+        flows = {"Contraction": Contraction, "Skeleton": Skeleton}
+        wanted = flows.get(self.consumes)
+        if not isinstance(data, wanted) if wanted else isinstance(data, tuple(flows.values())):
             raise StageError(
-                f"{type(self).__name__} takes a {self.consumes}, not a {given}: "
+                f"{type(self).__name__} takes a {self.consumes}, not a {type(data).__name__}: "
                 "the order is RingBuilder | Contractor | Connector | Refiner"
             )
         start = time.perf_counter()

@@ -78,7 +78,9 @@ class LPRReducer(Filter):
         if self.order == "index":
             rank = state.point_of_survivor[candidates[feasible]]
         else:
-            rank = energy[candidates[feasible]] / state.ring_size[candidates[feasible]] ** 2
+            chosen = candidates[feasible]
+            with np.errstate(divide="ignore"):
+                rank = energy[chosen] / state.ring_size[chosen] ** 2
         feasible = feasible[np.argsort(rank, kind="stable")]
         chosen = feasible[match(len(state), candidates[feasible], nearest[candidates[feasible]])]
         if len(chosen) == 0:
@@ -127,7 +129,7 @@ def merge_energy(state):
     -------
     (n,) float array
         :math:`V_1 - V_2 + 3 U`, with :math:`\psi' = 1.2 \psi`, :math:`\eta = (s - \psi' s(0)) / s(0)`,
-        :math:`V_1 = (9 w_L |\eta \delta|)^2`,
+        :math:`V_1 = (9 w_L |\eta \delta|)^2` with the :math:`w_L` of the solve (9 is the published :math:`s_L^2`),
         :math:`V_2 = (\psi' s(0) |P' - P| / (\eta (s(0) - s)))^2` and
         :math:`U = |\delta_i - \bar\delta_j|^2` over the ring. Minus infinity where a ring did not change.
     """

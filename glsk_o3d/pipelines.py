@@ -20,7 +20,7 @@ def cao2010() -> Pipeline:
     """The baseline: contraction without reduction, stopped by the ring sizes (Cao et al. 2010)."""
     return (
         RingBuilder(k=None, outlier_factor=0)
-        | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0, retries=0)
+        | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0, keep_last=False, retries=0)
         | Connector(radius="2%", thickness=0, links="nearest")
         | Refiner(opening=0, twig=0, spacing=0, recentre=0)
     )
@@ -38,6 +38,7 @@ def wen2024() -> Pipeline:
             reducer=LPRReducer(conserve_mass=False, order="index", mend_rings=False),
             stop=ExplainedScore(),
             min_attraction=0,
+            keep_last=False,
             retries=0,
         )
         | Connector(radius="2%", thickness=0, links="nearest")

@@ -51,6 +51,11 @@ class IterationRecord:
     seconds: float
 
 
+def _known(cls, data: dict) -> dict:
+    names = {field.name for field in dataclasses.fields(cls)}
+    return {name: value for name, value in data.items() if name in names}
+
+
 def _outside() -> int:
     """Stack level, as seen from the caller, of the first frame that is not of this package: the user's line."""
     frame, level = sys._getframe(1), 1
@@ -119,9 +124,10 @@ class Report:
     @classmethod
     def from_dict(cls, data: dict) -> Report:
         """Inverse of `to_dict`; entries of a later version that this one does not know are passed over."""
-        known = {field.name for field in dataclasses.fields(cls)}
-        values = {name: value for name, value in data.items() if name in known}
-        values["iterations"] = tuple(IterationRecord(**record) for record in values.get("iterations", ()))
+        values = _known(cls, data)
+        values["iterations"] = tuple(
+            IterationRecord(**_known(IterationRecord, record)) for record in values.get("iterations", ())
+        )
         for name in ("stages", "warnings"):
             values[name] = tuple(values.get(name, ()))
         return cls(**values)

@@ -92,33 +92,33 @@ def _horton(chains):
     component = len({int(np.argmax(np.isfinite(row))) for row in distance})
     rank = len(chains) - m + component
 
-    candidates = []
-    masks = []
-    for root in range(m):
-        mask = [0] * m
-        reached = np.argsort(distance[root], kind="stable")
-        for v in reached.tolist():
-            if before[root, v] >= 0:
-                mask[v] = mask[before[root, v]] | 1 << shortest[int(before[root, v]), v]
-        masks.append(mask)
-        total = distance[root, ends[:, 0]] + distance[root, ends[:, 1]] + lengths
-        candidates += [(total[e], root, e) for e in np.flatnonzero(np.isfinite(total)).tolist()]
-    candidates.sort()
+    def path(root, v):
+        """Chains on the shortest path, as a bit mask."""
+        mask = 0
+        while v != root:
+            u = int(before[root, v])
+            mask |= 1 << shortest[u, v]
+            v = u
+        return mask
 
+    # Candidates: a chain, closed by the shortest paths from a root to its two ends.
+    totals = distance[:, ends[:, 0]] + distance[:, ends[:, 1]] + lengths
     basis, pivots = [], {}
-    for total, root, e in candidates:
-        a, b = ends[e].tolist()
-        if masks[root][a] & masks[root][b] or (masks[root][a] | masks[root][b]) >> e & 1:
+    for candidate in np.argsort(totals, axis=None, kind="stable").tolist():
+        root, e = divmod(candidate, len(chains))
+        total = float(totals[root, e])
+        if len(basis) == rank or not np.isfinite(total):
+            break
+        one, other = (path(root, v) for v in ends[e].tolist())
+        if one & other or (one | other) >> e & 1:
             continue  # not a simple cycle
-        cycle = masks[root][a] | masks[root][b] | 1 << e
+        cycle = one | other | 1 << e
         reduced = cycle
         while reduced and (top := reduced.bit_length()) in pivots:
             reduced ^= pivots[top]
         if reduced:
             pivots[reduced.bit_length()] = reduced
             basis.append((total, _walk([chains[i][1] for i in range(len(chains)) if cycle >> i & 1])))
-            if len(basis) == rank:
-                break
     return basis
 
 

@@ -12,7 +12,7 @@ def medial_vertices(skeleton):
 
     For every vertex the points owned by it and its neighbours, p with normal n, give the least-squares point
     min_x sum |(I - n n^T)(x - p)|^2 + small |x - x0|^2, which lies on the axis of a tube even if the points cover only
-    one side of it. Only the component across the skeleton is used, so that vertices do not slide along it.
+    one side of it.
 
     Parameters
     ----------

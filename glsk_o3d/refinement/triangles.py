@@ -48,9 +48,11 @@ def collapse_triangles(skeleton):
                 around[c].add(a)
                 around[a].add(c)
         around[b].clear()
-        for c in around[a]:
-            if around[a] & around[c]:
-                heapq.heappush(queue, (*cost(a, c), a, c))
+        # The merge changes the degrees around it and makes new triangles: price all that may have become cheaper.
+        for c in {a, *around[a]}:
+            for d in around[c]:
+                if around[c] & around[d]:
+                    heapq.heappush(queue, (*cost(c, d), c, d))
     for v in range(len(into)):  # a vertex's target may have been merged on
         while into[into[v]] != into[v]:
             into[v] = into[into[v]]

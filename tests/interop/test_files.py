@@ -315,7 +315,7 @@ def doctored(tree, **changes):
         ({"radii": [1.0]}, "1 radii for 6 vertices"),
         ({"vertex_of_point": [9] * 7}, "vertex_of_point"),
         ({"points": [[0, 0, 0]]}, "differ in length"),
-        ({"report": {"iterations": [{"unheard": 1}]}}, "unheard"),
+        ({"report": {"iterations": [{"iteration": 1}]}}, "missing"),
         ({"report": None}, "valid"),
     ],
 )
