@@ -1,0 +1,46 @@
+"""Merging of vertices by its definition."""
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glsk_o3d.refinement.merging import merge_vertices, support
+
+
+def test_support_counts_witnesses_and_is_at_least_one(ringed):
+    raw = ringed([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1)], per=3)
+    normals = raw.normals.copy()
+    normals[[0, 1]] = np.nan  # set aside
+    owner = np.array([0, 0, 0, 1, 1, -1, 1, 1, 1])
+    skeleton = replace(raw, normals=normals, vertex_of_point=owner)
+    assert support(skeleton).tolist() == [1, 5, 1]
+    assert support(skeleton).dtype == float
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 10**6), st.lists(st.integers(-3, 5), min_size=12, max_size=12), st.booleans())
+def test_by_its_definition(random_skeleton, seed, labels, every):
+    raw, group = random_skeleton(seed, every=every), np.array(labels)
+    skeleton = merge_vertices(raw, group)
+    names = sorted(set(labels))
+    weight = support(raw)
+    for v, name in enumerate(names):
+        inside = group == name
+        for merged, own in ((skeleton.vertices, raw.vertices), (skeleton.radii, raw.radii)):
+            np.testing.assert_allclose(merged[v], np.average(own[inside], axis=0, weights=weight[inside]), atol=1e-12)
+    new = [names.index(label) for label in labels]
+    expected = [-1 if v < 0 else new[v] for v in raw.vertex_of_point.tolist()]
+    np.testing.assert_array_equal(skeleton.vertex_of_point, expected)
+    edges = {tuple(sorted((new[a], new[b]))) for a, b in raw.edges.tolist() if new[a] != new[b]}
+    assert [tuple(e) for e in skeleton.edges.tolist()] == sorted(edges)
+    assert skeleton.points is raw.points
+
+
+def test_nothing_to_merge_changes_nothing(random_skeleton):
+    raw = random_skeleton(3)
+    skeleton = merge_vertices(raw, np.arange(12))
+    np.testing.assert_allclose(skeleton.vertices, raw.vertices, rtol=1e-15)
+    np.testing.assert_array_equal(skeleton.edges, raw.edges)
+    np.testing.assert_array_equal(skeleton.vertex_of_point, raw.vertex_of_point)

@@ -1,0 +1,92 @@
+"""Warnings where a curve skeleton means little."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glsk_o3d import Skeleton
+from glsk_o3d.refinement.trust import trust_warnings
+
+
+def unit(n, seed=0):
+    normals = np.random.default_rng(seed).normal(size=(n, 3))
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def sheet(n=400):
+    points = np.column_stack([*np.random.default_rng(0).uniform(-1, 1, (2, n)), np.zeros(n)])
+    return points, np.tile([0.0, 0, 1], (n, 1)), [[-0.5, 0, 0], [0, 0, 0], [0.5, 0, 0]]
+
+
+def ball(n=400):
+    normals = unit(n)
+    return normals, normals, [[-0.3, 0, 0], [0, 0, 0], [0.3, 0, 0]]
+
+
+def torus(n=1600):
+    a, b = np.random.default_rng(1).uniform(0, 2 * np.pi, (2, n))
+    out = np.column_stack([np.cos(a), np.sin(a), 0 * a])
+    normals = np.cos(b)[:, None] * out + np.sin(b)[:, None] * [0, 0, 1]
+    t = np.arange(12) * np.pi / 6
+    return out + 0.3 * normals, normals, np.column_stack([np.cos(t), np.sin(t), 0 * t]).tolist()
+
+
+def skeleton_of(*shapes, joined=True):
+    """Shapes side by side, each a component: a path over its vertices."""
+    vertices, edges, points, normals, owner = [], [], [], [], []
+    for k, (p, n, v) in enumerate(shapes):
+        first = len(vertices)
+        nearest = np.linalg.norm(p[:, None] - np.array(v)[None], axis=2).argmin(axis=1)
+        owner.append(first + nearest)
+        vertices += (np.array(v) + [10 * k, 0, 0]).tolist()
+        points.append(p + [10 * k, 0, 0])
+        normals.append(n * np.random.default_rng(k).choice([-1, 1], (len(n), 1)))
+        edges += [(i, i + 1) for i in range(first, len(vertices) - 1)] if joined else []
+    return Skeleton(
+        vertices, edges, np.ones(len(vertices)), np.concatenate(owner), np.concatenate(points), np.concatenate(normals)
+    )
+
+
+@pytest.mark.parametrize(
+    ("shapes", "start"),
+    [
+        ([sheet()], "sheet-like: around 100% of the points"),
+        ([ball()], "sphere-like: the normals of parts with 100% of the points"),
+        ([torus()], None),
+        ([sheet(600), torus(400)], "sheet-like: around 60% of the points"),
+        ([sheet(400), torus(600)], None),
+        ([ball(600), torus(400)], "sphere-like: the normals of parts with 60% of the points"),
+        ([ball(400), torus(600)], None),
+        ([ball(200), ball(200)], "sphere-like: the normals of parts with 100% of the points"),
+    ],
+)
+@pytest.mark.parametrize("size", [1e-3, 1, 1e3])
+def test_shapes(shapes, start, size):
+    skeleton = skeleton_of(*shapes)
+    scaled = replace(skeleton, vertices=size * skeleton.vertices, points=size * skeleton.points)
+    messages = trust_warnings(scaled)
+    assert len(messages) == (start is not None)
+    assert not start or messages[0].startswith(start)
+
+
+def test_asks_the_cloud_and_not_the_skeleton():
+    """Wherever the vertices are."""
+    skeleton = skeleton_of(ball())
+    astray = replace(skeleton, vertices=skeleton.vertices + [3, 1, 2])
+    assert trust_warnings(astray)[0].startswith("sphere-like")
+
+
+def test_no_edges():
+    messages = trust_warnings(skeleton_of(torus(), joined=False))
+    assert [message.startswith("no edges: every part became one vertex") for message in messages] == [True]
+    # one reason is enough
+    assert trust_warnings(skeleton_of(sheet(), joined=False))[0].startswith("sheet-like")
+
+
+def test_points_without_a_say_do_not_count():
+    skeleton = skeleton_of(sheet(600), torus(400))
+    normals = skeleton.normals.copy()
+    normals[:400] = np.nan
+    assert trust_warnings(replace(skeleton, normals=normals)) == []
+    assert trust_warnings(replace(skeleton, normals=np.full_like(normals, np.nan))) == []
