@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from glsk_o3d import Connector, Contractor, InvalidParameterError, LPRReducer, RingBuilder, Skeleton, pipelines, samples
+from glsk_o3d.connector import local_thickness
 
 VARIANTS = {name: make().stages[2] for name, make in pipelines.PIPELINES.items()}
 ONE_RADIUS = VARIANTS["cao2010"]
@@ -122,3 +123,41 @@ def test_radii_are_those_of_the_tube():
 def test_bad_radius(state, radius):
     with pytest.raises(InvalidParameterError, match=r"Connector\.radius"):
         Connector(radius=radius)(state)
+
+
+# ---- local thickness
+
+
+def slow_thickness(state, k=16):
+    n = len(state)
+    distance = np.linalg.norm(state.cloud - state.positions[state.owner], axis=1)
+    own = np.array([np.median(distance[state.owner == i]) for i in range(n)])
+    near = np.argsort(cdist(state.positions, state.positions), axis=1)[:, :k]
+    return np.median(own[near], axis=1)
+
+
+def test_local_thickness_is_a_median_over_sixteen(state):
+    """Of the medians of what each survivor speaks for; itself is one of the 16."""
+    np.testing.assert_allclose(local_thickness(state), slow_thickness(state), atol=1e-12)
+    assert np.abs(slow_thickness(state, 15) - slow_thickness(state)).max() > 1e-4
+
+
+def test_local_thickness_of_a_tube_is_its_radius():
+    state = Contractor()(RingBuilder()(samples.tube(n=2000, radius=0.1).points))
+    middle = np.abs(state.contracted[:, 0]) < 0.4
+    np.testing.assert_allclose(local_thickness(state)[middle] * state.frame.scale, 0.1, rtol=0.1)
+
+
+def test_local_thickness_ignores_a_few_points_gone_astray(state):
+    cloud = state.cloud.copy()
+    cloud[state.survivors[::40]] += 100
+    astray = replace(state, cloud=cloud)
+    assert local_thickness(astray).max() < 1
+
+
+def test_local_thickness_of_fewer_points_than_neighbours():
+    points = np.random.default_rng(0).normal(size=(10, 3))
+    state = RingBuilder(outlier_factor=0)(points)
+    moved = replace(state, positions=0.5 * state.positions)
+    expected = np.median(np.linalg.norm(state.cloud, axis=1)) / 2
+    np.testing.assert_allclose(local_thickness(moved), expected)

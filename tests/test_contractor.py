@@ -340,3 +340,116 @@ def test_ring_size_rule_in_a_run(built):
     drops = -np.diff([1.0, *(record.ring_ratio for record in records)])
     assert (drops[:-1] >= 0.1).all()
     assert drops[-1] < 0.1
+
+
+# ---- weights, floors, and points held
+
+
+class Capture:
+    """Stands in for the solve: keeps what it is given and throws points out unless they are held."""
+
+    def __init__(self, monkeypatch, thrown=(), cap=1e4):
+        self.calls, self.solve, self.thrown, self.cap = [], module.solve_contraction, list(thrown), cap
+        monkeypatch.setattr(module, "solve_contraction", self)
+
+    def __call__(self, laplacian, row_weight, weight, points):
+        self.calls.append((row_weight, weight))
+        positions, error = self.solve(laplacian, row_weight, weight, points)
+        positions = positions.copy()
+        for point in self.thrown:
+            if weight[point] < self.cap:
+                positions[point, 1] = -40
+                break  # one at a time
+        return positions, error
+
+
+@pytest.mark.parametrize("thrown", [[7], [7, 3], [7, 3, 250]])
+def test_thrown_points_are_held(built, monkeypatch, thrown):
+    capture = Capture(monkeypatch, thrown)
+    state = Contractor(max_iterations=1)(built)
+    assert [record.n_held for record in state.report.iterations] == [len(thrown)]
+    assert state.report.stop_reason == "reached max_iterations = 1"
+    assert len(capture.calls) == len(thrown) + 1
+    for attempt, (_, weight) in enumerate(capture.calls):
+        expected = np.ones(len(built))
+        expected[thrown[:attempt]] = 1e4
+        np.testing.assert_array_equal(weight, expected)
+    np.testing.assert_allclose(state.positions[thrown], built.positions[thrown], atol=1e-4)
+
+
+def test_holding_is_for_one_solve(built, monkeypatch):
+    capture = Capture(monkeypatch, [7])
+    report = Contractor(max_iterations=2, stop=never)(built).report
+    assert [record.n_held for record in report.iterations] == [1, 1]
+    assert [bool(weight[7] == 1e4) for _, weight in capture.calls] == [False, True, False, True]
+
+
+@pytest.mark.parametrize(("thrown", "retries"), [([7], 0), ([7, 3, 250], 2), ([7, 3, 250, 9], 3)])
+def test_too_many_retries_refuse(built, monkeypatch, thrown, retries):
+    capture = Capture(monkeypatch, thrown)
+    state = Contractor(retries=retries)(built)
+    assert len(capture.calls) == retries + 1
+    assert state.report.iterations == ()
+    assert state.report.stop_reason == (
+        "solve 1 refused, last sound state kept: it would throw 1 of 400 points out of 1.2 times the bounding box"
+    )
+    same(state, built)
+
+
+def test_points_that_run_even_if_held_refuse(built, monkeypatch):
+    capture = Capture(monkeypatch, [7], cap=np.inf)
+    assert "solve 1 refused" in Contractor()(built).report.stop_reason
+    assert len(capture.calls) == 4
+
+
+def test_no_point_thrown_no_point_held(built):
+    assert {record.n_held for record in Contractor()(built).report.iterations} == {0}
+
+
+def test_held_points_rescue_the_cube():
+    """What a real solve throws out is held, and the run goes on."""
+    built = BUILDER(GRID)
+    assert len(replace(CAO, retries=0)(built).report.iterations) == 1
+    state = replace(CAO, retries=3)(built)
+    assert len(state.report.iterations) > 1
+    assert state.report.iterations[1].n_held > 0
+    assert (np.abs(state.positions) <= 1.2 * state.frame.half_extent).all()
+
+
+@pytest.mark.parametrize("floor", [0, 0.5, 1, 3])
+def test_attraction_has_a_floor_and_a_cap(built, monkeypatch, floor):
+    size = built.ring_size0.copy()
+    size[:4] *= [4, 0.25, 1e-9, 0]
+    capture = Capture(monkeypatch)
+    Contractor(max_iterations=1, min_attraction=floor, max_attraction=500.0)(replace(built, ring_size=size))
+    ((_, weight),) = capture.calls
+    np.testing.assert_allclose(weight[:5], np.maximum([0.25, 4, 500, 500, 1], floor))
+
+
+def test_presets_hold_nothing_and_have_no_floor():
+    for filter in (CAO, WEN):
+        assert (filter.min_attraction, filter.retries) == (0, 0)
+
+
+def test_mass_enters_both_terms_by_its_root(built, monkeypatch):
+    mass = np.random.default_rng(0).integers(1, 9, len(built)).astype(float)
+    size = built.ring_size0 / 2
+    capture = Capture(monkeypatch, [7], cap=1e4)
+    mass[7] = 4
+    state = Contractor(max_iterations=1)(replace(built, mass=mass, ring_size=size))
+    (rows, weight), (_, held) = capture.calls
+    np.testing.assert_allclose(rows, state.contraction_weight / np.sqrt(mass))
+    np.testing.assert_allclose(weight, 2 * np.sqrt(mass))
+    assert held[7] == 2e4
+    np.testing.assert_array_equal(np.delete(held, 7), np.delete(weight, 7))
+
+
+def test_solve_is_that_of_the_documented_system(built):
+    """(w_L^2 L^T M^-1 L + M W_H^2) P' = M W_H^2 P."""
+    mass = np.random.default_rng(0).integers(1, 9, len(built)).astype(float)
+    state = Contractor(max_iterations=1)(replace(built, mass=mass, ring_size=built.ring_size0 / 2))
+    laplacian = cotangent_laplacian(built.positions, built.rings).toarray()
+    attraction = np.diag(mass * 4.0)
+    lhs = state.contraction_weight**2 * laplacian.T @ np.diag(1 / mass) @ laplacian + attraction
+    np.testing.assert_allclose(lhs @ state.positions, attraction @ built.positions, atol=1e-5)
+    np.testing.assert_allclose(state.positions, np.linalg.solve(lhs, attraction @ built.positions), atol=1e-7)

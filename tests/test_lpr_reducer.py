@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
 from glsk_o3d import Contractor, LPRReducer, RingBuilder, StageError, samples
-from glsk_o3d.lpr_reducer import combine_rings, match, merge_energy
+from glsk_o3d.lpr_reducer import combine_rings, match, mend_rings, merge_energy
 from glsk_o3d.numerics.neighbourhoods import plane_axes
+from glsk_o3d.numerics.rings import Rings
 
 CLOUDS = {
     "torus": samples.torus(n=600).points,
@@ -145,6 +146,61 @@ def test_merge_along_a_direction_within_the_tangent_plane_takes_that_plane():
     assert combined.closed[inside].all()
     assert combined.sizes[inside].min() > 3
     assert len(LPRReducer()(state)) < 225
+
+
+# ---- broken rings
+
+
+def flat_rings(seed=0):
+    """Delaunay stars of random points in the plane z = 0, and their normals."""
+    points = np.column_stack([np.random.default_rng(seed).uniform(size=(120, 2)), np.zeros(120)])
+    return RingBuilder()(points), np.tile([0.0, 0, 1], (120, 1))
+
+
+def cut_short(rings, broken, length):
+    rows = rings.padded(np.arange(len(rings)))
+    rows[broken, length:] = -1
+    return Rings.from_padded(rows, rings.closed & ~np.isin(np.arange(len(rings)), broken))
+
+
+@pytest.mark.parametrize("length", [1, 2])
+def test_rings_of_fewer_than_three_are_rebuilt(length):
+    """As Delaunay stars among what is left of them and the rings of these."""
+    state, normals = flat_rings()
+    inside = np.flatnonzero((np.abs(state.positions[:, :2]) < 0.5).all(axis=1) & (state.rings.sizes > 4))
+    broken = inside[::6]
+    rings = cut_short(state.rings, broken, length)
+    mended = mend_rings(rings, state.cloud, normals)
+    whole = np.setdiff1d(np.arange(120), broken)
+    for i in whole.tolist():
+        if rings.sizes[i] >= 3:
+            np.testing.assert_array_equal(mended[i], rings[i])
+            assert mended.closed[i] == rings.closed[i]
+    for i in broken.tolist():
+        union = sorted({*rings[i].tolist(), *(k for j in rings[i].tolist() for k in rings[j].tolist())} - {i})
+        simplices = Delaunay(state.cloud[[*union, i], :2]).simplices
+        star = simplices[(simplices == len(union)).any(axis=1)]
+        expected = {frozenset(union[j] for j in triangle if j != len(union)) for triangle in star.tolist()}
+        ring = mended[i].tolist()
+        following = ring[1:] + (ring[:1] if mended.closed[i] else [])
+        assert {frozenset(pair) for pair in zip(ring, following, strict=False)} == expected
+        assert len(ring) >= 3
+    assert len(mended) == 120
+
+
+def test_sound_rings_are_left_alone():
+    state = contracted(CLOUDS["torus"])
+    rings = state.rings
+    assert rings.sizes.min() >= 3
+    assert mend_rings(rings, state.cloud, state.normals) is rings
+
+
+def test_mending_leaves_fewer_points_that_nothing_surrounds():
+    broken = {}
+    for mend in (False, True):
+        reduced = contracted(CLOUDS["torus"], 6, LPRReducer(mend_rings=mend))
+        broken[mend] = int((reduced.rings.sizes < 3).sum())
+    assert broken[True] < broken[False]
 
 
 # ---- the pass

@@ -151,14 +151,8 @@ def inscribed_circle(points):
     """
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]
-    curve = np.concatenate([points, points[:1]])
-    length = np.linalg.norm(np.diff(curve, axis=0), axis=1)
-    pieces = np.maximum(np.ceil(length / length.sum() * 200).astype(int), 1)
-    row = np.repeat(np.arange(len(points)), pieces)
-    t = (np.arange(len(row)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[row]
-    samples = (curve[row] + (curve[row + 1] - curve[row]) * t[:, None] - middle) @ axes.T
     polygon = (points - middle) @ axes.T
-    low, high = samples[:, :2].min(axis=0), samples[:, :2].max(axis=0)
+    low, high = polygon[:, :2].min(axis=0), polygon[:, :2].max(axis=0)
     centre, best = np.zeros(3), 0.0
     span = high - low
     at = (low + high) / 2
@@ -167,11 +161,20 @@ def inscribed_circle(points):
         grid = np.stack([*np.meshgrid(x, y), np.zeros((21, 21))], axis=-1).reshape(-1, 3)
         grid = grid[_inside(grid, polygon)]
         if len(grid):
-            distance = np.linalg.norm(grid[:, None] - samples[None], axis=2).min(axis=1)
+            distance = _distance(grid, polygon)
             if distance.max() > best:
                 best, centre = float(distance.max()), grid[np.argmax(distance)]
         at, span = centre[:2], span / 5
     return centre @ axes + middle, best
+
+
+def _distance(points, polygon):
+    """Distance from each point to the closed polygon, (n,) float array."""
+    start, edge = polygon, np.roll(polygon, -1, axis=0) - polygon
+    offset = points[:, None] - start
+    squared = np.maximum((edge**2).sum(axis=1), np.finfo(float).tiny)
+    along = np.clip((offset * edge).sum(axis=2) / squared, 0, 1)
+    return np.linalg.norm(offset - along[:, :, None] * edge, axis=2).min(axis=1)
 
 
 def _inside(points, polygon):

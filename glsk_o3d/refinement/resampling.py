@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from .merging import support
 
-SUPPORT = 8  # input points that a piece of a subdivided edge needs
+SUPPORT = 8  # an edge is cut into at most one piece for every so many input points, begun ones counted
 
 
 def resample(skeleton, spacing):
@@ -17,7 +17,7 @@ def resample(skeleton, spacing):
     ----------
     skeleton : Skeleton
     spacing : float
-        Longest edge afterwards, over the mean radius of its ends; longer where fewer than 8 points would support it.
+        Longest edge afterwards, over the mean radius of its ends; longer where points are few: a piece for 8.
 
     Returns
     -------

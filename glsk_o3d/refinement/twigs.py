@@ -28,7 +28,7 @@ def cut_twigs(skeleton, length):
         worst, ratio = None, length
         for branch in skeleton.branches:
             a, b = branch[0], branch[-1]
-            if sorted((degree[a] == 1, degree[b] == 1)) != [False, True] or max(degree[a], degree[b]) < 3:
+            if sorted((degree[a] == 1, degree[b] == 1)) != [False, True]:
                 continue
             junction, twig = (a, branch[1:]) if degree[b] == 1 else (b, branch[:-1])
             path = np.linalg.norm(np.diff(skeleton.vertices[branch], axis=0), axis=1).sum()

@@ -50,5 +50,3 @@ def random_skeleton():
         return Skeleton(vertices, edges, rng.uniform(0.05, 0.2, m), owner, points, normals)
 
     return make
-
-

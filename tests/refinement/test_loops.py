@@ -1,6 +1,7 @@
 """False loops are zipped up, true ones stay."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def test_true_and_false_loop_in_one_graph(ringed):
     ring = circle(n)
     inner = ring[4:13] * 0.96
     chain = [3, *range(n, n + 9), 13]
-    edges = ring_edges(n) + list(zip(chain, chain[1:], strict=False))
+    edges = ring_edges(n) + list(pairwise(chain))
     raw = ringed(np.concatenate([ring, inner]), edges, radius=0.1)
     assert raw.n_loops == 2
     skeleton = close_loops(raw, 1)

@@ -72,9 +72,7 @@ def test_no_points_no_move(around):
 def test_goes_with_the_cloud(random_skeleton):
     raw = random_skeleton(5)
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
-    moved = replace(
-        raw, vertices=raw.vertices @ turn + 1e4, points=raw.points @ turn + 1e4, normals=raw.normals @ turn
-    )
+    moved = replace(raw, vertices=raw.vertices @ turn + 1e4, points=raw.points @ turn + 1e4, normals=raw.normals @ turn)
     np.testing.assert_allclose(medial_vertices(moved) - 1e4, medial_vertices(raw) @ turn, atol=1e-9)
 
 

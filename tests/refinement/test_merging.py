@@ -35,7 +35,8 @@ def test_by_its_definition(random_skeleton, seed, labels, every):
     np.testing.assert_array_equal(skeleton.vertex_of_point, expected)
     edges = {tuple(sorted((new[a], new[b]))) for a, b in raw.edges.tolist() if new[a] != new[b]}
     assert [tuple(e) for e in skeleton.edges.tolist()] == sorted(edges)
-    assert skeleton.points is raw.points
+    np.testing.assert_array_equal(skeleton.points, raw.points)
+    np.testing.assert_array_equal(skeleton.normals, raw.normals)
 
 
 def test_nothing_to_merge_changes_nothing(random_skeleton):

@@ -66,10 +66,7 @@ def test_points_go_to_the_nearest_sample_of_their_own_vertex(random_skeleton, se
     raw = random_skeleton(seed, m, 0.6, n=60)
     skeleton = resample(raw, 1.0)
     samples = {v: [v] for v in range(m)}
-    for branch in skeleton.branches:
-        inside = [v for v in branch.tolist() if v >= m]
-        assert len(inside) <= len(skeleton.vertices) - m
-    for edge in raw.edges.tolist():  # walk from one end to the other along new vertices only
+    for edge in raw.edges.tolist():
         (a, b), ends = edge, raw.vertices[edge]
         along = ends[1] - ends[0]
         t = (skeleton.vertices[m:] - ends[0]) @ along / (along @ along)
