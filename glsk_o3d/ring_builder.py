@@ -19,7 +19,8 @@ from .report import Report
 from .state import Contraction
 
 MIN_POINTS = 8
-SMALLEST, LARGEST = 1e-120, 1e120  # lengths whose squares and products a float64 holds
+SMALLEST, LARGEST = 1e-120, 1e120  # extents whose squares and products a float64 holds
+COINCIDENT = 4e-15  # points nearer than this in the working frame, a few roundings, are duplicates
 
 
 def published_k(n: int) -> int:
@@ -33,8 +34,8 @@ class RingBuilder(Filter):
     """Surround every point of a cloud with its one-ring.
 
     The ring of a point is its Delaunay star among its k nearest neighbours, projected on their principal plane. The
-    cloud is taken in its own working frame (centred, longest side 1.6), in Morton order and without duplicates; what
-    comes out is mapped back to the user's order and units.
+    cloud is taken in its own working frame (centred, longest side 1.6), in Morton order and without duplicates (points
+    that differ by rounding are one); what comes out is mapped back to the user's order and units.
 
     Raises
     ------
@@ -138,14 +139,15 @@ class RingBuilder(Filter):
             raise InvalidCloudError(f"the cloud is {extent:g} long, too extreme for its squares: rescale it")
         frame = Frame.of(points)
         scaled = frame.into(points)
-        scaled[np.abs(scaled) < SMALLEST] = 0
         order = morton_order(scaled)
         cloud, row = scaled[order], np.empty(len(points), int)
         row[order] = np.arange(len(points))
         k = min(self.k or published_k(len(cloud)), len(cloud))
         distance, neighbours = nearest_neighbours(cloud, k)
-        if (distance[:, 1] == 0).any():
-            cloud, inverse = np.unique(cloud, axis=0, return_inverse=True)
+        if distance[:, 1].min() < COINCIDENT:
+            cells = np.round(cloud / COINCIDENT).astype(np.int64)
+            first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)[1:]
+            cloud = cloud[first]
             if len(cloud) < MIN_POINTS:
                 raise InvalidCloudError(
                     f"{len(points)} points but only {len(cloud)} distinct ones: a skeleton needs at least {MIN_POINTS}"
