@@ -1,4 +1,5 @@
 # The public names and where they live; the package imports each when it is first asked for.
+from . import analysis as analysis
 from . import pipelines as pipelines
 from .connector import Connector
 from .contractor import Contractor
@@ -46,6 +47,7 @@ __all__ = [
     "Skeleton",
     "SkeletonWarning",
     "StageError",
+    "analysis",
     "pipelines",
     "read_cloud",
     "read_skeleton",

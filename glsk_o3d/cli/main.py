@@ -12,6 +12,7 @@ import typer
 
 from .. import __version__
 from .demo import demo
+from .evaluate import evaluate
 from .filters import filters
 from .info import info
 from .skeletonize import skeletonize
@@ -28,7 +29,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (skeletonize, demo, filters, info):
+for command in (skeletonize, evaluate, demo, filters, info):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
 
 

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 MOST_POINTS = 20_000
-_DPI = 150
+DPI = 150
 _VIEWS = ((0, 1), (0, 2), (1, 2))
-_INK, _RED, _PAPER = "#333333", "#d0121f", "white"
+INK, _RED, _PAPER = "#333333", "#d0121f", "white"
 _FAR, _NEAR = np.array([0.90] * 3), np.array([0.68] * 3)
 
 
@@ -47,18 +47,18 @@ def save_preview(
     OSError
         The file cannot be written.
     """
-    figure = _draw(skeleton, size, title)
-    write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=_DPI))
+    figure = draw(skeleton, size, title)
+    write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=DPI))
 
 
-def _draw(skeleton: Skeleton, size, title):
+def draw(skeleton: Skeleton, size, title):
     """The figure, on a canvas of its own: pyplot and its global state stay out of it."""
     require("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
-    width, height = np.asarray(size) / _DPI  # inches, as everything below
+    width, height = np.asarray(size) / DPI  # inches, as everything below
     figure = Figure((width, height), facecolor=_PAPER)
     FigureCanvasAgg(figure)
     cloud = skeleton.points[np.isfinite(skeleton.points).all(axis=1)]
@@ -90,16 +90,16 @@ def _draw(skeleton: Skeleton, size, title):
         for chosen, face, area in (
             (skeleton.degree == 0, _RED, 14),
             (skeleton.degree == 1, _PAPER, 9),
-            (skeleton.degree > 2, _INK, 9),
+            (skeleton.degree > 2, INK, 9),
         ):
             spots = {"s": area, "facecolors": face, "edgecolors": _RED if face == _PAPER else face, "linewidths": 0.9}
             axes.scatter(*vertices[chosen][:, [a, b]].T, zorder=3, clip_on=False, **spots)
         names = f"{'xyz'[a]}\N{RIGHTWARDS ARROW} {'xyz'[b]}\N{UPWARDS ARROW}"
         figure.text((left + view_width / 2) / width, 0.36 / height, names, ha="center", color="#999999", fontsize=7)
         left += view_width + gap
-    figure.text(0.5, 0.12 / height, _caption(skeleton), ha="center", color=_INK, fontsize=8)
+    figure.text(0.5, 0.12 / height, _caption(skeleton), ha="center", color=INK, fontsize=8)
     if title:
-        figure.text(0.5, 1 - 0.33 / height, title, ha="center", color=_INK, fontsize=12, parse_math=False)
+        figure.text(0.5, 1 - 0.33 / height, title, ha="center", color=INK, fontsize=12, parse_math=False)
     return figure
 
 

@@ -1,0 +1,376 @@
+"""Measures of a skeleton: against a known axis (`compare`), or against its cloud alone (`assess`)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+
+from ..errors import InvalidCloudError, InvalidParameterError
+from ..interop.open3d import cloud_points
+from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
+from ..numerics.neighbourhoods import nearest_neighbours
+from ..skeleton import Skeleton
+from .graph import check_graph, count_components, simple_edges
+from .sections import cross_sections
+from .truth import Truth
+
+FINENESS = 0.1  # spacing of the places where curves are compared, in median true radii
+NEIGHBOURS = 16  # of each point, in the graph whose components are the clusters of a cloud
+LEAST = 6  # points that make a cross-section
+OPEN = (
+    4 * np.pi / 3
+)  # angle without points at which a place is outside; a scan from one side leaves a little over pi open
+
+
+# ------------------------------------------------------------------------------------------------------ with a truth
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """How far a skeleton is from a known axis.
+
+    Curves are compared at places a tenth of the median true radius apart. A place on one curve is measured to the
+    nearest place on the other, and "radius" is the true one there.
+
+    Attributes
+    ----------
+    error : float
+        Mean over the skeleton of its distance to the axis over the radius. 0 is best; 1 is the surface.
+    inside : float
+        Share of the skeleton that is less than a radius away from the axis. 0 to 1, 1 is best.
+    completeness : float
+        Share of the axis that is less than a radius away from the skeleton. 0 to 1, 1 is best.
+    ends : float or None
+        Mean over the axis's leaves of the distance to the nearest leaf of the skeleton (to its nearest vertex, if it
+        has no leaf) over the radius at the axis's leaf. 0 is best. None if the axis has no leaf.
+    radius_error : float or None
+        Mean over the skeleton of |r - radius| / radius, with its own radii r interpolated along its edges. 0 is best.
+        None if the skeleton has no radii; places between vertices of which one has none do not count.
+    components, loops, leaves, junctions : int
+        Their number in the skeleton minus that in the axis. Loops are counted by the cycle rank.
+    topology : bool
+        Whether components and loops agree.
+    edge_error : (E,) float array
+        `error` of each edge of the skeleton. Not part of `as_dict`.
+    """
+
+    error: float
+    inside: float
+    completeness: float
+    ends: float | None
+    radius_error: float | None
+    components: int
+    loops: int
+    leaves: int
+    junctions: int
+    topology: bool
+    edge_error: np.ndarray = field(repr=False)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The numbers, as JSON holds them.
+
+        Returns
+        -------
+        dict of str to float, int, bool or None
+        """
+        return {name: value for name, value in vars(self).items() if name != "edge_error"}
+
+
+def compare(skeleton: Skeleton, truth: Any) -> Comparison:
+    """Measure a skeleton against a known axis.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Only `vertices`, `edges` and `radii` count. If it has edges, vertices without an edge count as components alone.
+    truth : Truth, Sample, or anything else with `nodes`, `edges` and `radii`
+        In the units of the skeleton.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InvalidParameterError
+        The skeleton is empty or not finite, or the truth is no axis (see `Truth`).
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> from glsk_o3d.skeleton import Skeleton
+    >>> ring = torus(500)
+    >>> axis = Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ())
+    >>> compare(axis, ring).topology
+    True
+    """
+    truth = truth if isinstance(truth, Truth) else Truth(truth.nodes, truth.edges, truth.radii)
+    vertices, edges = skeleton.vertices, check_graph(skeleton.vertices, skeleton.edges, "skeleton")
+    step = FINENESS * np.median(truth.radii)
+    row, part = _pieces(truth.nodes, truth.edges, step)
+    axis, axis_radius = (_along(truth.edges, row, part, values) for values in (truth.nodes, truth.radii))
+    row, part = _pieces(vertices, edges, step)
+    curve, curve_radius = (_along(edges, row, part, values) for values in (vertices, skeleton.radii))
+    to_axis, nearest = cKDTree(axis).query(curve)
+    to_curve, _ = cKDTree(curve).query(axis)
+    radius = axis_radius[nearest]
+
+    mine, degree = _structure(len(vertices), edges)
+    true, true_degree = _structure(len(truth.nodes), truth.edges)
+    difference = {name: mine[name] - true[name] for name in true}
+    tips = np.flatnonzero(true_degree == 1)
+    leaves = vertices[degree == 1] if (degree == 1).any() else vertices
+    to_leaf = cKDTree(leaves).query(truth.nodes[tips])[0] / truth.radii[tips]
+    known = np.isfinite(curve_radius)
+    off = np.abs(curve_radius - radius)[known] / radius[known]
+    return Comparison(
+        error=float(np.mean(to_axis / radius)),
+        inside=float(np.mean(to_axis < radius)),
+        completeness=float(np.mean(to_curve < axis_radius)),
+        ends=float(to_leaf.mean()) if len(tips) else None,
+        radius_error=float(off.mean()) if len(off) else None,
+        **difference,
+        topology=difference["components"] == 0 == difference["loops"],
+        edge_error=_mean_per_edge(to_axis / radius, row, len(edges)),
+    )
+
+
+def _pieces(nodes, edges, step):
+    """Edges cut into equal pieces no longer than `step`: the edge of each piece, and how far along it its middle is.
+
+    Without edges every node stands for itself; `_along` knows.
+    """
+    if len(edges) == 0:
+        return np.arange(len(nodes)), np.zeros(len(nodes))
+    length = np.linalg.norm(nodes[edges[:, 1]] - nodes[edges[:, 0]], axis=1)
+    count = np.maximum(np.ceil(length / step).astype(int), 1)
+    row = np.repeat(np.arange(len(edges)), count)
+    before = np.repeat(np.cumsum(count) - count, count)
+    return row, (np.arange(len(row)) - before + 0.5) / count[row]
+
+
+def _along(edges, row, part, values):
+    """Values at the nodes, interpolated to the middles of the pieces."""
+    if len(edges) == 0:
+        return values[row]
+    start, end = values[edges[row]].swapaxes(0, 1)
+    return start + (end - start) * part.reshape(-1, *[1] * (values.ndim - 1))
+
+
+def _mean_per_edge(values, row, n):
+    return np.bincount(row, values)[:n] / np.bincount(row)[:n] if n else np.empty(0)
+
+
+def _structure(n, edges):
+    """Components, loops, leaves and junctions of a graph, and the degrees of its n vertices."""
+    edges = simple_edges(edges)
+    components = count_components(n, edges)
+    degree = np.bincount(edges.ravel(), minlength=n)
+    loops = len(edges) - n + components
+    leaves, junctions = int((degree == 1).sum()), int((degree > 2).sum())
+    return {"components": components, "loops": loops, "leaves": leaves, "junctions": junctions}, degree
+
+
+# --------------------------------------------------------------------------------------------------- without a truth
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop of a skeleton.
+
+    Attributes
+    ----------
+    opening : float
+        Radius of the largest circle inside it, in the cloud's units.
+    thickness : float
+        Radius of the tube that makes it: the median over its vertices of the nearest cross-section's.
+    """
+
+    opening: float
+    thickness: float
+
+    @property
+    def wider(self) -> bool:
+        """Whether it opens wider than its tube is thick, as every true loop does."""
+        return self.opening > self.thickness
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """How a skeleton lies in its cloud: four measures from 0 to 1, of which 1 is best, all without a unit.
+
+    They need no truth, and so cannot see everything: parts of the cloud without a branch, and loops that are missing,
+    cost little or nothing. Noise, and a scan from one side, cost something even on the true axis: compare skeletons of
+    one cloud.
+
+    A cross-section is what `cross_sections` makes, of at least six points. Where branches meet, none is of one tube
+    only: places in the largest empty ball around a junction do not count (unless there are no others). Branches that
+    run side by side in one part share its outline, and count as off its middle.
+
+    Attributes
+    ----------
+    centredness : float
+        Mean over the length that has cross-sections of max(0, 1 - d / r): d is the distance from the curve to the
+        centre of its cross-section and r that section's radius. 1 on the axis of a round tube, 0 on its surface and
+        outside.
+    boundedness : float
+        Share of the length that is inside: where the cross-section is seen in more than a third of all directions in
+        its plane, gaps of more than a right angle between points left out. Inside a closed outline all is seen; at the
+        distance x > r from the axis of a round tube arcsin(r / x) / pi, which is a half on the surface and a third at
+        1.15 r. A third, because a scan from one side shows less than a half even to the axis. Where there is no
+        cross-section the curve counts as outside.
+    smoothness : float
+        max(0, 1 - (sum of a r) / (pi L)), with L the length, a the angle by which the curve turns at a vertex and r the
+        radius of the nearest cross-section: 1 minus the turning per radius travelled, in half turns. Junctions and
+        leaves do not count. 1 on a straight line, 1 - r / (pi R) on a circle of radius R.
+    topology : float
+        min(components, clusters) / max(components, clusters), times the share of the loops that open wider than their
+        tube is thick (1 without loops).
+    components, clusters : int
+        Connected parts of the skeleton, and of the cloud when every point is joined to its 15 nearest.
+    loops : tuple of Loop
+        A minimum cycle basis of the skeleton, shortest first.
+    edge_centredness : (E,) float array
+        max(0, 1 - d / r) of the cross-section nearest to the middle of each edge, NaN in the empty ball of a junction.
+        Not part of `as_dict`.
+
+    References
+    ----------
+    The four properties are those of Wen et al. 2025, "Skeletonization quality evaluation: geometric metrics for point
+    cloud analysis in robotics", arXiv 2504.00032. The formulas are ours: without thresholds in absolute units.
+    """
+
+    centredness: float
+    boundedness: float
+    smoothness: float
+    topology: float
+    components: int
+    clusters: int
+    loops: tuple[Loop, ...]
+    edge_centredness: np.ndarray = field(repr=False)
+
+    @property
+    def wide_loops(self) -> int:
+        """Loops that open wider than their tube is thick."""
+        return sum(loop.wider for loop in self.loops)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The numbers, as JSON holds them.
+
+        Returns
+        -------
+        dict of str to float, int or list
+            `loops` is a list of dicts with `opening`, `thickness` and `wider`.
+        """
+        shown = {name: value for name, value in vars(self).items() if name != "edge_centredness"}
+        return {**shown, "loops": [{**asdict(loop), "wider": loop.wider} for loop in self.loops]}
+
+
+def assess(skeleton: Skeleton, points: Any) -> Assessment:
+    """Measure how a skeleton lies in its cloud, without knowing the truth.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Only `vertices` and `edges` count.
+    points : cloud
+        Anything that carries points, in the units of the skeleton. Those that are not finite are passed over.
+
+    Returns
+    -------
+    Assessment
+
+    Raises
+    ------
+    InvalidParameterError
+        The skeleton is empty, not finite, or has no edge with a length.
+    InvalidCloudError
+        `points` is no cloud, or no part of the skeleton has six points around it.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import tube
+    >>> from glsk_o3d.skeleton import Skeleton
+    >>> straight = tube(2000)
+    >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), ())
+    >>> found = assess(axis, straight.points)
+    >>> found.boundedness, found.smoothness, found.topology
+    (1.0, 1.0, 1.0)
+    """
+    edges = check_graph(skeleton.vertices, skeleton.edges, "skeleton")
+    cloud = cloud_points(points)
+    cloud = np.unique(cloud[np.isfinite(cloud).all(axis=1)], axis=0)
+    middles = skeleton.vertices[edges].mean(axis=1)
+    skeleton = replace(skeleton, edges=simple_edges(edges))
+    if not skeleton.length > 0:
+        raise InvalidParameterError("the skeleton has no edge with a length: there is no curve to assess")
+    reach, clusters = _neighbourhood(cloud)
+    sections = cross_sections(skeleton.vertices, skeleton.branches, cloud, shortest=reach)
+    found = sections.counts >= LEAST
+    if not found.any():
+        raise InvalidCloudError(
+            f"no part of the skeleton has {LEAST} points around it: is this the cloud it was made from?"
+        )
+    apart = ~_at_junctions(skeleton, sections.places, cloud)
+    counted = apart if (apart & found).any() else np.ones_like(found)
+    found &= counted
+    centred = np.maximum(0, 1 - sections.offsets / np.maximum(sections.radii, np.finfo(float).tiny))[found]
+    bounded = found & (sections.open_angles < OPEN)
+    nearest = cKDTree(sections.places[found])
+    thickness = sections.radii[found][nearest.query(skeleton.vertices)[1]]
+    loops = _loops(skeleton, thickness)
+    components = skeleton.n_components
+    agreement = min(components, clusters) / max(components, clusters)
+    wide = sum(loop.wider for loop in loops) / len(loops) if loops else 1.0
+    return Assessment(
+        centredness=float(np.average(centred, weights=sections.lengths[found])),
+        boundedness=float(np.average(bounded[counted], weights=sections.lengths[counted])),
+        smoothness=max(0.0, 1 - _turning(skeleton, thickness) / (np.pi * skeleton.length)),
+        topology=agreement * wide,
+        components=components,
+        clusters=clusters,
+        loops=loops,
+        edge_centredness=np.where(_at_junctions(skeleton, middles, cloud), np.nan, centred[nearest.query(middles)[1]]),
+    )
+
+
+def _at_junctions(skeleton, places, cloud):
+    """Whether each place lies in the largest ball around a junction that holds no point of the cloud."""
+    junctions = skeleton.vertices[skeleton.junctions]
+    clearance = cKDTree(cloud).query(junctions)[0]
+    return (cdist(places, junctions) < clearance).any(axis=1)
+
+
+def _turning(skeleton, thickness):
+    """Sum over the vertices with two edges of the angle between these, times the thickness there."""
+    inner = np.flatnonzero(skeleton.degree == 2)
+    ends = np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
+    ends = ends[skeleton.degree[ends[:, 0]] == 2]
+    onward = ends[np.argsort(ends[:, 0], kind="stable"), 1].reshape(-1, 2)
+    before, after = (skeleton.vertices[onward] - skeleton.vertices[inner, None]).swapaxes(0, 1)
+    # between the one edge and the other turned back; the arctangent is exact also near 0, where the arccosine is not
+    angle = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), -(before * after).sum(axis=1))
+    straight = (before == 0).all(axis=1) | (after == 0).all(axis=1)
+    return float((np.where(straight, 0, angle) * thickness[inner]).sum())
+
+
+def _loops(skeleton, thickness):
+    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+    return tuple(
+        Loop(float(inscribed_circle(skeleton.vertices[cycle])[1]), float(np.median(thickness[cycle])))
+        for cycle in cycles
+    )
+
+
+def _neighbourhood(cloud):
+    """Median distance to the last of the neighbours, and the connected components of the neighbour graph."""
+    k = min(NEIGHBOURS, len(cloud))
+    if k < 2:
+        return 0.0, len(cloud)
+    distance, neighbour = nearest_neighbours(cloud, k)
+    pairs = np.column_stack([np.repeat(np.arange(len(cloud)), k), neighbour.ravel()])
+    return float(np.median(distance[:, -1])), count_components(len(cloud), pairs)

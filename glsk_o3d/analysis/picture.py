@@ -1,0 +1,92 @@
+"""A picture of a skeleton in its cloud, coloured by a measure."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InvalidParameterError
+from ..interop import preview
+from ..interop.files import write_atomically
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
+
+_BAR = (1.7, 0.09)  # width and height of the colour bar, in inches
+_CORNER = (0.3, 0.2)  # from the upper right corner of the picture to that of the bar, in inches
+
+
+def save_picture(
+    skeleton: Skeleton,
+    points: np.ndarray,
+    values: np.ndarray,
+    path: str | os.PathLike,
+    *,
+    label: str,
+    best: int = 0,
+    size: tuple[int, int] = (1800, 760),
+    title: str | None = None,
+) -> None:
+    """Draw a skeleton in its cloud from three sides, as `save_preview` does, its edges coloured by a measure.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    points : (N, 3) float array
+        The cloud, in grey.
+    values : (E,) float array
+        One per edge, shown from 0 to 1; those outside have the colour of the nearer end, and NaN is drawn in dark grey.
+    path : path-like
+        Written whatever its ending, as PNG, complete or not at all.
+    label : str
+        What the values are, on the colour bar.
+    best : {0, 1}
+        The good end of the scale, dark blue; the bad one is orange.
+    size : (width, height)
+        In pixels.
+    title : str, optional
+        Above the views.
+
+    Raises
+    ------
+    InvalidParameterError
+        There is not one value per edge.
+    MissingPackageError
+        matplotlib is not installed.
+    OSError
+        The folder does not exist, or the file cannot be written.
+    """
+    if np.shape(values) != (len(skeleton.edges),):
+        raise InvalidParameterError(f"{len(skeleton.edges)} edges need as many values, not {np.shape(values)}")
+    shown = dataclasses.replace(skeleton, points=points, vertex_of_point=np.empty(0), normals=np.empty(0))
+    figure = preview.draw(shown, size, title)
+    _colour(figure, values, label, best)
+    write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=preview.DPI))
+
+
+def _colour(figure, values, label, best):
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import ListedColormap, Normalize
+
+    shades = colormaps["plasma"](np.linspace(0, 0.8, 256))  # its last fifth is too light for thin lines on white
+    shades = ListedColormap(shades[::-1] if best else shades).with_extremes(bad=preview.INK)
+    scale = ScalarMappable(Normalize(0, 1, clip=True), shades)
+    for axes in figure.axes:
+        for drawn in axes.collections[1:]:  # the first is the cloud
+            if isinstance(drawn, LineCollection):
+                drawn.set(color=scale.to_rgba(np.ma.masked_invalid(values)), linewidths=2)
+            else:
+                drawn.set_edgecolor(preview.INK)
+    width, height = figure.get_size_inches()
+    box = [width - _CORNER[0] - _BAR[0], height - _CORNER[1] - _BAR[1], *_BAR]
+    bar = figure.colorbar(scale, cax=figure.add_axes(np.divide(box, [width, height] * 2)), orientation="horizontal")
+    bar.set_ticks([0, 0.5, 1])
+    bar.outline.set_visible(False)
+    bar.ax.tick_params(length=0, pad=2, labelsize=7, labelcolor=preview.INK)
+    middle = (box[1] + _BAR[1] / 2) / height
+    figure.text((box[0] - 0.1) / width, middle, label, ha="right", va="center_baseline", color=preview.INK, fontsize=8)

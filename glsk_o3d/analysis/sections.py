@@ -1,0 +1,120 @@
+"""Cross-sections of a cloud along a skeleton."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..numerics.groups import group_median, group_sum
+from ..numerics.neighbourhoods import plane_axes
+
+POINTS_PER_SECTION, MOST_SECTIONS = 24, 1000
+FAR = 3.0  # times the median distance of a section's points; those farther belong to no tube around the curve
+FLAT = 0.1  # least variance of an outline across itself over that along it: arcs below about 130 degrees have less
+
+
+@dataclass(frozen=True, eq=False)
+class Sections:
+    """What the cloud looks like around S places along a skeleton, all of about one length.
+
+    Attributes
+    ----------
+    places : (S, 3) float array
+        The middles of the pieces that the branches are cut into.
+    lengths : (S,) float array
+        Their lengths along the curve.
+    counts : (S,) int array
+        Points in each section; with few of them the other values mean little.
+    offsets : (S,) float array
+        Distance from the place to the centre of its section.
+    radii : (S,) float array
+        Root mean square distance from the points to the centre: of a round tube its radius.
+    open_angles : (S,) float array
+        Radians out of 2 pi in which the place sees no points: the sum of the gaps of more than a right angle.
+    """
+
+    places: np.ndarray
+    lengths: np.ndarray
+    counts: np.ndarray
+    offsets: np.ndarray
+    radii: np.ndarray
+    open_angles: np.ndarray
+
+
+def cross_sections(vertices, branches, points, shortest=0.0) -> Sections:
+    """Cut a cloud into sections along a curve.
+
+    Every point goes to the nearest place on the curve and is projected into the plane across the curve there; points
+    more than three times as far away as the median one are left out. So parts of the object that cross the plane
+    elsewhere do not count if the skeleton has branches in them.
+
+    The centre of a section is that of the circle with least sum of (|q - c|^2 - r^2)^2 (Kasa 1976), which is exact on
+    a round tube however unevenly its outline is covered. In directions in which the outline is flat, or seen from
+    below a third of its circumference, it is the mean of the points.
+
+    Parameters
+    ----------
+    vertices : (M, 3) float array
+    branches : sequence of int arrays
+        Vertices in order; at least one has a length.
+    points : (N, 3) float array
+    shortest : float
+        Least length of the pieces, as far as branches are not shorter.
+
+    Returns
+    -------
+    Sections
+        About one per 24 points or fewer, at most about 1000, at least one per branch that has a length.
+    """
+    places, tangents, lengths = _cut(vertices, branches, len(points), shortest)
+    n = len(places)
+    distance, owner = cKDTree(places).query(points)
+    kept = distance <= FAR * group_median(distance, owner, n)[owner]
+    owner = owner[kept]
+    q = np.einsum("nij,ni->nj", plane_axes(tangents)[owner], points[kept] - places[owner])
+    count = np.bincount(owner, minlength=n)
+    total = np.maximum(count, 1)
+    mean = group_sum(q, owner, n) / total[:, None]
+    u = q - mean[owner]
+    spread = group_sum(u[:, :, None] * u[:, None, :], owner, n)
+    skew = group_sum((u**2).sum(axis=1, keepdims=True) * u, owner, n)
+    # the pseudo-inverse leaves the centre where the mean is in directions in which the outline is flat
+    centre = mean + np.einsum("sij,sj->si", np.linalg.pinv(spread, rcond=FLAT, hermitian=True), skew) / 2
+    squared = group_sum(((q - centre[owner]) ** 2).sum(axis=1), owner, n) / total
+    return Sections(places, lengths, count, np.linalg.norm(centre, axis=1), np.sqrt(squared), _open(q, owner, n))
+
+
+def _cut(vertices, branches, n_points, shortest):
+    """Places, unit tangents and lengths of the pieces that the branches are cut into."""
+    along = [np.r_[0, np.cumsum(np.linalg.norm(np.diff(vertices[path], axis=0), axis=1))] for path in branches]
+    total = sum(travelled[-1] for travelled in along)
+    step = max(total / np.clip(n_points // POINTS_PER_SECTION, 1, MOST_SECTIONS), shortest)
+    cuts, middles, lengths = [], [], []
+    for path, travelled in zip(branches, along, strict=True):
+        if travelled[-1] == 0:
+            continue
+        pieces = max(1, round(travelled[-1] / step))
+        at = np.linspace(0, travelled[-1], 2 * pieces + 1)
+        curve = np.stack([np.interp(at, travelled, column) for column in vertices[path].T], axis=1)
+        middles.append(curve[1::2])
+        cuts.append(curve[2::2] - curve[:-1:2])
+        lengths.append(np.full(pieces, travelled[-1] / pieces))
+    chord = np.concatenate(cuts)
+    size = np.linalg.norm(chord, axis=1, keepdims=True)
+    # a piece that comes back to where it began, such as a whole small loop, has no direction of its own
+    tangent = np.where(size > 0, chord / np.where(size > 0, size, 1), [0.0, 0.0, 1.0])
+    return np.concatenate(middles), tangent, np.concatenate(lengths)
+
+
+def _open(q, owner, n):
+    """Sum of the gaps wider than a right angle between the directions to the points of each group."""
+    angle = np.arctan2(q[:, 1], q[:, 0])
+    order = np.lexsort((angle, owner))
+    angle, owner = angle[order], owner[order]
+    last = np.r_[owner[1:] != owner[:-1], True][: len(owner)]
+    first = np.flatnonzero(np.r_[True, last[:-1]][: len(owner)])
+    gap = np.roll(angle, -1) - angle
+    gap[last] = angle[first] + 2 * np.pi - angle[last]
+    return np.bincount(owner, np.where(gap > np.pi / 2, gap, 0), n)

@@ -1,0 +1,157 @@
+"""``glsk evaluate``: how good a skeleton is."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .console import WrongUsage, holding_interrupts, print_json, print_table, progress, reporting
+from .options import Json, Quiet, Verbose
+
+if TYPE_CHECKING:
+    from ..analysis import Assessment, Comparison
+
+_NUMBERS = {  # measure: (best, what it is), as the table shows them
+    "centredness": ("1", "1 - offset from the section's middle, in radii"),
+    "boundedness": ("1", "share of the length inside the cloud"),
+    "smoothness": ("1", "1 - half turns per radius travelled"),
+    "topology": ("1", "parts as in the cloud, no false loops"),
+    "error": ("0", "distance from the true axis, in true radii"),
+    "inside": ("1", "share of it within a radius of the axis"),
+    "completeness": ("1", "share of the axis within a radius of it"),
+    "ends": ("0", "distance of the axis's ends, in true radii"),
+    "radius_error": ("0", "difference from the true radii, relative"),
+}
+
+
+def evaluate(
+    skeleton: Annotated[
+        Path, typer.Argument(metavar="SKELETON", help="In any format that 'glsk skeletonize' writes, or the like.")
+    ],
+    cloud: Annotated[Path, typer.Argument(metavar="CLOUD", help="The cloud it was made from, in the same units.")],
+    truth: Annotated[
+        Path | None,
+        typer.Option(
+            "--truth",
+            metavar="FILE",
+            help="Also compare with a known axis: npz with nodes, edges and radii, or a skeleton.",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="JSON", help="Write all numbers to a file.")
+    ] = None,
+    preview: Annotated[
+        Path | None,
+        typer.Option(
+            "--preview", metavar="PNG", help="Draw the skeleton coloured by its error, or by its centredness."
+        ),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Measure how good a skeleton is.
+
+    From the cloud alone: is it centred, inside, smooth, in as many parts, and without false loops. With a truth also:
+    how far is it from the true axis.
+    """
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..analysis import assess, compare, read_truth, save_picture
+        from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
+        from ..interop.files import read_cloud, read_skeleton, write_atomically
+        from ..interop.open3d import cloud_points
+
+        files = [path for path in (output, preview) if path is not None]
+        _check_outputs(output, preview, [path for path in (skeleton, cloud, truth) if path is not None])
+        with progress(not quiet and not verbose) as update:
+            update(f"reading {skeleton.name}")
+            curve = read_skeleton(skeleton)
+            axis = read_truth(truth) if truth is not None else None
+            update(f"reading {cloud.name}")
+            with holding_interrupts():
+                points = cloud_points(read_cloud(cloud))
+            update("measuring")
+            try:
+                assessment = assess(curve, points)
+                comparison = compare(curve, axis) if axis is not None else None
+            except InvalidParameterError as error:  # the file's fault, not that of the command line
+                raise FileFormatError(f"{skeleton}: {error}") from error
+            except InvalidCloudError as error:
+                raise InvalidCloudError(f"{cloud}: {error}") from error
+            told = {
+                "skeleton": str(skeleton),
+                "cloud": str(cloud),
+                "truth": None if truth is None else str(truth),
+                "assessment": assessment.as_dict(),
+                "comparison": None if comparison is None else comparison.as_dict(),
+            }
+            if output is not None:
+                text = json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+                write_atomically(output, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+            if preview is not None:
+                update(f"drawing {preview.name}")
+                values, label, best = (
+                    (assessment.edge_centredness, "centredness", 1)
+                    if comparison is None
+                    else (comparison.edge_error, "error in true radii", 0)
+                )
+                save_picture(curve, points, values, preview, label=label, best=best, title=skeleton.name)
+        if as_json:
+            print_json({**told, "files": [str(path) for path in files]})
+        elif not quiet:
+            _print_measures(assessment, comparison)
+            for path in files:
+                typer.echo(f"wrote {path}")
+
+
+def _check_outputs(report: Path | None, preview: Path | None, inputs: list[Path]) -> None:
+    """Find out before computing whether the files can be written, and that no input is among them."""
+    from .running import check_writable
+
+    for path, ending, what in ((report, ".json", "report is JSON"), (preview, ".png", "preview is a picture")):
+        if path is None:
+            continue
+        if path.suffix.lower() != ending:
+            raise WrongUsage(f"{path}: the {what} and its name ends in {ending}")
+        if os.path.realpath(path) in map(os.path.realpath, inputs):
+            raise WrongUsage(f"{path}: is an input: choose another name")
+        check_writable(path)
+
+
+def _print_measures(assessment: Assessment, comparison: Comparison | None) -> None:
+    """One table: the measures that need only the cloud, and then those against the truth."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, header_style="")
+    table.add_column("measure", no_wrap=True)
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("best", justify="right")
+    table.add_column("what it is")
+    _add_numbers(table, assessment)
+    table.add_row(
+        "parts", f"{assessment.components}", f"{assessment.clusters}", "components; the cloud has as many as best"
+    )
+    table.add_row("loops", f"{len(assessment.loops)}", "", f"{assessment.wide_loops} open wider than their tube")
+    for i, loop in enumerate(assessment.loops, 1):
+        ratio = f"{loop.opening / loop.thickness:.2f}" if loop.thickness > 0 else "inf"
+        table.add_row(f"  loop {i}", ratio, "> 1", f"opening {loop.opening:.4g}, thickness {loop.thickness:.4g}")
+    if comparison is not None:
+        table.add_section()
+        _add_numbers(table, comparison)
+        for name in ("components", "loops", "leaves", "junctions"):
+            difference = getattr(comparison, name)
+            table.add_row(name, f"{difference:+d}" if difference else "0", "0", "more, or fewer, than in the axis")
+        agree = "yes" if comparison.topology else "no"
+        table.add_row("true topology", agree, "yes", "components and loops as in the axis")
+    print_table(table)
+
+
+def _add_numbers(table: Any, measures: Assessment | Comparison) -> None:
+    for name, value in measures.as_dict().items():
+        if isinstance(value, float) and name in _NUMBERS:
+            table.add_row(name.replace("_", " "), f"{value:.4f}", *_NUMBERS[name])

@@ -1,0 +1,136 @@
+"""`glsk evaluate`: how good a skeleton is."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from glsk_o3d.analysis import assess, compare, save_picture
+from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.interop.files import save_skeleton
+from glsk_o3d.samples import torus
+from glsk_o3d.skeleton import Skeleton
+
+matplotlib = pytest.importorskip("matplotlib")
+from matplotlib.image import imread  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def ring():
+    return torus(1000)
+
+
+@pytest.fixture(scope="module")
+def moved(ring):
+    """The axis of the ring, half a radius too high."""
+    return Skeleton(ring.nodes + [0, 0, 0.05], np.sort(ring.edges), 1.1 * ring.radii, (), (), ())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, ring, moved):
+    """Skeletons, and a truth."""
+    place = tmp_path_factory.mktemp("ring")
+    save_skeleton(moved, place / "s.json")
+    save_skeleton(Skeleton([[0, 0, 0]], [], [1], (), (), ()), place / "dot.ply")
+    np.savez(place / "truth.npz", nodes=ring.nodes, edges=ring.edges, radii=ring.radii)
+    np.savez(place / "none.npz", nodes=np.empty((0, 3)), edges=np.empty((0, 2), int), radii=[])
+    return place
+
+
+def colours(path):
+    """Whether a picture has dark blue and orange lines, left of the colour bar and below it."""
+    image = imread(path)[110:, :, :3]
+    blue = (image[..., 2] > 0.5) & (image[..., 0] < 0.2) & (image[..., 1] < 0.1)
+    orange = (image[..., 0] > 0.9) & (image[..., 1] > 0.5) & (image[..., 2] < 0.35)
+    return blue.sum(), orange.sum()
+
+
+def test_without_a_truth(glsk, scans, folder, tmp_path, ring, moved):
+    run = glsk("evaluate", folder / "s.json", scans / "ring.ply", "-o", "r.json", "--preview", "p.png")
+    assert (run.returncode, run.stderr) == (0, "")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["p.png", "r.json"]
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert report.keys() == {"skeleton", "cloud", "truth", "assessment", "comparison"}
+    assert report["assessment"] == assess(moved, ring.points).as_dict()
+    assert report["truth"] is report["comparison"] is None
+    assert f"centredness {report['assessment']['centredness']:.4f} " in " ".join(run.stdout.split())
+    assert f"opening {report['assessment']['loops'][0]['opening']:.4g}" in run.stdout
+    assert "completeness" not in run.stdout
+    assert run.stdout.endswith("wrote r.json\nwrote p.png\n")
+    assert imread(tmp_path / "p.png").shape[:2] == (760, 1800)
+
+
+def test_with_a_truth(invoke, scans, folder, tmp_path, ring, moved):
+    words = ("evaluate", folder / "s.json", scans / "ring.ply", "--truth", folder / "truth.npz")
+    result = invoke(*words, "--json", "--preview", "p.png")
+    assert (result.exit_code, result.stderr) == (0, "")
+    told = json.loads(result.stdout)
+    assert told["comparison"] == compare(moved, ring).as_dict()
+    assert told["comparison"]["error"] == pytest.approx(0.5)
+    assert told["comparison"]["radius_error"] == pytest.approx(0.1)
+    assert told["files"] == ["p.png"]
+    table = invoke(*words).stdout
+    rows = [" ".join(line.split()) for line in table.splitlines()]
+    for start in ("error 0.5000 0", "radius error 0.1000 0", "true topology yes yes"):
+        assert any(row.startswith(start) for row in rows)
+    assert "ends" not in [line.split()[0] for line in table.splitlines() if line.strip()]  # a ring has none
+
+
+def test_quiet(invoke, scans, folder, tmp_path):
+    result = invoke("evaluate", folder / "s.json", scans / "ring.ply", "-o", "r.json", "--quiet")
+    assert (result.exit_code, result.output) == (0, "")
+    assert (tmp_path / "r.json").is_file()
+
+
+@pytest.mark.parametrize(
+    ("code", "words", "message"),
+    [
+        (1, ["no.ply", "ring.ply"], "no.ply: no such file"),
+        (1, ["s.json", "no.ply"], "no.ply: no such file"),
+        (1, ["s.json", "empty.ply"], "the file is empty"),
+        (1, ["s.json", "ring.ply", "--truth", "no.npz"], "no.npz: no such file"),
+        (1, ["s.json", "ring.ply", "--truth", "none.npz"], "none.npz: the truth has no nodes"),
+        (1, ["dot.ply", "ring.ply"], "dot.ply: the skeleton has no edge with a length"),
+        (2, ["s.json", "ring.ply", "-o", "r.txt"], "r.txt: the report is JSON and its name ends in .json"),
+        (2, ["s.json", "ring.ply", "--preview", "p.jpg"], "p.jpg: the preview is a picture and its name ends in .png"),
+        (2, ["s.json", "ring.ply", "-o", "s.json"], "s.json: is an input: choose another name"),
+        (1, ["s.json", "ring.ply", "-o", "no/r.json"], "no: no such folder"),
+    ],
+)
+def test_refusals(refused, scans, folder, code, words, message):
+    places = {name: place / name for place in (scans, folder) for name in words if (place / name).exists()}
+    before = (folder / "s.json").read_bytes()
+    assert message in refused(code, "evaluate", *(places.get(word, word) for word in words))
+    assert (folder / "s.json").read_bytes() == before
+
+
+def test_a_cloud_of_something_else(refused, folder, tmp_path_factory, write_scan):
+    cloud = write_scan(tmp_path_factory.mktemp("few") / "few.ply", np.eye(3))
+    assert "few.ply: no part of the skeleton has 6 points around it" in refused(1, "evaluate", folder / "s.json", cloud)
+
+
+def test_help_loads_nothing_heavy():
+    code = "import sys\nfrom glsk_o3d.cli.main import app\ntry:\n    app(['evaluate', '--help'])\nexcept SystemExit:\n"
+    code += "    print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "--truth" in run.stdout
+    assert not set(run.stderr.split()) & {"open3d", "matplotlib", "numpy", "scipy", "networkx"}
+
+
+def test_the_picture_tells_good_from_bad(ring, moved, tmp_path):
+    flags = np.zeros(len(moved.edges))
+    counts = {}
+    for value, best in ((0, 0), (1, 0), (7, 0), (0, 1), (1, 1), (np.nan, 1)):
+        save_picture(moved, ring.points, flags + value, tmp_path / "p.png", label="measure", best=best, title="a title")
+        blue, orange = colours(tmp_path / "p.png")
+        counts[value, best] = (blue > 500, orange > 500)
+    good, bad = (True, False), (False, True)
+    assert list(counts.values()) == [good, bad, bad, bad, good, (False, False)]
+
+
+def test_the_picture_needs_a_value_per_edge(ring, moved, tmp_path):
+    with pytest.raises(InvalidParameterError, match="128 edges need as many values"):
+        save_picture(moved, ring.points, np.zeros(3), tmp_path / "p.png", label="measure")
+    assert list(tmp_path.iterdir()) == []
