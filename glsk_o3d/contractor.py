@@ -11,6 +11,7 @@ import numpy as np
 
 from .filter import Filter, documented, parameter
 from .numerics.cotangent import cotangent_laplacian
+from .numerics.neighbourhoods import nearest_neighbours, principal
 from .numerics.solver import SolveError, solve_contraction
 from .report import IterationRecord
 from .state import Contraction
@@ -18,6 +19,7 @@ from .stopping import ExplainedScore, StopRule
 
 BOX_SLACK = 1.2
 FLAT = 0.01
+LINE, LINE_NEIGHBOURS = 0.97, 16  # linearity of a neighbourhood of so many points that counts as a line
 
 
 @documented
@@ -56,6 +58,13 @@ class Contractor(Filter):
         "Floor of W_H: a point whose ring grows would be held ever less, and run away. 0 as published.",
         type="float",
         low=0,
+    )
+    line_hold: float = parameter(
+        30.0,
+        "Factor on W_H where the contracted cloud is a line already: more contraction would only shorten it and round "
+        "its bends, while thicker parts still need some. 1 as published.",
+        type="float",
+        low=1,
     )
     keep_last: bool = parameter(
         True, "Keep the solve after which the rule says stop; the published codes throw it away.", type="bool"
@@ -100,7 +109,10 @@ class Contractor(Filter):
         contraction = state.contraction_weight * self.amplification or self.initial_contraction / state.mean_ring_edge
         contraction = min(contraction, self.max_contraction)
         with np.errstate(divide="ignore"):
-            attraction = np.clip(state.ring_size0 / state.ring_size, self.min_attraction, self.max_attraction)
+            attraction = state.ring_size0 / state.ring_size
+        if self.line_hold > 1 and state.report.iterations:
+            attraction = np.where(linearity(state.positions) > LINE, self.line_hold, 1) * attraction
+        attraction = np.clip(attraction, self.min_attraction, self.max_attraction)
         laplacian = cotangent_laplacian(state.positions, state.rings)
         mass = np.sqrt(state.mass)
         positions, facts = self._solve_in_box(state, laplacian, contraction / mass, attraction, mass)
@@ -132,6 +144,23 @@ class Contractor(Filter):
         raise SolveError(
             f"it would throw {outside.sum()} of {len(state)} points out of {BOX_SLACK:g} times the bounding box"
         )
+
+
+def linearity(points):
+    """Share of the largest principal component in the spread of every point's neighbourhood, (n,) float array.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+
+    Returns
+    -------
+    (n,) float array
+        1 on a line.
+    """
+    _, neighbours = nearest_neighbours(points, min(LINE_NEIGHBOURS, len(points)))
+    spread = principal(points, neighbours)[0]
+    return spread[:, 2] / np.maximum(spread.sum(axis=1), np.finfo(float).tiny)
 
 
 def explained_score(points) -> float:

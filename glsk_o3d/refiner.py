@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from .filter import Filter, documented, parameter
+from .refinement.anchoring import anchor
+from .refinement.bridging import bridge_gaps
 from .refinement.loops import close_loops
-from .refinement.medial import medial_vertices, smooth
+from .refinement.medial import fit_axis
 from .refinement.resampling import resample
 from .refinement.triangles import collapse_triangles
 from .refinement.trust import trust_warnings
@@ -22,18 +24,22 @@ class Refiner(Filter):
 
     1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
        the shortest, until there is no triangle.
-    2. Loops that open less than their tube is thick are zipped up, and branches shorter than the part they grow from is
-       thick are cut.
-    3. Edges are subdivided, so that chords do not cut corners.
-    4. Every vertex moves to the point nearest to the normal lines of the input points that it and its neighbours own:
-       on the axis, even if only one side was scanned.
+    2. Loops that open less than their tube is thick are zipped up, loops that hang by a thread are cut, and branches
+       shorter than the part they grow from is thick are cut.
+    3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
+       corners.
+    4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
+       side was scanned, and to the points themselves where noise has spoilt the normals.
+    5. Ends of different parts that point at each other across a gap of the scan are joined.
 
-    The first step is published; with `opening`, `twig`, `spacing` and `recentre` all 0 it is the only one.
+    The first step is published; with `opening`, `weak`, `twig`, `spacing`, `recentre` and `bridge` all 0 it is the only
+    one.
 
     Warns
     -----
     SkeletonWarning
-        Where no curve skeleton is meaningful: sphere-like or sheet-like clouds.
+        Where no curve skeleton is meaningful, sphere-like or sheet-like clouds, and where many points do not say where
+        the axis is; it names the region.
 
     Notes
     -----
@@ -54,9 +60,16 @@ class Refiner(Filter):
         type="float",
         low=0,
     )
+    weak: float = parameter(
+        0.25,
+        "A loop is cut where its weakest edge joins so many fewer near points than its median one, and hardly any. 0 "
+        "keeps all.",
+        type="float",
+        low=0,
+    )
     twig: float = parameter(
-        0.8,
-        "Shortest branch over the local thickness where it begins; shorter ones are cut. 0 keeps all.",
+        1.3,
+        "Least reach of a branch's points from its junction over the thickness there; others are cut. 0 keeps all.",
         type="float",
         low=0,
     )
@@ -67,29 +80,35 @@ class Refiner(Filter):
         low=0,
     )
     recentre: int = parameter(
-        2,
-        "Passes that centre the vertices on the normal lines of their points and smooth once; 0 leaves them.",
-        type="int",
-        unit="passes",
+        3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", type="int", unit="passes", low=0
+    )
+    bridge: float = parameter(
+        8.0,
+        "Longest gap between two parts that continue each other, over their radius; wider gaps stay. 0 bridges none.",
+        type="float",
         low=0,
     )
 
     def _run(self, skeleton, on_iteration):
         skeleton = collapse_triangles(skeleton)
-        if self.opening:
-            skeleton = close_loops(skeleton, self.opening)
+        if self.opening or self.weak:
+            skeleton = close_loops(skeleton, self.opening, self.weak)
         if self.twig:
             skeleton = cut_twigs(skeleton, self.twig)
+        if self.recentre:
+            skeleton = anchor(skeleton)
         if self.spacing:
             skeleton = resample(skeleton, self.spacing)
-        for _ in range(self.recentre):
-            skeleton = replace(skeleton, vertices=medial_vertices(skeleton))
-            skeleton = replace(skeleton, vertices=smooth(skeleton))
+        vertices, confidence = fit_axis(skeleton, self.recentre)
+        skeleton = replace(skeleton, vertices=vertices, confidence=confidence)
         radii = plane_distance_radii(
             skeleton.vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals, skeleton.radii
         )
         skeleton = replace(skeleton, radii=radii)
         report = skeleton.report
+        if self.bridge:
+            skeleton, bridges = bridge_gaps(skeleton, self.bridge)
+            report = replace(report, n_bridges=bridges)
         for message in trust_warnings(skeleton):
             report = report.with_warning(message)
         return replace(skeleton, report=report)

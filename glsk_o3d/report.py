@@ -82,6 +82,8 @@ class Report:
     ----------
     n_input, n_dropped, n_outliers, n_distinct : int
         Input points, those dropped as not finite, those set aside as outliers, and the distinct ones among the rest.
+    n_bridges : int
+        Gaps between parts that were bridged.
     stages : tuple of str
         The filters that ran, as the expressions that rebuild them.
     seconds : dict of str to float
@@ -98,6 +100,7 @@ class Report:
     n_dropped: int = 0
     n_outliers: int = 0
     n_distinct: int = 0
+    n_bridges: int = 0
     stages: tuple[str, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
     iterations: tuple[IterationRecord, ...] = ()

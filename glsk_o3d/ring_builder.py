@@ -12,8 +12,9 @@ from .errors import InvalidCloudError
 from .filter import Filter, documented, parameter
 from .interop.open3d import cloud_points
 from .numerics.frame import Frame
-from .numerics.neighbourhoods import isolation, nearest_neighbours, tangent_planes
+from .numerics.neighbourhoods import isolation, nearest_neighbours, principal
 from .numerics.ordering import morton_order
+from .numerics.ridges import scatter, to_ridges
 from .numerics.rings import star_rings
 from .report import Report
 from .state import Contraction
@@ -65,6 +66,14 @@ class RingBuilder(Filter):
         type="float",
         low=0,
     )
+    denoise: int = parameter(
+        4,
+        "Passes that draw the points of noisy neighbourhoods to the ridge of their density before the rings are made; "
+        "clean points stay. 0 for none.",
+        type="int",
+        unit="passes",
+        low=0,
+    )
     drop_invalid: bool = parameter(
         False, "Drop points with NaN or infinite coordinates instead of refusing.", type="bool"
     )
@@ -72,20 +81,28 @@ class RingBuilder(Filter):
     def _run(self, cloud, on_iteration):
         points = cloud_points(cloud)
         finite = self._finite(points)
-        frame, distinct, row, distance, neighbours = self._distinct(points[finite])
-        stray = np.zeros(len(row), bool)
-        if self.outlier_factor:
-            stray = isolation(distance, neighbours)[row] > self.outlier_factor
-            if not 0 < stray.sum() <= len(row) - MIN_POINTS:
-                stray[:] = False
-            else:
-                frame, distinct, row[~stray], distance, neighbours = self._distinct(points[finite][~stray])
-                row[stray] = cKDTree(distinct).query(frame.into(points[finite][stray]))[1]
+        good = points[finite]
+        frame, distinct, row, distance, neighbours = self._distinct(good)
+        stray = np.zeros(len(good), bool)
+        while self.outlier_factor:  # what is left of a group of outliers stands out when the rest of it is gone
+            found = np.zeros(len(good), bool)
+            found[~stray] = isolation(distance, neighbours)[row[~stray]] > self.outlier_factor
+            if not found.any() or len(np.unique(row[~stray & ~found])) < MIN_POINTS:
+                break
+            stray |= found
+            frame, distinct, row[~stray], distance, neighbours = self._distinct(good[~stray])
+        if stray.any():
+            row[stray] = cKDTree(distinct).query(frame.into(good[stray]))[1]
         row_of_point, outlier = np.full(len(points), -1), np.zeros(len(points), bool)
         row_of_point[finite], outlier[finite] = row, stray
 
         n = len(distinct)
-        axes = tangent_planes(distinct, neighbours)
+        spread, axes = principal(distinct, neighbours)
+        normals = np.ascontiguousarray(axes[:, :, 0])  # a ridge has none: those of the cloud as it came
+        if self.denoise and (calm := to_ridges(distinct, scatter(spread, neighbours), self.denoise)) is not distinct:
+            distinct = calm
+            neighbours = nearest_neighbours(distinct, neighbours.shape[1])[1]
+            axes = principal(distinct, neighbours)[1]
         rings = star_rings(distinct, np.arange(n), neighbours[:, 1:], axes[:, :, 1:])
         _, ring_size = rings.nearest(distinct)
         return Contraction(
@@ -94,7 +111,7 @@ class RingBuilder(Filter):
             outlier=outlier,
             frame=frame,
             cloud=distinct,
-            normals=np.ascontiguousarray(axes[:, :, 0]),
+            normals=normals,
             survivors=np.arange(n),
             owner=np.arange(n),
             positions=distinct,

@@ -38,6 +38,9 @@ class Skeleton:
         were dropped as not finite or set aside as outliers.
     report : Report
         What the run did.
+    confidence : (M,) float64 array
+        How well its points support each vertex, from 0 to 1: the share of what they say about where the axis is that
+        they agree on, less where they are few. NaN where nobody has measured it.
     """
 
     vertices: np.ndarray
@@ -47,12 +50,17 @@ class Skeleton:
     points: np.ndarray
     normals: np.ndarray
     report: Report = field(default_factory=Report)
+    confidence: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self):
+        # steps that merge or add vertices pass on what was measured before them: it means nothing any more
+        if len(self.confidence) != len(self.vertices):
+            object.__setattr__(self, "confidence", np.full(len(self.vertices), np.nan))
         for name, dtype, columns in (
             ("vertices", float, 3),
             ("edges", np.int64, 2),
             ("radii", float, None),
+            ("confidence", float, None),
             ("vertex_of_point", np.int64, None),
             ("points", float, 3),
             ("normals", float, 3),
@@ -147,7 +155,7 @@ class Skeleton:
         return tuple(paths)
 
     def to_networkx(self) -> networkx.Graph:
-        """Graph with node attributes ``position`` (3-tuple) and ``radius`` and the edge attribute ``length``.
+        """Graph; nodes have ``position`` (3-tuple), ``radius`` and ``confidence``, edges ``length``.
 
         Returns
         -------
@@ -156,8 +164,9 @@ class Skeleton:
         import networkx
 
         graph = networkx.Graph()
-        for i, (position, radius) in enumerate(zip(self.vertices.tolist(), self.radii.tolist(), strict=True)):
-            graph.add_node(i, position=tuple(position), radius=radius)
+        facts = zip(self.vertices.tolist(), self.radii.tolist(), self.confidence.tolist(), strict=True)
+        for i, (position, radius, confidence) in enumerate(facts):
+            graph.add_node(i, position=tuple(position), radius=radius, confidence=confidence)
         for (a, b), length in zip(self.edges.tolist(), self.edge_lengths.tolist(), strict=True):
             graph.add_edge(a, b, length=length)
         return graph
@@ -169,7 +178,7 @@ class Skeleton:
         return to_line_set(self)
 
     def to_tensor_line_set(self):
-        """The skeleton as an ``open3d.t.geometry.LineSet`` with the point attribute ``radii``."""
+        """The skeleton as an ``open3d.t.geometry.LineSet`` with the point attributes ``radii`` and ``confidence``."""
         from .interop.open3d import to_tensor_line_set
 
         return to_tensor_line_set(self)

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import Contractor, ExplainedScore, LPRReducer, RingBuilder, RingSizeRatio, pipelines, samples
 from glsk_o3d import contractor as module
-from glsk_o3d.contractor import explained_score
+from glsk_o3d.contractor import LINE, LINE_NEIGHBOURS, explained_score, linearity
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
 from glsk_o3d.numerics.solver import SolveError
 
@@ -428,7 +428,79 @@ def test_attraction_has_a_floor_and_a_cap(built, monkeypatch, floor):
 
 def test_presets_hold_nothing_and_have_no_floor():
     for filter in (CAO, WEN):
-        assert (filter.min_attraction, filter.retries) == (0, 0)
+        assert (filter.min_attraction, filter.retries, filter.line_hold) == (0, 0, 1)
+
+
+# ---- what is a line already
+
+
+@pytest.mark.parametrize(
+    ("points", "expected"),
+    [
+        (np.outer(np.arange(LINE_NEIGHBOURS), [1, 2, 3]), 1),
+        (np.stack([np.cos(a := np.arange(LINE_NEIGHBOURS) * 2 * np.pi / LINE_NEIGHBOURS), np.sin(a), 0 * a], 1), 1 / 2),
+        (np.stack([3 * np.cos(a), np.sin(a), 0 * a], 1), 9 / 10),
+        (np.concatenate([np.eye(3), -np.eye(3)]), 1 / 3),
+        (np.zeros((9, 3)), 0),
+    ],
+    ids=["line", "circle", "ellipse", "ball", "point"],
+)
+@pytest.mark.parametrize("scale", [1e-6, 1, 1e6])
+def test_linearity_of_one_neighbourhood(points, expected, scale):
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    np.testing.assert_allclose(linearity(scale * points @ turn), expected, rtol=1e-9)
+
+
+def test_linearity_is_that_of_the_place():
+    """A long line and a disc in one cloud."""
+    line = np.outer(np.arange(200.0), [0, 0, 1])
+    disc = np.stack(np.meshgrid(np.arange(15.0), np.arange(15.0), [-50.0]), -1).reshape(-1, 3)
+    found = linearity(np.concatenate([line, disc]))
+    np.testing.assert_allclose(found[:200], 1, atol=1e-12)
+    inside = ((disc[:, :2] > 3) & (disc[:, :2] < 11)).all(axis=1)
+    assert ((found[200:][inside] > 0.5) & (found[200:][inside] < 0.7)).all()
+    assert (found[200:] < 0.9).all()  # nor is its rim a line
+
+
+def test_no_line_hold_is_as_before(built, monkeypatch):
+    """No neighbourhood is asked, and W_H is the ratio of the ring sizes alone."""
+    plain = Contractor(stop=never, max_iterations=4, line_hold=1)
+    monkeypatch.setattr(module, "linearity", Mock(side_effect=AssertionError))
+    capture = Capture(monkeypatch)
+    state = built
+    for done in range(4):
+        before, state = state, replace(plain, max_iterations=1)(state)
+        expected = np.clip(before.ring_size0 / before.ring_size, 1, 1e4)
+        np.testing.assert_array_equal(capture.calls[done][1], expected)
+    np.testing.assert_array_equal(plain(built).positions, state.positions)
+
+
+@pytest.mark.parametrize(("floor", "cap"), [(0, 1e4), (1, 1e4), (3, 50)])
+@pytest.mark.parametrize("hold", [1.5, 30])
+def test_lines_are_held_from_the_second_solve_on(built, monkeypatch, hold, floor, cap):
+    filter = Contractor(stop=never, max_iterations=1, line_hold=hold, min_attraction=floor, max_attraction=cap)
+    share = np.linspace(LINE - 0.3, 1, len(built))
+    monkeypatch.setattr(module, "linearity", lambda points: share[: len(points)])
+    capture = Capture(monkeypatch)
+    one = filter(built)
+    filter(one)
+    (_, first), (_, second) = capture.calls
+    np.testing.assert_array_equal(first, np.clip(np.ones(len(built)), floor, cap))
+    ratio = one.ring_size0 / one.ring_size
+    held = share > LINE
+    assert 0 < held.sum() < len(built)
+    np.testing.assert_allclose(second, np.clip(np.where(held, hold * ratio, ratio), floor, cap), rtol=1e-12)
+
+
+def test_held_lines_keep_their_length():
+    """Contraction that goes on and on shortens a tube to a point, unless what has become a line is held."""
+    built = RingBuilder()(samples.tube(n=400).points)
+    length = [
+        np.ptp(Contractor(reducer=LPRReducer(), stop=never, max_iterations=8, line_hold=hold)(built).contracted[:, 0])
+        for hold in (1, 30)
+    ]
+    assert length[0] < 0.2
+    assert length[1] > 0.9
 
 
 def test_mass_enters_both_terms_by_its_root(built, monkeypatch):

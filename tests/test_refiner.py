@@ -100,7 +100,7 @@ def test_random_graphs(assert_sound, m, edges, seed):
         skeleton = refined(raw, filter)
         assert_sound(skeleton, m + 21, n_dropped=1)
         assert skeleton.vertex_of_point[-1] == -1
-        assert skeleton.n_components == nx.number_connected_components(graph)
+        assert skeleton.n_components == nx.number_connected_components(graph) - skeleton.report.n_bridges
         assert skeleton.n_loops <= len(nx.cycle_basis(graph))
         # points of one component stay in one component
         parts = {part: set() for part in range(raw.n_components)}
@@ -150,6 +150,21 @@ def test_centring_halves_the_error_of_a_scanned_tube():
     assert error[1] < error[0] / 2
 
 
+def test_confidence_is_high_where_normals_agree_and_low_where_they_do_not():
+    raw = around_torus()
+    sure = Refiner()(raw)
+    assert sure.confidence.shape == (len(sure.vertices),)
+    assert sure.confidence.min() > 0.7
+    # any direction across the axis
+    angle = np.random.default_rng(0).uniform(0, 2 * np.pi, (1500, 1))
+    out = raw.points * [1, 1, 0] / np.linalg.norm(raw.points[:, :2], axis=1, keepdims=True)
+    anyhow = replace(raw, normals=np.cos(angle) * out + np.sin(angle) * [0, 0, 1])
+    with pytest.warns(SkeletonWarning, match=r"^weakly supported: around \d+% of the points, above all within "):
+        unsure = Refiner(recentre=0)(anyhow)
+    assert unsure.confidence.max() < 0.25
+    assert len(unsure.report.warnings) == 1
+
+
 @pytest.mark.parametrize(
     ("name", "shape", "n", "kind"),
     [
@@ -179,7 +194,8 @@ def test_shapes_with_one_are_not(shape):
     assert glsk.skeletonize(samples.SAMPLES[shape](n=2048).points).report.warnings == ()
 
 
-def test_graph_without_a_cloud():
+@pytest.mark.parametrize("name", VARIANTS)
+def test_graph_without_a_cloud(name):
     bare = replace(around_torus(), points=(), normals=(), vertex_of_point=())
-    skeleton = refined(bare, PUBLISHED)
+    skeleton = refined(bare, VARIANTS[name])
     assert skeleton.n_loops == 1

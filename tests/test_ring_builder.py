@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, cKDTree
 
 from glsk_o3d import Contraction, InvalidCloudError, RingBuilder, samples
-from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
+from glsk_o3d.numerics.neighbourhoods import isolation, nearest_neighbours, principal
+from glsk_o3d.numerics.ridges import scatter, to_ridges
 from glsk_o3d.ring_builder import published_k
 
 TORUS = samples.torus(n=600).points
@@ -136,6 +137,128 @@ def test_invalid_points_are_counted_and_dropped_only_when_asked():
     valid = np.delete(TORUS, [5, 70, 599], axis=0)
     np.testing.assert_array_equal(state.cloud, RingBuilder()(valid).cloud)
     assert 599 not in state.point_of_survivor
+
+
+# ---- outliers
+
+
+STRICT = RingBuilder(k=16, outlier_factor=2.5)
+
+
+def group(n, wide, seed=4):
+    """Points beside the torus."""
+    return [1.5, 0, 1] + wide * np.random.default_rng(seed).normal(size=(n, 3))
+
+
+def stands_out(points):
+    return isolation(*nearest_neighbours(points, STRICT.k)) > STRICT.outlier_factor
+
+
+@pytest.mark.parametrize("seed", [2, 4, 9, 13])
+def test_a_group_of_outliers_that_hide_each_other_is_found_in_rounds(seed):
+    """At first most of ten have others among their neighbours that are as lonely."""
+    points = np.concatenate([TORUS, group(10, 0.4, seed)])
+    first = stands_out(points)
+    assert not first[:600].any()
+    assert 0 < first.sum() < 5
+    state = STRICT(points)
+    np.testing.assert_array_equal(state.outlier, np.arange(610) >= 600)
+    assert (state.report.n_outliers, state.report.n_distinct) == (10, 600)
+
+
+@pytest.mark.parametrize("outliers", [np.outer([1, 2, 4, 8, 16], [1, 0.3, 1]), group(6, 0.01), group(10, 0.4)])
+def test_what_is_left_is_the_cloud_without_them(outliers):
+    order = np.random.default_rng(0).permutation(600 + len(outliers))
+    mixed = np.concatenate([TORUS, outliers])[order]
+    state, clean = STRICT(mixed), STRICT(TORUS)
+    np.testing.assert_array_equal(state.outlier, order >= 600)
+    np.testing.assert_array_equal(state.cloud, clean.cloud)
+    np.testing.assert_array_equal(state.rings.indices, clean.rings.indices)
+    assert state.frame.diagonal == clean.frame.diagonal
+    kept = order < 600
+    np.testing.assert_array_equal(state.row_of_point[kept], clean.row_of_point[order[kept]])
+    # outliers go with the nearest point that is none
+    nearest = cKDTree(TORUS).query(mixed[~kept])[1]
+    np.testing.assert_array_equal(state.row_of_point[~kept], clean.row_of_point[nearest])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_stands_out_of_what_is_left(seed):
+    """However patchy the cloud is: the rounds end when there is nothing more to find."""
+    rng = np.random.default_rng(seed)
+    points = np.concatenate([TORUS, *(rng.normal(size=(rng.integers(1, 15), 3)) * rng.uniform(0, 2) for _ in range(6))])
+    state = STRICT(points)
+    assert 0 < stands_out(points).sum() <= state.report.n_outliers
+    assert state.outlier[stands_out(points)].all()
+    again = STRICT(points[~state.outlier])
+    assert again.report.n_outliers == 0
+    np.testing.assert_array_equal(again.cloud, state.cloud)
+
+
+def test_no_factor_no_outliers():
+    points = np.concatenate([TORUS, group(10, 0.4)])
+    state = RingBuilder(outlier_factor=0)(points)
+    assert (state.report.n_outliers, state.report.n_distinct, state.outlier.any()) == (0, 610, False)
+
+
+@pytest.mark.parametrize("copies", [1, 20])
+def test_outliers_are_left_in_where_hardly_anything_would_be_left(copies):
+    """Seven points in one place and three far away: without these there is no cloud."""
+    near = 0.01 * np.random.default_rng(0).normal(size=(7, 3))
+    far = [[5, 0, 0], [0, 6, 0], [0, 0, 7]]
+    state = STRICT(np.concatenate([np.repeat(near, copies, axis=0), far]))
+    assert (state.report.n_outliers, state.report.n_distinct) == (0, 10)
+
+
+# ---- noise
+
+
+def noisy_tube(n=800):
+    return samples.tube(n=n, radius=0.1, noise=0.04).points
+
+
+def in_order(state):
+    """The working cloud in the user's order and units."""
+    return state.frame.out_of(state.cloud)[state.row_of_point]
+
+
+def test_no_denoising_leaves_the_points():
+    points = noisy_tube()
+    np.testing.assert_allclose(in_order(RingBuilder(denoise=0)(points)), points, atol=1e-15)
+    assert np.abs(in_order(RingBuilder()(points)) - points).max() > 0.02
+
+
+@pytest.mark.parametrize("passes", [1, 4])
+def test_denoising_moves_the_cloud_to_its_ridges_before_the_rings(passes):
+    points = noisy_tube()
+    plain, calm = RingBuilder(denoise=0)(points), RingBuilder(denoise=passes)(points)
+    spread, axes = principal(plain.cloud, nearest_neighbours(plain.cloud, 16)[1])
+    noise = scatter(spread, nearest_neighbours(plain.cloud, 16)[1])
+    np.testing.assert_array_equal(calm.cloud, to_ridges(plain.cloud, noise, passes))
+    assert calm.cloud is calm.positions is calm.previous
+    np.testing.assert_array_equal(calm.row_of_point, plain.row_of_point)
+    np.testing.assert_array_equal(calm.points, points)
+    # a ridge has no normals
+    np.testing.assert_array_equal(calm.normals, plain.normals)
+    np.testing.assert_array_equal(calm.normals, axes[:, :, 0])
+    # rings are those of the moved cloud
+    np.testing.assert_array_equal(calm.ring_size, calm.rings.nearest(calm.cloud)[1])
+    near = nearest_neighbours(calm.cloud, 16)[1]
+    assert all(set(calm.rings[i].tolist()) <= set(near[i].tolist()) for i in range(len(calm)))
+
+
+def test_denoised_tube_is_thinner():
+    points = noisy_tube()
+    middle = np.abs(points[:, 0]) < 0.4
+    spread = [np.hypot(*in_order(RingBuilder(denoise=passes)(points))[middle, 1:].T).std() for passes in (0, 4)]
+    assert spread[1] < 0.8 * spread[0]
+
+
+@pytest.mark.parametrize("points", [TORUS, SHEET], ids=["torus", "sheet"])
+def test_clean_clouds_are_not_denoised(points):
+    plain, calm = RingBuilder(denoise=0)(points), RingBuilder(denoise=9)(points)
+    np.testing.assert_array_equal(calm.cloud, plain.cloud)
+    np.testing.assert_array_equal(calm.rings.indices, plain.rings.indices)
 
 
 def test_more_neighbours_than_points_are_all_points():

@@ -16,7 +16,8 @@ from glsk_o3d.skeleton import plane_distance_radii
 def skeleton_of(m, edges):
     rng = np.random.default_rng(m)
     edges = sorted({(min(edge), max(edge)) for edge in edges})
-    return Skeleton(rng.normal(size=(m, 3)), edges, rng.random(m), [0] * 4, rng.normal(size=(4, 3)), np.ones((4, 3)))
+    cloud = [0] * 4, rng.normal(size=(4, 3)), np.ones((4, 3))
+    return Skeleton(rng.normal(size=(m, 3)), edges, rng.random(m), *cloud, confidence=rng.random(m))
 
 
 def cycle(nodes):
@@ -103,7 +104,11 @@ def test_random_graphs_against_networkx(m, edges):
     assert set(back.nodes) == set(range(m))
     assert {tuple(sorted(edge)) for edge in back.edges} == edges
     for i in range(m):
-        assert back.nodes[i] == {"position": tuple(skeleton.vertices[i]), "radius": skeleton.radii[i]}
+        assert back.nodes[i] == {
+            "position": tuple(skeleton.vertices[i]),
+            "radius": skeleton.radii[i],
+            "confidence": skeleton.confidence[i],
+        }
     total = sum(length for _, _, length in back.edges(data="length"))
     assert skeleton.length == pytest.approx(total)
 
@@ -124,6 +129,20 @@ def test_arrays_are_of_the_promised_kind():
     assert skeleton.degree.tolist() == [0, 0]
     with pytest.raises(dataclasses.FrozenInstanceError):
         skeleton.edges = None
+
+
+def test_confidence_is_unknown_until_it_is_measured():
+    plain = Skeleton([[0, 0, 0], [1, 0, 0]], [(0, 1)], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
+    assert plain.confidence.shape == (2,)
+    assert np.isnan(plain.confidence).all()
+    assert np.isnan(plain.to_networkx().nodes[1]["confidence"])
+    measured = dataclasses.replace(plain, confidence=[1, 0.5])
+    assert measured.confidence.dtype == np.float64
+    assert measured.confidence.tolist() == [1, 0.5]
+    # moved vertices are the same ones; other vertices are not
+    assert dataclasses.replace(measured, vertices=measured.vertices + 1).confidence.tolist() == [1, 0.5]
+    one = dataclasses.replace(measured, vertices=[[0, 0, 0]], edges=[], radii=[1])
+    assert np.isnan(one.confidence).tolist() == [True]
 
 
 def test_nothing():

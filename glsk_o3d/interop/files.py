@@ -31,7 +31,7 @@ MESH_ENDINGS = (".off", ".obj", ".stl", ".gltf", ".glb")
 """Files that `read_cloud` reads as meshes, to take their vertices."""
 
 FORMAT, FORMAT_VERSION = "glsk-o3d skeleton", 1
-_ARRAYS = ("vertices", "edges", "radii", "vertex_of_point", "points", "normals")
+_ARRAYS = ("vertices", "edges", "radii", "confidence", "vertex_of_point", "points", "normals")
 _log = logging.getLogger(__name__)
 
 
@@ -343,13 +343,15 @@ def _decode(values: dict) -> Skeleton:
     arrays = {}
     for name in _ARRAYS:
         whole = name in ("edges", "vertex_of_point")
-        columns = {"edges": (2,), "radii": (), "vertex_of_point": ()}.get(name, (3,))
+        columns = {"edges": (2,), "radii": (), "confidence": (), "vertex_of_point": ()}.get(name, (3,))
         array = np.asarray(values[name], None if whole else float)
         if array.size == 0:
             array = np.empty((0, *columns), np.int64 if whole else float)
         if array.shape[1:] != columns or array.dtype.kind not in ("iu" if whole else "f"):
             raise ValueError(f"{name} has shape {array.shape} and dtype {array.dtype}")
         arrays[name] = array
+    if len(arrays["confidence"]) != len(arrays["vertices"]):
+        raise ValueError(f"{len(arrays['confidence'])} confidences for {len(arrays['vertices'])} vertices")
     return _checked(Skeleton(**arrays, report=Report.from_dict(_with_nan(values["report"]))))
 
 

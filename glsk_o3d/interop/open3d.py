@@ -200,7 +200,8 @@ def to_tensor_line_set(skeleton: Skeleton) -> Any:
     Returns
     -------
     open3d.t.geometry.LineSet
-        On the CPU: ``point.positions`` (M, 3) float64, ``point.radii`` (M, 1) float64, ``line.indices`` (E, 2) int64.
+        On the CPU: ``point.positions`` (M, 3), ``point.radii`` and ``point.confidence`` (M, 1) float64, and
+        ``line.indices`` (E, 2) int64.
 
     Raises
     ------
@@ -210,6 +211,7 @@ def to_tensor_line_set(skeleton: Skeleton) -> Any:
     lines = o3d.t.geometry.LineSet()
     lines.point.positions = o3d.core.Tensor(_rows(skeleton.vertices, float, 3))
     lines.point.radii = o3d.core.Tensor(_rows(skeleton.radii, float, 1))
+    lines.point.confidence = o3d.core.Tensor(_rows(skeleton.confidence, float, 1))
     lines.line.indices = o3d.core.Tensor(_rows(skeleton.edges, np.int64, 2))
     return lines
 

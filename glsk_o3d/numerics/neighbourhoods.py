@@ -1,4 +1,4 @@
-"""Nearest neighbours and the tangent planes they span."""
+"""Nearest neighbours and how they are spread."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -6,13 +6,15 @@ from scipy.spatial import cKDTree
 _CHUNK = 16384
 
 
-def nearest_neighbours(points, k):
+def nearest_neighbours(points, k, of=None):
     """The k nearest points of every point, itself among them.
 
     Parameters
     ----------
     points : (n, 3) float array
     k : int
+    of : (m, 3) float array, optional
+        Whose neighbours; by default those of all points.
 
     Returns
     -------
@@ -21,7 +23,7 @@ def nearest_neighbours(points, k):
         Nearest first.
     """
     # One worker: SciPy's threads outlive their arrays when they are interrupted, and crash the process.
-    return cKDTree(points).query(points, k)
+    return cKDTree(points).query(points if of is None else of, k)
 
 
 def isolation(distance, neighbours):
@@ -43,8 +45,8 @@ def isolation(distance, neighbours):
     return mean / np.median(mean[neighbours[:, 1:]], axis=1)
 
 
-def tangent_planes(points, neighbours):
-    """Principal axes of every neighbourhood.
+def principal(points, neighbours):
+    """Principal components of every neighbourhood.
 
     Parameters
     ----------
@@ -53,16 +55,18 @@ def tangent_planes(points, neighbours):
 
     Returns
     -------
+    spread : (n, 3) float array
+        Sums of squares along the axes, ascending, not negative.
     axes : (n, 3, 3) float array
-        Orthonormal columns, least variance first: column 0 is the normal, columns 1 and 2 span the tangent plane.
+        Orthonormal columns in the same order: column 0 is the normal, columns 1 and 2 span the tangent plane.
     """
-    axes = np.empty((len(points), 3, 3))
+    spread, axes = np.empty((len(points), 3)), np.empty((len(points), 3, 3))
     for start in range(0, len(points), _CHUNK):
         part = slice(start, start + _CHUNK)
         patch = points[neighbours[part]]
         patch -= patch.mean(axis=1, keepdims=True)
-        axes[part] = np.linalg.eigh(np.matmul(patch.transpose(0, 2, 1), patch))[1]
-    return axes
+        spread[part], axes[part] = np.linalg.eigh(np.matmul(patch.transpose(0, 2, 1), patch))
+    return np.maximum(spread, 0), axes
 
 
 def plane_axes(normals):

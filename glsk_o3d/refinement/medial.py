@@ -1,61 +1,187 @@
-"""Centre the vertices in the surface around them."""
+"""Fit the skeleton to the axis of the surface around it."""
+
+from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.linalg import splu
 
-from ..numerics.groups import group_sum
+from ..numerics.groups import group_median, group_sum
 
-KEEP = 0.2  # weight of staying, per point
+BENDING = 2.0  # weight of a vertex's distance from the chord of its neighbours, per point
+STAY = 0.1  # weight of staying where it was, per point
+OUTLYING = 0.5  # distance from the axis, in radii, at which a point's normal counts half
+CENTROID = 0.5  # weight of the points themselves where their normals say nothing
+SUPPORT = 8  # points that support a vertex half
+TIE = 1e-9
+TINY = np.finfo(float).tiny
 
 
-def medial_vertices(skeleton):
-    """Vertices moved to the point nearest to the normal lines of the input points around them.
+def fit_axis(skeleton, passes):
+    r"""Vertices moved to the axis of the surface, and how well the points around say where that is.
 
-    For every vertex the points owned by it and its neighbours, p with normal n, give the least-squares point
-    min_x sum |(I - n n^T)(x - p)|^2 + small |x - x0|^2, which lies on the axis of a tube even if the points cover only
-    one side of it.
+    The plane through a point p of a tube, spanned by its normal n and the tangent t of the axis, contains the axis:
+    b (x(p) - p) = 0 with b = n x t and x(p) the place of the curve nearest to p. Each pass minimises, over all vertices
+    at once,
+
+    .. math:: \sum_p w (b \cdot (x(p) - p))^2 + \mu d |(x(p) - p)_\perp|^2
+        + \sum_v c (\lambda |x_v - chord|^2 + \epsilon |x_v - old|^2 + ((x_v - old) \cdot t)^2)
+
+    with c the number of points at a vertex. w = 1 / (1 + (r / OUTLYING)^2), where r is the distance of the curve from
+    that plane in local radii, is small for points of something else. The doubt d, from 0 to 1, is the share of the
+    distance from the curve that the normals do not explain; where it is large, noise is as wide as the part and the
+    points say more than their normals. A half tube, scanned from one side, has an axis, but the centroid of its points
+    is off it. So the first pass takes the normals alone, w = 1 and d = 0: it finds the axis from wherever the
+    contraction left the curve.
 
     Parameters
     ----------
     skeleton : Skeleton
+    passes : int
 
     Returns
     -------
-    (M, 3) float array
+    vertices : (M, 3) float array
+    confidence : (M,) float array
+        (1 - d) c / (c + SUPPORT) with c over the vertex and its neighbours: near 1 on the axis of a tube, near 0 where
+        the normals have no axis in common or points are few.
     """
-    centre = skeleton.vertices.mean(axis=0)
-    x0 = skeleton.vertices - centre
-    m = len(x0)
+    m, ends = len(skeleton.vertices), skeleton.edges
     owned = skeleton.witnesses
-    owner, p, n = skeleton.vertex_of_point[owned], skeleton.points[owned] - centre, skeleton.normals[owned]
-    across = np.eye(3) - n[:, :, None] * n[:, None, :]
-    lhs = group_sum(across, owner, m)
-    rhs = group_sum(np.einsum("nij,nj->ni", across, p), owner, m)
-    count = np.bincount(owner, minlength=m).astype(float)
-    a, b = skeleton.edges.T
-    lhs, rhs, count = (_with_neighbours(q, a, b) for q in (lhs, rhs, count))
-    small = (KEEP * count + 1)[:, None, None]
-    return np.linalg.solve(lhs + small * np.eye(3), (rhs + small[:, 0] * x0)[:, :, None])[:, :, 0] + centre
+    owned = owned[skeleton.degree[skeleton.vertex_of_point[owned]] > 0]
+    if len(owned) == 0:
+        return skeleton.vertices, np.zeros(m)
+    centre = skeleton.vertices.mean(axis=0)
+    x, p, n = skeleton.vertices - centre, skeleton.points[owned] - centre, skeleton.normals[owned]
+    edges_at = incident_edges(ends, m)
+    around = edges_at[skeleton.vertex_of_point[owned]]
+    inner = np.flatnonzero(skeleton.degree == 2)
+    beside = ends[edges_at[inner, :2]].sum(axis=2) - inner[:, None]  # the other end of either edge
+    for step in range(passes):
+        near = _nearest(x, ends, around, p, n)
+        weight, pull = np.ones(len(p)), np.zeros(len(p))
+        if step:
+            radius = group_median(np.linalg.norm(near.offset, axis=1), near.edge, len(ends))[near.edge]
+            weight = 1 / (1 + near.miss / np.maximum((OUTLYING * radius) ** 2, TINY))
+            pull = CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1)
+        x = _solve(x, ends, near, p, weight, pull, inner, beside)
+        far = np.linalg.norm(p, axis=1).max()
+        size = np.linalg.norm(x, axis=1)
+        x = np.where(
+            (size > far)[:, None] & (skeleton.degree > 0)[:, None], x * (far / np.maximum(size, TINY))[:, None], x
+        )
+    near = _nearest(x, ends, around, p, n)
+    return x + centre, (1 - near.doubt) * near.support / (near.support + SUPPORT)
 
 
-def smooth(skeleton):
-    """Move every vertex with two neighbours halfway to their midpoint: thin parts have few points per vertex.
+def incident_edges(edges, m):
+    """Edges at every vertex, (m, most) int array, filled up with -1."""
+    vertex, edge = edges.ravel(), np.repeat(np.arange(len(edges)), 2)
+    order = np.argsort(vertex, kind="stable")
+    vertex, edge = vertex[order], edge[order]
+    degree = np.bincount(vertex, minlength=m)
+    table = np.full((m, max(degree.max(initial=0), 2)), -1)
+    table[vertex, np.arange(len(vertex)) - np.repeat(np.cumsum(degree) - degree, degree)] = edge
+    return table
+
+
+def nearest_on_edges(x, edges, candidates, p):
+    """The place nearest to each point among some edges.
 
     Parameters
     ----------
-    skeleton : Skeleton
+    x : (m, 3) float array
+    edges : (e, 2) int array
+    candidates : (n, c) int array
+        Edges to look at for each point, -1 for none; at least one.
+    p : (n, 3) float array
 
     Returns
     -------
-    (M, 3) float array
+    edge : (n,) int array
+    t : (n,) float array
+        From 0 at the first end of the edge to 1 at the second.
     """
-    x = skeleton.vertices
-    middle = (_with_neighbours(x, *skeleton.edges.T) - x) / 2
-    return np.where(skeleton.degree[:, None] == 2, (x + middle) / 2, x)
+    edge, t, best = np.zeros(len(p), int), np.zeros(len(p)), np.full(len(p), np.inf)
+    for column in candidates.T:
+        some = np.flatnonzero(column >= 0)
+        start, stop = x[edges[column[some], 0]], x[edges[column[some], 1]]
+        along, offset = stop - start, p[some] - start
+        part = np.einsum("ni,ni->n", along, offset) / np.maximum(np.einsum("ni,ni->n", along, along), TINY)
+        part = np.clip(part, 0, 1)
+        squared = ((offset - part[:, None] * along) ** 2).sum(axis=1)
+        nearer = squared < (1 - TIE) * best[some]  # a vertex belongs to all its edges: rounding must not choose
+        some = some[nearer]
+        edge[some], t[some], best[some] = column[some], part[nearer], squared[nearer]
+    return edge, t
 
 
-def _with_neighbours(values, a, b):
-    """Values of each vertex plus those of its neighbours along the edges (a, b)."""
-    total = values.copy()
-    np.add.at(total, a, values[b])
-    np.add.at(total, b, values[a])
-    return total
+class _Nearest(NamedTuple):
+    """What the points are to the place of the curve nearest to them."""
+
+    edge: np.ndarray
+    share: np.ndarray  # of the edge's two ends in that place
+    tangent: np.ndarray  # of every edge
+    across: np.ndarray  # b
+    offset: np.ndarray  # x(p) - p
+    miss: np.ndarray  # (b (x(p) - p))^2
+    doubt: np.ndarray  # d, of every vertex
+    support: np.ndarray  # points at every vertex and its neighbours
+
+
+def _nearest(x, ends, around, p, n):
+    edge, t = nearest_on_edges(x, ends, around, p)
+    share = np.column_stack([1 - t, t])
+    tangent = x[ends[:, 1]] - x[ends[:, 0]]
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), TINY)
+    across = np.cross(n, tangent[edge])
+    offset = np.einsum("ns,nsi->ni", share, x[ends[edge]]) - p
+    miss = np.einsum("ni,ni->n", across, offset) ** 2
+    apart = (offset**2).sum(axis=1) - np.einsum("ni,ni->n", offset, tangent[edge]) ** 2
+    facts = np.column_stack([miss, apart, np.full(len(p), 0.5)])
+    at = group_sum(np.repeat(facts, 2, axis=0), ends[edge].ravel(), len(x))
+    a, b = ends.T
+    miss_at, apart_at, support = (at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))).T
+    # normals that point anywhere explain half of the distance; without points there is nothing but doubt
+    doubt = np.where(apart_at > 0, np.clip(2 * miss_at / np.maximum(apart_at, TINY), 0, 1), 1)
+    return _Nearest(edge, share, tangent, across, offset, miss, doubt, support)
+
+
+def _solve(x, ends, near, p, weight, pull, inner, beside):
+    """The minimum of the energy in `fit_axis`: one sparse, symmetric, positive definite system."""
+    m, e = len(x), len(ends)
+    tangent = near.tangent[near.edge]
+    terms = weight[:, None, None] * near.across[:, :, None] * near.across[:, None]
+    terms += pull[:, None, None] * (np.eye(3) - tangent[:, :, None] * tangent[:, None])
+    target = np.einsum("nij,nj->ni", terms, p)
+    a, b = ends.T
+    first, second = near.share.T
+    at_edges = [group_sum(part[:, None, None] * terms, near.edge, e) for part in (first**2, first * second, second**2)]
+    right = sum(group_sum(group_sum(near.share[:, [i]] * target, near.edge, e), ends[:, i], m) for i in (0, 1))
+    count = sum(group_sum(group_sum(near.share[:, [i]], near.edge, e), ends[:, i], m)[:, 0] for i in (0, 1))
+
+    along = near.tangent[:, :, None] * near.tangent[:, None]
+    along = sum(group_sum(along, ends[:, i], m) for i in (0, 1))
+    along /= np.maximum(np.bincount(ends.ravel(), minlength=m), 1)[:, None, None]
+    stay = (STAY * count + 1e-3 * max(count.mean(), 1))[:, None, None] * np.eye(3) + count[:, None, None] * along
+    right = right + np.einsum("nij,nj->ni", stay, x)
+
+    every = np.arange(m)
+    blocks = [(a, a, at_edges[0]), (a, b, at_edges[1]), (b, a, at_edges[1]), (b, b, at_edges[2]), (every, every, stay)]
+    reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
+    chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
+    stencil = np.column_stack([np.ones(len(inner)), -chord])
+    bend = BENDING * np.maximum(count[inner], 1)
+    corners = np.column_stack([inner, beside])
+    for i in range(3):
+        for j in range(3):
+            value = (bend * stencil[:, i] * stencil[:, j])[:, None, None] * np.eye(3)
+            blocks.append((corners[:, i], corners[:, j], value))
+
+    row, column, value = (np.concatenate(part) for part in zip(*blocks, strict=True))
+    axis = np.arange(3)
+    rows = np.broadcast_to(3 * row[:, None, None] + axis[:, None], value.shape)
+    columns = np.broadcast_to(3 * column[:, None, None] + axis, value.shape)
+    matrix = coo_matrix((value.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * m, 3 * m)).tocsc()
+    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=dict(SymmetricMode=True))
+    return factor.solve(right.ravel()).reshape(m, 3)

@@ -46,7 +46,11 @@ def resample(skeleton, spacing):
     parents = np.concatenate([np.column_stack([np.arange(m)] * 2), ends[edge]])
     owned = np.flatnonzero(skeleton.vertex_of_point >= 0)
     owner = skeleton.vertex_of_point[owned]
-    near = cKDTree(vertices).query(skeleton.points[owned], min(16, len(vertices)))[1].reshape(len(owned), -1)
+    near = (
+        cKDTree(vertices)
+        .query(skeleton.points[owned], min(16, len(vertices)))[1]
+        .reshape(len(owned), min(16, len(vertices)))
+    )
     related = (parents[near] == owner[:, None, None]).any(axis=2)
     choice = near[np.arange(len(owned)), np.argmax(related, axis=1)]
     vertex_of_point = skeleton.vertex_of_point.copy()

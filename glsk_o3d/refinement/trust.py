@@ -1,18 +1,24 @@
-"""Tell where no curve skeleton is meaningful: on sheets and balls."""
+"""Tell where no curve skeleton is meaningful, on sheets and balls, and where the points do not say where it is."""
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from ..numerics.groups import group_sum
 
 SHEET = 0.9  # share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
 BALL = 0.5  # spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
 
+WEAK = 0.1  # confidence below which a vertex is not to be trusted
+MUCH = 0.25  # share of the points around such vertices that is worth a warning
+
 
 def trust_warnings(skeleton):
-    """Reasons not to trust a skeleton: most of the cloud is sheet-like or sphere-like, or there are no edges.
+    """Reasons not to trust a skeleton: the cloud is sheet-like, sphere-like, or does not say where much of the axis is.
 
     Sheet-like: the normals around a vertex have one direction. Sphere-like: the normal lines of a whole component meet
-    in one point. Both are scale-free and ask the cloud, not the skeleton.
+    in one point. Both are scale-free and ask the cloud, not the skeleton. Of a cloud that is neither, the parts with
+    little confidence are named. No edges at all are a reason, too.
 
     Parameters
     ----------
@@ -58,4 +64,23 @@ def trust_warnings(skeleton):
         ]
     if len(skeleton.edges) == 0:
         return ["no edges: every part became one vertex; is Connector.radius larger than the parts are long?"]
-    return []
+    return _weak_region(skeleton, count)
+
+
+def _weak_region(skeleton, count):
+    weak = skeleton.confidence < WEAK
+    share = count[weak].sum() / count.sum()
+    if share <= MUCH:
+        return []
+    inner = skeleton.edges[weak[skeleton.edges].all(axis=1)]
+    m = len(weak)
+    label = connected_components(coo_matrix((np.ones(len(inner)), inner.T), shape=(m, m)), directed=False)[1]
+    most = np.argmax(np.bincount(label[weak], count[weak], minlength=m))
+    region = skeleton.vertices[weak & (label == most)]
+    middle = region.mean(axis=0)
+    reach = np.linalg.norm(region - middle, axis=1).max()
+    place = ", ".join(f"{c:.4g}" for c in middle)
+    return [
+        f"weakly supported: around {share:.0%} of the points, above all within {reach:.3g} of ({place}), the points do "
+        "not agree on an axis: too sparse or too noisy for how thin the parts are, or no tubes at all"
+    ]

@@ -1,4 +1,4 @@
-"""Cut twigs that are shorter than the part they grow from is thick."""
+"""Cut twigs that hardly leave the part they grow from."""
 
 from dataclasses import replace
 
@@ -7,15 +7,21 @@ import numpy as np
 from .loops import surface_distance
 from .merging import merge_vertices
 
+FAR = 0.9  # share of a twig's points that its reach covers
 
-def cut_twigs(skeleton, length):
-    """Cut branches that end in a leaf and are shorter than the local thickness where they begin, shortest first.
+
+def cut_twigs(skeleton, reach):
+    """Cut branches that end in a leaf and whose points reach no farther than the surface around their junction.
+
+    What counts is the points, not the curve: the contraction shortens stubs as thick as they are long, and lets thin
+    ones grow.
 
     Parameters
     ----------
     skeleton : Skeleton
-    length : float
-        Shortest branch that stays, over the distance from its junction to the surface.
+    reach : float
+        Least distance of a branch's points from its junction (all but a tenth), over the distance from the junction to
+        the surface. Least first, until there is none.
 
     Returns
     -------
@@ -23,17 +29,22 @@ def cut_twigs(skeleton, length):
         Points of a cut twig belong to its junction.
     """
     while True:
-        thickness = surface_distance(skeleton)
-        degree = skeleton.degree
-        worst, ratio = None, length
+        thickness, degree = surface_distance(skeleton), skeleton.degree
+        owned = skeleton.witnesses
+        owned = owned[np.argsort(skeleton.vertex_of_point[owned], kind="stable")]
+        stop = np.cumsum(np.bincount(skeleton.vertex_of_point[owned], minlength=len(degree)))
+        start = np.concatenate([[0], stop[:-1]])
+        worst, least = None, reach
         for branch in skeleton.branches:
             a, b = branch[0], branch[-1]
             if sorted((degree[a] == 1, degree[b] == 1)) != [False, True]:
                 continue
             junction, twig = (a, branch[1:]) if degree[b] == 1 else (b, branch[:-1])
-            path = np.linalg.norm(np.diff(skeleton.vertices[branch], axis=0), axis=1).sum()
-            if path < ratio * thickness[junction]:
-                worst, ratio = (junction, twig), path / thickness[junction]
+            points = skeleton.points[np.concatenate([owned[start[v] : stop[v]] for v in twig])]
+            distance = np.linalg.norm(points - skeleton.vertices[junction], axis=1)
+            far = np.quantile(distance, FAR) if len(distance) else 0.0
+            if far < least * thickness[junction]:
+                worst, least = (junction, twig), far / thickness[junction]
         if worst is None:
             return skeleton
         junction, twig = worst

@@ -120,7 +120,10 @@ def test_every_occurrence_is_changed():
             "Contractor.max_iteration=2",
             "no parameter of Contractor is called 'max_iteration': did you mean 'max_iterations'?",
         ),
-        ("RingBuilder.zzz=2", "no parameter of RingBuilder is called 'zzz': there are k, outlier_factor, drop_invalid"),
+        (
+            "RingBuilder.zzz=2",
+            "no parameter of RingBuilder is called 'zzz': there are k, outlier_factor, denoise, drop_invalid",
+        ),
         ("RingBuilder.consumes=cloud", "no parameter of RingBuilder is called 'consumes'"),
         ("RingSizeRatio.threshold=1", "RingSizeRatio is not in the pipeline, which has RingBuilder"),
         ("RingSizeRatio.threshold=1", "to put it in: --set Contractor.stop=RingSizeRatio"),

@@ -24,7 +24,8 @@ def build(vertices, edges, n_points=7, seed=0):
         for _ in range(2)
     )
     report = Report(n_input=n_points, seconds={"RingBuilder": 1 / 7}, iterations=records, warnings=("häßlich",))
-    return Skeleton(vertices, edges, rng.random(m) / 3, owners, points, normals, report)
+    confidence = np.where(np.arange(m) == 1, np.nan, rng.random(m) / 3)
+    return Skeleton(vertices, edges, rng.random(m) / 3, owners, points, normals, report, confidence)
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from glsk_o3d.interop.files import read_cloud, read_skeleton, save_skeleton, wri
 from glsk_o3d.report import Report
 from glsk_o3d.skeleton import Skeleton
 
-ARRAYS = ("vertices", "edges", "radii", "vertex_of_point", "points", "normals")
+ARRAYS = ("vertices", "edges", "radii", "confidence", "vertex_of_point", "points", "normals")
 SAME_ORDER = (".ply", ".obj", ".graphml")
 WITH_RADII = (".ply", ".swc", ".graphml")
 GRAPHS = (".ply", ".obj", ".graphml", ".swc", ".cgal", ".polylines.txt")
@@ -75,6 +75,8 @@ def test_graph_formats(skeleton, tmp_path, ending):
         np.testing.assert_array_equal(back.edges, skeleton.edges)
     if ending not in WITH_RADII:
         assert np.isnan(back.radii).all()
+    assert np.isnan(back.confidence).all()
+    assert len(back.confidence) == len(back.vertices)
     assert len(back.radii) == len(back.vertices)
     assert len(back.points) == len(back.normals) == len(back.vertex_of_point) == 0
 
@@ -90,7 +92,9 @@ def random_skeletons(draw):
     owners = draw(st.lists(st.integers(-1, m - 1), max_size=4))
     anything = st.tuples(*[st.floats()] * 3)
     points, normals = (draw(st.lists(anything, min_size=len(owners), max_size=len(owners))) for _ in "pn")
-    return Skeleton(vertices, sorted(edges), radii, owners, points, normals, Report(versions={}))
+    confidence = draw(st.none() | st.lists(st.floats(0, 1), min_size=m, max_size=m))
+    measured = {} if confidence is None else dict(confidence=confidence)
+    return Skeleton(vertices, sorted(edges), radii, owners, points, normals, Report(versions={}), **measured)
 
 
 @given(skeleton=random_skeletons())
@@ -313,6 +317,9 @@ def doctored(tree, **changes):
         ({"vertices": [[0, 1]]}, "vertices has"),
         ({"vertices": "abc"}, "valid"),
         ({"radii": [1.0]}, "1 radii for 6 vertices"),
+        ({"confidence": [0.5] * 5}, "5 confidences for 6 vertices"),
+        ({"confidence": []}, "0 confidences for 6 vertices"),
+        ({"confidence": [[0.5]] * 6}, "confidence has"),
         ({"vertex_of_point": [9] * 7}, "vertex_of_point"),
         ({"points": [[0, 0, 0]]}, "differ in length"),
         ({"report": {"iterations": [{"iteration": 1}]}}, "missing"),

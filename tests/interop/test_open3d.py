@@ -149,6 +149,8 @@ def test_tensor_line_set(skeleton, o3d):
     assert lines.point.positions.dtype == o3d.core.float64
     np.testing.assert_array_equal(lines.point.positions.numpy(), skeleton.vertices)
     np.testing.assert_array_equal(lines.point.radii.numpy().ravel(), skeleton.radii)
+    assert lines.point.confidence.dtype == o3d.core.float64
+    np.testing.assert_array_equal(lines.point.confidence.numpy(), skeleton.confidence[:, None])
     np.testing.assert_array_equal(lines.line.indices.numpy(), skeleton.edges)
     legacy = lines.to_legacy()
     np.testing.assert_array_equal(np.asarray(legacy.lines).reshape(-1, 2), skeleton.edges)

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from glsk_o3d.numerics import neighbourhoods as module
-from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, plane_axes, tangent_planes
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, plane_axes, principal
 
 RNG = np.random.default_rng(0)
 CLOUD = RNG.normal(size=(300, 3))
@@ -26,14 +26,14 @@ def test_plane_of_an_exact_plane(seed):
     rng = np.random.default_rng(seed)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     points = np.column_stack([rng.uniform(size=(200, 2)), np.zeros(200)]) @ turn.T + rng.normal(size=3)
-    axes = tangent_planes(points, nearest_neighbours(points, 10)[1])
+    axes = principal(points, nearest_neighbours(points, 10)[1])[1]
     np.testing.assert_allclose(np.abs(axes[:, :, 0] @ turn[:, 2]), 1, atol=1e-12)
     np.testing.assert_allclose(axes[:, :, 1:].transpose(0, 2, 1) @ turn[:, 2], 0, atol=1e-7)
 
 
 def test_axes_are_orthonormal_and_sorted_by_variance():
     neighbours = nearest_neighbours(CLOUD, 12)[1]
-    axes = tangent_planes(CLOUD, neighbours)
+    axes = principal(CLOUD, neighbours)[1]
     np.testing.assert_allclose(axes.transpose(0, 2, 1) @ axes, np.tile(np.eye(3), (300, 1, 1)), atol=1e-13)
     patch = CLOUD[neighbours]
     variance = ((patch - patch.mean(axis=1, keepdims=True)) @ axes).var(axis=1)
@@ -43,27 +43,27 @@ def test_axes_are_orthonormal_and_sorted_by_variance():
     np.testing.assert_allclose(variance[:, 0], np.linalg.eigvalsh(covariance)[:, 0], rtol=1e-9)
 
 
-def test_tangent_planes_of_a_sphere():
+def test_normals_of_a_sphere():
     points = CLOUD / np.linalg.norm(CLOUD, axis=1, keepdims=True)
     points = np.concatenate([points, points + 1e-3 * np.random.default_rng(1).normal(size=points.shape)])
-    normals = tangent_planes(points, nearest_neighbours(points, 12)[1])[:, :, 0]
+    normals = principal(points, nearest_neighbours(points, 12)[1])[1][:, :, 0]
     assert np.median(np.abs(np.einsum("ij,ij->i", normals, points))) > 0.99
 
 
 def test_chunks_do_not_show(monkeypatch):
     neighbours = nearest_neighbours(CLOUD, 8)[1]
-    whole = tangent_planes(CLOUD, neighbours)
+    whole = principal(CLOUD, neighbours)[1]
     monkeypatch.setattr(module, "_CHUNK", 64)
-    np.testing.assert_array_equal(tangent_planes(CLOUD, neighbours), whole)
+    np.testing.assert_array_equal(principal(CLOUD, neighbours)[1], whole)
 
 
 @pytest.mark.parametrize("k", [3, 8])
 def test_degenerate_neighbourhoods_still_give_axes(k):
     line = np.outer(np.arange(20.0), [1, 2, 2])
     for points in (line, np.ones((20, 3))):
-        axes = tangent_planes(points, np.arange(20)[:, None] * 0 + np.arange(k))
+        axes = principal(points, np.arange(20)[:, None] * 0 + np.arange(k))[1]
         np.testing.assert_allclose(axes.transpose(0, 2, 1) @ axes, np.tile(np.eye(3), (20, 1, 1)), atol=1e-13)
-    axes = tangent_planes(line, nearest_neighbours(line, k)[1])
+    axes = principal(line, nearest_neighbours(line, k)[1])[1]
     np.testing.assert_allclose(np.abs(axes[:, :, 2] @ np.array([1, 2, 2]) / 3), 1, atol=1e-12)
 
 

@@ -1,12 +1,13 @@
 """Warnings where a curve skeleton means little."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from glsk_o3d import Skeleton
-from glsk_o3d.refinement.trust import trust_warnings
+from glsk_o3d.refinement.trust import MUCH, WEAK, trust_warnings
 
 
 def unit(n, seed=0):
@@ -88,6 +89,71 @@ def test_no_edges():
     assert [message.startswith("no edges: every part became one vertex") for message in messages] == [True]
     # one reason is enough
     assert trust_warnings(skeleton_of(sheet(), joined=False))[0].startswith("sheet-like")
+
+
+# ---- weakly supported
+
+
+def unsure(shape, vertices, confidence=0.9 * WEAK):
+    """A shape, some of whose vertices have little confidence."""
+    skeleton = skeleton_of(*shape)
+    values = np.ones(len(skeleton.vertices))
+    values[vertices] = confidence
+    return replace(skeleton, confidence=values)
+
+
+def weak_place(message):
+    """Reach and middle of the region that a message names."""
+    reach, place = re.search(r"above all within (\S+) of \((.*?)\)", message).groups()
+    return float(reach), [float(c) for c in place.split(",")]
+
+
+@pytest.mark.parametrize("size", [1e-3, 1, 1e3])
+def test_names_the_region_that_is_weakly_supported(size):
+    skeleton = unsure([torus(), torus()], [*range(12, 24)])
+    scaled = replace(skeleton, vertices=size * skeleton.vertices, points=size * skeleton.points)
+    (message,) = trust_warnings(scaled)
+    assert message.startswith("weakly supported: around 50% of the points")
+    reach, place = weak_place(message)
+    assert reach == pytest.approx(size, rel=1e-2)
+    np.testing.assert_allclose(place, [10 * size, 0, 0], atol=1e-2 * size)
+
+
+def test_the_region_with_most_points_is_named():
+    """Of two regions of a torus, the first has more vertices, but few of its points have a say."""
+    skeleton = unsure([torus()], [0, 1, 2, 3, 6, 7, 8])
+    owner, normals = skeleton.vertex_of_point, skeleton.normals.copy()
+    normals[(owner < 4) & (np.arange(len(owner)) % 10 > 0)] = np.nan
+    skeleton = replace(skeleton, normals=normals)
+    share = np.isin(owner[skeleton.witnesses], [0, 1, 2, 3, 6, 7, 8]).mean()
+    (message,) = trust_warnings(skeleton)
+    assert message.startswith(f"weakly supported: around {share:.0%} of the points")
+    reach, place = weak_place(message)
+    region = skeleton.vertices[6:9]
+    np.testing.assert_allclose(place, region.mean(axis=0), atol=1e-3)
+    assert reach == pytest.approx(np.linalg.norm(region - region.mean(axis=0), axis=1).max(), rel=1e-2)
+
+
+def test_thresholds_of_support():
+    count = np.bincount(skeleton_of(torus()).vertex_of_point, minlength=12)
+    share = np.cumsum(count) / count.sum()
+    for few in range(1, 13):
+        weak = trust_warnings(unsure([torus()], [*range(few)]))
+        assert len(weak) == (share[few - 1] > MUCH)
+    assert trust_warnings(unsure([torus()], [*range(12)], WEAK)) == []
+    assert len(trust_warnings(unsure([torus()], [*range(12)], np.nextafter(WEAK, 0)))) == 1
+
+
+def test_confidence_that_nobody_measured_is_no_reason():
+    assert np.isnan(skeleton_of(torus()).confidence).all()
+    assert trust_warnings(skeleton_of(torus())) == []
+
+
+@pytest.mark.parametrize(("shape", "start"), [(sheet, "sheet-like"), (ball, "sphere-like"), (tube, "no edges")])
+def test_other_reasons_say_more(shape, start):
+    skeleton = skeleton_of(shape())
+    messages = trust_warnings(replace(skeleton, confidence=np.zeros(len(skeleton.vertices))))
+    assert [message.startswith(start) for message in messages] == [True]
 
 
 def test_points_without_a_say_do_not_count():

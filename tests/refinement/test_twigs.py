@@ -1,26 +1,43 @@
-"""Twigs are cut by their length over the thickness where they begin."""
+"""Twigs are cut by the reach of their points over the thickness where they begin."""
 
 import numpy as np
 import pytest
 
-from glsk_o3d.refinement.twigs import cut_twigs
+from glsk_o3d import Skeleton
+from glsk_o3d.refinement.twigs import FAR, cut_twigs
 
 N = 21  # vertices of the trunk
+PER = 60  # points of each: many, so that a cut twig does not change the thickness of its junction
 
 
-def tree(ringed, *twigs, radius=0.1):
-    """A trunk along x from -1 to 1; twigs (vertex, length) grow from it in two edges each, along z."""
+def directions(n, seed=0):
+    towards = np.random.default_rng(seed).normal(size=(n, 3))
+    return towards / np.linalg.norm(towards, axis=1, keepdims=True)
+
+
+def tree(*twigs, radius=0.1, length=None, share=1.0, per=10):
+    """A trunk along x from -1 to 1, every point of it at the distance `radius` from its vertex.
+
+    Twigs (vertex, reach) grow from it in two edges each, along z, as long as they reach or `length` long. All their
+    points are as far from the junction as they reach; where `share` is below 1, the others are ten times as far.
+    """
     x = np.linspace(-1, 1, N)
-    vertices = list(np.column_stack([x, 0 * x, 0 * x]))
-    edges = [(i, i + 1) for i in range(N - 1)]
-    for at, length in twigs:
-        edges += [(at, len(vertices)), (len(vertices), len(vertices) + 1)]
-        vertices += [vertices[at] + [0, 0, length * share] for share in (0.4, 1)]
-    return ringed(vertices, edges, radius)
+    trunk = np.column_stack([x, 0 * x, 0 * x])
+    vertices, edges, owner = [*trunk], [(i, i + 1) for i in range(N - 1)], [np.repeat(np.arange(N), PER)]
+    points = [np.repeat(trunk, PER, axis=0) + np.repeat(np.broadcast_to(radius, N), PER)[:, None] * directions(N * PER)]
+    for at, reach in twigs:
+        first = len(vertices)
+        edges += [(at, first), (first, first + 1)]
+        vertices += [trunk[at] + [0, 0, (length or reach) * part] for part in (0.4, 1)]
+        distance = np.where(np.arange(2 * per) < round(share * 2 * per), reach, 10 * reach)
+        points.append(trunk[at] + distance[:, None] * directions(2 * per, seed=first))
+        owner.append(first + np.arange(2 * per) % 2)
+    points, owner = np.concatenate(points), np.concatenate(owner)
+    return Skeleton(vertices, sorted(edges), np.full(len(vertices), 0.1), owner, points, directions(len(points)))
 
 
-def test_short_is_cut_long_stays(ringed):
-    raw = tree(ringed, (5, 0.07), (12, 0.5))
+def test_short_is_cut_long_stays():
+    raw = tree((5, 0.07), (12, 0.5))
     skeleton = cut_twigs(raw, 0.8)
     assert len(skeleton.vertices) == N + 2
     np.testing.assert_array_equal(skeleton.junctions, [12])
@@ -28,46 +45,74 @@ def test_short_is_cut_long_stays(ringed):
     np.testing.assert_allclose(skeleton.vertices[N:], raw.vertices[N + 2 :], atol=1e-15)
     # the junction stays in its place and takes the points
     count = np.bincount(skeleton.vertex_of_point)
-    assert count[5] == 36
-    assert (np.delete(count, 5) == 12).all()
+    assert count.tolist() == [PER] * 5 + [PER + 20] + [PER] * (N - 6) + [10, 10]
     owner = raw.vertex_of_point
     assert (skeleton.vertex_of_point[(owner == N) | (owner == N + 1)] == 5).all()
 
 
-@pytest.mark.parametrize("share", [0.4, 0.8, 2.0])
-@pytest.mark.parametrize(("length", "cut"), [(1 - 1e-6, True), (1 + 1e-6, False)])
-def test_threshold_is_exact(ringed, share, length, cut):
-    radius = np.full(N + 2, 0.3)
+@pytest.mark.parametrize("reach", [0.4, 1.3, 2.0])
+@pytest.mark.parametrize(("share", "cut"), [(1 - 1e-6, True), (1 + 1e-6, False)])
+def test_threshold_is_exact(reach, share, cut):
+    radius = np.full(N, 0.3)
     radius[10] = 0.1  # at the junction, and nowhere else
-    skeleton = cut_twigs(tree(ringed, (10, share * 0.1 * length), radius=radius), share)
+    skeleton = cut_twigs(tree((10, reach * 0.1 * share), radius=radius), reach)
     assert (len(skeleton.vertices) == N) == cut
 
 
-def test_ends_of_the_trunk_stay(ringed):
+@pytest.mark.parametrize(("reach", "length", "cut"), [(0.07, 0.9, True), (0.3, 0.02, False)])
+def test_points_count_and_not_the_curve(reach, length, cut):
+    skeleton = cut_twigs(tree((10, reach), length=length), 1.0)
+    assert (len(skeleton.vertices) == N) == cut
+
+
+@pytest.mark.parametrize(("share", "cut"), [(1.0, True), (FAR + 0.02, True), (FAR - 0.02, False)])
+def test_a_few_far_points_do_not_save_a_twig(share, cut):
+    skeleton = cut_twigs(tree((10, 0.05), share=share, per=100), 1.0)
+    assert (len(skeleton.vertices) == N) == cut
+
+
+def test_a_twig_without_points_reaches_nowhere():
+    raw = tree((10, 0.5), per=0)
+    skeleton = cut_twigs(raw, 1e-6)
+    assert len(skeleton.vertices) == N
+    np.testing.assert_allclose(skeleton.vertices, raw.vertices[:N], atol=1e-15)
+
+
+def test_points_without_a_say_do_not_count():
+    """Outliers hang on the twig: they have no normal, and do not make it longer."""
+    raw = tree((10, 0.05), share=0.5)
+    distance = np.linalg.norm(raw.points - raw.vertices[10], axis=1)
+    raw.normals[(raw.vertex_of_point >= N) & (distance > 0.1)] = np.nan
+    assert len(cut_twigs(raw, 1.0).vertices) == N
+
+
+def test_ends_of_the_trunk_stay():
     """Only what leaves a junction is a twig: a path shorter than it is thick is all there is."""
-    raw = tree(ringed, radius=50.0)
+    raw = tree(radius=50.0)
     assert cut_twigs(raw, 0.8) is raw
 
 
-def test_zero_keeps_all(ringed):
-    raw = tree(ringed, (5, 0.07))
+def test_zero_keeps_all():
+    raw = tree((5, 0.07))
     assert cut_twigs(raw, 0) is raw
 
 
-def test_shortest_first_until_it_is_no_junction(ringed):
-    """Of three short branches the longest two remain as a path."""
+def test_least_first_until_it_is_no_junction(ringed):
+    """Of three short branches the farthest two remain as a path."""
     tips = np.array([[0.06, 0, 0], [-0.02, 0.05, 0], [-0.02, -0.07, 0]])
-    raw = ringed(np.concatenate([[[0, 0, 0]], tips]), [(0, 1), (0, 2), (0, 3)])
+    raw = ringed(np.concatenate([[[0, 0, 0]], tips]), [(0, 1), (0, 2), (0, 3)], radius=[0.1, 1e-6, 1e-6, 1e-6])
     skeleton = cut_twigs(raw, 0.8)
     assert skeleton.edges.tolist() == [[0, 1], [0, 2]]
     np.testing.assert_allclose(skeleton.vertices, [[0, 0, 0], tips[0], tips[2]], atol=1e-15)
 
 
-def test_several_at_one_junction_and_in_any_numbering(ringed):
-    raw = tree(ringed, (5, 0.03), (5, 0.07), (9, 0.05), (12, 0.5))
+def test_several_at_one_junction_and_in_any_numbering():
+    raw = tree((5, 0.03), (5, 0.07), (9, 0.05), (12, 0.5))
     turn = np.random.default_rng(1).permutation(len(raw.vertices))
     back = np.argsort(turn)
-    for case in (raw, ringed(raw.vertices[turn], back[raw.edges])):
+    edges = sorted(map(tuple, np.sort(back[raw.edges], axis=1).tolist()))
+    renamed = Skeleton(raw.vertices[turn], edges, raw.radii, back[raw.vertex_of_point], raw.points, raw.normals)
+    for case in (raw, renamed):
         skeleton = cut_twigs(case, 0.8)
         assert len(skeleton.vertices) == N + 2
         assert len(skeleton.junctions) == 1

@@ -1,0 +1,189 @@
+"""Noisy points come to the ridge of their density, clean ones stay."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glsk_o3d.numerics import ridges as module
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
+from glsk_o3d.numerics.ridges import CLEAN, NEIGHBOURS, NOISY, scatter, to_ridges
+
+TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+
+
+def scatter_of(points, k=16):
+    neighbours = nearest_neighbours(points, k)[1]
+    return scatter(principal(points, neighbours)[0], neighbours)
+
+
+def cylinder(noise, n=1200, seed=0):
+    """Of radius 1 along x."""
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(0, 2 * np.pi, n)
+    surface = np.column_stack([rng.uniform(-2, 2, n), np.cos(angle), np.sin(angle)])
+    return surface + noise * rng.normal(size=(n, 3))
+
+
+def from_surface(points):
+    return np.abs(np.hypot(points[:, 1], points[:, 2]) - 1)[np.abs(points[:, 0]) < 1.5].mean()
+
+
+def thread(noise=0.2, n=400):
+    """A noisy line along x."""
+    rng = np.random.default_rng(2)
+    x = rng.uniform(-5, 5, n)
+    return np.column_stack([x, 0 * x, 0 * x]) + noise * rng.normal(size=(n, 3))
+
+
+# ---- scatter
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10**6), st.integers(1, 30), st.integers(1, 9))
+def test_scatter_by_its_definition(seed, n, k):
+    rng = np.random.default_rng(seed)
+    spread, neighbours = np.sort(rng.random((n, 3)), axis=1), rng.integers(0, n, (n, k))
+    spread[:: n // 2 + 1] = 0  # points in one place
+    ratio = [s[0] / s[2] if s[2] else 0.0 for s in spread]
+    expected = [np.median([ratio[j] for j in row]) for row in neighbours]
+    np.testing.assert_allclose(scatter(spread, neighbours), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1, 1e9])
+@pytest.mark.parametrize("density", [1, 100])
+def test_scatter_of_planes_and_lines_is_nothing(size, density):
+    rng = np.random.default_rng(0)
+    plane = np.column_stack([rng.uniform(size=(300, 2)) * [density, 1], np.zeros(300)]) @ TURN
+    line = np.outer(np.linspace(0, 1, 300), [1, density, 3])
+    for points in (plane, line):
+        assert scatter_of(size * points).max() < 1e-9
+
+
+def test_scatter_of_a_ball_of_noise_is_large_and_of_a_surface_small():
+    noise = np.random.default_rng(0).normal(size=(1000, 3))
+    assert np.median(scatter_of(noise)) >= 0.95 * NOISY
+    assert scatter_of(noise).min() > 0.8 * CLEAN
+    assert scatter_of(cylinder(0)).max() < CLEAN / 4
+    # and grows with the noise
+    grown = [np.median(scatter_of(cylinder(noise))) for noise in (0, 0.02, 0.05, 0.1, 0.2)]
+    assert (np.diff(grown) > 0).all()
+
+
+def test_scatter_of_the_same_spread_in_all_directions_is_one():
+    points = np.concatenate([np.eye(3), -np.eye(3)])
+    np.testing.assert_allclose(scatter_of(points, 6), 1)
+
+
+# ---- ridges
+
+
+def test_points_of_a_noisy_cylinder_come_nearer_to_it():
+    points = cylinder(0.2)
+    moved = to_ridges(points, scatter_of(points), 4)
+    assert from_surface(moved) < 0.6 * from_surface(points)
+    # on it, not in it
+    radius = np.hypot(moved[:, 1], moved[:, 2])[np.abs(moved[:, 0]) < 1.5]
+    assert np.mean(radius) == pytest.approx(1, abs=0.05)
+
+
+def test_points_of_a_noisy_line_come_nearer_to_it_but_do_not_clump():
+    points = thread()
+    moved = to_ridges(points, np.ones(400), 4)
+    inner = np.abs(points[:, 0]) < 4
+    assert np.hypot(*moved[inner, 1:].T).mean() < np.hypot(*points[inner, 1:].T).mean() / 2
+    assert np.abs(moved - points)[inner, 0].mean() < 0.05
+    # as evenly along the line as before
+    before, after = (np.diff(np.sort(part[inner, 0])).std() for part in (points, moved))
+    assert after < 1.2 * before
+
+
+@pytest.mark.parametrize("noise", [0, 0.01])
+def test_clean_cylinder_does_not_move(noise):
+    points = cylinder(noise)
+    assert to_ridges(points, scatter_of(points), 4) is points
+
+
+def test_no_passes_move_nothing():
+    points = thread()
+    assert to_ridges(points, np.ones(400), 0) is points
+
+
+def test_clean_points_stay_among_noisy_ones():
+    points = thread()
+    noise = np.where(np.arange(400) % 2, NOISY, CLEAN)
+    moved = to_ridges(points, noise, 3)
+    np.testing.assert_array_equal(moved[::2], points[::2])
+    assert (moved[1::2] != points[1::2]).any(axis=1).all()
+    assert not np.shares_memory(moved, points)
+
+
+@pytest.mark.parametrize(("noise", "share"), [(CLEAN, 0), ((CLEAN + NOISY) / 2, 0.5), (NOISY, 1), (9, 1)])
+def test_noise_says_how_much_of_the_way(noise, share):
+    points = thread()
+    step, whole = (to_ridges(points, np.full(400, value), 1) - points for value in (noise, NOISY))
+    np.testing.assert_allclose(step, share * whole, atol=1e-12)
+
+
+def test_one_pass_by_its_definition():
+    """The mean of the neighbours in a Gaussian as wide as they are, but for the way along their main direction."""
+    points = thread(n=60)
+    moved = to_ridges(points, np.ones(60), 1)
+    for x, after in zip(points, moved, strict=True):
+        distance = np.linalg.norm(points - x, axis=1)
+        near = points[np.argsort(distance)[:NEIGHBOURS]]
+        squared = np.sort(distance)[:NEIGHBOURS] ** 2
+        weight = np.exp(-squared / (2 * squared.mean()))
+        mean = np.average(near, axis=0, weights=weight)
+        along = np.linalg.eigh(np.cov(near, rowvar=False, aweights=weight))[1][:, 2]
+        np.testing.assert_allclose(after, mean - along * (along @ (mean - x)), atol=1e-10)
+
+
+def test_passes_look_at_the_cloud_as_it_came():
+    """Neighbours do not move: each point goes its way, whatever the others do."""
+    points = thread()
+    all_of_them = to_ridges(points, np.ones(400), 5)
+    for some in (np.arange(400) < 7, np.arange(400) % 3 == 0):
+        moved = to_ridges(points, some.astype(float), 5)
+        np.testing.assert_allclose(moved, np.where(some[:, None], all_of_them, points), atol=1e-12)
+
+
+@pytest.mark.parametrize(("turn", "scale", "shift"), [(TURN, 1, 0), (-np.eye(3), 1, [5, 6, 7]), (TURN, 1e-9, 0)])
+def test_goes_with_the_cloud(turn, scale, shift):
+    points = cylinder(0.2)
+    noise = scatter_of(points)
+    there = scale * points @ turn + shift
+    np.testing.assert_allclose(scatter_of(there), noise, atol=1e-9)
+    moved = (to_ridges(there, noise, 3) - shift) / scale
+    np.testing.assert_allclose(moved, to_ridges(points, noise, 3) @ turn, atol=1e-8)
+
+
+def test_order_does_not_matter():
+    points = cylinder(0.2)
+    noise, order = scatter_of(points), np.random.default_rng(3).permutation(1200)
+    np.testing.assert_allclose(
+        to_ridges(points[order], noise[order], 3), to_ridges(points, noise, 3)[order], atol=1e-10
+    )
+
+
+def test_chunks_do_not_show(monkeypatch):
+    points = cylinder(0.2)
+    noise = scatter_of(points)
+    whole = to_ridges(points, noise, 2)
+    monkeypatch.setattr(module, "_CHUNK", 64)
+    np.testing.assert_array_equal(to_ridges(points, noise, 2), whole)
+
+
+@pytest.mark.parametrize("n", [8, NEIGHBOURS - 1, NEIGHBOURS, NEIGHBOURS + 1])
+def test_few_points_are_each_others_neighbours(n):
+    points = np.random.default_rng(n).normal(size=(n, 3))
+    moved = to_ridges(points, np.ones(n), 4)
+    assert np.isfinite(moved).all()
+    diameter = np.linalg.norm(points[:, None] - points, axis=2).max()
+    assert 0 < np.linalg.norm(moved - points, axis=1).max() < diameter
+
+
+def test_the_line_itself_stays():
+    """On the ridge there is nowhere to go, at the ends neither."""
+    line = np.outer(np.linspace(-1, 1, 50), [1, 2, 2])
+    np.testing.assert_allclose(to_ridges(line, np.ones(50), 4), line, atol=1e-12)
