@@ -5,11 +5,13 @@ BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip --disable-pip-version-check -qq
 # One BLAS thread per worker, because more only fight over the cores.
 PYTEST_ARGS ?= -n 2
+# See benchmarks/README.md for what else there is.
+ACCURACY_ARGS ?= truth --builtin
 
 PYTHON_HINT = glsk-o3d needs Python 3.10 or newer: install it, or say 'make ... PYTHON=/path/to/python3'.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format clean system-deps
+.PHONY: help demo test accuracy lint format clean system-deps
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -19,6 +21,9 @@ demo: $(VENV)/.installed-demo ## skeletonise the built-in sample object; writes 
 
 test: $(VENV)/.installed-test ## run the whole test suite (PYTEST_ARGS="-k name" for a part)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MPLBACKEND=Agg $(BIN)/python -m pytest $(PYTEST_ARGS)
+
+accuracy: $(VENV)/.installed-demo ## how far skeletons are from known axes (ACCURACY_ARGS="ablation --builtin" for more)
+	$(BIN)/python benchmarks/accuracy.py $(ACCURACY_ARGS)
 
 lint: $(VENV)/.installed-test ## ruff and mypy
 	$(BIN)/ruff check .

@@ -1,0 +1,408 @@
+"""How far skeletons are from known axes, and what every idea of the method contributes.
+
+python benchmarks/accuracy.py truth --builtin
+
+The README beside this file says what each command shows.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from statistics import fmean, median
+from typing import Annotated
+
+import numpy as np
+import typer
+from _common import (
+    Case,
+    Folder,
+    Jobs,
+    Markdown,
+    Output,
+    Own,
+    Pipelines,
+    Shapes,
+    Variants,
+    cases,
+    folder_or,
+    named,
+    number,
+    run,
+    save,
+    show,
+)
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from glsk_o3d import Contractor, Pipeline, read_cloud
+from glsk_o3d.analysis import compare
+from glsk_o3d.cli.overrides import override
+from glsk_o3d.pipelines import default
+
+EVERY = "clean_1024,clean_4096,density_4096,holes_4096,scan2_4096,noise1_4096,noise2_4096,outliers_4096"
+SOLVES = range(7)
+PUBLISHED = ("wen2024", "cao2010")
+
+IDEAS = {
+    "16 neighbours": "RingBuilder.k=none",
+    "outliers set aside": "RingBuilder.outlier_factor=0",
+    "denoising": "RingBuilder.denoise=0",
+    "point reduction": "Contractor.reducer=none",
+    "mass of merged points": "LPRReducer.conserve_mass=false",
+    "cheapest merges first": "LPRReducer.order=index",
+    "mended rings": "LPRReducer.mend_rings=false",
+    "stop by score": "Contractor.stop=RingSizeRatio",
+    "last solve kept": "Contractor.keep_last=false",
+    "floor of attraction": "Contractor.min_attraction=0",
+    "hold on lines": "Contractor.line_hold=1",
+    "runaways held": "Contractor.retries=0",
+    "sampling by thickness": "Connector.radius=2% Connector.thickness=0",
+    "all ring links": "Connector.links=nearest",
+    "loops must open": "Refiner.opening=0",
+    "threads cut": "Refiner.weak=0",
+    "twigs cut": "Refiner.twig=0",
+    "edges subdivided": "Refiner.spacing=0",
+    "fit to the axis": "Refiner.recentre=0",
+    "gaps bridged": "Refiner.bridge=0",
+}
+"""What `default` adds to the publications, and the settings that switch it off. All of them together (but for the
+reduction and the stop rule, which are published) are `wen2024`."""
+
+app = typer.Typer(
+    help=__doc__, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
+)
+
+
+# -------------------------------------------------------------------------------------------------- against known axes
+
+
+def measure(case: Case, pipeline: Pipeline, repeat: int = 1) -> dict:
+    """One skeleton against its axis; CPU seconds are the median of `repeat` runs."""
+    points, truth = case.load()
+    seconds = []
+    for _ in range(repeat):
+        start = time.process_time()
+        skeleton = pipeline(points)
+        seconds.append(time.process_time() - start)
+    facts = dict(cpu=median(seconds), vertices=len(skeleton.vertices), solves=len(skeleton.report.iterations))
+    return facts | compare(skeleton, truth).as_dict()
+
+
+def measured(found: list[Case], pipelines: dict[str, Pipeline], jobs: int, repeat: int = 1) -> list[dict]:
+    """`measure` for every case and pipeline."""
+    work = [
+        (dict(pipeline=name, variant=case.variant, shape=case.shape), (case, pipeline, repeat))
+        for case in found
+        for name, pipeline in pipelines.items()
+    ]
+    return run(measure, work, jobs)
+
+
+def summary(rows: list[dict]) -> dict:
+    """Means over the shapes that gave a skeleton, and how many are right; a failure is not."""
+    good = [row for row in rows if "failure" not in row]
+    names = ("error", "inside", "completeness", "ends", "radius_error", "cpu")
+    values = {name: [row[name] for row in good if row[name] is not None] for name in names}
+    right = [row for row in good if row["topology"]]
+    counts = dict(n=len(rows), right=len(right), leaves=sum(row["leaves"] == 0 for row in right))
+    return counts | {name: fmean(found) if found else float("nan") for name, found in values.items()}
+
+
+def pick(rows: list[dict], **facts) -> list[dict]:
+    """The rows with these facts."""
+    return [row for row in rows if all(row[name] == value for name, value in facts.items())]
+
+
+def by_variant(rows: list[dict]) -> dict[str, list[dict]]:
+    """The rows of each variant, in their order."""
+    return {name: pick(rows, variant=name) for name in dict.fromkeys(row["variant"] for row in rows)}
+
+
+def wrong(row: dict) -> str:
+    """What is wrong with the topology of a row: nothing, loops and components too many or too few, or everything."""
+    if "failure" in row:
+        return f"{row['shape']} ({row['failure']})"
+    off = [f"{row[name]:+d} {name}" for name in ("loops", "components") if row[name]]
+    return f"{row['shape']} {' '.join(off)}" if off else ""
+
+
+@app.command()
+def truth(
+    folder: Folder = None,
+    own: Own = False,
+    pipeline: Pipelines = "default,cao2010,wen2024",
+    variant: Variants = f"clean_16384,{EVERY}",
+    shapes: Shapes = "",
+    repeat: Annotated[int, typer.Option(min=1, help="Runs, of whose CPU seconds the median counts.")] = 1,
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Pipelines on shapes with known axes, a table per variant."""
+    chosen = named(pipeline)
+    rows = measured(cases(folder, own, variant, shapes), chosen, jobs, repeat)
+    save(output, rows)
+    header = ["", "error", "inside", "complete", "topology", "leaves", "ends", "radius", "CPU s", "worst", "wrong"]
+    for name, group in by_variant(rows).items():
+        lines = []
+        for label in chosen:
+            here = pick(group, pipeline=label)
+            mean = summary(here)
+            last = sorted((row for row in here if "failure" not in row), key=lambda row: -row["error"])[:3]
+            lines.append(
+                [
+                    label,
+                    *(number(mean[key]) for key in ("error", "inside", "completeness")),
+                    *(f"{mean[key]}/{mean['n']}" for key in ("right", "leaves")),
+                    *(number(mean[key], 2) for key in ("ends", "radius_error", "cpu")),
+                    ", ".join(f"{row['shape']} {row['error']:.2f}" for row in last),
+                    ", ".join(filter(None, map(wrong, here))),
+                ]
+            )
+        show(name, header, lines, markdown)
+
+
+@app.command()
+def ablation(
+    folder: Folder = None,
+    own: Own = False,
+    variant: Variants = EVERY,
+    shapes: Shapes = "",
+    idea: Annotated[str, typer.Option(metavar="NAMES", help="With commas; else all.")] = ",".join(IDEAS),
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """The default pipeline with each idea switched off, one at a time: mean error / shapes with right topology."""
+    if unknown := set(idea.split(",")) - set(IDEAS):
+        raise typer.BadParameter(f"no idea {', '.join(unknown)}: there are {', '.join(IDEAS)}")
+    chosen = {"default": default()}
+    chosen |= {name: override(default(), IDEAS[name].split()) for name in idea.split(",")}
+    chosen |= named(",".join(PUBLISHED))
+    rows = measured(cases(folder, own, variant, shapes), chosen, jobs)
+    save(output, rows)
+    header, lines = ablation_table(rows)
+    show("one idea off at a time", header, lines, markdown)
+
+
+def ablation_table(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
+    """Header and lines: `default`, the ideas by how much is lost without them, and the publications.
+
+    What is lost is the relative rise of the error and the relative fall of the number of shapes with right topology.
+    """
+    variants = by_variant(rows)
+    mean = {name: summary(pick(rows, pipeline=name)) for name in dict.fromkeys(row["pipeline"] for row in rows)}
+    whole = mean["default"]
+
+    def loss(name):
+        return mean[name]["error"] / whole["error"] - mean[name]["right"] / max(whole["right"], 1)
+
+    ideas = sorted((name for name in mean if name in IDEAS), key=loss, reverse=True)
+    lines = []
+    for name in ["default", *ideas, *(name for name in PUBLISHED if name in mean)]:
+        parts = [summary(pick(group, pipeline=name)) for group in variants.values()]
+        cells = [f"{number(part['error'])} / {part['right']}" for part in (*parts, mean[name])]
+        label, setting = (f"without {name}", f"`{IDEAS[name]}`") if name in IDEAS else (name, "")
+        lines.append([label, *cells, setting])
+    titles = [f"{variant} ({len(pick(group, pipeline='default'))})" for variant, group in variants.items()]
+    return ["", *titles, f"all ({whole['n']})", "setting"], lines
+
+
+# ---------------------------------------------------------------------------------------------------- the contraction
+
+
+def with_solves(pipeline: Pipeline, n: int) -> Pipeline:
+    """The pipeline with exactly n solves, fewer only where one is refused."""
+    if n == 0:
+        return Pipeline(*(stage for stage in pipeline.stages if not isinstance(stage, Contractor)))
+    at_once = ["Contractor.stop=ExplainedScore", "ExplainedScore.threshold=1e9", f"ExplainedScore.min_iterations={n}"]
+    return override(pipeline, at_once)
+
+
+@app.command()
+def stop(
+    folder: Folder = None,
+    own: Own = False,
+    variant: Variants = "clean_4096,noise2_4096",
+    shapes: Shapes = "",
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Where the stop rule stops, and what more or fewer solves would give."""
+    chosen = {str(n): with_solves(default(), n) for n in SOLVES} | {"rule": default()}
+    rows = measured(cases(folder, own, variant, shapes), chosen, jobs)
+    save(output, rows)
+    for name, here in by_variant(rows).items():
+        taken = [row.get("solves") for row in pick(here, pipeline="rule")]
+        lines = []
+        for label in chosen:
+            mean = summary(pick(here, pipeline=label))
+            numbers = [number(mean[key]) for key in ("error", "inside", "completeness")]
+            stops = str(taken.count(int(label))) if label != "rule" else ""
+            lines.append([label, *numbers, f"{mean['right']}/{mean['n']}", stops])
+        show(name, ["solves", "error", "inside", "complete", "topology", "rule stops"], lines, markdown)
+
+
+def tracking(case: Case) -> dict:
+    """How far reduced contractions are from the one without reduction after as many solves, in local radii."""
+    points, axis = case.load()
+    contraction = Pipeline(*default().stages[:2])
+    solves = len(contraction(points).report.iterations)
+    contraction = with_solves(contraction, solves)
+    full = override(contraction, ["Contractor.reducer=none"])(points).contracted
+    found: dict[str, float] = dict(solves=solves)
+    for name, kept in (("conserved", "true"), ("published", "false")):
+        reduced = override(contraction, [f"LPRReducer.conserve_mass={kept}"])(points).contracted
+        away = cKDTree(full).query(reduced)[0] / local_radius(axis, reduced)
+        missed = cKDTree(reduced).query(full)[0] / local_radius(axis, full)
+        found |= {f"{name}_points": len(reduced), f"{name}_mean": float(away.mean())}
+        found |= {f"{name}_hausdorff": float(max(away.max(), missed.max()))}
+    return found
+
+
+@app.command()
+def mass(
+    folder: Folder = None,
+    own: Own = False,
+    variant: Variants = "clean_4096",
+    shapes: Shapes = "",
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """How well the reduced contraction tracks the full one, with the mass of merged points and without."""
+    found = cases(folder, own, variant, shapes)
+    rows = run(tracking, [(dict(variant=case.variant, shape=case.shape), (case,)) for case in found], jobs)
+    save(output, rows)
+    names = ["solves"]
+    names += [f"{kind}_{what}" for kind in ("conserved", "published") for what in ("points", "mean", "hausdorff")]
+    digits = [0 if name == "solves" or name.endswith("points") else 3 for name in names]
+    for name, here in by_variant(rows).items():
+        good = [row for row in here if "failure" not in row]
+        if good:
+            here.append({"shape": "mean"} | {key: fmean(row[key] for row in good) for key in names})
+        lines = []
+        for row in here:
+            cells = [number(row.get(key), n) for key, n in zip(names, digits, strict=True)]
+            lines.append([row["shape"], *cells, row.get("failure", "")])
+        show(name, ["shape", *(key.replace("_", " ") for key in names), "note"], lines, markdown)
+
+
+def feet(points, nodes, edges):
+    """Distance of each point to a curve of straight edges, the edge it is nearest to, and how far along that edge."""
+    start, end = nodes[edges].swapaxes(0, 1)
+    span, offset = end - start, points[:, None] - start
+    part = (offset * span).sum(axis=2) / np.maximum((span**2).sum(axis=1), np.finfo(float).tiny)
+    part = np.clip(part, 0, 1)
+    distance = np.linalg.norm(offset - part[:, :, None] * span, axis=2)
+    edge = distance.argmin(axis=1)
+    row = np.arange(len(points))
+    return distance[row, edge], edge, part[row, edge]
+
+
+def local_radius(axis, points):
+    """Radius of the true axis where it is nearest to each point."""
+    _, edge, part = feet(points, axis.nodes, axis.edges)
+    start, end = axis.radii[axis.edges[edge]].T
+    return start + (end - start) * part
+
+
+# ------------------------------------------------------------------------------------------- turned clouds, real clouds
+
+
+def turned(case: Case, count: int) -> dict:
+    """What changes when the cloud is turned at random and its points are shuffled."""
+    points, axis = case.load()
+    rng = np.random.default_rng(0)
+    first = default()(points)
+    moves, topology, leaves = [], 0, 0
+    for _ in range(count):
+        rotation = Rotation.from_quat(rng.normal(size=4)).as_matrix()
+        other = default()((points @ rotation.T)[rng.permutation(len(points))])
+        back = other.vertices @ rotation
+        there = feet(back, first.vertices, first.edges)[0] / local_radius(axis, back)
+        here = feet(first.vertices, back, other.edges)[0] / local_radius(axis, first.vertices)
+        moves.append(float(max(there.max(), here.max())))
+        topology += (other.n_loops, other.n_components) != (first.n_loops, first.n_components)
+        leaves += len(other.leaves) != len(first.leaves)
+    return dict(runs=count, topology_changes=topology, leaf_changes=leaves, moves=moves)
+
+
+@app.command()
+def rotations(
+    folder: Folder = None,
+    own: Own = False,
+    variant: Variants = "clean_4096",
+    shapes: Shapes = "6",
+    count: Annotated[int, typer.Option(min=1, help="Turns per shape.")] = 20,
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Whether the skeleton depends on how the cloud is turned and in which order its points come."""
+    found = cases(folder, own, variant, shapes)
+    rows = run(turned, [(dict(variant=case.variant, shape=case.shape), (case, count)) for case in found], jobs)
+    save(output, rows)
+    header = ["shape", "turns", "topology changes", "leaf changes", "median move", "largest move", "note"]
+    for name, here in by_variant(rows).items():
+        lines = []
+        for row in here:
+            counts = [str(row.get(key, "-")) for key in ("runs", "topology_changes", "leaf_changes")]
+            moves = [number(of(row["moves"])) if "moves" in row else "-" for of in (median, max)]
+            lines.append([row["shape"], *counts, *moves, row.get("failure", "")])
+        show(name, header, lines, markdown)
+
+
+def looped(path: Path, pipeline: Pipeline) -> dict:
+    """Loops and CPU seconds of a cloud in a file."""
+    cloud = read_cloud(path)
+    start = time.process_time()
+    skeleton = pipeline(cloud)
+    seconds = time.process_time() - start
+    return dict(cpu=seconds, points=skeleton.report.n_input, components=skeleton.n_components, loops=skeleton.n_loops)
+
+
+@app.command()
+def loops(
+    folder: Folder = None,
+    pipeline: Pipelines = "default",
+    largest: Annotated[int, typer.Option(help="Clouds with more points are left out.")] = 150_000,
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Loops of real clouds whose number is known, in a folder with a manifest."""
+    folder = folder_or(folder, "GLSK_DATA", "shared/data")
+    listed = json.loads((folder / "manifest.json").read_text())
+    listed = [it for it in listed if it["meaningful_skeleton"] and it["loops"] is not None]
+    listed = [it for it in listed if it["n_points"] <= largest]
+    listed.sort(key=lambda it: it["n_points"], reverse=True)  # the long ones first, so that no process is left alone
+    chosen = named(pipeline)
+    work = [
+        (dict(pipeline=name, cloud=it["name"], expected=it["loops"]), (folder / it["path"], pipe))
+        for it in listed
+        for name, pipe in chosen.items()
+    ]
+    rows = run(looped, work, jobs)
+    save(output, rows)
+    header = ["cloud", "points", "CPU s", "per point", "components", "loops", "expected", "right", "note"]
+    for name in chosen:
+        here = pick(rows, pipeline=name)
+        each = [row["cpu"] / row["points"] for row in here if "failure" not in row]
+        lines = []
+        for row in here:
+            if "failure" in row:
+                lines.append([row["cloud"], *"-" * 5, str(row["expected"]), "no", row["failure"]])
+                continue
+            cost = number(row["cpu"] / row["points"] / median(each), 2)
+            counts = [str(row[key]) for key in ("components", "loops", "expected")]
+            right = "yes" if row["loops"] == row["expected"] else "no"
+            lines.append([row["cloud"], str(row["points"]), number(row["cpu"], 2), cost, *counts, right, ""])
+        show(f"{name}: {sum(line[7] == 'yes' for line in lines)} of {len(lines)} right", header, lines, markdown)
+
+
+if __name__ == "__main__":
+    app()

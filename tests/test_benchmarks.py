@@ -1,0 +1,201 @@
+"""The accuracy benchmark: its clouds, its arithmetic, and its commands on tiny shapes."""
+
+import importlib
+import json
+import math
+import sys
+from itertools import chain
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+from typer.testing import CliRunner
+
+from glsk_o3d import pipelines
+from glsk_o3d.cli.overrides import override
+from glsk_o3d.samples import torus
+
+
+@pytest.fixture(scope="module")
+def tool(root):
+    """The benchmark as a module. Its folder stays on the path, on which the processes that it starts look for it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(root / "benchmarks"))
+        yield SimpleNamespace(common=importlib.import_module("_common"), **vars(importlib.import_module("accuracy")))
+    for name in ("_common", "accuracy"):
+        del sys.modules[name]
+
+
+@pytest.fixture
+def call(tool):
+    """Run a command; gives what it printed."""
+
+    def run(*arguments, code=0):
+        result = CliRunner().invoke(tool.app, [*map(str, arguments)])
+        assert result.exit_code == code, result.output
+        return result.output
+
+    return run
+
+
+def row(shape="torus", variant="clean_512", pipeline="default", **values):
+    found = dict(error=0.1, inside=1.0, completeness=1.0, ends=None, radius_error=0.05, cpu=0.2)
+    found |= dict(components=0, loops=0, leaves=0, junctions=0, topology=True)
+    return dict(shape=shape, variant=variant, pipeline=pipeline) | found | values
+
+
+class TestBuiltinClouds:
+    @pytest.mark.parametrize("variant", ["clean_300", "density_300", "holes_300", "outliers_300", "noise2_300"])
+    def test_have_their_size_and_are_repeatable(self, tool, variant):
+        for shape in tool.common.BUILTIN:
+            points, axis = tool.common.builtin(shape, variant)
+            assert points.shape == (300, 3)
+            assert len(axis.edges) > 0
+            np.testing.assert_array_equal(points, tool.common.builtin(shape, variant)[0])
+
+    def test_density_falls_tenfold(self, tool):
+        x = tool.common.builtin("tube", "density_20000")[0][:, 0]
+        dense, thin = (np.count_nonzero(abs(x - at) < 0.05) for at in (0.45, -0.45))
+        assert dense / thin == pytest.approx(10**0.75, rel=0.1)
+
+    def test_holes_are_empty_and_sever_nothing(self, tool):
+        whole, holed = (tool.common.builtin("torus", f"{kind}_4096")[0] for kind in ("clean", "holes"))
+        away = cKDTree(holed).query(whole)[0]
+        assert 0.08 < away.max() < 0.12
+        angle = np.arctan2(holed[:, 1], holed[:, 0])
+        assert np.histogram(angle, 100)[0].min() > 0
+
+    def test_outliers_are_one_percent(self, tool):
+        points = tool.common.builtin("torus", "outliers_4096")[0]
+        on_ring = np.hypot(np.hypot(points[:, 0], points[:, 1]) - 0.4, points[:, 2])
+        assert np.count_nonzero(abs(on_ring - 0.1) > 1e-9) == 40
+
+
+class TestArithmetic:
+    def test_summary_takes_means_and_counts_failures_as_wrong(self, tool):
+        rows = [row(error=0.1, ends=0.5), row(error=0.3, topology=False, loops=1), row(leaves=1, error=0.2)]
+        mean = tool.summary([*rows, dict(shape="mug", failure="ValueError: no")])
+        assert (mean["n"], mean["right"], mean["leaves"]) == (4, 2, 1)
+        assert mean["error"] == pytest.approx(0.2)
+        assert mean["ends"] == 0.5
+
+    def test_summary_of_failures_only(self, tool):
+        mean = tool.summary([dict(shape="mug", failure="ValueError: no")])
+        assert math.isnan(mean["error"])
+        assert mean["right"] == 0
+
+    def test_wrong_says_what(self, tool):
+        assert tool.wrong(row()) == ""
+        assert tool.wrong(row(loops=2, components=-1, topology=False)) == "torus +2 loops -1 components"
+        assert tool.wrong(dict(shape="mug", failure="ValueError: no")) == "mug (ValueError: no)"
+
+    def test_ablation_is_sorted_by_what_is_lost(self, tool):
+        rows = [row(), row(variant="noise1_512", error=0.3)]
+        for name, error, right in (("twigs cut", 0.1, True), ("denoising", 0.5, True), ("threads cut", 0.1, False)):
+            rows += [row(pipeline=name, error=error), row(pipeline=name, variant="noise1_512", topology=right)]
+        rows += [row(pipeline="cao2010"), row(pipeline="cao2010", variant="noise1_512")]
+        header, lines = tool.ablation_table(rows)
+        assert header == ["", "clean_512 (1)", "noise1_512 (1)", "all (2)", "setting"]
+        assert lines[0] == ["default", "0.100 / 1", "0.300 / 1", "0.200 / 2", ""]
+        names = [line[0] for line in lines[1:]]
+        assert names == ["without denoising", "without threads cut", "without twigs cut", "cao2010"]
+        assert lines[1] == ["without denoising", "0.500 / 1", "0.100 / 1", "0.300 / 2", "`RingBuilder.denoise=0`"]
+
+    def test_feet_on_a_square(self, tool):
+        nodes = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
+        edges = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+        distance, edge, part = tool.feet(np.array([[0.5, 0.1, 0], [3, 2.0, 0], [-1, 0.5, 0]]), nodes, edges)
+        np.testing.assert_allclose(distance, [0.1, 1, 1])
+        np.testing.assert_array_equal(edge[[0, 2]], [0, 3])
+        np.testing.assert_allclose(part[[0, 2]], [0.25, 0.75])
+
+    def test_local_radius_is_interpolated(self, tool):
+        axis = SimpleNamespace(nodes=np.array([[0.0, 0, 0], [1, 0, 0]]), edges=np.array([[0, 1]]), radii=np.r_[1.0, 2])
+        np.testing.assert_allclose(tool.local_radius(axis, np.array([[0.25, 3, 0], [5, 0, 0]])), [1.25, 2])
+
+
+class TestPipelines:
+    def test_all_ideas_off_are_the_publications(self, tool):
+        off = {name: setting.split() for name, setting in tool.IDEAS.items()}
+        published = ("point reduction", "stop by score")
+        wen = chain.from_iterable(setting for name, setting in off.items() if name not in published)
+        assert override(pipelines.default(), wen) == pipelines.wen2024()
+        without_reducer = (s for s in chain.from_iterable(off.values()) if not s.startswith("LPRReducer."))
+        assert override(pipelines.default(), [*without_reducer, "Contractor.max_iterations=20"]) == pipelines.cao2010()
+
+    @pytest.mark.parametrize("n", [0, 1, 3, 6])
+    def test_as_many_solves_as_asked_for(self, tool, n):
+        skeleton = tool.with_solves(pipelines.default(), n)(torus(512).points)
+        assert len(skeleton.report.iterations) == n
+
+
+class TestCommands:
+    def test_truth(self, call, tmp_path):
+        out = tmp_path / "out.json"
+        printed = call("truth", "--builtin", "--shapes", "tube,torus", "--variant", "clean_512", "-o", out, "--jobs", 1)
+        for name in pipelines.PIPELINES:
+            assert name in printed
+        told = json.loads(out.read_text())
+        assert {"commit", "machine", "versions", "command"} < set(told)
+        assert len(told["rows"]) == 6
+        rows = [found for found in told["rows"] if found["pipeline"] == "default"]
+        assert [found["shape"] for found in rows] == ["tube", "torus"]
+        assert all(found["topology"] and 0 < found["error"] < 0.2 and found["cpu"] > 0 for found in rows)
+
+    def test_a_shape_that_fails_is_a_row(self, call, tmp_path):
+        ring = torus(512)
+        axis = dict(nodes=ring.nodes, edges=ring.edges, radii=ring.radii)
+        np.savez(tmp_path / "good.npz", **axis, clean_512=ring.points)
+        np.savez(tmp_path / "few.npz", **axis, clean_512=ring.points[:3])
+        (tmp_path / "broken.npz").write_text("this is no archive")
+        printed = call("truth", tmp_path, "--variant", "clean_512", "--pipeline", "default", "--markdown", "--jobs", 0)
+        assert "1/3" in printed
+        assert "few (InvalidCloudError: 3 finite points" in printed
+        assert "broken (" in printed
+
+    def test_ablation(self, call):
+        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--idea", "twigs cut,mended rings")
+        lines = call("ablation", *few, "--markdown", "--jobs", 0).splitlines()
+        table = [line for line in lines if line.startswith("|")]
+        assert table[0] == "|  | clean_512 (1) | all (1) | setting |"
+        assert len(table) == 7
+        assert "without twigs cut" in "".join(table[3:5])
+
+    def test_rotations(self, call, tmp_path):
+        out = tmp_path / "out.json"
+        few = ("--builtin", "--shapes", "1", "--variant", "clean_512", "--count", 1)
+        call("rotations", *few, "-o", out, "--jobs", 0)
+        (found,) = json.loads(out.read_text())["rows"]
+        assert (found["runs"], found["topology_changes"], len(found["moves"])) == (1, 0, 1)
+        assert found["moves"][0] < 0.5
+
+    def test_stop_and_mass(self, call):
+        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--markdown", "--jobs", 0)
+        printed = call("stop", *few)
+        assert [line.split()[1] for line in printed.splitlines() if line.startswith("|")][2:] == [*"0123456", "rule"]
+        assert "| mean | " in call("mass", *few)
+
+    def test_loops(self, call, tmp_path):
+        np.savetxt(tmp_path / "ring.xyz", torus(512).points)
+        listed = [dict(name="ring", path="ring.xyz", n_points=512, loops=1, meaningful_skeleton=True)]
+        listed += [dict(listed[0], name="gone", path="gone.xyz"), dict(listed[0], name="big", n_points=10**6)]
+        (tmp_path / "manifest.json").write_text(json.dumps(listed))
+        printed = call("loops", tmp_path, "--markdown", "--jobs", 0)
+        assert "default: 1 of 2 right" in printed
+        assert "| ring | 512 | " in printed
+        assert "| gone | - |" in printed
+
+    @pytest.mark.parametrize(
+        "wrong",
+        [
+            ("truth", "--builtin", "--shapes", "teapot"),
+            ("truth", "--builtin", "--variant", "dirty_512"),
+            ("truth", "--builtin", "--pipeline", "wen2023"),
+            ("truth", "no_such_folder"),
+            ("ablation", "--builtin", "--idea", "magic"),
+            ("mass", "--builtin", "-o", "no_such_folder/out.json"),
+        ],
+    )
+    def test_wrong_usage_is_found_at_once(self, call, wrong):
+        assert "Invalid value" in call(*wrong, code=2)
