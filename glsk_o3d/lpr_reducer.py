@@ -10,7 +10,7 @@ import numpy as np
 from .errors import StageError
 from .filter import Filter, documented, parameter
 from .numerics.neighbourhoods import plane_axes
-from .numerics.rings import star_rings
+from .numerics.rings import Rings, star_rings
 
 _IN_PLANE = 1e-3  # sine of the angle below which a direction counts as lying in the tangent plane
 _MIN_SIZE = 1e-4  # floor of s - psi' s(0) in the working frame, as in the published code
@@ -72,20 +72,16 @@ class LPRReducer(Filter):
         nearest, _ = state.rings.nearest(state.positions)
         energy = merge_energy(state)
         candidates = np.flatnonzero(energy < self.phi * state.ring_size**2)
-        combined = combine_rings(state, candidates, nearest[candidates])
-        # An umbrella of three or a fan of four is the least that still surrounds a point.
-        feasible = np.flatnonzero(combined.sizes + combined.closed > 3)
         if self.order == "index":
-            rank = state.point_of_survivor[candidates[feasible]]
+            rank = state.point_of_survivor[candidates]
         else:
-            chosen = candidates[feasible]
             with np.errstate(divide="ignore"):
-                rank = energy[chosen] / state.ring_size[chosen] ** 2
-        feasible = feasible[np.argsort(rank, kind="stable")]
-        chosen = feasible[match(len(state), candidates[feasible], nearest[candidates[feasible]])]
-        if len(chosen) == 0:
+                rank = energy[candidates] / state.ring_size[candidates] ** 2
+        candidates = candidates[np.argsort(rank, kind="stable")]
+        keepers, combined = match_feasible(state, candidates, nearest[candidates])
+        if len(keepers) == 0:
             return state
-        return self._merge(state, candidates[chosen], nearest[candidates[chosen]], combined.take(chosen))
+        return self._merge(state, keepers, nearest[keepers], combined)
 
     def _merge(self, state, keepers, swallowed, combined):
         n = len(state)
@@ -166,6 +162,40 @@ def combine_rings(state, keepers, swallowed):
     along = np.abs(np.einsum("ij,ij->i", delta, normals))[:, None] > _IN_PLANE * length
     direction = np.where(along, np.divide(delta, length, out=np.zeros_like(delta), where=along), normals)
     return star_rings(state.cloud[state.survivors], keepers, union, plane_axes(direction))
+
+
+def match_feasible(state, keepers, swallowed):
+    """Greedy matching, in the given order, of the pairs that leave a ring around the keeper.
+
+    An umbrella of three or a fan of four is the least that still surrounds a point. The rings cost most, so they are
+    made only for pairs that the matching takes; it is repeated without those found wanting until there are none, which
+    gives the same pairs as if these had never been there.
+
+    Parameters
+    ----------
+    state : Contraction
+    keepers, swallowed : (c,) int array
+        Pairs of survivors, every keeper at most once.
+
+    Returns
+    -------
+    keepers : (p,) int array
+    combined : Rings
+        Their rings after the merge.
+    """
+    rings = Rings.concatenate([])
+    ring_of = np.full(len(state), -1)
+    feasible = np.ones(len(keepers), bool)
+    while True:
+        left = np.flatnonzero(feasible)
+        chosen = left[match(len(state), keepers[left], swallowed[left])]
+        new = chosen[ring_of[keepers[chosen]] < 0]
+        if len(new) == 0:
+            return keepers[chosen], rings.take(ring_of[keepers[chosen]])
+        combined = combine_rings(state, keepers[new], swallowed[new])
+        ring_of[keepers[new]] = len(rings) + np.arange(len(new))
+        rings = Rings.concatenate([rings, combined])
+        feasible[new] = combined.sizes + combined.closed > 3
 
 
 def mend_rings(rings, points, normals):

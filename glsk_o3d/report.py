@@ -6,6 +6,7 @@ import dataclasses
 import sys
 import warnings as _warnings
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 from .errors import SkeletonWarning
@@ -64,6 +65,7 @@ def _outside() -> int:
     return level
 
 
+@cache
 def _versions() -> dict[str, str]:
     found = {}
     for name in ("glsk-o3d", "numpy", "scipy", "open3d"):

@@ -156,9 +156,9 @@ def inscribed_circle(points):
     centre, best = np.zeros(3), 0.0
     span = high - low
     at = (low + high) / 2
-    for _ in range(3):
-        x, y = (np.linspace(-0.5, 0.5, 21)[:, None] * span + at).T
-        grid = np.stack([*np.meshgrid(x, y), np.zeros((21, 21))], axis=-1).reshape(-1, 3)
+    for n in (21, 11, 11):
+        x, y = (np.linspace(-0.5, 0.5, n)[:, None] * span + at).T
+        grid = np.stack([*np.meshgrid(x, y), np.zeros((n, n))], axis=-1).reshape(-1, 3)
         grid = grid[_inside(grid, polygon)]
         if len(grid):
             distance = _distance(grid, polygon)
