@@ -46,7 +46,8 @@ SOLVES = range(7)
 PUBLISHED = ("wen2024", "cao2010")
 
 IDEAS = {
-    "16 neighbours": "RingBuilder.k=none",
+    "neighbours by size": "RingBuilder.k=published",
+    "frame that turns along": "RingBuilder.frame=box",
     "outliers set aside": "RingBuilder.outlier_factor=0",
     "denoising": "RingBuilder.denoise=0",
     "point reduction": "Contractor.reducer=none",
@@ -54,14 +55,17 @@ IDEAS = {
     "cheapest merges first": "LPRReducer.order=index",
     "mended rings": "LPRReducer.mend_rings=false",
     "stop by score": "Contractor.stop=RingSizeRatio",
+    "an earlier stop": "ExplainedScore.threshold=0.02",
     "last solve kept": "Contractor.keep_last=false",
     "floor of attraction": "Contractor.min_attraction=0",
     "hold on lines": "Contractor.line_hold=1",
     "runaways held": "Contractor.retries=0",
     "sampling by thickness": "Connector.radius=2% Connector.thickness=0",
     "all ring links": "Connector.links=nearest",
+    "stray vertices dropped": "Connector.stray=0",
     "loops must open": "Refiner.opening=0",
     "threads cut": "Refiner.weak=0",
+    "unsure loops cut": "Refiner.sure=0",
     "twigs cut": "Refiner.twig=0",
     "edges subdivided": "Refiner.spacing=0",
     "fit to the axis": "Refiner.recentre=0",

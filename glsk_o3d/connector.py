@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from .filter import Filter, documented, parameter, resolve_length
 from .numerics.groups import group_median, group_sum
 from .numerics.neighbourhoods import nearest_neighbours
 from .numerics.sampling import farthest_point_sampling
 from .skeleton import Skeleton, plane_distance_radii
+
+NOISY = 0.3  # share of noise from which on a vertex may be stray
 
 
 @documented
@@ -59,6 +64,15 @@ class Connector(Filter):
         choices=("all", "nearest"),
     )
 
+    stray: float = parameter(
+        0.1,
+        "Where the cloud is noisy, vertices with less than this share of the points of another at most two edges away "
+        "are dropped, unless they hold parts together. 0 keeps all.",
+        type="float",
+        low=0,
+        high=1,
+    )
+
     def _run(self, state, on_iteration):
         radius = resolve_length(self.radius, state.frame.diagonal * state.frame.scale) / state.frame.scale
         radii = np.maximum(radius, self.thickness * local_thickness(state))
@@ -70,7 +84,7 @@ class Connector(Filter):
         known = (state.row_of_point >= 0) & ~state.outlier
         normals = np.where(known[:, None], state.normals[state.row_of_point], np.nan)
         vertices = state.frame.out_of(vertices)
-        return Skeleton(
+        skeleton = Skeleton(
             vertices=vertices,
             edges=self._edges(state, owner),
             radii=plane_distance_radii(vertices, vertex_of_point, state.points, normals),
@@ -79,6 +93,10 @@ class Connector(Filter):
             normals=normals,
             report=state.report,
         )
+        vertex_of_row = owner[state.owner]
+        count = np.bincount(vertex_of_row, minlength=len(samples))
+        noise = np.bincount(vertex_of_row, state.noise, len(samples)) / np.maximum(count, 1)
+        return drop_stray(skeleton, count, (noise > NOISY) & (self.stray > 0), self.stray)
 
     def _edges(self, state, owner):
         rings = state.rings
@@ -88,6 +106,58 @@ class Connector(Filter):
             length = np.where(link, rings.edge_lengths(state.positions), np.inf)
             link &= length == np.repeat(np.minimum.reduceat(length, rings.indptr[:-1]), rings.sizes)
         return np.unique(np.sort(np.column_stack([a[link], b[link]]), axis=1), axis=0)
+
+
+def drop_stray(skeleton, count, noisy, share):
+    """Drop the vertices of stray points, which noise leaves between parts and contraction leaves there.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    count : (M,) int array
+        Points of every vertex.
+    noisy : (M,) bool array
+        Vertices that may be dropped.
+    share : float
+        Points of a stray vertex over those of another at most two edges away, at most. Adjoining stray vertices that
+        hold other parts together stay.
+
+    Returns
+    -------
+    Skeleton
+        The points of dropped vertices are those of the nearest one left, without normals: they have no say.
+    """
+    m, edges = len(skeleton.vertices), skeleton.edges
+    ends, others = np.concatenate([edges, edges[:, ::-1]]).T
+    most = count.copy()
+    for _ in range(2):
+        around = most.copy()
+        np.maximum.at(around, ends, most[others])
+        most = around
+    stray = noisy & (count < share * most)
+    if not stray.any():
+        return skeleton
+    parts, groups = (_components(m, edges[kept[edges].all(axis=1)]) for kept in (~stray, stray))
+    border = stray[ends] & ~stray[others]
+    held = np.unique(np.column_stack([groups[ends[border]], parts[others[border]]]), axis=0)[:, 0]
+    dropped = stray & (np.bincount(held, minlength=m)[groups] == 1)
+    left = np.flatnonzero(~dropped)
+    nearest = np.cumsum(~dropped) - 1
+    nearest[dropped] = cKDTree(skeleton.vertices[left]).query(skeleton.vertices[dropped])[1]
+    owner = skeleton.vertex_of_point
+    return replace(
+        skeleton,
+        vertices=skeleton.vertices[left],
+        edges=nearest[edges[~dropped[edges].any(axis=1)]],
+        radii=skeleton.radii[left],
+        confidence=skeleton.confidence[left],
+        vertex_of_point=np.where(owner >= 0, nearest[owner], -1),
+        normals=np.where(((owner >= 0) & dropped[owner])[:, None], np.nan, skeleton.normals),
+    )
+
+
+def _components(m, edges):
+    return connected_components(coo_matrix((np.ones(len(edges)), edges.T), shape=(m, m)), directed=False)[1]
 
 
 def local_thickness(state):

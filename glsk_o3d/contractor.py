@@ -11,14 +11,12 @@ import numpy as np
 
 from .filter import Filter, documented, parameter
 from .numerics.cotangent import cotangent_laplacian
-from .numerics.neighbourhoods import nearest_neighbours, principal
+from .numerics.neighbourhoods import nearest_neighbours
 from .numerics.solver import SolveError, solve_contraction
 from .report import IterationRecord
 from .state import Contraction
 from .stopping import ExplainedScore, StopRule
 
-BOX_SLACK = 1.2
-FLAT = 0.01
 LINE, LINE_NEIGHBOURS = 0.97, 16  # linearity of a neighbourhood of so many points that counts as a line
 
 
@@ -132,18 +130,15 @@ class Contractor(Filter):
 
     def _solve_in_box(self, state, laplacian, row_weight, attraction, mass):
         """Solve; as long as that throws points out of the box, hold these and solve again."""
-        limit = np.maximum(BOX_SLACK * state.frame.half_extent, FLAT * state.frame.diagonal)
         held = np.zeros(len(state), bool)
         for _ in range(self.retries + 1):
             weight = np.where(held, self.max_attraction, attraction) * mass
             positions, error = solve_contraction(laplacian, row_weight, weight, state.positions)
-            outside = (np.abs(positions) > limit).any(axis=1)
+            outside = state.frame.beyond(positions)
             if not outside.any():
                 return positions, dict(n_held=int(held.sum()), solve_error=error)
             held |= outside
-        raise SolveError(
-            f"it would throw {outside.sum()} of {len(state)} points out of {BOX_SLACK:g} times the bounding box"
-        )
+        raise SolveError(f"it would throw {outside.sum()} of {len(state)} points far out of the cloud")
 
 
 def linearity(points):
@@ -159,7 +154,9 @@ def linearity(points):
         1 on a line.
     """
     _, neighbours = nearest_neighbours(points, min(LINE_NEIGHBOURS, len(points)))
-    spread = principal(points, neighbours)[0]
+    patch = points[neighbours]
+    patch -= patch.mean(axis=1, keepdims=True)
+    spread = np.maximum(np.linalg.eigvalsh(np.matmul(patch.transpose(0, 2, 1), patch)), 0)
     return spread[:, 2] / np.maximum(spread.sum(axis=1), np.finfo(float).tiny)
 
 

@@ -46,7 +46,7 @@ def parameter(
         Inclusive limits (`low` is exclusive with `open_low`); for a length in percent they limit nothing.
     open_low : bool
     choices : tuple of str
-        For the type ``"choice"``.
+        What the type ``"choice"`` may be; any other type may also be one of these words.
     """
     facts = dict(doc=doc, type=type, unit=unit, low=low, high=high, open_low=open_low, choices=choices)
     return dataclasses.field(default=default, metadata=facts)
@@ -57,7 +57,8 @@ def documented(cls):
     lines = []
     for field in dataclasses.fields(cls):
         facts = field.metadata
-        kind = " or ".join(repr(c) for c in facts["choices"]) or facts["type"].replace("?", " or None")
+        words = [repr(choice) for choice in facts["choices"]]
+        kind = " or ".join(words + [facts["type"].replace("?", " or None")] * (facts["type"] != "choice"))
         unit = "" if facts["unit"] == "-" else f" [{facts['unit']}]"
         lines += [f"{field.name} : {kind}{unit}, default {field.default!r}", f"    {facts['doc']}"]
     if lines:
@@ -81,6 +82,8 @@ class Parameters:
 
 def _problem(value, facts) -> str | None:
     kind, low, high = facts["type"], facts["low"], facts["high"]
+    if isinstance(value, str) and value in facts["choices"]:
+        return None
     if kind.endswith("?"):
         if value is None:
             return None
@@ -88,7 +91,7 @@ def _problem(value, facts) -> str | None:
     if kind == "bool":
         return None if isinstance(value, bool) else "must be True or False"
     if kind == "choice":
-        return None if value in facts["choices"] else f"must be one of {', '.join(map(repr, facts['choices']))}"
+        return f"must be one of {', '.join(map(repr, facts['choices']))}"
     if kind in ("reducer", "stop"):
         usable = callable(value) and not isinstance(value, type)
         return None if usable else f"must be a {kind}: an instance, not a class or a name"
@@ -98,7 +101,8 @@ def _problem(value, facts) -> str | None:
             return "must be a number in the cloud's units or a percentage of its diagonal such as '2%'"
         return None if 0 < percent <= 100 else "a percentage of the diagonal lies above 0% and up to 100%"
     if isinstance(value, bool) or not isinstance(value, Integral if kind == "int" else Real):
-        return f"must be {'an int' if kind == 'int' else 'a number'}"
+        words = "".join(f", or {choice!r}" for choice in facts["choices"])
+        return f"must be {'an int' if kind == 'int' else 'a number'}{words}"
     if not isinstance(value, Integral) and not math.isfinite(value):
         return "must be finite"
     if low is not None and (value < low or (facts["open_low"] and value == low)):

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 def cao2010() -> Pipeline:
     """The baseline: contraction without reduction, stopped by the ring sizes (Cao et al. 2010)."""
     return (
-        RingBuilder(k=None, outlier_factor=0, denoise=0)
+        RingBuilder(k="published", outlier_factor=0, denoise=0, frame="box")
         | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0, line_hold=1, keep_last=False, retries=0)
-        | Connector(radius="2%", thickness=0, links="nearest")
-        | Refiner(opening=0, weak=0, twig=0, spacing=0, recentre=0, bridge=0)
+        | Connector(radius="2%", thickness=0, links="nearest", stray=0)
+        | Refiner(opening=0, twig=0, spacing=0, recentre=0, weak=0, sure=0, bridge=0)
     )
 
 
@@ -33,7 +33,7 @@ def wen2024() -> Pipeline:
     the fourth solve. The pages of the filters list every difference.
     """
     return (
-        RingBuilder(k=None, outlier_factor=0, denoise=0)
+        RingBuilder(k="published", outlier_factor=0, denoise=0, frame="box")
         | Contractor(
             reducer=LPRReducer(conserve_mass=False, order="index", mend_rings=False),
             stop=ExplainedScore(),
@@ -42,14 +42,16 @@ def wen2024() -> Pipeline:
             keep_last=False,
             retries=0,
         )
-        | Connector(radius="2%", thickness=0, links="nearest")
-        | Refiner(opening=0, weak=0, twig=0, spacing=0, recentre=0, bridge=0)
+        | Connector(radius="2%", thickness=0, links="nearest", stray=0)
+        | Refiner(opening=0, twig=0, spacing=0, recentre=0, weak=0, sure=0, bridge=0)
     )
 
 
 def default() -> Pipeline:
     """What we recommend: GLSkeleton with the mass of merged points kept and the vertices centred in the surface."""
-    return RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore()) | Connector() | Refiner()
+    return (
+        RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore(threshold=0.03)) | Connector() | Refiner()
+    )
 
 
 PIPELINES = {"default": default, "wen2024": wen2024, "cao2010": cao2010}

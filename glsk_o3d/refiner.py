@@ -11,6 +11,7 @@ from .refinement.bridging import bridge_gaps
 from .refinement.loops import close_loops
 from .refinement.medial import fit_axis
 from .refinement.resampling import resample
+from .refinement.threads import cut_threads
 from .refinement.triangles import collapse_triangles
 from .refinement.trust import trust_warnings
 from .refinement.twigs import cut_twigs
@@ -24,16 +25,17 @@ class Refiner(Filter):
 
     1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
        the shortest, until there is no triangle.
-    2. Loops that open less than their tube is thick are zipped up, loops that hang by a thread are cut, and branches
-       shorter than the part they grow from is thick are cut.
+    2. Loops that open less than their tube is thick are zipped up, and branches shorter than the part they grow from is
+       thick are cut.
     3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
        corners.
     4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
        side was scanned, and to the points themselves where noise has spoilt the normals.
-    5. Ends of different parts that point at each other across a gap of the scan are joined.
+    5. Loops that hang by a thread, and narrow loops where the points hardly say where the axis is, are cut.
+    6. Ends of different parts that point at each other across a gap of the scan are joined.
 
-    The first step is published; with `opening`, `weak`, `twig`, `spacing`, `recentre` and `bridge` all 0 it is the only
-    one.
+    The first step is published; with `opening`, `twig`, `spacing`, `recentre`, `weak`, `sure` and `bridge` all 0 it
+    is the only one.
 
     Warns
     -----
@@ -60,13 +62,6 @@ class Refiner(Filter):
         type="float",
         low=0,
     )
-    weak: float = parameter(
-        0.25,
-        "A loop is cut where its weakest edge joins so many fewer near points than its median one, and hardly any. 0 "
-        "keeps all.",
-        type="float",
-        low=0,
-    )
     twig: float = parameter(
         1.3,
         "Least reach of a branch's points from its junction over the thickness there; others are cut. 0 keeps all.",
@@ -82,6 +77,19 @@ class Refiner(Filter):
     recentre: int = parameter(
         3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", type="int", unit="passes", low=0
     )
+    weak: float = parameter(
+        0.03,
+        "A loop is cut where so much less of the surface goes across than its median; 0 keeps all.",
+        type="float",
+        low=0,
+    )
+    sure: float = parameter(
+        0.65,
+        "Least opening of a loop over the radius of its tube, times the mean confidence; other loops are cut. 0 keeps "
+        "all.",
+        type="float",
+        low=0,
+    )
     bridge: float = parameter(
         8.0,
         "Longest gap between two parts that continue each other, over their radius; wider gaps stay. 0 bridges none.",
@@ -91,8 +99,8 @@ class Refiner(Filter):
 
     def _run(self, skeleton, on_iteration):
         skeleton = collapse_triangles(skeleton)
-        if self.opening or self.weak:
-            skeleton = close_loops(skeleton, self.opening, self.weak)
+        if self.opening:
+            skeleton = close_loops(skeleton, self.opening)
         if self.twig:
             skeleton = cut_twigs(skeleton, self.twig)
         if self.recentre:
@@ -101,6 +109,8 @@ class Refiner(Filter):
             skeleton = resample(skeleton, self.spacing)
         vertices, confidence = fit_axis(skeleton, self.recentre)
         skeleton = replace(skeleton, vertices=vertices, confidence=confidence)
+        if self.weak or self.sure:
+            skeleton = cut_threads(skeleton, self.weak, self.sure)
         radii = plane_distance_radii(
             skeleton.vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals, skeleton.radii
         )

@@ -14,14 +14,23 @@ from .interop.open3d import cloud_points
 from .numerics.frame import Frame
 from .numerics.neighbourhoods import isolation, nearest_neighbours, principal
 from .numerics.ordering import morton_order
-from .numerics.ridges import scatter, to_ridges
+from .numerics.ridges import noise_share, to_ridges
 from .numerics.rings import star_rings
 from .report import Report
 from .state import Contraction
 
 MIN_POINTS = 8
 SMALLEST, LARGEST = 1e-120, 1e120  # extents whose squares and products a float64 holds
+ALONE, FAIRLY_NOISY = 1.8, 0.2  # isolation of a denoised point that is set aside, and its least noise
 COINCIDENT = 4e-15  # points nearer than this in the working frame, a few roundings, are duplicates
+
+
+def usual_k(n: int) -> int:
+    """Neighbours per point, itself included: 16 from 4096 points on, fewer by the cube root below, at least 8.
+
+    In a sparse cloud 16 neighbours would reach across thin parts.
+    """
+    return int(np.clip(np.floor(16 * np.cbrt(n / 4096) + 0.5), 8, 16))
 
 
 def published_k(n: int) -> int:
@@ -50,14 +59,16 @@ class RingBuilder(Filter):
 
     consumes: ClassVar[str] = "cloud"
 
-    k: int | None = parameter(
-        16,
+    k: int | str = parameter(
+        "auto",
         "Neighbours per point, itself included; at most all points. More bridge noise and gaps, fewer keep thin parts "
-        "apart. None takes 1.2 % of the points, at least 8 and at most 30, as published.",
-        type="int?",
+        "apart. 'auto' is 16 from 4096 points on and fewer below, by the cube root, at least 8; 'published' is 1.2 % "
+        "of the points, at least 8 and at most 30.",
+        type="int",
         unit="points",
         low=4,
         high=256,
+        choices=("auto", "published"),
     )
     outlier_factor: float = parameter(
         2.5,
@@ -73,6 +84,13 @@ class RingBuilder(Filter):
         type="int",
         unit="passes",
         low=0,
+    )
+    frame: str = parameter(
+        "spread",
+        "What lengths in percent refer to, and the frame in which the weights are stated: the box with the spread of "
+        "the points, which turns with them, or the axis-aligned bounding box, as published.",
+        type="choice",
+        choices=("spread", "box"),
     )
     drop_invalid: bool = parameter(
         False, "Drop points with NaN or infinite coordinates instead of refusing.", type="bool"
@@ -96,13 +114,18 @@ class RingBuilder(Filter):
         row_of_point, outlier = np.full(len(points), -1), np.zeros(len(points), bool)
         row_of_point[finite], outlier[finite] = row, stray
 
-        n = len(distinct)
         spread, axes = principal(distinct, neighbours)
         normals = np.ascontiguousarray(axes[:, :, 0])  # a ridge has none: those of the cloud as it came
-        if self.denoise and (calm := to_ridges(distinct, scatter(spread, neighbours), self.denoise)) is not distinct:
-            distinct = calm
-            neighbours = nearest_neighbours(distinct, neighbours.shape[1])[1]
+        noise = noise_share(spread, neighbours)
+        if self.denoise and noise.any():
+            distinct, neighbours, left, nearest = self._denoised(distinct, neighbours.shape[1], noise)
+            normals, noise = normals[left], noise[left]
+            row_of_point[finite], outlier[finite] = (
+                nearest[row],
+                stray | (left[nearest] != np.arange(len(nearest)))[row],
+            )
             axes = principal(distinct, neighbours)[1]
+        n = len(distinct)
         rings = star_rings(distinct, np.arange(n), neighbours[:, 1:], axes[:, :, 1:])
         _, ring_size = rings.nearest(distinct)
         return Contraction(
@@ -111,6 +134,7 @@ class RingBuilder(Filter):
             outlier=outlier,
             frame=frame,
             cloud=distinct,
+            noise=noise,
             normals=normals,
             survivors=np.arange(n),
             owner=np.arange(n),
@@ -127,10 +151,31 @@ class RingBuilder(Filter):
             report=Report(
                 n_input=len(points),
                 n_dropped=int((~finite).sum()),
-                n_outliers=int(stray.sum()),
+                n_outliers=int(outlier.sum()),
                 n_distinct=n,
             ),
         )
+
+    def _denoised(self, cloud, k, noise):
+        """The denoised cloud and its neighbours, without points that now stand alone; who is left; nearest of these."""
+        calm = to_ridges(cloud, noise, self.denoise)
+        distance, neighbours = nearest_neighbours(calm, k)
+        alone = (noise > FAIRLY_NOISY) & (isolation(distance, neighbours) > ALONE) & (self.outlier_factor > 0)
+        if not 0 < alone.sum() <= len(calm) - max(k, MIN_POINTS):
+            return calm, neighbours, np.arange(len(calm)), np.arange(len(calm))
+        left = np.flatnonzero(~alone)
+        nearest = np.cumsum(~alone) - 1
+        nearest[alone] = cKDTree(calm[left]).query(calm[alone])[1]
+        calm, neighbours, changed = (
+            calm[left],
+            nearest[neighbours[left]],
+            np.flatnonzero(alone[neighbours[left]].any(axis=1)),
+        )
+        neighbours[changed] = nearest_neighbours(calm, k, of=calm[changed])[1]
+        return calm, neighbours, left, nearest
+
+    def _neighbours(self, n):
+        return min({"auto": usual_k, "published": published_k}[self.k](n) if isinstance(self.k, str) else self.k, n)
 
     def _finite(self, points):
         finite = np.isfinite(points).all(axis=1)
@@ -154,25 +199,27 @@ class RingBuilder(Filter):
             raise InvalidCloudError(f"all {len(points)} points coincide: there is nothing to skeletonise")
         if not SMALLEST < extent < LARGEST:
             raise InvalidCloudError(f"the cloud is {extent:g} long, too extreme for its squares: rescale it")
-        frame = Frame.of(points)
+        frame = Frame.of(points, self.frame)
         scaled = frame.into(points)
         order = morton_order(scaled)
         cloud, row = scaled[order], np.empty(len(points), int)
         row[order] = np.arange(len(points))
-        k = min(self.k or published_k(len(cloud)), len(cloud))
+        k = self._neighbours(len(cloud))
         distance, neighbours = nearest_neighbours(cloud, k)
         if distance[:, 1].min() < COINCIDENT:
             cells = np.round(cloud / COINCIDENT).astype(np.int64)
             first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)[1:]
-            cloud = cloud[first]
-            if len(cloud) < MIN_POINTS:
+            if len(first) < MIN_POINTS:
                 raise InvalidCloudError(
-                    f"{len(points)} points but only {len(cloud)} distinct ones: a skeleton needs at least {MIN_POINTS}"
+                    f"{len(points)} points but only {len(first)} distinct ones: a skeleton needs at least {MIN_POINTS}"
                 )
+            # Anew: the frame is that of the distinct points, however often they came.
+            distinct = points[order[first]]
+            frame = Frame.of(distinct, self.frame)
+            cloud = frame.into(distinct)
             order = morton_order(cloud)
             position = np.empty(len(cloud), int)
             position[order] = np.arange(len(cloud))
             cloud, row = cloud[order], position[inverse.reshape(-1)[row]]
-            k = min(self.k or published_k(len(cloud)), len(cloud))
-            distance, neighbours = nearest_neighbours(cloud, k)
+            distance, neighbours = nearest_neighbours(cloud, self._neighbours(len(cloud)))
         return frame, cloud, row, distance, neighbours

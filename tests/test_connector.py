@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 
+import networkx as nx
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from glsk_o3d import Connector, Contractor, InvalidParameterError, LPRReducer, RingBuilder, Skeleton, pipelines, samples
-from glsk_o3d.connector import local_thickness
+from glsk_o3d.connector import NOISY, drop_stray, local_thickness
 
 VARIANTS = {name: make().stages[2] for name, make in pipelines.PIPELINES.items()}
 ONE_RADIUS = VARIANTS["cao2010"]
@@ -64,10 +67,12 @@ def test_edges_join_what_rings_join(state):
 
 
 @pytest.mark.parametrize("share", [0.5, 2, 5])
-def test_percentages_and_units_agree(share):
+@pytest.mark.parametrize("frame", ["box", "spread"])
+def test_percentages_and_units_agree(frame, share):
     sample = samples.y_junction(n=800).points * 250
-    state = contracted(sample)
-    diagonal = np.linalg.norm(np.ptp(sample, axis=0))
+    state = Contractor(max_iterations=3)(RingBuilder(frame=frame)(sample))
+    # of the box with the spread of the points: a^2 / 12 is the variance of one side, evenly filled
+    diagonal = np.linalg.norm(np.ptp(sample, axis=0) if frame == "box" else np.sqrt(12) * sample.std(axis=0))
     a, b = (replace(ONE_RADIUS, radius=radius)(state) for radius in (f"{share}%", share / 100 * diagonal))
     np.testing.assert_array_equal(a.vertices, b.vertices)
     np.testing.assert_array_equal(a.edges, b.edges)
@@ -161,3 +166,162 @@ def test_local_thickness_of_fewer_points_than_neighbours():
     moved = replace(state, positions=0.5 * state.positions)
     expected = np.median(np.linalg.norm(state.cloud, axis=1)) / 2
     np.testing.assert_allclose(local_thickness(moved), expected)
+
+
+# ---- stray vertices
+
+
+def counted(edges, count, seed=0):
+    """A graph whose vertices own as many points as they count, and two points of no vertex."""
+    rng, m = np.random.default_rng(seed), len(count)
+    owner = rng.permutation(np.concatenate([np.repeat(np.arange(m), count), [-1, -1]]))
+    vertices, points, normals = (rng.normal(size=(n, 3)) for n in (m, len(owner), len(owner)))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    edges = sorted({(min(edge), max(edge)) for edge in edges})
+    raw = Skeleton(vertices, edges, rng.random(m), owner, points, normals, confidence=rng.random(m))
+    return raw, np.array(count)
+
+
+THICK = [(0, 1), (1, 2), (3, 4), (4, 5)]  # two parts, and what is between them
+BETWEEN = {
+    "a bridge holds": ([(2, 6), (6, 3)], []),
+    "two bridges hold": ([(2, 6), (6, 3), (1, 7), (7, 4)], []),
+    "a bridge of two holds": ([(2, 6), (6, 7), (7, 3)], []),
+    "what hangs from a bridge stays with it": ([(2, 6), (6, 3), (6, 7)], []),
+    "a bridge beside an edge": ([(2, 3), (2, 6), (6, 3)], [6]),
+    "a bridge of two beside an edge": ([(2, 3), (1, 6), (6, 7), (7, 4)], [6, 7]),
+    "a bridge within one part": ([(0, 6), (6, 2)], [6]),
+    "a twig": ([(2, 6)], [6]),
+    "twigs of both": ([(2, 6), (3, 7)], [6, 7]),
+    "a twig of two": ([(2, 6), (6, 7)], [6, 7]),
+    "three in a row hold the last, too far from what is thick": ([(2, 6), (6, 7), (7, 8)], []),
+    "alone": ([], []),
+}
+
+
+@pytest.mark.parametrize("case", BETWEEN)
+def test_stray_vertices_are_dropped_unless_they_hold_parts_together(case):
+    more, dropped = BETWEEN[case]
+    raw, count = counted(THICK + more, [100] * 6 + [5] * 3)
+    skeleton = drop_stray(raw, count, np.ones(9, bool), 0.1)
+    left = np.setdiff1d(np.arange(9), dropped)
+    np.testing.assert_array_equal(skeleton.vertices, raw.vertices[left])
+    kept = [edge for edge in raw.edges.tolist() if not set(edge) & set(dropped)]
+    assert left[skeleton.edges].tolist() == kept
+    np.testing.assert_array_equal(skeleton.radii, raw.radii[left])
+    np.testing.assert_array_equal(skeleton.confidence, raw.confidence[left])
+    if not dropped:
+        assert skeleton.n_components == raw.n_components
+
+
+@pytest.mark.parametrize(
+    ("count", "share", "dropped"), [(9, 0.1, True), (10, 0.1, False), (49, 0.5, True), (9, 0, False)]
+)
+@pytest.mark.parametrize("away", [1, 2, 3])
+def test_share_of_the_points_of_another_at_most_two_edges_away(count, share, dropped, away):
+    path = [100, *[60] * (away - 1), count]
+    raw, count = counted([(i, i + 1) for i in range(away)], path)
+    noisy = np.arange(away + 1) == away
+    skeleton = drop_stray(raw, count, noisy, share)
+    near = count[away] < share * 60 if away == 3 else dropped
+    assert len(skeleton.vertices) == len(path) - near
+    if not near:
+        assert skeleton is raw
+
+
+def test_only_noisy_vertices_are_dropped():
+    raw, count = counted([*THICK, (2, 6), (3, 7)], [100] * 6 + [1, 1])
+    assert drop_stray(raw, count, np.zeros(8, bool), 0.1) is raw
+    assert drop_stray(raw, count, np.arange(8) < 6, 1.0) is raw
+    np.testing.assert_array_equal(drop_stray(raw, count, np.arange(8) == 7, 0.1).vertices, raw.vertices[:7])
+
+
+def slow_stray(edges, count, noisy, share):
+    """The vertices that are dropped."""
+    graph = nx.Graph(edges)
+    graph.add_nodes_from(range(len(count)))
+    near = [nx.single_source_shortest_path_length(graph, v, cutoff=2) for v in range(len(count))]
+    stray = [v for v in graph if noisy[v] and count[v] < share * max(count[w] for w in near[v])]
+    parts = list(nx.connected_components(graph.subgraph(set(graph) - set(stray))))
+    dropped = []
+    for group in nx.connected_components(graph.subgraph(stray)):
+        touched = [part for part in parts if any(set(graph[v]) & part for v in group)]
+        dropped += group if len(touched) == 1 else []
+    return sorted(dropped)
+
+
+@st.composite
+def graphs(draw):
+    m = draw(st.integers(1, 12))
+    pairs = [(a, b) for b in range(m) for a in range(b)]
+    edges = draw(st.lists(st.sampled_from(pairs), max_size=16, unique=True)) if pairs else []
+    count = draw(st.lists(st.sampled_from([1, 2, 5, 20, 100]), min_size=m, max_size=m))
+    return edges, count, np.array(draw(st.lists(st.booleans() | st.just(True), min_size=m, max_size=m)), bool)
+
+
+@settings(max_examples=100, deadline=None)
+@given(graphs(), st.sampled_from([0.0, 0.1, 0.5, 1.0]), st.integers(0, 100))
+def test_drop_stray_by_its_definition(graph, share, seed):
+    edges, count, noisy = graph
+    raw, count = counted(edges, count, seed)
+    skeleton = drop_stray(raw, count, noisy, share)
+    dropped = slow_stray(edges, count.tolist(), noisy, share)
+    left = np.setdiff1d(np.arange(len(count)), dropped)
+    np.testing.assert_array_equal(skeleton.vertices, raw.vertices[left])
+    assert left[skeleton.edges].tolist() == [e for e in raw.edges.tolist() if not set(e) & set(dropped)]
+    # components are neither torn nor joined, and none vanishes
+    of = raw.component_of_vertex[left]
+    pairs = set(zip(of.tolist(), skeleton.component_of_vertex.tolist(), strict=True))
+    assert len(pairs) == raw.n_components == skeleton.n_components
+    # points of dropped vertices go with the nearest left and have no say; all others are as before
+    owner, gone = raw.vertex_of_point, np.isin(raw.vertex_of_point, dropped)
+    nearest = left[cdist(raw.vertices, skeleton.vertices).argmin(axis=1)]
+    now = np.where(skeleton.vertex_of_point >= 0, left[skeleton.vertex_of_point], -1)
+    np.testing.assert_array_equal(now, np.where(owner >= 0, nearest[owner], -1))
+    np.testing.assert_array_equal(now[~gone], owner[~gone])
+    np.testing.assert_array_equal(np.isnan(skeleton.normals).all(axis=1), gone)
+    np.testing.assert_array_equal(skeleton.normals[~gone], raw.normals[~gone])
+    np.testing.assert_array_equal(skeleton.points, raw.points)
+
+
+@settings(max_examples=30, deadline=None)
+@given(graphs(), st.integers(0, 100))
+def test_drop_stray_does_not_mind_numbers(graph, seed):
+    edges, count, noisy = graph
+    raw, count = counted(edges, count)
+    name = np.random.default_rng(seed).permutation(len(count))
+    back = np.argsort(name)
+    owner = np.where(raw.vertex_of_point >= 0, name[raw.vertex_of_point], -1)
+    renamed = replace(
+        raw, vertices=raw.vertices[back], edges=sorted(map(tuple, np.sort(name[raw.edges], axis=1).tolist())),
+        radii=raw.radii[back], confidence=raw.confidence[back], vertex_of_point=owner,
+    )  # fmt: skip
+    one, other = drop_stray(raw, count, noisy, 0.1), drop_stray(renamed, count[back], noisy[back], 0.1)
+    places = [
+        {frozenset(map(tuple, s.vertices[edge].tolist())) for edge in s.edges} | set(map(tuple, s.vertices.tolist()))
+        for s in (one, other)
+    ]
+    assert places[0] == places[1]
+    said = raw.vertex_of_point >= 0
+    np.testing.assert_array_equal(*(s.vertices[s.vertex_of_point[said]] for s in (one, other)))
+    np.testing.assert_array_equal(one.normals, other.normals)
+
+
+@pytest.mark.parametrize("shape", ["tube", "torus", "y_junction", "two_rings", "sheet"])
+def test_clean_clouds_have_no_stray_vertices(shape):
+    state = contracted(samples.SAMPLES[shape](n=700).points, LPRReducer())
+    assert state.noise.max() <= NOISY
+    all_of_them, skeleton = Connector(stray=0)(state), Connector(stray=1.0)(state)
+    np.testing.assert_array_equal(skeleton.vertices, all_of_them.vertices)
+    np.testing.assert_array_equal(skeleton.vertex_of_point, all_of_them.vertex_of_point)
+    np.testing.assert_array_equal(skeleton.normals, all_of_them.normals)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.99 * NOISY, 1.01 * NOISY, 1.0])
+def test_vertices_are_stray_only_where_noise_is(state, noise, assert_sound):
+    all_of_them = Connector(stray=0)(state)
+    share = np.full(len(state.cloud), noise)
+    skeleton = Connector(stray=1.0)(replace(state, noise=share))
+    assert (len(skeleton.vertices) < len(all_of_them.vertices)) == (noise > NOISY)
+    assert_sound(skeleton, 800, triangles=True)
+    assert skeleton.n_components == all_of_them.n_components

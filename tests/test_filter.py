@@ -68,6 +68,15 @@ def test_wrong_parameters_are_named_when_the_filter_is_called(cls, name, value):
             made(POINTS)
 
 
+@pytest.mark.parametrize("word", ["published ", "Auto", "16", ""])
+def test_a_parameter_of_any_type_takes_its_words_and_no_others(word):
+    with pytest.raises(InvalidParameterError, match="must be an int, or 'auto', or 'published'"):
+        RingBuilder(k=word).check()
+    RingBuilder(k="auto").check()
+    assert "k : 'auto' or 'published' or int [points], default 'auto'" in RingBuilder.__doc__
+    assert "frame : 'spread' or 'box', default 'spread'" in RingBuilder.__doc__  # only words
+
+
 @pytest.mark.parametrize(("cls", "field"), fields(), ids=lambda x: getattr(x, "__name__", None) or x.name)
 def test_right_parameters_pass(cls, field):
     facts = field.metadata

@@ -1,13 +1,15 @@
 """RingBuilder: cloud -> rings."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay, cKDTree
 
 from glsk_o3d import Contraction, InvalidCloudError, RingBuilder, samples
 from glsk_o3d.numerics.neighbourhoods import isolation, nearest_neighbours, principal
-from glsk_o3d.numerics.ridges import scatter, to_ridges
-from glsk_o3d.ring_builder import published_k
+from glsk_o3d.numerics.ridges import noise_share, to_ridges
+from glsk_o3d.ring_builder import ALONE, FAIRLY_NOISY, MIN_POINTS, published_k, usual_k
 
 TORUS = samples.torus(n=600).points
 SHEET = samples.sheet(n=500, bend=0).points
@@ -33,12 +35,26 @@ def test_published_number_of_neighbours(n, k):
     assert published_k(n) == k
 
 
-@pytest.mark.parametrize("k", [None, 5, 20])
+@pytest.mark.parametrize(
+    ("n", "k"), [(8, 8), (614, 8), (615, 9), (2048, 13), (3723, 15), (3724, 16), (4096, 16), (10**8, 16)]
+)
+def test_usual_number_of_neighbours(n, k):
+    assert usual_k(n) == k
+
+
+@pytest.mark.parametrize(("word", "number"), [("auto", usual_k), ("published", published_k)])
+@pytest.mark.parametrize("n", [20, 900, 2000])
+def test_words_for_numbers_of_neighbours(word, number, n):
+    points = samples.torus(n=n).points
+    assert named_rings(RingBuilder(k=word)(points)) == named_rings(RingBuilder(k=number(n))(points))
+
+
+@pytest.mark.parametrize("k", ["published", "auto", 5, 20])
 @pytest.mark.parametrize("points", [TORUS, SHEET], ids=["torus", "sheet"])
 def test_rings_are_delaunay_stars_in_the_principal_plane(points, k):
     state = RingBuilder(k=k)(points)
     cloud = state.cloud
-    _, neighbours = nearest_neighbours(cloud, k or published_k(len(points)))
+    _, neighbours = nearest_neighbours(cloud, {"published": 8, "auto": 8}.get(k, k))
     for i, patch in enumerate(neighbours):
         assert patch[0] == i
         plane = np.linalg.svd(cloud[patch] - cloud[patch].mean(axis=0))[2][:2]
@@ -117,7 +133,7 @@ def test_duplicates_are_one_point():
     order = np.random.default_rng(2).permutation(np.repeat(np.arange(600), 3))
     state = RingBuilder()(TORUS[order])
     assert (state.report.n_input, state.report.n_distinct, len(state)) == (1800, 600, 600)
-    np.testing.assert_array_equal(state.cloud, single.cloud)
+    np.testing.assert_allclose(state.cloud, single.cloud, atol=1e-15)
     np.testing.assert_array_equal(state.row_of_point, single.row_of_point[order])
     np.testing.assert_array_equal(state.rings.indices, single.rings.indices)
     np.testing.assert_array_equal(order[state.point_of_survivor], single.point_of_survivor)
@@ -172,9 +188,9 @@ def test_what_is_left_is_the_cloud_without_them(outliers):
     mixed = np.concatenate([TORUS, outliers])[order]
     state, clean = STRICT(mixed), STRICT(TORUS)
     np.testing.assert_array_equal(state.outlier, order >= 600)
-    np.testing.assert_array_equal(state.cloud, clean.cloud)
+    np.testing.assert_allclose(state.cloud, clean.cloud, atol=1e-15)  # sums in another order
     np.testing.assert_array_equal(state.rings.indices, clean.rings.indices)
-    assert state.frame.diagonal == clean.frame.diagonal
+    assert state.frame.diagonal == pytest.approx(clean.frame.diagonal, rel=1e-15)
     kept = order < 600
     np.testing.assert_array_equal(state.row_of_point[kept], clean.row_of_point[order[kept]])
     # outliers go with the nearest point that is none
@@ -222,25 +238,30 @@ def in_order(state):
     return state.frame.out_of(state.cloud)[state.row_of_point]
 
 
+BY_16 = RingBuilder(k=16)
+RAW = replace(BY_16, denoise=0)
+
+
 def test_no_denoising_leaves_the_points():
     points = noisy_tube()
-    np.testing.assert_allclose(in_order(RingBuilder(denoise=0)(points)), points, atol=1e-15)
-    assert np.abs(in_order(RingBuilder()(points)) - points).max() > 0.02
+    np.testing.assert_allclose(in_order(RAW(points)), points, atol=1e-15)
+    assert np.abs(in_order(BY_16(points)) - points).max() > 0.02
 
 
 @pytest.mark.parametrize("passes", [1, 4])
 def test_denoising_moves_the_cloud_to_its_ridges_before_the_rings(passes):
     points = noisy_tube()
-    plain, calm = RingBuilder(denoise=0)(points), RingBuilder(denoise=passes)(points)
+    plain, calm = RAW(points), replace(BY_16, denoise=passes, outlier_factor=0)(points)
     spread, axes = principal(plain.cloud, nearest_neighbours(plain.cloud, 16)[1])
-    noise = scatter(spread, nearest_neighbours(plain.cloud, 16)[1])
+    noise = noise_share(spread, nearest_neighbours(plain.cloud, 16)[1])
     np.testing.assert_array_equal(calm.cloud, to_ridges(plain.cloud, noise, passes))
     assert calm.cloud is calm.positions is calm.previous
     np.testing.assert_array_equal(calm.row_of_point, plain.row_of_point)
     np.testing.assert_array_equal(calm.points, points)
-    # a ridge has no normals
-    np.testing.assert_array_equal(calm.normals, plain.normals)
-    np.testing.assert_array_equal(calm.normals, axes[:, :, 0])
+    # a ridge has no normals, and is not noisy any more
+    for state in (plain, calm):
+        np.testing.assert_array_equal(state.normals, axes[:, :, 0])
+        np.testing.assert_array_equal(state.noise, noise)
     # rings are those of the moved cloud
     np.testing.assert_array_equal(calm.ring_size, calm.rings.nearest(calm.cloud)[1])
     near = nearest_neighbours(calm.cloud, 16)[1]
@@ -259,6 +280,85 @@ def test_clean_clouds_are_not_denoised(points):
     plain, calm = RingBuilder(denoise=0)(points), RingBuilder(denoise=9)(points)
     np.testing.assert_array_equal(calm.cloud, plain.cloud)
     np.testing.assert_array_equal(calm.rings.indices, plain.rings.indices)
+
+
+# ---- points that stand alone after denoising
+
+
+def lonely(plain, passes):
+    """The denoised cloud and which of its points stand alone, by definition."""
+    near = nearest_neighbours(plain.cloud, 16)[1]
+    noise = noise_share(principal(plain.cloud, near)[0], near)
+    calm = to_ridges(plain.cloud, noise, passes)
+    return calm, (isolation(*nearest_neighbours(calm, 16)) > ALONE) & (noise > FAIRLY_NOISY), noise
+
+
+@pytest.mark.parametrize("passes", [1, 4])
+@pytest.mark.parametrize(("noise", "seed"), [(0.05, 2), (0.05, 3), (0.06, 2), (0.06, 4)])
+def test_denoised_points_that_stand_alone_are_set_aside(noise, seed, passes):
+    points = samples.tube(n=800, radius=0.1, noise=noise, seed=seed).points
+    plain, state = RAW(points), replace(BY_16, denoise=passes)(points)
+    calm, alone, share = lonely(plain, passes)
+    assert 0 < alone.sum() < 20
+    np.testing.assert_array_equal(state.cloud, calm[~alone])
+    np.testing.assert_array_equal(state.noise, share[~alone])
+    np.testing.assert_array_equal(state.normals, plain.normals[~alone])
+    # they are outliers, like those found before, and go with the nearest that is left
+    np.testing.assert_array_equal(state.outlier, plain.outlier | alone[plain.row_of_point])
+    expected = cKDTree(state.cloud).query(calm)[1]
+    np.testing.assert_array_equal(state.row_of_point, expected[plain.row_of_point])
+    assert state.report.n_outliers == state.outlier.sum() == plain.report.n_outliers + alone.sum()
+    assert state.report.n_distinct == len(state) == 800 - state.report.n_outliers
+    # nothing else of the state knows them
+    near = nearest_neighbours(state.cloud, 16)[1]
+    assert all(set(state.rings[i].tolist()) <= set(near[i].tolist()) for i in range(len(state)))
+    assert sorted(state.point_of_survivor.tolist()) == np.flatnonzero(~state.outlier).tolist()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_copies_share_the_fate_of_their_point_and_dropped_ones_have_none(seed):
+    points = samples.tube(n=800, radius=0.1, noise=0.06, seed=2).points
+    rng, filter = np.random.default_rng(seed), replace(BY_16, frame="box", drop_invalid=True)
+    order = rng.permutation(np.concatenate([np.repeat(np.arange(800), rng.integers(1, 4, 800)), np.full(30, 800)]))
+    once, state = filter(points), filter(np.concatenate([points, [[0, np.nan, 0]]])[order])
+    kept, source = order < 800, order[order < 800]
+    assert once.report.n_outliers > RAW(points).report.n_outliers > 0
+    np.testing.assert_array_equal(state.cloud, once.cloud)
+    np.testing.assert_array_equal(state.row_of_point[kept], once.row_of_point[source])
+    np.testing.assert_array_equal(state.outlier[kept], once.outlier[source])
+    assert (state.row_of_point[~kept] == -1).all()
+    assert not state.outlier[~kept].any()
+    report = state.report
+    assert (report.n_input, report.n_dropped, report.n_distinct) == (len(order), 30, once.report.n_distinct)
+    assert report.n_outliers == once.outlier[source].sum()
+
+
+def test_no_factor_no_lonely_points():
+    points = samples.tube(n=800, radius=0.1, noise=0.06, seed=2).points
+    state = replace(BY_16, outlier_factor=0)(points)
+    assert lonely(replace(RAW, outlier_factor=0)(points), 4)[1].any()
+    assert (state.report.n_outliers, len(state), state.outlier.any()) == (0, 800, False)
+
+
+@pytest.mark.parametrize(("left", "stays"), [(MIN_POINTS - 1, True), (MIN_POINTS, False)])
+def test_lonely_points_are_left_in_where_hardly_anything_would_be_left(monkeypatch, left, stays):
+    points = samples.tube(n=24, radius=0.1, noise=0.1).points
+    filter, noise = RingBuilder(k=8, outlier_factor=100.0), np.ones(24)
+    monkeypatch.setattr("glsk_o3d.ring_builder.noise_share", lambda spread, neighbours: noise)
+    monkeypatch.setattr("glsk_o3d.ring_builder.to_ridges", lambda cloud, noise, passes: cloud)
+    found = np.where(np.arange(24) < left, 1.0, 2 * ALONE)
+    monkeypatch.setattr("glsk_o3d.ring_builder.isolation", lambda distance, neighbours: found)
+    assert len(filter(points)) == (24 if stays else left)
+
+
+@pytest.mark.parametrize("frame", ["box", "spread"])
+def test_frame_is_that_of_the_distinct_points(frame):
+    """However often some of them came."""
+    filter = RingBuilder(frame=frame)
+    often = np.concatenate([TORUS, np.repeat(TORUS[:3], 500, axis=0)])
+    once, state = filter(TORUS).frame, filter(often).frame
+    assert state.scale == pytest.approx(once.scale, rel=1e-12)
+    assert state.diagonal == pytest.approx(once.diagonal, rel=1e-12)
 
 
 def test_more_neighbours_than_points_are_all_points():

@@ -1,6 +1,4 @@
-"""Open or close loops that are not there."""
-
-from dataclasses import replace
+"""Close loops that nothing passes through."""
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -8,12 +6,8 @@ from scipy.sparse.csgraph import connected_components
 
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..numerics.groups import group_median
-from ..numerics.neighbourhoods import nearest_neighbours
 from .merging import merge_vertices
 from .triangles import collapse_triangles
-
-NEAR = 8  # points, itself included, that are near to a point
-THREAD = 5  # pairs of near points, each seen from both sides; fewer are a thread
 
 
 def surface_distance(skeleton):
@@ -24,35 +18,18 @@ def surface_distance(skeleton):
     return group_median(distance, owner, len(skeleton.vertices))
 
 
-def links(skeleton):
-    """Pairs of near points whose vertices each edge joins, (E,) int array; a point's nearest 7 are near to it."""
-    owned = skeleton.witnesses
-    owner, m = skeleton.vertex_of_point[owned], len(skeleton.vertices)
-    if len(owned) == 0:
-        return np.zeros(len(skeleton.edges), int)
-    near = owner[nearest_neighbours(skeleton.points[owned], min(NEAR, len(owned)))[1].reshape(len(owned), -1)]
-    pairs = np.sort(np.column_stack([np.repeat(owner, near.shape[1]), near.ravel()]), axis=1)
-    keys, count = np.unique(pairs @ [m, 1], return_counts=True)
-    edges = skeleton.edges @ [m, 1]
-    at = np.minimum(np.searchsorted(keys, edges), len(keys) - 1)
-    return np.where(keys[at] == edges, count[at], 0)
-
-
-def close_loops(skeleton, opening, weak):
-    """Zip up the loops whose opening is not wider than the tube that makes them; cut those held by a thread.
+def close_loops(skeleton, opening):
+    """Zip up the loops whose opening is not wider than the tube that makes them.
 
     The opening of a loop is the radius of the largest circle inside it; the tube's is the median over the loop of the
-    distance from its vertices to the surface. A wide loop hangs by a thread where it has an edge that hardly any near
-    points cross: there two parts touch, or an outlier lies between them. All false loops of a minimum cycle basis are
-    treated at once, until there are none.
+    distance from its vertices to the surface. All false loops of a minimum cycle basis are zipped up at once, until
+    there are none.
 
     Parameters
     ----------
     skeleton : Skeleton
     opening : float
         Least opening of a true loop over the radius of its tube.
-    weak : float
-        Pairs of near points across an edge over the median of its loop, below which it is cut if they are few.
 
     Returns
     -------
@@ -60,37 +37,19 @@ def close_loops(skeleton, opening, weak):
         Without triangles.
     """
     while True:
-        cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-        if not cycles:
-            return skeleton
         thickness = surface_distance(skeleton)
-        narrow = [
-            inscribed_circle(skeleton.vertices[cycle])[1] < opening * np.median(thickness[cycle]) for cycle in cycles
+        cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+        false = [
+            cycle
+            for cycle in cycles
+            if inscribed_circle(skeleton.vertices[cycle])[1] < opening * np.median(thickness[cycle])
         ]
-        cut = _threads(skeleton, [c for c, shut in zip(cycles, narrow, strict=True) if not shut], weak) if weak else []
-        if len(cut):
-            skeleton = replace(skeleton, edges=np.delete(skeleton.edges, cut, axis=0))
-            continue
-        false = [cycle for cycle, shut in zip(cycles, narrow, strict=True) if shut]
         if not false:
             return skeleton
         pairs = np.concatenate([zip_pairs(skeleton.vertices[cycle], cycle) for cycle in false])
         n = len(skeleton.vertices)
         joined = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(n, n))
         skeleton = collapse_triangles(merge_vertices(skeleton, connected_components(joined, directed=False)[1]))
-
-
-def _threads(skeleton, cycles, weak):
-    """The weakest edge of each cycle that hangs by a thread."""
-    count, m = links(skeleton), len(skeleton.vertices)
-    keys = skeleton.edges @ [m, 1]
-    cut = []
-    for cycle in cycles:
-        steps = np.searchsorted(keys, np.sort(np.column_stack([cycle, np.roll(cycle, -1)]), axis=1) @ [m, 1])
-        weakest = steps[np.lexsort((steps, count[steps]))[0]]
-        if count[weakest] < min(weak * np.median(count[steps]), THREAD):
-            cut.append(weakest)
-    return np.unique(cut)
 
 
 def zip_pairs(points, labels):

@@ -9,6 +9,8 @@ from scipy.sparse.linalg import splu
 from ..numerics.groups import group_median, group_sum
 
 BENDING = 2.0  # weight of a vertex's distance from the chord of its neighbours, per point
+BLUR = 0.3  # how much more of that where there is doubt, over the squared ratio of noise to spacing
+WIDEST = 100.0  # that ratio at most: vertices in one place have none
 STAY = 0.1  # weight of staying where it was, per point
 OUTLYING = 0.5  # distance from the axis, in radii, at which a point's normal counts half
 CENTROID = 0.5  # weight of the points themselves where their normals say nothing
@@ -30,9 +32,11 @@ def fit_axis(skeleton, passes):
     with c the number of points at a vertex. w = 1 / (1 + (r / OUTLYING)^2), where r is the distance of the curve from
     that plane in local radii, is small for points of something else. The doubt d, from 0 to 1, is the share of the
     distance from the curve that the normals do not explain; where it is large, noise is as wide as the part and the
-    points say more than their normals. A half tube, scanned from one side, has an axis, but the centroid of its points
-    is off it. So the first pass takes the normals alone, w = 1 and d = 0: it finds the axis from wherever the
-    contraction left the curve.
+    points say more than their normals, and the curve may not bend within less than the points' spread s around it:
+    :math:`\lambda = 2 (1 + 0.3 (d s^2 / h^2)^2)` with the spacing h of the vertices, so that the length over which the
+    curve is smoothed grows with s and not with h. A half tube, scanned from one side, has an axis, but the centroid of
+    its points is off it. So the first pass takes the normals alone, w = 1 and d = 0: it finds the axis from wherever
+    the contraction left the curve.
 
     Parameters
     ----------
@@ -64,12 +68,11 @@ def fit_axis(skeleton, passes):
             radius = group_median(np.linalg.norm(near.offset, axis=1), near.edge, len(ends))[near.edge]
             weight = 1 / (1 + near.miss / np.maximum((OUTLYING * radius) ** 2, TINY))
             pull = CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1)
-        x = _solve(x, ends, near, p, weight, pull, inner, beside)
+        x = _solve(x, ends, near, p, weight, pull, inner, beside, BLUR if step else 0)
         far = np.linalg.norm(p, axis=1).max()
         size = np.linalg.norm(x, axis=1)
-        x = np.where(
-            (size > far)[:, None] & (skeleton.degree > 0)[:, None], x * (far / np.maximum(size, TINY))[:, None], x
-        )
+        run = np.where((size > far) & (skeleton.degree > 0), far / np.maximum(size, TINY), 1)
+        x = run[:, None] * x  # normals that mean nothing may meet anywhere
     near = _nearest(x, ends, around, p, n)
     return x + centre, (1 - near.doubt) * near.support / (near.support + SUPPORT)
 
@@ -126,6 +129,7 @@ class _Nearest(NamedTuple):
     offset: np.ndarray  # x(p) - p
     miss: np.ndarray  # (b (x(p) - p))^2
     doubt: np.ndarray  # d, of every vertex
+    apart: np.ndarray  # mean squared distance of the points around every vertex
     support: np.ndarray  # points at every vertex and its neighbours
 
 
@@ -144,10 +148,10 @@ def _nearest(x, ends, around, p, n):
     miss_at, apart_at, support = (at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))).T
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
     doubt = np.where(apart_at > 0, np.clip(2 * miss_at / np.maximum(apart_at, TINY), 0, 1), 1)
-    return _Nearest(edge, share, tangent, across, offset, miss, doubt, support)
+    return _Nearest(edge, share, tangent, across, offset, miss, doubt, apart_at / np.maximum(support, TINY), support)
 
 
-def _solve(x, ends, near, p, weight, pull, inner, beside):
+def _solve(x, ends, near, p, weight, pull, inner, beside, blur):
     """The minimum of the energy in `fit_axis`: one sparse, symmetric, positive definite system."""
     m, e = len(x), len(ends)
     tangent = near.tangent[near.edge]
@@ -171,7 +175,8 @@ def _solve(x, ends, near, p, weight, pull, inner, beside):
     reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
     stencil = np.column_stack([np.ones(len(inner)), -chord])
-    bend = BENDING * np.maximum(count[inner], 1)
+    width = np.minimum((near.doubt * near.apart)[inner] / np.maximum(reach.prod(axis=1), TINY), WIDEST)
+    bend = BENDING * (1 + blur * width**2) * np.maximum(count[inner], 1)
     corners = np.column_stack([inner, beside])
     for i in range(3):
         for j in range(3):

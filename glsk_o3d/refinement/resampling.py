@@ -3,11 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from .medial import incident_edges
 from .merging import support
 
 SUPPORT = 8  # an edge is cut into at most one piece for every so many input points, begun ones counted
+TINY = np.finfo(float).tiny
 
 
 def resample(skeleton, spacing):
@@ -43,18 +44,21 @@ def resample(skeleton, spacing):
     edges = np.sort(np.column_stack([start, stop]), axis=1)
     edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
 
-    parents = np.concatenate([np.column_stack([np.arange(m)] * 2), ends[edge]])
     owned = np.flatnonzero(skeleton.vertex_of_point >= 0)
-    owner = skeleton.vertex_of_point[owned]
-    near = (
-        cKDTree(vertices)
-        .query(skeleton.points[owned], min(16, len(vertices)))[1]
-        .reshape(len(owned), min(16, len(vertices)))
-    )
-    related = (parents[near] == owner[:, None, None]).any(axis=2)
-    choice = near[np.arange(len(owned)), np.argmax(related, axis=1)]
+    owner, points = skeleton.vertex_of_point[owned], skeleton.points[owned]
+    choice, best = owner.copy(), ((points - skeleton.vertices[owner]) ** 2).sum(axis=1)
+    for column in incident_edges(ends, m)[owner].T:
+        some = np.flatnonzero(column >= 0)
+        some = some[inner[column[some]] > 0]
+        e = column[some]
+        a, along = skeleton.vertices[ends[e, 0]], skeleton.vertices[ends[e, 1]] - skeleton.vertices[ends[e, 0]]
+        place = pieces[e] * np.einsum("ni,ni->n", points[some] - a, along) / np.maximum((along**2).sum(axis=1), TINY)
+        sample = first[e] + np.clip(np.rint(place), 1, inner[e]).astype(int) - 1
+        squared = ((points[some] - vertices[sample]) ** 2).sum(axis=1)
+        nearer = squared < best[some]
+        choice[some[nearer]], best[some[nearer]] = sample[nearer], squared[nearer]
     vertex_of_point = skeleton.vertex_of_point.copy()
-    vertex_of_point[owned] = np.where(related.any(axis=1), choice, owner)
+    vertex_of_point[owned] = choice
     radii = np.concatenate(
         [skeleton.radii, ((1 - t[:, 0]) * skeleton.radii[ends[edge, 0]] + t[:, 0] * skeleton.radii[ends[edge, 1]])]
     )

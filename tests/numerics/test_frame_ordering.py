@@ -50,6 +50,56 @@ def test_frame_does_not_overflow_half_way():
     np.testing.assert_allclose(np.abs(frame.into(points)[:, 0]), SIDE / 2)
 
 
+# ---- the box with the spread of the points
+
+
+def lattice(sides, n):
+    """Middles of n^3 equal cells of a box."""
+    share = (np.arange(n) + 0.5) / n - 0.5
+    return np.stack(np.meshgrid(share, share, share), axis=-1).reshape(-1, 3) * sides
+
+
+def size(frame):
+    """Longest side and diagonal in the user's units."""
+    return np.array([SIDE, frame.diagonal]) * frame.scale
+
+
+@pytest.mark.parametrize("n", [2, 5, 16])
+@pytest.mark.parametrize("sides", [(1, 1, 1), (1, 3, 2), (7, 0.5, 0), (0, 0, 2)])
+def test_spread_of_an_evenly_filled_box_is_that_box(n, sides):
+    """n points to a side have 1 - 1 / n^2 of its variance."""
+    points = lattice(sides, n)
+    expected = np.array([max(sides), np.linalg.norm(sides)])
+    np.testing.assert_allclose(size(Frame.of(points, "spread")), expected * np.sqrt(1 - 1 / n**2), rtol=1e-12)
+    # the bounding box of the middles lacks half a cell on every side
+    np.testing.assert_allclose(size(Frame.of(points)), expected * (1 - 1 / n), rtol=1e-12)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1, 1e12])
+@pytest.mark.parametrize("shift", [0, -7, 1e4])
+@pytest.mark.parametrize("seed", range(3))
+def test_spread_goes_with_the_cloud(seed, shift, scale):
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    moved = (rng.permutation(CLOUD) @ turn + shift) * scale
+    frame, expected = Frame.of(moved, "spread"), Frame.of(CLOUD, "spread")
+    np.testing.assert_allclose(size(frame), size(expected) * scale, rtol=1e-12)
+    assert frame.diagonal == pytest.approx(expected.diagonal, rel=1e-12)
+    # unlike those of the bounding box
+    assert np.abs(size(Frame.of(moved)) / size(Frame.of(CLOUD)) / scale - 1).max() > 0.01
+
+
+@pytest.mark.parametrize("offset", [0, 1e6])
+def test_spread_leaves_the_centre_of_the_bounding_box(offset):
+    points = CLOUD + offset
+    frame, box = Frame.of(points, "spread"), Frame.of(points, "box")
+    np.testing.assert_array_equal(frame.centre, box.centre)
+    np.testing.assert_allclose(frame.half_extent * frame.scale, box.half_extent * box.scale, rtol=1e-14)
+    inside = frame.into(points)
+    np.testing.assert_allclose(inside.max(axis=0), frame.half_extent, rtol=1e-8)
+    np.testing.assert_allclose(frame.out_of(inside), points, rtol=0, atol=4e-15 * max(1, offset))
+
+
 # ---- Morton order
 
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
+from glsk_o3d.refinement import medial
 from glsk_o3d.refinement.medial import STAY, SUPPORT, fit_axis, incident_edges, nearest_on_edges
 
 R = 0.15  # of the tubes
@@ -150,6 +151,74 @@ def test_vertices_hardly_slide_along_a_bend():
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     moved = fit_axis(raw, 20)[0] - raw.vertices
     assert np.abs(np.einsum("ij,ij->i", moved, along)).max() < 0.2 * R
+
+
+# ---- noise as wide as the tube
+
+
+def noisy(noise, seed=0, m=60, known=False):
+    """A tube along x whose points are `noise` radii off; normals in random directions unless they are known."""
+    rng = np.random.default_rng(seed)
+    x, angle = rng.uniform(-1, 1, 3000), rng.uniform(0, 2 * np.pi, 3000)
+    normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
+    points = R * (normals + noise * rng.normal(size=(3000, 3))) + x[:, None] * [1, 0, 0]
+    if not known:
+        normals = rng.normal(size=(3000, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    off = 0.1 * R * rng.normal(size=(m, 2))
+    return path(np.column_stack([np.linspace(-0.95, 0.95, m), off]), points, normals)
+
+
+def with_and_without(raw, monkeypatch, passes=3):
+    found = []
+    for blur in (medial.BLUR, 0):
+        monkeypatch.setattr(medial, "BLUR", blur)
+        found.append(fit_axis(raw, passes)[0])
+    return found
+
+
+def bends(vertices):
+    return np.linalg.norm(np.diff(vertices, 2, axis=0), axis=1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("m", [40, 60])
+@pytest.mark.parametrize(("noise", "known"), [(0.3, False), (1.0, False), (1.0, True)])
+def test_where_noise_is_the_curve_is_smoother_and_nearer_the_axis(monkeypatch, noise, known, m, seed):
+    blurred, sharp = with_and_without(noisy(noise, seed, m, known), monkeypatch)
+    assert off_axis(blurred).mean() < off_axis(sharp).mean() / 2
+    assert bends(blurred).mean() < bends(sharp).mean() / 2
+    # across the axis, not along it
+    assert np.ptp(blurred[:, 0]) > 0.95 * np.ptp(sharp[:, 0])
+
+
+@pytest.mark.parametrize("noise", [0.3, 1.0])
+def test_the_finer_the_curve_the_more_is_smoothed(noise):
+    """Over a length that grows with the noise, and not with the spacing: a curve of more vertices is as good."""
+    away = [off_axis(fit_axis(noisy(noise, m=m), 3)[0]).mean() for m in (30, 60, 120)]
+    assert max(away) < 2 * min(away)
+    assert max(away) < 0.15 * R
+
+
+@pytest.mark.parametrize("shape", [torus, bent, lambda: tube((0.02, 0.03), m=39)], ids=["torus", "bent", "tube"])
+def test_without_noise_bends_stay(monkeypatch, shape):
+    blurred, sharp = with_and_without(shape(), monkeypatch, 6)
+    np.testing.assert_allclose(blurred, sharp, atol=0.03 * R)
+
+
+def test_the_first_pass_bends_as_it_likes(monkeypatch):
+    """It does not know yet where the axis is."""
+    np.testing.assert_array_equal(*with_and_without(noisy(1.0), monkeypatch, 1))
+
+
+def test_vertices_in_one_place_are_no_noise_without_end():
+    """Nor is there a warning."""
+    raw = noisy(1.0, m=10)
+    vertices = raw.vertices.copy()
+    vertices[4] = vertices[5]
+    moved = fit_axis(replace(raw, vertices=vertices), 3)[0]
+    assert np.isfinite(moved).all()
+    assert off_axis(moved).max() < R
 
 
 # ---- confidence

@@ -1,0 +1,117 @@
+"""Cut loops that hang by a thread, and loops that are hardly supported."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
+from ..numerics.neighbourhoods import nearest_neighbours
+from .loops import surface_distance
+
+NEAR = 8  # points, itself included, that are near to a point
+
+
+def bonds(skeleton):
+    """How far the surface goes on from vertex to vertex.
+
+    Every two near points of different vertices count by how far their normals agree and stand upright on the line
+    between them, cos^2 times sin^2 times sin^2: not where surfaces of two parts face each other.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    pairs : (B, 2) int array
+        Vertices, i < j.
+    weight : (B,) float array
+    """
+    owned = skeleton.witnesses
+    owned = owned[np.unique(skeleton.points[owned], axis=0, return_index=True)[1]]  # copies are near to nothing else
+    if len(owned) < 2:
+        return np.empty((0, 2), int), np.empty(0)
+    points, normals, owner = skeleton.points[owned], skeleton.normals[owned], skeleton.vertex_of_point[owned]
+    near = nearest_neighbours(points, min(NEAR, len(owned)))[1][:, 1:]
+    p, q = np.repeat(np.arange(len(owned)), near.shape[1]), near.ravel()
+    foreign = owner[p] != owner[q]
+    p, q = p[foreign], q[foreign]
+    line = points[q] - points[p]
+    line /= np.maximum(np.linalg.norm(line, axis=1, keepdims=True), np.finfo(float).tiny)
+    agree = np.einsum("ni,ni->n", normals[p], normals[q]) ** 2
+    upright = [np.maximum(1 - np.einsum("ni,ni->n", normals[end], line) ** 2, 0) for end in (p, q)]
+    m = len(skeleton.vertices)
+    keys, which = np.unique(np.sort(np.column_stack([owner[p], owner[q]]), axis=1) @ [m, 1], return_inverse=True)
+    return np.column_stack(np.divmod(keys, m)), np.bincount(which, agree * upright[0] * upright[1], len(keys))
+
+
+def crossings(cycle, m, pairs, weight):
+    """Bonds across every edge of a cycle, from its vertices on the one side to those on the other, the shorter way.
+
+    Parameters
+    ----------
+    cycle : (n,) int array
+    m : int
+        Vertices of the graph.
+    pairs, weight
+        From `bonds`.
+
+    Returns
+    -------
+    (n,) float array
+        For the edge from each vertex of the cycle to the next.
+    """
+    n = len(cycle)
+    place = np.full(m, -1)
+    place[cycle] = np.arange(n)
+    first, last = np.sort(place[pairs], axis=1).T
+    inside = first >= 0
+    first, last, weight = first[inside], last[inside], weight[inside]
+    around = last - first > n / 2
+    start, stop = np.where(around, last, first), np.where(around, first, last)
+    steps = np.bincount(start, weight, n) - np.bincount(stop, weight, n)
+    return np.maximum(np.cumsum(steps) + weight[around].sum(), 0)  # rounding leaves less than nothing
+
+
+def cut_threads(skeleton, weak, sure):
+    """Cut the loops that hang by a thread or are hardly supported, each where the fewest bonds cross.
+
+    A loop hangs by a thread where hardly any bond crosses it: two parts touch there, or a stray point lies between
+    them. It is hardly supported if its opening over the thickness of its tube is small for the confidence in it: noise
+    and sparse points leave narrow loops, not wide ones. All such loops of a minimum cycle basis are cut, until there
+    are none; a component is never torn.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        With its confidence.
+    weak : float
+        Least bonds across an edge over the median along its loop.
+    sure : float
+        Least opening over thickness, times the mean confidence.
+
+    Returns
+    -------
+    Skeleton
+    """
+    m = len(skeleton.vertices)
+    cycles = minimum_cycle_basis(m, skeleton.edges, skeleton.edge_lengths)
+    if not cycles:
+        return skeleton
+    pairs, weight = bonds(skeleton)
+    thickness = surface_distance(skeleton)
+    while True:
+        keys = skeleton.edges @ [m, 1]
+        cut, used = [], np.zeros(len(keys), bool)
+        for cycle in cycles:
+            across = crossings(cycle, m, pairs, weight)
+            opening, tube = inscribed_circle(skeleton.vertices[cycle])[1], np.median(thickness[cycle])
+            if across.min() < weak * np.median(across) or opening * skeleton.confidence[cycle].mean() < sure * tube:
+                edges = np.searchsorted(keys, np.sort(np.column_stack([cycle, np.roll(cycle, -1)]), axis=1) @ [m, 1])
+                if not used[edges].any():  # two cuts in what two loops share would tear a piece out of it
+                    cut.append(edges[np.lexsort((edges, across))[0]])
+                used[edges] = True
+        if not cut:
+            return skeleton
+        skeleton = replace(skeleton, edges=np.delete(skeleton.edges, cut, axis=0))
+        cycles = minimum_cycle_basis(m, skeleton.edges, skeleton.edge_lengths)
