@@ -55,7 +55,7 @@ IDEAS = {
     "cheapest merges first": "LPRReducer.order=index",
     "mended rings": "LPRReducer.mend_rings=false",
     "stop by score": "Contractor.stop=RingSizeRatio",
-    "an earlier stop": "ExplainedScore.threshold=0.02",
+    "stop at 3 %": "ExplainedScore.threshold=0.02",
     "last solve kept": "Contractor.keep_last=false",
     "floor of attraction": "Contractor.min_attraction=0",
     "hold on lines": "Contractor.line_hold=1",
@@ -69,7 +69,6 @@ IDEAS = {
     "twigs cut": "Refiner.twig=0",
     "edges subdivided": "Refiner.spacing=0",
     "fit to the axis": "Refiner.recentre=0",
-    "gaps bridged": "Refiner.bridge=0",
 }
 """What `default` adds to the publications, and the settings that switch it off. All of them together (but for the
 reduction and the stop rule, which are published) are `wen2024`."""
@@ -373,7 +372,7 @@ def looped(path: Path, pipeline: Pipeline) -> dict:
 def loops(
     folder: Folder = None,
     pipeline: Pipelines = "default",
-    largest: Annotated[int, typer.Option(help="Clouds with more points are left out.")] = 150_000,
+    largest: Annotated[int, typer.Option(help="Clouds with more points are left out.")] = 400_000,
     jobs: Jobs = 2,
     output: Output = None,
     markdown: Markdown = False,

@@ -17,6 +17,10 @@ from .numerics.sampling import farthest_point_sampling
 from .skeleton import Skeleton, plane_distance_radii
 
 NOISY = 0.3  # share of noise from which on a vertex may be stray
+FACING, CALM = (
+    0.1,
+    0.2,
+)  # sin^2 times sin^2 of a line with two normals that face each other, and noise where that counts
 
 
 @documented
@@ -59,7 +63,8 @@ class Connector(Filter):
     )
     links: str = parameter(
         "all",
-        "Join a point's vertex with those of all its foreign ring neighbours, or of the nearest one only.",
+        "Join a point's vertex with those of all its foreign ring neighbours (but where two surfaces face each other), "
+        "or of the nearest one only.",
         type="choice",
         choices=("all", "nearest"),
     )
@@ -102,10 +107,31 @@ class Connector(Filter):
         rings = state.rings
         a, b = owner[rings.owners], owner[rings.indices]
         link = a != b
+        if self.links == "all":
+            link &= ~across_gaps(state)
         if self.links == "nearest":
             length = np.where(link, rings.edge_lengths(state.positions), np.inf)
             link &= length == np.repeat(np.minimum.reduceat(length, rings.indptr[:-1]), rings.sizes)
         return np.unique(np.sort(np.column_stack([a[link], b[link]]), axis=1), axis=0)
+
+
+def across_gaps(state):
+    """Ring links between surfaces that face each other: between them is air, or the inside of a part.
+
+    Parameters
+    ----------
+    state : Contraction
+
+    Returns
+    -------
+    (r,) bool array
+        For every entry of the rings; only where there is no noise, since it spoils the normals.
+    """
+    p, q = state.survivors[state.rings.owners], state.survivors[state.rings.indices]
+    line = state.cloud[q] - state.cloud[p]
+    line /= np.maximum(np.linalg.norm(line, axis=1, keepdims=True), np.finfo(float).tiny)
+    upright = [1 - np.einsum("ni,ni->n", state.normals[end], line) ** 2 for end in (p, q)]
+    return (np.maximum(state.noise[p], state.noise[q]) < CALM) & (upright[0] * upright[1] < FACING)
 
 
 def drop_stray(skeleton, count, noisy, share):

@@ -91,7 +91,7 @@ class Refiner(Filter):
         low=0,
     )
     bridge: float = parameter(
-        8.0,
+        0.0,
         "Longest gap between two parts that continue each other, over their radius; wider gaps stay. 0 bridges none.",
         type="float",
         low=0,

@@ -20,6 +20,7 @@ from .report import Report
 from .state import Contraction
 
 MIN_POINTS = 8
+ROUNDS = 4  # of setting outliers aside
 SMALLEST, LARGEST = 1e-120, 1e120  # extents whose squares and products a float64 holds
 ALONE, FAIRLY_NOISY = 1.8, 0.2  # isolation of a denoised point that is set aside, and its least noise
 COINCIDENT = 4e-15  # points nearer than this in the working frame, a few roundings, are duplicates
@@ -73,7 +74,7 @@ class RingBuilder(Filter):
     outlier_factor: float = parameter(
         2.5,
         "A point this many times farther from its neighbours than these are from theirs is set aside: it goes to the "
-        "nearest vertex but has no say. 0 keeps all.",
+        "nearest vertex but has no say; so does one that denoising leaves alone. 0 keeps all.",
         type="float",
         low=0,
     )
@@ -102,7 +103,9 @@ class RingBuilder(Filter):
         good = points[finite]
         frame, distinct, row, distance, neighbours = self._distinct(good)
         stray = np.zeros(len(good), bool)
-        while self.outlier_factor:  # what is left of a group of outliers stands out when the rest of it is gone
+        for _ in range(
+            ROUNDS if self.outlier_factor else 0
+        ):  # what is left of a group stands out once the rest is gone
             found = np.zeros(len(good), bool)
             found[~stray] = isolation(distance, neighbours)[row[~stray]] > self.outlier_factor
             if not found.any() or len(np.unique(row[~stray & ~found])) < MIN_POINTS:

@@ -236,6 +236,30 @@ def test_cao2010_on_shapes_with_a_known_axis(shape, loops):
     assert found.inside == found.completeness == 1
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("gap", [1, 2])
+def test_thin_parts_side_by_side_stay_apart(gap, seed):
+    rng, radius = np.random.default_rng(seed), 0.03
+    along, angle = rng.random((2, 4096)), rng.random((2, 4096)) * 2 * np.pi
+    middle = np.array([[0], [2 + gap]]) * radius
+    tubes = np.stack([along, middle + radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+    skeleton = skeletonize(tubes.reshape(-1, 3))
+    assert (skeleton.n_components, skeleton.n_loops) == (2, 0)
+    owner = skeleton.vertex_of_point.reshape(2, -1)
+    assert not set(owner[0]) & set(owner[1])
+
+
+def test_parts_in_line_are_bridged_only_when_asked():
+    rod = samples.tube(2048).points
+    parts = np.concatenate([rod, rod + [1.5, 0, 0]])  # round ends 0.3 apart, 3 radii
+    assert skeletonize(parts).n_components == 2
+    asked = skeletonize(
+        parts,
+        glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector() | glsk.Refiner(bridge=8),
+    )
+    assert (asked.n_components, asked.report.n_bridges) == (1, 1)
+
+
 # ---- equivariance, end to end
 
 TURNS = {"a quarter about the diagonal": np.eye(3)[[1, 2, 0]], "half about x": np.diag([1.0, -1, -1])}

@@ -114,7 +114,8 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     row, part = _pieces(truth.nodes, truth.edges, step)
     axis, axis_radius = (_along(truth.edges, row, part, values) for values in (truth.nodes, truth.radii))
     row, part = _pieces(vertices, edges, step)
-    curve, curve_radius = (_along(edges, row, part, values) for values in (vertices, skeleton.radii))
+    radii = skeleton.radii if len(skeleton.radii) == len(vertices) else np.full(len(vertices), np.nan)
+    curve, curve_radius = (_along(edges, row, part, values) for values in (vertices, radii))
     to_axis, nearest = cKDTree(axis).query(curve)
     to_curve, _ = cKDTree(curve).query(axis)
     radius = axis_radius[nearest]

@@ -76,8 +76,9 @@ def evaluate(
                 points = cloud_points(read_cloud(cloud))
             update("measuring")
             try:
-                assessment = assess(curve, points)
                 comparison = compare(curve, axis) if axis is not None else None
+                # a ball's skeleton is a vertex: it can be compared, but lies along nothing
+                assessment = assess(curve, points) if comparison is None or curve.edge_lengths.any() else None
             except InvalidParameterError as error:  # the file's fault, not that of the command line
                 raise FileFormatError(f"{skeleton}: {error}") from error
             except InvalidCloudError as error:
@@ -86,7 +87,7 @@ def evaluate(
                 "skeleton": str(skeleton),
                 "cloud": str(cloud),
                 "truth": None if truth is None else str(truth),
-                "assessment": assessment.as_dict(),
+                "assessment": None if assessment is None else assessment.as_dict(),
                 "comparison": None if comparison is None else comparison.as_dict(),
             }
             if output is not None:
@@ -94,11 +95,10 @@ def evaluate(
                 write_atomically(output, lambda temporary: temporary.write_text(text, encoding="utf-8"))
             if preview is not None:
                 update(f"drawing {preview.name}")
-                values, label, best = (
-                    (assessment.edge_centredness, "centredness", 1)
-                    if comparison is None
-                    else (comparison.edge_error, "error in true radii", 0)
-                )
+                if comparison is not None:
+                    values, label, best = comparison.edge_error, "error in true radii", 0
+                elif assessment is not None:
+                    values, label, best = assessment.edge_centredness, "centredness", 1
                 save_picture(curve, points, values, preview, label=label, best=best, title=skeleton.name)
         if as_json:
             print_json({**told, "files": [str(path) for path in files]})
@@ -122,7 +122,7 @@ def _check_outputs(report: Path | None, preview: Path | None, inputs: list[Path]
         check_writable(path)
 
 
-def _print_measures(assessment: Assessment, comparison: Comparison | None) -> None:
+def _print_measures(assessment: Assessment | None, comparison: Comparison | None) -> None:
     """One table: the measures that need only the cloud, and then those against the truth."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -132,14 +132,14 @@ def _print_measures(assessment: Assessment, comparison: Comparison | None) -> No
     table.add_column("value", justify="right", no_wrap=True)
     table.add_column("best", justify="right")
     table.add_column("what it is")
-    _add_numbers(table, assessment)
-    table.add_row(
-        "parts", f"{assessment.components}", f"{assessment.clusters}", "components; the cloud has as many as best"
-    )
-    table.add_row("loops", f"{len(assessment.loops)}", "", f"{assessment.wide_loops} open wider than their tube")
-    for i, loop in enumerate(assessment.loops, 1):
-        ratio = f"{loop.opening / loop.thickness:.2f}" if loop.thickness > 0 else "inf"
-        table.add_row(f"  loop {i}", ratio, "> 1", f"opening {loop.opening:.4g}, thickness {loop.thickness:.4g}")
+    if assessment is not None:
+        _add_numbers(table, assessment)
+        parts = f"{assessment.components}", f"{assessment.clusters}"
+        table.add_row("parts", *parts, "components; the cloud has as many as best")
+        table.add_row("loops", f"{len(assessment.loops)}", "", f"{assessment.wide_loops} open wider than their tube")
+        for i, loop in enumerate(assessment.loops, 1):
+            ratio = f"{loop.opening / loop.thickness:.2f}" if loop.thickness > 0 else "inf"
+            table.add_row(f"  loop {i}", ratio, "> 1", f"opening {loop.opening:.4g}, thickness {loop.thickness:.4g}")
     if comparison is not None:
         table.add_section()
         _add_numbers(table, comparison)

@@ -21,7 +21,7 @@ def cut_twigs(skeleton, reach):
     skeleton : Skeleton
     reach : float
         Least distance of a branch's points from its junction (all but a tenth), over the distance from the junction to
-        the surface. Least first, until there is none.
+        the surface. Of every junction the least first, until there is none.
 
     Returns
     -------
@@ -34,7 +34,7 @@ def cut_twigs(skeleton, reach):
         owned = owned[np.argsort(skeleton.vertex_of_point[owned], kind="stable")]
         stop = np.cumsum(np.bincount(skeleton.vertex_of_point[owned], minlength=len(degree)))
         start = np.concatenate([[0], stop[:-1]])
-        worst, least = None, reach
+        worst = {}
         for branch in skeleton.branches:
             a, b = branch[0], branch[-1]
             if sorted((degree[a] == 1, degree[b] == 1)) != [False, True]:
@@ -43,16 +43,15 @@ def cut_twigs(skeleton, reach):
             points = skeleton.points[np.concatenate([owned[start[v] : stop[v]] for v in twig])]
             distance = np.linalg.norm(points - skeleton.vertices[junction], axis=1)
             far = np.quantile(distance, FAR) if len(distance) else 0.0
-            if far < least * thickness[junction]:
-                worst, least = (junction, twig), far / thickness[junction]
-        if worst is None:
+            if far < worst.get(junction, (reach * thickness[junction],))[0]:
+                worst[junction] = (far, twig)
+        if not worst:
             return skeleton
-        junction, twig = worst
-        place = skeleton.vertices[junction]
-        group = np.arange(len(skeleton.vertices))
-        group[twig] = junction
+        group, m = np.arange(len(skeleton.vertices)), len(skeleton.vertices)
+        for junction, (_, twig) in worst.items():
+            group[twig] = junction
+        stay = np.flatnonzero(group == np.arange(m))
+        places = skeleton.vertices[stay]
         skeleton = merge_vertices(skeleton, group)
-        # the junction stays where it was
-        vertices = skeleton.vertices.copy()
-        vertices[junction - (twig < junction).sum()] = place
-        skeleton = replace(skeleton, vertices=vertices)
+        # a junction stays where it was
+        skeleton = replace(skeleton, vertices=places)

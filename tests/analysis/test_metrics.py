@@ -371,3 +371,9 @@ def test_the_example_in_the_documentation(root, capsys):
     promised = re.findall(r"# prints (.*)", code)
     assert capsys.readouterr().out.splitlines() == promised
     assert promised
+
+
+def test_without_radii_there_is_no_radius_error(ring):
+    axis = Skeleton(ring.nodes, ring.edges, (), (), (), ())
+    found = compare(axis, ring)
+    assert (found.error, found.radius_error) == (pytest.approx(0, abs=1e-12), None)

@@ -78,6 +78,17 @@ def test_with_a_truth(invoke, scans, folder, tmp_path, ring, moved):
     assert "ends" not in [line.split()[0] for line in table.splitlines() if line.strip()]  # a ring has none
 
 
+def test_a_vertex_against_a_vertex(invoke, scans, folder, tmp_path):
+    np.savez(tmp_path / "ball.npz", nodes=np.ones((1, 3)), edges=np.empty((0, 2), int), radii=[2.0])
+    words = ("evaluate", folder / "dot.ply", scans / "ring.ply", "--truth", tmp_path / "ball.npz")
+    result = invoke(*words, "--json")
+    assert result.exit_code == 0
+    told = json.loads(result.stdout)
+    assert told["assessment"] is None
+    assert told["comparison"]["components"] == 0
+    assert "centredness" not in invoke(*words).stdout
+
+
 def test_quiet(invoke, scans, folder, tmp_path):
     result = invoke("evaluate", folder / "s.json", scans / "ring.ply", "-o", "r.json", "--quiet")
     assert (result.exit_code, result.output) == (0, "")
