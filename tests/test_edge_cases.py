@@ -226,6 +226,24 @@ def test_warns_where_no_curve_skeleton_is_meaningful(case, name):
     assert run(SOUND[case], name).report.warnings
 
 
+def bulk(kind, seed, n=2048):
+    rng = np.random.default_rng(seed)
+    out = rng.normal(size=(n, 3))
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    if kind == "noisy sphere":
+        return out + 0.07 * rng.normal(size=(n, 3))
+    if kind == "solid ball":
+        return out * rng.random((n, 1)) ** (1 / 3)
+    return out / np.abs(out).max(axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", ["noisy sphere", "solid ball", "surface of a cube"])
+def test_warns_of_what_is_as_thick_as_long(kind, seed):
+    warnings = run(bulk(kind, seed), "default").report.warnings
+    assert [text.partition(":")[0] for text in warnings] == ["sphere-like"]
+
+
 @pytest.mark.parametrize("name", ["wen2024", "cao2010"])
 def test_duplicates_change_nothing_but_the_owners(name):
     single, doubled = run(TORUS, name), run(SOUND["every point twice"], name)

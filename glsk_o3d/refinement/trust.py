@@ -4,11 +4,12 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..numerics.groups import group_sum
+from ..numerics.groups import group_median, group_sum
 
 SHEET = 0.9  # share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
 BALL = 0.5  # spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
 
+STUB = 3.3  # length of the evenly filled box with a part's spread over the median thickness; balls have 2 to 3
 WEAK = 0.1  # confidence below which a vertex is not to be trusted
 MUCH = 0.25  # share of the points around such vertices that is worth a warning
 
@@ -17,8 +18,8 @@ def trust_warnings(skeleton):
     """Reasons not to trust a skeleton: the cloud is sheet-like, sphere-like, or does not say where much of the axis is.
 
     Sheet-like: the normals around a vertex have one direction. Sphere-like: the normal lines of a whole component meet
-    in one point. Both are scale-free and ask the cloud, not the skeleton. Of a cloud that is neither, the parts with
-    little confidence are named. No edges at all are a reason, too.
+    in one point, or it is hardly longer than thick. All are scale-free and ask the cloud, not the skeleton. Of a cloud
+    that is neither, the parts with little confidence are named. No edges at all are a reason, too.
 
     Parameters
     ----------
@@ -60,6 +61,16 @@ def trust_warnings(skeleton):
     if share > 0.5:
         return [
             f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
+            "so that no curve skeleton is meaningful there"
+        ]
+    spread = group_sum(points[:, :, None] * points[:, None], component, n) / np.maximum(size, 1)[:, :, None]
+    mean = group_sum(points, component, n) / np.maximum(size, 1)
+    length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread - mean[:, :, None] * mean[:, None])[:, 2], 0))
+    reach = np.linalg.norm(skeleton.points[owned] - skeleton.vertices[owner], axis=1)
+    share = size[length < STUB * group_median(reach, component, n)].sum() / len(owner)
+    if share > 0.5:
+        return [
+            f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
             "so that no curve skeleton is meaningful there"
         ]
     if len(skeleton.edges) == 0:
