@@ -156,6 +156,9 @@ def combine_rings(state, keepers, swallowed):
     """
     union = np.concatenate([state.rings.padded(keepers), state.rings.padded(swallowed)], axis=1)
     union[(union == keepers[:, None]) | (union == swallowed[:, None])] = -1
+    union.sort(axis=1)
+    union[:, 1:][union[:, 1:] == union[:, :-1]] = -1  # the two share neighbours
+    union = -np.sort(-union, axis=1)[:, : (union >= 0).sum(axis=1).max(initial=0)]
     normals = state.normals[state.survivors[keepers]]
     delta = state.laplacian_coordinates[keepers]
     length = np.linalg.norm(delta, axis=1, keepdims=True)
