@@ -36,7 +36,7 @@ def wen2024() -> Pipeline:
         RingBuilder(k="published", outlier_factor=0, denoise=0, frame="box")
         | Contractor(
             reducer=LPRReducer(conserve_mass=False, order="index", mend_rings=False),
-            stop=ExplainedScore(),
+            stop=ExplainedScore(threshold=0.02),
             min_attraction=0,
             line_hold=1,
             keep_last=False,
@@ -49,9 +49,7 @@ def wen2024() -> Pipeline:
 
 def default() -> Pipeline:
     """What we recommend: GLSkeleton with the mass of merged points kept and the vertices centred in the surface."""
-    return (
-        RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore(threshold=0.03)) | Connector() | Refiner()
-    )
+    return RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore()) | Connector() | Refiner()
 
 
 PIPELINES = {"default": default, "wen2024": wen2024, "cao2010": cao2010}

@@ -26,7 +26,7 @@ class ExplainedScore(Parameters):
     """
 
     threshold: float = parameter(
-        0.02, "De below which the contraction is finished.", type="float", low=0, open_low=True
+        0.03, "De below which the contraction is finished.", type="float", low=0, open_low=True
     )
     min_iterations: int = parameter(4, "Solves before the rule may stop.", type="int", unit="solves", low=1)
 

@@ -21,7 +21,7 @@ def records(**columns):
     [
         (ExplainedScore(), [0.5, 0.001, 0.5, 0.5, 0.03, 0.019, 0.001], 6),
         (ExplainedScore(), [0.0, 0.0, 0.0, 0.0], 4),
-        (ExplainedScore(), [0.5, 0.5, 0.5, 0.02], None),
+        (ExplainedScore(), [0.5, 0.5, 0.5, 0.03], None),
         (ExplainedScore(0.1), [0.5, 0.09, 0.5, 0.2, 0.09], 5),
         (ExplainedScore(min_iterations=1), [0.019], 1),
         (ExplainedScore(min_iterations=2), [0.5, 0.019], 2),
@@ -57,7 +57,7 @@ def test_ring_size_ratio(rule, ratios, stops_after):
 
 
 def test_reasons_give_the_figures():
-    assert "De = 0.0123 < 0.02" in ExplainedScore()(records(explained_change=[1, 1, 1, 0.0123]))
+    assert "De = 0.0123 < 0.03" in ExplainedScore()(records(explained_change=[1, 1, 1, 0.0123]))
     assert "0.0042 < 0.01" in RingSizeRatio()(records(ring_ratio=[0.5, 0.4958]))
 
 
