@@ -6,21 +6,18 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .filter import Filter, documented, parameter, resolve_length
+from .numerics.components import component_labels
 from .numerics.groups import group_median, group_sum
-from .numerics.neighbourhoods import nearest_neighbours
+from .numerics.neighbourhoods import nearest_neighbours, uprightness
 from .numerics.sampling import farthest_point_sampling
 from .skeleton import Skeleton, plane_distance_radii
 
 NOISY = 0.3  # share of noise from which on a vertex may be stray
-FACING, CALM = (
-    0.1,
-    0.2,
-)  # sin^2 times sin^2 of a line with two normals that face each other, and noise where that counts
+FACING = 0.1  # uprightness of two normals below which their surfaces face each other
+CALM = 0.2  # share of noise below which that counts
 
 
 @documented
@@ -128,10 +125,8 @@ def across_gaps(state):
         For every entry of the rings; only where there is no noise, since it spoils the normals.
     """
     p, q = state.survivors[state.rings.owners], state.survivors[state.rings.indices]
-    line = state.cloud[q] - state.cloud[p]
-    line /= np.maximum(np.linalg.norm(line, axis=1, keepdims=True), np.finfo(float).tiny)
-    upright = [1 - np.einsum("ni,ni->n", state.normals[end], line) ** 2 for end in (p, q)]
-    return (np.maximum(state.noise[p], state.noise[q]) < CALM) & (upright[0] * upright[1] < FACING)
+    facing = uprightness(state.cloud, state.normals, p, q) < FACING
+    return facing & (np.maximum(state.noise[p], state.noise[q]) < CALM)
 
 
 def drop_stray(skeleton, count, noisy, share):
@@ -163,7 +158,7 @@ def drop_stray(skeleton, count, noisy, share):
     stray = noisy & (count < share * most)
     if not stray.any():
         return skeleton
-    parts, groups = (_components(m, edges[kept[edges].all(axis=1)]) for kept in (~stray, stray))
+    parts, groups = (component_labels(m, edges[kept[edges].all(axis=1)]) for kept in (~stray, stray))
     border = stray[ends] & ~stray[others]
     held = np.unique(np.column_stack([groups[ends[border]], parts[others[border]]]), axis=0)[:, 0]
     dropped = stray & (np.bincount(held, minlength=m)[groups] == 1)
@@ -180,10 +175,6 @@ def drop_stray(skeleton, count, noisy, share):
         vertex_of_point=np.where(owner >= 0, nearest[owner], -1),
         normals=np.where(((owner >= 0) & dropped[owner])[:, None], np.nan, skeleton.normals),
     )
-
-
-def _components(m, edges):
-    return connected_components(coo_matrix((np.ones(len(edges)), edges.T), shape=(m, m)), directed=False)[1]
 
 
 def local_thickness(state):

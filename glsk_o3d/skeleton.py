@@ -98,12 +98,9 @@ class Skeleton:
     @cached_property
     def component_of_vertex(self) -> np.ndarray:
         """Connected component of every vertex, (M,) int array."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
+        from .numerics.components import component_labels
 
-        n = len(self.vertices)
-        ones = np.ones(len(self.edges))
-        return connected_components(coo_matrix((ones, self.edges.T), shape=(n, n)), directed=False)[1]
+        return component_labels(len(self.vertices), self.edges)
 
     @property
     def n_components(self) -> int:

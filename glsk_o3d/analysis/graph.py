@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..errors import InvalidParameterError
+from ..numerics.components import component_labels
 
 
 def check_graph(vertices, edges, name):
@@ -67,5 +66,4 @@ def count_components(n, edges):
     -------
     int
     """
-    graph = coo_matrix((np.ones(len(edges)), edges.T), shape=(n, n))
-    return int(connected_components(graph, directed=False)[0])
+    return int(component_labels(n, edges).max(initial=-1)) + 1

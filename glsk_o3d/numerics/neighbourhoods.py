@@ -69,6 +69,26 @@ def principal(points, neighbours):
     return np.maximum(spread, 0), axes
 
 
+def uprightness(points, normals, p, q):
+    """How upright two normals stand on the line between their points: sin^2 times sin^2 of their angles with it.
+
+    Parameters
+    ----------
+    points, normals : (n, 3) float array
+    p, q : (m,) int array
+        Pairs of points.
+
+    Returns
+    -------
+    (m,) float array
+        1 where a surface goes on from one point to the other, 0 where two surfaces face each other.
+    """
+    line = points[q] - points[p]
+    line /= np.maximum(np.linalg.norm(line, axis=1, keepdims=True), np.finfo(float).tiny)
+    at_p, at_q = (np.maximum(1 - np.einsum("ni,ni->n", normals[end], line) ** 2, 0) for end in (p, q))
+    return at_p * at_q
+
+
 def plane_axes(normals):
     """Two orthonormal axes perpendicular to each normal (Duff et al. 2017, "Building an orthonormal basis, revisited").
 

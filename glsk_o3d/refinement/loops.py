@@ -1,9 +1,8 @@
 """Close loops that nothing passes through."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
+from ..numerics.components import component_labels
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..numerics.groups import group_median
 from .merging import merge_vertices
@@ -47,9 +46,8 @@ def close_loops(skeleton, opening):
         if not false:
             return skeleton
         pairs = np.concatenate([zip_pairs(skeleton.vertices[cycle], cycle) for cycle in false])
-        n = len(skeleton.vertices)
-        joined = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(n, n))
-        skeleton = collapse_triangles(merge_vertices(skeleton, connected_components(joined, directed=False)[1]))
+        group = component_labels(len(skeleton.vertices), pairs)
+        skeleton = collapse_triangles(merge_vertices(skeleton, group))
 
 
 def zip_pairs(points, labels):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
-from ..numerics.neighbourhoods import nearest_neighbours
+from ..numerics.neighbourhoods import nearest_neighbours, uprightness
 from .loops import surface_distance
 
 NEAR = 8  # points, itself included, that are near to a point
@@ -36,13 +36,11 @@ def bonds(skeleton):
     p, q = np.repeat(np.arange(len(owned)), near.shape[1]), near.ravel()
     foreign = owner[p] != owner[q]
     p, q = p[foreign], q[foreign]
-    line = points[q] - points[p]
-    line /= np.maximum(np.linalg.norm(line, axis=1, keepdims=True), np.finfo(float).tiny)
     agree = np.einsum("ni,ni->n", normals[p], normals[q]) ** 2
-    upright = [np.maximum(1 - np.einsum("ni,ni->n", normals[end], line) ** 2, 0) for end in (p, q)]
+    weight = agree * uprightness(points, normals, p, q)
     m = len(skeleton.vertices)
     keys, which = np.unique(np.sort(np.column_stack([owner[p], owner[q]]), axis=1) @ [m, 1], return_inverse=True)
-    return np.column_stack(np.divmod(keys, m)), np.bincount(which, agree * upright[0] * upright[1], len(keys))
+    return np.column_stack(np.divmod(keys, m)), np.bincount(which, weight, len(keys))
 
 
 def crossings(cycle, m, pairs, weight):

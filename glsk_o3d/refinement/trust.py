@@ -1,9 +1,8 @@
 """Tell where no curve skeleton is meaningful, on sheets and balls, and where the points do not say where it is."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
+from ..numerics.components import component_labels
 from ..numerics.groups import group_median, group_sum
 
 SHEET = 0.9  # share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
@@ -84,9 +83,8 @@ def _weak_region(skeleton, count):
     if share <= MUCH:
         return []
     inner = skeleton.edges[weak[skeleton.edges].all(axis=1)]
-    m = len(weak)
-    label = connected_components(coo_matrix((np.ones(len(inner)), inner.T), shape=(m, m)), directed=False)[1]
-    most = np.argmax(np.bincount(label[weak], count[weak], minlength=m))
+    label = component_labels(len(weak), inner)
+    most = np.argmax(np.bincount(label[weak], count[weak], minlength=len(weak)))
     region = skeleton.vertices[weak & (label == most)]
     middle = region.mean(axis=0)
     reach = np.linalg.norm(region - middle, axis=1).max()
