@@ -27,8 +27,8 @@ def filters(
     Everything is taken from the code: the filters, the stopping rules and the named pipelines.
     """
     with reporting():
+        from ..catalogue import catalogue, nearest
         from ..pipelines import PIPELINES
-        from .overrides import catalogue, nearest
 
         known = catalogue()
         if name is not None and name not in known and name not in PIPELINES:

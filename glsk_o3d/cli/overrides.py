@@ -3,55 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
-import glsk_o3d
-
+from ..catalogue import catalogue, nearest, parts
 from ..errors import InvalidParameterError
 from ..filter import Filter, Parameters
 from ..pipeline import Pipeline
-from ..pipelines import PIPELINES
 
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
-
-
-def parts(item: Pipeline | Parameters) -> Iterator[Parameters]:
-    """Everything with parameters in a pipeline: its filters, and after each the reducer and the rule inside.
-
-    Parameters
-    ----------
-    item : Pipeline or Parameters
-
-    Yields
-    ------
-    Parameters
-    """
-    if isinstance(item, Pipeline):
-        inner: Iterable[Any] = item.stages
-    else:
-        yield item
-        inner = (getattr(item, field.name) for field in dataclasses.fields(item))  # type: ignore[arg-type]
-    for part in inner:
-        if isinstance(part, Parameters):
-            yield from parts(part)
-
-
-def catalogue() -> dict[str, type[Parameters]]:
-    """The public filters and stopping rules by name: filters in the order in which they run, then the rules.
-
-    Returns
-    -------
-    dict of str to class
-    """
-    public = [getattr(glsk_o3d, name) for name in glsk_o3d.__all__]
-    kinds = [cls for cls in public if isinstance(cls, type) and issubclass(cls, Parameters)]
-    known = [cls for cls in kinds if dataclasses.is_dataclass(cls)]
-    order = [type(part) for part in parts(PIPELINES["default"]())]
-    known.sort(key=lambda cls: (not issubclass(cls, Filter), order.index(cls) if cls in order else len(order)))
-    return {cls.__name__: cls for cls in known}
 
 
 def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pipeline:
@@ -95,31 +56,6 @@ def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pip
         pipeline = Pipeline(*(_replaced(stage, cls, field, value) for stage in pipeline.stages))
     pipeline.check()
     return pipeline
-
-
-def nearest(word: str, known: Iterable[str], what: str) -> str:
-    """The message for an unknown word: what was meant, or what there is.
-
-    Parameters
-    ----------
-    word : str
-    known : iterable of str
-    what : str
-        What `word` should have been, such as ``"filter"``.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> nearest("radios", ["radius", "links"], "parameter of Connector")
-    "no parameter of Connector is called 'radios': did you mean 'radius'?"
-    """
-    names = {name.lower(): name for name in known}
-    close = difflib.get_close_matches(word.lower(), names, n=1)
-    hint = f"did you mean {names[close[0]]!r}?" if close else f"there are {', '.join(names.values()) or 'none'}"
-    return f"no {what} is called {word!r}: {hint}"
 
 
 def _parse(setting: str) -> tuple[type[Parameters], str, Any]:

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from glsk_o3d.cli.overrides import catalogue
+from glsk_o3d.catalogue import catalogue
 from glsk_o3d.filter import Filter
 from glsk_o3d.pipelines import PIPELINES
 
