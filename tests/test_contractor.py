@@ -266,7 +266,7 @@ def same(a, b):
     assert [replace(r, seconds=0) for r in a.report.iterations] == [replace(r, seconds=0) for r in b.report.iterations]
 
 
-GRID = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3)
+GRID = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3) + 0.1 * np.random.default_rng(0).normal(size=(216, 3))
 
 
 def test_solve_that_throws_points_out_is_dropped():
@@ -495,14 +495,17 @@ def test_lines_are_held_from_the_second_solve_on(built, monkeypatch, hold, floor
 
 
 def test_held_lines_keep_their_length():
-    """Contraction that goes on and on shortens a tube to a point, unless what has become a line is held."""
+    """Contraction that goes on and on shortens a tube, unless what has become a line is held.
+
+    By how much hangs on rounding: from 1.2 to between 0.0 and 0.5 if the points move by 1e-12.
+    """
     built = RingBuilder()(samples.tube(n=400).points)
     length = [
         np.ptp(Contractor(reducer=LPRReducer(), stop=never, max_iterations=8, line_hold=hold)(built).contracted[:, 0])
         for hold in (1, 30)
     ]
-    assert length[0] < 0.2
-    assert length[1] > 0.9
+    assert length[0] < 0.7
+    assert length[1] > 1.1
 
 
 def test_mass_enters_both_terms_by_its_root(built, monkeypatch):

@@ -29,25 +29,26 @@ def cotangent_laplacian(points, rings, cap=WEIGHT_CAP):
     The weight is the sum of both cotangents, without the factor 1/2: on a closed manifold mesh this matrix is
     ``2 * igl.cotmatrix(V, F)`` and ``-2 *`` the matrix of robust_laplacian. Triangles without area add nothing.
     """
-    i, j, k = rings.triangles.T
-    n = len(points)
-    weight = np.concatenate([_cotangent(points, k, i, j), _cotangent(points, j, i, k)])
-    row, column = np.concatenate([i, i]), np.concatenate([j, k])
-    total = np.bincount(row, weight, n)
+    x = np.ascontiguousarray(points.T)
+    entry, after = rings.fans
+    i, j, k = x[:, rings.owners[entry]], x[:, rings.indices[entry]], x[:, rings.indices[after]]
+    weight = np.zeros(len(rings.indices))
+    weight[entry] = _cotangent(k, i, j)
+    weight[after] += _cotangent(j, i, k)
+    n, owners = len(points), rings.owners
+    total = np.bincount(owners, weight, n)
     scale = cap / np.maximum(np.abs(total), cap)
-    diagonal = np.arange(n)
-    return csr_matrix(
-        (
-            np.concatenate([weight * scale[row], -total * scale]),
-            (np.concatenate([row, diagonal]), np.concatenate([column, diagonal])),
-        ),
-        shape=(n, n),
-    )
+    # every row is its diagonal entry and then its ring
+    indptr, ring, every = rings.indptr + np.arange(n + 1), np.arange(len(owners)) + owners + 1, np.arange(n)
+    data, indices = np.empty(n + len(ring)), np.empty(n + len(ring), np.int32)
+    data[ring], indices[ring] = weight * scale[owners], rings.indices
+    data[indptr[:-1]], indices[indptr[:-1]] = -total * scale, every
+    return csr_matrix((data, indices, indptr.astype(np.int32)), shape=(n, n))
 
 
-def _cotangent(points, apex, a, b):
-    """Cotangent of the angle at `apex` between `a` and `b`."""
-    u, v = points[a] - points[apex], points[b] - points[apex]
-    dot = np.einsum("ij,ij->i", u, v)
-    area = np.linalg.norm(np.cross(u, v), axis=1)
+def _cotangent(apex, a, b):
+    """Cotangent of the angle at `apex` between `a` and `b`, each (3, t)."""
+    (x, y, z), (u, v, w) = a - apex, b - apex
+    dot = x * u + y * v + z * w
+    area = np.sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2)
     return np.divide(dot, area, out=np.zeros_like(dot), where=area > 0)

@@ -3,7 +3,6 @@
 import numpy as np
 
 _COINCIDENT = 1e-300  # squared distance below which a neighbour counts as the origin itself
-_HUGE = np.finfo(float).max
 _COLLINEAR = 1e-12  # sine below which two directions count as one
 
 
@@ -41,55 +40,54 @@ def delaunay_star(offsets, valid=None):
     if offsets.shape[1] == 0:
         return np.empty((len(offsets), 0), int), np.zeros(len(offsets), bool)
     n, k = offsets.shape[:2]
-    squared = np.einsum("nkc,nkc->nk", offsets, offsets)
-    apart = squared > _COINCIDENT
-    usable = apart if valid is None else valid & apart
+    x, y = offsets[..., 0], offsets[..., 1]
+    squared = x * x + y * y
+    usable = squared > _COINCIDENT
+    if valid is not None:
+        usable &= valid
     inverse = np.divide(1.0, squared, out=np.zeros_like(squared), where=usable)
     # Column k is the origin of the inverted plane.
     qx, qy = np.zeros((n, k + 1)), np.zeros((n, k + 1))
-    np.multiply(offsets[..., 0], inverse, out=qx[:, :k])
-    np.multiply(offsets[..., 1], inverse, out=qy[:, :k])
-    open_to = np.ones((n, k + 1), bool)
-    open_to[:, :k] = usable
+    np.multiply(x, inverse, out=qx[:, :k])
+    np.multiply(y, inverse, out=qy[:, :k])
+    shut = np.zeros((n, k + 1))
+    shut[:, :k][~usable] = -np.inf
 
     walk = np.full((n, k + 2), -1)
     start = np.argmax(inverse, axis=1)
     walk[:, 0] = start
     rows = np.flatnonzero(usable.any(axis=1))
-    qx, qy, open_to, first = qx[rows], qy[rows], open_to[rows], start[rows]
+    qx, qy, shut, first = qx[rows], qy[rows], shut[rows], start[rows]
     here = first
     line = np.arange(len(rows))
     # The farthest image is a hull corner; everything lies to the left of its tangent.
-    dx, dy = -qy[line, here], qx[line, here]
+    px, py = qx[line, here], qy[line, here]
+    dx, dy, widest = -py, px, 2 * np.hypot(px, py)
     for step in range(1, k + 2):
-        vx, vy = qx - qx[line, here][:, None], qy - qy[line, here][:, None]
-        length = np.sqrt(vx * vx + vy * vy)
-        dot = dx[:, None] * vx + dy[:, None] * vy
-        cross = dx[:, None] * vy - dy[:, None] * vx
-        open_to[line, here] = False
-        open_to[line, first] = here != first
-        # Half-angle tangent: monotone on [0, pi], and exact for small angles.
-        scale = np.sqrt(dx * dx + dy * dy)[:, None] * length
-        ahead = dot > 0
-        with np.errstate(divide="ignore", invalid="ignore"):
-            turn = np.where(ahead, np.maximum(cross, 0) / (scale + dot), (scale - dot) / np.maximum(cross, 0))
-        candidate = open_to & (length > 0)
-        best = np.argmin(np.where(candidate, np.minimum(turn, _HUGE), np.inf), axis=1)
-        bx, by, bl = vx[line, best], vy[line, best], length[line, best]
-        # Among the images on the same hull edge take the farthest, but never step over the origin.
-        same = candidate & (np.abs(bx[:, None] * vy - by[:, None] * vx) <= _COLLINEAR * bl[:, None] * length)
-        same &= bx[:, None] * vx + by[:, None] * vy > 0
-        reach = np.where(same, length, -1.0)
-        reach[:, k][same[:, k]] = np.inf
-        best = np.where(reach.max(axis=1) > 0, np.argmax(reach, axis=1), first)
+        vx, vy = qx - px[:, None], qy - py[:, None]
+        shut[line, first] = 0
+        shut[line, here] = -np.inf
+        # The cotangent of the turn: falls on ]0, pi[, and is exact for small turns. 0 / 0 is where we are.
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            ahead = dx[:, None] * vx + dy[:, None] * vy
+            ahead /= np.maximum(dx[:, None] * vy - dy[:, None] * vx, 0)
+            ahead += shut
+        best = np.argmax(np.fmax(ahead, -np.inf, out=ahead), axis=1)
+        best = np.where(ahead[line, best] > -np.inf, best, first)  # straight back, along a line
         dx, dy = vx[line, best], vy[line, best]
+        aside = np.abs(dx[:, None] * vy - dy[:, None] * vx)
+        several = np.flatnonzero((aside <= (_COLLINEAR * widest * np.hypot(dx, dy))[:, None]).sum(axis=1) > 2)
+        if len(several):
+            best[several] = _farthest(vx[several], vy[several], shut[several] == 0, best[several])
+            dx, dy = vx[line, best], vy[line, best]
         going = best != first
-        walk[rows[going], step] = best[going]
         if not going.any():
             break
-        rows, first, here = rows[going], first[going], best[going]
-        qx, qy, open_to, dx, dy = qx[going], qy[going], open_to[going], dx[going], dy[going]
-        line = np.arange(len(rows))
+        if not going.all():
+            rows, first, best, dx, dy, widest = (a[going] for a in (rows, first, best, dx, dy, widest))
+            qx, qy, shut, line = qx[going], qy[going], shut[going], np.arange(len(rows))
+        walk[rows, step] = here = best
+        px, py = qx[line, here], qy[line, here]
 
     # Cut the walk at the origin, where it meets it.
     size = (walk >= 0).sum(axis=1)
@@ -102,3 +100,15 @@ def delaunay_star(offsets, valid=None):
     source = (cut[:, None] + column) % np.maximum(size, 1)[:, None]
     ring = np.where(column < length[:, None], np.take_along_axis(walk, source, axis=1), -1)
     return ring, closed
+
+
+def _farthest(vx, vy, usable, best):
+    """Among the images on one hull edge with the best one, the farthest; but never step over the origin."""
+    line = np.arange(len(best))
+    length = np.sqrt(vx * vx + vy * vy)
+    bx, by, reach = vx[line, best], vy[line, best], length[line, best]
+    same = np.abs(bx[:, None] * vy - by[:, None] * vx) <= _COLLINEAR * reach[:, None] * length
+    same &= usable & (bx[:, None] * vx + by[:, None] * vy > 0)
+    reach = np.where(same, length, -1.0)
+    reach[:, -1][same[:, -1]] = np.inf
+    return np.argmax(reach, axis=1)

@@ -1,6 +1,7 @@
 """One-rings of a point cloud: which neighbours surround each point, in rotational order."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,30 +38,36 @@ class Rings:
     def __getitem__(self, point):
         return self.indices[self.indptr[point] : self.indptr[point + 1]]
 
-    @property
+    @cached_property
     def sizes(self):
         """Neighbours per ring, (n,) int array."""
         return np.diff(self.indptr)
 
-    @property
+    @cached_property
     def owners(self):
         """The point that each entry of `indices` belongs to, (m,) int array."""
         return np.repeat(np.arange(len(self)), self.sizes)
 
+    @cached_property
+    def fans(self):
+        """Positions in `indices` of two neighbours that share a triangle with their point: two (t,) int arrays."""
+        following = np.arange(1, len(self.indices) + 1)
+        some = self.sizes > 0
+        last = self.indptr[1:][some] - 1
+        following[last] = np.where(self.closed[some], self.indptr[:-1][some], -1)
+        entry = np.flatnonzero(following >= 0)
+        return entry, following[entry]
+
     @property
     def triangles(self):
         """Fan triangles (i, j, k): a point and two consecutive neighbours, (t, 3) int array."""
-        owner = self.owners
-        following = np.arange(1, len(self.indices) + 1)
-        last = self.indptr[1:][self.sizes > 0] - 1
-        following[last] = self.indptr[:-1][self.sizes > 0]
-        has_next = np.ones(len(self.indices), bool)
-        has_next[last] = self.closed[self.sizes > 0]
-        return np.column_stack([owner, self.indices, self.indices[following]])[has_next]
+        entry, after = self.fans
+        return np.column_stack([self.owners[entry], self.indices[entry], self.indices[after]])
 
     def edge_lengths(self, points):
         """Distance from every point to each of its ring neighbours, (m,) float array."""
-        return np.linalg.norm(points[self.indices] - points[self.owners], axis=1)
+        edge = points[self.indices] - points[self.owners]
+        return np.sqrt(np.einsum("mi,mi->m", edge, edge))
 
     def mean_lengths(self, points):
         """Mean ring edge of every point with a ring, (n,) float array."""
@@ -74,7 +81,8 @@ class Rings:
         length = self.edge_lengths(points)
         distance = np.minimum.reduceat(length, self.indptr[:-1])
         hits = np.flatnonzero(length == np.repeat(distance, self.sizes))
-        first = np.unique(self.owners[hits], return_index=True)[1]
+        owner = self.owners[hits]
+        first = np.append(True, owner[1:] != owner[:-1])
         return self.indices[hits[first]], distance
 
     def mean_over(self, values):

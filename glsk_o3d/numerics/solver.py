@@ -1,7 +1,7 @@
 """The linear solve of the contraction."""
 
 import numpy as np
-from scipy.sparse import diags_array
+from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 TOLERANCE = 1e-7  # of the cloud's size; refinement ends here
@@ -39,10 +39,12 @@ def solve_contraction(laplacian, row_weight, position_weight, points):
     SolveError
         If the factorisation breaks down or the error estimate stays above 1e-4.
     """
-    scaled = (diags_array(row_weight) @ laplacian).tocsr()
+    laplacian = laplacian.tocsr()
+    weight = np.repeat(row_weight, np.diff(laplacian.indptr))
+    scaled = csr_array((weight * laplacian.data, laplacian.indices, laplacian.indptr), shape=laplacian.shape)
     transposed = scaled.T.tocsr()
     attraction = position_weight[:, None] ** 2
-    normal = (transposed @ scaled + diags_array(attraction[:, 0])).tocsc()
+    normal = (transposed @ scaled + diags_array(attraction[:, 0], format="csr")).T  # symmetric, so that .T is free
     try:
         factor = splu(
             normal,
