@@ -266,7 +266,8 @@ def same(a, b):
     assert [replace(r, seconds=0) for r in a.report.iterations] == [replace(r, seconds=0) for r in b.report.iterations]
 
 
-GRID = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3) + 0.1 * np.random.default_rng(0).normal(size=(216, 3))
+GRID = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3)
+GRID += 0.1 * np.random.default_rng(0).normal(size=(216, 3))
 
 
 def test_solve_that_throws_points_out_is_dropped():
