@@ -11,6 +11,7 @@ import numpy as np
 
 from .filter import Filter, documented, parameter
 from .numerics.cotangent import cotangent_laplacian
+from .numerics.eigen import largest_eigenvalue
 from .numerics.neighbourhoods import nearest_neighbours
 from .numerics.solver import SolveError, solve_contraction
 from .report import IterationRecord
@@ -30,7 +31,8 @@ class Contractor(Filter):
     diagonal of the survivors' masses; it is the identity unless the reducer conserves mass.
 
     A late, ill-conditioned solve can throw points out of the cloud. It is detected (a point beyond 1.2 times the
-    bounding box, or a solve without a trustworthy solution). Such a solve is repeated with the runaway points held;
+    bounding box or, in a frame that turns with the cloud, the ball around it; or a solve without a trustworthy
+    solution). Such a solve is repeated with the runaway points held;
     where that does not help it is dropped, the last sound state is kept, and the report says so.
 
     References
@@ -43,6 +45,14 @@ class Contractor(Filter):
 
     reducer: Callable[[Contraction], Contraction] | None = parameter(
         None, "Merges redundant points after each solve; None keeps them all.", type="reducer?"
+    )
+    reduce_above: int = parameter(
+        500,
+        "The reducer works only while more points are left: below, a pass costs more than it saves, and thin parts "
+        "lose the points that say where they are. 0 as published.",
+        type="int",
+        unit="points",
+        low=0,
     )
     stop: StopRule = parameter(ExplainedScore(), "Decides after each solve whether to stop.", type="stop")
     max_iterations: int = parameter(10, "Most solves.", type="int", unit="solves", low=1)
@@ -88,7 +98,7 @@ class Contractor(Filter):
                 )
             state = _record(state, **facts, seconds=time.perf_counter() - start)
             reason = self.stop(state.report.iterations)
-            if reason is None and reducer is not None:
+            if reason is None and reducer is not None and len(state) > self.reduce_above:
                 n = len(state)
                 state = _within(reducer(state), state.report)
                 if len(state) == n:
@@ -156,8 +166,9 @@ def linearity(points):
     _, neighbours = nearest_neighbours(points, min(LINE_NEIGHBOURS, len(points)))
     patch = points[neighbours]
     patch -= patch.mean(axis=1, keepdims=True)
-    spread = np.maximum(np.linalg.eigvalsh(np.matmul(patch.transpose(0, 2, 1), patch)), 0)
-    return spread[:, 2] / np.maximum(spread.sum(axis=1), np.finfo(float).tiny)
+    covariance = np.matmul(patch.transpose(0, 2, 1), patch)
+    total = np.trace(covariance, axis1=1, axis2=2)
+    return largest_eigenvalue(covariance) / np.maximum(total, np.finfo(float).tiny)
 
 
 def explained_score(points) -> float:

@@ -170,11 +170,15 @@ def inscribed_circle(points):
 
 def _distance(points, polygon):
     """Distance from each point to the closed polygon, (n,) float array."""
-    start, edge = polygon, np.roll(polygon, -1, axis=0) - polygon
-    offset = points[:, None] - start
-    squared = np.maximum((edge**2).sum(axis=1), np.finfo(float).tiny)
-    along = np.clip((offset * edge).sum(axis=2) / squared, 0, 1)
-    return np.linalg.norm(offset - along[:, :, None] * edge, axis=2).min(axis=1)
+    edge = np.roll(polygon, -1, axis=0) - polygon
+    squared = np.maximum(np.einsum("ei,ei->e", edge, edge), np.finfo(float).tiny)
+    # products of matrices instead of differences of all pairs; the polygon is centred, so that they lose nothing
+    along = points @ edge.T - np.einsum("ei,ei->e", polygon, edge)
+    apart = np.einsum("ni,ni->n", points, points)[:, None] - 2 * points @ polygon.T
+    apart += np.einsum("ei,ei->e", polygon, polygon)
+    share = np.clip(along / squared, 0, 1)
+    apart += share * (share * squared - 2 * along)
+    return np.sqrt(np.maximum(apart.min(axis=1), 0))
 
 
 def _inside(points, polygon):

@@ -46,10 +46,10 @@ def delaunay_star(offsets, valid=None):
     if valid is not None:
         usable &= valid
     inverse = np.divide(1.0, squared, out=np.zeros_like(squared), where=usable)
-    # Column k is the origin of the inverted plane.
-    qx, qy = np.zeros((n, k + 1)), np.zeros((n, k + 1))
-    np.multiply(x, inverse, out=qx[:, :k])
-    np.multiply(y, inverse, out=qy[:, :k])
+    # The inverted plane is that of the complex numbers; column k is its origin.
+    q = np.zeros((n, k + 1), complex)
+    np.multiply(x, inverse, out=q.real[:, :k])
+    np.multiply(y, inverse, out=q.imag[:, :k])
     shut = np.zeros((n, k + 1))
     shut[:, :k][~usable] = -np.inf
 
@@ -57,37 +57,35 @@ def delaunay_star(offsets, valid=None):
     start = np.argmax(inverse, axis=1)
     walk[:, 0] = start
     rows = np.flatnonzero(usable.any(axis=1))
-    qx, qy, shut, first = qx[rows], qy[rows], shut[rows], start[rows]
+    q, shut, first = q[rows], shut[rows], start[rows]
     here = first
     line = np.arange(len(rows))
     # The farthest image is a hull corner; everything lies to the left of its tangent.
-    px, py = qx[line, here], qy[line, here]
-    dx, dy, widest = -py, px, 2 * np.hypot(px, py)
+    ahead = 1j * q[line, here]
+    widest = 2 * np.abs(ahead)
     for step in range(1, k + 2):
-        vx, vy = qx - px[:, None], qy - py[:, None]
+        way = q - q[line, here][:, None]
         shut[line, first] = 0
         shut[line, here] = -np.inf
         # The cotangent of the turn: falls on ]0, pi[, and is exact for small turns. 0 / 0 is where we are.
+        turn = way * ahead.conj()[:, None]
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            ahead = dx[:, None] * vx + dy[:, None] * vy
-            ahead /= np.maximum(dx[:, None] * vy - dy[:, None] * vx, 0)
-            ahead += shut
-        best = np.argmax(np.fmax(ahead, -np.inf, out=ahead), axis=1)
-        best = np.where(ahead[line, best] > -np.inf, best, first)  # straight back, along a line
-        dx, dy = vx[line, best], vy[line, best]
-        aside = np.abs(dx[:, None] * vy - dy[:, None] * vx)
-        several = np.flatnonzero((aside <= (_COLLINEAR * widest * np.hypot(dx, dy))[:, None]).sum(axis=1) > 2)
-        if len(several):
-            best[several] = _farthest(vx[several], vy[several], shut[several] == 0, best[several])
-            dx, dy = vx[line, best], vy[line, best]
+            cotangent = turn.real / np.maximum(turn.imag, 0) + shut
+        best = np.argmax(np.fmax(cotangent, -np.inf), axis=1)
+        best = np.where(cotangent[line, best] > -np.inf, best, first)  # straight back, along a line
+        ahead = way[line, best]
+        aside = np.abs((way * ahead.conj()[:, None]).imag)
+        several = (aside <= (_COLLINEAR * widest * np.abs(ahead))[:, None]).sum(axis=1) > 2
+        if several.any():
+            best[several] = _farthest(way[several], shut[several] == 0, best[several])
+            ahead = way[line, best]
         going = best != first
         if not going.any():
             break
         if not going.all():
-            rows, first, best, dx, dy, widest = (a[going] for a in (rows, first, best, dx, dy, widest))
-            qx, qy, shut, line = qx[going], qy[going], shut[going], np.arange(len(rows))
+            rows, first, best, ahead, widest = (a[going] for a in (rows, first, best, ahead, widest))
+            q, shut, line = q[going], shut[going], line[: len(rows)]
         walk[rows, step] = here = best
-        px, py = qx[line, here], qy[line, here]
 
     # Cut the walk at the origin, where it meets it.
     size = (walk >= 0).sum(axis=1)
@@ -102,13 +100,12 @@ def delaunay_star(offsets, valid=None):
     return ring, closed
 
 
-def _farthest(vx, vy, usable, best):
+def _farthest(way, usable, best):
     """Among the images on one hull edge with the best one, the farthest; but never step over the origin."""
     line = np.arange(len(best))
-    length = np.sqrt(vx * vx + vy * vy)
-    bx, by, reach = vx[line, best], vy[line, best], length[line, best]
-    same = np.abs(bx[:, None] * vy - by[:, None] * vx) <= _COLLINEAR * reach[:, None] * length
-    same &= usable & (bx[:, None] * vx + by[:, None] * vy > 0)
-    reach = np.where(same, length, -1.0)
-    reach[:, -1][same[:, -1]] = np.inf
+    length = np.abs(way)
+    turn = way * way[line, best].conj()[:, None]
+    same = np.abs(turn.imag) <= _COLLINEAR * length[line, best][:, None] * length
+    reach = np.where(same & usable & (turn.real > 0), length, -1.0)
+    reach[:, -1][reach[:, -1] > 0] = np.inf
     return np.argmax(reach, axis=1)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from .eigen import main_direction
 from .neighbourhoods import nearest_neighbours
 
 NEIGHBOURS = 32  # among which a ridge is sought: more than for rings, a noisy shell is thick
@@ -69,29 +70,3 @@ def to_ridges(points, noise, passes):
             x = x + step * shift
         moved[noisy[part]] = x
     return moved
-
-
-def main_direction(covariance):
-    """Direction of the largest spread: the eigenvalue in closed form (Smith 1961), 3 times faster than NumPy's eigh.
-
-    Parameters
-    ----------
-    covariance : (n, 3, 3) float array
-        Symmetric, not negative.
-
-    Returns
-    -------
-    (n, 3) float array
-        Unit vectors; any of those with the largest spread, where there is more than one.
-    """
-    tiny = np.finfo(float).tiny
-    rest = covariance - np.trace(covariance, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
-    rest /= np.maximum(np.sqrt(np.einsum("nij,nij->n", rest, rest) / 6), tiny)[:, None, None]
-    largest = 2 * np.cos(np.arccos(np.clip(np.linalg.det(rest) / 2, -1, 1)) / 3)
-    rest -= largest[:, None, None] * np.eye(3)
-    # The rows are upright on the eigenvector; of their cross products take the longest.
-    normals = np.cross(rest[:, [0, 1, 2]], rest[:, [1, 2, 0]])
-    length = np.einsum("nij,nij->ni", normals, normals)
-    best = np.argmax(length, axis=1)
-    line = np.arange(len(best))
-    return normals[line, best] / np.maximum(np.sqrt(length[line, best]), tiny)[:, None]

@@ -11,7 +11,7 @@ from .loops import surface_distance
 NEAR = 8  # points, itself included, that are near to a point
 
 
-def bonds(skeleton):
+def bonds(skeleton, among=None):
     """How far the surface goes on from vertex to vertex.
 
     Every two near points of different vertices count by how far their normals agree and stand upright on the line
@@ -20,6 +20,8 @@ def bonds(skeleton):
     Parameters
     ----------
     skeleton : Skeleton
+    among : (c,) int array, optional
+        The vertices to look at; by default all.
 
     Returns
     -------
@@ -28,13 +30,17 @@ def bonds(skeleton):
     weight : (B,) float array
     """
     owned = skeleton.witnesses
-    owned = owned[np.unique(skeleton.points[owned], axis=0, return_index=True)[1]]  # copies are near to nothing else
+    order = np.lexsort(skeleton.points[owned].T)
+    step = np.diff(skeleton.points[owned[order]], axis=0, prepend=np.nan)
+    owned = np.sort(owned[order[(step != 0).any(axis=1)]])  # copies are near to nothing else
     if len(owned) < 2:
         return np.empty((0, 2), int), np.empty(0)
     points, normals, owner = skeleton.points[owned], skeleton.normals[owned], skeleton.vertex_of_point[owned]
-    near = nearest_neighbours(points, min(NEAR, len(owned)))[1][:, 1:]
-    p, q = np.repeat(np.arange(len(owned)), near.shape[1]), near.ravel()
-    foreign = owner[p] != owner[q]
+    chosen = np.ones(len(owner), bool) if among is None else np.isin(owner, among)
+    p = np.flatnonzero(chosen)
+    near = nearest_neighbours(points, min(NEAR, len(owned)), of=points[p])[1][:, 1:]
+    p, q = np.repeat(p, near.shape[1]), near.ravel()
+    foreign = (owner[p] != owner[q]) & chosen[q]
     p, q = p[foreign], q[foreign]
     agree = np.einsum("ni,ni->n", normals[p], normals[q]) ** 2
     weight = agree * uprightness(points, normals, p, q)
@@ -96,7 +102,7 @@ def cut_threads(skeleton, weak, sure):
     cycles = minimum_cycle_basis(m, skeleton.edges, skeleton.edge_lengths)
     if not cycles:
         return skeleton
-    pairs, weight = bonds(skeleton)
+    pairs, weight = bonds(skeleton, np.concatenate(cycles))  # cutting makes no new cycles elsewhere
     thickness = surface_distance(skeleton)
     while True:
         keys = skeleton.edges @ [m, 1]

@@ -1,6 +1,7 @@
 """Collapse triangles, so that the graph is one-dimensional."""
 
 import heapq
+import math
 
 import numpy as np
 
@@ -19,19 +20,18 @@ def collapse_triangles(skeleton):
     Skeleton
         Without triangles; points of merged vertices belong to the vertex they were merged into.
     """
-    position = skeleton.vertices.copy()
-    weight = support(skeleton)
+    position, weight = skeleton.vertices.tolist(), support(skeleton).tolist()
     around: list[set[int]] = [set() for _ in position]
     for a, b in skeleton.edges.tolist():
         around[a].add(b)
         around[b].add(a)
 
     def cost(a, b):
-        return (len(around[a]) + len(around[b])) / 2, float(np.linalg.norm(position[a] - position[b]))
+        return (len(around[a]) + len(around[b])) / 2, math.dist(position[a], position[b])
 
     queue = [(*cost(a, b), a, b) for a, b in skeleton.edges.tolist() if around[a] & around[b]]
     heapq.heapify(queue)
-    into = np.arange(len(position))
+    into = list(range(len(position)))
     while queue:
         *priced, a, b = heapq.heappop(queue)
         if b not in around[a] or not around[a] & around[b]:
@@ -40,8 +40,9 @@ def collapse_triangles(skeleton):
             heapq.heappush(queue, (*cost(a, b), a, b))
             continue
         into[b] = a
-        position[a] = (weight[a] * position[a] + weight[b] * position[b]) / (weight[a] + weight[b])
-        weight[a] += weight[b]
+        both = weight[a] + weight[b]
+        position[a] = [(weight[a] * x + weight[b] * y) / both for x, y in zip(position[a], position[b], strict=True)]
+        weight[a] = both
         for c in around[b]:
             around[c].discard(b)
             if c != a:
@@ -56,4 +57,4 @@ def collapse_triangles(skeleton):
     for v in range(len(into)):  # a vertex's target may have been merged on
         while into[into[v]] != into[v]:
             into[v] = into[into[v]]
-    return merge_vertices(skeleton, into)
+    return merge_vertices(skeleton, np.array(into, int))
