@@ -17,6 +17,8 @@ CENTROID = 0.5  # weight of the points themselves where their normals say nothin
 SUPPORT = 8  # points that support a vertex half
 TIE = 1e-9
 TINY = np.finfo(float).tiny
+ROWS, COLUMNS = np.triu_indices(3)
+ENTRIES = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # the upper triangle of a symmetric matrix, spread out
 
 
 def fit_axis(skeleton, passes):
@@ -105,17 +107,19 @@ def nearest_on_edges(x, edges, candidates, p):
     t : (n,) float array
         From 0 at the first end of the edge to 1 at the second.
     """
+    starts, ways = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
+    lengths = np.maximum(np.einsum("ei,ei->e", ways, ways), TINY)  # squared
     edge, t, best = np.zeros(len(p), int), np.zeros(len(p)), np.full(len(p), np.inf)
     for column in candidates.T:
         some = np.flatnonzero(column >= 0)
-        start, stop = x[edges[column[some], 0]], x[edges[column[some], 1]]
-        along, offset = stop - start, p[some] - start
-        part = np.einsum("ni,ni->n", along, offset) / np.maximum(np.einsum("ni,ni->n", along, along), TINY)
-        part = np.clip(part, 0, 1)
-        squared = ((offset - part[:, None] * along) ** 2).sum(axis=1)
+        column = column[some]
+        along, offset = ways[column], p[some] - starts[column]
+        part = np.clip(np.einsum("ni,ni->n", along, offset) / lengths[column], 0, 1)
+        offset -= part[:, None] * along
+        squared = np.einsum("ni,ni->n", offset, offset)
         nearer = squared < (1 - TIE) * best[some]  # a vertex belongs to all its edges: rounding must not choose
         some = some[nearer]
-        edge[some], t[some], best[some] = column[some], part[nearer], squared[nearer]
+        edge[some], t[some], best[some] = column[nearer], part[nearer], squared[nearer]
     return edge, t
 
 
@@ -154,39 +158,52 @@ def _nearest(x, ends, around, p, n):
 def _solve(x, ends, near, p, weight, pull, inner, beside, blur):
     """The minimum of the energy in `fit_axis`: one sparse, symmetric, positive definite system."""
     m, e = len(x), len(ends)
-    tangent = near.tangent[near.edge]
-    terms = weight[:, None, None] * near.across[:, :, None] * near.across[:, None]
-    terms += pull[:, None, None] * (np.eye(3) - tangent[:, :, None] * tangent[:, None])
-    target = np.einsum("nij,nj->ni", terms, p)
-    a, b = ends.T
-    first, second = near.share.T
-    at_edges = [group_sum(part[:, None, None] * terms, near.edge, e) for part in (first**2, first * second, second**2)]
-    right = sum(group_sum(group_sum(near.share[:, [i]] * target, near.edge, e), ends[:, i], m) for i in (0, 1))
-    count = sum(group_sum(group_sum(near.share[:, [i]], near.edge, e), ends[:, i], m)[:, 0] for i in (0, 1))
-
     along = near.tangent[:, :, None] * near.tangent[:, None]
-    along = sum(group_sum(along, ends[:, i], m) for i in (0, 1))
-    along /= np.maximum(np.bincount(ends.ravel(), minlength=m), 1)[:, None, None]
+    upright = np.eye(3) - along
+    # Of every point w b b^T by its six different entries, and the pull, once for each pair of ends of its edge; and
+    # what they say of its place, and that it is there, once for each end.
+    weighted = weight[:, None] * near.across
+    matrix = np.column_stack([weighted[:, ROWS] * near.across[:, COLUMNS], pull])
+    target = np.einsum("ni,ni->n", near.across, p)[:, None] * weighted
+    target = np.column_stack([target, pull[:, None] * p, np.ones(len(p))])
+    first, second = near.share[:, [0]], near.share[:, [1]]
+    parts = [matrix * first**2, matrix * first * second, matrix * second**2, target * first, target * second]
+    parts = np.split(group_sum(np.concatenate(parts, axis=1), near.edge, e), 5, axis=1)
+    at_edges = [part[:, ENTRIES].reshape(e, 3, 3) + part[:, 6, None, None] * upright for part in parts[:3]]
+    at_ends = np.concatenate(parts[3:])
+    wanted = at_ends[:, :3] + np.einsum("eij,ej->ei", np.tile(upright, (2, 1, 1)), at_ends[:, 3:6])
+    facts = np.column_stack([wanted, at_ends[:, 6], np.tile(along.reshape(e, 9), (2, 1))])
+    facts = group_sum(facts, ends.T.ravel(), m)
+    right, count = facts[:, :3], facts[:, 3]
+    along = facts[:, 4:].reshape(m, 3, 3) / np.maximum(np.bincount(ends.ravel(), minlength=m), 1)[:, None, None]
     stay = (STAY * count + 1e-3 * max(count.mean(), 1))[:, None, None] * np.eye(3) + count[:, None, None] * along
     right = right + np.einsum("nij,nj->ni", stay, x)
 
-    every = np.arange(m)
-    blocks = [(a, a, at_edges[0]), (a, b, at_edges[1]), (b, a, at_edges[1]), (b, b, at_edges[2]), (every, every, stay)]
+    a, b, every = *ends.T, np.arange(m)
+    rows, columns = np.concatenate([a, a, b, b, every]), np.concatenate([a, b, a, b, every])
+    blocks = np.concatenate([at_edges[0], at_edges[1], at_edges[1], at_edges[2], stay])
     reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
     stencil = np.column_stack([np.ones(len(inner)), -chord])
     width = np.minimum((near.doubt * near.apart)[inner] / np.maximum(reach.prod(axis=1), TINY), WIDEST)
     bend = BENDING * (1 + blur * width**2) * np.maximum(count[inner], 1)
-    corners = np.column_stack([inner, beside])
-    for i in range(3):
-        for j in range(3):
-            value = (bend * stencil[:, i] * stencil[:, j])[:, None, None] * np.eye(3)
-            blocks.append((corners[:, i], corners[:, j], value))
+    bend = bend[:, None, None] * stencil[:, :, None] * stencil[:, None]  # the same for all three coordinates
+    corners = np.broadcast_to(np.column_stack([inner, beside])[:, :, None], bend.shape)
 
-    row, column, value = (np.concatenate(part) for part in zip(*blocks, strict=True))
     axis = np.arange(3)
-    rows = np.broadcast_to(3 * row[:, None, None] + axis[:, None], value.shape)
-    columns = np.broadcast_to(3 * column[:, None, None] + axis, value.shape)
-    matrix = coo_matrix((value.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * m, 3 * m)).tocsc()
-    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=dict(SymmetricMode=True))
+    row = [(3 * rows[:, None, None] + axis[:, None] + 0 * axis).ravel(), (3 * corners[..., None] + axis).ravel()]
+    column = [
+        (3 * columns[:, None, None] + 0 * axis[:, None] + axis).ravel(),
+        (3 * corners.swapaxes(1, 2)[..., None] + axis).ravel(),
+    ]
+    value = np.concatenate([blocks.ravel(), np.repeat(bend.ravel(), 3)])
+    system = coo_matrix((value, (np.concatenate(row), np.concatenate(column))), shape=(3 * m, 3 * m)).tocsc()
+    factor = splu(
+        system,
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        relax=1,
+        panel_size=1,
+        options=dict(SymmetricMode=True),
+    )
     return factor.solve(right.ravel()).reshape(m, 3)
