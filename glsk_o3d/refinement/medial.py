@@ -179,7 +179,7 @@ def _solve(x, ends, near, p, weight, pull, inner, beside, blur):
     stay = (STAY * count + 1e-3 * max(count.mean(), 1))[:, None, None] * np.eye(3) + count[:, None, None] * along
     right = right + np.einsum("nij,nj->ni", stay, x)
 
-    a, b, every = *ends.T, np.arange(m)
+    (a, b), every = ends.T, np.arange(m)
     rows, columns = np.concatenate([a, a, b, b, every]), np.concatenate([a, b, a, b, every])
     blocks = np.concatenate([at_edges[0], at_edges[1], at_edges[1], at_edges[2], stay])
     reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
