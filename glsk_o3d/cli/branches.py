@@ -96,12 +96,12 @@ def _print(table: BranchTable) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    shown = Table(box=SIMPLE_HEAD, pad_edge=False, header_style="")
+    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
     for head, (_, form) in _COLUMNS.items():
         shown.add_column(head, justify="left" if form == "s" else "right")
     for row in table:
         shown.add_row(*(_cell(row[name], form, name) for name, form in _COLUMNS.values()))
-    print_table(shown)
+    print_table(shown, whole=True)
 
 
 def _cell(value, form: str, name: str) -> str:

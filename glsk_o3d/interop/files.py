@@ -24,6 +24,7 @@ from ..errors import FileFormatError, MissingPackageError
 from ..report import Report
 from ..skeleton import Skeleton
 from .open3d import import_open3d, require
+from .verbosity import following_open3d
 
 CLOUD_ENDINGS = (".ply", ".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts")
 """Files that `read_cloud` reads as clouds."""
@@ -86,7 +87,8 @@ def read_cloud(path: str | os.PathLike) -> Any:
     if not cloud.has_points():
         raise FileFormatError(f"{path}: no points could be read: it is damaged, empty, or not a {ending} file")
     if rows > len(cloud.points):
-        _log.warning("%s: %d of %d lines hold no point and were skipped", path, rows - len(cloud.points), rows)
+        with following_open3d():
+            _log.warning("%s: %d of %d lines hold no point and were skipped", path, rows - len(cloud.points), rows)
     return cloud
 
 
