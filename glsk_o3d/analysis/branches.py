@@ -121,6 +121,7 @@ class BranchTable:
         write_atomically(path, write)
 
 
+@np.errstate(all="ignore")  # a file may hold coordinates whose squares no float64 holds
 def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     """Measure every branch of a skeleton.
 
@@ -153,8 +154,8 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     def mean(values):
         return np.array([_mean(values[path], weight) for path, weight in zip(paths, weights, strict=True)])
 
-    squared = mean(skeleton.radii**2)
-    parent, level, backwards = _grow(skeleton, paths, length, np.where(np.isnan(squared), 1, squared), chosen)
+    section = mean((skeleton.radii / np.nanmax(skeleton.radii, initial=np.finfo(float).tiny)) ** 2)
+    parent, level, backwards = _grow(skeleton, paths, length, np.where(np.isnan(section), 1, section), chosen)
     paths = [path[::-1] if turn else path for path, turn in zip(paths, backwards, strict=True)]
     start, end = (np.array([path[i] for path in paths]) for i in (0, -1))
     first, last = skeleton.vertices[start], skeleton.vertices[end]

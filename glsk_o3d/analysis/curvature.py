@@ -64,6 +64,7 @@ def curvature_torsion(skeleton: Skeleton, window: float | None = None) -> tuple[
     return curvature, torsion
 
 
+@np.errstate(all="ignore")
 def bend(curve, half=None, closed=False):
     """Curvature and torsion of one curve at its vertices; see `curvature_torsion`.
 
@@ -81,10 +82,11 @@ def bend(curve, half=None, closed=False):
     """
     n = len(curve)
     along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
-    length = along[-1]
-    if length == 0:
+    unit = along[-1]
+    if not (np.isfinite(unit) and unit > 0):
         return np.full((2, n), np.nan)
-    half = min(half or length / 4, length / 2)
+    curve, along, length = (curve - curve[0]) / unit, along / unit, 1.0
+    half = min(half / unit if half else length / 4, length / 2)
     if closed:
         centre = along
         curve = np.concatenate([curve[:-1], curve[:-1], curve])
@@ -111,4 +113,4 @@ def bend(curve, half=None, closed=False):
     curvature = np.divide(size, speed**3, out=np.full(n, np.nan), where=speed > 0)
     planar = (curvature * reach > STRAIGHT) & (least > 3)
     torsion = np.divide((normal * jerk).sum(axis=1), size**2, out=np.full(n, np.nan), where=planar)
-    return curvature, torsion
+    return curvature / unit, torsion / unit

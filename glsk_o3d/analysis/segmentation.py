@@ -114,6 +114,7 @@ def branch_of_vertex(skeleton):
     return branch
 
 
+@np.errstate(all="ignore")
 def branch_of_point(skeleton, points, vertex):
     """`segment`, for points whose vertices are known.
 

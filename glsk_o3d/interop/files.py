@@ -545,7 +545,10 @@ def _write_swc(skeleton: Skeleton, cut_loops: bool = False) -> bytes:
             "pass cut_loops=True to drop an edge of each, or choose another format"
         )
     networkx = require("networkx")
-    forest = networkx.minimum_spanning_tree(skeleton.to_networkx(), weight="length")
+    graph = networkx.Graph()
+    graph.add_nodes_from(range(len(skeleton.vertices)))
+    graph.add_weighted_edges_from(zip(*skeleton.edges.T.tolist(), skeleton.edge_lengths.tolist(), strict=True))
+    forest = networkx.minimum_spanning_tree(graph)
     order = list(networkx.dfs_preorder_nodes(forest))
     number = {vertex: i for i, vertex in enumerate(order, 1)}
     parent = {child: number[vertex] for vertex, child in networkx.dfs_edges(forest)}

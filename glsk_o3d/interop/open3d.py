@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 ACCEPTED = "an Open3D point cloud or triangle mesh (legacy or tensor) or an (N, 3) array of real numbers"
+MOST_NEIGHBOURS = 30  # within a radius without a limit of its own: as many as Open3D's KDTreeSearchParamKNN has
 
 _DEBIAN = {  # shared library -> Debian package, where the one does not follow from the other
     "libGL": "libgl1",
@@ -160,6 +161,29 @@ def open3d_class(thing: Any) -> tuple[str, bool]:
         if package == "open3d":
             return cls.__name__, "t" in parts or "core" in parts
     return "", False
+
+
+def search_parameters(given: Any) -> dict[str, Any]:
+    """The number of neighbours and the radius in Open3D's ``KDTreeSearchParam*``.
+
+    Parameters
+    ----------
+    given : object
+
+    Returns
+    -------
+    dict
+        With ``k``, and with ``radius`` (float) if there is one; for a radius alone, `k` is `MOST_NEIGHBOURS`. Empty for
+        anything else.
+    """
+    name, _ = open3d_class(given)
+    if name == "KDTreeSearchParamKNN":
+        return {"k": int(given.knn)}
+    if name == "KDTreeSearchParamHybrid":
+        return {"k": int(given.max_nn), "radius": float(given.radius)}
+    if name == "KDTreeSearchParamRadius":
+        return {"k": MOST_NEIGHBOURS, "radius": float(given.radius)}
+    return {}
 
 
 def to_point_cloud(points: np.ndarray) -> Any:
