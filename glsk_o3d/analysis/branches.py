@@ -50,7 +50,8 @@ class BranchTable:
     mean_radius, start_radius, end_radius : (B,) float arrays
     angle : (B,) float array
         Degrees between the direction in which the parent arrives and that in which the branch leaves: 0 goes straight
-        on. Each is taken from one to three radii away from the junction. NaN without a parent, and where it is closed.
+        on. Each is taken from one to three radii away from the junction, without
+        radii from the nearest quarter. NaN without a parent, and where it is closed.
     mean_curvature, mean_torsion : (B,) float arrays
         See `curvature_torsion`.
     points : (B,) int array
@@ -275,9 +276,9 @@ def _angle(skeleton, paths, row, parent):
 
 
 def _heading(curve, radius):
-    """Where a curve goes from its first point: from one radius along it to three, or over all of it without a radius."""
+    """Where a curve goes from its first point: from one radius along it to three; without a radius over its first quarter."""
     along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
     reach = along[-1]
-    near, far = np.minimum(np.multiply(AWAY, radius), [reach / 2, reach]) if radius > 0 else (0, reach)
+    near, far = np.minimum(np.multiply(AWAY, radius), [reach / 2, reach]) if radius > 0 else (0, reach / 4)
     a, b = (np.array([np.interp(place, along, column) for column in curve.T]) for place in (near, far))
     return b - a

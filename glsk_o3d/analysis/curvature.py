@@ -49,8 +49,8 @@ def curvature_torsion(skeleton: Skeleton, window: float | None = None) -> tuple[
 
     Notes
     -----
-    Exact on straight lines. On finely sampled circles and helices of radius of curvature R the error of the curvature is
-    about 0.004 (window / R)^4 of it; that of the torsion 0.1 (window / R)^2.
+    Exact on straight lines. On finely sampled circles and helices, with x = window * sqrt(curvature^2 + torsion^2), the
+    relative error of the curvature is 0.0006 x^4 and that of the torsion 0.03 x^2, up to x = 1.2.
     """
     if window is not None and not (np.isfinite(window) and window > 0):
         raise InvalidParameterError(f"window = {window!r}: must be a length above 0, in the cloud's units")
@@ -104,7 +104,8 @@ def bend(curve, half=None, closed=False):
     powers = u[:, :, None] ** np.arange(min(DEGREE, least - 1) + 1)
     local = curve[row] - curve[row].mean(axis=1, keepdims=True)
     fit = np.zeros((n, DEGREE + 1, 3))
-    fit[:, : powers.shape[2]] = np.linalg.pinv(weight * powers) @ (weight * local)
+    seen = (weight**2 * powers).transpose(0, 2, 1)
+    fit[:, : powers.shape[2]] = np.linalg.pinv(seen @ powers, hermitian=True) @ (seen @ local)
     scale = reach[:, None]
     velocity, acceleration, jerk = fit[:, 1] / scale, 2 * fit[:, 2] / scale**2, 6 * fit[:, 3] / scale**3
     normal = np.cross(velocity, acceleration)
