@@ -8,7 +8,6 @@ import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -188,7 +187,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
 
 def _root_vertex(skeleton, root) -> int:
     m = len(skeleton.vertices)
-    if isinstance(root, Integral) and not isinstance(root, bool):
+    if isinstance(root, (int, np.integer)) and not isinstance(root, bool):
         if not 0 <= root < m:
             raise InvalidParameterError(f"root = {root}: there are vertices 0 to {m - 1}")
         return int(root)
@@ -196,7 +195,7 @@ def _root_vertex(skeleton, root) -> int:
         point = np.asarray(root, float)
     except (TypeError, ValueError):
         point = np.empty(0)
-    if isinstance(root, bool) or point.shape != (3,) or not np.isfinite(point).all():
+    if point.shape != (3,) or not np.isfinite(point).all():
         raise InvalidParameterError(f"root = {root!r}: must be the number of a vertex or a point (x, y, z)")
     return int(np.argmin(np.linalg.norm(skeleton.vertices - point, axis=1)))
 
@@ -276,7 +275,7 @@ def _angle(skeleton, paths, row, parent):
 
 
 def _heading(curve, radius):
-    """Where a curve goes from its first point: from one radius along it to three; without a radius over its first quarter."""
+    """Where a curve goes from its first point: from one to three radii, or the first quarter."""
     along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
     reach = along[-1]
     near, far = np.minimum(np.multiply(AWAY, radius), [reach / 2, reach]) if radius > 0 else (0, reach / 4)

@@ -44,8 +44,8 @@ def branches(
         typer.Option(
             "--root",
             metavar="VERTEX|X,Y,Z",
-            help="Where the skeleton grows from: the number of a vertex, or a point near one. By default, its part with "
-            "the most volume.",
+            help="Where the skeleton grows from: the number of a vertex, or a point near one. By default, its part "
+            "with the most volume.",
         ),
     ] = None,
     as_json: Json = False,

@@ -57,7 +57,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: str | None = None)
 
     points, vertex = vertex_of_cloud(skeleton, cloud)
     branch = branch_of_point(skeleton, points, vertex)
-    geometry, attributes, put = _copy(points if cloud is None else cloud)
+    geometry, put = _copy(points if cloud is None else cloud)
     put("skeleton_vertex", vertex[:, None], "int32")
     put("branch", branch[:, None], "int32")
     put("radius", np.where(vertex >= 0, skeleton.radii[vertex], np.nan)[:, None])
@@ -98,13 +98,13 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
         found = np.full(len(points), -1)
         found[finite] = survivor[known[cKDTree(state.points[known]).query(points[finite])[1]]]
         survivor = found
-    geometry, _, put = _copy(points if cloud is None else cloud)
+    geometry, put = _copy(points if cloud is None else cloud)
     put("contracted", np.where((survivor >= 0)[:, None], state.contracted[survivor], np.nan))
     return geometry
 
 
 def _copy(cloud):
-    """A tensor geometry with its own copy of all data, its attributes, and a function that sets one of them."""
+    """A tensor geometry with its own copy of all data, and a function that sets one of its attributes."""
     o3d = import_open3d()
     name, tensor = open3d_class(cloud)
     if name in ("PointCloud", "TriangleMesh"):
@@ -122,4 +122,4 @@ def _copy(cloud):
         values = np.ascontiguousarray(values, None if dtype is None else dtype)
         attributes[key] = o3d.core.Tensor(values, own if dtype is None else None, positions.device)
 
-    return geometry, attributes, put
+    return geometry, put

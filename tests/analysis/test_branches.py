@@ -84,7 +84,7 @@ def test_a_root_inside_a_branch_and_at_a_junction():
     assert inside.level.tolist() == TREE.branch_table().level.tolist()
     assert inside.start[inside.level == 0].tolist() == [0]
     fork = TREE.branch_table(8)
-    assert np.flatnonzero(fork.level == 0).tolist() == np.flatnonzero((fork.start == 8)).tolist()
+    assert np.flatnonzero(fork.level == 0).tolist() == np.flatnonzero(fork.start == 8).tolist()
     assert (fork.level == 0).sum() == 3
     assert np.isnan(fork.angle[fork.level == 0]).all()
 
