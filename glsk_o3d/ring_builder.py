@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -67,7 +67,7 @@ class RingBuilder(Filter):
 
     consumes: ClassVar[str] = "cloud"
 
-    k: int | str = parameter(
+    k: int | str | Any = parameter(
         "auto",
         "Neighbours per point, itself included; at most all points. More bridge noise and gaps, fewer keep thin parts "
         "apart. 'auto' is 16 from 4096 points on and fewer below, by the cube root, at least 8; 'published' is 1.2 % "
