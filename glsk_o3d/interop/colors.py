@@ -22,7 +22,7 @@ def shades(skeleton: Skeleton, color, branch: np.ndarray, vertices: np.ndarray) 
     ----------
     skeleton : Skeleton
     color : {"branch", "radius", "confidence"} or three floats in [0, 1]
-        Branches have 20 colours in turn; radii go from dark blue, the least of the skeleton, to yellow, the largest;
+        Branches have 18 colours in turn; radii go from dark blue, the least of the skeleton, to yellow, the largest;
         confidences from 0 to 1 likewise. Or one colour for all: red, green, blue.
     branch : (n,) int array
         -1 for none: grey.
@@ -51,7 +51,7 @@ def shades(skeleton: Skeleton, color, branch: np.ndarray, vertices: np.ndarray) 
     from matplotlib import colormaps
 
     if color == "branch":
-        palette = np.array(colormaps["tab20"].colors)
+        palette = np.delete(colormaps["tab20"].colors, [14, 15], axis=0)  # grey is for none
         palette = np.concatenate([palette[::2], palette[1::2]])  # the strong ones first
         return np.where((branch >= 0)[:, None], palette[branch % len(palette)], GREY)
     if color == "radius":
