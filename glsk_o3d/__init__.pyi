@@ -17,6 +17,7 @@ from .interop.files import read_cloud, read_skeleton, save_skeleton
 from .interop.preview import save_preview
 from .lpr_reducer import LPRReducer
 from .pipeline import Pipeline, skeletonize
+from .reduction import remove_redundant_points
 from .refiner import Refiner
 from .report import IterationRecord, Report
 from .ring_builder import RingBuilder
@@ -51,6 +52,7 @@ __all__ = [
     "pipelines",
     "read_cloud",
     "read_skeleton",
+    "remove_redundant_points",
     "save_preview",
     "save_skeleton",
     "skeletonize",

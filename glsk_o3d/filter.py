@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import logging
 import math
 import re
 import time
@@ -12,12 +13,15 @@ from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from .errors import InvalidParameterError, StageError
+from .interop.verbosity import following_open3d
 
 if TYPE_CHECKING:
     from .pipeline import Pipeline
     from .report import IterationRecord
 
     OnIteration = Callable[[IterationRecord], bool | None]
+
+_log = logging.getLogger(__name__)
 
 
 def parameter(
@@ -175,9 +179,11 @@ class Filter(Parameters):
                 "the order is RingBuilder | Contractor | Connector | Refiner"
             )
         start = time.perf_counter()
-        result = self._run(data, on_iteration)
-        report = result.report.with_stage(self, time.perf_counter() - start)
-        return dataclasses.replace(result, report=report)
+        with following_open3d():
+            result = self._run(data, _logged(on_iteration))
+            seconds = time.perf_counter() - start
+            _log.debug("%s took %.3f s: %r", type(self).__name__, seconds, result)
+        return dataclasses.replace(result, report=result.report.with_stage(self, seconds))
 
     def __or__(self, other: Filter | Pipeline) -> Pipeline:
         from .pipeline import Pipeline
@@ -186,3 +192,19 @@ class Filter(Parameters):
 
     def _run(self, data, on_iteration):
         raise NotImplementedError
+
+
+def _logged(on_iteration):
+    """A callback that also logs every iteration, where somebody listens."""
+    if not _log.isEnabledFor(logging.DEBUG):
+        return on_iteration
+
+    def watch(record):
+        _log.debug(
+            "solve %d: %d points, %d merged, e %.4f, De %.4f, ring ratio %.4f, %.3f s",
+            *(record.iteration, record.n_points, record.n_merged, record.explained, record.explained_change),
+            *(record.ring_ratio, record.seconds),
+        )
+        return None if on_iteration is None else on_iteration(record)
+
+    return watch

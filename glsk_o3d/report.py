@@ -10,6 +10,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 from .errors import SkeletonWarning
+from .interop.verbosity import QUIET, open3d_is
 
 
 @dataclass(frozen=True)
@@ -118,8 +119,9 @@ class Report:
         return dataclasses.replace(self, stages=(*self.stages, repr(stage)), seconds={**self.seconds, name: total})
 
     def with_warning(self, message: str) -> Report:
-        """This report with a warning in it, which is also issued as a SkeletonWarning."""
-        _warnings.warn(message, SkeletonWarning, stacklevel=_outside())
+        """This report with a warning in it; also issued as a SkeletonWarning, unless Open3D's verbosity is Error."""
+        if not open3d_is(QUIET):
+            _warnings.warn(message, SkeletonWarning, stacklevel=_outside())
         return dataclasses.replace(self, warnings=(*self.warnings, message))
 
     def to_dict(self) -> dict:

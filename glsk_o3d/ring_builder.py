@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .errors import InvalidCloudError
-from .filter import Filter, documented, parameter
-from .interop.open3d import cloud_points
+from .errors import InvalidCloudError, InvalidParameterError
+from .filter import Filter, documented, parameter, resolve_length
+from .interop.open3d import cloud_points, search_parameters
 from .numerics.frame import Frame
 from .numerics.neighbourhoods import isolation, nearest_neighbours, principal
 from .numerics.ordering import morton_order
@@ -20,6 +20,7 @@ from .report import Report
 from .state import Contraction
 
 MIN_POINTS = 8
+LEAST_RING = 3
 ROUNDS = 4  # of setting outliers aside
 SMALLEST, LARGEST = 1e-120, 1e120  # extents whose squares and products a float64 holds
 ALONE, FAIRLY_NOISY = 1.8, 0.2  # isolation of a denoised point that is set aside, and its least noise
@@ -48,10 +49,16 @@ class RingBuilder(Filter):
     cloud is taken in its own working frame (centred, longest side 1.6), in Morton order and without duplicates (points
     that differ by rounding are one); what comes out is mapped back to the user's order and units.
 
+    For `k` Open3D's own search parameters may be given: ``KDTreeSearchParamKNN(knn)`` is ``k=knn``,
+    ``KDTreeSearchParamHybrid(radius, max_nn)`` is ``k=max_nn, radius=radius``, and ``KDTreeSearchParamRadius(radius)``,
+    which has no limit of its own, is ``k=30, radius=radius``.
+
     Raises
     ------
     InvalidCloudError
         For points that are not finite (unless dropped), fewer than 8 distinct points, and anything that is no cloud.
+    InvalidParameterError
+        If the radius leaves more than half of the points without three neighbours.
 
     References
     ----------
@@ -60,7 +67,7 @@ class RingBuilder(Filter):
 
     consumes: ClassVar[str] = "cloud"
 
-    k: int | str = parameter(
+    k: int | str | Any = parameter(
         "auto",
         "Neighbours per point, itself included; at most all points. More bridge noise and gaps, fewer keep thin parts "
         "apart. 'auto' is 16 from 4096 points on and fewer below, by the cube root, at least 8; 'published' is 1.2 % "
@@ -70,6 +77,14 @@ class RingBuilder(Filter):
         low=4,
         high=256,
         choices=("auto", "published"),
+    )
+    radius: float | str | None = parameter(
+        None,
+        "Neighbours farther away than this are left out of the ring, but for the three nearest; None for no limit.",
+        type="length?",
+        unit="cloud's units, or % of the diagonal",
+        low=0,
+        open_low=True,
     )
     outlier_factor: float = parameter(
         2.5,
@@ -96,6 +111,14 @@ class RingBuilder(Filter):
     drop_invalid: bool = parameter(
         False, "Drop points with NaN or infinite coordinates instead of refusing.", type="bool"
     )
+
+    def __post_init__(self):
+        # as plain numbers they can be compared, printed and written to files
+        if not isinstance(self.k, (int, str)):
+            for name, value in search_parameters(self.k).items():
+                if name == "radius" and self.radius is not None:
+                    raise InvalidParameterError(f"RingBuilder.radius = {self.radius!r}: {self.k!r} already has one")
+                object.__setattr__(self, name, value)
 
     def _run(self, cloud, on_iteration):
         points = cloud_points(cloud)
@@ -129,7 +152,7 @@ class RingBuilder(Filter):
             )
             axes = principal(distinct, neighbours)[1]
         n = len(distinct)
-        rings = star_rings(distinct, np.arange(n), neighbours[:, 1:], axes[:, :, 1:])
+        rings = star_rings(distinct, np.arange(n), self._within(distinct, neighbours[:, 1:], frame), axes[:, :, 1:])
         _, ring_size = rings.nearest(distinct)
         return Contraction(
             points=points,
@@ -176,6 +199,21 @@ class RingBuilder(Filter):
         )
         neighbours[changed] = nearest_neighbours(calm, k, of=calm[changed])[1]
         return calm, neighbours, left, nearest
+
+    def _within(self, cloud, neighbours, frame):
+        """The neighbours without those beyond the radius, which become -1."""
+        if self.radius is None:
+            return neighbours
+        radius = resolve_length(self.radius, frame.diagonal * frame.scale) / frame.scale
+        far = ((cloud[neighbours] - cloud[:, None]) ** 2).sum(axis=2) > radius**2
+        alone = np.count_nonzero(far[:, LEAST_RING - 1])
+        if 2 * alone > len(cloud):
+            raise InvalidParameterError(
+                f"RingBuilder.radius = {self.radius!r}: {alone} of {len(cloud)} points have fewer than {LEAST_RING} "
+                "neighbours so near; is it in the cloud's units?"
+            )
+        far[:, :LEAST_RING] = False
+        return np.where(far, -1, neighbours)
 
     def _neighbours(self, n):
         return min({"auto": usual_k, "published": published_k}[self.k](n) if isinstance(self.k, str) else self.k, n)

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     import networkx
 
+    from .analysis.branches import BranchTable
+
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
@@ -151,34 +153,89 @@ class Skeleton:
                 paths.append(np.array(path))
         return tuple(paths)
 
-    def to_networkx(self) -> networkx.Graph:
-        """Graph; nodes have ``position`` (3-tuple), ``radius`` and ``confidence``, edges ``length``.
+    def segment(self, cloud=None) -> np.ndarray:
+        """Label every point with its branch, (N,) int64 array. See `glsk_o3d.analysis.segment`."""
+        from .analysis.segmentation import segment
+
+        return segment(self, cloud)
+
+    def branch_table(self, root=None) -> BranchTable:
+        """One row of measures per branch. See `glsk_o3d.analysis.branch_table`."""
+        from .analysis.branches import branch_table
+
+        return branch_table(self, root)
+
+    def annotate(self, cloud=None, *, color: str | None = None):
+        """A copy of a cloud with the attributes ``skeleton_vertex``, ``branch`` and ``radius``.
+
+        See `glsk_o3d.interop.annotation.annotate`.
+        """
+        from .interop.annotation import annotate
+
+        return annotate(self, cloud, color=color)
+
+    def to_networkx(self, root=None) -> networkx.Graph:
+        """Graph that carries everything that is known about the skeleton.
+
+        Parameters
+        ----------
+        root : int or (x, y, z), optional
+            See `branch_table`.
 
         Returns
         -------
         networkx.Graph
+            Nodes have ``position`` (3-tuple), ``radius``, ``confidence``, ``curvature`` and ``torsion``; edges
+            ``length`` and ``branch``. ``graph.graph["branches"]`` is the branch table, a list of dicts, with a row for
+            every value of ``branch``.
         """
         import networkx
 
-        graph = networkx.Graph()
-        facts = zip(self.vertices.tolist(), self.radii.tolist(), self.confidence.tolist(), strict=True)
-        for i, (position, radius, confidence) in enumerate(facts):
-            graph.add_node(i, position=tuple(position), radius=radius, confidence=confidence)
-        for (a, b), length in zip(self.edges.tolist(), self.edge_lengths.tolist(), strict=True):
-            graph.add_edge(a, b, length=length)
+        from .analysis.curvature import curvature_torsion
+        from .analysis.segmentation import branch_of_edge
+
+        names = ("radius", "confidence", "curvature", "torsion")
+        values = np.stack([self.radii, self.confidence, *curvature_torsion(self)], axis=1).tolist()
+        graph = networkx.Graph(branches=list(self.branch_table(root)) if len(self.vertices) else [])
+        for i, (position, facts) in enumerate(zip(self.vertices.tolist(), values, strict=True)):
+            graph.add_node(i, position=tuple(position), **dict(zip(names, facts, strict=True)))
+        facts = zip(self.edges.tolist(), self.edge_lengths.tolist(), branch_of_edge(self).tolist(), strict=True)
+        for (a, b), length, branch in facts:
+            graph.add_edge(a, b, length=length, branch=branch)
         return graph
 
-    def to_line_set(self):
-        """The skeleton as an ``open3d.geometry.LineSet``."""
+    def to_line_set(self, color=(0.85, 0.1, 0.1)):
+        """The skeleton as an ``open3d.geometry.LineSet``.
+
+        Parameters
+        ----------
+        color : {"branch", "radius", "confidence"} or three floats in [0, 1]
+            What the colours of the edges show, or the one colour of all.
+        """
         from .interop.open3d import to_line_set
 
-        return to_line_set(self)
+        return to_line_set(self, color)
 
-    def to_tensor_line_set(self):
-        """The skeleton as an ``open3d.t.geometry.LineSet`` with the point attributes ``radii`` and ``confidence``."""
+    def to_tensor_line_set(self, color=None):
+        """The skeleton as an ``open3d.t.geometry.LineSet`` with the point attributes ``radii`` and ``confidence``.
+
+        Parameters
+        ----------
+        color : {"branch", "radius", "confidence"} or three floats in [0, 1], optional
+            What the colours of the edges show, or the one colour of all; by default there are none.
+        """
         from .interop.open3d import to_tensor_line_set
 
-        return to_tensor_line_set(self)
+        return to_tensor_line_set(self, color)
+
+    def to_tubes(self, color="branch", *, radius: float | None = None, sides: int = 16):
+        """The skeleton as tubes as thick as the object, an ``open3d.geometry.TriangleMesh``.
+
+        See `glsk_o3d.interop.tubes.to_tubes`.
+        """
+        from .interop.tubes import to_tubes
+
+        return to_tubes(self, color, radius=radius, sides=sides)
 
     def to_pymeshlab(self):
         """The skeleton as a ``pymeshlab.Mesh`` of vertices and edges (extra ``meshlab``)."""

@@ -111,3 +111,12 @@ class Contraction:
         from .interop.open3d import to_point_cloud
 
         return to_point_cloud(self.contracted)
+
+    def annotate(self, cloud=None):
+        """A copy of a cloud with the attribute ``contracted``.
+
+        See `glsk_o3d.interop.annotation.annotate_contraction`.
+        """
+        from .interop.annotation import annotate_contraction
+
+        return annotate_contraction(self, cloud)

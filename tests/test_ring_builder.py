@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay, cKDTree
 
-from glsk_o3d import Contraction, InvalidCloudError, RingBuilder, samples
+from glsk_o3d import Contraction, InvalidCloudError, InvalidParameterError, RingBuilder, samples
 from glsk_o3d.numerics.neighbourhoods import isolation, nearest_neighbours, principal
 from glsk_o3d.numerics.ridges import noise_share, to_ridges
 from glsk_o3d.ring_builder import ALONE, FAIRLY_NOISY, MIN_POINTS, published_k, usual_k
@@ -371,3 +371,61 @@ def test_more_neighbours_than_points_are_all_points():
 def test_to_point_cloud():
     cloud = RingBuilder()(TORUS).to_point_cloud()
     np.testing.assert_allclose(np.sort(np.asarray(cloud.points), axis=0), np.sort(TORUS, axis=0), atol=1e-15)
+
+
+# ------------------------------------------------------------------------------------------ Open3D's search parameters
+
+
+@pytest.fixture(scope="module")
+def search():
+    import open3d
+
+    return open3d.geometry
+
+
+def test_open3d_search_parameters_are_plain_numbers_inside(search):
+    cases = [
+        (RingBuilder(k=search.KDTreeSearchParamKNN(12)), RingBuilder(k=12)),
+        (RingBuilder(k=search.KDTreeSearchParamHybrid(0.5, 20)), RingBuilder(k=20, radius=0.5)),
+        (RingBuilder(k=search.KDTreeSearchParamRadius(0.25)), RingBuilder(k=30, radius=0.25)),
+    ]
+    for given, plain in cases:
+        given.check()
+        assert given == plain
+        assert hash(given) == hash(plain)
+        assert eval(repr(given)) == plain
+    same = RingBuilder(k=search.KDTreeSearchParamKNN(12))(TORUS)
+    np.testing.assert_array_equal(same.rings.indices, RingBuilder(k=12)(TORUS).rings.indices)
+
+
+def test_open3d_search_parameters_that_do_not_fit(search):
+    for k, message in (
+        (search.KDTreeSearchParamKNN(2), "k = 2: must be at least 4"),
+        (search.KDTreeSearchParamHybrid(-0.5, 20), "radius = -0.5: must be above 0"),
+        (search.KDTreeSearchParam, "k = .*: must be an int"),
+        (search.KDTreeFlann(), "k = .*: must be an int"),
+    ):
+        with pytest.raises(InvalidParameterError, match=message):
+            RingBuilder(k=k)(TORUS)
+    with pytest.raises(InvalidParameterError, match="already has one"):
+        RingBuilder(k=search.KDTreeSearchParamRadius(0.5), radius=0.2)
+
+
+def test_radius_limits_the_rings():
+    free, wide = RingBuilder(k=16)(TORUS), RingBuilder(k=16, radius=10.0)(TORUS)
+    np.testing.assert_array_equal(free.rings.indices, wide.rings.indices)
+    radius = 0.09
+    near = RingBuilder(k=16, radius=radius)(TORUS)
+    assert len(near.rings.indices) < len(free.rings.indices)
+    scale = near.frame.scale
+    third = cKDTree(near.cloud).query(near.cloud, 4)[0][:, 3] * scale
+    length = near.rings.edge_lengths(near.cloud) * scale
+    assert (length <= np.maximum(radius, third[near.rings.owners]) * (1 + 1e-9)).all()
+    percent = RingBuilder(k=16, radius="5%")(TORUS)
+    absolute = RingBuilder(k=16, radius=0.05 * near.frame.diagonal * scale)(TORUS)
+    np.testing.assert_array_equal(percent.rings.indices, absolute.rings.indices)
+
+
+def test_a_radius_in_the_wrong_units_is_refused():
+    with pytest.raises(InvalidParameterError, match=r"points have fewer than 3 neighbours so near"):
+        RingBuilder(radius=1e-6)(TORUS)

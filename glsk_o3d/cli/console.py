@@ -49,15 +49,19 @@ def console(*, stderr: bool = False) -> Any:
     return Console(stderr=stderr, markup=False, highlight=False, emoji=False)
 
 
-def print_table(table: Any, *, stderr: bool = False) -> None:
+def print_table(table: Any, *, stderr: bool = False, whole: bool = False) -> None:
     """Print a rich table without the spaces that fill its lines.
 
     Parameters
     ----------
     table : rich.table.Table
     stderr : bool
+    whole : bool
+        Leave the columns as wide as they are, however narrow the terminal is.
     """
     out = console(stderr=stderr)
+    if whole:
+        out.width = 10**4
     with out.capture() as captured:
         out.print(table)
     typer.echo("\n".join(line.rstrip() for line in captured.get().splitlines()), err=stderr)

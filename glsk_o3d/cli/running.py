@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import tempfile
 import time
@@ -20,7 +19,6 @@ from ..pipeline import Pipeline
 from ..skeleton import Skeleton
 from .console import WrongUsage, print_iterations, print_json, print_rows
 
-_log = logging.getLogger(__name__)
 _DOING = {
     "RingBuilder": "building rings",
     "Contractor": "contracting",
@@ -105,11 +103,9 @@ def run(pipeline: Pipeline, cloud: Any, update) -> tuple[Skeleton, float]:
     start = time.perf_counter()
     flow = cloud
     for stage in pipeline.stages:
-        began = time.perf_counter()
         doing = _DOING.get(type(stage).__name__, type(stage).__name__)
         update(doing)
         flow = stage(flow, on_iteration=_watch(stage, doing, update))
-        _log.info("%s took %.3f s", type(stage).__name__, time.perf_counter() - began)
     return flow, time.perf_counter() - start
 
 
@@ -119,11 +115,6 @@ def _watch(stage: Filter, doing: str, update):
     def on_iteration(record):
         left = record.n_points - record.n_merged
         update(f"{doing}: solve {record.iteration} of at most {most}, {left} points", record.iteration, most)
-        _log.debug(
-            "solve %d: %d points, %d merged, e %.4f, De %.4f, ring ratio %.4f, %.3f s",
-            *(record.iteration, record.n_points, record.n_merged, record.explained, record.explained_change),
-            *(record.ring_ratio, record.seconds),
-        )
 
     return on_iteration
 

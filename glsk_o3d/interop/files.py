@@ -24,6 +24,7 @@ from ..errors import FileFormatError, MissingPackageError
 from ..report import Report
 from ..skeleton import Skeleton
 from .open3d import import_open3d, require
+from .verbosity import following_open3d
 
 CLOUD_ENDINGS = (".ply", ".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts")
 """Files that `read_cloud` reads as clouds."""
@@ -86,7 +87,8 @@ def read_cloud(path: str | os.PathLike) -> Any:
     if not cloud.has_points():
         raise FileFormatError(f"{path}: no points could be read: it is damaged, empty, or not a {ending} file")
     if rows > len(cloud.points):
-        _log.warning("%s: %d of %d lines hold no point and were skipped", path, rows - len(cloud.points), rows)
+        with following_open3d():
+            _log.warning("%s: %d of %d lines hold no point and were skipped", path, rows - len(cloud.points), rows)
     return cloud
 
 
@@ -543,7 +545,10 @@ def _write_swc(skeleton: Skeleton, cut_loops: bool = False) -> bytes:
             "pass cut_loops=True to drop an edge of each, or choose another format"
         )
     networkx = require("networkx")
-    forest = networkx.minimum_spanning_tree(skeleton.to_networkx(), weight="length")
+    graph = networkx.Graph()
+    graph.add_nodes_from(range(len(skeleton.vertices)))
+    graph.add_weighted_edges_from(zip(*skeleton.edges.T.tolist(), skeleton.edge_lengths.tolist(), strict=True))
+    forest = networkx.minimum_spanning_tree(graph)
     order = list(networkx.dfs_preorder_nodes(forest))
     number = {vertex: i for i, vertex in enumerate(order, 1)}
     parent = {child: number[vertex] for vertex, child in networkx.dfs_edges(forest)}

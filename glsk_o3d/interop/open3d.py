@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 ACCEPTED = "an Open3D point cloud or triangle mesh (legacy or tensor) or an (N, 3) array of real numbers"
+MOST_NEIGHBOURS = 30  # within a radius without a limit of its own: as many as Open3D's KDTreeSearchParamKNN has
 
 _DEBIAN = {  # shared library -> Debian package, where the one does not follow from the other
     "libGL": "libgl1",
@@ -128,21 +129,61 @@ def cloud_points(cloud: Any) -> np.ndarray:
 
 def _held(cloud):
     """The array-like in an Open3D object, or `cloud` itself; knows Open3D's classes by name, so as not to import it."""
-    for cls in type(cloud).__mro__:
-        if cls.__module__.partition(".")[0] != "open3d":
-            continue
-        if cls.__name__ == "Tensor":
-            return cloud.cpu().numpy()
-        if cls.__name__ in ("PointCloud", "TriangleMesh"):
-            field = "point" if cls.__name__ == "PointCloud" else "vertex"
-            if not hasattr(cloud, field):
-                return cloud.points if field == "point" else cloud.vertices
-            attributes = getattr(cloud, field)
-            return attributes.positions.cpu().numpy() if "positions" in attributes else np.empty((0, 3))
-        if cls.__name__.endswith("Vector"):
-            return cloud
-        raise InvalidCloudError(f"an Open3D {cls.__name__} is no cloud: give {ACCEPTED}")
-    return cloud
+    name, tensor = open3d_class(cloud)
+    if name == "Tensor":
+        return cloud.cpu().numpy()
+    if name in ("PointCloud", "TriangleMesh"):
+        field = "point" if name == "PointCloud" else "vertex"
+        if not tensor:
+            return cloud.points if field == "point" else cloud.vertices
+        attributes = getattr(cloud, field)
+        return attributes.positions.cpu().numpy() if "positions" in attributes else np.empty((0, 3))
+    if name == "" or name.endswith("Vector"):
+        return cloud
+    raise InvalidCloudError(f"an Open3D {name} is no cloud: give {ACCEPTED}")
+
+
+def open3d_class(thing: Any) -> tuple[str, bool]:
+    """The name of the Open3D class that something is of, and whether it is one of the tensor API.
+
+    Parameters
+    ----------
+    thing : object
+
+    Returns
+    -------
+    name : str
+        Empty if it is not Open3D's.
+    tensor : bool
+    """
+    for cls in type(thing).__mro__:
+        package, *_ = parts = cls.__module__.split(".")
+        if package == "open3d":
+            return cls.__name__, "t" in parts or "core" in parts
+    return "", False
+
+
+def search_parameters(given: Any) -> dict[str, Any]:
+    """The number of neighbours and the radius in Open3D's ``KDTreeSearchParam*``.
+
+    Parameters
+    ----------
+    given : object
+
+    Returns
+    -------
+    dict
+        With ``k``, and with ``radius`` (float) if there is one; for a radius alone, `k` is `MOST_NEIGHBOURS`. Empty for
+        anything else.
+    """
+    name, _ = open3d_class(given)
+    if name == "KDTreeSearchParamKNN":
+        return {"k": int(given.knn)}
+    if name == "KDTreeSearchParamHybrid":
+        return {"k": int(given.max_nn), "radius": float(given.radius)}
+    if name == "KDTreeSearchParamRadius":
+        return {"k": MOST_NEIGHBOURS, "radius": float(given.radius)}
+    return {}
 
 
 def to_point_cloud(points: np.ndarray) -> Any:
@@ -164,14 +205,14 @@ def to_point_cloud(points: np.ndarray) -> Any:
     return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(_rows(points, float, 3)))
 
 
-def to_line_set(skeleton: Skeleton, color: tuple[float, float, float] = (0.85, 0.1, 0.1)) -> Any:
+def to_line_set(skeleton: Skeleton, color: Any = (0.85, 0.1, 0.1)) -> Any:
     """A skeleton as a legacy line set, ready for ``draw_geometries``.
 
     Parameters
     ----------
     skeleton : Skeleton
-    color : 3 floats in [0, 1]
-        Red, green and blue of every edge.
+    color : {"branch", "radius", "confidence"} or three floats in [0, 1]
+        What the colours of the edges show, or the one colour of all; see `glsk_o3d.interop.colors.shades`.
 
     Returns
     -------
@@ -180,40 +221,58 @@ def to_line_set(skeleton: Skeleton, color: tuple[float, float, float] = (0.85, 0
 
     Raises
     ------
+    InvalidParameterError
+        The colour is unknown.
     MissingPackageError
     """
     o3d = import_open3d()
     lines = o3d.geometry.LineSet()
     lines.points = o3d.utility.Vector3dVector(_rows(skeleton.vertices, float, 3))
     lines.lines = o3d.utility.Vector2iVector(_rows(skeleton.edges, np.int32, 2))
-    lines.colors = o3d.utility.Vector3dVector(np.tile(np.asarray(color, float), (len(skeleton.edges), 1)))
+    lines.colors = o3d.utility.Vector3dVector(_edge_colors(skeleton, color))
     return lines
 
 
-def to_tensor_line_set(skeleton: Skeleton) -> Any:
+def to_tensor_line_set(skeleton: Skeleton, color: Any = None) -> Any:
     """A skeleton as a tensor line set.
 
     Parameters
     ----------
     skeleton : Skeleton
+    color : {"branch", "radius", "confidence"} or three floats in [0, 1], optional
+        As for `to_line_set`; by default there are no colours.
 
     Returns
     -------
     open3d.t.geometry.LineSet
         On the CPU: ``point.positions`` (M, 3), ``point.radii`` and ``point.confidence`` (M, 1) float64, and
-        ``line.indices`` (E, 2) int64.
+        ``line.indices`` (E, 2) int64 and ``line.branch`` (E, 1) int32; with a color, ``line.colors`` (E, 3) float64.
 
     Raises
     ------
+    InvalidParameterError
+        The colour is unknown.
     MissingPackageError
     """
+    from ..analysis.segmentation import branch_of_edge
+
     o3d = import_open3d()
     lines = o3d.t.geometry.LineSet()
     lines.point.positions = o3d.core.Tensor(_rows(skeleton.vertices, float, 3))
     lines.point.radii = o3d.core.Tensor(_rows(skeleton.radii, float, 1))
     lines.point.confidence = o3d.core.Tensor(_rows(skeleton.confidence, float, 1))
     lines.line.indices = o3d.core.Tensor(_rows(skeleton.edges, np.int64, 2))
+    lines.line.branch = o3d.core.Tensor(_rows(branch_of_edge(skeleton), np.int32, 1))
+    if color is not None:
+        lines.line.colors = o3d.core.Tensor(_rows(_edge_colors(skeleton, color), float, 3))
     return lines
+
+
+def _edge_colors(skeleton, color):
+    from ..analysis.segmentation import branch_of_edge
+    from .colors import shades
+
+    return shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
 
 
 def _rows(array, dtype, columns):

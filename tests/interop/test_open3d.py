@@ -4,6 +4,8 @@ import sys
 import numpy as np
 import pytest
 
+from glsk_o3d import samples, skeletonize
+from glsk_o3d.catalogue import catalogue
 from glsk_o3d.errors import InvalidCloudError, MissingPackageError
 from glsk_o3d.interop import open3d as door
 
@@ -185,3 +187,21 @@ def test_missing_open3d_says_what_to_install(monkeypatch, error, says):
         door.import_open3d()
     assert "open3d" in str(caught.value)
     assert caught.value.__cause__ is error
+
+
+def test_filters_take_every_kind_of_cloud_and_leave_it_alone(o3d):
+    points = samples.torus(200).points
+    for name, make, dtype in (
+        ("legacy", lambda: o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points)), np.float64),
+        ("float32", lambda: o3d.t.geometry.PointCloud(o3d.core.Tensor(points.astype(np.float32))), np.float32),
+        ("float64", lambda: o3d.t.geometry.PointCloud(o3d.core.Tensor(points)), np.float64),
+        ("mesh", lambda: o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(points), o3d.utility.Vector3iVector()),
+         np.float64),
+    ):  # fmt: skip
+        cloud, expected = make(), points.astype(dtype).astype(float)
+        for consumer in (cls() for cls in catalogue().values() if getattr(cls, "consumes", None) == "cloud"):
+            found, plain = consumer(cloud), consumer(expected)
+            np.testing.assert_array_equal(found.positions, plain.positions, err_msg=name)
+            np.testing.assert_array_equal(found.rings.indices, plain.rings.indices, err_msg=name)
+        np.testing.assert_array_equal(skeletonize(cloud).vertices, skeletonize(expected).vertices, err_msg=name)
+        np.testing.assert_array_equal(door.cloud_points(cloud), expected)

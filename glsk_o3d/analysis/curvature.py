@@ -1,0 +1,117 @@
+"""Curvature and torsion along the branches of a skeleton."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import InvalidParameterError
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
+
+DEGREE = 4  # of the local polynomials: with an odd one less the second derivative of a bend is too small
+LEAST = 7  # vertices in a window, where the branch has as many
+REACH = 5.0  # half the window, in median radii of the branch
+STRAIGHT = 0.1  # radians turned over half a window below which a curve has no osculating plane to speak of
+
+
+def curvature_torsion(skeleton: Skeleton, window: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Curvature and torsion of a skeleton's branches, as curves in space.
+
+    Around every vertex a polynomial of fourth degree is fitted to the branch by weighted least squares, in arc length
+    over a window; the Frenet formulas give curvature |r' x r''| / |r'|^3 and torsion (r' x r'') . r''' / |r' x r''|^2.
+    Closed branches are taken as closed. Near an open end, within half of half a window, they are those half of half a
+    window away from it: one-sided fits mean little.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    window : float, optional
+        Half the length of the window, in the cloud's units; by default five median radii of the branch, or a quarter of
+        its length where radii are unknown. Bends that are tighter are smoothed; the rest comes out better the longer
+        it is. It is never so short that it holds fewer than seven vertices.
+
+    Returns
+    -------
+    curvature, torsion : (M,) float arrays
+        Per vertex, in 1 / the cloud's unit. Curvature is not negative; torsion is positive on a right-handed screw.
+        Both are NaN at junctions, where curves meet, and at vertices without edges; torsion is NaN also where the curve
+        is straight, turning less than 0.1 radians over half a window. Curves with fewer than four vertices have no
+        torsion either.
+
+    Raises
+    ------
+    InvalidParameterError
+        The window is not positive.
+
+    Notes
+    -----
+    Exact on straight lines. On finely sampled circles and helices, with x = window * sqrt(curvature^2 + torsion^2), the
+    relative error of the curvature is 0.0006 x^4 and that of the torsion 0.03 x^2, up to x = 1.2.
+    """
+    if window is not None and not (np.isfinite(window) and window > 0):
+        raise InvalidParameterError(f"window = {window!r}: must be a length above 0, in the cloud's units")
+    curvature, torsion = np.full((2, len(skeleton.vertices)), np.nan)
+    for path in skeleton.branches:
+        half = window or REACH * float(np.median(skeleton.radii[path]))
+        curve = skeleton.vertices[path]
+        closed = path[0] == path[-1] and skeleton.degree[path[0]] == 2
+        curvature[path], torsion[path] = bend(curve, half if np.isfinite(half) and half > 0 else None, closed)
+    curvature[skeleton.junctions] = torsion[skeleton.junctions] = np.nan
+    return curvature, torsion
+
+
+@np.errstate(all="ignore")
+def bend(curve, half=None, closed=False):
+    """Curvature and torsion of one curve at its vertices; see `curvature_torsion`.
+
+    Parameters
+    ----------
+    curve : (n, 3) float array
+        At least two points; the last is the first again if it is closed.
+    half : float, optional
+        Half the window; by default a quarter of the length.
+    closed : bool
+
+    Returns
+    -------
+    curvature, torsion : (n,) float arrays
+    """
+    n = len(curve)
+    along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
+    unit = along[-1]
+    if not (np.isfinite(unit) and unit > 0):
+        return np.full((2, n), np.nan)
+    curve, along, length = (curve - curve[0]) / unit, along / unit, 1.0
+    half = min(half / unit if half else length / 4, length / 2)
+    if closed:
+        centre = along
+        curve = np.concatenate([curve[:-1], curve[:-1], curve])
+        along = np.concatenate([along[:-1] - length, along[:-1], along + length])
+    else:
+        centre = np.clip(along, half / 2, length - half / 2)
+    least = min(LEAST, len(along))
+    reach = np.maximum(half, 1.001 * cKDTree(along[:, None]).query(centre[:, None], [least])[0][:, 0])
+    first, last = np.searchsorted(along, centre - reach), np.searchsorted(along, centre + reach, side="right")
+    row = first[:, None] + np.arange((last - first).max())
+    inside = row < last[:, None]
+    row = np.minimum(row, len(along) - 1)
+    u = (along[row] - centre[:, None]) / reach[:, None]
+    weight = np.where(inside, np.maximum(1 - np.abs(u), 0) ** 1.5 + 1e-3, 0)[:, :, None]
+    powers = u[:, :, None] ** np.arange(min(DEGREE, least - 1) + 1)
+    local = curve[row] - curve[row].mean(axis=1, keepdims=True)
+    fit = np.zeros((n, DEGREE + 1, 3))
+    seen = (weight**2 * powers).transpose(0, 2, 1)
+    fit[:, : powers.shape[2]] = np.linalg.pinv(seen @ powers, hermitian=True) @ (seen @ local)
+    scale = reach[:, None]
+    velocity, acceleration, jerk = fit[:, 1] / scale, 2 * fit[:, 2] / scale**2, 6 * fit[:, 3] / scale**3
+    normal = np.cross(velocity, acceleration)
+    size = np.linalg.norm(normal, axis=1)
+    speed = np.linalg.norm(velocity, axis=1)
+    curvature = np.divide(size, speed**3, out=np.full(n, np.nan), where=speed > 0)
+    planar = (curvature * reach > STRAIGHT) & (least > 3)
+    torsion = np.divide((normal * jerk).sum(axis=1), size**2, out=np.full(n, np.nan), where=planar)
+    return curvature / unit, torsion / unit

@@ -1,0 +1,142 @@
+"""Points of a cloud by branch of its skeleton."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import InvalidCloudError, InvalidParameterError
+from ..interop.open3d import cloud_points
+from ..refinement.medial import nearest_on_edges
+from .metrics import _along, _pieces
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
+
+PIECES = 4000  # that a curve is cut into, to find the one nearest to a point
+
+
+def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
+    """Label every point with the branch that it belongs to.
+
+    A point belongs to the branch of its vertex; around a junction, to the branch whose curve is nearest.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    cloud : cloud, optional
+        By default the cloud that the skeleton was made from. Points of another one, such as the full scan of which a
+        thinned one was skeletonised, go with the nearest point of that; if the skeleton came from a file that holds no
+        cloud, with the nearest place on the curve.
+
+    Returns
+    -------
+    (N,) int64 array
+        Rows of `Skeleton.branch_table`: positions in `Skeleton.branches`, and after these the vertices without edges in
+        their order. -1 only for points with coordinates that are not finite.
+
+    Raises
+    ------
+    InvalidCloudError
+        There is no cloud, or it is none.
+    InvalidParameterError
+        The skeleton is empty.
+    """
+    points, vertex = vertex_of_cloud(skeleton, cloud)
+    return branch_of_point(skeleton, points, vertex)
+
+
+def vertex_of_cloud(skeleton, cloud=None):
+    """The points of a cloud and the vertex of each; -1 for those that are not finite.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    cloud : cloud, optional
+        As for `segment`.
+
+    Returns
+    -------
+    points : (N, 3) float64 array
+    vertex : (N,) int64 array
+    """
+    if len(skeleton.vertices) == 0:
+        raise InvalidParameterError("the skeleton is empty: there is nothing to label points with")
+    if cloud is None:
+        if len(skeleton.points) == 0:
+            raise InvalidCloudError("this skeleton came without its cloud: give the cloud, too")
+        return skeleton.points, skeleton.vertex_of_point
+    points = cloud_points(cloud)
+    if np.array_equal(points, skeleton.points, equal_nan=True):
+        return points, skeleton.vertex_of_point
+    vertex = np.full(len(points), -1)
+    finite = np.isfinite(points).all(axis=1)
+    known = np.flatnonzero(skeleton.vertex_of_point >= 0)
+    if len(known):
+        nearest = cKDTree(skeleton.points[known]).query(points[finite])[1]
+        vertex[finite] = skeleton.vertex_of_point[known[nearest]]
+    else:
+        vertex[finite] = _nearest_vertex(skeleton, points[finite])
+    return points, vertex
+
+
+def _nearest_vertex(skeleton, points):
+    """The nearer end of the edge that is nearest to each point; vertices without edges count, too."""
+    length = skeleton.edge_lengths.sum()
+    alone = np.flatnonzero(skeleton.degree == 0)
+    if length == 0:
+        return cKDTree(skeleton.vertices).query(points)[1]
+    row, part = _pieces(skeleton.vertices, skeleton.edges, length / PIECES)
+    places = np.concatenate([_along(skeleton.edges, row, part, skeleton.vertices), skeleton.vertices[alone]])
+    ends = np.where(part < 0.5, *skeleton.edges[row].T)
+    return np.concatenate([ends, alone])[cKDTree(places).query(points)[1]]
+
+
+def branch_of_edge(skeleton):
+    """The position in `Skeleton.branches` of every edge, (E,) int array."""
+    m, none = len(skeleton.vertices), np.empty((0, 2), int)
+    steps = [np.column_stack([path[:-1], path[1:]]) for path in skeleton.branches]
+    found, edges = (np.sort(pairs, axis=1) @ [m, 1] for pairs in (np.concatenate([*steps, none]), skeleton.edges))
+    branch = np.empty(len(edges), int)
+    branch[np.argsort(edges)] = np.repeat(np.arange(len(steps)), list(map(len, steps)))[np.argsort(found)]
+    return branch
+
+
+def branch_of_vertex(skeleton):
+    """The row of the branch table of every vertex, (M,) int array; -1 for junctions."""
+    branch = np.full(len(skeleton.vertices), -1)
+    branch[skeleton.edges] = branch_of_edge(skeleton)[:, None]
+    branch[skeleton.junctions] = -1
+    alone = skeleton.degree == 0
+    branch[alone] = len(skeleton.branches) + np.arange(alone.sum())
+    return branch
+
+
+@np.errstate(all="ignore")
+def branch_of_point(skeleton, points, vertex):
+    """`segment`, for points whose vertices are known.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    points : (N, 3) float array
+    vertex : (N,) int array
+
+    Returns
+    -------
+    (N,) int64 array
+    """
+    label = np.where(vertex >= 0, branch_of_vertex(skeleton)[vertex], -1)
+    edge_branch = branch_of_edge(skeleton)
+    unsure = np.flatnonzero((vertex >= 0) & (label < 0))
+    unsure = unsure[np.argsort(vertex[unsure], kind="stable")]
+    groups = np.split(unsure, np.flatnonzero(np.diff(vertex[unsure])) + 1) if len(unsure) else []
+    for rows in groups:  # one junction each
+        around = (skeleton.edges == vertex[rows[0]]).any(axis=1)
+        edges = np.flatnonzero(np.isin(edge_branch, edge_branch[around]))
+        candidates = np.broadcast_to(edges, (len(rows), len(edges)))
+        edge = nearest_on_edges(skeleton.vertices, skeleton.edges, candidates, points[rows])[0]
+        label[rows] = edge_branch[edge]
+    return label

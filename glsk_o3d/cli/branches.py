@@ -1,0 +1,110 @@
+"""``glsk branches``: the branches of a skeleton, measured one by one."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .console import WrongUsage, print_json, print_table, reporting
+from .options import Json, Quiet, Verbose
+
+if TYPE_CHECKING:
+    from ..analysis import BranchTable
+
+_COLUMNS = {  # head: (column of the table, format)
+    "": ("branch", "d"),
+    "kind": ("kind", "s"),
+    "parent": ("parent", "d"),
+    "level": ("level", "d"),
+    "length": ("length", ".4g"),
+    "radius": ("mean_radius", ".3g"),
+    "first": ("start_radius", ".3g"),
+    "last": ("end_radius", ".3g"),
+    "bent": ("tortuosity", ".2f"),
+    "angle": ("angle", ".1f"),
+    "points": ("points", "d"),
+    "sure": ("confidence", ".2f"),
+}
+
+
+def branches(
+    skeleton: Annotated[
+        Path, typer.Argument(metavar="SKELETON", help="In any format that 'glsk skeletonize' writes, or the like.")
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="CSV", help="Write the whole table, with ends, curvature and torsion."),
+    ] = None,
+    root: Annotated[
+        str | None,
+        typer.Option(
+            "--root",
+            metavar="VERTEX|X,Y,Z",
+            help="Where the skeleton grows from: the number of a vertex, or a point near one. By default, its part "
+            "with the most volume.",
+        ),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Measure every branch of a skeleton.
+
+    Lengths are in the units of the file. 'first' and 'last' are the radii at the ends, from the root on; 'bent' is the
+    length over the distance of the ends, 'angle' in degrees to the parent, 'sure' the mean confidence.
+    """
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..errors import FileFormatError
+        from ..interop.files import read_skeleton
+        from .running import check_writable
+
+        if output is not None:
+            if output.suffix.lower() != ".csv":
+                raise WrongUsage(f"{output}: the table is CSV and its name ends in .csv")
+            if os.path.realpath(output) == os.path.realpath(skeleton):
+                raise WrongUsage(f"{output}: is the skeleton itself: choose another name")
+            check_writable(output)
+        place = _root(root)
+        curve = read_skeleton(skeleton)
+        if len(curve.vertices) == 0:
+            raise FileFormatError(f"{skeleton}: the skeleton is empty: it has no branches to measure")
+        table = curve.branch_table(place)
+        if output is not None:
+            table.to_csv(output)
+        if as_json:
+            print_json({"skeleton": str(skeleton), "branches": list(table)})
+        elif not quiet:
+            _print(table)
+            if output is not None:
+                typer.echo(f"wrote {output}")
+
+
+def _root(text: str | None) -> int | list[float] | None:
+    if text is None:
+        return None
+    try:
+        return [float(word) for word in text.split(",")] if "," in text else int(text)
+    except ValueError:
+        raise WrongUsage(f"--root {text}: write the number of a vertex, or a point as x,y,z") from None
+
+
+def _print(table: BranchTable) -> None:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
+    for head, (_, form) in _COLUMNS.items():
+        shown.add_column(head, justify="left" if form == "s" else "right")
+    for row in table:
+        shown.add_row(*(_cell(row[name], form, name) for name, form in _COLUMNS.values()))
+    print_table(shown, whole=True)
+
+
+def _cell(value, form: str, name: str) -> str:
+    if (name == "parent" and value < 0) or (isinstance(value, float) and math.isnan(value)):
+        return "-"
+    return format(value, form)

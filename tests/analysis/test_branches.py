@@ -1,0 +1,238 @@
+"""Points by branch, and the table of branches: shapes whose numbers are known."""
+
+import csv
+import math
+
+import numpy as np
+import open3d as o3d
+import pytest
+
+from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, samples, skeletonize
+from glsk_o3d.analysis.segmentation import branch_of_edge
+
+RNG = np.random.default_rng(0)
+ANGLES, SHARE = (30.0, 50.0), 0.6
+
+
+def axis_of(sample):
+    return Skeleton(sample.nodes, sample.edges, sample.radii, (), (), ())
+
+
+def grow(levels=3, pieces=8):
+    """A plane tree: every branch ends in two, 30 degrees to one side and 50 to the other, 0.6 as long and thick."""
+    nodes, edges, radii = [np.zeros(2)], [], [0.1]
+
+    def branch(start, heading, length, radius, left):
+        here = start
+        for i in range(1, pieces + 1):
+            nodes.append(nodes[start] + heading * length * i / pieces)
+            radii.append(radius)
+            edges.append((here, len(nodes) - 1))
+            here = len(nodes) - 1
+        for turn in np.deg2rad([-ANGLES[0], ANGLES[1]]) if left else ():
+            turned = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]] @ heading
+            branch(here, turned, SHARE * length, SHARE * radius, left - 1)
+
+    branch(0, np.array([0.0, 1]), 1.0, 0.1, levels)
+    vertices = np.insert(np.array(nodes), 1, 0, axis=1)
+    return Skeleton(vertices, sorted(edges), radii, (), (), (), confidence=np.full(len(nodes), 0.5))
+
+
+TREE = grow()
+
+
+# ---------------------------------------------------------------------------------------------------------- the table
+
+
+def test_a_tree_with_known_numbers():
+    table = TREE.branch_table()
+    assert len(table) == 15
+    assert np.bincount(table.level).tolist() == [1, 2, 4, 8]
+    np.testing.assert_allclose(table.length, SHARE**table.level)
+    np.testing.assert_allclose(table.tortuosity, 1)
+    np.testing.assert_allclose(table.end_radius, 0.1 * SHARE**table.level)
+    np.testing.assert_allclose(table.confidence, 0.5)
+    np.testing.assert_allclose(table.mean_curvature, 0, atol=1e-9)
+    assert set(table.kind[table.level < 3]) == {"inner", "tip"}  # the trunk has a free end
+    assert (table.kind[table.level == 3]).tolist() == ["tip"] * 8
+    (trunk,) = np.flatnonzero(table.parent < 0)
+    assert (table.start[trunk], table.level[trunk]) == (0, 0)
+    child = np.flatnonzero(table.parent >= 0)
+    np.testing.assert_array_equal(table.start[child], table.end[table.parent[child]])
+    np.testing.assert_array_equal(table.level[child], table.level[table.parent[child]] + 1)
+    assert math.isnan(table.angle[trunk])
+    np.testing.assert_allclose(np.sort(table.angle[child]), np.repeat(ANGLES, 7))
+    np.testing.assert_array_equal(table.start_point, TREE.vertices[table.start])
+    np.testing.assert_array_equal(table.end_point, TREE.vertices[table.end])
+    assert repr(table) == "BranchTable(15 branches, 4 levels)"
+
+
+def test_parents_and_angles_follow_the_root():
+    tip = TREE.leaves[-1]
+    for root in (int(tip), np.int64(tip), TREE.vertices[tip] + 1e-3, tuple(TREE.vertices[tip])):
+        table = TREE.branch_table(root)
+        assert table.level.max() == 5  # up the trunk's side, and down again to the farthest twigs
+        (row,) = np.flatnonzero(table.level == 0)
+        assert table.start[row] == tip
+        # what was a fork of 30 and 50 degrees is one of 80 between the arms, seen from one of them
+        first = table.angle[table.level == 1]
+        np.testing.assert_allclose(np.sort(first), sorted([ANGLES[1], 180 - sum(ANGLES)]), atol=1e-6)
+
+
+def test_a_root_inside_a_branch_and_at_a_junction():
+    inside = TREE.branch_table(3)  # a vertex of the trunk
+    assert inside.level.tolist() == TREE.branch_table().level.tolist()
+    assert inside.start[inside.level == 0].tolist() == [0]
+    fork = TREE.branch_table(8)
+    assert np.flatnonzero(fork.level == 0).tolist() == np.flatnonzero(fork.start == 8).tolist()
+    assert (fork.level == 0).sum() == 3
+    assert np.isnan(fork.angle[fork.level == 0]).all()
+
+
+def test_y_junction_exactly_and_from_its_cloud():
+    sample = samples.y_junction(4096, angle=80)
+    table = axis_of(sample).branch_table()
+    np.testing.assert_allclose(table.length, 0.5)
+    np.testing.assert_allclose(table.angle[1:], 40)
+    np.testing.assert_allclose(table.mean_radius, [0.09, 0.08, 0.08])
+    found = skeletonize(sample.points).branch_table(root=(0, 0, -1))
+    assert found.level.tolist() == [0, 1, 1]
+    np.testing.assert_allclose(found.angle[1:], 40, atol=4)
+    np.testing.assert_allclose(found.length, 0.5, atol=0.1)
+    np.testing.assert_allclose(found.mean_radius, table.mean_radius, rtol=0.1)
+    assert found.points.sum() == 4096
+
+
+def test_loops():
+    table = axis_of(samples.two_rings()).branch_table()
+    assert table.kind.tolist() == ["loop", "loop"]
+    assert table.component.tolist() == [0, 1]
+    assert table.parent.tolist() == [-1, -1]
+    assert np.isinf(table.tortuosity).all()
+    np.testing.assert_allclose(table.length, 128 * 0.6 * np.sin(np.pi / 128))
+    np.testing.assert_allclose(table.mean_curvature, 1 / 0.3, rtol=1e-3)
+
+    # a ring between two sticks, and a ball apart
+    ring = [[0, 0, 0], [1, 1, 0], [2, 0, 0], [1, -1, 0]]
+    edges = [[0, 1], [0, 3], [0, 4], [1, 2], [2, 3], [2, 5]]
+    skeleton = Skeleton([*ring, [-5, 0, 0], [4, 0, 0], [9, 9, 9]], edges, np.full(7, np.nan), (), (), ())
+    table = skeleton.branch_table()
+    kinds = {name: np.flatnonzero(table.kind == name) for name in ("loop", "tip", "isolated", "inner")}
+    assert [len(kinds[name]) for name in kinds] == [2, 2, 1, 0]
+    assert table.start[table.level == 0].tolist() == [4, 6]  # without radii the longest branch, from its free end
+    assert table.level[kinds["loop"]].tolist() == [1, 1]
+    assert sorted(table.level[kinds["tip"]].tolist()) == [0, 2]
+    assert (table.length[kinds["isolated"]], table.start[kinds["isolated"]]) == (0, 6)
+    np.testing.assert_allclose(table.angle[table.start == 0], 45)
+    assert np.isnan(table.mean_radius).all()
+
+
+def test_sauropod():
+    table = axis_of(samples.sauropod(1000)).branch_table()
+    assert sorted(table.kind.tolist()) == ["inner"] * 2 + ["loop"] * 2 + ["tip"] * 6
+    (body,) = np.flatnonzero(table.level == 0)
+    assert table.mean_radius[body] == table.mean_radius.max()
+    assert table.length.sum() == pytest.approx(axis_of(samples.sauropod(1000)).length)
+
+
+def test_csv_and_dicts(tmp_path):
+    table = TREE.branch_table()
+    rows = list(table)
+    assert [row["branch"] for row in rows] == list(range(15))
+    assert all(type(value) in (int, float, str) for row in rows for value in row.values())
+    path = tmp_path / "table.csv"
+    table.to_csv(path)
+    with path.open(newline="") as stream:
+        back = list(csv.DictReader(stream))
+    assert [list(row) for row in back] == [list(row) for row in rows]
+    for read, row in zip(back, rows, strict=True):
+        for name, value in row.items():
+            text = read[name]
+            assert (text == "") if value != value else (type(value)(text) == value)
+    with pytest.raises(FileNotFoundError, match="no such folder"):
+        table.to_csv(tmp_path / "none" / "table.csv")
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("root", [-1, 121, 1.5, True, "trunk", (0, 0), (0, 0, np.nan), [[0, 0, 0]]])
+def test_refuses_roots(root):
+    with pytest.raises(InvalidParameterError, match="root"):
+        TREE.branch_table(root)
+
+
+def test_an_empty_skeleton():
+    nothing = Skeleton((), (), (), (), (), ())
+    for ask in (nothing.branch_table, nothing.segment, nothing.annotate):
+        with pytest.raises(InvalidParameterError, match="empty"):
+            ask()
+    assert len(nothing.to_networkx()) == 0
+
+
+# --------------------------------------------------------------------------------------------------------- the points
+
+
+@pytest.fixture(scope="module")
+def y():
+    return skeletonize(samples.y_junction(2000).points)
+
+
+def distance_to(points, curve):
+    """From every point to a polyline, by brute force."""
+    a, span = curve[:-1], np.diff(curve, axis=0)
+    share = np.einsum("nei,ei->ne", points[:, None] - a, span) / (span**2).sum(axis=1)
+    foot = a + np.clip(share, 0, 1)[:, :, None] * span
+    return np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1)
+
+
+def test_every_point_has_the_branch_of_its_vertex_or_the_nearest_one(y):
+    label = y.segment()
+    assert label.shape == (2000,)
+    assert label.dtype == np.int64
+    apart = np.stack([distance_to(y.points, y.vertices[path]) for path in y.branches])
+    at_junction = np.isin(y.vertex_of_point, y.junctions)
+    assert at_junction.any()
+    np.testing.assert_allclose(apart[label, np.arange(2000)][at_junction], apart.min(axis=0)[at_junction], atol=1e-9)
+    for vertex, branch in zip(y.vertex_of_point[~at_junction], label[~at_junction], strict=True):
+        assert vertex in y.branches[branch]
+    np.testing.assert_array_equal(np.bincount(label, minlength=3), y.branch_table().points)
+    # three arms of known directions: nearly all points away from the middle are where they belong
+    truth = samples.y_junction(2000)
+    sector = np.argmax(y.points @ truth.nodes[1:].T, axis=1)
+    arm = np.argmax(np.stack([y.vertices[np.setdiff1d(p, y.junctions)[-1]] for p in y.branches]) @ truth.nodes[1:].T, 1)
+    far = np.linalg.norm(y.points, axis=1) > 0.2
+    assert (arm[label] == sector)[far].mean() > 0.99
+
+
+def test_other_clouds(y):
+    label = y.segment()
+    order = RNG.permutation(2000)
+    np.testing.assert_array_equal(y.segment(y.points[order]), label[order])
+    np.testing.assert_array_equal(y.segment(y.points.astype(np.float32)), label)
+    np.testing.assert_array_equal(y.segment(o3d.t.geometry.PointCloud(o3d.core.Tensor(y.points))), label)
+    near = y.segment(np.concatenate([y.points[:5] + 1e-7, [[np.nan, 0, 0]]]))
+    np.testing.assert_array_equal(near, [*label[:5], -1])
+    bare = Skeleton(y.vertices, y.edges, y.radii, (), (), ())
+    with pytest.raises(InvalidCloudError, match="without its cloud"):
+        bare.segment()
+    apart = np.stack([distance_to(y.points, y.vertices[path]) for path in y.branches])
+    chosen = apart[bare.segment(y.points), np.arange(2000)]
+    assert (chosen - apart.min(axis=0)).max() < 0.01 * y.radii.max()
+
+
+def test_dropped_points_and_vertices_without_edges():
+    vertices = [[0, 0, 0], [1, 0, 0], [5, 5, 5], [7, 7, 7]]
+    points = [[0.2, 0, 0], [np.nan] * 3, [5, 5, 5], [7, 7, 7], [0.9, 1, 0]]
+    skeleton = Skeleton(vertices, [(0, 1)], np.ones(4), [0, -1, 2, 3, 1], points, np.ones((5, 3)))
+    assert skeleton.segment().tolist() == [0, -1, 1, 2, 0]
+    assert skeleton.segment(points).tolist() == [0, -1, 1, 2, 0]
+    bare = Skeleton(vertices, [(0, 1)], np.ones(4), (), (), ())
+    assert bare.segment(points).tolist() == [0, -1, 1, 2, 0]
+    assert Skeleton(vertices, [], np.ones(4), (), (), ()).segment(points).tolist() == [0, -1, 2, 3, 1]
+    assert skeleton.branch_table().points.tolist() == [2, 1, 1]
+
+
+def test_edges_in_any_order():
+    order = RNG.permutation(len(TREE.edges))
+    mixed = Skeleton(TREE.vertices, TREE.edges[order], TREE.radii, (), (), ())
+    for (a, b), branch in zip(mixed.edges, branch_of_edge(mixed), strict=True):
+        assert {a, b} <= set(mixed.branches[branch].tolist())

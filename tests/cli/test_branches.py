@@ -1,0 +1,65 @@
+"""`glsk branches`: the table, the file, the root."""
+
+import csv
+import json
+
+import pytest
+
+from glsk_o3d import Skeleton, read_skeleton, samples
+
+
+@pytest.fixture
+def y(tmp_path):
+    sample = samples.y_junction(100)
+    Skeleton(sample.nodes, sample.edges, sample.radii, (), (), ()).save(tmp_path / "y.ply")
+    return "y.ply"
+
+
+def test_table_file_and_json_agree(invoke, tmp_path, y):
+    result = invoke("branches", y, "-o", "y.csv")
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    lines = result.stdout.splitlines()
+    assert lines[-1] == "wrote y.csv"
+    rows = list(read_skeleton(tmp_path / y).branch_table())
+    with (tmp_path / "y.csv").open(newline="") as stream:
+        assert [row["kind"] for row in csv.DictReader(stream)] == [row["kind"] for row in rows]
+    told = [line.split() for line in lines if line.strip()[:1].isdigit()]
+    assert [words[:5] for words in told] == [
+        ["0", "tip", "-", "0", "0.5"],
+        ["1", "tip", "0", "1", "0.5"],
+        ["2", "tip", "0", "1", "0.5"],
+    ]
+    assert [words[-3] for words in told] == ["-", "40.0", "40.0"]
+    facts = json.loads(invoke("branches", y, "--json").stdout)
+    assert facts["branches"][0]["angle"] is None
+    assert [row["length"] for row in facts["branches"]] == [row["length"] for row in rows]
+    assert invoke("branches", y, "-q").stdout == ""
+
+
+@pytest.mark.parametrize(("root", "start"), [("2", 2), ("-0.3,0,0.4", 2), ("0.4, 0, 1", 3)])
+def test_root(invoke, y, root, start):
+    facts = json.loads(invoke("branches", y, "--json", "--root", root).stdout)
+    assert [row["start"] for row in facts["branches"] if row["level"] == 0] == [start]
+
+
+@pytest.mark.parametrize(
+    ("code", "words", "message"),
+    [
+        (2, ["y.ply", "--root", "trunk"], "--root trunk: write the number of a vertex, or a point"),
+        (2, ["y.ply", "--root", "1,2"], "root = [1.0, 2.0]: must be the number of a vertex or a point"),
+        (2, ["y.ply", "--root", "4"], "root = 4: there are vertices 0 to 3"),
+        (2, ["y.ply", "-o", "y.txt"], "y.txt: the table is CSV"),
+        (1, ["y.ply", "-o", "no/y.csv"], "no: no such folder"),
+        (1, ["z.ply"], "z.ply: no such file"),
+        (1, ["empty.json"], "empty.json: the skeleton is empty"),
+    ],
+)
+def test_refuses(invoke, tmp_path, y, code, words, message):
+    Skeleton((), (), (), (), (), ()).save(tmp_path / "empty.json")
+    result = invoke("branches", *words)
+    assert result.exit_code == code
+    assert result.stdout == ""
+    assert result.stderr.startswith(f"glsk: error: {message}")
+    assert result.stderr.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["empty.json", "y.ply"]
