@@ -62,7 +62,10 @@ def remove_redundant_points(
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
     rings = RingBuilder(outlier_factor=0, denoise=0) if rings is None else rings
     contractor = Contractor(
-        reducer=LPRReducer() if reducer is None else reducer, max_iterations=int(passes), stop=lambda iterations: None
+        reducer=LPRReducer() if reducer is None else reducer,
+        reduce_above=0,
+        max_iterations=int(passes),
+        stop=lambda iterations: None,
     )
     state = (rings | contractor)(cloud)
     kept = np.sort(state.point_of_survivor)
