@@ -22,7 +22,7 @@ class FileFormatError(GlskError, ValueError):
 
 
 class ScriptError(GlskError, ValueError):
-    """A filter script is malformed, asks for what there is not, or failed at a line; the message names file and line."""
+    """A filter script is malformed, asks for what there is not, or fails; the message names file and line."""
 
 
 class MissingPackageError(GlskError, ImportError):

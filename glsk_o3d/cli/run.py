@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def run(
     script: Annotated[
         str | None,
-        typer.Argument(metavar="SCRIPT", help="A filter script (.mlx), or the name of one that comes with the package."),
+        typer.Argument(metavar="SCRIPT", help="A filter script (.mlx), or the name of one in --list."),
     ] = None,
     scan: Annotated[Path | None, typer.Argument(metavar="SCAN", help="The cloud or mesh it starts from.")] = None,
     output: Annotated[
@@ -28,8 +28,8 @@ def run(
             "--output",
             "-o",
             metavar="FILE",
-            help="Where to write the last layer: a skeleton as in 'glsk skeletonize', points as ply, pcd or xyz, a mesh "
-            "as ply, obj, off or stl; may be repeated.",
+            help="Where to write the last layer: a skeleton as in 'glsk skeletonize', points as ply, pcd or xyz, a "
+            "mesh as ply, obj, off or stl; may be repeated.",
         ),
     ] = None,
     listed: Annotated[bool, typer.Option("--list", help="List the scripts that come with the package.")] = False,
@@ -54,7 +54,7 @@ def run(
             _list(as_json)
             return
         if script is None or scan is None:
-            raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE; 'glsk run --list' names scripts")
+            raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
         steps = read_steps(find_script(script))
         outputs, last = output or [], steps[-1]
         edges = last.verb.makes_edges if last.verb else None

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...catalogue import nearest
 from ..open3d import require
-from .script import BOOL, FLOAT, INT, LENGTH, TEXT, Param
+from .script import BOOL, FLOAT, INT, LENGTH, MATRIX, POINT, TEXT, Param
 
 EXTRA = "glsk-o3d[meshlab]"
 
@@ -96,16 +96,14 @@ def arguments(name: str, params: tuple[Param, ...]) -> dict[str, Any]:
 
 
 def _argument(name, key, param, default):
-    kinds = _fitting(default)
-    if param.type not in kinds:
-        raise ValueError(nearest(param.type, kinds, "type that it may have"))
+    param.check_type(_fitting(default))
     pymeshlab = require("pymeshlab", EXTRA)
     value = param.value()
     if param.type in LENGTH:
         try:
             percent = isinstance(value, str)
             value = pymeshlab.PercentageValue(float(value[:-1])) if percent else pymeshlab.PureValue(value)
-        except pymeshlab.PyMeshLabException as error:
+        except Exception as error:  # here and below: pymeshlab's exceptions have no base of their own
             raise ValueError(str(error)) from None
     elif param.type == "RichColor":
         value = pymeshlab.Color(*map(int, value))
@@ -113,7 +111,7 @@ def _argument(name, key, param, default):
         value = np.reshape(value, np.shape(default))
     try:
         _trial().filter_parameter_values(name, **{key: value})
-    except (pymeshlab.PyMeshLabException, RuntimeError) as error:
+    except Exception as error:
         reason = str(error).partition("\n")[0]
         raise ValueError(f"a {param.type} is not what it takes" if "Unable to cast" in reason else reason) from None
     return value
@@ -136,5 +134,5 @@ def _fitting(default) -> tuple[str, ...]:
         if isinstance(default, kind):
             return types
     if isinstance(default, np.ndarray):
-        return ("RichPosition", "RichDirection", "RichPoint3f") if default.size == 3 else ("RichMatrix44f", "RichMatrix44")
+        return POINT if default.size == 3 else MATRIX
     return ("RichColor",) if type(default).__name__ == "Color" else ()

@@ -104,13 +104,13 @@ class Layer:
         return graph_skeleton(self.vertices, np.empty((0, 2)) if self.edges is None else self.edges, self.scalars)
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write the layer: a layer with edges as `save_skeleton` does, points with their scalars and colours as a cloud.
+        """Write the layer: one with edges as `save_skeleton` does, points with scalars and colours as a cloud.
 
         Parameters
         ----------
         path : path-like
-            The ending of a skeleton's format, or ``.ply``, ``.pcd`` or ``.xyz``. The scalars are the property
-            ``quality`` of a PLY or PCD file, as MeshLab reads and writes it.
+            The ending of a skeleton's format; for points ``.ply`` (with the scalars as the property ``quality``, as
+            MeshLab has it), ``.pcd`` (float32, with colours) or ``.xyz``.
         **options
             As in `save_skeleton`.
 
@@ -126,20 +126,33 @@ class Layer:
             save_skeleton(self.to_skeleton(), path, **options)
             return
         check_ending(path)
+        writers = {".ply": self._write_ply, ".pcd": self._write_pcd, ".xyz": self._write_xyz}
+        write_atomically(path, writers[path.suffix.lower()])
+
+    def _write_ply(self, path: Path) -> None:
         o3d = import_open3d()
+        columns = {
+            "normals": (self.normals, float),
+            "colors": (None if self.colors is None else np.round(255 * self.colors[:, :3]), np.uint8),
+            "quality": (None if self.scalars is None else self.scalars[:, None], float),
+        }
         cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(np.ascontiguousarray(self.vertices, float)))
-        if self.normals is not None:
-            cloud.point.normals = o3d.core.Tensor(np.ascontiguousarray(self.normals, float))
+        for name, (array, kind) in columns.items():
+            if array is not None:
+                cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(array, kind))
+        if not o3d.t.io.write_point_cloud(str(path), cloud):
+            raise FileFormatError(f"{path}: Open3D cannot write it")
+
+    def _write_pcd(self, path: Path) -> None:
+        o3d = import_open3d()
+        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.ascontiguousarray(self.vertices, float)))
         if self.colors is not None:
-            cloud.point.colors = o3d.core.Tensor(np.round(255 * self.colors[:, :3]).astype(np.uint8))
-        if self.scalars is not None:
-            cloud.point.quality = o3d.core.Tensor(np.ascontiguousarray(self.scalars, float).reshape(-1, 1))
+            cloud.colors = o3d.utility.Vector3dVector(np.ascontiguousarray(self.colors[:, :3], float))
+        if not o3d.io.write_point_cloud(str(path), cloud):
+            raise FileFormatError(f"{path}: Open3D cannot write it")
 
-        def write(temporary):
-            if not o3d.t.io.write_point_cloud(str(temporary), cloud):
-                raise OSError(f"{path}: Open3D cannot write it")
-
-        write_atomically(path, write)
+    def _write_xyz(self, path: Path) -> None:
+        np.savetxt(path, self.vertices, fmt="%.17g")
 
 
 def check_ending(path: Path, edges: bool | None = False) -> None:

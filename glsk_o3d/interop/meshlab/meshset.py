@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from .verbs import Verb, facts, verbs
 pymeshlab = require("pymeshlab", builtin.EXTRA)
 
 
-class MeshSet(pymeshlab.MeshSet):
+class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
     """``pymeshlab.MeshSet`` with the filters of this package among MeshLab's own.
 
     Ours are applied as MeshLab's are, by name or as methods, and can be mixed with them in filter scripts. Each makes a
@@ -69,27 +69,41 @@ class MeshSet(pymeshlab.MeshSet):
         """
         self.add_mesh(Layer.of(points).to_pymeshlab(), name)
 
-    def current_layer(self) -> Layer:
-        """The current layer as our filters see it, with what they passed on if it is unchanged since.
+    def layer(self, number: int = -1) -> Layer:
+        """A layer as our filters see it, with what they passed on if it is unchanged since.
+
+        Parameters
+        ----------
+        number : int
+            Its id; -1 is the current layer.
+
+        Returns
+        -------
+        Layer
 
         Raises
         ------
         InvalidCloudError
-            There is no layer.
+            There is no layer at all.
+        InvalidParameterError
+            There is none of that id.
         """
         if not self.mesh_number():
             raise InvalidCloudError("there is no layer: load a scan first")
-        mesh = self.current_mesh()
+        number = self.current_mesh_id() if number == -1 else number
+        if not self.mesh_id_exists(number):
+            raise InvalidParameterError(f"layer = {number}: there is no such layer")
+        mesh = self.mesh(number)
         layer = Layer(
             mesh.transformed_vertex_matrix(),
             faces=mesh.face_matrix() if mesh.face_number() else None,
             edges=mesh.edge_matrix().reshape(-1, 2) if mesh.edge_number() else None,
-            normals=mesh.vertex_normal_matrix(),
-            scalars=mesh.vertex_scalar_array() if mesh.has_vertex_scalar() else None,
-            colors=mesh.vertex_color_matrix() if mesh.has_vertex_color() else None,
+            normals=_unless(mesh.vertex_normal_matrix(), 0),
+            scalars=_unless(mesh.vertex_scalar_array(), 0),
+            colors=_unless(mesh.vertex_color_matrix(), 1),
             label=mesh.label(),
         )
-        known = self._flows.get(self.current_mesh_id())
+        known = self._flows.get(number)
         return known if known is not None and known.shows(layer) else layer
 
     def current_skeleton(self) -> Skeleton:
@@ -100,7 +114,7 @@ class MeshSet(pymeshlab.MeshSet):
         InvalidCloudError
             The layer has no edges.
         """
-        layer = self.current_layer()
+        layer = self.layer()
         if layer.edges is None:
             raise InvalidCloudError(f"the current layer ({layer.label}) has no edges: it is no skeleton")
         return layer.to_skeleton()
@@ -126,7 +140,7 @@ class MeshSet(pymeshlab.MeshSet):
         super().save_current_mesh(os.fspath(file_name), *args, **kwargs)
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write the current layer, complete or not at all: edges by `save_skeleton`, points by `Layer.save`, else MeshLab.
+        """Write the current layer, complete or not at all: by MeshLab if it has faces, else as `Layer.save`.
 
         Parameters
         ----------
@@ -138,7 +152,7 @@ class MeshSet(pymeshlab.MeshSet):
         ------
         FileFormatError, OSError
         """
-        layer = self.current_layer()
+        layer = self.layer()
         if layer.faces is None:
             layer.save(path, **options)
             return
@@ -228,14 +242,14 @@ class MeshSet(pymeshlab.MeshSet):
                 return self._run_ours(step, on_iteration)
             try:
                 return self._run_theirs(step.name, step.values)[1]
-            except pymeshlab.PyMeshLabException as error:
+            except Exception as error:  # pymeshlab's have no base of their own
                 reason = " ".join(str(error).split())
                 raise ScriptError(f"{step.place}: filter {step.call.name!r}: {reason}") from error
 
     def _run_ours(self, step: Step, on_iteration=None) -> dict[str, Any]:
         verb = step.verb
         assert verb is not None
-        layer = verb.run(self.current_layer(), step.values, on_iteration)
+        layer = verb.run(self.layer(step.values.get("layer", -1)), step.values, on_iteration)
         self.add_mesh(layer.to_pymeshlab(), layer.label)
         self._flows[self.current_mesh_id()] = layer
         return {"layer": self.current_mesh_id(), **facts(layer)}
@@ -244,7 +258,7 @@ class MeshSet(pymeshlab.MeshSet):
         exact = super().filter_parameter_values(name, **params) if self.mesh_number() else {}  # crashes without a mesh
         super().clear_filter_script()
         result = super().apply_filter(name, **params)
-        with tempfile.TemporaryDirectory() as folder:  # how the filter and its parameters are written, MeshLab alone knows
+        with tempfile.TemporaryDirectory() as folder:  # MeshLab alone knows how they are written
             file = os.path.join(folder, "last.mlx")
             super().save_filter_script(file)
             (call,) = read_script(file)
@@ -349,6 +363,11 @@ class MeshSet(pymeshlab.MeshSet):
                 print(f"\t{param.name} : {param.type} = {_shown(param)}")
 
 
+def _unless(array: np.ndarray, blank: float) -> np.ndarray | None:
+    """What every layer has, or nothing if it was never set."""
+    return None if (array == blank).all() else array
+
+
 def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
     """MeshLab's classes for lengths, which hold float32, as what our filters take."""
 
@@ -360,17 +379,20 @@ def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
     return {name: plain(value) for name, value in params.items()}
 
 
-def _described(verb: Verb):
+def _described(verb: Verb) -> Iterator[str]:
+    values = verb.values({})
     for slot in verb.slots.values():
-        default = verb.values({}).get(slot.name, "as the pipeline has it")
-        bounds = [f"{key}: {slot.facts[which]:g}" for key, which in (("min", "low"), ("max", "high")) if slot.facts[which] is not None]
-        said = f" [{'; '.join(bounds)}]" if bounds else f" ({', '.join(slot.words)})" if slot.words else ""
+        limits = {"min": slot.facts["low"], "max": slot.facts["high"]}
+        said = "; ".join(f"{key}: {limit:g}" for key, limit in limits.items() if limit is not None)
+        said = f" [{said}]" if said else f" ({', '.join(slot.words)})" if slot.words else ""
+        default = values.get(slot.name, "as the pipeline has it")
         yield f"\t{slot.name} : {slot.python_type()} = {default}{said}\n\t\t{slot.facts['doc']}"
 
 
 def _shown(param: Param) -> str:
-    rest = {key: value for key, value in param.attributes.items() if key not in ("name", "type", "tooltip", "description")}
-    return rest["value"] if "value" in rest else ", ".join(rest.values())
+    told = ("name", "type", "tooltip", "description")
+    values = {key: value for key, value in param.attributes.items() if key not in told}
+    return values.get("value", ", ".join(values.values()))
 
 
 def _method(name: str, verb: Verb):

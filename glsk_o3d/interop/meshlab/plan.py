@@ -126,7 +126,9 @@ def _step(call: Call, place: str, path) -> Step:
     try:
         return Step(theirs[call.name], builtin.arguments(theirs[call.name], call.params), call, place)
     except MissingPackageError as error:
-        raise MissingPackageError(f"{place}: filter {call.name!r} is MeshLab's own: {error}", name=error.name) from error
+        raise MissingPackageError(
+            f"{place}: filter {call.name!r} is MeshLab's own: {error}", name=error.name
+        ) from error
     except ValueError as error:
         message, line = error.args
         raise ScriptError(f"{path}, line {line}: filter {call.name!r}: {message}") from None
@@ -170,18 +172,25 @@ def find_script(name: str | os.PathLike) -> Path:
 
 
 class PlainLayers:
-    """The current layer, and our filters run on it: what a `MeshSet` does, without pymeshlab.
+    """Layers, and our filters run on them: what a `MeshSet` does, without pymeshlab.
 
     Parameters
     ----------
     layer : Layer
+        The first one, number 0.
     """
 
     def __init__(self, layer: Layer):
-        self.layer = layer
+        self.layers = [layer]
+
+    def layer(self, number: int = -1) -> Layer:
+        """A layer, the last one by default."""
+        if number >= len(self.layers):
+            raise InvalidParameterError(f"layer = {number}: there are {len(self.layers)}, counted from 0")
+        return self.layers[number]
 
     def apply_step(self, step: Step, on_iteration: Callable[..., Any] | None = None) -> dict[str, Any]:
-        """Run a filter of ours on the current layer; its result becomes the current one.
+        """Run a filter of ours; its result becomes the last layer.
 
         Returns
         -------
@@ -190,16 +199,13 @@ class PlainLayers:
         """
         assert step.verb is not None
         with step.named_in_errors():
-            self.layer = step.verb.run(self.layer, step.values, on_iteration)
-        return facts(self.layer)
-
-    def current_layer(self) -> Layer:
-        """The layer that the next filter takes."""
-        return self.layer
+            layer = self.layer(step.values.get("layer", -1))
+            self.layers.append(step.verb.run(layer, step.values, on_iteration))
+        return {"layer": len(self.layers) - 1, **facts(self.layers[-1])}
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write the current layer. See `Layer.save`."""
-        self.layer.save(path, **options)
+        """Write the last layer. See `Layer.save`."""
+        self.layer().save(path, **options)
 
 
 def exact_digits(step: Step, values: Mapping[str, Any]) -> Step:

@@ -34,12 +34,13 @@ INT = ("RichInt", "RichEnum", "RichMesh")
 FLOAT = ("RichFloat", "RichDynamicFloat")
 LENGTH = ("RichAbsPerc", "RichPercentage")
 TEXT = ("RichString", "RichOpenFile", "RichSaveFile", "RichFileOpen", "RichFileSave")
+POINT = ("RichPosition", "RichDirection", "RichPoint3f")
+MATRIX = ("RichMatrix44f", "RichMatrix44")
 _VECTORS = {
     "RichColor": ("r", "g", "b", "a"),
-    **dict.fromkeys(("RichPosition", "RichDirection", "RichPoint3f"), ("x", "y", "z")),
-    **dict.fromkeys(("RichMatrix44f", "RichMatrix44"), tuple(f"val{i}" for i in range(16))),
+    **dict.fromkeys(POINT, ("x", "y", "z")),
+    **dict.fromkeys(MATRIX, tuple(f"val{i}" for i in range(16))),
 }
-TYPES = (*BOOL, *INT, *FLOAT, *LENGTH, *TEXT, *_VECTORS)
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Param:
     ----------
     name : str
     type : str
-        ``"RichInt"``, ``"RichAbsPerc"`` and so on: one of `TYPES`.
+        ``"RichInt"``, ``"RichAbsPerc"`` and so on.
     attributes : dict of str to str
         All attributes of the element; most types have their value in ``value``.
     line : int
@@ -60,6 +61,11 @@ class Param:
     type: str
     attributes: dict[str, str]
     line: int = 0
+
+    def check_type(self, types: Sequence[str]) -> None:
+        """Raise ValueError unless the parameter has one of the types."""
+        if self.type not in types:
+            raise ValueError(f"a {self.type} is not what it takes: it may be a {' or '.join(types)}")
 
     def value(self) -> Any:
         """What stands there: bool, int, float, str, a list of floats, or for a length a float or text such as "2%".
@@ -135,8 +141,8 @@ def read_script(path: str | os.PathLike) -> list[Call]:
     FileFormatError
         A folder, a device, or an empty or huge file.
     ScriptError
-        It is not XML, has what scripts never need and attacks do (entities, a DOCTYPE with declarations or a reference),
-        or elements other than those of a script. The message names file and line.
+        It is not XML, has elements other than those of a script, or what scripts never need and attacks do: entities,
+        and a DOCTYPE with declarations or a reference. The message names file and line.
     """
     path = Path(path)
     if not path.exists():
@@ -166,7 +172,9 @@ class _Reader:
             self.parser.Parse(data, True)
         except expat.ExpatError as error:
             line = min(error.lineno, data.count(b"\n") + 1)
-            raise ScriptError(f"{self.path}, line {line}: not well-formed XML: {expat.ErrorString(error.code)}") from None
+            raise ScriptError(
+                f"{self.path}, line {line}: not well-formed XML: {expat.ErrorString(error.code)}"
+            ) from None
         except (ValueError, LookupError) as error:
             if isinstance(error, ScriptError):
                 raise

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
-from numbers import Integral
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,7 +20,7 @@ import numpy as np
 from ...catalogue import catalogue, nearest, parts, replaced, serves
 from ...contractor import Contractor
 from ...errors import InvalidCloudError, InvalidParameterError
-from ...filter import Filter, Parameters, problem_with
+from ...filter import Filter, Parameters, parameter, problem_with
 from ...lpr_reducer import LPRReducer
 from ...pipeline import Pipeline
 from ...pipelines import PIPELINES, named_pipeline
@@ -44,21 +43,24 @@ _PARTS = ("reducer", "stop")
 
 @dataclass(frozen=True)
 class Slot:
-    """A parameter of a verb: one of a filter's, of what is inside it, or the choice of a pipeline.
+    """A parameter of a verb: one of a filter's or of what is inside it, or one of the verb's own.
 
     Attributes
     ----------
     name : str
     facts : mapping
         As `glsk_o3d.filter.parameter` makes it.
-    owner : subclass of Parameters, or None for the choice of a pipeline
+    owner : subclass of Parameters, or None for the verb's own
     field : str
+    default : object
+        Of the verb's own; those of filters are as the pipeline has them.
     """
 
     name: str
     facts: Mapping[str, Any]
-    owner: type[Parameters] | None
-    field: str
+    owner: type[Parameters] | None = None
+    field: str = ""
+    default: Any = None
 
     @property
     def kind(self) -> str:
@@ -79,6 +81,8 @@ class Slot:
         worded = {"choice": ("RichEnum",), **dict.fromkeys(_PARTS, ())}
         if self.kind in worded:
             return ("RichString", *worded[self.kind])
+        if self.name == "layer":
+            return ("RichMesh", "RichInt")
         plain = {"bool": ("RichBool",), "int": ("RichInt",), "float": FLOAT, "length": LENGTH}[self.kind]
         return (*plain, "RichString") if self.words else plain
 
@@ -96,7 +100,7 @@ class Slot:
         """
         if isinstance(value, np.generic):
             value = value.item()
-        if self.kind == "choice" and isinstance(value, Integral) and not isinstance(value, bool):
+        if self.kind == "choice" and type(value) is int:
             if not 0 <= value < len(self.words):
                 raise ValueError(f"must be one of {', '.join(map(repr, self.words))}, or its number from 0")
             value = self.words[value]
@@ -116,8 +120,7 @@ class Slot:
         ------
         ValueError
         """
-        if param.type not in self.types:
-            raise ValueError(nearest(param.type, self.types, "type that it may have"))
+        param.check_type(self.types)
         value = param.value()
         self.checked(value)
         return value
@@ -217,7 +220,7 @@ class Verb:
         found: dict[str, Any] = {}
         for slot in self.slots.values():
             if slot.owner is None:
-                found[slot.name] = given.get(slot.name, self.default)
+                found[slot.name] = given.get(slot.name, slot.default)
             for part in parts(pipeline):
                 if type(part) is slot.owner:
                     value = getattr(part, slot.field)
@@ -301,7 +304,9 @@ class SegmentVerb(Verb):
 
     def run(self, layer, given, on_iteration=None):
         pipeline = self.plan(given)
-        skeleton = layer.flow if isinstance(layer.flow, Skeleton) else pipeline(_cloud(layer), on_iteration=on_iteration)
+        skeleton = (
+            layer.flow if isinstance(layer.flow, Skeleton) else pipeline(_cloud(layer), on_iteration=on_iteration)
+        )
         labels = branch_of_point(skeleton)
         layer = _plain(layer)
         hues = [colorsys.hsv_to_rgb(i * 0.618034 % 1, 0.65, 0.95) for i in range(labels.max(initial=-1) + 1)]
@@ -329,9 +334,7 @@ def branch_of_point(skeleton: Skeleton) -> np.ndarray:
         count as branches of their own after these. -1 for points that were dropped.
     """
     branch = np.full(len(skeleton.vertices), -1)
-    lengths = [
-        np.linalg.norm(np.diff(skeleton.vertices[path], axis=0), axis=1).sum() for path in skeleton.branches
-    ]
+    lengths = [np.linalg.norm(np.diff(skeleton.vertices[path], axis=0), axis=1).sum() for path in skeleton.branches]
     for i in np.argsort(lengths, kind="stable"):
         branch[skeleton.branches[i]] = i
     alone = branch < 0
@@ -377,13 +380,12 @@ def verbs() -> dict[str, Verb]:
     known = catalogue()
     whole = {type(part): None for make in PIPELINES.values() for part in parts(make())}
     whole |= {cls: None for cls in known.values() if any(serves(cls, kind) for kind in _PARTS)}
-    choice = dict(doc="The named pipeline; parameters that are not given are as it has them.", type="choice", unit="-")
-    choice |= dict(low=None, high=None, open_low=False, choices=tuple(PIPELINES))
-    slots = [Slot("pipeline", choice, None, ""), *chain.from_iterable(_slots(cls) for cls in whole)]
+    choice = _facts("The named pipeline; parameters that are not given are as it has them.", "choice", tuple(PIPELINES))
+    slots = [Slot("pipeline", choice, default=Verb.default), *chain.from_iterable(_slots(cls) for cls in whole)]
     found = [
         Verb(
             *_called(_WHOLE),
-            "The curve skeleton of the current layer's vertices, with radii as scalars. A mesh is taken as its vertices.",
+            "The curve skeleton of the current layer's vertices, with radii as scalars.",
             {slot.name: slot for slot in slots},
         )
     ]
@@ -399,12 +401,17 @@ def verbs() -> dict[str, Verb]:
     found.append(
         SegmentVerb(
             *_called(_SEGMENTED),
-            "The points that a skeleton was made from, with the branch that each belongs to as scalar and as colour. On "
-            "a layer without skeleton the default pipeline makes one first. Faces are kept.",
+            "The points that a skeleton was made from, with the branch that each belongs to as scalar and as colour. "
+            "On a layer without skeleton the default pipeline makes one first. Faces are kept.",
             {},
         )
     )
-    return {verb.name: verb for verb in found}
+    layer = Slot("layer", _facts("The layer to act on; -1 is the current one.", "int", low=-1), default=-1)
+    return {verb.name: dataclasses.replace(verb, slots={**verb.slots, layer.name: layer}) for verb in found}
+
+
+def _facts(doc, type, choices=(), low=None):
+    return parameter(None, doc, type=type, choices=choices, low=low).metadata
 
 
 def _called(stem: str) -> tuple[str, str]:
