@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +14,7 @@ from .options import Json, Quiet, Verbose
 
 if TYPE_CHECKING:
     from ..interop.meshlab.plan import Step
+    from ..report import IterationRecord
 
 
 def run(
@@ -72,8 +73,9 @@ def run(
                     layers.load_scan(scan)
             results = []
             for i, step in enumerate(steps, 1):
-                update(f"{i} of {len(steps)}: {step.call.name}")
-                results.append(layers.apply_step(step))
+                doing = f"{i} of {len(steps)}: {step.call.name}"
+                update(doing)
+                results.append(layers.apply_step(step, partial(_solved, update, doing)))
             for path in outputs:
                 update(f"writing {path.name}")
                 layers.save(path, cut_loops=cut_loops)
@@ -84,6 +86,10 @@ def run(
             _print_results(steps, results)
             for path in outputs:
                 typer.echo(f"wrote {path}")
+
+
+def _solved(update: Callable[..., None], doing: str, record: IterationRecord) -> None:
+    update(f"{doing}, solve {record.iteration}")
 
 
 def _print_results(steps: Sequence[Step], results: Sequence[dict[str, Any]]) -> None:

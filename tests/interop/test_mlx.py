@@ -10,8 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import glsk_o3d
+from glsk_o3d import Filter, samples
+from glsk_o3d.catalogue import catalogue
 from glsk_o3d.errors import FileFormatError, MissingPackageError, ScriptError
-from glsk_o3d.interop.meshlab.plan import find_script, read_steps, step
+from glsk_o3d.filter import documented, parameter
+from glsk_o3d.interop.meshlab.layers import Layer
+from glsk_o3d.interop.meshlab.plan import PlainLayers, find_script, read_steps, step
 from glsk_o3d.interop.meshlab.script import MOST_BYTES, Call, Param, read_script, script_text, write_script
 from glsk_o3d.interop.meshlab.verbs import verbs
 
@@ -304,6 +308,48 @@ def test_the_whole_pipeline_has_the_parameters_of_all_its_parts():
     for cls in (*map(type, glsk_o3d.pipelines.default().stages), glsk_o3d.LPRReducer, glsk_o3d.ExplainedScore):
         known |= {f"{cls.__name__.lower()}_{field.name}" for field in dataclasses.fields(cls)}
     assert known <= set(verbs()["generate_curve_skeleton_glsk"].slots)
+
+
+def test_a_filter_of_the_pymeshlab_of_another_year(tmp_path, monkeypatch):
+    pymeshlab = pytest.importorskip("pymeshlab")
+    (tmp_path / "s.mlx").write_text(_theirs())
+    monkeypatch.setattr(pymeshlab, "filter_list", lambda: ["create_sphere"])
+    with pytest.raises(
+        ScriptError, match="line 3: filter 'Select Outliers': the pymeshlab that is installed has no such"
+    ):
+        read_steps(tmp_path / "s.mlx")
+
+
+def test_a_new_filter_is_a_verb_by_itself(monkeypatch, tmp_path):
+    @documented
+    @dataclasses.dataclass(frozen=True, kw_only=True)
+    class VertexDoubler(Filter):
+        """Twice as large."""
+
+        consumes = produces = "Skeleton"
+        factor: float = parameter(2.0, "How much.", type="float", low=1)
+
+        def _run(self, skeleton, on_iteration):
+            return dataclasses.replace(skeleton, vertices=self.factor * skeleton.vertices)
+
+    known = {**catalogue(), "VertexDoubler": VertexDoubler}
+    monkeypatch.setattr("glsk_o3d.interop.meshlab.verbs.catalogue", lambda: known)
+    verbs.cache_clear()
+    try:
+        assert verbs()["generate_by_vertex_doubler_glsk"].title == "Generate By Vertex Doubler (GLSkeleton)"
+        title = "Generate By Vertex Doubler (GLSkeleton)"
+        param = Param("factor", "RichFloat", {"type": "RichFloat", "name": "factor", "value": "3"})
+        write_script(tmp_path / "s.mlx", [Call(SKELETON), Call(title, (param,))])
+        points = samples.torus(1000).points
+        layers = PlainLayers(Layer.of(points))
+        for one in read_steps(tmp_path / "s.mlx"):
+            layers.apply_step(one)
+        np.testing.assert_array_equal(layers.layer(2).vertices, 3 * glsk_o3d.skeletonize(points).vertices)
+        (tmp_path / "s.mlx").write_text((tmp_path / "s.mlx").read_text().replace('"3"', '"0.5"'))
+        with pytest.raises(ScriptError, match="parameter 'factor': must be at least 1"):
+            read_steps(tmp_path / "s.mlx")
+    finally:
+        verbs.cache_clear()
 
 
 def test_scripts_are_found_by_name_or_path():

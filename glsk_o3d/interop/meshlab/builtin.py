@@ -80,9 +80,11 @@ def arguments(name: str, params: tuple[Param, ...]) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        With the line of the parameter as its second argument.
+        With the line of the parameter as its second argument, or None.
     MissingPackageError
     """
+    if name not in require("pymeshlab", EXTRA).filter_list():
+        raise ValueError("the pymeshlab that is installed has no such filter", None)
     known, found = defaults(name), {}
     for param in params:
         key = next((key for key in known if key.rstrip("_") == pythonic(param.name)), None)

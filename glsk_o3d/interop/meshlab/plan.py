@@ -131,7 +131,7 @@ def _step(call: Call, place: str, path) -> Step:
         ) from error
     except ValueError as error:
         message, line = error.args
-        raise ScriptError(f"{path}, line {line}: filter {call.name!r}: {message}") from None
+        raise ScriptError(f"{path}, line {line or call.line}: filter {call.name!r}: {message}") from None
 
 
 def scripts() -> dict[str, Path]:
@@ -164,7 +164,7 @@ def find_script(name: str | os.PathLike) -> Path:
         There is no script of that name; the message says which there are.
     """
     path, known = Path(name), scripts()
-    if path.suffix.lower() == ".mlx" or len(path.parts) > 1 or path.exists():
+    if path.suffix.lower() == ".mlx" or len(path.parts) > 1 or path.is_file():
         return path
     if str(name) not in known:
         raise InvalidParameterError(f"{nearest(str(name), known, 'filter script')} (a file's name ends in .mlx)")

@@ -65,7 +65,8 @@ class Param:
     def check_type(self, types: Sequence[str]) -> None:
         """Raise ValueError unless the parameter has one of the types."""
         if self.type not in types:
-            raise ValueError(f"a {self.type} is not what it takes: it may be a {' or '.join(types)}")
+            fitting = f"it may be a {' or '.join(types)}" if types else "scripts cannot give it"
+            raise ValueError(f"a {self.type} is not what it takes: {fitting}")
 
     def value(self) -> Any:
         """What stands there: bool, int, float, str, a list of floats, or for a length a float or text such as "2%".
