@@ -5,8 +5,10 @@ import sys
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import glsk_o3d as glsk
+from glsk_o3d.cli.main import app
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, MissingPackageError, ScriptError
 from glsk_o3d.interop.files import read_skeleton
 from glsk_o3d.interop.meshlab.layers import Layer
@@ -82,6 +84,11 @@ def test_a_mixed_script_does_what_its_filters_do_by_hand(points, meshes, tmp_pat
     np.testing.assert_array_equal(mesh.vertex_matrix(), expected.vertices)
     np.testing.assert_array_equal(mesh.edge_matrix(), expected.edges)
     np.testing.assert_array_equal(mesh.vertex_scalar_array(), expected.radii)
+
+    Layer.of(points).save(tmp_path / "scan.ply")
+    words = ["run", str(tmp_path / "s.mlx"), str(tmp_path / "scan.ply"), "-o", str(tmp_path / "run.json")]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    _same(read_skeleton(tmp_path / "run.json"), expected)
 
     session = glsk.MeshSet()
     session.add_points(points)
