@@ -9,11 +9,13 @@ from .errors import (
     InvalidCloudError,
     InvalidParameterError,
     MissingPackageError,
+    ScriptError,
     SkeletonWarning,
     StageError,
 )
 from .filter import Filter
 from .interop.files import read_cloud, read_skeleton, save_skeleton
+from .interop.meshlab.meshset import MeshSet
 from .interop.preview import save_preview
 from .lpr_reducer import LPRReducer
 from .pipeline import Pipeline, skeletonize
@@ -39,12 +41,14 @@ __all__ = [
     "InvalidParameterError",
     "IterationRecord",
     "LPRReducer",
+    "MeshSet",
     "MissingPackageError",
     "Pipeline",
     "Refiner",
     "Report",
     "RingBuilder",
     "RingSizeRatio",
+    "ScriptError",
     "Skeleton",
     "SkeletonWarning",
     "StageError",

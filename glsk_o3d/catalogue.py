@@ -50,6 +50,45 @@ def catalogue() -> dict[str, type[Parameters]]:
     return {cls.__name__: cls for cls in known}
 
 
+def serves(cls: type[Parameters], kind: str) -> bool:
+    """Whether a class can be what a parameter of the kind takes.
+
+    Parameters
+    ----------
+    cls : subclass of Parameters
+    kind : {"reducer", "stop"}
+
+    Returns
+    -------
+    bool
+    """
+    if kind == "stop":
+        return not issubclass(cls, Filter)
+    return issubclass(cls, Filter) and cls.consumes == cls.produces == "Contraction"
+
+
+def replaced(part: Any, cls: type[Parameters], name: str, value: Any) -> Any:
+    """A filter or rule with a parameter replaced in every instance of a class, itself and those inside it.
+
+    Parameters
+    ----------
+    part : Parameters
+    cls : subclass of Parameters
+    name : str
+    value : object
+
+    Returns
+    -------
+    Parameters
+    """
+    changes = {name: value} if type(part) is cls else {}
+    for field in dataclasses.fields(part):
+        inner = getattr(part, field.name)
+        if isinstance(inner, Parameters) and field.name not in changes:
+            changes[field.name] = replaced(inner, cls, name, value)
+    return dataclasses.replace(part, **changes)
+
+
 def nearest(word: str, known: Iterable[str], what: str) -> str:
     """The message for an unknown word: what was meant, or what there is.
 
@@ -70,6 +109,7 @@ def nearest(word: str, known: Iterable[str], what: str) -> str:
     "no parameter of Connector is called 'radios': did you mean 'radius'?"
     """
     names = {name.lower(): name for name in known}
-    close = difflib.get_close_matches(word.lower(), names, n=1)
+    # a long list helps nobody: then the nearest name is said however far it is
+    close = difflib.get_close_matches(word.lower(), names, n=1, cutoff=0.6 if len(names) <= 20 else 0.0)
     hint = f"did you mean {names[close[0]]!r}?" if close else f"there are {', '.join(names.values()) or 'none'}"
     return f"no {what} is called {word!r}: {hint}"

@@ -21,6 +21,10 @@ class FileFormatError(GlskError, ValueError):
     """A file cannot be read or written in the format asked for."""
 
 
+class ScriptError(GlskError, ValueError):
+    """A filter script is malformed, asks for what there is not, or fails; the message names file and line."""
+
+
 class MissingPackageError(GlskError, ImportError):
     """An optional package, or a system library it needs, is not installed."""
 

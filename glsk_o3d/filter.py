@@ -77,14 +77,27 @@ class Parameters:
         """Raise InvalidParameterError if a parameter has the wrong type or is out of range."""
         for field in dataclasses.fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
-            problem = _problem(value, field.metadata)
+            problem = problem_with(value, field.metadata)
             if problem:
                 raise InvalidParameterError(f"{type(self).__name__}.{field.name} = {value!r}: {problem}")
             if isinstance(value, Parameters):
                 value.check()
 
 
-def _problem(value, facts) -> str | None:
+def problem_with(value: Any, facts: Any) -> str | None:
+    """What is wrong with the value of a parameter.
+
+    Parameters
+    ----------
+    value : object
+    facts : mapping
+        As `parameter` makes it.
+
+    Returns
+    -------
+    str or None
+        None where nothing is.
+    """
     kind, low, high = facts["type"], facts["low"], facts["high"]
     if isinstance(value, str) and value in facts["choices"]:
         return None

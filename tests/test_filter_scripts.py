@@ -1,22 +1,81 @@
-"""The MeshLab scripts in filters/ run, and do what their table says."""
+"""The scripts in filters/ run at every scale, do what their table says, and are all documented."""
+
+import re
+import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pytest
 
+import glsk_o3d
 from glsk_o3d import samples
+from glsk_o3d.interop.meshlab.plan import read_steps, scripts
+from glsk_o3d.interop.meshlab.script import comment
 
 pymeshlab = pytest.importorskip("pymeshlab")
 
 
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
-def test_scan_cleanup(root, scale):
+def _far_and_double(scale):
     tube = samples.SAMPLES["tube"](n=2000).points
     far = 2.0 * np.array([[1, 1, 0], [-1, 1, 0], [1, -1, 1], [-1, -1, 1], [0, 0, 2]])
+    return scale * np.concatenate([tube, tube[:100], far]), far
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_scan_cleanup(root, scale):
+    points, far = _far_and_double(scale)
     scan = pymeshlab.MeshSet()
-    scan.add_mesh(pymeshlab.Mesh(scale * np.concatenate([tube, tube[:100], far])))
+    scan.add_mesh(pymeshlab.Mesh(points))
     scan.load_filter_script(str(root / "filters" / "scan_cleanup.mlx"))
     scan.apply_filter_script()
     left = scan.current_mesh().vertex_matrix() / scale
     assert (np.linalg.norm(left[:, None] - far, axis=2) > 1e-3).all()
     assert 1900 < len(left) <= 2000
     assert len(np.unique(left, axis=0)) == len(left)
+
+    ours = glsk_o3d.MeshSet()
+    ours.add_points(points)
+    ours.load_filter_script(root / "filters" / "scan_cleanup.mlx")
+    ours.apply_filter_script()
+    np.testing.assert_array_equal(ours.current_mesh().vertex_matrix() / scale, left)
+
+
+@pytest.mark.parametrize("name", sorted(set(scripts()) - {"scan_cleanup"}))
+def test_scripts_with_ours_fit_every_scale(name):
+    found = []
+    for scale in (1.0, 2.0**-10, 2.0**10):
+        meshes = glsk_o3d.MeshSet()
+        meshes.add_points(scale * samples.torus(1000).points)
+        meshes.load_filter_script(scripts()[name])
+        meshes.apply_filter_script()
+        skeleton = meshes.current_skeleton()
+        found.append((skeleton.n_components, skeleton.n_loops, skeleton.length / scale))
+    assert found[0][:2] == (1, 1)
+    for other in found[1:]:
+        assert other == pytest.approx(found[0], rel=1e-3)
+
+
+@pytest.mark.parametrize("name", scripts())
+def test_every_script_has_a_comment_and_is_documented(root, name):
+    assert len(comment(scripts()[name])) > 40
+    assert f"`{name}.mlx`" in (root / "filters" / "README.md").read_text()
+    assert f"\n### {name}\n" in (root / "docs" / "meshlab.md").read_text()
+    needs = any(step.verb is None for step in read_steps(scripts()[name]))
+    said = re.search(rf"`{name}.mlx` .*\| (yes|no) \|", (root / "filters" / "README.md").read_text())[1]
+    assert said == ("yes" if needs else "no")
+
+
+def test_the_page_says_what_is_so(root, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    page = (root / "docs" / "meshlab.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(compile(code, "docs/meshlab.md", "exec"), {})
+    assert capsys.readouterr().out == "".join(re.findall(r"# prints (.*\n)", code))
+    assert len(read_steps("mine.mlx")) == 4
+    (script,) = re.findall(r"```xml\n(.*?)```", page, re.DOTALL)
+    assert ElementTree.fromstring(script).tag == "FilterScript"
+    (tmp_path / "page.mlx").write_text(script)
+    assert read_steps("page.mlx")[1].values == {"connector_radius": "2%"}
+    table = re.findall(r"^\| `(generate_\w+)` \| `([\w ]+)` \|", page, re.MULTILINE)
+    from glsk_o3d.interop.meshlab.verbs import verbs
+
+    assert {name: f"{title} (GLSkeleton)" for name, title in table} == {v.name: v.title for v in verbs().values()}

@@ -16,6 +16,7 @@ from .demo import demo
 from .evaluate import evaluate
 from .filters import filters
 from .info import info
+from .run import run
 from .skeletonize import skeletonize
 
 EPILOG = (
@@ -30,7 +31,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (skeletonize, evaluate, branches, demo, filters, info):
+for command in (skeletonize, run, evaluate, branches, demo, filters, info):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
 
 

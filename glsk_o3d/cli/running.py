@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,16 +28,22 @@ _DOING = {
 }
 
 
-def check_outputs(outputs: Sequence[Path], preview: Path | None = None, scan: Path | None = None) -> None:
+def check_outputs(
+    outputs: Sequence[Path],
+    preview: Path | None = None,
+    scan: Path | None = None,
+    check_ending: Callable[[Path], object] = skeleton_ending,
+) -> None:
     """Find out before computing whether the files can be written.
 
     Parameters
     ----------
     outputs : sequence of Path
-        Skeleton files.
     preview : Path, optional
     scan : Path, optional
         The input, which must not be overwritten.
+    check_ending : callable
+        Raises FileFormatError for an output whose ending is wrong.
 
     Raises
     ------
@@ -48,7 +54,7 @@ def check_outputs(outputs: Sequence[Path], preview: Path | None = None, scan: Pa
     """
     for path in outputs:
         try:
-            skeleton_ending(path)
+            check_ending(path)
         except FileFormatError as error:
             hint = "; a picture is made with --preview" if path.suffix.lower() == ".png" else ""
             raise WrongUsage(f"{error}{hint}") from None

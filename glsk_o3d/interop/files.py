@@ -63,15 +63,12 @@ def read_cloud(path: str | os.PathLike) -> Any:
         A folder, an unknown ending, or a file that is empty, damaged, broken off, or without points.
     MissingPackageError
     """
-    path = _existing(path)
-    ending = path.suffix.lower()
+    path = check_scan(path)
+    ending, rows = path.suffix.lower(), 0
     if ending not in CLOUD_ENDINGS + MESH_ENDINGS:
         raise _unknown(path, CLOUD_ENDINGS + MESH_ENDINGS)
-    rows = 0
-    with path.open("rb") as stream:  # where it may not be read, this says so
-        if ending in _PROMISES:
-            _check_complete(path, stream)
-        elif ending.startswith(".xyz"):
+    if ending.startswith(".xyz"):
+        with path.open("rb") as stream:
             rows = sum(1 for line in stream if line.strip() and not line.lstrip().startswith(b"#"))
     o3d = import_open3d()
     try:
@@ -90,6 +87,30 @@ def read_cloud(path: str | os.PathLike) -> Any:
         with following_open3d():
             _log.warning("%s: %d of %d lines hold no point and were skipped", path, rows - len(cloud.points), rows)
     return cloud
+
+
+def check_scan(path: str | os.PathLike) -> Path:
+    """Find out before reading a scan whether it is there and complete.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    FileNotFoundError
+    FileFormatError
+        A folder, or a file that is empty or breaks off.
+    """
+    path = _existing(path)
+    with path.open("rb") as stream:  # where it may not be read, this says so
+        if path.suffix.lower() in _PROMISES:
+            _check_complete(path, stream)
+    return path
 
 
 def _check_complete(path: Path, stream: BinaryIO) -> None:
@@ -305,7 +326,7 @@ def _unknown(what, endings) -> FileFormatError:
     return FileFormatError(f"{what}: unknown ending; known are {', '.join(endings)}")
 
 
-def _graph(vertices, edges, radii=None) -> Skeleton:
+def graph_skeleton(vertices, edges, radii=None) -> Skeleton:
     """A skeleton without a cloud, its edges sorted and each once."""
     vertices = np.asarray(vertices, float).reshape(-1, 3)
     edges = np.sort(np.asarray(edges, np.int64).reshape(-1, 2), axis=1)
@@ -496,7 +517,7 @@ def _read_ply(data: bytes) -> Skeleton:
     vertex, edge = tables["vertex"], tables.get("edge", {"vertex1": [], "vertex2": []})
     xyz = np.column_stack([vertex[axis] for axis in "xyz"]).astype(float)
     radii = np.array(vertex["radius"], float) if "radius" in vertex else None
-    return _graph(xyz, np.column_stack([edge["vertex1"], edge["vertex2"]]), radii)
+    return graph_skeleton(xyz, np.column_stack([edge["vertex1"], edge["vertex2"]]), radii)
 
 
 # ------------------------------------------------------------------------------------------------------------- text
@@ -535,7 +556,7 @@ def _read_obj(data: bytes) -> Skeleton:
             edges += pairwise(ends)
     if not vertices:
         raise ValueError("it has no 'v' line")
-    return _graph(vertices, edges)
+    return graph_skeleton(vertices, edges)
 
 
 def _write_swc(skeleton: Skeleton, cut_loops: bool = False) -> bytes:
@@ -567,7 +588,7 @@ def _read_swc(data: bytes) -> Skeleton:
     place = np.searchsorted(names[order], parents[child]).clip(max=len(names) - 1)
     if (names[order][place] != parents[child]).any() or len(np.unique(names)) < len(names):
         raise ValueError("a parent is not there, or two rows have one id")
-    return _graph(table[:, 2:5], np.column_stack([child, order[place]]), table[:, 5])
+    return graph_skeleton(table[:, 2:5], np.column_stack([child, order[place]]), table[:, 5])
 
 
 def _write_graphml(skeleton: Skeleton) -> bytes:
@@ -590,7 +611,7 @@ def _read_graphml(data: bytes) -> Skeleton:
     index = {node: i for i, node in enumerate(graph)}
     table = [[facts.get(key, math.nan) for key in ("x", "y", "z", "radius")] for _, facts in graph.nodes(data=True)]
     table = np.array(table, float).reshape(-1, 4)
-    return _graph(table[:, :3], [(index[a], index[b]) for a, b in graph.edges()], table[:, 3])
+    return graph_skeleton(table[:, :3], [(index[a], index[b]) for a, b in graph.edges()], table[:, 3])
 
 
 def _write_polylines(skeleton: Skeleton) -> bytes:
@@ -611,7 +632,7 @@ def _read_polylines(data: bytes) -> Skeleton:
     label = np.arange(len(points))
     label[ends] = ends[first][which.ravel()]
     kept, index = np.unique(label, return_inverse=True)
-    return _graph(points[kept], index[np.column_stack([inner, inner + 1])])
+    return graph_skeleton(points[kept], index[np.column_stack([inner, inner + 1])])
 
 
 _FORMATS: dict[str, tuple[Callable[..., bytes], Callable[[bytes], Skeleton]]] = {

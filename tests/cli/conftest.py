@@ -78,12 +78,13 @@ def refused(invoke, tmp_path):
     """Run the command in this process; it must fail with one line and leave nothing behind. Gives the line."""
 
     def run(code, *words):
+        before = list(tmp_path.iterdir())
         result = invoke(*words)
         assert result.exit_code == code, result.output
         assert result.stdout == ""
         assert result.stderr.startswith("glsk: error: ")
         assert result.stderr.count("\n") == 1
-        assert list(tmp_path.iterdir()) == []
+        assert list(tmp_path.iterdir()) == before
         return result.stderr.removeprefix("glsk: error: ").rstrip()
 
     return run

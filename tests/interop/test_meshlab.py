@@ -1,13 +1,344 @@
+"""MeshSet: MeshLab's filters and ours in one session and in one script."""
+
+import subprocess
 import sys
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
-from glsk_o3d.errors import MissingPackageError
+import glsk_o3d as glsk
+from glsk_o3d.cli.main import app
+from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, MissingPackageError, ScriptError
+from glsk_o3d.interop.files import read_skeleton
+from glsk_o3d.interop.meshlab.layers import Layer
+from glsk_o3d.interop.meshlab.plan import PlainLayers, read_steps
+from glsk_o3d.interop.meshlab.verbs import verbs
+from glsk_o3d.samples import sample_object
+
+pymeshlab = pytest.importorskip("pymeshlab")
+
+MIXED = """<!DOCTYPE FilterScript>
+<FilterScript>
+ <filter name="Remove Duplicate Vertices"/>
+ <filter name="Generate Reduced Cloud (GLSkeleton)">
+  <Param type="RichFloat" name="phi" value="1000"/>
+ </filter>
+ <filter name="Select Outliers">
+  <Param type="RichDynamicFloat" name="PropThreshold" value="0.9"/>
+  <Param type="RichInt" name="KNearest" value="16"/>
+ </filter>
+ <filter name="Delete Selected Vertices"/>
+ <filter name="Generate Skeleton Graph (GLSkeleton)">
+  <Param type="RichAbsPerc" name="radius" value="2%"/>
+ </filter>
+ <filter name="Generate Refined Skeleton (GLSkeleton)">
+  <Param type="RichInt" name="recentre" value="2"/>
+ </filter>
+</FilterScript>
+"""
+
+
+@pytest.fixture(scope="module")
+def points():
+    cloud = sample_object(1500).points
+    return np.concatenate([cloud, cloud[:200], [[9.0, 9, 9], [9, -9, 9]]])
+
+
+@pytest.fixture
+def meshes(points):
+    meshes = glsk.MeshSet()
+    meshes.add_points(points)
+    return meshes
+
+
+def _same(a, b):
+    np.testing.assert_array_equal(a.vertices, b.vertices)
+    np.testing.assert_array_equal(a.edges, b.edges)
+    np.testing.assert_array_equal(a.radii, b.radii)
+
+
+def _by_hand(points):
+    """The same filters as in MIXED, each from the library that it is of."""
+    scan = pymeshlab.MeshSet()
+    scan.add_mesh(pymeshlab.Mesh(points))
+    scan.meshing_remove_duplicate_vertices()
+    clean = scan.current_mesh().vertex_matrix()
+    once = (glsk.RingBuilder() | glsk.Contractor(max_iterations=1) | glsk.LPRReducer(phi=1000))(clean)
+    rest = pymeshlab.MeshSet()
+    rest.add_mesh(pymeshlab.Mesh(once.points[once.point_of_survivor]))
+    rest.compute_selection_point_cloud_outliers(propthreshold=0.9, knearest=16)
+    rest.meshing_remove_selected_vertices()
+    contract = glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer())
+    return (contract | glsk.Connector(radius="2%") | glsk.Refiner(recentre=2))(rest.current_mesh().vertex_matrix())
+
+
+def test_a_mixed_script_does_what_its_filters_do_by_hand(points, meshes, tmp_path):
+    (tmp_path / "s.mlx").write_text(MIXED)
+    expected = _by_hand(points)
+    assert len(expected.edges) > 20
+    meshes.load_filter_script(tmp_path / "s.mlx")
+    meshes.apply_filter_script()
+    _same(meshes.current_skeleton(), expected)
+    mesh = meshes.current_mesh()
+    np.testing.assert_array_equal(mesh.vertex_matrix(), expected.vertices)
+    np.testing.assert_array_equal(mesh.edge_matrix(), expected.edges)
+    np.testing.assert_array_equal(mesh.vertex_scalar_array(), expected.radii)
+
+    Layer.of(points).save(tmp_path / "scan.ply")
+    words = ["run", str(tmp_path / "s.mlx"), str(tmp_path / "scan.ply"), "-o", str(tmp_path / "run.json")]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    _same(read_skeleton(tmp_path / "run.json"), expected)
+
+    session = glsk.MeshSet()
+    session.add_points(points)
+    session.meshing_remove_duplicate_vertices()
+    session.generate_reduced_cloud_glsk(phi=1000)
+    session.apply_filter("compute_selection_point_cloud_outliers", propthreshold=0.9, knearest=16)
+    session.meshing_remove_selected_vertices()
+    session.generate_skeleton_graph_glsk(radius=pymeshlab.PercentageValue(2))
+    session.apply_filter("generate_refined_skeleton_glsk", recentre=2)
+    _same(session.current_skeleton(), expected)
+
+    session.save_filter_script(tmp_path / "saved.mlx")
+    again = glsk.MeshSet()
+    again.add_points(points)
+    again.load_filter_script(tmp_path / "saved.mlx")
+    again.apply_filter_script()
+    _same(again.current_skeleton(), expected)
+    again.save_filter_script(tmp_path / "again.mlx")
+    assert (tmp_path / "again.mlx").read_text() == (tmp_path / "saved.mlx").read_text()
+    again.clear_filter_script()
+    again.save_filter_script(tmp_path / "none.mlx")
+    assert "<filter " not in (tmp_path / "none.mlx").read_text()
+
+
+def test_a_script_of_ours_alone_gives_the_same_without_pymeshlab(points, meshes, tmp_path):
+    meshes.generate_contracted_cloud_glsk(max_iterations=3)
+    meshes.generate_skeleton_graph_glsk(radius=0.05)
+    meshes.generate_refined_skeleton_glsk()
+    meshes.generate_segmented_cloud_glsk()
+    meshes.save_filter_script(tmp_path / "s.mlx")
+    plain = PlainLayers(Layer.of(points))
+    for step in read_steps(tmp_path / "s.mlx"):
+        plain.apply_step(step)
+    for number in range(1, 5):
+        mesh, layer = meshes.mesh(number), plain.layer(number)
+        np.testing.assert_array_equal(mesh.vertex_matrix(), layer.vertices)
+        np.testing.assert_array_equal(mesh.vertex_scalar_array(), layer.scalars)
+
+
+def test_our_lengths_fit_every_scale(meshes, points, tmp_path):
+    meshes.generate_curve_skeleton_glsk(connector_radius=pymeshlab.PercentageValue(2))
+    meshes.save_filter_script(tmp_path / "s.mlx")
+    large = glsk.MeshSet()
+    large.add_points(4096 * points)  # a power of 2: every step is the same but for the exponents
+    large.load_filter_script(tmp_path / "s.mlx")
+    large.apply_filter_script()
+    np.testing.assert_allclose(large.current_skeleton().vertices, 4096 * meshes.current_skeleton().vertices, rtol=1e-9)
+
+
+def test_lengths_in_all_words(meshes, points):
+    lengths = {"2.3%": ("2.3%", pymeshlab.PercentageValue(2.3)), 0.1: (0.1, np.float64(0.1), pymeshlab.PureValue(0.1))}
+    contract = glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer())
+    for plain, words in lengths.items():
+        expected = (contract | glsk.Connector(radius=plain) | glsk.Refiner())(points)
+        for length in words:
+            meshes.generate_curve_skeleton_glsk(connector_radius=length, layer=0)
+            _same(meshes.current_skeleton(), expected)
+
+
+def test_the_result_of_a_filter(meshes, points):
+    said = meshes.generate_curve_skeleton_glsk()
+    skeleton = glsk.skeletonize(points)
+    _same(meshes.current_skeleton(), skeleton)
+    assert said["layer"] == meshes.current_mesh_id() == 1
+    assert (said["vertices"], said["edges"]) == (len(skeleton.vertices), len(skeleton.edges))
+    assert (said["loops"], said["components"]) == (skeleton.n_loops, skeleton.n_components)
+    assert said["length"] == skeleton.length
+    assert said["converged"] is skeleton.report.converged
+    assert meshes.current_mesh().label() == "Curve Skeleton of cloud"
+    assert np.array_equal(meshes.mesh(0).vertex_matrix(), points)
+
+
+def test_filters_go_on_where_the_last_one_ended_unless_the_layer_was_changed(meshes, points):
+    meshes.generate_contracted_cloud_glsk(max_iterations=2)
+    contracted = meshes.current_mesh().vertex_matrix()
+    meshes.generate_contracted_cloud_glsk(max_iterations=1)
+    assert meshes.layer().flow.report.stages[:2] == meshes.layer(1).flow.report.stages
+    once_more = glsk.Contractor(reducer=glsk.LPRReducer(), max_iterations=1)
+    two = glsk.Contractor(reducer=glsk.LPRReducer(), max_iterations=2)
+    expected = (glsk.RingBuilder() | two | once_more)(points)
+    np.testing.assert_array_equal(meshes.current_mesh().vertex_matrix(), expected.contracted)
+
+    meshes.set_current_mesh(1)
+    meshes.compute_matrix_from_scaling_or_normalization(axisx=2.0, uniformflag=True)
+    changed = meshes.current_mesh().vertex_matrix()
+    assert not np.array_equal(changed, contracted)
+    assert meshes.layer().flow is None
+    meshes.generate_contracted_cloud_glsk(max_iterations=1)
+    np.testing.assert_array_equal(
+        meshes.current_mesh().vertex_matrix(), (glsk.RingBuilder() | once_more)(changed).contracted
+    )
+
+
+def test_a_segmented_mesh_keeps_its_faces():
+    points = sample_object(1500, noise=0).points
+    faces = np.arange(1500, dtype=np.int32).reshape(-1, 3)
+    meshes = glsk.MeshSet()
+    meshes.add_mesh(pymeshlab.Mesh(points, faces), "animal")
+    meshes.generate_curve_skeleton_glsk()
+    skeleton = meshes.current_skeleton()
+    said = meshes.generate_segmented_cloud_glsk()
+    mesh = meshes.current_mesh()
+    np.testing.assert_array_equal(mesh.face_matrix(), faces)
+    np.testing.assert_array_equal(mesh.vertex_matrix(), points)
+    labels = mesh.vertex_scalar_array().astype(int)
+    np.testing.assert_array_equal(labels, skeleton.segment())
+    assert said["branches"] == len(skeleton.branches) > 1
+    for i, path in enumerate(skeleton.branches):
+        assert np.isin(path[1:-1], skeleton.vertex_of_point[labels == i]).any() or len(path) < 3
+    colours = np.unique(np.column_stack([labels, mesh.vertex_color_matrix()]), axis=0)
+    assert len(colours) == len(np.unique(labels))  # one for each
+    assert len(np.unique(colours[:, 1:], axis=0)) == min(len(colours), 18)
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "message"),
+    [
+        (
+            "generate_curve_skeleton_glks",
+            {},
+            "no filter is called 'generate_curve_skeleton_glks': did you mean 'generate_curve_skeleton_glsk'?",
+        ),
+        (
+            "meshing_remove_duplicated_vertices",
+            {},
+            "no filter is called 'meshing_remove_duplicated_vertices': "
+            "did you mean 'meshing_remove_duplicate_vertices'?",
+        ),
+        (
+            "generate_curve_skeleton_glsk",
+            {"conector_radius": 1},
+            "no parameter of generate_curve_skeleton_glsk is called 'conector_radius': "
+            "did you mean 'connector_radius'?",
+        ),
+        (
+            "generate_curve_skeleton_glsk",
+            {"connector_radius": "2 mm"},
+            "connector_radius = '2 mm': must be a number in",
+        ),
+        ("generate_curve_skeleton_glsk", {"connector_radius": True}, "connector_radius = True: must be a number"),
+        ("generate_curve_skeleton_glsk", {"ringbuilder_k": 12.5}, "ringbuilder_k = 12.5: must be an int, or 'auto'"),
+        (
+            "generate_curve_skeleton_glsk",
+            {"connector_links": 2},
+            "connector_links = 2: must be one of 'all', 'nea",
+        ),
+        (
+            "generate_contracted_cloud_glsk",
+            {"stop": "RingSizRatio"},
+            "stop = 'RingSizRatio': no stop is called 'RingSizRatio': did you mean 'RingSizeRatio'?",
+        ),
+        (
+            "generate_contracted_cloud_glsk",
+            {"reducer": None, "lprreducer_phi": 3},
+            "lprreducer_phi: there is no LPRReducer here, only Contractor, ExplainedScore",
+        ),
+        ("generate_one_rings_glsk", {"layer": 7}, "layer = 7: there is no such layer"),
+    ],
+)
+def test_wrong_names_and_values(meshes, name, params, message):
+    with pytest.raises(InvalidParameterError) as caught:
+        meshes.apply_filter(name, **params)
+    assert str(caught.value).startswith(message)
+    assert meshes.mesh_number() == 1
+
+
+def test_layers_that_are_no_clouds(meshes):
+    with pytest.raises(InvalidCloudError, match="there is no layer: load a scan first"):
+        glsk.MeshSet().generate_curve_skeleton_glsk()
+    with pytest.raises(InvalidCloudError, match=r"the current layer \(cloud\) has no edges: it is no skeleton"):
+        meshes.current_skeleton()
+    meshes.generate_curve_skeleton_glsk()
+    with pytest.raises(InvalidCloudError, match="is a skeleton or another line drawing: make the scan the"):
+        meshes.generate_curve_skeleton_glsk()
+
+
+def test_a_filter_that_fails_in_a_script(meshes, tmp_path):
+    (tmp_path / "s.mlx").write_text(
+        '<FilterScript>\n<filter name="Select None"/>\n<filter name="Close Holes"/>\n</FilterScript>'
+    )
+    meshes.load_filter_script(tmp_path / "s.mlx")
+    with pytest.raises(ScriptError, match=r"s.mlx, line 3: filter 'Close Holes': .*does not have Any Faces"):
+        meshes.apply_filter_script()
+    (tmp_path / "s.mlx").write_text('<FilterScript>\n<filter name="Generate One Rings (GLSkeleton)"/>\n</FilterScript>')
+    few = PlainLayers(Layer.of(np.eye(3)))
+    with pytest.raises(ScriptError, match=r"s.mlx, line 2: filter 'Generate One Rings \(GLSkeleton\)': .*8 distinct"):
+        few.apply_step(read_steps(tmp_path / "s.mlx")[0])
+
+
+def test_a_script_that_is_wrong_leaves_the_current_one(meshes, tmp_path):
+    meshes.meshing_remove_duplicate_vertices()
+    with pytest.raises(FileNotFoundError):
+        meshes.load_filter_script(tmp_path / "none.mlx")
+    meshes.save_filter_script(tmp_path / "s.mlx")
+    assert [step.name for step in read_steps(tmp_path / "s.mlx")] == ["meshing_remove_duplicate_vertices"]
+
+
+def test_listings_have_both_kinds(capfd, meshes):
+    names = glsk.MeshSet.filter_list()
+    assert {"meshing_remove_duplicate_vertices", *verbs()} <= set(names)
+    meshes.print_filter_list()
+    assert capfd.readouterr().out.split() == names
+    meshes.print_filter_parameter_list("generate_skeleton_graph_glsk")
+    assert "\tradius : PercentageValue = 1% [min: 0]\n" in capfd.readouterr().out
+    with pytest.raises(InvalidParameterError, match="did you mean 'generate_skeleton_graph_glsk'"):
+        meshes.print_filter_parameter_list("generate_skeleton_graf_glsk")
+    meshes.search("curve skeleton")
+    assert "generate_curve_skeleton_glsk : The curve skeleton" in capfd.readouterr().out
+    meshes.generate_one_rings_glsk(k=9)
+    meshes.print_filter_script()
+    assert "0: generate_one_rings_glsk\n\tk : RichInt = 9\n" in capfd.readouterr().out
+    values = meshes.filter_parameter_values("generate_skeleton_graph_glsk", radius=pymeshlab.PercentageValue(3))
+    assert values["radius"] == "3.0%"
+    assert meshes.filter_parameter_values("compute_selection_point_cloud_outliers")["knearest"] == 32
+
+
+def test_what_pymeshlab_prints_of_its_own_is_still_there():
+    code = "import glsk_o3d as g; g.MeshSet.print_filter_parameter_list('create_sphere'); g.MeshSet.search('poisson')"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "radius : float = 1" in run.stdout
+    assert "generate_surface_reconstruction_screened_poisson" in run.stdout
+
+
+@pytest.mark.parametrize("ending", ["ply", "obj", "json"])
+def test_saved_skeletons_keep_their_edges(meshes, tmp_path, ending):
+    meshes.generate_curve_skeleton_glsk()
+    meshes.save_current_mesh(tmp_path / f"s.{ending}")
+    back = read_skeleton(tmp_path / f"s.{ending}")
+    np.testing.assert_array_equal(back.vertices, meshes.current_skeleton().vertices)
+    np.testing.assert_array_equal(back.edges, meshes.current_skeleton().edges)
+
+
+def test_a_skeleton_that_meshlab_changed_is_what_meshlab_made_of_it(meshes):
+    meshes.generate_curve_skeleton_glsk()
+    before = meshes.current_skeleton()
+    meshes.compute_matrix_from_scaling_or_normalization(axisx=2.0, uniformflag=True, scalecenter="origin")
+    after = meshes.current_skeleton()
+    np.testing.assert_array_equal(after.vertices, 2 * before.vertices)
+    np.testing.assert_array_equal(after.edges, before.edges)
+    np.testing.assert_array_equal(after.radii, before.radii)  # scalars are what MeshLab leaves alone
+    assert len(after.points) == 0
+
+
+def test_it_is_a_meshset_of_pymeshlab(meshes):
+    assert isinstance(meshes, pymeshlab.MeshSet)
+    assert "generate_curve_skeleton_glsk" in dir(glsk.MeshSet)
+    assert "curve skeleton" in glsk.MeshSet.generate_curve_skeleton_glsk.__doc__
 
 
 def test_mesh_of_vertices_and_edges(skeleton):
-    pymeshlab = pytest.importorskip("pymeshlab")
     meshes = pymeshlab.MeshSet()
     meshes.add_mesh(skeleton.to_pymeshlab())
     mesh = meshes.current_mesh()
@@ -17,9 +348,6 @@ def test_mesh_of_vertices_and_edges(skeleton):
 
 
 def test_obj_of_meshlab_keeps_the_edges(tree, tmp_path):
-    pymeshlab = pytest.importorskip("pymeshlab")
-    from glsk_o3d.interop.files import read_skeleton
-
     meshes = pymeshlab.MeshSet()
     meshes.add_mesh(tree.to_pymeshlab())
     meshes.save_current_mesh(str(tmp_path / "m.obj"))
@@ -32,3 +360,19 @@ def test_without_pymeshlab_the_extra_is_named(tree, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     with pytest.raises(MissingPackageError, match=r"pymeshlab.*glsk-o3d\[meshlab\]"):
         tree.to_pymeshlab()
+
+
+def test_without_pymeshlab_meshset_names_the_extra_and_all_else_works():
+    code = """
+import sys
+sys.modules["pymeshlab"] = None
+import glsk_o3d
+from glsk_o3d import *
+from glsk_o3d.catalogue import catalogue
+assert "Refiner" in catalogue()
+glsk_o3d.MeshSet
+"""
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert run.stderr.rstrip().endswith(
+        'MissingPackageError: pymeshlab cannot be imported: pip install "glsk-o3d[meshlab]"'
+    )

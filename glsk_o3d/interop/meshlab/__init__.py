@@ -1,15 +1,16 @@
-"""Skeletons for MeshLab."""
+"""MeshLab: its filters and ours, one after the other, in Python and in filter scripts.
+
+``script`` reads and writes .mlx, ``verbs`` are our filters under MeshLab's kind of names, ``builtin`` knows MeshLab's
+own, ``plan`` brings them together, and ``meshset`` is ``pymeshlab.MeshSet`` with all of it. Only the last, and scripts
+with MeshLab's own filters, need pymeshlab.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from .open3d import require
-
 if TYPE_CHECKING:
-    from ..skeleton import Skeleton
+    from ...skeleton import Skeleton
 
 
 def to_pymeshlab(skeleton: Skeleton) -> Any:
@@ -32,9 +33,6 @@ def to_pymeshlab(skeleton: Skeleton) -> Any:
     MissingPackageError
         pymeshlab (GPL-3, hence an extra: ``glsk-o3d[meshlab]``) or a library that it needs is not installed.
     """
-    pymeshlab = require("pymeshlab", "glsk-o3d[meshlab]")
-    return pymeshlab.Mesh(
-        vertex_matrix=np.ascontiguousarray(skeleton.vertices),
-        edge_matrix=np.ascontiguousarray(skeleton.edges, np.int32),
-        v_scalar_array=np.ascontiguousarray(skeleton.radii),
-    )
+    from .layers import Layer
+
+    return Layer.of(skeleton).to_pymeshlab()

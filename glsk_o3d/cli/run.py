@@ -1,0 +1,120 @@
+"""``glsk run``: filter scripts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .console import WrongUsage, holding_interrupts, print_json, print_table, progress, reporting
+from .options import Json, Quiet, Verbose
+
+if TYPE_CHECKING:
+    from ..interop.meshlab.plan import Step
+    from ..report import IterationRecord
+
+
+def run(
+    script: Annotated[
+        str | None,
+        typer.Argument(metavar="SCRIPT", help="A filter script (.mlx), or the name of one in --list."),
+    ] = None,
+    scan: Annotated[Path | None, typer.Argument(metavar="SCAN", help="The cloud or mesh it starts from.")] = None,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Where to write the last layer: a skeleton as in 'glsk skeletonize', points as ply, pcd or xyz, a "
+            "mesh as ply, obj, off or stl; may be repeated.",
+        ),
+    ] = None,
+    listed: Annotated[bool, typer.Option("--list", help="List the scripts that come with the package.")] = False,
+    cut_loops: Annotated[
+        bool, typer.Option("--cut-loops", help="Cut loops open for formats that hold only trees (swc).")
+    ] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Run a MeshLab filter script, with MeshLab's filters and ours.
+
+    The whole script is checked before anything is run. Filters of MeshLab's own need pymeshlab.
+    """
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..interop.files import read_cloud
+        from ..interop.meshlab.layers import Layer, check_ending
+        from ..interop.meshlab.plan import PlainLayers, find_script, read_steps
+        from .running import check_outputs
+
+        if listed:
+            _list(as_json)
+            return
+        if script is None or scan is None:
+            raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
+        steps = read_steps(find_script(script))
+        outputs, last = output or [], steps[-1]
+        edges = last.verb.makes_edges if last.verb else None
+        if outputs or not last.name.startswith("get_"):  # a script that ends in a measurement needs no file
+            check_outputs(outputs, None, scan, partial(check_ending, edges=edges))
+        with progress(not quiet and not verbose) as update:
+            update(f"reading {scan.name}")
+            with holding_interrupts():
+                if all(step.verb for step in steps):
+                    layers: Any = PlainLayers(Layer.of(read_cloud(scan), scan.name))
+                else:
+                    from ..interop.meshlab.meshset import MeshSet
+
+                    layers = MeshSet()
+                    layers.load_scan(scan)
+            results = []
+            for i, step in enumerate(steps, 1):
+                doing = f"{i} of {len(steps)}: {step.call.name}"
+                update(doing)
+                results.append(layers.apply_step(step, partial(_solved, update, doing)))
+            for path in outputs:
+                update(f"writing {path.name}")
+                layers.save(path, cut_loops=cut_loops)
+        if as_json:
+            done = [{"filter": step.call.name, "result": result} for step, result in zip(steps, results, strict=True)]
+            print_json({"steps": done, "files": [str(path) for path in outputs]})
+        elif not quiet:
+            _print_results(steps, results)
+            for path in outputs:
+                typer.echo(f"wrote {path}")
+
+
+def _solved(update: Callable[..., None], doing: str, record: IterationRecord) -> None:
+    update(f"{doing}, solve {record.iteration}")
+
+
+def _print_results(steps: Sequence[Step], results: Sequence[dict[str, Any]]) -> None:
+    for i, (step, result) in enumerate(zip(steps, results, strict=True), 1):
+        said = ", ".join(
+            f"{key.replace('_', ' ')} {value:.6g}" if isinstance(value, float) else f"{key.replace('_', ' ')} {value}"
+            for key, value in (result or {}).items()
+            if key != "warnings"
+        )
+        typer.echo(f"{i}. {step.call.name}" + f": {said}" * bool(said))
+
+
+def _list(as_json: bool) -> None:
+    from rich.table import Table
+
+    from ..interop.meshlab.plan import scripts
+    from ..interop.meshlab.script import comment
+
+    told = {name: comment(path) for name, path in scripts().items()}
+    if as_json:
+        print_json([{"name": name, "doc": doc} for name, doc in told.items()])
+        return
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True)
+    table.add_column()
+    for name, doc in told.items():
+        table.add_row(name, doc)
+    print_table(table)
