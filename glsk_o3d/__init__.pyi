@@ -24,12 +24,15 @@ from .ring_builder import RingBuilder
 from .skeleton import Skeleton
 from .state import Contraction
 from .stopping import ExplainedScore, RingSizeRatio
+from .viewing.page import save_report
+from .viewing.recorder import ContractionRecorder
 
 __version__: str
 
 __all__ = [
     "Connector",
     "Contraction",
+    "ContractionRecorder",
     "Contractor",
     "ExplainedScore",
     "FileFormatError",
@@ -54,6 +57,7 @@ __all__ = [
     "read_skeleton",
     "remove_redundant_points",
     "save_preview",
+    "save_report",
     "save_skeleton",
     "skeletonize",
 ]
