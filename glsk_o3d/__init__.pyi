@@ -4,6 +4,7 @@ from . import pipelines as pipelines
 from .connector import Connector
 from .contractor import Contractor
 from .errors import (
+    DisplayError,
     FileFormatError,
     GlskError,
     InvalidCloudError,
@@ -34,6 +35,7 @@ __all__ = [
     "Contraction",
     "ContractionRecorder",
     "Contractor",
+    "DisplayError",
     "ExplainedScore",
     "FileFormatError",
     "Filter",

@@ -17,6 +17,7 @@ from .evaluate import evaluate
 from .filters import filters
 from .info import info
 from .skeletonize import skeletonize
+from .view import view
 
 EPILOG = (
     "Exit codes: 0 all went well; 1 the input or the run failed; 2 the command line is wrong; 130 interrupted. "
@@ -30,7 +31,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (skeletonize, evaluate, branches, demo, filters, info):
+for command in (skeletonize, evaluate, branches, demo, filters, info, view):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
 
 

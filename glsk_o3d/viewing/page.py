@@ -81,11 +81,11 @@ def _page(skeleton, recorder, title) -> str:
     shown, positions = _followed(skeleton, recorder)
     script = _asset("report.js")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    versions = skeleton.report.versions
+    kind = "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
     now = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
     parts = {
         "title": escape(title),
-        "subtitle": escape(f"Curve skeleton · glsk-o3d {versions.get('glsk-o3d', '')} · {now}"),
+        "subtitle": escape(f"{kind} · glsk-o3d {skeleton.report.versions.get('glsk-o3d', '')} · {now}"),
         "policy": f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'",
         "style": _asset("report.css"),
         "figures": sections.figures(skeleton),
@@ -137,19 +137,19 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
     thin, middle, _ = np.sort(high - low)
     across = int(np.argmin(high - low)) if thin < FLAT * middle else 2 if np.argmax(high - low) == 1 else 1
     lone = np.flatnonzero(skeleton.degree == 0)  # drawn as edges without a length
+    owner = skeleton.vertex_of_point[shown] if len(skeleton.vertices) else np.full(len(shown), -1)
+    label = branch_of_point(skeleton, skeleton.points[shown], owner) if len(skeleton.vertices) else owner
     dots = len(skeleton.branches) + np.arange(len(lone))
     return {
         "captions": _captions(skeleton, len(positions) - 1),
         "view": ("yz", "xz", "xy")[across],  # what is flat from its broad side; else z is up, or y if that is longest
         "unit": unit,
-        "palette": sections.branch_colors(20),
+        "palette": sections.branch_colors(skeleton, 20),
         "ramp": sections.hexadecimal(colormaps["viridis"](np.linspace(0, 1, 24))),
         "ranges": ranges,
         "positions": _packed(np.rint(32767 * steps), "<i2"),
-        "vertex_of_point": _packed(skeleton.vertex_of_point[shown], "<i4"),
-        "branch_of_point": _packed(
-            branch_of_point(skeleton, skeleton.points[shown], skeleton.vertex_of_point[shown]), "<i4"
-        ),
+        "vertex_of_point": _packed(owner, "<i4"),
+        "branch_of_point": _packed(label, "<i4"),
         "vertices": _packed((skeleton.vertices - centre) / unit, "<f4"),
         "radii": _packed(np.nan_to_num(skeleton.radii / unit, nan=0.0), "<f4"),
         "confidence": _packed(skeleton.confidence, "<f4"),

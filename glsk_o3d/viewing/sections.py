@@ -39,18 +39,19 @@ _WIDTH, _HEIGHT, _LEFT, _TOP, _BOTTOM = 320, 150, 46, 12, 22  # of a chart and o
 
 def figures(skeleton: Skeleton) -> str:
     """The run in a few numbers."""
-    seconds = sum(skeleton.report.seconds.values())
-    told = {
-        "Points": f"{len(skeleton.points):,}" if len(skeleton.points) else None,
-        "Vertices": f"{len(skeleton.vertices):,}",
-        "Branches": f"{len(skeleton.branches):,}",
-        "Components": f"{skeleton.n_components:,}",
-        "Loops": f"{skeleton.n_loops:,}",
-        "Leaves": f"{len(skeleton.leaves):,}",
-        "Length": _number(skeleton.length),
-        "Seconds": f"{seconds:.2f}" if seconds else None,
-    }
-    return "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in told.items() if value)
+    told = {"Points": f"{len(skeleton.points):,}"} if len(skeleton.points) else {}
+    if len(skeleton.vertices):
+        told |= {
+            "Vertices": f"{len(skeleton.vertices):,}",
+            "Branches": f"{len(skeleton.branches):,}",
+            "Components": f"{skeleton.n_components:,}",
+            "Loops": f"{skeleton.n_loops:,}",
+            "Leaves": f"{len(skeleton.leaves):,}",
+            "Length": _number(skeleton.length),
+        }
+    if skeleton.report.seconds:
+        told["Seconds"] = f"{sum(skeleton.report.seconds.values()):.2f}"
+    return "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in told.items())
 
 
 def warnings(messages: Iterable[str]) -> str:
@@ -83,7 +84,7 @@ def branches(skeleton: Skeleton) -> str:
         return ""
     table = sorted(skeleton.branch_table(), key=lambda row: -row["length"])
     table = [row for row in table if row["kind"] != "isolated"]
-    colors = branch_colors(len(skeleton.branches))
+    colors = branch_colors(skeleton, len(skeleton.branches))
     rows = ""
     for row in table[:MOST_BRANCHES]:
         swatch = f'<span class="swatch" style="background:{colors[row["branch"]]}"></span>'
@@ -96,11 +97,12 @@ def branches(skeleton: Skeleton) -> str:
     return f"<h2>Longest branches</h2>{_table(heads, rows)}{more}"
 
 
-def branch_colors(n: int) -> list[str]:
+def branch_colors(skeleton: Skeleton, n: int) -> list[str]:
     """The colours of the first n branches, the same as in Open3D's windows.
 
     Parameters
     ----------
+    skeleton : Skeleton
     n : int
 
     Returns
@@ -108,10 +110,7 @@ def branch_colors(n: int) -> list[str]:
     list of str
         As ``"#rrggbb"``.
     """
-    from ..skeleton import Skeleton
-
-    nothing = Skeleton((), (), (), (), (), ())
-    return hexadecimal(shades(nothing, "branch", np.arange(n), np.arange(n)))
+    return hexadecimal(shades(skeleton, "branch", np.arange(n), np.arange(n)))
 
 
 def hexadecimal(colors: np.ndarray) -> list[str]:

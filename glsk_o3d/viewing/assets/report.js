@@ -3,7 +3,7 @@
 (() => {
   const element = (id) => document.getElementById(id);
   const canvas = element("view");
-  const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
+  const gl = canvas.getContext("webgl2", { alpha: false, antialias: true, preserveDrawingBuffer: true });
   if (!gl) return; // the still picture stays
   document.body.classList.remove("still");
   canvas.addEventListener("webglcontextlost", () => document.body.classList.add("still"));
@@ -319,7 +319,8 @@
   element("colour").addEventListener("change", paint);
   for (const name of ["cloud", "skeleton", "tubes"]) element(name).addEventListener("change", () => redraw());
   element("cloud").parentNode.hidden = !nPoints;
-  element("tubes").parentNode.hidden = !("radius" in data.ranges);
+  for (const name of ["skeleton", "colour"]) element(name).parentNode.hidden = !nPieces;
+  element("tubes").parentNode.hidden = !("radius" in data.ranges && nPieces);
   document.querySelectorAll("[data-view]").forEach((button) =>
     button.addEventListener("click", () => look(button.dataset.view)));
   element("save").addEventListener("click", () => {
