@@ -58,7 +58,7 @@ def open_window(skeleton: Skeleton, cloud: Any, title: str) -> Any:
         )
     o3d = import_open3d()
     window = o3d.visualization.VisualizerWithKeyCallback()
-    if not window.create_window(title):
+    if not window.create_window(title, 1280, 800):
         raise DisplayError(
             "Open3D cannot open a window here: save_report and save_preview make files to look at instead"
         )

@@ -52,7 +52,7 @@ def look(browser):
     """Open a page offline, in an empty profile of its own; it must not complain or ask for anything but itself."""
     contexts, trouble = [], []
 
-    def open_page(path, width=700, height=700, scheme="light", within=browser, **options):
+    def open_page(path, width=560, height=640, scheme="light", within=browser, **options):
         context = within.new_context(
             viewport={"width": width, "height": height}, color_scheme=scheme, offline=True, **options
         )
@@ -76,11 +76,11 @@ def look(browser):
 
 @pytest.fixture(scope="session")
 def pixels():
-    """What a part of a page looks like, as an (h, w, 3) int array."""
+    """What the view looks like, without its round corners, as an (h, w, 3) int array."""
 
-    def shoot(page, selector="#view"):
+    def shoot(page):
         page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        image = imread(io.BytesIO(page.locator(selector).screenshot()))
-        return np.rint(255 * image[..., :3]).astype(int)
+        image = imread(io.BytesIO(page.locator("#view").screenshot()))
+        return np.rint(255 * image[10:-10, 10:-10, :3]).astype(int)
 
     return shoot

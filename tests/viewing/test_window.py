@@ -20,9 +20,8 @@ import glsk_o3d as glsk
 from glsk_o3d.viewing import window
 
 def colours():
-    for _ in range(3):
-        opened.poll_events()
-        opened.update_renderer()
+    opened.poll_events()
+    opened.update_renderer()
     image = np.asarray(opened.capture_screen_float_buffer(True))
     return len(np.unique(np.rint(255 * image).reshape(-1, 3), axis=0))
 

@@ -209,7 +209,7 @@
   };
 
   // -------------------------------------------------------------------------------------------------- drawing
-  let shown = 0, wanted = 0, playing = false, due = false, clock = 0;
+  let shown = 0, wanted = 0, playing = false, due = false, moving = false, clock = 0;
   const drawPieces = (thin, opacity, plain = [0, 0, 0, 0]) => {
     gl.uniform1f(pieces.uniform("thin"), thin);
     gl.uniform4fv(pieces.uniform("plain"), plain);
@@ -264,7 +264,7 @@
   };
   const tick = (now) => {
     due = false;
-    const step = Math.min((now - clock) / 1000, 0.1) * (playing ? 1 : 4);
+    const step = (Math.max(now - clock, 0) / 1000) * (playing ? 1 : 4); // solves
     clock = now;
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches && !playing;
     shown = calm || Math.abs(wanted - shown) <= step ? wanted : shown + step * Math.sign(wanted - shown);
@@ -274,12 +274,15 @@
       if (shown === last) stop();
     }
     draw();
-    if (shown !== wanted) redraw();
+    moving = shown !== wanted;
+    if (moving) redraw();
   };
   const redraw = () => {
     if (due) return;
     due = true;
-    requestAnimationFrame((now) => { if (now - clock > 100) clock = now - 16; tick(now); });
+    if (!moving) clock = performance.now();
+    moving = shown !== wanted;
+    requestAnimationFrame(tick);
   };
   const say = (solve) => {
     element("caption").textContent = data.captions[solve];
