@@ -30,7 +30,7 @@ _COLUMNS = (  # heading, field of the record, format, whether there is no room f
     ("seconds", "seconds", ".3f", True),
 )
 _CHARTS = (
-    ("Points solved for, <i>n</i>", "n_points", ",.4g"),
+    ("Points solved for, <i>n</i>", "n_points", ",.10g"),
     ("Change of the explained score, <i>De</i>", "explained_change", ".3g"),
     ("Ring ratio, <i>a</i>", "ring_ratio", ".3g"),
 )
@@ -85,16 +85,18 @@ def branches(skeleton: Skeleton) -> str:
     table = sorted(skeleton.branch_table(), key=lambda row: -row["length"])
     table = [row for row in table if row["kind"] != "isolated"]
     colors = branch_colors(skeleton, len(skeleton.branches))
+    columns = (("length", "#.4g", False), ("mean_radius", "#.4g", False))
+    columns = (*columns, ("tortuosity", ".2f", True), ("confidence", ".2f", True))
+    heads = "<th>branch</th><th>kind</th>"
+    heads += "".join(f"<th{_extra(hidden)}>{name.replace('_', ' ')}</th>" for name, _, hidden in columns)
     rows = ""
     for row in table[:MOST_BRANCHES]:
         swatch = f'<span class="swatch" style="background:{colors[row["branch"]]}"></span>'
-        numbers = [_number(row[name]) for name in ("length", "mean_radius", "tortuosity")]
-        cells = (f"{swatch}{row['branch']}", row["kind"], *numbers, f"{row['points']:,}")
-        rows += f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
-    heads = "".join(f"<th>{head}</th>" for head in ("branch", "kind", "length", "radius", "bent", "points"))
+        cells = "".join(f"<td{_extra(hidden)}>{_number(row[name], form)}</td>" for name, form, hidden in columns)
+        rows += f"<tr><td>{swatch}{row['branch']}</td><td>{row['kind']}</td>{cells}<td>{row['points']:,}</td></tr>"
     rest = len(table) - MOST_BRANCHES
     more = f'<p class="muted small">and {rest:,} shorter ones</p>' if rest > 0 else ""
-    return f"<h2>Longest branches</h2>{_table(heads, rows)}{more}"
+    return f"<h2>Longest branches</h2>{_table(heads + '<th>points</th>', rows, 'branches')}{more}"
 
 
 def branch_colors(skeleton: Skeleton, n: int) -> list[str]:
@@ -147,8 +149,8 @@ def origin(report: Report) -> str:
     return f'{told}<div class="pair">{_facts("The run", numbers, "number")}{_facts("Versions", report.versions)}</div>'
 
 
-def _number(value: float) -> str:
-    return f"{value:.4g}" if math.isfinite(value) else "–"
+def _number(value: float, form: str = "#.4g") -> str:
+    return f"{value:{form}}".rstrip(".") if math.isfinite(value) else "–"
 
 
 def _extra(hidden: bool) -> str:

@@ -24,8 +24,8 @@ def run():
 @pytest.fixture(scope="module")
 def launch():
     """Start a headless Chromium with other flags than the usual ones."""
-    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
-    browser = os.environ.get("GLSK_CHROMIUM", browser)
+    names = (os.environ.get("GLSK_CHROMIUM", ""), "chromium", "chromium-browser", "google-chrome", "chrome")
+    browser = next(filter(None, map(shutil.which, names)), None)
     if browser is None:
         pytest.skip("needs Chromium: apt-get install chromium, or set GLSK_CHROMIUM to where it is")
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright, of the extra 'dev'")
