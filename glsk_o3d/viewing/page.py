@@ -144,7 +144,7 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
         "captions": _captions(skeleton, len(positions) - 1),
         "view": ("yz", "xz", "xy")[across],  # what is flat from its broad side; else z is up, or y if that is longest
         "unit": unit,
-        "palette": sections.branch_colors(skeleton, 20),
+        "palette": sections.branch_colors(skeleton, len(skeleton.branches) + len(lone)),
         "ramp": sections.hexadecimal(colormaps["viridis"](np.linspace(0, 1, 24))),
         "ranges": ranges,
         "positions": _packed(np.rint(32767 * steps), "<i2"),

@@ -100,6 +100,9 @@ def test_positions_come_through(data, offset):
     np.testing.assert_array_equal(unpacked(held["edges"], "<u4").reshape(-1, 2), skeleton.edges)
     np.testing.assert_array_equal(unpacked(held["vertex_of_point"], "<i4"), skeleton.vertex_of_point)
     np.testing.assert_array_equal(unpacked(held["branch_of_point"], "<i4"), skeleton.segment())
+    colours = [[int(hexa[i : i + 2], 16) / 255 for i in (1, 3, 5)] for hexa in held["palette"]]
+    lines = np.asarray(skeleton.to_line_set("branch").colors)
+    np.testing.assert_allclose(np.array(colours)[unpacked(held["branch_of_edge"], "<i4")], lines, atol=0.003)
     assert len(held["captions"]) == len(skeleton.report.iterations) + 1
 
 

@@ -139,7 +139,7 @@
   const rgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
   const palette = data.palette.map(rgb), ramp = data.ramp.map(rgb);
   const blend = (a, b, share) => a.map((value, i) => value + share * (b[i] - value));
-  const ofBranch = (branch) => (branch < 0 ? GREY : palette[branch % palette.length]);
+  const ofBranch = (branch) => (branch < 0 ? GREY : palette[branch]);
   const ofMeasure = (value, [low, high]) => {
     if (!Number.isFinite(value)) return GREY;
     const x = (ramp.length - 1) * Math.min(Math.max((value - low) / (high - low || 1), 0), 1);
