@@ -11,7 +11,7 @@ ACCURACY_ARGS ?= truth --builtin
 PYTHON_HINT = glsk-o3d needs Python 3.10 or newer: install it, or say 'make ... PYTHON=/path/to/python3'.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test accuracy lint format clean system-deps
+.PHONY: help demo test accuracy lint format clean system-deps browser
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -19,7 +19,7 @@ help: ## show this list
 demo: $(VENV)/.installed-demo ## skeletonise the built-in sample object; writes demo/skeleton.{ply,json,png}
 	$(BIN)/glsk demo -o demo
 
-test: $(VENV)/.installed-test ## run the whole test suite (PYTEST_ARGS="-k name" for a part)
+test: $(VENV)/.installed-test | browser ## run the whole test suite (PYTEST_ARGS="-k name" for a part)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MPLBACKEND=Agg $(BIN)/python -m pytest $(PYTEST_ARGS)
 
 accuracy: $(VENV)/.installed-demo ## how far skeletons are from known axes (ACCURACY_ARGS="ablation --builtin" for more)
@@ -44,6 +44,10 @@ system-deps:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
 		{ echo "This is `$(PYTHON) -V 2>&1`. $(PYTHON_HINT)" >&2; exit 1; }
 	@sh scripts/system-deps.sh $(PYTHON) $(VENV)
+
+# Tests that need a browser are skipped, visibly, where there is none and none can be installed.
+browser: | system-deps
+	@sh scripts/browser.sh
 
 $(BIN)/python: | system-deps
 	$(PYTHON) -m venv $(VENV)

@@ -4,6 +4,7 @@ from . import pipelines as pipelines
 from .connector import Connector
 from .contractor import Contractor
 from .errors import (
+    DisplayError,
     FileFormatError,
     GlskError,
     InvalidCloudError,
@@ -26,13 +27,17 @@ from .ring_builder import RingBuilder
 from .skeleton import Skeleton
 from .state import Contraction
 from .stopping import ExplainedScore, RingSizeRatio
+from .viewing.page import save_report
+from .viewing.recorder import ContractionRecorder
 
 __version__: str
 
 __all__ = [
     "Connector",
     "Contraction",
+    "ContractionRecorder",
     "Contractor",
+    "DisplayError",
     "ExplainedScore",
     "FileFormatError",
     "Filter",
@@ -58,6 +63,7 @@ __all__ = [
     "read_skeleton",
     "remove_redundant_points",
     "save_preview",
+    "save_report",
     "save_skeleton",
     "skeletonize",
 ]

@@ -75,7 +75,7 @@ class Connector(Filter):
         high=1,
     )
 
-    def _run(self, state, on_iteration):
+    def _run(self, state, watch):
         radius = resolve_length(self.radius, state.frame.diagonal * state.frame.scale) / state.frame.scale
         radii = np.maximum(radius, self.thickness * local_thickness(state))
         samples, owner = farthest_point_sampling(state.positions, radii)

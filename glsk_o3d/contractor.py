@@ -85,7 +85,7 @@ class Contractor(Filter):
     )
     max_attraction: float = parameter(1e4, "Cap of W_H.", type="float", low=0, open_low=True)
 
-    def _run(self, state, on_iteration):
+    def _run(self, state, watch):
         reducer = self.reducer
         for _ in range(self.max_iterations):
             start = time.perf_counter()
@@ -104,7 +104,7 @@ class Contractor(Filter):
                 if len(state) == n:
                     reducer = None  # as in the published code, which gives up after a pass without a merge
                 state = _amend(state, n_merged=n - len(state), seconds=time.perf_counter() - start)
-            if on_iteration is not None and on_iteration(state.report.iterations[-1]) is False and reason is None:
+            if watch is not None and watch(state) is False and reason is None:
                 return _finished(state, "stopped by the caller")
             if reason is not None:
                 keep = self.keep_last or len(state.report.iterations) == 1

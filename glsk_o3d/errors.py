@@ -29,5 +29,9 @@ class MissingPackageError(GlskError, ImportError):
     """An optional package, or a system library it needs, is not installed."""
 
 
+class DisplayError(GlskError, RuntimeError):
+    """There is no screen to open a window on."""
+
+
 class SkeletonWarning(UserWarning):
     """The skeleton was computed but should not be trusted blindly."""

@@ -18,8 +18,10 @@ from .interop.verbosity import following_open3d
 if TYPE_CHECKING:
     from .pipeline import Pipeline
     from .report import IterationRecord
+    from .state import Contraction
 
     OnIteration = Callable[[IterationRecord], bool | None]
+    OnState = Callable[[Contraction], object]
 
 _log = logging.getLogger(__name__)
 
@@ -170,7 +172,7 @@ class Filter(Parameters):
     """What the filter takes: ``"cloud"``, ``"Contraction"`` or ``"Skeleton"``."""
     produces: ClassVar[str] = "Contraction"
 
-    def __call__(self, data, *, on_iteration: OnIteration | None = None):
+    def __call__(self, data, *, on_iteration: OnIteration | None = None, on_state: OnState | None = None):
         """Run the filter.
 
         Parameters
@@ -179,6 +181,8 @@ class Filter(Parameters):
             See `consumes`. A cloud is anything `glsk_o3d.skeletonize` takes.
         on_iteration : callable, optional
             Called with each IterationRecord of a contraction; return False to stop there and keep what is done.
+        on_state : callable, optional
+            Called before it with the Contraction itself, as it is after each solve and the merges that follow.
         """
         from .skeleton import Skeleton
         from .state import Contraction
@@ -193,7 +197,7 @@ class Filter(Parameters):
             )
         start = time.perf_counter()
         with following_open3d():
-            result = self._run(data, _logged(on_iteration))
+            result = self._run(data, _watch(on_iteration, on_state))
             seconds = time.perf_counter() - start
             _log.debug("%s took %.3f s: %r", type(self).__name__, seconds, result)
         return dataclasses.replace(result, report=result.report.with_stage(self, seconds))
@@ -203,21 +207,25 @@ class Filter(Parameters):
 
         return Pipeline(self) | other
 
-    def _run(self, data, on_iteration):
+    def _run(self, data, watch):
+        """The work itself; `watch` is None or wants the Contraction after each solve, and says False to stop."""
         raise NotImplementedError
 
 
-def _logged(on_iteration):
-    """A callback that also logs every iteration, where somebody listens."""
-    if not _log.isEnabledFor(logging.DEBUG):
-        return on_iteration
+def _watch(on_iteration, on_state):
+    """One callback for both, and for the log; None where nobody listens."""
+    if on_iteration is None and on_state is None and not _log.isEnabledFor(logging.DEBUG):
+        return None
 
-    def watch(record):
+    def watch(state):
+        record = state.report.iterations[-1]
         _log.debug(
             "solve %d: %d points, %d merged, e %.4f, De %.4f, ring ratio %.4f, %.3f s",
             *(record.iteration, record.n_points, record.n_merged, record.explained, record.explained_change),
             *(record.ring_ratio, record.seconds),
         )
+        if on_state is not None:
+            on_state(state)
         return None if on_iteration is None else on_iteration(record)
 
     return watch

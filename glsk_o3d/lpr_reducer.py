@@ -66,7 +66,7 @@ class LPRReducer(Filter):
         choices=("cheapest", "index"),
     )
 
-    def _run(self, state, on_iteration):
+    def _run(self, state, watch):
         if not state.report.iterations:
             raise StageError("LPRReducer compares ring sizes before and after a contraction: run Contractor first")
         nearest, _ = state.rings.nearest(state.positions)

@@ -39,7 +39,7 @@ class Pipeline:
                 )
         self.stages = stages
 
-    def __call__(self, cloud, *, on_iteration=None):
+    def __call__(self, cloud, *, on_iteration=None, on_state=None):
         """Run all filters on a cloud.
 
         Parameters
@@ -47,6 +47,8 @@ class Pipeline:
         cloud : cloud, or whatever the first filter consumes
         on_iteration : callable, optional
             Called with the IterationRecord of each solve; return False to stop the contraction there.
+        on_state : callable, optional
+            Called before it with the Contraction after each solve, such as a `ContractionRecorder`.
 
         Returns
         -------
@@ -55,7 +57,7 @@ class Pipeline:
         """
         self.check()
         for stage in self.stages:
-            cloud = stage(cloud, on_iteration=on_iteration)
+            cloud = stage(cloud, on_iteration=on_iteration, on_state=on_state)
         return cloud
 
     def check(self) -> None:
@@ -76,7 +78,7 @@ class Pipeline:
         return hash(self.stages)
 
 
-def skeletonize(cloud, pipeline: Pipeline | str = "default", *, on_iteration=None) -> Skeleton:
+def skeletonize(cloud, pipeline: Pipeline | str = "default", *, on_iteration=None, on_state=None) -> Skeleton:
     """Curve skeleton of a point cloud.
 
     Parameters
@@ -86,6 +88,8 @@ def skeletonize(cloud, pipeline: Pipeline | str = "default", *, on_iteration=Non
     pipeline : Pipeline or {"default", "wen2024", "cao2010"}
     on_iteration : callable, optional
         Called with the IterationRecord of each solve; return False to stop the contraction there.
+    on_state : callable, optional
+        Called before it with the Contraction after each solve, such as a `ContractionRecorder`.
 
     Returns
     -------
@@ -106,4 +110,4 @@ def skeletonize(cloud, pipeline: Pipeline | str = "default", *, on_iteration=Non
         raise InvalidParameterError(f"pipeline = {pipeline!r}: must be a Pipeline or the name of one")
     if pipeline.stages[0].consumes != "cloud" or pipeline.stages[-1].produces != "Skeleton":
         raise InvalidParameterError(f"{pipeline!r} does not lead from a cloud to a skeleton")
-    return pipeline(cloud, on_iteration=on_iteration)
+    return pipeline(cloud, on_iteration=on_iteration, on_state=on_state)

@@ -97,7 +97,7 @@ class Refiner(Filter):
         low=0,
     )
 
-    def _run(self, skeleton, on_iteration):
+    def _run(self, skeleton, watch):
         skeleton = collapse_triangles(skeleton)
         if self.opening:
             skeleton = close_loops(skeleton, self.opening)

@@ -120,7 +120,7 @@ class RingBuilder(Filter):
                     raise InvalidParameterError(f"RingBuilder.radius = {self.radius!r}: {self.k!r} already has one")
                 object.__setattr__(self, name, value)
 
-    def _run(self, cloud, on_iteration):
+    def _run(self, cloud, watch):
         points = cloud_points(cloud)
         finite = self._finite(points)
         good = points[finite]

@@ -77,6 +77,12 @@ class Skeleton:
             f"{self.n_loops} loops, {len(self.leaves)} leaves, {len(self.junctions)} junctions)"
         )
 
+    def _repr_html_(self) -> str:
+        """A picture and the numbers, for Jupyter."""
+        from .viewing.notebook import to_html
+
+        return to_html(self)
+
     @cached_property
     def degree(self) -> np.ndarray:
         """Edges at every vertex, (M,) int array."""

@@ -18,6 +18,7 @@ from .filters import filters
 from .info import info
 from .run import run
 from .skeletonize import skeletonize
+from .view import view
 
 EPILOG = (
     "Exit codes: 0 all went well; 1 the input or the run failed; 2 the command line is wrong; 130 interrupted. "
@@ -31,7 +32,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (skeletonize, run, evaluate, branches, demo, filters, info):
+for command in (skeletonize, run, evaluate, branches, view, demo, filters, info):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
 
 

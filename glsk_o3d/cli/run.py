@@ -60,7 +60,7 @@ def run(
         outputs, last = output or [], steps[-1]
         edges = last.verb.makes_edges if last.verb else None
         if outputs or not last.name.startswith("get_"):  # a script that ends in a measurement needs no file
-            check_outputs(outputs, None, scan, partial(check_ending, edges=edges))
+            check_outputs(outputs, None, scan, check_ending=partial(check_ending, edges=edges))
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")
             with holding_interrupts():

@@ -17,8 +17,11 @@ from ..interop.files import skeleton_ending
 from ..interop.preview import save_preview
 from ..pipeline import Pipeline
 from ..skeleton import Skeleton
+from ..viewing.page import save_report
+from ..viewing.recorder import ContractionRecorder
 from .console import WrongUsage, print_iterations, print_json, print_rows
 
+_MADE_WITH = {".png": "; a picture is made with --preview", ".html": "; a page is made with --report"}
 _DOING = {
     "RingBuilder": "building rings",
     "Contractor": "contracting",
@@ -32,6 +35,7 @@ def check_outputs(
     outputs: Sequence[Path],
     preview: Path | None = None,
     scan: Path | None = None,
+    page: Path | None = None,
     check_ending: Callable[[Path], object] = skeleton_ending,
 ) -> None:
     """Find out before computing whether the files can be written.
@@ -42,6 +46,8 @@ def check_outputs(
     preview : Path, optional
     scan : Path, optional
         The input, which must not be overwritten.
+    page : Path, optional
+        The report.
     check_ending : callable
         Raises FileFormatError for an output whose ending is wrong.
 
@@ -56,13 +62,15 @@ def check_outputs(
         try:
             check_ending(path)
         except FileFormatError as error:
-            hint = "; a picture is made with --preview" if path.suffix.lower() == ".png" else ""
+            hint = _MADE_WITH.get(path.suffix.lower(), "")
             raise WrongUsage(f"{error}{hint}") from None
     if preview is not None and preview.suffix.lower() != ".png":
         raise WrongUsage(f"{preview}: the preview is a picture and its name ends in .png")
-    files = [*outputs, *([preview] if preview is not None else [])]
+    if page is not None and page.suffix.lower() not in (".html", ".htm"):
+        raise WrongUsage(f"{page}: the report is a page and its name ends in .html")
+    files = [*outputs, *(path for path in (preview, page) if path is not None)]
     if not files:
-        raise WrongUsage("nothing to write: give an output with -o, a picture with --preview, or both")
+        raise WrongUsage("nothing to write: give an output with -o, a picture with --preview, a page with --report")
     seen = {os.path.realpath(scan): "is the scan itself"} if scan is not None else {}
     for path in files:
         real = os.path.realpath(path)
@@ -91,7 +99,7 @@ def check_writable(path: Path) -> None:
         raise OSError(f"{path}: no file can be made in this folder: {error.strerror}") from error
 
 
-def run(pipeline: Pipeline, cloud: Any, update) -> tuple[Skeleton, float]:
+def run(pipeline: Pipeline, cloud: Any, update, on_state=None) -> tuple[Skeleton, float]:
     """Run a pipeline and show how far it is.
 
     Parameters
@@ -100,6 +108,8 @@ def run(pipeline: Pipeline, cloud: Any, update) -> tuple[Skeleton, float]:
     cloud : cloud
     update : callable
         From `console.progress`.
+    on_state : callable, optional
+        Called with the Contraction after each solve.
 
     Returns
     -------
@@ -111,7 +121,7 @@ def run(pipeline: Pipeline, cloud: Any, update) -> tuple[Skeleton, float]:
     for stage in pipeline.stages:
         doing = _DOING.get(type(stage).__name__, type(stage).__name__)
         update(doing)
-        flow = stage(flow, on_iteration=_watch(stage, doing, update))
+        flow = stage(flow, on_iteration=_watch(stage, doing, update), on_state=on_state)
     return flow, time.perf_counter() - start
 
 
@@ -126,7 +136,15 @@ def _watch(stage: Filter, doing: str, update):
 
 
 def write(
-    skeleton: Skeleton, outputs: Sequence[Path], preview: Path | None, *, title: str, cut_loops: bool, update
+    skeleton: Skeleton,
+    outputs: Sequence[Path],
+    preview: Path | None,
+    page: Path | None = None,
+    *,
+    title: str,
+    cut_loops: bool,
+    update,
+    recorder: ContractionRecorder | None = None,
 ) -> tuple[list[Path], list[str]]:
     """Write all files that can be written; one that cannot does not keep the others from it.
 
@@ -135,12 +153,16 @@ def write(
     skeleton : Skeleton
     outputs : sequence of Path
     preview : Path or None
+    page : Path, optional
+        The report.
     title : str
-        Above the preview.
+        Above the preview and the report.
     cut_loops : bool
         Cut loops where the format holds only trees.
     update : callable
         From `console.progress`.
+    recorder : ContractionRecorder, optional
+        What watched the run, for the report.
 
     Returns
     -------
@@ -148,11 +170,13 @@ def write(
         The files that were written, and what was wrong with the others.
     """
     written, problems = [], []
-    for path in [*outputs, *([preview] if preview is not None else [])]:
+    for path in [*outputs, *(path for path in (preview, page) if path is not None)]:
         update(f"writing {path.name}")
         try:
             if path is preview:
                 save_preview(skeleton, path, title=title)
+            elif path is page:
+                save_report(skeleton, path, recorder=recorder, title=title)
             else:
                 skeleton.save(path, cut_loops=cut_loops)
             written.append(path)

@@ -22,6 +22,12 @@ def skeletonize(
     preview: Annotated[
         Path | None, typer.Option("--preview", metavar="PNG", help="Also draw cloud and skeleton.")
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            "--report", metavar="HTML", help="Also write a page to look at: turn, zoom, watch the contraction, read."
+        ),
+    ] = None,
     pipeline: PipelineName = "default",
     settings: Annotated[
         list[str] | None,
@@ -48,17 +54,28 @@ def skeletonize(
     with reporting(quiet=quiet, verbose=verbose):
         from ..interop.files import read_cloud
         from ..pipelines import named_pipeline
+        from ..viewing.recorder import ContractionRecorder
         from .overrides import override
         from .running import check_outputs, print_results, run, write
 
         drop = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
         chosen = override(named_pipeline(pipeline), [*(settings or []), *drop], name=pipeline)
         outputs = output or []
-        check_outputs(outputs, preview, scan)
+        check_outputs(outputs, preview, scan, report)
+        recorder = ContractionRecorder() if report is not None else None
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")
             with holding_interrupts():
                 cloud = read_cloud(scan)
-            skeleton, seconds = run(chosen, cloud, update)
-            written, problems = write(skeleton, outputs, preview, title=scan.name, cut_loops=cut_loops, update=update)
+            skeleton, seconds = run(chosen, cloud, update, recorder)
+            written, problems = write(
+                skeleton,
+                outputs,
+                preview,
+                report,
+                title=scan.name,
+                cut_loops=cut_loops,
+                update=update,
+                recorder=recorder,
+            )
         print_results(skeleton, seconds, written, problems, quiet=quiet, verbose=verbose, as_json=as_json)

@@ -51,7 +51,7 @@ def save_preview(
     write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=DPI))
 
 
-def draw(skeleton: Skeleton, size, title):
+def draw(skeleton: Skeleton, size, title, caption=True):
     """The figure, on a canvas of its own: pyplot and its global state stay out of it."""
     require("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -97,7 +97,8 @@ def draw(skeleton: Skeleton, size, title):
         names = f"{'xyz'[a]}\N{RIGHTWARDS ARROW} {'xyz'[b]}\N{UPWARDS ARROW}"
         figure.text((left + view_width / 2) / width, 0.36 / height, names, ha="center", color="#999999", fontsize=7)
         left += view_width + gap
-    figure.text(0.5, 0.12 / height, _caption(skeleton), ha="center", color=INK, fontsize=8)
+    if caption:
+        figure.text(0.5, 0.12 / height, _caption(skeleton), ha="center", color=INK, fontsize=8)
     if title:
         figure.text(0.5, 1 - 0.33 / height, title, ha="center", color=INK, fontsize=12, parse_math=False)
     return figure

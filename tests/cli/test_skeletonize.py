@@ -2,12 +2,13 @@
 
 import json
 import logging
+import re
 from pathlib import Path
 
 import pytest
 
 import glsk_o3d
-from glsk_o3d import read_skeleton
+from glsk_o3d import read_skeleton, samples
 from glsk_o3d.cli.options import PipelineName
 from glsk_o3d.pipelines import PIPELINES
 
@@ -31,10 +32,13 @@ def no_run(monkeypatch):
         (2, ["-o", "s"], "s: unknown ending"),
         (2, ["-o", "s.png"], "a picture is made with --preview"),
         (2, ["-o", "s.ply", "--preview", "s.jpg"], "s.jpg: the preview is a picture and its name ends in .png"),
+        (2, ["-o", "s.html"], "a page is made with --report"),
+        (2, ["--report", "s.pdf"], "s.pdf: the report is a page and its name ends in .html"),
         (2, ["-o", "s.ply", "-o", "./s.ply"], "s.ply: is named twice"),
         (2, ["-o", "SCAN"], "is the scan itself"),
         (1, ["-o", "no/where/s.ply"], "no/where: no such folder"),
         (1, ["-o", "s.ply", "--preview", "no/s.png"], "no: no such folder"),
+        (1, ["--report", "no/s.html"], "no: no such folder"),
         (1, ["-o", "/proc/s.ply"], "/proc/s.ply: no file can be made in this folder"),
         (2, ["-o", "s.ply", "--pipeline", "wen2042"], "no pipeline is called 'wen2042': there are default, wen2024"),
         (2, ["-o", "s.ply", "--set", "Connector.radius=-1"], "Connector.radius = -1.0: must be above 0"),
@@ -75,6 +79,18 @@ def test_loops_and_formats_without(invoke, scans, tmp_path):
     assert read_skeleton(tmp_path / "s.json").n_loops == 1
     assert invoke(*words, "--cut-loops").exit_code == 0
     assert read_skeleton(tmp_path / "s.swc").n_loops == 0
+
+
+def test_a_report(invoke, write_scan, scans, tmp_path):
+    name = "<b>'&.ply"
+    write_scan(tmp_path / name, samples.sample_object(1000).points)
+    result = invoke("skeletonize", name, "--report", "r.html")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert "wrote r.html\n" in result.stdout
+    text = (tmp_path / "r.html").read_text("utf-8")
+    assert "<title>&lt;b&gt;&#x27;&amp;.ply</title>" in text
+    solves = int(re.search(r"^iterations +(\d+)$", result.stdout, re.MULTILINE)[1])
+    assert text.count("After solve") == solves > 0
 
 
 def test_settings_reach_the_run(invoke, scans, tmp_path):

@@ -1,0 +1,75 @@
+"""How a skeleton shows itself in Jupyter."""
+
+from __future__ import annotations
+
+import base64
+import io
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
+
+SIZE = (1200, 500)
+COLOURS = 48  # of the picture: greys, red, and what lies between; a third of the bytes of the full range
+
+
+def picture(skeleton: Skeleton) -> str:
+    """The preview as a ``data:`` address, for an HTML image.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    str
+    """
+    from PIL import Image  # matplotlib needs it, too
+
+    from ..interop.preview import DPI, draw
+
+    figure, stream = draw(skeleton, SIZE, None, caption=False), io.BytesIO()
+    figure.set_dpi(DPI)
+    figure.canvas.draw()
+    drawn = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3].copy())
+    drawn.quantize(COLOURS, method=Image.Quantize.MEDIANCUT).save(stream, format="png", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
+def to_html(skeleton: Skeleton) -> str:
+    """A picture from three sides and the numbers, as a piece of HTML that needs nothing else.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    str
+    """
+    report = skeleton.report
+    told = {
+        "points": f"{len(skeleton.points):,}",
+        "vertices": f"{len(skeleton.vertices):,}",
+        "edges": f"{len(skeleton.edges):,}",
+        "components": f"{skeleton.n_components:,}",
+        "loops": f"{skeleton.n_loops:,}",
+        "leaves": f"{len(skeleton.leaves):,}",
+        "junctions": f"{len(skeleton.junctions):,}",
+        "length": f"{skeleton.length:.4g}",
+    }
+    heads = "".join(f'<th style="text-align:right">{name}</th>' for name in told)
+    cells = "".join(f'<td style="text-align:right">{value}</td>' for value in told.values())
+    warnings = "".join(
+        f'<p style="margin:4px 0;border-left:3px solid #c77700;padding-left:8px">{escape(text)}</p>'
+        for text in dict.fromkeys(report.warnings)
+    )
+    return (
+        '<div style="max-width:1100px">'
+        f'<img alt="{escape(repr(skeleton))}" style="width:100%;background:#fff;border-radius:4px" '
+        f'src="{picture(skeleton)}">'
+        f"<table><thead><tr>{heads}</tr></thead><tbody><tr>{cells}</tr></tbody></table>{warnings}</div>"
+    )

@@ -1,0 +1,175 @@
+"""A run as one page for the browser: it holds all it needs, and asks no network for anything."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import os
+import re
+from datetime import datetime, timezone
+from html import escape
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..analysis.segmentation import branch_of_edge, branch_of_point, branch_of_vertex
+from ..errors import InvalidParameterError
+from ..interop.files import write_atomically
+from . import sections
+from .notebook import picture
+from .recorder import MOST_POINTS, ContractionRecorder, thinned
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
+
+FLAT = 0.85  # a box whose least side is less than this share of the next is flat
+_ROOM = 1.25  # positions are stored as shares of so many half diagonals: contracted points may leave the box a little
+
+
+def save_report(
+    skeleton: Skeleton,
+    path: str | os.PathLike,
+    *,
+    recorder: ContractionRecorder | None = None,
+    title: str = "Curve skeleton",
+) -> None:
+    """Write a page that shows a skeleton and the run that made it.
+
+    The page is one HTML file that works offline in any browser with WebGL 2: cloud, skeleton and radius tubes to turn
+    and zoom, the contraction on a slider, the run's numbers and charts, warnings, recipe and versions. Without WebGL or
+    scripts there is a still picture.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    path : path-like
+        Written whatever its ending, complete or not at all.
+    recorder : ContractionRecorder, optional
+        What was given as ``on_state`` to the run that made the skeleton. Without it there is no slider.
+    title : str
+        Shown as it is, whatever signs are in it.
+
+    Raises
+    ------
+    InvalidParameterError
+        The recorder watched another run.
+    FileNotFoundError
+        The folder does not exist.
+    OSError
+        The file cannot be written.
+
+    Notes
+    -----
+    Of larger clouds 20 000 points are shown, drawn at random; their positions are rounded to 1/50 000 of the diagonal.
+    The page says so. Numbers and charts are those of the whole run.
+
+    Examples
+    --------
+    >>> import glsk_o3d as glsk
+    >>> from glsk_o3d.samples import torus
+    >>> recorder = glsk.ContractionRecorder()
+    >>> skeleton = glsk.skeletonize(torus(600).points, on_state=recorder)
+    >>> glsk.save_report(skeleton, "report.html", recorder=recorder, title="A torus")  # doctest: +SKIP
+    """
+    page = _page(skeleton, recorder, title).encode("utf-8", "replace")  # a file name may be no Unicode
+    write_atomically(path, lambda temporary: temporary.write_bytes(page))
+
+
+def _page(skeleton, recorder, title) -> str:
+    shown, positions = _followed(skeleton, recorder)
+    script = _asset("report.js")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    kind = "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
+    now = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
+    parts = {
+        "title": escape(title),
+        "subtitle": escape(f"{kind} · glsk-o3d {skeleton.report.versions.get('glsk-o3d', '')} · {now}"),
+        "policy": f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'",
+        "style": _asset("report.css"),
+        "figures": sections.figures(skeleton),
+        "warnings": sections.warnings(skeleton.report.warnings),
+        "still": picture(skeleton),
+        "thinning": _thinning(len(shown), len(skeleton.points)),
+        "sections": sections.contraction(skeleton.report)
+        + sections.branches(skeleton)
+        + sections.origin(skeleton.report),
+        # no "<" in it, so that nothing in it can end the script element
+        "data": json.dumps(_data(skeleton, shown, positions), allow_nan=False).replace("<", "\\u003c"),
+        "script": script,
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], _asset("report.html"))
+
+
+def _asset(name: str) -> str:
+    return (files(__package__) / "assets" / name).read_text("utf-8")
+
+
+# --------------------------------------------------------------------------------------------------------- the view
+
+
+def _followed(skeleton, recorder) -> tuple[np.ndarray, list[np.ndarray]]:
+    """The points to show, and where they are: at first, and after each solve."""
+    if recorder is None or not recorder.positions:
+        shown = thinned(skeleton.points, MOST_POINTS)
+        return shown, [skeleton.points[shown]]
+    shown, positions = recorder.shown, recorder.positions
+    same = len(positions) == len(skeleton.report.iterations) + 1 and shown.max(initial=-1) < len(skeleton.points)
+    if not same or not np.array_equal(skeleton.points[shown], positions[0]):
+        raise InvalidParameterError("the recorder watched another run than the one that made this skeleton")
+    return shown, positions
+
+
+def _data(skeleton, shown, positions) -> dict[str, Any]:
+    from matplotlib import colormaps
+
+    box = np.concatenate([positions[0], skeleton.vertices])
+    low, high = (box.min(axis=0), box.max(axis=0)) if len(box) else np.zeros((2, 3))
+    centre = low + (high - low) / 2
+    unit = _ROOM * float(np.linalg.norm(high - low)) / 2 or 1.0
+    steps = np.clip([(state - centre) / unit for state in positions], -1, 1)
+    ranges: dict[str, list[float] | None] = {"branch": None}
+    for name, values in (("radius", skeleton.radii / unit), ("confidence", skeleton.confidence)):
+        finite = values[np.isfinite(values)]
+        if len(finite) == len(values) > 0 or (name == "confidence" and len(finite)):
+            ranges[name] = [float(finite.min()), float(finite.max())]
+    thin, middle, _ = np.sort(high - low)
+    across = int(np.argmin(high - low)) if thin < FLAT * middle else 2 if np.argmax(high - low) == 1 else 1
+    lone = np.flatnonzero(skeleton.degree == 0)  # drawn as edges without a length
+    owner = skeleton.vertex_of_point[shown] if len(skeleton.vertices) else np.full(len(shown), -1)
+    label = branch_of_point(skeleton, skeleton.points[shown], owner) if len(skeleton.vertices) else owner
+    dots = len(skeleton.branches) + np.arange(len(lone))
+    return {
+        "captions": _captions(skeleton, len(positions) - 1),
+        "view": ("yz", "xz", "xy")[across],  # what is flat from its broad side; else z is up, or y if that is longest
+        "unit": unit,
+        "palette": sections.branch_colors(skeleton, len(skeleton.branches) + len(lone)),
+        "ramp": sections.hexadecimal(colormaps["viridis"](np.linspace(0, 1, 24))),
+        "ranges": ranges,
+        "positions": _packed(np.rint(32767 * steps), "<i2"),
+        "vertex_of_point": _packed(owner, "<i4"),
+        "branch_of_point": _packed(label, "<i4"),
+        "vertices": _packed((skeleton.vertices - centre) / unit, "<f4"),
+        "radii": _packed(np.nan_to_num(skeleton.radii / unit, nan=0.0), "<f4"),
+        "confidence": _packed(skeleton.confidence, "<f4"),
+        "branch_of_vertex": _packed(branch_of_vertex(skeleton), "<i4"),
+        "edges": _packed(np.concatenate([skeleton.edges, np.column_stack([lone, lone])]), "<u4"),
+        "branch_of_edge": _packed(np.concatenate([branch_of_edge(skeleton), dots]), "<i4"),
+    }
+
+
+def _packed(array, dtype) -> str:
+    return base64.b64encode(np.ascontiguousarray(array, dtype).tobytes()).decode()
+
+
+def _captions(skeleton, n_solves) -> list[str]:
+    told = [f"Input: {len(skeleton.points):,} points"]
+    for record in skeleton.report.iterations[:n_solves]:
+        left = record.n_points - record.n_merged
+        told.append(f"After solve {record.iteration} of {n_solves}: {left:,} points left")
+    return told
+
+
+def _thinning(n_shown, n_points) -> str:
+    return f"The view shows {n_shown:,} of {n_points:,} points, drawn at random." if n_shown < n_points else ""

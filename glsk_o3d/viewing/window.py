@@ -1,0 +1,141 @@
+"""A window on the screen, where there is one."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import DisplayError
+from ..interop.open3d import import_open3d, to_point_cloud
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
+
+KEYS = {"C": "cloud", "S": "skeleton", "T": "radius tubes"}
+GREY, LINE = (0.62, 0.64, 0.66), 0.002  # of points without a colour; radius of the skeleton's lines per diagonal
+
+
+def show(skeleton: Skeleton, cloud: Any = None, *, title: str = "Curve skeleton") -> None:
+    """Open a window with a skeleton and its cloud, and wait until it is closed.
+
+    The keys C, S and T show and hide the cloud, the skeleton, and its tubes of true radius, which are hidden at first;
+    H lists Open3D's own, Q closes the window. Branches have colours in turn.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Without vertices, the cloud alone is shown.
+    cloud : open3d.geometry.PointCloud, optional
+        Shown instead of `skeleton.points`, with its colours.
+    title : str
+
+    Raises
+    ------
+    DisplayError
+        There is no display, or no window can be opened on it. Open3D itself would render unseen, and wait for ever.
+    MissingPackageError
+    """
+    window = open_window(skeleton, cloud, title)
+    window.run()
+    window.destroy_window()
+
+
+def open_window(skeleton: Skeleton, cloud: Any, title: str) -> Any:
+    """The window of `show`, before it waits.
+
+    Returns
+    -------
+    open3d.visualization.VisualizerWithKeyCallback
+    """
+    if not has_display():
+        raise DisplayError(
+            "there is no display to open a window on: save_report and save_preview make files to look at instead"
+        )
+    o3d = import_open3d()
+    window = o3d.visualization.VisualizerWithKeyCallback()
+    if not window.create_window(title, 1280, 800):
+        raise DisplayError(
+            "Open3D cannot open a window here: save_report and save_preview make files to look at instead"
+        )
+    options = window.get_render_option()
+    options.point_size, options.mesh_shade_option = 3.0, o3d.visualization.MeshShadeOption.Color
+    shapes = layers(skeleton, cloud)
+    for key, name in KEYS.items():
+        shown = name != "radius tubes"
+        for shape in shapes[name] if shown else ():
+            window.add_geometry(shape)
+        window.register_key_callback(ord(key), _switch(shapes[name], shown))
+    return window
+
+
+def layers(skeleton: Skeleton, cloud: Any = None) -> dict[str, list[Any]]:
+    """What the window can show, by name: Open3D geometries.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    cloud : open3d.geometry.PointCloud, optional
+
+    Returns
+    -------
+    dict of str to list
+    """
+    if cloud is None:
+        cloud = to_point_cloud(skeleton.points[np.isfinite(skeleton.points).all(axis=1)])
+    else:
+        cloud = import_open3d().geometry.PointCloud(cloud).remove_non_finite_points()
+    if not cloud.has_colors():
+        cloud.paint_uniform_color(GREY)
+    shapes: dict[str, list[Any]] = {"cloud": [cloud] if cloud.has_points() else [], "skeleton": [], "radius tubes": []}
+    if len(skeleton.vertices):
+        box = np.concatenate([np.asarray(cloud.points), skeleton.vertices])
+        line = LINE * float(np.linalg.norm(np.ptp(box, axis=0))) or 1.0
+        # lines of Open3D are a pixel wide: tubes show better
+        shapes["skeleton"] = [skeleton.to_line_set("branch"), skeleton.to_tubes("branch", radius=line, sides=8)]
+        if np.isfinite(skeleton.radii).all():
+            shapes["radius tubes"] = [skeleton.to_tubes("branch")]
+    return shapes
+
+
+def _switch(shapes, shown):
+    def switch(window):
+        nonlocal shown
+        shown = not shown
+        for shape in shapes:
+            change = window.add_geometry if shown else window.remove_geometry
+            change(shape, reset_bounding_box=False)
+        return True
+
+    return switch
+
+
+def has_display() -> bool:
+    """Whether a window can be seen: on Linux and the like, whether an X server or a Wayland compositor answers.
+
+    Returns
+    -------
+    bool
+    """
+    if sys.platform in ("win32", "darwin"):
+        return True
+    if "WAYLAND_DISPLAY" in os.environ:
+        socket = Path(os.environ.get("XDG_RUNTIME_DIR", "/"), os.environ["WAYLAND_DISPLAY"])
+        if socket.is_socket():
+            return True
+    if not os.environ.get("DISPLAY"):
+        return False
+    try:
+        x11 = ctypes.CDLL("libX11.so.6")  # which Open3D needs, too
+    except OSError:
+        return False
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
+    display = x11.XOpenDisplay(None)
+    if display:
+        x11.XCloseDisplay(display)
+    return bool(display)

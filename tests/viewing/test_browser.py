@@ -1,0 +1,212 @@
+"""The report as a browser shows it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import glsk_o3d as glsk
+from glsk_o3d.report import Report
+from glsk_o3d.skeleton import Skeleton
+
+HOSTILE = "</title></script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&amp;{{data}}"
+TOO_WIDE = """[...document.querySelectorAll("body *")]
+    .filter((part) => part.getBoundingClientRect().right > innerWidth + 0.5).map((part) => part.outerHTML)"""
+
+
+@pytest.fixture(scope="module")
+def report(run, tmp_path_factory):
+    skeleton, recorder = run
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    glsk.save_report(skeleton, path, recorder=recorder, title="sample.ply")
+    return path
+
+
+def drawn(image):
+    """Which pixels differ from the ground."""
+    return (np.abs(image - image[3, 3]) > 12).any(axis=-1)
+
+
+def settle(page, solve):
+    page.locator(f"#view[data-shown='{solve}']").wait_for()
+
+
+def test_shows_a_picture(report, look, pixels):
+    page = look(report)
+    image = pixels(page)
+    assert 0.02 < drawn(image).mean() < 0.9
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 100
+    assert page.title() == "sample.ply"
+    assert page.locator("#still").is_hidden()
+
+
+def test_the_slider_contracts_the_cloud(run, report, look, pixels):
+    skeleton, recorder = run
+    last = len(skeleton.report.iterations)
+    page = look(report)
+    page.uncheck("#skeleton")
+    first, areas = pixels(page), []
+    for solve in (0, 1, last, 0):
+        page.fill("#solve", str(solve))
+        settle(page, solve)
+        areas.append(drawn(pixels(page)).sum())
+        caption = page.locator("#caption").inner_text()
+        left = len(np.unique(recorder.positions[solve], axis=0)) if solve else len(skeleton.points)
+        assert f"{left:,} points" in caption
+        assert page.locator("tr.now").count() == (solve > 0)
+    assert areas[1] < 0.9 * areas[0]
+    assert areas[2] < 0.6 * areas[0]
+    np.testing.assert_array_equal(pixels(page), first)
+
+
+def test_plays_to_the_end(run, report, look, pixels):
+    page = look(report)
+    before = pixels(page)
+    page.click("#play")
+    last = len(run[0].report.iterations)
+    settle(page, last)
+    assert page.locator("#play").inner_text() == "Play"
+    assert page.locator("#solve").input_value() == str(last)
+    assert (pixels(page) != before).any(axis=-1).mean() > 0.02
+
+
+def test_layers_and_colours(report, look, pixels):
+    page = look(report)
+    everything = pixels(page)
+    layers = ("cloud", "skeleton", "tubes")
+    for layer in layers[:2]:
+        page.uncheck(f"#{layer}")
+    assert not drawn(pixels(page)).any()
+    alone = []
+    for layer in layers:
+        page.check(f"#{layer}")
+        alone.append(drawn(pixels(page)))
+        page.uncheck(f"#{layer}")
+    cloud, skeleton, tubes = alone
+    assert cloud.sum() > skeleton.sum() > 0
+    assert (tubes & skeleton).sum() > 0.99 * skeleton.sum()  # the curve runs inside its tubes
+    assert (tubes & cloud).sum() > 0.7 * cloud.sum()
+    for layer in layers[:2]:
+        page.check(f"#{layer}")
+    np.testing.assert_array_equal(pixels(page), everything)
+    assert page.locator("#colour option").all_inner_texts() == ["branch", "radius", "confidence"]
+    page.select_option("#colour", "radius")
+    assert (pixels(page) != everything).any(axis=-1).mean() > 0.01
+    assert page.locator("#legend").is_visible()
+
+
+def test_turns_zooms_and_comes_back(report, look, pixels):
+    page = look(report)
+    box = page.locator("#view").bounding_box()
+    x, y = box["x"] + 20, box["y"] + 20  # where no vertex is under the mouse
+    page.mouse.move(x, y)
+    first = pixels(page)
+
+    def drag(button):
+        page.mouse.down(button=button)
+        page.mouse.move(x + 60, y + 25, steps=3)
+        page.mouse.up(button=button)
+        page.mouse.move(x, y)
+
+    acts = {
+        "turn": lambda: drag("left"),
+        "move": lambda: drag("right"),
+        "key": lambda: page.keyboard.press("ArrowLeft"),
+        "zoom": lambda: page.mouse.wheel(0, 300),
+    }
+    for name, act in acts.items():
+        page.focus("#view")
+        act()
+        if name == "zoom":  # the wheel comes late
+            page.wait_for_timeout(100)
+        assert (pixels(page) != first).any(axis=-1).mean() > 0.01, name
+        page.keyboard.press("Home")
+        np.testing.assert_array_equal(pixels(page), first)
+
+
+def test_the_wheel_scrolls_the_page_unless_the_view_was_clicked(report, look):
+    page = look(report)
+    page.mouse.move(300, 400)
+    for clicked in (False, True):
+        if clicked:
+            page.mouse.click(300, 300)
+        before = page.evaluate("scrollY")
+        page.mouse.wheel(0, 100)
+        page.wait_for_timeout(150)
+        assert (page.evaluate("scrollY") > before) != clicked
+
+
+@pytest.mark.parametrize(("view", "across", "up"), [("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2)])
+def test_projection(view, across, up, look, pixels, tmp_path):
+    """An L with arms of 4 to the right and 2 upwards, in the plane through the centre, where the scale is one."""
+    corners = np.full((3, 3), 1e6)
+    corners[1:, across] += 4
+    corners[2, up] += 2
+    lying = Skeleton(corners, [[0, 1], [1, 2]], [np.nan] * 3, (), (), ())
+    glsk.save_report(lying, tmp_path / "l.html")
+    page = look(tmp_path / "l.html")
+    page.click(f"button[data-view={view}]")
+    mark = drawn(pixels(page))
+    rows, columns = np.nonzero(mark)
+    thick = mark[:, (columns.min() + columns.max()) // 2].sum()
+    width, height = np.ptp(columns) + 1 - thick, np.ptp(rows) + 1 - thick
+    assert width / height == pytest.approx(2, abs=0.03)
+    assert 0.8 * mark.shape[1] < width < 0.95 * mark.shape[1]
+    assert mark[rows.max() - thick // 2].sum() > width
+    assert mark[:, columns.max() - thick // 2].sum() > height
+    assert not mark[: rows.max() - 2 * thick, : columns.max() - 2 * thick].any()
+    for hidden in ("#solves", "label:has(#cloud)", "label:has(#tubes)"):
+        assert page.locator(hidden).is_hidden()
+    corner = {"x": int(columns.max() + 10 - thick // 2), "y": int(rows.max() + 10 - thick // 2)}
+    page.locator("#view").hover(position=corner)
+    assert page.locator("#tip").inner_text() == "vertex 1 · branch 0"
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_fits_the_screen_in_light_and_dark(report, look, pixels, width):
+    grounds = []
+    for scheme in ("light", "dark"):
+        page = look(report, width, 844, scheme)
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+        assert page.evaluate(TOO_WIDE) == []
+        image = pixels(page)
+        assert drawn(image).mean() > 0.02
+        grounds.append(image[3, 3].mean())
+    assert grounds[0] > 200 > 60 > grounds[1]
+
+
+def test_texts_are_texts(run, look, tmp_path):
+    skeleton, recorder = run
+    recorded = dataclasses.replace(
+        skeleton.report, warnings=(HOSTILE,), stop_reason=HOSTILE, stages=(HOSTILE,), versions={HOSTILE: HOSTILE}
+    )
+    glsk.save_report(
+        dataclasses.replace(skeleton, report=recorded), tmp_path / "r.html", recorder=recorder, title=HOSTILE
+    )
+    page = look(tmp_path / "r.html")
+    assert page.title() == HOSTILE
+    for place in ("h1", ".warnings li", "pre", "table.facts th >> nth=-1", "table.facts td >> nth=-1"):
+        assert page.locator(place).text_content() == HOSTILE
+    assert HOSTILE in page.locator("h2 + p").first.text_content()
+    assert page.locator("script").count() == 2
+    assert page.locator("img").count() == 1
+
+
+def test_a_still_picture_without_webgl_or_scripts(report, look, launch):
+    blind = launch("--disable-3d-apis")
+    for page in (look(report, within=blind), look(report, java_script_enabled=False)):
+        assert page.locator("#view").is_hidden()
+        still = page.locator("#still img")
+        assert still.is_visible()
+        assert still.bounding_box()["height"] > 100
+
+
+@pytest.mark.parametrize("report", [Report(), None])
+def test_little_to_show(report, look, tmp_path):
+    points = np.random.default_rng(0).normal(size=(50, 3)) if report else np.empty((0, 3))
+    none = np.empty(0)
+    nowhere = Skeleton(none, none, none, np.full(len(points), -1), points, np.full_like(points, np.nan))
+    glsk.save_report(nowhere, tmp_path / "r.html")
+    page = look(tmp_path / "r.html")
+    assert page.locator("#view").is_visible()
+    assert page.locator("label:has(#skeleton)").is_hidden()
