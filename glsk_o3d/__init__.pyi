@@ -9,6 +9,8 @@ from .errors import (
     InvalidCloudError,
     InvalidParameterError,
     MissingPackageError,
+    PluginWarning,
+    RecipeError,
     SkeletonWarning,
     StageError,
 )
@@ -17,6 +19,7 @@ from .interop.files import read_cloud, read_skeleton, save_skeleton
 from .interop.preview import save_preview
 from .lpr_reducer import LPRReducer
 from .pipeline import Pipeline, skeletonize
+from .recipes import load_recipe, rerun, save_recipe
 from .refiner import Refiner
 from .report import IterationRecord, Report
 from .ring_builder import RingBuilder
@@ -40,6 +43,8 @@ __all__ = [
     "LPRReducer",
     "MissingPackageError",
     "Pipeline",
+    "PluginWarning",
+    "RecipeError",
     "Refiner",
     "Report",
     "RingBuilder",
@@ -48,10 +53,13 @@ __all__ = [
     "SkeletonWarning",
     "StageError",
     "analysis",
+    "load_recipe",
     "pipelines",
     "read_cloud",
     "read_skeleton",
+    "rerun",
     "save_preview",
+    "save_recipe",
     "save_skeleton",
     "skeletonize",
 ]

@@ -21,9 +21,17 @@ class FileFormatError(GlskError, ValueError):
     """A file cannot be read or written in the format asked for."""
 
 
+class RecipeError(GlskError, ValueError):
+    """A recipe is malformed, or a pipeline cannot be written as one."""
+
+
 class MissingPackageError(GlskError, ImportError):
     """An optional package, or a system library it needs, is not installed."""
 
 
 class SkeletonWarning(UserWarning):
     """The skeleton was computed but should not be trusted blindly."""
+
+
+class PluginWarning(UserWarning):
+    """A plugin of another distribution is broken and was left out."""

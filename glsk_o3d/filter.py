@@ -66,6 +66,12 @@ def documented(cls):
     return cls
 
 
+FLOWS = ("cloud", "Contraction", "Skeleton")
+"""What runs between filters."""
+RESERVED = ("filter", "rule", "unwritten")
+"""Names that no parameter has, since recipes use them."""
+
+
 class Parameters:
     """Mixin of frozen dataclasses whose fields are made by `parameter`: checked when used, not when made."""
 
@@ -73,14 +79,26 @@ class Parameters:
         """Raise InvalidParameterError if a parameter has the wrong type or is out of range."""
         for field in dataclasses.fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
-            problem = _problem(value, field.metadata)
+            problem = problem_with(value, field.metadata)
             if problem:
                 raise InvalidParameterError(f"{type(self).__name__}.{field.name} = {value!r}: {problem}")
             if isinstance(value, Parameters):
                 value.check()
 
 
-def _problem(value, facts) -> str | None:
+def problem_with(value, facts) -> str | None:
+    """What is wrong with a value of a parameter, None if nothing.
+
+    Parameters
+    ----------
+    value : object
+    facts : mapping
+        The metadata of a field that `parameter` made.
+
+    Returns
+    -------
+    str or None
+    """
     kind, low, high = facts["type"], facts["low"], facts["high"]
     if isinstance(value, str) and value in facts["choices"]:
         return None
@@ -152,6 +170,7 @@ class Filter(Parameters):
     consumes: ClassVar[str] = "cloud"
     """What the filter takes: ``"cloud"``, ``"Contraction"`` or ``"Skeleton"``."""
     produces: ClassVar[str] = "Contraction"
+    """What it gives. A cloud, which only a filter of clouds gives, carries no report: pipelines tell of its stage."""
 
     def __call__(self, data, *, on_iteration: OnIteration | None = None):
         """Run the filter.
@@ -176,6 +195,11 @@ class Filter(Parameters):
             )
         start = time.perf_counter()
         result = self._run(data, on_iteration)
+        promised = flows.get(self.produces)
+        if not isinstance(result, promised) if promised else isinstance(result, (*flows.values(), type(None))):
+            raise StageError(f"{type(self).__name__} should give a {self.produces} and gave a {type(result).__name__}")
+        if promised is None:
+            return result
         report = result.report.with_stage(self, time.perf_counter() - start)
         return dataclasses.replace(result, report=report)
 

@@ -15,6 +15,7 @@ from .demo import demo
 from .evaluate import evaluate
 from .filters import filters
 from .info import info
+from .rerun import rerun
 from .skeletonize import skeletonize
 
 EPILOG = (
@@ -29,7 +30,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (skeletonize, evaluate, demo, filters, info):
+for command in (skeletonize, rerun, evaluate, demo, filters, info):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
 
 

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
-from ..catalogue import catalogue, nearest, parts
+from ..catalogue import catalogue, changed, find, nearest, parts, serves
 from ..errors import InvalidParameterError
-from ..filter import Filter, Parameters
+from ..filter import Parameters
 from ..pipeline import Pipeline
 
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
@@ -53,7 +53,7 @@ def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pip
             raise InvalidParameterError(
                 f"--set {setting}: {cls.__name__} is not in {place}, which has {', '.join(present)}{_how_to_add(cls)}"
             )
-        pipeline = Pipeline(*(_replaced(stage, cls, field, value) for stage in pipeline.stages))
+        pipeline = changed(pipeline, cls, field, value)
     pipeline.check()
     return pipeline
 
@@ -65,17 +65,17 @@ def _parse(setting: str) -> tuple[type[Parameters], str, Any]:
         raise InvalidParameterError(
             f"--set {setting}: write it as Filter.parameter=value, for example Connector.radius=2%"
         )
-    known = catalogue()
-    if owner not in known:
-        raise InvalidParameterError(f"--set {setting}: {nearest(owner, known, 'filter')}")
-    cls = known[owner]
+    cls = find(owner)
+    if cls is None:
+        raise InvalidParameterError(f"--set {setting}: {nearest(owner, catalogue(), 'filter')}")
     kinds = {field.name: field.metadata["type"] for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
     if name not in kinds:
         raise InvalidParameterError(f"--set {setting}: {nearest(name, kinds, f'parameter of {owner}')}")
     kind = kinds[name]
     if kind.rstrip("?") not in ("reducer", "stop") or (kind.endswith("?") and text.lower() == "none"):
         return cls, name, _value(text, kind)
-    fitting = [other for other, its in known.items() if its is not cls and _serves(its, kind.rstrip("?"))]
+    known = catalogue()
+    fitting = [other for other, its in known.items() if its is not cls and serves(its, kind.rstrip("?"))]
     if text not in fitting:
         raise InvalidParameterError(f"--set {setting}: {nearest(text, fitting, kind.rstrip('?'))}")
     return cls, name, known[text]()
@@ -94,25 +94,10 @@ def _value(text: str, kind: str) -> Any:
     return text
 
 
-def _serves(cls: type[Parameters], kind: str) -> bool:
-    if kind == "stop":
-        return not issubclass(cls, Filter)
-    return issubclass(cls, Filter) and cls.consumes == cls.produces == "Contraction"
-
-
 def _how_to_add(cls: type[Parameters]) -> str:
     for owner in catalogue().values():
         for field in dataclasses.fields(owner):  # type: ignore[arg-type]
             kind = field.metadata["type"].rstrip("?")
-            if kind in ("reducer", "stop") and cls is not owner and _serves(cls, kind):
+            if kind in ("reducer", "stop") and cls is not owner and serves(cls, kind):
                 return f"; to put it in: --set {owner.__name__}.{field.name}={cls.__name__}"
     return ""
-
-
-def _replaced(part: Any, cls: type[Parameters], name: str, value: Any) -> Any:
-    changes = {name: value} if type(part) is cls else {}
-    for field in dataclasses.fields(part):
-        inner = getattr(part, field.name)
-        if isinstance(inner, Parameters) and field.name not in changes:
-            changes[field.name] = _replaced(inner, cls, name, value)
-    return dataclasses.replace(part, **changes)

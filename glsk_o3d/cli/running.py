@@ -6,17 +6,17 @@ import logging
 import os
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import typer
 
 from ..errors import FileFormatError, GlskError
-from ..filter import Filter
 from ..interop.files import skeleton_ending
 from ..interop.preview import save_preview
-from ..pipeline import Pipeline
 from ..skeleton import Skeleton
 from .console import WrongUsage, print_iterations, print_json, print_rows
 
@@ -30,7 +30,13 @@ _DOING = {
 }
 
 
-def check_outputs(outputs: Sequence[Path], preview: Path | None = None, scan: Path | None = None) -> None:
+def check_outputs(
+    outputs: Sequence[Path],
+    preview: Path | None = None,
+    scan: Path | None = None,
+    others: Iterable[Path] = (),
+    **inputs: Path | None,
+) -> None:
     """Find out before computing whether the files can be written.
 
     Parameters
@@ -40,6 +46,10 @@ def check_outputs(outputs: Sequence[Path], preview: Path | None = None, scan: Pa
     preview : Path, optional
     scan : Path, optional
         The input, which must not be overwritten.
+    others : iterable of Path
+        Other files to be written.
+    **inputs : Path or None
+        Other inputs, by what they are.
 
     Raises
     ------
@@ -59,7 +69,9 @@ def check_outputs(outputs: Sequence[Path], preview: Path | None = None, scan: Pa
     files = [*outputs, *([preview] if preview is not None else [])]
     if not files:
         raise WrongUsage("nothing to write: give an output with -o, a picture with --preview, or both")
-    seen = {os.path.realpath(scan): "is the scan itself"} if scan is not None else {}
+    files += others
+    sources = {"scan": scan, **inputs}
+    seen = {os.path.realpath(path): f"is the {what} itself" for what, path in sources.items() if path is not None}
     for path in files:
         real = os.path.realpath(path)
         if real in seen:
@@ -87,12 +99,13 @@ def check_writable(path: Path) -> None:
         raise OSError(f"{path}: no file can be made in this folder: {error.strerror}") from error
 
 
-def run(pipeline: Pipeline, cloud: Any, update) -> tuple[Skeleton, float]:
+def run(pipeline: Callable[..., Skeleton], cloud: Any, update) -> tuple[Skeleton, float]:
     """Run a pipeline and show how far it is.
 
     Parameters
     ----------
-    pipeline : Pipeline
+    pipeline : Pipeline, or callable
+        Given the cloud, and ``on_iteration`` and ``on_stage`` as keywords.
     cloud : cloud
     update : callable
         From `console.progress`.
@@ -103,18 +116,18 @@ def run(pipeline: Pipeline, cloud: Any, update) -> tuple[Skeleton, float]:
         The skeleton, and the seconds it took.
     """
     start = time.perf_counter()
-    flow = cloud
-    for stage in pipeline.stages:
-        began = time.perf_counter()
-        doing = _DOING.get(type(stage).__name__, type(stage).__name__)
+    on_stage, on_iteration = _watch(update)
+    skeleton = pipeline(cloud, on_iteration=on_iteration, on_stage=on_stage)
+    return skeleton, time.perf_counter() - start
+
+
+def _watch(update):
+    doing, most = "", None
+
+    def on_stage(stage):
+        nonlocal doing, most
+        doing, most = _DOING.get(type(stage).__name__, type(stage).__name__), getattr(stage, "max_iterations", None)
         update(doing)
-        flow = stage(flow, on_iteration=_watch(stage, doing, update))
-        _log.info("%s took %.3f s", type(stage).__name__, time.perf_counter() - began)
-    return flow, time.perf_counter() - start
-
-
-def _watch(stage: Filter, doing: str, update):
-    most = getattr(stage, "max_iterations", None)
 
     def on_iteration(record):
         left = record.n_points - record.n_merged
@@ -125,11 +138,18 @@ def _watch(stage: Filter, doing: str, update):
             *(record.ring_ratio, record.seconds),
         )
 
-    return on_iteration
+    return on_stage, on_iteration
 
 
 def write(
-    skeleton: Skeleton, outputs: Sequence[Path], preview: Path | None, *, title: str, cut_loops: bool, update
+    skeleton: Skeleton,
+    outputs: Sequence[Path],
+    preview: Path | None,
+    others: Mapping[Path, Callable[[Path], object]] = MappingProxyType({}),
+    *,
+    title: str,
+    cut_loops: bool,
+    update,
 ) -> tuple[list[Path], list[str]]:
     """Write all files that can be written; one that cannot does not keep the others from it.
 
@@ -138,6 +158,8 @@ def write(
     skeleton : Skeleton
     outputs : sequence of Path
     preview : Path or None
+    others : mapping of Path to callable
+        Other files, and what writes each.
     title : str
         Above the preview.
     cut_loops : bool
@@ -150,14 +172,16 @@ def write(
     list of Path, list of str
         The files that were written, and what was wrong with the others.
     """
+    writers: dict[Path, Callable[[Path], object]] = {
+        path: partial(skeleton.save, cut_loops=cut_loops) for path in outputs
+    }
+    if preview is not None:
+        writers[preview] = partial(save_preview, skeleton, title=title)
     written, problems = [], []
-    for path in [*outputs, *([preview] if preview is not None else [])]:
+    for path, save in {**writers, **others}.items():
         update(f"writing {path.name}")
         try:
-            if path is preview:
-                save_preview(skeleton, path, title=title)
-            else:
-                skeleton.save(path, cut_loops=cut_loops)
+            save(path)
             written.append(path)
         except OSError as error:
             problems.append(f"{path}: cannot be written: {error.strerror or error}")
