@@ -118,6 +118,8 @@ def _check_filter(name: str, cls: Any) -> None:
             raise _Unfit(f"its field {field.name!r} is not made by glsk_o3d.filter.parameter")
         if field.name in RESERVED:
             raise _Unfit(f"recipes have another meaning for a parameter {field.name!r}")
+        if field.metadata["type"].endswith("?") and "none" in field.metadata["choices"]:
+            raise _Unfit(f"the choice 'none' of its parameter {field.name!r} cannot be told from None")
     if not issubclass(cls, Filter):
         if not callable(cls()):
             raise _Unfit("a stopping rule must be callable")

@@ -125,20 +125,30 @@ def _name(value: Any) -> str:
     return f"{'' if named is value else 'a '}{named.__module__}.{named.__qualname__}"
 
 
-def _gaps(value: Any, path: str = "") -> Iterator[str]:
-    """What a recipe says that it could not hold, each with its path."""
+def gaps(value: Any, path: str = "") -> Iterator[str]:
+    """What a recipe says that it could not hold, each with its path.
+
+    Parameters
+    ----------
+    value : dict, or part of one
+    path : str
+
+    Yields
+    ------
+    str
+    """
     if isinstance(value, dict):
         if UNWRITTEN in value:
             yield f"{path}: a recipe cannot hold it: {value[UNWRITTEN]}"
         for key, item in value.items():
-            yield from _gaps(item, f"{path}.{key}" if path else str(key))
+            yield from gaps(item, f"{path}.{key}" if path else str(key))
     elif isinstance(value, list):
         for i, item in enumerate(value):
-            yield from _gaps(item, f"{path}[{i}]")
+            yield from gaps(item, f"{path}[{i}]")
 
 
 def _refuse_gaps(recipe: Any) -> None:
-    for gap in _gaps(recipe):
+    for gap in gaps(recipe):
         raise RecipeError(gap)
 
 
@@ -225,7 +235,7 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
         raise RecipeError(f"{os.fspath(path)}: not valid {ending[1:].upper()}: {error}") from error
     try:
         return from_recipe(recipe)
-    except RecipeError as error:
+    except (RecipeError, RecursionError) as error:
         raise RecipeError(f"{os.fspath(path)}: {error}") from None
 
 
@@ -339,8 +349,8 @@ def _part(table: Any, path: str, role: str) -> Parameters:
     if cls is None or not serves(cls, role):
         fitting = [other for other, its in catalogue().items() if serves(its, role)]
         raise RecipeError(f"{path}.{kind}: {nearest(str(name), fitting, role.replace('stop', 'stopping rule'))}")
-    part = cls(**_values(cls, {key: value for key, value in table.items() if key != kind}, path))
-    return _valid(lambda: part, path)
+    values = _values(cls, {key: value for key, value in table.items() if key != kind}, path)
+    return _valid(lambda: cls(**values), path)
 
 
 def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
@@ -370,7 +380,7 @@ def _valid(make: Callable[[], Any], path: str) -> Any:
     try:
         made = make()
         made.check()
-    except InvalidParameterError as error:
+    except (ValueError, TypeError) as error:  # InvalidParameterError, or what a plugin raises
         raise RecipeError(f"{path}: {error}") from None
     return made
 
