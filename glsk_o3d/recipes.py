@@ -393,13 +393,7 @@ def _short(value: Any) -> str:
 # ---------------------------------------------------------------------------------------------------------- repeating
 
 
-def rerun(
-    skeleton: Skeleton,
-    cloud: Any = None,
-    *,
-    on_iteration: Callable | None = None,
-    on_stage: Callable[[Filter], object] | None = None,
-) -> Skeleton:
+def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -> Skeleton:
     """Make a skeleton again with the recipe in its report.
 
     Parameters
@@ -409,8 +403,8 @@ def rerun(
     cloud : cloud, optional
         Another cloud to run the recipe on; by default the skeleton's own points. They are what the first filter after
         those of clouds took, so that these do not run again.
-    on_iteration, on_stage : callable, optional
-        As for `Pipeline`.
+    **callbacks : callable, optional
+        Those that a Pipeline takes when it is called.
 
     Returns
     -------
@@ -436,13 +430,12 @@ def rerun(
         pipeline.check_complete()
     except InvalidParameterError as error:
         raise RecipeError(f"pipeline: {error}") from None
-    watching = dict(on_iteration=on_iteration, on_stage=on_stage)
     if cloud is not None:
-        return pipeline(cloud, **watching)
+        return pipeline(cloud, **callbacks)
     if not len(skeleton.points):
         raise RecipeError("it holds no points: give the scan")
     first = max((i for i, stage in enumerate(pipeline.stages) if stage.produces == "cloud"), default=-1) + 1
-    again = Pipeline(*pipeline.stages[first:])(skeleton.points, **watching)
+    again = Pipeline(*pipeline.stages[first:])(skeleton.points, **callbacks)
     if first:
         ahead = Report()
         for stage in pipeline.stages[:first]:
