@@ -10,6 +10,8 @@ from .errors import (
     InvalidCloudError,
     InvalidParameterError,
     MissingPackageError,
+    PluginWarning,
+    RecipeError,
     ScriptError,
     SkeletonWarning,
     StageError,
@@ -20,6 +22,7 @@ from .interop.meshlab.meshset import MeshSet
 from .interop.preview import save_preview
 from .lpr_reducer import LPRReducer
 from .pipeline import Pipeline, skeletonize
+from .recipes import load_recipe, rerun, save_recipe
 from .reduction import remove_redundant_points
 from .refiner import Refiner
 from .report import IterationRecord, Report
@@ -49,6 +52,8 @@ __all__ = [
     "MeshSet",
     "MissingPackageError",
     "Pipeline",
+    "PluginWarning",
+    "RecipeError",
     "Refiner",
     "Report",
     "RingBuilder",
@@ -58,11 +63,14 @@ __all__ = [
     "SkeletonWarning",
     "StageError",
     "analysis",
+    "load_recipe",
     "pipelines",
     "read_cloud",
     "read_skeleton",
     "remove_redundant_points",
+    "rerun",
     "save_preview",
+    "save_recipe",
     "save_report",
     "save_skeleton",
     "skeletonize",

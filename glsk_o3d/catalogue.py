@@ -7,11 +7,20 @@ import difflib
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-import glsk_o3d
-
+from .connector import Connector
+from .contractor import Contractor
 from .filter import Filter, Parameters
+from .lpr_reducer import LPRReducer
 from .pipeline import Pipeline
-from .pipelines import PIPELINES
+from .refiner import Refiner
+from .ring_builder import RingBuilder
+from .stopping import ExplainedScore, RingSizeRatio
+
+BUILTIN: dict[str, type[Parameters]] = {
+    cls.__name__: cls
+    for cls in (RingBuilder, Contractor, LPRReducer, Connector, Refiner, ExplainedScore, RingSizeRatio)
+}
+"""The filters and stopping rules of this package, in the order in which they run."""
 
 
 def parts(item: Pipeline | Parameters) -> Iterator[Parameters]:
@@ -35,58 +44,72 @@ def parts(item: Pipeline | Parameters) -> Iterator[Parameters]:
             yield from parts(part)
 
 
-def catalogue() -> dict[str, type[Parameters]]:
-    """The public filters and stopping rules by name: filters in the order in which they run, then the rules.
-
-    Returns
-    -------
-    dict of str to class
-    """
-    public = [getattr(glsk_o3d, name) for name in glsk_o3d.__all__]
-    kinds = [cls for cls in public if isinstance(cls, type) and issubclass(cls, Parameters)]
-    known = [cls for cls in kinds if dataclasses.is_dataclass(cls)]
-    order = [type(part) for part in parts(PIPELINES["default"]())]
-    known.sort(key=lambda cls: (not issubclass(cls, Filter), order.index(cls) if cls in order else len(order)))
-    return {cls.__name__: cls for cls in known}
-
-
-def serves(cls: type[Parameters], kind: str) -> bool:
-    """Whether a class can be what a parameter of the kind takes.
+def changed(item: Any, cls: type[Parameters], name: str, value: Any) -> Any:
+    """A pipeline, or a part of one, with a parameter replaced wherever its filter occurs, also inside another.
 
     Parameters
     ----------
-    cls : subclass of Parameters
-    kind : {"reducer", "stop"}
-
-    Returns
-    -------
-    bool
-    """
-    if kind == "stop":
-        return not issubclass(cls, Filter)
-    return issubclass(cls, Filter) and cls.consumes == cls.produces == "Contraction"
-
-
-def replaced(part: Any, cls: type[Parameters], name: str, value: Any) -> Any:
-    """A filter or rule with a parameter replaced in every instance of a class, itself and those inside it.
-
-    Parameters
-    ----------
-    part : Parameters
-    cls : subclass of Parameters
+    item : Pipeline or Parameters
+    cls : class
     name : str
     value : object
 
     Returns
     -------
-    Parameters
+    Pipeline or Parameters
     """
-    changes = {name: value} if type(part) is cls else {}
-    for field in dataclasses.fields(part):
-        inner = getattr(part, field.name)
+    if isinstance(item, Pipeline):
+        return Pipeline(*(changed(stage, cls, name, value) for stage in item.stages))
+    changes = {name: value} if type(item) is cls else {}
+    for field in dataclasses.fields(item):
+        inner = getattr(item, field.name)
         if isinstance(inner, Parameters) and field.name not in changes:
-            changes[field.name] = replaced(inner, cls, name, value)
-    return dataclasses.replace(part, **changes)
+            changes[field.name] = changed(inner, cls, name, value)
+    return dataclasses.replace(item, **changes)
+
+
+def catalogue() -> dict[str, type[Parameters]]:
+    """All filters and stopping rules by name, those of plugins after the built-in ones; first the filters.
+
+    Returns
+    -------
+    dict of str to class
+    """
+    from .plugins import plugin_filters
+
+    known = {**BUILTIN, **plugin_filters()}
+    return dict(sorted(known.items(), key=lambda item: not issubclass(item[1], Filter)))
+
+
+def find(name: str) -> type[Parameters] | None:
+    """The filter or stopping rule of that name, if there is one; plugins are only loaded for names of their own.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    class or None
+    """
+    return BUILTIN.get(name) or catalogue().get(name)
+
+
+def serves(cls: type[Parameters], kind: str) -> bool:
+    """Whether an instance can be a parameter of the type ``"reducer"`` or ``"stop"``, or a stage: ``"filter"``.
+
+    Parameters
+    ----------
+    cls : class
+    kind : {"filter", "reducer", "stop"}
+
+    Returns
+    -------
+    bool
+    """
+    if kind == "stop" or not issubclass(cls, Filter):
+        return kind == "stop" and not issubclass(cls, Filter)
+    return kind == "filter" or cls.consumes == cls.produces == "Contraction"
 
 
 def nearest(word: str, known: Iterable[str], what: str) -> str:

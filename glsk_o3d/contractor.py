@@ -14,7 +14,7 @@ from .numerics.cotangent import cotangent_laplacian
 from .numerics.eigen import largest_eigenvalue
 from .numerics.neighbourhoods import nearest_neighbours
 from .numerics.solver import SolveError, solve_contraction
-from .report import IterationRecord
+from .report import STOPPED_BY_CALLER, IterationRecord
 from .state import Contraction
 from .stopping import ExplainedScore, StopRule
 
@@ -105,7 +105,7 @@ class Contractor(Filter):
                     reducer = None  # as in the published code, which gives up after a pass without a merge
                 state = _amend(state, n_merged=n - len(state), seconds=time.perf_counter() - start)
             if watch is not None and watch(state) is False and reason is None:
-                return _finished(state, "stopped by the caller")
+                return _finished(state, STOPPED_BY_CALLER)
             if reason is not None:
                 keep = self.keep_last or len(state.report.iterations) == 1
                 kept = state if keep else replace(before, report=state.report)
@@ -189,7 +189,8 @@ def explained_score(points) -> float:
 
 def _within(state, report):
     """The state of a reducer that ran inside the contractor: no stage of its own in the report."""
-    return replace(state, report=replace(state.report, stages=report.stages, seconds=report.seconds))
+    kept = replace(state.report, stages=report.stages, recipe=report.recipe, seconds=report.seconds)
+    return replace(state, report=kept)
 
 
 def _record(state, **facts):

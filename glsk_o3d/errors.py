@@ -25,6 +25,10 @@ class ScriptError(GlskError, ValueError):
     """A filter script is malformed, asks for what there is not, or fails; the message names file and line."""
 
 
+class RecipeError(GlskError, ValueError):
+    """A recipe is malformed, or a pipeline cannot be written as one."""
+
+
 class MissingPackageError(GlskError, ImportError):
     """An optional package, or a system library it needs, is not installed."""
 
@@ -35,3 +39,7 @@ class DisplayError(GlskError, RuntimeError):
 
 class SkeletonWarning(UserWarning):
     """The skeleton was computed but should not be trusted blindly."""
+
+
+class PluginWarning(UserWarning):
+    """A plugin of another distribution is broken and was left out."""

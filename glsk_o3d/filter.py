@@ -72,6 +72,12 @@ def documented(cls):
     return cls
 
 
+FLOWS = ("cloud", "Contraction", "Skeleton")
+"""What runs between filters."""
+RESERVED = ("filter", "rule", "unwritten")
+"""Names that no parameter has, since recipes use them."""
+
+
 class Parameters:
     """Mixin of frozen dataclasses whose fields are made by `parameter`: checked when used, not when made."""
 
@@ -171,6 +177,7 @@ class Filter(Parameters):
     consumes: ClassVar[str] = "cloud"
     """What the filter takes: ``"cloud"``, ``"Contraction"`` or ``"Skeleton"``."""
     produces: ClassVar[str] = "Contraction"
+    """What it gives. A cloud, which only a filter of clouds gives, carries no report: pipelines tell of its stage."""
 
     def __call__(self, data, *, on_iteration: OnIteration | None = None, on_state: OnState | None = None):
         """Run the filter.
@@ -200,6 +207,11 @@ class Filter(Parameters):
             result = self._run(data, _watch(on_iteration, on_state))
             seconds = time.perf_counter() - start
             _log.debug("%s took %.3f s: %r", type(self).__name__, seconds, result)
+        promised = flows.get(self.produces)
+        if not isinstance(result, promised) if promised else isinstance(result, (*flows.values(), type(None))):
+            raise StageError(f"{type(self).__name__} should give a {self.produces} and gave a {type(result).__name__}")
+        if promised is None:
+            return result
         return dataclasses.replace(result, report=result.report.with_stage(self, seconds))
 
     def __or__(self, other: Filter | Pipeline) -> Pipeline:

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
+import os
+import time
+from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 from .errors import InvalidParameterError
 from .filter import Filter
 from .pipelines import named_pipeline
+from .report import Report
 from .skeleton import Skeleton
 
 
@@ -39,7 +46,7 @@ class Pipeline:
                 )
         self.stages = stages
 
-    def __call__(self, cloud, *, on_iteration=None, on_state=None):
+    def __call__(self, cloud, *, on_iteration=None, on_state=None, on_stage: Callable[[Filter], object] | None = None):
         """Run all filters on a cloud.
 
         Parameters
@@ -49,21 +56,55 @@ class Pipeline:
             Called with the IterationRecord of each solve; return False to stop the contraction there.
         on_state : callable, optional
             Called before it with the Contraction after each solve, such as a `ContractionRecorder`.
+        on_stage : callable, optional
+            Called with each filter before it runs.
 
         Returns
         -------
-        Skeleton or Contraction
+        Skeleton, Contraction or cloud
             Whatever the last filter gives.
         """
         self.check()
+        ahead = Report()
         for stage in self.stages:
+            if on_stage is not None:
+                on_stage(stage)
+            start = time.perf_counter()
             cloud = stage(cloud, on_iteration=on_iteration, on_state=on_state)
+            if stage.produces == "cloud":
+                ahead = ahead.with_stage(stage, time.perf_counter() - start)
+            elif ahead.stages and stage.consumes == "cloud":
+                cloud = dataclasses.replace(cloud, report=cloud.report.after(ahead))
         return cloud
 
     def check(self) -> None:
         """Raise InvalidParameterError if a parameter of a stage is wrong."""
         for stage in self.stages:
             stage.check()
+
+    def check_complete(self) -> None:
+        """Raise InvalidParameterError unless the pipeline leads from a cloud to a skeleton."""
+        if self.stages[0].consumes != "cloud" or self.stages[-1].produces != "Skeleton":
+            raise InvalidParameterError(f"{self!r} does not lead from a cloud to a skeleton")
+
+    def to_recipe(self) -> dict[str, Any]:
+        """The pipeline as a plain dict; see `glsk_o3d.recipes.to_recipe`."""
+        from .recipes import to_recipe
+
+        return to_recipe(self)
+
+    @classmethod
+    def from_recipe(cls, recipe: dict[str, Any]) -> Pipeline:
+        """The pipeline that a plain dict describes; see `glsk_o3d.recipes.from_recipe`."""
+        from .recipes import from_recipe
+
+        return from_recipe(recipe)
+
+    def save_recipe(self, path: str | os.PathLike) -> None:
+        """Write the pipeline to a JSON or TOML file, which `glsk_o3d.load_recipe` reads."""
+        from .recipes import save_recipe
+
+        save_recipe(self, path)
 
     def __or__(self, other: Filter | Pipeline) -> Pipeline:
         return Pipeline(*self.stages, *(other.stages if isinstance(other, Pipeline) else (other,)))
@@ -78,14 +119,17 @@ class Pipeline:
         return hash(self.stages)
 
 
-def skeletonize(cloud, pipeline: Pipeline | str = "default", *, on_iteration=None, on_state=None) -> Skeleton:
+def skeletonize(
+    cloud, pipeline: Pipeline | str | os.PathLike = "default", *, on_iteration=None, on_state=None
+) -> Skeleton:
     """Curve skeleton of a point cloud.
 
     Parameters
     ----------
     cloud : open3d.geometry.PointCloud, open3d.t.geometry.PointCloud, TriangleMesh of either kind, or (N, 3) array
         Points without order, normals or orientation; of a mesh the vertices. It is not modified.
-    pipeline : Pipeline or {"default", "wen2024", "cao2010"}
+    pipeline : Pipeline, {"default", "wen2024", "cao2010"}, name of a plugin's pipeline, or path of a recipe
+        A name that ends in ``.json`` or ``.toml`` is a path.
     on_iteration : callable, optional
         Called with the IterationRecord of each solve; return False to stop the contraction there.
     on_state : callable, optional
@@ -101,13 +145,22 @@ def skeletonize(cloud, pipeline: Pipeline | str = "default", *, on_iteration=Non
         If the points cannot be skeletonised.
     InvalidParameterError
         If the pipeline is unknown, lacks a stage, or has a wrong parameter.
+    RecipeError
+        If the recipe is wrong.
     """
-    if isinstance(pipeline, str):
+    if isinstance(pipeline, os.PathLike) or (
+        isinstance(pipeline, str) and Path(pipeline).suffix.lower() in (".json", ".toml")
+    ):
+        from .recipes import load_recipe
+
+        pipeline = load_recipe(pipeline)
+    elif isinstance(pipeline, str):
         pipeline = named_pipeline(pipeline)
     elif isinstance(pipeline, Filter):
         pipeline = Pipeline(pipeline)
     elif not isinstance(pipeline, Pipeline):
-        raise InvalidParameterError(f"pipeline = {pipeline!r}: must be a Pipeline or the name of one")
-    if pipeline.stages[0].consumes != "cloud" or pipeline.stages[-1].produces != "Skeleton":
-        raise InvalidParameterError(f"{pipeline!r} does not lead from a cloud to a skeleton")
+        raise InvalidParameterError(
+            f"pipeline = {pipeline!r}: must be a Pipeline, the name of one, or the path of a recipe"
+        )
+    pipeline.check_complete()
     return pipeline(cloud, on_iteration=on_iteration, on_state=on_state)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from .connector import Connector
@@ -53,17 +54,31 @@ def default() -> Pipeline:
     return RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore()) | Connector() | Refiner()
 
 
-PIPELINES = {"default": default, "wen2024": wen2024, "cao2010": cao2010}
+PIPELINES: dict[str, Callable[[], Pipeline]] = {"default": default, "wen2024": wen2024, "cao2010": cao2010}
+
+
+def known_pipelines() -> dict[str, Callable[[], Pipeline]]:
+    """All pipelines by name, those of plugins after the built-in ones.
+
+    Returns
+    -------
+    dict of str to callable
+        Each makes a Pipeline.
+    """
+    from .plugins import plugin_pipelines
+
+    return {**PIPELINES, **plugin_pipelines()}
 
 
 def named_pipeline(name: str) -> Pipeline:
-    """The pipeline of that name.
+    """The pipeline of that name, built in or of a plugin.
 
     Raises
     ------
     InvalidParameterError
         If there is none; the message lists the names.
     """
-    if name not in PIPELINES:
-        raise InvalidParameterError(f"no pipeline is called {name!r}: there are {', '.join(PIPELINES)}")
-    return PIPELINES[name]()
+    make = PIPELINES.get(name) or known_pipelines().get(name)
+    if make is None:
+        raise InvalidParameterError(f"no pipeline is called {name!r}: there are {', '.join(known_pipelines())}")
+    return make()

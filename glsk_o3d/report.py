@@ -8,9 +8,12 @@ import warnings as _warnings
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 from .errors import SkeletonWarning
 from .interop.verbosity import QUIET, open3d_is
+
+STOPPED_BY_CALLER = "stopped by the caller"
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ def _known(cls, data: dict) -> dict:
     return {name: value for name, value in data.items() if name in names}
 
 
-def _outside() -> int:
+def outside() -> int:
     """Stack level, as seen from the caller, of the first frame that is not of this package: the user's line."""
     frame, level = sys._getframe(1), 1
     while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith(__package__):
@@ -89,6 +92,9 @@ class Report:
         Gaps between parts that were bridged.
     stages : tuple of str
         The filters that ran, as the expressions that rebuild them.
+    recipe : dict
+        The same as a recipe, from which `Pipeline.from_recipe` makes the pipeline that repeats the run. Empty if it is
+        not known. What a recipe cannot hold is an entry ``"unwritten"`` that says what was there.
     seconds : dict of str to float
         Wall time per filter.
     iterations : tuple of IterationRecord
@@ -105,6 +111,7 @@ class Report:
     n_distinct: int = 0
     n_bridges: int = 0
     stages: tuple[str, ...] = ()
+    recipe: dict[str, Any] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     iterations: tuple[IterationRecord, ...] = ()
     converged: bool = False
@@ -114,14 +121,37 @@ class Report:
 
     def with_stage(self, stage, seconds: float) -> Report:
         """This report with one more filter in it."""
+        from .recipes import UNWRITTEN, joined, written
+
+        entry = written(stage)
+        if self.stop_reason == STOPPED_BY_CALLER:
+            entry[UNWRITTEN] = f"the contraction was stopped by the caller after solve {len(self.iterations)}"
         name = type(stage).__name__
-        total = self.seconds.get(name, 0.0) + seconds
-        return dataclasses.replace(self, stages=(*self.stages, repr(stage)), seconds={**self.seconds, name: total})
+        return dataclasses.replace(
+            self,
+            stages=(*self.stages, repr(stage)),
+            recipe=joined(self.recipe, entry),
+            seconds={**self.seconds, name: self.seconds.get(name, 0.0) + seconds},
+        )
+
+    def after(self, ahead: Report) -> Report:
+        """This report with the filters of another ahead of its own: clouds carry no report of what made them."""
+        from .recipes import joined
+
+        return dataclasses.replace(
+            self,
+            stages=(*ahead.stages, *self.stages),
+            recipe=joined(ahead.recipe, *self.recipe["pipeline"]),
+            seconds={
+                name: ahead.seconds.get(name, 0.0) + self.seconds.get(name, 0.0)
+                for name in (*ahead.seconds, *self.seconds)
+            },
+        )
 
     def with_warning(self, message: str) -> Report:
         """This report with a warning in it; also issued as a SkeletonWarning, unless Open3D's verbosity is Error."""
         if not open3d_is(QUIET):
-            _warnings.warn(message, SkeletonWarning, stacklevel=_outside())
+            _warnings.warn(message, SkeletonWarning, stacklevel=outside())
         return dataclasses.replace(self, warnings=(*self.warnings, message))
 
     def to_dict(self) -> dict:
@@ -132,6 +162,9 @@ class Report:
     def from_dict(cls, data: dict) -> Report:
         """Inverse of `to_dict`; entries of a later version that this one does not know are passed over."""
         values = _known(cls, data)
+        recipe = values.get("recipe", {})
+        if not isinstance(recipe, dict) or not isinstance(recipe.get("pipeline", []), list):
+            raise ValueError("its recipe is none")
         values["iterations"] = tuple(
             IterationRecord(**_known(IterationRecord, record)) for record in values.get("iterations", ())
         )

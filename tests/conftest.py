@@ -1,13 +1,17 @@
 """Fixtures for all tests."""
 
+import importlib
 import math
 import os
+import sys
 from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import tomlkit
 
+from glsk_o3d.plugins import forget_plugins
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.skeleton import Skeleton
 
@@ -143,3 +147,42 @@ def skeleton(request):
 def bare(tree):
     """A skeleton without a cloud."""
     return replace(tree, points=(), normals=(), vertex_of_point=())
+
+
+@pytest.fixture
+def install(tmp_path, monkeypatch):
+    """Install a module with entry points into a folder on the path, as pip would, and take it away afterwards."""
+    folder = tmp_path / "site"
+    folder.mkdir()
+    monkeypatch.syspath_prepend(folder)
+    before = set(sys.modules)
+
+    def add(distribution: str, version: str, code: str, entry_points: str) -> Path:
+        module = distribution.replace("-", "_")
+        (folder / f"{module}.py").write_text(code)
+        info = folder / f"{module}-{version}.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: {version}\n")
+        (info / "entry_points.txt").write_text(entry_points)
+        importlib.invalidate_caches()
+        forget_plugins()
+        return folder
+
+    yield add
+    for name in set(sys.modules) - before:
+        if str(folder) in str(getattr(sys.modules[name], "__file__", "")):
+            del sys.modules[name]
+    forget_plugins()
+
+
+@pytest.fixture
+def example(install, root):
+    """The example plugin, installed; gives the folder that it is in."""
+    source = root / "tests" / "example_plugin"
+    text = (source / "pyproject.toml").read_text()
+    groups = tomlkit.parse(text)["project"]["entry-points"]
+    entries = "".join(
+        f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in entries.items())
+        for group, entries in groups.items()
+    )
+    return install("glsk-example", "0.3", (source / "glsk_example.py").read_text(), entries)

@@ -18,7 +18,7 @@ from typing import Any
 
 import typer
 
-from ..errors import GlskError, InvalidParameterError, SkeletonWarning
+from ..errors import GlskError, InvalidParameterError, PluginWarning, SkeletonWarning
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
 
@@ -89,14 +89,15 @@ def reporting(*, quiet: bool = False, verbose: bool = False) -> Iterator[None]:
     lines: dict[str, None] = {}
 
     def keep(message, category, filename, lineno, file=None, line=None):
-        if issubclass(category, SkeletonWarning):
+        if issubclass(category, SkeletonWarning | PluginWarning):
             lines[str(message)] = None
         else:
             show(message, category, filename, lineno, file, line)
 
     with warnings.catch_warnings(), _logging(quiet, verbose):
         show, warnings.showwarning = warnings.showwarning, keep
-        warnings.simplefilter("always", SkeletonWarning)
+        for category in (SkeletonWarning, PluginWarning):
+            warnings.simplefilter("always", category)
         problem: BaseException | None = None
         code = 0
         try:

@@ -35,6 +35,7 @@ def demo(
         from .running import check_writable, print_results, run, write
 
         chosen = named_pipeline(pipeline)
+        chosen.check_complete()
         names = ("skeleton.ply", "skeleton.json", "skeleton.png", "cloud.ply")
         if folder.exists() and not folder.is_dir():
             raise NotADirectoryError(f"{folder}: is a file, not a folder")

@@ -24,17 +24,17 @@ def filters(
 ) -> None:
     """List filters and their parameters, and pipelines.
 
-    Everything is taken from the code: the filters, the stopping rules and the named pipelines.
+    Everything is taken from the code: the filters, the stopping rules and the named pipelines, those of plugins too.
     """
     with reporting():
         from ..catalogue import catalogue, nearest
-        from ..pipelines import PIPELINES
+        from ..pipelines import known_pipelines
 
-        known = catalogue()
-        if name is not None and name not in known and name not in PIPELINES:
-            raise WrongUsage(nearest(name, [*known, *PIPELINES], "filter or pipeline"))
+        known, pipelines = catalogue(), known_pipelines()
+        if name is not None and name not in known and name not in pipelines:
+            raise WrongUsage(nearest(name, [*known, *pipelines], "filter or pipeline"))
         classes = [cls for key, cls in known.items() if name in (None, key)]
-        names = [key for key in PIPELINES if name in (None, key)]
+        names = [key for key in pipelines if name in (None, key)]
         if as_json:
             print_json(
                 {"filters": [facts(cls) for cls in classes], "pipelines": [_pipeline_facts(key) for key in names]}
@@ -56,8 +56,9 @@ def facts(cls: type[Parameters]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``name``, ``kind``, ``consumes``, ``produces`` (None for a rule), ``doc`` and ``parameters``: a list of dicts of
-        the field's metadata, with ``name``, ``default`` and ``limits`` in words.
+        ``name``, ``kind``, ``plugin`` (the package that it is from, None for this one), ``consumes``, ``produces``
+        (None for a rule), ``doc`` and ``parameters``: a list of dicts of the field's metadata, with ``name``,
+        ``default`` and ``limits`` in words.
     """
     from ..filter import Filter
 
@@ -65,6 +66,7 @@ def facts(cls: type[Parameters]) -> dict[str, Any]:
     return {
         "name": cls.__name__,
         "kind": "filter" if flow[0] else "stopping rule",
+        "plugin": _plugin(cls),
         "consumes": flow[0],
         "produces": flow[1],
         "doc": _prose(cls),
@@ -119,6 +121,10 @@ def _prose(documented) -> str:
     return re.sub(r"(?<!\n)\n(?!\n)", " ", text)
 
 
+def _from(told) -> str:
+    return f", from {told['plugin']}" if told["plugin"] else ""
+
+
 def _print_filter(cls, full: bool) -> None:
     from rich.table import Table
     from rich.text import Text
@@ -126,7 +132,7 @@ def _print_filter(cls, full: bool) -> None:
     told = facts(cls)
     flow = f"  {told['consumes']} -> {told['produces']}" if told["consumes"] else "  stopping rule"
     out = console()
-    out.print(Text.assemble((told["name"], "bold"), (flow, "dim")))
+    out.print(Text.assemble((told["name"], "bold"), (flow + _from(told), "dim")))
     out.print(told["doc"] + "\n" if full else told["doc"].partition("\n\n")[0])
     table = Table.grid(padding=(0, 2))
     table.add_column(no_wrap=True)
@@ -143,11 +149,18 @@ def _print_filter(cls, full: bool) -> None:
 
 
 def _pipeline_facts(name: str) -> dict[str, Any]:
-    from ..pipelines import PIPELINES
+    from ..pipelines import known_pipelines
 
-    make = PIPELINES[name]
-    stages = [repr(stage) for stage in make().stages]
-    return {"name": name, "doc": _prose(make), "expression": repr(make()), "stages": stages}
+    make = known_pipelines()[name]
+    made = make()
+    stages = [repr(stage) for stage in made.stages]
+    return {"name": name, "plugin": _plugin(make), "doc": _prose(make), "expression": repr(made), "stages": stages}
+
+
+def _plugin(thing) -> str | None:
+    """The package that a filter or pipeline is from, None for this one."""
+    package = getattr(thing, "__module__", "").partition(".")[0]
+    return None if package == __package__.partition(".")[0] else package
 
 
 def _print_pipeline(name: str, full: bool) -> None:
@@ -156,7 +169,7 @@ def _print_pipeline(name: str, full: bool) -> None:
 
     told = _pipeline_facts(name)
     out = console()
-    out.print(Text.assemble((name, "bold"), ("  pipeline", "dim")))
+    out.print(Text.assemble((name, "bold"), ("  pipeline" + _from(told), "dim")))
     out.print(told["doc"] + "\n" if full else told["doc"].partition("\n\n")[0])
     table = Table.grid(padding=(0, 1))
     for i, stage in enumerate(told["stages"]):

@@ -121,6 +121,7 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
     """
     import numpy as np
 
+    from ..recipes import gaps
     from .running import structure
 
     report = skeleton.report
@@ -138,6 +139,7 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
         "stages": [stage for i, stage in enumerate(report.stages) if stage not in report.stages[:i]],
         "converged": report.converged,
         "stop_reason": report.stop_reason,
+        "repeatable": bool(report.recipe) and not any(gaps(report.recipe)),
         "warnings": list(report.warnings),
         "versions": report.versions,
     }

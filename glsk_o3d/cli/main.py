@@ -16,6 +16,7 @@ from .demo import demo
 from .evaluate import evaluate
 from .filters import filters
 from .info import info
+from .rerun import rerun
 from .run import run
 from .skeletonize import skeletonize
 from .view import view
@@ -32,7 +33,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (skeletonize, run, evaluate, branches, view, demo, filters, info):
+for command in (skeletonize, run, rerun, evaluate, branches, view, demo, filters, info):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
 
 

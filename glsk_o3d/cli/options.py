@@ -17,12 +17,14 @@ Output = Annotated[
         "may be repeated.",
     ),
 ]
+Preview = Annotated[Path | None, typer.Option("--preview", metavar="PNG", help="Also draw cloud and skeleton.")]
+CutLoops = Annotated[bool, typer.Option("--cut-loops", help="Cut loops open for formats that hold only trees (swc).")]
 PipelineName = Annotated[
     str,
     typer.Option(
         "--pipeline",
         metavar="NAME",
-        help="One of default, wen2024 and cao2010; 'glsk filters' says what they are.",
+        help="One of default, wen2024 and cao2010, or a plugin's; 'glsk filters' says what they are.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout instead of tables.")]

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
-from ..catalogue import catalogue, nearest, parts, replaced, serves
+from ..catalogue import catalogue, changed, find, nearest, parts, serves
 from ..errors import InvalidParameterError
 from ..filter import Parameters
 from ..pipeline import Pipeline
@@ -53,7 +53,7 @@ def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pip
             raise InvalidParameterError(
                 f"--set {setting}: {cls.__name__} is not in {place}, which has {', '.join(present)}{_how_to_add(cls)}"
             )
-        pipeline = Pipeline(*(replaced(stage, cls, field, value) for stage in pipeline.stages))
+        pipeline = changed(pipeline, cls, field, value)
     pipeline.check()
     return pipeline
 
@@ -65,16 +65,16 @@ def _parse(setting: str) -> tuple[type[Parameters], str, Any]:
         raise InvalidParameterError(
             f"--set {setting}: write it as Filter.parameter=value, for example Connector.radius=2%"
         )
-    known = catalogue()
-    if owner not in known:
-        raise InvalidParameterError(f"--set {setting}: {nearest(owner, known, 'filter')}")
-    cls = known[owner]
+    cls = find(owner)
+    if cls is None:
+        raise InvalidParameterError(f"--set {setting}: {nearest(owner, catalogue(), 'filter')}")
     kinds = {field.name: field.metadata["type"] for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
     if name not in kinds:
         raise InvalidParameterError(f"--set {setting}: {nearest(name, kinds, f'parameter of {owner}')}")
     kind = kinds[name]
     if kind.rstrip("?") not in ("reducer", "stop") or (kind.endswith("?") and text.lower() == "none"):
         return cls, name, _value(text, kind)
+    known = catalogue()
     fitting = [other for other, its in known.items() if its is not cls and serves(its, kind.rstrip("?"))]
     if text not in fitting:
         raise InvalidParameterError(f"--set {setting}: {nearest(text, fitting, kind.rstrip('?'))}")

@@ -5,17 +5,17 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import typer
 
 from ..errors import FileFormatError, GlskError
-from ..filter import Filter
 from ..interop.files import skeleton_ending
 from ..interop.preview import save_preview
-from ..pipeline import Pipeline
 from ..skeleton import Skeleton
 from ..viewing.page import save_report
 from ..viewing.recorder import ContractionRecorder
@@ -36,7 +36,9 @@ def check_outputs(
     preview: Path | None = None,
     scan: Path | None = None,
     page: Path | None = None,
+    others: Iterable[Path] = (),
     check_ending: Callable[[Path], object] = skeleton_ending,
+    **inputs: Path | None,
 ) -> None:
     """Find out before computing whether the files can be written.
 
@@ -48,8 +50,12 @@ def check_outputs(
         The input, which must not be overwritten.
     page : Path, optional
         The report.
+    others : iterable of Path
+        Other files to be written.
     check_ending : callable
         Raises FileFormatError for an output whose ending is wrong.
+    **inputs : Path or None
+        Other inputs, by what they are.
 
     Raises
     ------
@@ -71,7 +77,9 @@ def check_outputs(
     files = [*outputs, *(path for path in (preview, page) if path is not None)]
     if not files:
         raise WrongUsage("nothing to write: give an output with -o, a picture with --preview, a page with --report")
-    seen = {os.path.realpath(scan): "is the scan itself"} if scan is not None else {}
+    files += others
+    sources = {"scan": scan, **inputs}
+    seen = {os.path.realpath(path): f"is the {what} itself" for what, path in sources.items() if path is not None}
     for path in files:
         real = os.path.realpath(path)
         if real in seen:
@@ -99,12 +107,13 @@ def check_writable(path: Path) -> None:
         raise OSError(f"{path}: no file can be made in this folder: {error.strerror}") from error
 
 
-def run(pipeline: Pipeline, cloud: Any, update, on_state=None) -> tuple[Skeleton, float]:
+def run(pipeline: Callable[..., Skeleton], cloud: Any, update, on_state=None) -> tuple[Skeleton, float]:
     """Run a pipeline and show how far it is.
 
     Parameters
     ----------
-    pipeline : Pipeline
+    pipeline : Pipeline, or callable
+        Given the cloud, and ``on_iteration`` and ``on_stage`` as keywords.
     cloud : cloud
     update : callable
         From `console.progress`.
@@ -117,22 +126,24 @@ def run(pipeline: Pipeline, cloud: Any, update, on_state=None) -> tuple[Skeleton
         The skeleton, and the seconds it took.
     """
     start = time.perf_counter()
-    flow = cloud
-    for stage in pipeline.stages:
-        doing = _DOING.get(type(stage).__name__, type(stage).__name__)
+    on_stage, on_iteration = _watch(update)
+    skeleton = pipeline(cloud, on_iteration=on_iteration, on_state=on_state, on_stage=on_stage)
+    return skeleton, time.perf_counter() - start
+
+
+def _watch(update):
+    doing, most = "", None
+
+    def on_stage(stage):
+        nonlocal doing, most
+        doing, most = _DOING.get(type(stage).__name__, type(stage).__name__), getattr(stage, "max_iterations", None)
         update(doing)
-        flow = stage(flow, on_iteration=_watch(stage, doing, update), on_state=on_state)
-    return flow, time.perf_counter() - start
-
-
-def _watch(stage: Filter, doing: str, update):
-    most = getattr(stage, "max_iterations", None)
 
     def on_iteration(record):
         left = record.n_points - record.n_merged
         update(f"{doing}: solve {record.iteration} of at most {most}, {left} points", record.iteration, most)
 
-    return on_iteration
+    return on_stage, on_iteration
 
 
 def write(
@@ -140,6 +151,7 @@ def write(
     outputs: Sequence[Path],
     preview: Path | None,
     page: Path | None = None,
+    others: Mapping[Path, Callable[[Path], object]] = MappingProxyType({}),
     *,
     title: str,
     cut_loops: bool,
@@ -155,6 +167,8 @@ def write(
     preview : Path or None
     page : Path, optional
         The report.
+    others : mapping of Path to callable
+        Other files, and what writes each.
     title : str
         Above the preview and the report.
     cut_loops : bool
@@ -169,16 +183,18 @@ def write(
     list of Path, list of str
         The files that were written, and what was wrong with the others.
     """
+    writers: dict[Path, Callable[[Path], object]] = {
+        path: partial(skeleton.save, cut_loops=cut_loops) for path in outputs
+    }
+    if preview is not None:
+        writers[preview] = partial(save_preview, skeleton, title=title)
+    if page is not None:
+        writers[page] = partial(save_report, skeleton, recorder=recorder, title=title)
     written, problems = [], []
-    for path in [*outputs, *(path for path in (preview, page) if path is not None)]:
+    for path, save in {**writers, **others}.items():
         update(f"writing {path.name}")
         try:
-            if path is preview:
-                save_preview(skeleton, path, title=title)
-            elif path is page:
-                save_report(skeleton, path, recorder=recorder, title=title)
-            else:
-                skeleton.save(path, cut_loops=cut_loops)
+            save(path)
             written.append(path)
         except OSError as error:
             problems.append(f"{path}: cannot be written: {error.strerror or error}")

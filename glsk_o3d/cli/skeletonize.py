@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .console import holding_interrupts, progress, reporting
-from .options import Json, Output, PipelineName, Quiet, Verbose
+from .console import WrongUsage, holding_interrupts, progress, reporting
+from .options import CutLoops, Json, Output, PipelineName, Preview, Quiet, Verbose
 
 
 def skeletonize(
@@ -19,9 +19,7 @@ def skeletonize(
         ),
     ],
     output: Output = None,
-    preview: Annotated[
-        Path | None, typer.Option("--preview", metavar="PNG", help="Also draw cloud and skeleton.")
-    ] = None,
+    preview: Preview = None,
     report: Annotated[
         Path | None,
         typer.Option(
@@ -29,6 +27,12 @@ def skeletonize(
         ),
     ] = None,
     pipeline: PipelineName = "default",
+    recipe: Annotated[
+        Path | None,
+        typer.Option(
+            "--recipe", metavar="FILE", help="Run a pipeline from a json or toml file instead of a named one."
+        ),
+    ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -37,12 +41,14 @@ def skeletonize(
             help="Change a parameter, such as Connector.radius=2%; may be repeated. See 'glsk filters'.",
         ),
     ] = None,
+    save_recipe: Annotated[
+        Path | None,
+        typer.Option("--save-recipe", metavar="FILE", help="Also write the pipeline as run to a json or toml file."),
+    ] = None,
     drop_invalid: Annotated[
         bool, typer.Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")
     ] = False,
-    cut_loops: Annotated[
-        bool, typer.Option("--cut-loops", help="Cut loops open for formats that hold only trees (swc).")
-    ] = False,
+    cut_loops: CutLoops = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -54,14 +60,24 @@ def skeletonize(
     with reporting(quiet=quiet, verbose=verbose):
         from ..interop.files import read_cloud
         from ..pipelines import named_pipeline
+        from ..recipes import load_recipe, recipe_ending
         from ..viewing.recorder import ContractionRecorder
         from .overrides import override
         from .running import check_outputs, print_results, run, write
 
         drop = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
-        chosen = override(named_pipeline(pipeline), [*(settings or []), *drop], name=pipeline)
+        if recipe is not None and pipeline != "default":
+            raise WrongUsage(f"--recipe {recipe} and --pipeline {pipeline}: give one of them")
+        base = named_pipeline(pipeline) if recipe is None else load_recipe(recipe)
+        chosen = override(base, [*(settings or []), *drop], name=pipeline if recipe is None else str(recipe))
+        chosen.check_complete()
         outputs = output or []
-        check_outputs(outputs, preview, scan, report)
+        others = {}
+        if save_recipe is not None:
+            recipe_ending(save_recipe)
+            chosen.to_recipe()
+            others[save_recipe] = chosen.save_recipe
+        check_outputs(outputs, preview, scan, report, others, recipe=recipe)
         recorder = ContractionRecorder() if report is not None else None
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")
@@ -73,6 +89,7 @@ def skeletonize(
                 outputs,
                 preview,
                 report,
+                others,
                 title=scan.name,
                 cut_loops=cut_loops,
                 update=update,

@@ -134,8 +134,7 @@ def hexadecimal(colors: np.ndarray) -> list[str]:
 
 def origin(report: Report) -> str:
     """What it takes to repeat the run: the recipe, the counts and times of the run, the versions."""
-    recipe = getattr(report, "recipe", None)
-    text = json.dumps(recipe, indent=2, ensure_ascii=False, default=str) if recipe else "\n".join(report.stages)
+    text = json.dumps(report.recipe, indent=2, ensure_ascii=False) if report.recipe else "\n".join(report.stages)
     told = f"<h2>Recipe</h2><pre>{escape(text)}</pre>" if text else ""
     counts = {
         "input points": report.n_input,

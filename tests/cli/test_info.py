@@ -71,6 +71,7 @@ def test_the_report_of_the_run(told, skeleton, invoke):
     facts, report = told("s.npz"), skeleton["s.npz"].report
     assert facts["stop_reason"] == report.stop_reason
     assert set(facts["stages"]) == set(report.stages)
+    assert facts["repeatable"] is True
     assert [each["n_points"] for each in facts["iterations"]] == [each.n_points for each in report.iterations]
     table = invoke("info", "s.npz").stdout
     assert "Connector(radius='4%'" in table

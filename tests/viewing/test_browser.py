@@ -1,6 +1,7 @@
 """The report as a browser shows it."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -178,15 +179,20 @@ def test_fits_the_screen_in_light_and_dark(report, look, pixels, width):
 def test_texts_are_texts(run, look, tmp_path):
     skeleton, recorder = run
     recorded = dataclasses.replace(
-        skeleton.report, warnings=(HOSTILE,), stop_reason=HOSTILE, stages=(HOSTILE,), versions={HOSTILE: HOSTILE}
+        skeleton.report,
+        warnings=(HOSTILE,),
+        stop_reason=HOSTILE,
+        recipe={HOSTILE: HOSTILE},
+        versions={HOSTILE: HOSTILE},
     )
     glsk.save_report(
         dataclasses.replace(skeleton, report=recorded), tmp_path / "r.html", recorder=recorder, title=HOSTILE
     )
     page = look(tmp_path / "r.html")
     assert page.title() == HOSTILE
-    for place in ("h1", ".warnings li", "pre", "table.facts th >> nth=-1", "table.facts td >> nth=-1"):
+    for place in ("h1", ".warnings li", "table.facts th >> nth=-1", "table.facts td >> nth=-1"):
         assert page.locator(place).text_content() == HOSTILE
+    assert json.loads(page.locator("pre").text_content()) == {HOSTILE: HOSTILE}
     assert HOSTILE in page.locator("h2 + p").first.text_content()
     assert page.locator("script").count() == 2
     assert page.locator("img").count() == 1

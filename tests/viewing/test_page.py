@@ -167,7 +167,7 @@ def test_a_recipe_takes_the_place_of_the_stages(tree):
     assert "<h2>Recipe</h2>" not in sections.origin(tree.report)
     told = dataclasses.replace(tree.report, stages=("RingBuilder(k=5)",))
     assert "RingBuilder(k=5)" in sections.origin(told)
-    object.__setattr__(told, "recipe", {"stages": [{"filter": "RingBuilder", "k": "<5>"}]})
+    told = dataclasses.replace(told, recipe={"pipeline": [{"filter": "RingBuilder", "k": "<5>"}]})
     assert "&quot;k&quot;: &quot;&lt;5&gt;&quot;" in sections.origin(told)
     assert "RingBuilder(k=5)" not in sections.origin(told)
 

@@ -16,13 +16,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...catalogue import catalogue, nearest, parts, replaced, serves
+from ...catalogue import catalogue, changed, nearest, parts, serves
 from ...contractor import Contractor
 from ...errors import InvalidCloudError, InvalidParameterError
 from ...filter import Filter, Parameters, parameter, problem_with
 from ...lpr_reducer import LPRReducer
 from ...pipeline import Pipeline
-from ...pipelines import PIPELINES, named_pipeline
+from ...pipelines import known_pipelines, named_pipeline
 from ...ring_builder import RingBuilder
 from ...skeleton import Skeleton
 from ...state import Contraction
@@ -203,7 +203,7 @@ class Verb:
                 there = ", ".join(cls.__name__ for cls in present)
                 raise InvalidParameterError(f"{name}: there is no {owner.__name__} here, only {there}")
             field = self.slots[name].field
-            pipeline = Pipeline(*(replaced(stage, owner, field, made[name]) for stage in pipeline.stages))
+            pipeline = changed(pipeline, owner, field, made[name])
         pipeline.check()
         return pipeline
 
@@ -268,7 +268,7 @@ class FilterVerb(Verb):
         return self.filter.produces == "Skeleton"
 
     def start(self, values):
-        found = [stage for stage in PIPELINES[self.default]().stages if type(stage) is self.filter]
+        found = [stage for stage in named_pipeline(self.default).stages if type(stage) is self.filter]
         return Pipeline(*(found or [self.filter()]))
 
     def run(self, layer, given, on_iteration=None):
@@ -281,7 +281,7 @@ class FilterVerb(Verb):
 
     def before(self) -> tuple[Filter, ...]:
         """What turns a cloud into what the filter takes: the default pipeline's filters before it."""
-        stages = PIPELINES[self.default]().stages
+        stages = named_pipeline(self.default).stages
         kinds = [type(stage) for stage in stages]
         if self.filter in kinds:
             return stages[: kinds.index(self.filter)]
@@ -356,9 +356,10 @@ def verbs() -> dict[str, Verb]:
         The whole pipeline first, then each filter of the catalogue, then the segmentation.
     """
     known = catalogue()
-    whole = {type(part): None for make in PIPELINES.values() for part in parts(make())}
+    whole = {type(part): None for make in known_pipelines().values() for part in parts(make())}
     whole |= {cls: None for cls in known.values() if any(serves(cls, kind) for kind in _PARTS)}
-    choice = _facts("The named pipeline; parameters that are not given are as it has them.", "choice", tuple(PIPELINES))
+    about = "The named pipeline; parameters that are not given are as it has them."
+    choice = _facts(about, "choice", tuple(known_pipelines()))
     slots = [Slot("pipeline", choice, default=Verb.default), *chain.from_iterable(_slots(cls) for cls in whole)]
     found = [
         Verb(

@@ -1,0 +1,54 @@
+"""``glsk rerun``."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .console import holding_interrupts, progress, reporting
+from .options import CutLoops, Json, Output, Preview, Quiet, Verbose
+
+
+def rerun(
+    result: Annotated[
+        Path, typer.Argument(metavar="RESULT", help="A skeleton that 'glsk skeletonize' wrote as json or npz.")
+    ],
+    scan: Annotated[
+        Path | None,
+        typer.Argument(metavar="SCAN", help="Another cloud to run it on; by default the points in the result."),
+    ] = None,
+    output: Output = None,
+    preview: Preview = None,
+    cut_loops: CutLoops = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Repeat the run that made a result, with the recipe that it holds.
+
+    On the points of the result the skeleton is the same to the last bit; where other releases make it differ, there is
+    a warning. 'glsk skeletonize --recipe' runs recipes from files of their own.
+    """
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..errors import RecipeError
+        from ..interop.files import read_cloud, read_skeleton
+        from ..recipes import rerun as run_again
+        from .running import check_outputs, print_results, run, write
+
+        outputs = output or []
+        check_outputs(outputs, preview, scan, result=result)
+        with progress(not quiet and not verbose) as update:
+            update(f"reading {result.name}")
+            made = read_skeleton(result)
+            with holding_interrupts():
+                cloud = read_cloud(scan) if scan is not None else None
+            try:
+                skeleton, seconds = run(partial(run_again, made), cloud, update)
+            except RecipeError as error:
+                raise RecipeError(f"{result}: cannot be repeated: {error}") from error
+            title = (scan or result).name
+            written, problems = write(skeleton, outputs, preview, title=title, cut_loops=cut_loops, update=update)
+        print_results(skeleton, seconds, written, problems, quiet=quiet, verbose=verbose, as_json=as_json)

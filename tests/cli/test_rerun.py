@@ -1,0 +1,116 @@
+"""`glsk rerun`, and the options of `glsk skeletonize` for recipes."""
+
+import json
+
+import numpy as np
+import pytest
+
+from glsk_o3d import load_recipe, pipelines, read_skeleton
+
+
+@pytest.fixture
+def made(invoke, scans, tmp_path):
+    """A result, and the recipe of its run."""
+    words = ("--set", "Connector.radius=4%", "--drop-invalid", "--save-recipe", "r.toml")
+    result = invoke("skeletonize", scans / "nan.ply", "-o", "s.json", "-o", "s.npz", *words)
+    assert result.exit_code == 0, result.output
+    assert result.stdout.endswith("wrote s.json\nwrote s.npz\nwrote r.toml\n")
+    return read_skeleton(tmp_path / "s.json")
+
+
+@pytest.mark.parametrize("words", [["s.json"], ["s.npz"], ["s.json", "SCAN"]])
+def test_identical(invoke, scans, tmp_path, made, words):
+    words = [scans / "nan.ply" if word == "SCAN" else word for word in words]
+    result = invoke("rerun", *words, "-o", "again.json", "-o", "again.ply", "--preview", "again.png", "--verbose")
+    assert result.exit_code == 0, result.output
+    again = read_skeleton(tmp_path / "again.json")
+    for name in ("vertices", "edges", "radii", "points", "vertex_of_point"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(made, name))
+    assert again.report.recipe == made.report.recipe
+    assert "warning" not in result.stderr
+    assert "glsk: Refiner took" in result.stderr
+    assert (tmp_path / "again.png").stat().st_size > 1000
+
+
+def test_another_scan_and_its_recipe_from_a_file(invoke, scans, tmp_path, made):
+    assert invoke("rerun", "s.npz", scans / "ring.ply", "-o", "a.json").exit_code == 0
+    words = ("--recipe", "r.toml", "-o", "b.json", "--save-recipe", "b.toml", "--json")
+    result = invoke("skeletonize", scans / "ring.ply", *words)
+    assert json.loads(result.stdout)["files"] == ["b.json", "b.toml"]
+    a, b = read_skeleton(tmp_path / "a.json"), read_skeleton(tmp_path / "b.json")
+    np.testing.assert_array_equal(a.vertices, b.vertices)
+    assert a.report.recipe == b.report.recipe == load_recipe(tmp_path / "b.toml").to_recipe()
+    assert (tmp_path / "r.toml").read_text() == (tmp_path / "b.toml").read_text()
+
+
+def test_settings_change_a_recipe(invoke, scans, tmp_path, made):
+    words = ("--recipe", "r.toml", "--set", "Connector.radius=5%", "-o", "c.json")
+    assert invoke("skeletonize", scans / "ring.ply", *words).exit_code == 0
+    assert read_skeleton(tmp_path / "c.json").report.stages[2].startswith("Connector(radius='5%'")
+
+
+@pytest.mark.parametrize(
+    ("code", "words", "message"),
+    [
+        (2, ["rerun", "s.json"], "nothing to write"),
+        (2, ["rerun", "s.json", "-o", "s.json"], "s.json: is the result itself: choose another name"),
+        (1, ["rerun", "none.json", "-o", "a.ply"], "none.json: no such file"),
+        (1, ["rerun", "s.json", "none.ply", "-o", "a.ply"], "none.ply: no such file"),
+        (1, ["rerun", "s.ply", "-o", "a.ply"], "s.ply: cannot be repeated: it holds no recipe"),
+        (1, ["rerun", "gap.json", "-o", "a.ply"], "gap.json: cannot be repeated: pipeline[1].reducer: a recipe cannot"),
+        (2, ["skeletonize", "SCAN", "--recipe", "r.toml", "-o", "r.toml"], "r.toml: unknown ending"),
+        (
+            2,
+            ["skeletonize", "SCAN", "--recipe", "r.toml", "--save-recipe", "./r.toml", "-o", "a.ply"],
+            "the recipe its",
+        ),
+        (2, ["skeletonize", "SCAN", "--save-recipe", "a.json", "-o", "a.json"], "a.json: is named twice"),
+        (2, ["skeletonize", "SCAN", "--save-recipe", "a.json"], "nothing to write"),
+        (1, ["skeletonize", "SCAN", "--save-recipe", "a.yaml", "-o", "a.ply"], "a.yaml: unknown ending; recipes are"),
+        (1, ["skeletonize", "SCAN", "--save-recipe", "no/a.json", "-o", "a.ply"], "no: no such folder"),
+        (2, ["skeletonize", "SCAN", "--recipe", "r.toml", "--pipeline", "wen2024", "-o", "a.ply"], "give one of them"),
+        (1, ["skeletonize", "SCAN", "--recipe", "none.toml", "-o", "a.ply"], "none.toml: No such file"),
+        (
+            1,
+            ["skeletonize", "SCAN", "--recipe", "bad.json", "-o", "a.ply"],
+            "bad.json: pipeline[0].k: must be at least",
+        ),
+        (
+            2,
+            ["skeletonize", "SCAN", "--recipe", "part.json", "-o", "a.ply"],
+            "does not lead from a cloud to a skeleton",
+        ),
+    ],
+)
+def test_refused_before_anything_runs(invoke, scans, tmp_path, made, code, words, message):
+    made.save("s.ply")
+    data = json.loads((tmp_path / "s.json").read_text())
+    data["report"]["recipe"]["pipeline"][1]["reducer"] = {"unwritten": "a function"}
+    (tmp_path / "gap.json").write_text(json.dumps(data))
+    for name, k in (("bad", 1), ("part", 9)):
+        recipe = {"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "RingBuilder", "k": k}]}
+        (tmp_path / f"{name}.json").write_text(json.dumps(recipe))
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    result = invoke(*(scans / "sample.ply" if word == "SCAN" else word for word in words))
+    assert result.exit_code == code
+    assert result.stdout == ""
+    assert result.stderr.startswith("glsk: error: ")
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_pipeline_that_no_recipe_can_hold_is_refused_before_it_runs(refused, scans, monkeypatch):
+    import glsk_o3d
+
+    def odd():
+        return (
+            glsk_o3d.RingBuilder()
+            | glsk_o3d.Contractor(reducer=lambda state: state)
+            | glsk_o3d.Connector()
+            | glsk_o3d.Refiner()
+        )
+
+    monkeypatch.setitem(pipelines.PIPELINES, "odd", odd)
+    words = ("--pipeline", "odd", "-o", "a.ply", "--save-recipe", "a.json")
+    assert "pipeline[1].reducer: a recipe cannot hold it: " in refused(1, "skeletonize", scans / "ring.ply", *words)
