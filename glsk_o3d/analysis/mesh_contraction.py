@@ -32,19 +32,19 @@ def mesh_laplacian(vertices, faces, cap=WEIGHT_CAP):
     Returns
     -------
     (n, n) csr_matrix
-        Negative semi-definite where no row was scaled; rows of vertices without a triangle are empty.
+        Rows of vertices without a triangle are empty.
     """
     igl = require("igl", "libigl")
     faces = faces[igl.doublearea(vertices, faces) > 0]  # igl would divide by them
     laplacian = 2 * igl.cotmatrix(vertices, faces)
-    total = np.abs(laplacian.diagonal())
-    return (diags_array(cap / np.maximum(total, cap)) @ laplacian).tocsr() if total.max() > cap else laplacian.tocsr()
+    return (diags_array(cap / np.maximum(np.abs(laplacian.diagonal()), cap)) @ laplacian).tocsr()
 
 
 def mesh_areas(vertices, faces):
     """Area of every vertex, (n,) float array: the mixed Voronoi areas of ``igl.massmatrix`` (Meyer et al. 2003)."""
     igl = require("igl", "libigl")
-    return igl.massmatrix(vertices, faces, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
+    areas = igl.massmatrix(vertices, faces, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
+    return np.pad(areas, (0, len(vertices) - len(areas)))  # igl leaves out bare vertices at the end
 
 
 def ring_areas(points, rings):
@@ -85,9 +85,11 @@ class MeshContractor(Contractor):
         Whose parameters to take.
     """
 
+    faces: np.ndarray  # no field of the dataclass: the report shows these
+
     def __init__(self, faces, like):
         super().__init__(**{field.name: getattr(like, field.name) for field in fields(like)} | {"reducer": None})
-        object.__setattr__(self, "faces", faces)  # no parameter: the report shows these
+        object.__setattr__(self, "faces", faces)
 
     def _laplacian(self, state):
         return mesh_laplacian(state.positions, self.faces)

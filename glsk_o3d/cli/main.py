@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from .crosscheck import crosscheck
 from .demo import demo
 from .evaluate import evaluate
 from .filters import filters
@@ -29,7 +30,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (skeletonize, evaluate, demo, filters, info):
+for command in (skeletonize, evaluate, crosscheck, demo, filters, info):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
 
 
