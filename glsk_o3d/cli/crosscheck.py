@@ -56,6 +56,8 @@ def crosscheck(
     """
     with reporting(quiet=quiet, verbose=verbose):
         from ..analysis import cross_check, save_crosscheck_picture
+        from ..analysis.crosscheck import SURFACES
+        from ..catalogue import nearest
         from ..interop.files import read_cloud, write_atomically
         from ..interop.meshes import read_mesh
         from ..pipelines import named_pipeline
@@ -63,6 +65,8 @@ def crosscheck(
 
         if mesh is not None and method != "auto":
             raise WrongUsage("--mesh gives a mesh: there is none to make with --method")
+        if method not in ("auto", *SURFACES):
+            raise WrongUsage(nearest(method, ("auto", *SURFACES), "method"))
         to_stdout = output == Path("-")
         _check_outputs(None if to_stdout else output, picture, [path for path in (scan, mesh) if path is not None])
         settings = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
