@@ -30,10 +30,9 @@ COVERED = 0.7  # share of the closed rings that ball pivoting must close, or Poi
 SAME = 1e-6  # of the diagonal: nearer vertices are points of the cloud, whichever file has fewer digits
 
 # What separates clean, dense samples of known shapes from sparse and noisy ones; see docs/crosscheck.md.
-TURNED = 10.0  # degrees
+TURNED = 30.0  # degrees
 NEAR, FAR = 0.2, 0.5  # local radii
 ASTRAY = 1.0  # local radii
-DOUBTFUL = 30.0  # degrees, of a single point
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +83,7 @@ class CrossCheck:
     @property
     def doubtful(self) -> np.ndarray:
         """Points where the Laplacian coordinates differ by more than 30 degrees, or could not be compared."""
-        return ~(self.angle <= DOUBTFUL)
+        return ~(self.angle <= TURNED)
 
     def to_dict(self) -> dict[str, Any]:
         """The verdict and all numbers but those of single points, as JSON holds them."""
@@ -95,7 +94,7 @@ class CrossCheck:
             "points": {
                 "given": self.n_input,
                 "used": len(self.points),
-                "turned": int((self.angle > DOUBTFUL).sum()),
+                "turned": int((self.angle > TURNED).sum()),
                 "not_compared": int(np.isnan(self.angle).sum()),
             },
             "mesh": {"vertices": len(self.vertices), "faces": len(self.faces)},
@@ -270,8 +269,9 @@ def judge(rows: RowAgreement, skeletons: SkeletonAgreement, warned: Sequence[str
     -------
     verdict : {"agrees", "agrees in part", "do not trust"}
         "do not trust" where the skeletons differ in components or loops, or lie more than half a radius apart on
-        average. "agrees" where they lie within a fifth of a radius on average and a radius in 95 % of their length, and
-        the Laplacian coordinates within 10 degrees in the median.
+        average. "agrees" where they lie within a fifth of a radius on average and a radius in 95 % of their length, the
+        mesh closes around 70 % of the points whose rings close, three quarters of the Laplacian coordinates lie within
+        30 degrees, and the run itself warned of nothing.
     reasons : tuple of str
     """
     grave, slight = [], []
@@ -290,7 +290,7 @@ def judge(rows: RowAgreement, skeletons: SkeletonAgreement, warned: Sequence[str
         slight.append("no Laplacian coordinates could be compared")
     elif rows.covered < COVERED:
         slight.append(f"the mesh closes around {rows.covered:.0%} of the points whose rings close")
-    if rows.angle and rows.angle["median"] > TURNED:
-        slight.append(f"the Laplacian coordinates are turned by {rows.angle['median']:.0f} degrees in the median")
+    if rows.angle and rows.angle["p75"] > TURNED:
+        slight.append(f"a quarter of the Laplacian coordinates are turned by more than {rows.angle['p75']:.0f} degrees")
     slight += [f"the run itself warns: {message}" for message in warned]
     return (DISTRUST if grave else IN_PART if slight else AGREES), (*grave, *slight)

@@ -56,7 +56,19 @@ def test_noise_turns_the_rows_before_it_moves_the_skeleton(noise):
     assert found.skeletons.topology
     assert found.skeletons.distance_in_radii < 0.1
     assert len(found.reasons) == 1
-    assert "are turned by" in found.reasons[0]
+    assert "a quarter of the Laplacian coordinates" in found.reasons[0]
+
+
+@pytest.mark.parametrize("shape", ["tube", "torus"])
+def test_it_tells_where_the_cloud_is_noisy(shape):
+    points = samples.SAMPLES[shape](3000).points.copy()
+    noisy = points[:, 0] < 0
+    points[noisy] += np.random.default_rng(0).normal(scale=0.008, size=(noisy.sum(), 3))
+    found = cross_check(points)
+    assert found.verdict == "agrees in part"
+    assert found.doubtful[noisy].mean() > 0.5
+    assert found.doubtful[~noisy].mean() < 0.05
+    assert np.nanmedian(found.angle[noisy]) > 10 * np.nanmedian(found.angle[~noisy])
 
 
 @SPIKY
@@ -82,7 +94,7 @@ def test_even_points_agree_to_rounding(even_ball):
 
 
 def rows(**changed):
-    good = RowAgreement(100, 90, 90, 1.0, True, 0.9, 0.95, 0.0, {"median": 1.0}, {"median": 1.0})
+    good = RowAgreement(100, 90, 90, 1.0, True, 0.9, 0.95, 0.0, {"median": 1.0, "p75": 2.0}, {"median": 1.0})
     return replace(good, **changed)
 
 
@@ -95,7 +107,7 @@ def apart(**changed):
     [
         ("agrees", {}, {}, None),
         ("agrees", {}, {"leaves": (3, 4)}, None),
-        ("agrees in part", {"angle": {"median": 11.0}}, {}, "turned by 11 degrees"),
+        ("agrees in part", {"angle": {"median": 1.0, "p75": 31.0}}, {}, "turned by more than 31 degrees"),
         ("agrees in part", {"covered": 0.69}, {}, "closes around 69%"),
         ("agrees in part", {"compared": 0, "angle": {}}, {}, "no Laplacian coordinates"),
         ("agrees in part", {}, {"distance_in_radii": 0.3}, "0.30 local radii apart"),
