@@ -121,7 +121,7 @@ class Contractor(Filter):
         if self.line_hold > 1 and state.report.iterations:
             attraction = np.where(linearity(state.positions) > LINE, self.line_hold, 1) * attraction
         attraction = np.clip(attraction, self.min_attraction, self.max_attraction)
-        laplacian = cotangent_laplacian(state.positions, state.rings)
+        laplacian = self._laplacian(state)
         mass = np.sqrt(state.mass)
         positions, facts = self._solve_in_box(state, laplacian, contraction / mass, attraction, mass)
         _, ring_size = state.rings.nearest(positions)
@@ -137,6 +137,10 @@ class Contractor(Filter):
         done = state.report.iterations
         drop = done[-1].ring_ratio - contracted.ring_ratio if done else contracted.ring_ratio
         return replace(contracted, ring_ratio_drop=drop), facts
+
+    def _laplacian(self, state):
+        """That of the current points; what has a surface of its own puts another in its place."""
+        return cotangent_laplacian(state.positions, state.rings)
 
     def _solve_in_box(self, state, laplacian, row_weight, attraction, mass):
         """Solve; as long as that throws points out of the box, hold these and solve again."""

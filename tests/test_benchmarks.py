@@ -200,3 +200,31 @@ class TestCommands:
     )
     def test_wrong_usage_is_found_at_once(self, call, wrong):
         assert "Invalid value" in call(*wrong, code=2)
+
+
+class TestCrosscheck:
+    @pytest.fixture
+    def tool(self, root, monkeypatch):
+        monkeypatch.syspath_prepend(str(root / "benchmarks"))
+        yield importlib.import_module("crosscheck")
+        del sys.modules["crosscheck"]
+
+    def test_verdicts(self, call, tmp_path):
+        words = ("--builtin", "--shapes", "tube,torus", "--variant", "clean_1500,noise5_300", "--jobs", 0)
+        table = " ".join(call("verdicts", *words, "-o", tmp_path / "r.json").split())
+        rows = json.loads((tmp_path / "r.json").read_text())["rows"]
+        assert [row["verdict"] for row in rows[:2]] == ["agrees"] * 2
+        assert all(row["good"] for row in rows[:2])
+        assert "clean_1500 2 / 2 0 / 0 0 / 0" in table
+        assert "all" in table
+
+    def test_curvature(self, call):
+        table = " ".join(call("curvature", "--sizes", "300", "--jobs", 0).split())
+        assert "even sphere 300 ours 0." in table
+        assert "cylinder 300 mesh " in table
+
+    def test_scans(self, call, tmp_path):
+        np.savetxt(tmp_path / "ring.xyz", torus(1000).points)
+        table = call("scans", tmp_path / "ring.xyz", "--pictures", tmp_path, "--jobs", 0)
+        assert "agrees (ball pivoting)" in table
+        assert (tmp_path / "ring.png").is_file()

@@ -1,6 +1,8 @@
-"""What a skeleton says about its object, and how good it is: against a known axis, or against its cloud alone."""
+"""What a skeleton says about its object, and how good it is: against a known axis, its cloud alone, or a mesh of it."""
 
 from .branches import BranchTable, branch_table
+from .crosscheck import CrossCheck, cross_check
+from .crosscheck_picture import save_crosscheck_picture
 from .curvature import curvature_torsion
 from .metrics import Assessment, Comparison, Loop, assess, compare
 from .picture import save_picture
@@ -11,13 +13,16 @@ __all__ = [
     "Assessment",
     "BranchTable",
     "Comparison",
+    "CrossCheck",
     "Loop",
     "Truth",
     "assess",
     "branch_table",
     "compare",
+    "cross_check",
     "curvature_torsion",
     "read_truth",
+    "save_crosscheck_picture",
     "save_picture",
     "segment",
 ]

@@ -14,6 +14,7 @@ from ..interop.open3d import cloud_points
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..skeleton import Skeleton
+from .curves import along, pieces
 from .graph import check_graph, count_components, simple_edges
 from .sections import cross_sections
 from .truth import Truth
@@ -111,11 +112,11 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     truth = truth if isinstance(truth, Truth) else Truth(truth.nodes, truth.edges, truth.radii)
     vertices, edges = skeleton.vertices, check_graph(skeleton.vertices, skeleton.edges, "skeleton")
     step = FINENESS * np.median(truth.radii)
-    row, part = _pieces(truth.nodes, truth.edges, step)
-    axis, axis_radius = (_along(truth.edges, row, part, values) for values in (truth.nodes, truth.radii))
-    row, part = _pieces(vertices, edges, step)
+    row, part = pieces(truth.nodes, truth.edges, step)
+    axis, axis_radius = (along(truth.edges, row, part, values) for values in (truth.nodes, truth.radii))
+    row, part = pieces(vertices, edges, step)
     radii = skeleton.radii if len(skeleton.radii) == len(vertices) else np.full(len(vertices), np.nan)
-    curve, curve_radius = (_along(edges, row, part, values) for values in (vertices, radii))
+    curve, curve_radius = (along(edges, row, part, values) for values in (vertices, radii))
     to_axis, nearest = cKDTree(axis).query(curve)
     to_curve, _ = cKDTree(curve).query(axis)
     radius = axis_radius[nearest]
@@ -138,28 +139,6 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
         topology=difference["components"] == 0 == difference["loops"],
         edge_error=_mean_per_edge(to_axis / radius, row, len(edges)),
     )
-
-
-def _pieces(nodes, edges, step):
-    """Edges cut into equal pieces no longer than `step`: the edge of each piece, and how far along it its middle is.
-
-    Without edges every node stands for itself; `_along` knows.
-    """
-    if len(edges) == 0:
-        return np.arange(len(nodes)), np.zeros(len(nodes))
-    length = np.linalg.norm(nodes[edges[:, 1]] - nodes[edges[:, 0]], axis=1)
-    count = np.maximum(np.ceil(length / step).astype(int), 1)
-    row = np.repeat(np.arange(len(edges)), count)
-    before = np.repeat(np.cumsum(count) - count, count)
-    return row, (np.arange(len(row)) - before + 0.5) / count[row]
-
-
-def _along(edges, row, part, values):
-    """Values at the nodes, interpolated to the middles of the pieces."""
-    if len(edges) == 0:
-        return values[row]
-    start, end = values[edges[row]].swapaxes(0, 1)
-    return start + (end - start) * part.reshape(-1, *[1] * (values.ndim - 1))
 
 
 def _mean_per_edge(values, row, n):

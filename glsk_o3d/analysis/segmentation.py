@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.open3d import cloud_points
 from ..refinement.medial import nearest_on_edges
-from .metrics import _along, _pieces
+from .metrics import along, pieces
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -88,8 +88,8 @@ def _nearest_vertex(skeleton, points):
     alone = np.flatnonzero(skeleton.degree == 0)
     if length == 0:
         return cKDTree(skeleton.vertices).query(points)[1]
-    row, part = _pieces(skeleton.vertices, skeleton.edges, length / PIECES)
-    places = np.concatenate([_along(skeleton.edges, row, part, skeleton.vertices), skeleton.vertices[alone]])
+    row, part = pieces(skeleton.vertices, skeleton.edges, length / PIECES)
+    places = np.concatenate([along(skeleton.edges, row, part, skeleton.vertices), skeleton.vertices[alone]])
     ends = np.where(part < 0.5, *skeleton.edges[row].T)
     return np.concatenate([ends, alone])[cKDTree(places).query(points)[1]]
 

@@ -12,6 +12,7 @@ import typer
 
 from .. import __version__
 from .branches import branches
+from .crosscheck import crosscheck
 from .demo import demo
 from .evaluate import evaluate
 from .filters import filters
@@ -33,7 +34,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (skeletonize, run, rerun, evaluate, branches, view, demo, filters, info):
+for command in (skeletonize, run, rerun, evaluate, crosscheck, branches, view, demo, filters, info):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
 
 

@@ -1,0 +1,135 @@
+"""``glsk crosscheck``: whether a scan is dense and clean enough."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .console import WrongUsage, holding_interrupts, print_json, print_rows, progress, reporting
+from .options import PipelineName, Quiet, Verbose
+
+
+def crosscheck(
+    scan: Annotated[
+        Path, typer.Argument(metavar="SCAN", help="The cloud, in any format that 'glsk skeletonize' reads.")
+    ],
+    mesh: Annotated[
+        Path | None,
+        typer.Option(
+            "--mesh",
+            metavar="MESH",
+            help="A mesh of the same surface to compare with: ply, off, obj, stl, gltf or glb.",
+        ),
+    ] = None,
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="NAME",
+            help="How to make a mesh: ball_pivoting; poisson; or auto: the first where it closes, else the second.",
+        ),
+    ] = "auto",
+    output: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write all numbers as JSON; - is stdout.")
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="PNG", help="Draw the cloud coloured by disagreement, and both skeletons."),
+    ] = None,
+    pipeline: PipelineName = "default",
+    max_points: Annotated[
+        int, typer.Option("--max-points", metavar="N", help="Thin larger clouds to so many points; 0 for no limit.")
+    ] = 16384,
+    drop_invalid: Annotated[
+        bool, typer.Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")
+    ] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Check a scan's skeleton against that of a mesh made from it, computed with libigl.
+
+    The verdict is one of 'agrees', 'agrees in part' and 'do not trust'; whatever it is, the exit code is 0.
+    """
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..analysis import cross_check, save_crosscheck_picture
+        from ..analysis.crosscheck import SURFACES
+        from ..catalogue import nearest
+        from ..interop.files import read_cloud, write_atomically
+        from ..interop.meshes import read_mesh
+        from ..pipelines import named_pipeline
+        from .overrides import override
+
+        if mesh is not None and method != "auto":
+            raise WrongUsage("--mesh gives a mesh: there is none to make with --method")
+        if method not in ("auto", *SURFACES):
+            raise WrongUsage(nearest(method, ("auto", *SURFACES), "method"))
+        to_stdout = output == Path("-")
+        _check_outputs(None if to_stdout else output, picture, [path for path in (scan, mesh) if path is not None])
+        settings = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
+        chosen = override(named_pipeline(pipeline), settings, name=pipeline)
+        with progress(not quiet and not verbose) as update:
+            update(f"reading {scan.name}")
+            with holding_interrupts():
+                cloud = read_cloud(scan)
+                surface = method if mesh is None else read_mesh(mesh)
+            update("comparing with a mesh")
+            check = cross_check(cloud, surface, pipeline=chosen, max_points=max_points or None)
+            told = {"scan": str(scan), "given_mesh": None if mesh is None else str(mesh), **check.to_dict()}
+            if output is not None and not to_stdout:
+                text = json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+                write_atomically(output, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+            if picture is not None:
+                update(f"drawing {picture.name}")
+                save_crosscheck_picture(check, picture, title=scan.name)
+        if to_stdout:
+            print_json(told)
+        elif not quiet:
+            print_rows(_rows(told), title=f"{scan}: {check.verdict}")
+            for path in (output, picture):
+                if path is not None:
+                    typer.echo(f"wrote {path}")
+
+
+def _check_outputs(report: Path | None, picture: Path | None, inputs: list[Path]) -> None:
+    from .running import check_writable
+
+    for path, ending, what in ((report, ".json", "report is JSON"), (picture, ".png", "picture is a PNG")):
+        if path is None:
+            continue
+        if path.suffix.lower() != ending:
+            raise WrongUsage(f"{path}: the {what} and its name ends in {ending}")
+        if os.path.realpath(path) in map(os.path.realpath, inputs):
+            raise WrongUsage(f"{path}: is an input: choose another name")
+        check_writable(path)
+
+
+def _rows(told: dict[str, Any]) -> dict[str, Any]:
+    """What the check found, in words."""
+    rows, skeletons, mesh = told["rows"], told["skeletons"], told["mesh"]
+    shown = {
+        "because": "\n".join(told["reasons"]) or None,
+        "points": "{used} of {given}; {turned} turned by more than 30 degrees, {not_compared} not compared".format(
+            **told["points"]
+        ),
+        "mesh": f"{told['surface'].replace('_', ' ')}, {mesh['vertices']} vertices, {mesh['faces']} triangles",
+        "rings compared": f"{rows['compared']} of {rows['closed']} closed ones ({rows['covered']:.0%})",
+    }
+    if rows["one_to_one"] and rows["compared"]:
+        shown["same rings"] = f"{rows['same_rings']:.0%} ({rows['common_triangles']:.0%} of the triangles)"
+    if rows["angle"]:
+        shown["angle"] = "median {median:.2f}, 75 % below {p75:.1f}, 90 % below {p90:.1f} degrees".format(
+            **rows["angle"]
+        )
+        shown["length"] = "median {median:.2f}, 80 % from {p10:.2f} to {p90:.2f} times the mesh's".format(
+            **rows["length"]
+        )
+    for name, words in (("distance", "mean distance"), ("hausdorff95", "95 % within")):
+        shown[words] = f"{skeletons[f'{name}_in_radii']:.2f} local radii ({skeletons[name]:.2%} of the diagonal)"
+    for name in ("components", "loops", "leaves"):
+        shown[name] = "{} and {}".format(*skeletons[name])
+    shown["contractions"] = "of the cloud: {}\nof the mesh: {}".format(*told["stop_reasons"])
+    return shown

@@ -1,0 +1,108 @@
+"""One-rings of triangle meshes, manifold or not."""
+
+import numpy as np
+
+from .components import component_labels
+from .rings import Rings
+
+
+def clean_faces(points, faces):
+    """Triangles with an area, each once; vertices without a triangle stay, so that rows keep their meaning.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    faces : (f, 3) int array
+
+    Returns
+    -------
+    (g, 3) int64 array
+        In the order given, with the orientation of the first of equal ones.
+    """
+    faces = np.asarray(faces, np.int64).reshape(-1, 3)
+    first = np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])
+    a, b, c = points[faces[first]].transpose(1, 0, 2)
+    return faces[first[np.cross(b - a, c - a).any(axis=1)]]
+
+
+def corners(faces):
+    """Every triangle from each of its corners, (3 f, 3) int array: a vertex and the two others, the smaller first."""
+    corner = np.concatenate([faces, faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]])
+    corner[:, 1:] = np.sort(corner[:, 1:], axis=1)
+    return corner
+
+
+def umbrellas(n, faces):
+    """Vertices whose triangles make one closed umbrella, (n,) bool array: neither border nor fan of fans nor bare.
+
+    Parameters
+    ----------
+    n : int
+    faces : (f, 3) int array
+        As from `clean_faces`.
+    """
+    corner = corners(faces)
+    spokes = np.concatenate([corner[:, [0, 1]], corner[:, [0, 2]]])
+    spoke, row, count = np.unique(spokes @ [n, 1], return_inverse=True, return_counts=True)
+    vertex = spoke // n
+    odd = np.bincount(vertex, count != 2, n) > 0
+    fan = component_labels(len(spoke), row.reshape(2, -1).T)
+    vertex_of_fan = np.unique(np.column_stack([vertex, fan]), axis=0)[:, 0]
+    return ~odd & (np.bincount(vertex_of_fan, minlength=n) == 1)
+
+
+def mesh_rings(n, faces):
+    """The neighbours of every vertex of a mesh as Rings; ascending, not in rotational order, since there may be none.
+
+    Parameters
+    ----------
+    n : int
+    faces : (f, 3) int array
+        As from `clean_faces`; `nearest` and `mean_lengths` need every vertex in one.
+
+    Returns
+    -------
+    Rings
+        Their `triangles` mean nothing.
+    """
+    edges = np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+    owner, neighbour = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).T
+    return Rings(np.searchsorted(owner, np.arange(n + 1)), neighbour, umbrellas(n, faces))
+
+
+def common_share(rings, faces):
+    """How much of each ring is in the mesh: triangles in both over triangles in either, (n,) float array.
+
+    Parameters
+    ----------
+    rings : Rings
+        Over the vertices of the mesh.
+    faces : (f, 3) int array
+        As from `clean_faces`.
+
+    Returns
+    -------
+    (n,) float array
+        1 where the ring and the mesh's one-ring have the same neighbours in the same cyclic order, whichever way they
+        are walked; 0 where there is no triangle at all.
+    """
+    n = len(rings)
+    fans = rings.triangles
+    fans[:, 1:] = np.sort(fans[:, 1:], axis=1)
+    in_rings, in_mesh = (_triangle_keys(corner, n) for corner in (fans, corners(faces)))
+    ours, theirs, both = (
+        np.bincount(_vertex_of_key(keys, n), minlength=n)
+        for keys in (in_rings, in_mesh, np.intersect1d(in_rings, in_mesh, assume_unique=True))
+    )
+    return both / np.maximum(ours + theirs - both, 1)
+
+
+# A corner as one number: three indices below 2 million fit into 63 bits.
+
+
+def _triangle_keys(corner, n):
+    return np.unique(corner @ np.array([n * n, n, 1], np.int64))
+
+
+def _vertex_of_key(keys, n):
+    return keys // (n * n)

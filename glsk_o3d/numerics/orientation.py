@@ -1,0 +1,44 @@
+"""Normals that agree on which side is out."""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
+
+_LEAST = 1e-6  # cost of an edge between equal normals; a sparse graph would take 0 for no edge
+
+
+def orient_normals(points, normals, edges):
+    """Turn normals so that neighbours agree (Hoppe et al. 1992): along the tree over which they turn least.
+
+    In every connected part the point farthest from the centroid of all points says which side is out. Open3D's function
+    makes a Delaunay tetrahedralisation first, which breaks down on points of a sphere.
+
+    Parameters
+    ----------
+    points, normals : (n, 3) float array
+    edges : (e, 2) int array
+        Which points are neighbours.
+
+    Returns
+    -------
+    (n, 3) float array
+    """
+    n = len(points)
+    a, b = np.unique(np.sort(edges, axis=1), axis=0).T
+    cost = 1 - np.abs(np.einsum("ij,ij->i", normals[a], normals[b])) + _LEAST
+    tree = minimum_spanning_tree(coo_matrix((cost, (a, b)), shape=(n, n)).tocsr())
+    part = connected_components(tree, directed=False)[1]
+    outward = points - points.mean(axis=0)
+    roots = np.empty(part.max() + 1, int)
+    order = np.argsort(np.einsum("ij,ij->i", outward, outward), kind="stable")
+    roots[part[order]] = order  # the last one written, the farthest, stays
+    before = dijkstra(tree, directed=False, indices=roots, min_only=True, return_predecessors=True, unweighted=True)[1]
+    before[roots] = roots
+    sign = _sign(normals, normals[before])
+    while (before != before[before]).any():  # every turn doubles the part of the path that is behind
+        sign, before = sign * sign[before], before[before]
+    return normals * (sign * _sign(normals, outward)[before])[:, None]
+
+
+def _sign(a, b):
+    return np.where(np.einsum("ij,ij->i", a, b) < 0, -1.0, 1.0)

@@ -1,0 +1,132 @@
+"""`glsk crosscheck`: whether a scan is dense and clean enough."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import open3d as o3d
+import pytest
+
+from glsk_o3d.analysis import cross_check
+from glsk_o3d.samples import torus
+
+matplotlib = pytest.importorskip("matplotlib")
+from matplotlib.image import imread  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def check():
+    return cross_check(torus(1000).points)
+
+
+@pytest.fixture(scope="module")
+def meshes(tmp_path_factory, check):
+    """Meshes of the ring and of something else, and one without triangles."""
+    folder = tmp_path_factory.mktemp("meshes")
+    corners, triangles = o3d.utility.Vector3dVector(check.vertices), o3d.utility.Vector3iVector(check.faces)
+    mesh = o3d.geometry.TriangleMesh(corners, triangles)
+    o3d.io.write_triangle_mesh(str(folder / "ring.ply"), mesh)
+    o3d.io.write_triangle_mesh(str(folder / "ring.off"), mesh)
+    o3d.io.write_triangle_mesh(str(folder / "away.ply"), mesh.translate((50, 0, 0)))
+    o3d.io.write_triangle_mesh(
+        str(folder / "bare.ply"), o3d.geometry.TriangleMesh(corners, o3d.utility.Vector3iVector())
+    )
+    return folder
+
+
+def test_what_it_says_and_writes(glsk, scans, tmp_path, check):
+    run = glsk("crosscheck", scans / "ring.ply", "--json", "r.json", "--picture", "p.png")
+    assert (run.returncode, run.stderr) == (0, "")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["p.png", "r.json"]
+    told = json.loads((tmp_path / "r.json").read_text())
+    assert told.pop("scan") == str(scans / "ring.ply")
+    assert told.pop("given_mesh") is None
+    assert told == json.loads(json.dumps(check.to_dict()))
+    first, *lines = run.stdout.splitlines()
+    assert first == f"{scans / 'ring.ply'}: agrees"
+    words = " ".join(run.stdout.split())
+    assert f"rings compared {check.rows.compared} of {check.rows.closed} closed ones" in words
+    assert "loops 1 and 1" in words
+    assert "because" not in words
+    assert lines[-2:] == ["wrote r.json", "wrote p.png"]
+    assert imread(tmp_path / "p.png").shape[:2] == (860, 1800)
+
+
+def test_json_on_stdout_and_quiet(invoke, scans, tmp_path):
+    result = invoke("crosscheck", scans / "ring.ply", "--json", "-", "--quiet")
+    assert json.loads(result.stdout)["verdict"] == "agrees"
+    assert (invoke("crosscheck", scans / "ring.ply", "--quiet").output, list(tmp_path.iterdir())) == ("", [])
+
+
+@pytest.mark.parametrize("mesh", ["ring.ply", "ring.off"])
+def test_a_mesh_of_the_users(invoke, scans, meshes, check, mesh):
+    told = json.loads(invoke("crosscheck", scans / "ring.ply", "--mesh", meshes / mesh, "--json", "-").stdout)
+    assert told["surface"] == "given"
+    assert told["given_mesh"] == str(meshes / mesh)
+    assert told["rows"]["one_to_one"]
+    assert told["rows"]["same_rings"] == pytest.approx(check.rows.same_rings)
+
+
+def test_reasons_and_warnings(invoke, scans):
+    result = invoke("crosscheck", scans / "ball.ply", "--method", "poisson", "--max-points", "500")
+    assert result.exit_code == 0
+    assert "glsk: warning: 500 of 1000 points are checked" in result.stderr
+    assert "because" in result.stdout
+    assert "mesh poisson, " in " ".join(result.stdout.split())
+    assert "same rings" not in result.stdout
+
+
+def test_points_that_are_not_finite(invoke, refused, scans):
+    assert "--drop-invalid" in refused(1, "crosscheck", scans / "nan.ply")
+    told = json.loads(invoke("crosscheck", scans / "nan.ply", "--drop-invalid", "--json", "-").stdout)
+    assert told["points"]["given"] == told["points"]["used"] == 1000
+
+
+@pytest.mark.parametrize(
+    ("code", "words", "message"),
+    [
+        (1, ["no.ply"], "no.ply: no such file"),
+        (1, ["empty.ply"], "the file is empty"),
+        (1, ["ring.ply", "--mesh", "no.ply"], "no.ply: no such file"),
+        (1, ["ring.ply", "--mesh", "no.xyz"], "unknown ending of a mesh"),
+        (1, ["ring.ply", "--mesh", "bare.ply"], "bare.ply: no triangles could be read"),
+        (2, ["ring.ply", "--mesh", "away.ply"], "no point of the cloud lies on the mesh"),
+        (2, ["ring.ply", "--mesh", "ring.off", "--method", "poisson"], "--mesh gives a mesh"),
+        (2, ["ring.ply", "--method", "alpha"], "no method is called 'alpha': there are auto, ball_pivoting, poisson"),
+        (2, ["ring.ply", "--method", "poison"], "did you mean 'poisson'?"),
+        (2, ["ring.ply", "--max-points", "5"], "max_points = 5"),
+        (2, ["ring.ply", "--pipeline", "no"], "no pipeline is called 'no'"),
+        (2, ["ring.ply", "--json", "r.txt"], "r.txt: the report is JSON"),
+        (2, ["ring.ply", "--picture", "p.jpg"], "p.jpg: the picture is a PNG"),
+        (1, ["ring.ply", "--json", "no/r.json"], "no: no such folder"),
+    ],
+)
+def test_refusals(refused, scans, meshes, code, words, message):
+    first, *others = words
+    places = [meshes / word if (meshes / word).exists() else word for word in others]
+    assert message in refused(code, "crosscheck", scans / first, *places)
+
+
+def test_the_input_is_not_overwritten(refused, tmp_path_factory, scans):
+    scan = tmp_path_factory.mktemp("input") / "scan.json"
+    scan.write_bytes((scans / "ring.ply").read_bytes())
+    assert "is an input" in refused(2, "crosscheck", scan, "--json", scan)
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys\nfrom glsk_o3d.cli.main import app\ntry:\n    app(['crosscheck', '--help'])\nexcept SystemExit:\n"
+    )
+    code += "    print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "--mesh" in run.stdout
+    assert not set(run.stderr.split()) & {"open3d", "igl", "matplotlib", "numpy", "scipy"}
+
+
+def test_the_scan_may_be_a_mesh_too(invoke, meshes):
+    told = json.loads(
+        invoke("crosscheck", meshes / "ring.off", "--mesh", meshes / "ring.off", "--json", "-").stdout
+    )  # its own triangles
+    assert told["rows"]["one_to_one"]
+    assert np.isclose(told["rows"]["angle"]["median"], 0, atol=1)

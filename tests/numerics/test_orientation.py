@@ -1,0 +1,52 @@
+"""Normals that agree on which side is out."""
+
+import numpy as np
+import pytest
+
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
+from glsk_o3d.numerics.orientation import orient_normals
+from glsk_o3d.samples import sphere, torus, two_rings
+
+
+def edges_of(points, k=8):
+    _, neighbours = nearest_neighbours(points, k)
+    return np.column_stack([np.repeat(np.arange(len(points)), k - 1), neighbours[:, 1:].ravel()])
+
+
+def outward_of(sample):
+    """Exact outward normals of a tube around circles, or of a ball."""
+    nearest = np.argmin(np.linalg.norm(sample.points[:, None] - sample.nodes, axis=2), axis=1)
+    away = sample.points - sample.nodes[nearest]
+    return away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("shape", [sphere, torus, two_rings])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_normals_of_closed_surfaces_point_outward(shape, seed):
+    sample = shape(3000, seed=seed)
+    outward = outward_of(sample)
+    signs = np.random.default_rng(seed).choice([-1, 1], (len(outward), 1))
+    turned = orient_normals(sample.points, outward * signs, edges_of(sample.points))
+    np.testing.assert_allclose(np.abs(np.einsum("ij,ij->i", turned, outward)), 1)
+    right = np.einsum("ij,ij->i", turned, outward) > 0
+    assert right.all()
+
+
+def test_a_long_chain_and_a_lone_point():
+    n = 1000
+    points = np.column_stack([np.arange(n + 1), np.zeros(n + 1), np.zeros(n + 1)])
+    angle = np.arange(n + 1) * 0.02  # a ribbon that turns over three times
+    normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
+    signs = np.random.default_rng(2).choice([-1, 1], (n + 1, 1))
+    turned = orient_normals(points, normals * signs, np.column_stack([np.arange(n - 1), np.arange(1, n)]))
+    steps = np.einsum("ij,ij->i", turned[: n - 1], turned[1:n])
+    assert (steps > 0.99).all()
+    assert np.abs(turned[n] @ normals[n]) == pytest.approx(1)
+
+
+def test_the_input_is_not_changed():
+    sample = sphere(200)
+    normals = outward_of(sample)
+    before = normals.copy()
+    orient_normals(sample.points, normals, edges_of(sample.points))
+    np.testing.assert_array_equal(normals, before)
