@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -62,13 +61,14 @@ def crosscheck(
         from ..interop.meshes import read_mesh
         from ..pipelines import named_pipeline
         from .overrides import override
+        from .running import check_findings
 
         if mesh is not None and method != "auto":
             raise WrongUsage("--mesh gives a mesh: there is none to make with --method")
         if method not in ("auto", *SURFACES):
             raise WrongUsage(nearest(method, ("auto", *SURFACES), "method"))
         to_stdout = output == Path("-")
-        _check_outputs(None if to_stdout else output, picture, [path for path in (scan, mesh) if path is not None])
+        check_findings(None if to_stdout else output, picture, scan, mesh)
         settings = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
         chosen = override(named_pipeline(pipeline), settings, name=pipeline)
         with progress(not quiet and not verbose) as update:
@@ -92,19 +92,6 @@ def crosscheck(
             for path in (output, picture):
                 if path is not None:
                     typer.echo(f"wrote {path}")
-
-
-def _check_outputs(report: Path | None, picture: Path | None, inputs: list[Path]) -> None:
-    from .running import check_writable
-
-    for path, ending, what in ((report, ".json", "report is JSON"), (picture, ".png", "picture is a PNG")):
-        if path is None:
-            continue
-        if path.suffix.lower() != ending:
-            raise WrongUsage(f"{path}: the {what} and its name ends in {ending}")
-        if os.path.realpath(path) in map(os.path.realpath, inputs):
-            raise WrongUsage(f"{path}: is an input: choose another name")
-        check_writable(path)
 
 
 def _rows(told: dict[str, Any]) -> dict[str, Any]:

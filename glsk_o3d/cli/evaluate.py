@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import WrongUsage, holding_interrupts, print_json, print_table, progress, reporting
+from .console import holding_interrupts, print_json, print_table, progress, reporting
 from .options import Json, Quiet, Verbose
 
 if TYPE_CHECKING:
@@ -64,9 +63,10 @@ def evaluate(
         from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
         from ..interop.files import read_cloud, read_skeleton, write_atomically
         from ..interop.open3d import cloud_points
+        from .running import check_findings
 
         files = [path for path in (output, preview) if path is not None]
-        _check_outputs(output, preview, [path for path in (skeleton, cloud, truth) if path is not None])
+        check_findings(output, preview, skeleton, cloud, truth)
         with progress(not quiet and not verbose) as update:
             update(f"reading {skeleton.name}")
             curve = read_skeleton(skeleton)
@@ -106,20 +106,6 @@ def evaluate(
             _print_measures(assessment, comparison)
             for path in files:
                 typer.echo(f"wrote {path}")
-
-
-def _check_outputs(report: Path | None, preview: Path | None, inputs: list[Path]) -> None:
-    """Find out before computing whether the files can be written, and that no input is among them."""
-    from .running import check_writable
-
-    for path, ending, what in ((report, ".json", "report is JSON"), (preview, ".png", "preview is a picture")):
-        if path is None:
-            continue
-        if path.suffix.lower() != ending:
-            raise WrongUsage(f"{path}: the {what} and its name ends in {ending}")
-        if os.path.realpath(path) in map(os.path.realpath, inputs):
-            raise WrongUsage(f"{path}: is an input: choose another name")
-        check_writable(path)
 
 
 def _print_measures(assessment: Assessment | None, comparison: Comparison | None) -> None:

@@ -89,6 +89,35 @@ def check_outputs(
         check_writable(path)
 
 
+def check_findings(report: Path | None, picture: Path | None, *inputs: Path | None) -> None:
+    """Find out before computing whether what is found can be written, and that no input is among the files.
+
+    Parameters
+    ----------
+    report : Path or None
+        JSON.
+    picture : Path or None
+        PNG.
+    *inputs : Path or None
+
+    Raises
+    ------
+    WrongUsage
+        A wrong ending, or an input.
+    OSError
+        A folder is missing, or a file cannot be written.
+    """
+    taken = [os.path.realpath(path) for path in inputs if path is not None]
+    for path, ending, what in ((report, ".json", "report is JSON"), (picture, ".png", "picture is a PNG")):
+        if path is None:
+            continue
+        if path.suffix.lower() != ending:
+            raise WrongUsage(f"{path}: the {what} and its name ends in {ending}")
+        if os.path.realpath(path) in taken:
+            raise WrongUsage(f"{path}: is an input: choose another name")
+        check_writable(path)
+
+
 def check_writable(path: Path) -> None:
     """Raise OSError unless the file can be made or replaced.
 

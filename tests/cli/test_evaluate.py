@@ -105,7 +105,7 @@ def test_quiet(invoke, scans, folder, tmp_path):
         (1, ["s.json", "ring.ply", "--truth", "none.npz"], "none.npz: the truth has no nodes"),
         (1, ["dot.ply", "ring.ply"], "dot.ply: the skeleton has no edge with a length"),
         (2, ["s.json", "ring.ply", "-o", "r.txt"], "r.txt: the report is JSON and its name ends in .json"),
-        (2, ["s.json", "ring.ply", "--preview", "p.jpg"], "p.jpg: the preview is a picture and its name ends in .png"),
+        (2, ["s.json", "ring.ply", "--preview", "p.jpg"], "p.jpg: the picture is a PNG and its name ends in .png"),
         (2, ["s.json", "ring.ply", "-o", "s.json"], "s.json: is an input: choose another name"),
         (1, ["s.json", "ring.ply", "-o", "no/r.json"], "no: no such folder"),
     ],
