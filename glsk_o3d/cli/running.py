@@ -249,6 +249,7 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
         "points": report.n_input,
         "dropped": report.n_dropped,
         "distinct": report.n_distinct,
+        "contracted": report.n_contracted,
         **structure(skeleton),
         "iterations": len(report.iterations),
         "converged": report.converged,
@@ -312,6 +313,8 @@ def print_results(
         print_json({**facts, "warnings": warnings, "files": [str(path) for path in written]})
     elif not quiet:
         hidden = {"dropped": facts["dropped"] or None, "converged": None, "seconds": f"{seconds:.2f}"}
+        if facts["contracted"] == facts["distinct"]:
+            hidden["contracted"] = None
         print_rows({**facts, **hidden})
         for path in written:
             typer.echo(f"wrote {path}")
