@@ -149,8 +149,8 @@ def resolve_length(length: float | str, diagonal: float) -> float:
     ----------
     length : float or str
     diagonal : float
-        In the cloud's units: of the bounding box, or of the box with the spread of the points; `RingBuilder.frame` names
-        which.
+        In the cloud's units: of the bounding box or of the box with the spread of the points, as `RingBuilder.frame`
+        says.
 
     Returns
     -------
