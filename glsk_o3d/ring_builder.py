@@ -133,9 +133,13 @@ class RingBuilder(Filter):
     def __post_init__(self):
         # as plain numbers they can be compared, printed and written to files
         if not isinstance(self.k, (int, str)):
-            for name, value in search_parameters(self.k).items():
-                if name == "radius" and self.radius is not None:
-                    raise InvalidParameterError(f"RingBuilder.radius = {self.radius!r}: {self.k!r} already has one")
+            given = search_parameters(self.k)
+            if self.radius not in (None, given.get("radius", self.radius)):
+                raise InvalidParameterError(
+                    f"RingBuilder.radius = {self.radius!r}: the {type(self.k).__name__} already has one, "
+                    f"{given['radius']!r}: give radius=None with it"
+                )
+            for name, value in given.items():
                 object.__setattr__(self, name, value)
 
     def _run(self, cloud, watch):

@@ -418,8 +418,19 @@ def test_open3d_search_parameters_that_do_not_fit(search):
     ):
         with pytest.raises(InvalidParameterError, match=message):
             RingBuilder(k=k)(TORUS)
-    with pytest.raises(InvalidParameterError, match="already has one"):
-        RingBuilder(k=search.KDTreeSearchParamRadius(0.5), radius=0.2)
+    message = "radius = 0.2: the KDTreeSearchParamHybrid already has one, 0.5: give radius=None"
+    with pytest.raises(InvalidParameterError, match=message):
+        RingBuilder(k=search.KDTreeSearchParamHybrid(0.5, 20), radius=0.2)
+
+
+def test_open3d_search_parameters_in_place_of_others(search):
+    first, second = search.KDTreeSearchParamHybrid(0.5, 20), search.KDTreeSearchParamHybrid(0.25, 12)
+    builder = RingBuilder(k=first)
+    assert replace(builder, k=first) == builder
+    assert replace(builder, k=second, radius=None) == RingBuilder(k=12, radius=0.25)
+    assert replace(builder, k=search.KDTreeSearchParamKNN(12)) == RingBuilder(k=12, radius=0.5)
+    with pytest.raises(InvalidParameterError, match="give radius=None"):  # one of two radii would be lost unsaid
+        replace(builder, k=second)
 
 
 def test_radius_limits_the_rings():
