@@ -292,7 +292,7 @@ def test_listings_have_both_kinds(capfd, meshes):
     meshes.print_filter_list()
     assert capfd.readouterr().out.split() == names
     meshes.print_filter_parameter_list("generate_skeleton_graph_glsk")
-    assert "\tradius : PercentageValue = 1% [min: 0]\n" in capfd.readouterr().out
+    assert "\tradius : PercentageValue = 1% [above: 0]\n" in capfd.readouterr().out
     with pytest.raises(InvalidParameterError, match="did you mean 'generate_skeleton_graph_glsk'"):
         meshes.print_filter_parameter_list("generate_skeleton_graf_glsk")
     meshes.search("curve skeleton")

@@ -209,7 +209,7 @@ def test_files_that_are_no_scripts(tmp_path, monkeypatch):
 def test_meshlab_filters_without_pymeshlab(tmp_path, monkeypatch):
     from glsk_o3d.interop.meshlab import builtin
 
-    builtin._trial.cache_clear()
+    builtin.trial.cache_clear()
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.mlx").write_text(_theirs())
