@@ -158,8 +158,8 @@ class Layer:
         ----------
         path : path-like
             The ending of a skeleton's format; for points ``.ply`` (with the scalars as the property ``quality``, as
-            MeshLab has it), ``.pcd`` (float32, with normals and colours) or ``.xyz``; for a mesh also ``.obj``, ``.off``
-            or ``.stl``.
+            MeshLab has it), ``.pcd`` (float32, with normals and colours) or ``.xyz``; for a mesh also ``.obj``,
+            ``.off`` or ``.stl``.
         **options
             As in `save_skeleton`.
 

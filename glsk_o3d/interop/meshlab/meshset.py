@@ -114,9 +114,9 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         return replace(layer, edges=known.edges, flow=flow, source=known.source)
 
     def current_skeleton(self) -> Skeleton:
-        """The skeleton in the current layer, with its report and points if its vertices and edges are as they were made.
+        """The skeleton in the current layer; its radii are the layer's scalars.
 
-        The radii are the layer's scalars.
+        It has its report and its points if nothing changed its vertices and edges since they were made.
 
         Raises
         ------
@@ -270,7 +270,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         return {"layer": self.current_mesh_id(), **facts(layer)}
 
     def _run_theirs(self, name: str, params: dict[str, Any]) -> tuple[Step, dict[str, Any]]:
-        asked = super() if self.mesh_number() else builtin.trial()  # without a mesh it crashes
+        asked: Any = super() if self.mesh_number() else builtin.trial()  # without a mesh it crashes
         exact = asked.filter_parameter_values(name, **params)
         for key, value in exact.items():
             if self.mesh_number() and builtin.is_layer(key, value) and not self.mesh_id_exists(value):

@@ -224,7 +224,7 @@ def exact_digits(step: Step, values: Mapping[str, Any]) -> Step:
     """
 
     def exact(param):
-        value = values.get(builtin.keyword(param.name, values))
+        value = values.get(builtin.keyword(param.name, values) or "")
         names = VECTORS.get(param.type, ("value",))
         if not isinstance(value, float | np.ndarray) or np.size(value) != len(names):
             return param

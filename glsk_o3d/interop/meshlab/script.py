@@ -69,7 +69,8 @@ class Param:
             raise ValueError(f"a {self.type} is not what it takes: {fitting}")
 
     def value(self) -> Any:
-        """What stands there: bool, int, float, str, a list of floats (ints for a colour), or for a length a float or text such as "2%".
+        """What stands there: bool, int, float, str, a list of floats (of ints for a colour), or for a
+        length a float or text such as "2%".
 
         Raises
         ------
