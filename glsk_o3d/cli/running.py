@@ -246,7 +246,7 @@ def write_each(writers: Mapping[Path, Callable[[Path], object]], update) -> tupl
         except OSError as error:
             problems.append(f"{path}: cannot be written: {error.strerror or error}")
         except GlskError as error:
-            problems.append(f"{path}: {error}")
+            problems.append(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}")
     return written, problems
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -92,10 +92,18 @@ class Layer:
         ------
         FileNotFoundError, FileFormatError, MissingPackageError
         """
-        path, scalars = Path(path), None
-        cloud = read_cloud(path)  # knows best what may be wrong with the file
+        path, scalars = files.check_scan(path), None
         ending, o3d = path.suffix.lower(), import_open3d()
-        held = files.ply_elements(path) if ending == ".ply" else {}
+        held = _elements(path, ending)
+        if "edge" in held and "face" not in held:
+            drawing = read_skeleton(path)
+            return cls(
+                drawing.vertices,
+                edges=drawing.edges if len(drawing.edges) else None,
+                scalars=None if np.isnan(drawing.radii).all() else drawing.radii,
+                label=path.name,
+            )
+        cloud = read_cloud(path)  # knows best what may be wrong with the file
         points, normals, colors = cloud.points, cloud.normals, cloud.colors
         faces = np.empty((0, 3), int)
         if "face" in held or ending in files.MESH_ENDINGS:
@@ -105,10 +113,6 @@ class Layer:
                 mesh.remove_duplicated_vertices()
             points, normals, colors = mesh.vertices, mesh.vertex_normals, mesh.vertex_colors
             faces = np.array(mesh.triangles)
-        if not len(faces) and ("edge" in held or ending == ".obj"):
-            drawing = read_skeleton(path)
-            if len(drawing.edges):
-                return replace(cls.of(drawing, path.name), flow=None)
         if "quality" in held.get("vertex", ()):
             scalars = o3d.t.io.read_point_cloud(str(path)).point["quality"].numpy().ravel().astype(float)
         return cls(
@@ -223,6 +227,13 @@ class Layer:
 
     def _write_xyz(self, path: Path) -> None:
         np.savetxt(path, self.vertices, fmt="%.17g")
+
+
+def _elements(path, ending) -> dict[str, list[str]]:
+    if ending == ".obj":  # without faces Open3D finds nothing in it
+        with path.open("rb") as stream:
+            return {"face" if any(line.split()[:1] == [b"f"] for line in stream) else "edge": []}
+    return files.ply_elements(path) if ending == ".ply" else {}
 
 
 def check_ending(path: Path, what: str) -> None:

@@ -238,4 +238,5 @@ def exact_digits(step: Step, values: Mapping[str, Any]) -> Step:
 
 def _digits(number: float) -> str:
     """The shortest text that is exactly the number, for float32 in float32."""
-    return str(np.float32(number)) if np.float32(number) == number else repr(number)
+    short = np.float32(number)
+    return str(short) if float(short) == number else repr(number)
