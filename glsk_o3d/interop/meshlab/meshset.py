@@ -30,11 +30,13 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
 
     Ours are applied as MeshLab's are, by name or as methods, and can be mixed with them in filter scripts. Each makes a
     new layer from the current one, which becomes the current layer: a skeleton has vertices, edges, and the radii as
-    vertex scalars. Where a layer came from one of our filters and was not changed since, the next one goes on from
-    there; on any other layer the vertices are the cloud, and whatever must run first is run with its defaults.
+    vertex scalars. Where a layer came from one of our filters and its vertices and edges are as they were, the next one
+    goes on from there; on any other layer the vertices are the cloud, and whatever must run first is run with its
+    defaults.
 
-    Lengths are ``pymeshlab.PercentageValue`` (of the diagonal of the cloud) or ``pymeshlab.PureValue`` (in its units);
-    a float and a string such as ``"2%"`` are understood too.
+    Lengths are ``pymeshlab.PercentageValue`` (of the diagonal of the box that has the spread of the points, unless the
+    parameter ``frame`` is ``"box"``) or ``pymeshlab.PureValue`` (in the units of the cloud); a float and a string such
+    as ``"2%"`` are understood too.
 
     Raises
     ------
