@@ -219,8 +219,26 @@ def write(
         writers[preview] = partial(save_preview, skeleton, title=title)
     if page is not None:
         writers[page] = partial(save_report, skeleton, recorder=recorder, title=title)
+    return write_each({**writers, **others}, update)
+
+
+def write_each(writers: Mapping[Path, Callable[[Path], object]], update) -> tuple[list[Path], list[str]]:
+    """Write all files that can be written; one that cannot does not keep the others from it.
+
+    Parameters
+    ----------
+    writers : mapping of Path to callable
+        The files, and what writes each.
+    update : callable
+        From `console.progress`.
+
+    Returns
+    -------
+    list of Path, list of str
+        The files that were written, and what was wrong with the others.
+    """
     written, problems = [], []
-    for path, save in {**writers, **others}.items():
+    for path, save in writers.items():
         update(f"writing {path.name}")
         try:
             save(path)
@@ -228,7 +246,7 @@ def write(
         except OSError as error:
             problems.append(f"{path}: cannot be written: {error.strerror or error}")
         except GlskError as error:
-            problems.append(f"{path}: {error}")
+            problems.append(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}")
     return written, problems
 
 

@@ -469,6 +469,22 @@ def _ply_header(stream: BinaryIO) -> tuple[str, list[tuple[str, int, list[tuple[
     raise ValueError("its header does not end")
 
 
+def ply_elements(path: str | os.PathLike) -> dict[str, list[str]]:
+    """The elements that a PLY file holds at least one of, with the names of their properties.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    dict of str to list of str
+    """
+    with open(path, "rb") as stream:
+        _, elements = _ply_header(stream)
+    return {name: [key for key, _ in fields] for name, count, fields in elements if count}
+
+
 def _ply_dtype(fields, order: str) -> np.dtype:
     return np.dtype([(name, order + kind) for name, kind in fields])
 
