@@ -37,11 +37,12 @@ def usual_k(n: int) -> int:
 
 
 def usual_number(n: int) -> int:
-    """Points to contract: all up to 8192, and 64 times the square root of their number from 16384 on.
+    """Points to contract: at most 25000, but 64 times the square root of their number from 152588 points on.
 
-    More points make the axis no more exact, since neither noise nor the thickness of parts shrinks with their spacing.
+    More points make the axis hardly more exact, since neither noise nor the thickness of parts shrinks with their
+    spacing; they only cost time.
     """
-    return min(n, max(8192, round(64 * np.sqrt(n))))
+    return min(n, max(25000, round(64 * np.sqrt(n))))
 
 
 def published_k(n: int) -> int:
@@ -97,8 +98,8 @@ class RingBuilder(Filter):
     )
     thin_to: int | str = parameter(
         "auto",
-        "Points to contract; the others are merged into a near one, which takes over their mass. 'auto' is 8192, but "
-        "64 times the square root of their number from 16384 points on; 'all' keeps them, as published.",
+        "Points to contract; the others are merged into a near one, which takes over their mass. 'auto' is at most "
+        "25000, but 64 times the square root of their number from 152588 on; 'all' keeps them, as published.",
         type="int",
         unit="points",
         low=8,

@@ -457,7 +457,7 @@ def test_a_radius_in_the_wrong_units_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("n", "expected"), [(8, 8), (8192, 8192), (8193, 8192), (16384, 8192), (65536, 16384), (10**6, 64000)]
+    ("n", "expected"), [(8, 8), (25000, 25000), (25001, 25000), (152588, 25000), (160000, 25600), (10**6, 64000)]
 )
 def test_usual_number(n, expected):
     assert usual_number(n) == expected
