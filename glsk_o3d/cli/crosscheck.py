@@ -53,7 +53,7 @@ def crosscheck(
 
     The verdict is one of 'agrees', 'agrees in part' and 'do not trust'; whatever it is, the exit code is 0.
     """
-    with reporting(quiet=quiet, verbose=verbose):
+    with reporting(scan, quiet=quiet, verbose=verbose):
         from ..analysis import cross_check, save_crosscheck_picture
         from ..analysis.crosscheck import SURFACES
         from ..catalogue import nearest

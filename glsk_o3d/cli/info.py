@@ -121,7 +121,6 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
     """
     import numpy as np
 
-    from ..recipes import gaps
     from .running import structure
 
     report = skeleton.report
@@ -139,10 +138,21 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
         "stages": [stage for i, stage in enumerate(report.stages) if stage not in report.stages[:i]],
         "converged": report.converged,
         "stop_reason": report.stop_reason,
-        "repeatable": bool(report.recipe) and not any(gaps(report.recipe)),
+        "repeatable": _repeatable(report.recipe),
         "warnings": list(report.warnings),
         "versions": report.versions,
     }
+
+
+def _repeatable(recipe) -> bool:
+    """Whether a recipe can be run here: some cannot be written, and some need a plugin."""
+    from ..errors import RecipeError
+    from ..recipes import from_recipe
+
+    try:
+        return bool(recipe and from_recipe(recipe))
+    except RecipeError:
+        return False
 
 
 def _words(value):

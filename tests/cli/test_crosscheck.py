@@ -91,7 +91,7 @@ def test_points_that_are_not_finite(invoke, refused, scans):
         (1, ["ring.ply", "--mesh", "no.ply"], "no.ply: no such file"),
         (1, ["ring.ply", "--mesh", "no.xyz"], "unknown ending of a mesh"),
         (1, ["ring.ply", "--mesh", "bare.ply"], "bare.ply: no triangles could be read"),
-        (2, ["ring.ply", "--mesh", "away.ply"], "no point of the cloud lies on the mesh"),
+        (1, ["ring.ply", "--mesh", "away.ply"], "ring.ply: no point of the cloud lies on the mesh"),
         (2, ["ring.ply", "--mesh", "ring.off", "--method", "poisson"], "--mesh gives a mesh"),
         (2, ["ring.ply", "--method", "alpha"], "no method is called 'alpha': there are auto, ball_pivoting, poisson"),
         (2, ["ring.ply", "--method", "poison"], "did you mean 'poisson'?"),

@@ -122,6 +122,13 @@ def test_a_cloud_of_something_else(refused, folder, tmp_path_factory, write_scan
     assert "few.ply: no part of the skeleton has 6 points around it" in refused(1, "evaluate", folder / "s.json", cloud)
 
 
+def test_a_cloud_elsewhere_or_in_other_units(invoke, folder, tmp_path, write_scan, ring):
+    for points in (ring.points + [9, 0, 0], 1000 * ring.points, ring.points / 1000):
+        result = invoke("evaluate", folder / "s.json", write_scan(tmp_path / "c.ply", points))
+        assert result.exit_code == 0
+        assert "c.ply: the skeleton does not lie in it: is this the cloud it was made from" in result.stderr
+
+
 def test_help_loads_nothing_heavy():
     code = "import sys\nfrom glsk_o3d.cli.main import app\ntry:\n    app(['evaluate', '--help'])\nexcept SystemExit:\n"
     code += "    print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr)"

@@ -78,6 +78,13 @@ def test_the_report_of_the_run(told, skeleton, invoke):
     assert all(f"{each.explained:.4f}" in table for each in report.iterations)
 
 
+def test_a_run_with_a_filter_that_is_not_installed_cannot_be_repeated(told, skeleton, tmp_path):
+    data = json.loads((tmp_path / "s.json").read_text())
+    data["report"]["recipe"]["pipeline"].insert(0, {"filter": "Slab"})
+    (tmp_path / "s.json").write_text(json.dumps(data))
+    assert told("s.json")["repeatable"] is False
+
+
 def test_a_mesh_is_a_cloud(told, tmp_path):
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert (told("m.obj")["kind"], told("m.obj")["points"]) == ("cloud", 3)
