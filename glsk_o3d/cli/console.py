@@ -26,6 +26,7 @@ FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
 # The library speaks Python; these are the same cures on the command line.
 _SAID_HERE = {
     "let RingBuilder(drop_invalid=True) drop them": "drop them with --drop-invalid",
+    "make one with glsk_o3d.skeletonize": "run 'glsk skeletonize' first",
     "pass cut_loops=True to drop": "add --cut-loops to drop",
     "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,7 +24,7 @@ def info(
 ) -> None:
     """Say what is in a cloud or skeleton file."""
     with reporting(verbose=verbose):
-        from ..interop.files import read_cloud, read_skeleton
+        from ..interop.files import holds_skeleton, read_scan, read_skeleton
 
         if holds_skeleton(file):
             skeleton = read_skeleton(file)
@@ -33,8 +32,8 @@ def info(
             records = skeleton.report.iterations
         else:
             with holding_interrupts():
-                cloud = read_cloud(file)
-            told, records = cloud_facts(cloud), ()
+                cloud, triangles = read_scan(file)
+            told, records = cloud_facts(cloud, len(triangles)), ()
         if as_json:
             iterations = {"iterations": skeleton.report.to_dict()["iterations"]} if records else {}
             print_json({"file": str(file), **told, **iterations})
@@ -44,39 +43,14 @@ def info(
             print_iterations(records)
 
 
-def holds_skeleton(path: Path) -> bool:
-    """Whether a file holds a skeleton: PLY with an element ``edge``, OBJ with lines and no faces, or by the ending.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    bool
-        False also for what does not exist or is unknown: reading it as a cloud says so.
-    """
-    from ..interop.files import CLOUD_ENDINGS, MESH_ENDINGS
-
-    ending = path.suffix.lower()
-    if not path.is_file() or ending not in (".ply", ".obj"):
-        return path.is_file() and ending not in CLOUD_ENDINGS + MESH_ENDINGS
-    with path.open("rb") as stream:
-        if ending == ".obj":
-            keywords = {line.split(maxsplit=1)[0] for line in stream if line.strip()}
-            return b"l" in keywords and b"f" not in keywords
-        for line in islice(stream, 1000):
-            if line.startswith((b"element edge", b"end_header")):
-                return line.startswith(b"element edge")
-    return False
-
-
-def cloud_facts(cloud: Any) -> dict[str, Any]:
+def cloud_facts(cloud: Any, triangles: int = 0) -> dict[str, Any]:
     """What there is to know about a cloud before skeletonising it.
 
     Parameters
     ----------
     cloud : open3d.geometry.PointCloud
+    triangles : int
+        Of the mesh whose vertices the points are, if they are.
 
     Returns
     -------
@@ -96,6 +70,7 @@ def cloud_facts(cloud: Any) -> dict[str, Any]:
     return {
         "kind": "cloud",
         "points": len(points),
+        "triangles": triangles or None,
         "not_finite": len(points) - len(finite),
         "duplicates": len(finite) - len(distinct),
         "lowest": low.tolist(),

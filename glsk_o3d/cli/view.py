@@ -31,10 +31,9 @@ def view(
     with reporting(quiet=quiet, verbose=verbose):
         import numpy as np
 
-        from ..interop.files import read_cloud, read_skeleton
+        from ..interop.files import holds_skeleton, read_cloud, read_skeleton
         from ..skeleton import Skeleton
         from ..viewing.window import show
-        from .info import holds_skeleton
         from .running import check_outputs, write
 
         elsewhere = preview is not None or report is not None

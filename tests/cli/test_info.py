@@ -33,6 +33,14 @@ def test_cloud(told, scans):
     assert 0.005 < facts["median_spacing"] < 0.05
 
 
+def test_a_scan_is_no_skeleton_and_a_skeleton_no_scan(refused, invoke, scans, tmp_path):
+    line = refused(1, "branches", scans / "ring.ply")
+    assert line == f"{scans / 'ring.ply'}: is a cloud, not a skeleton: run 'glsk skeletonize' first"
+    invoke("skeletonize", scans / "ring.ply", "-o", "s.json", "-o", "s.obj")
+    for words in (["skeletonize", "s.obj"], ["rerun", "s.json", "s.obj"]):
+        assert refused(1, *words, "-o", "a.ply") == "s.obj: is a skeleton, not a scan"
+
+
 def test_numbers_of_a_small_cloud(told, tmp_path):
     rows = [[x, 2 * y, 0] for x in range(3) for y in range(2)]
     np.savetxt(tmp_path / "grid.xyz", [*rows, rows[0]])
@@ -85,9 +93,13 @@ def test_a_run_with_a_filter_that_is_not_installed_cannot_be_repeated(told, skel
     assert told("s.json")["repeatable"] is False
 
 
-def test_a_mesh_is_a_cloud(told, tmp_path):
+def test_a_mesh_is_a_cloud(told, invoke, tmp_path):
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    assert (told("m.obj")["kind"], told("m.obj")["points"]) == ("cloud", 3)
+    facts = told("m.obj")
+    assert (facts["kind"], facts["points"], facts["triangles"]) == ("cloud", 3, 1)
+    result = invoke("info", "m.obj")
+    assert "triangles" in result.stdout
+    assert "m.obj: only the 3 vertices of this mesh count" in result.stderr
 
 
 @pytest.mark.parametrize(
