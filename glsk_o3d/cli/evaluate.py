@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from ..analysis import Assessment, Comparison
 
+_BLACK = "around a junction, not measured"
 _NUMBERS = {  # measure: (best, what it is), as the table shows them
     "centredness": ("1", "1 - offset from the section's middle, in radii"),
     "boundedness": ("1", "share of the length inside the cloud"),
@@ -106,7 +107,9 @@ def evaluate(
                     values, label, best = comparison.edge_error, "error in true radii", 0
                 elif assessment is not None:
                     values, label, best = assessment.edge_centredness, "centredness", 1
-                save_picture(curve, points, values, preview, label=label, best=best, title=skeleton.name)
+                save_picture(
+                    curve, points, values, preview, label=label, best=best, unknown=_BLACK, title=skeleton.name
+                )
         if as_json:
             print_json({**told, "files": [str(path) for path in files]})
         elif not quiet:

@@ -226,7 +226,7 @@ def write(
             save(path)
             written.append(path)
         except OSError as error:
-            problems.append(f"{path}: cannot be written: {error.strerror or error}")
+            problems.append(f"{path}: {error.strerror or f'cannot be written: {error}'}")
         except GlskError as error:
             problems.append(f"{path}: {error}")
     return written, problems

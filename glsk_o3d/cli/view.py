@@ -24,9 +24,10 @@ def view(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Look at a skeleton or a scan in a window, where there is a display.
+    """Look at a skeleton or a scan in a window.
 
-    In the window, C, S and T show and hide the cloud, the skeleton, and its tubes of true radius; H helps, Q closes.
+    That needs a display; --preview and --report make files instead. In the window, C, S and T show and hide the cloud,
+    the skeleton, and its tubes of true radius; H helps, Q closes.
     """
     with reporting(quiet=quiet, verbose=verbose):
         import numpy as np

@@ -359,9 +359,9 @@ def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -
     FileNotFoundError
         The folder does not exist.
     OSError
-        `path` is a folder or a device, or cannot be written.
+        `path` is a folder or a device, or cannot be written; the message names it, not the temporary file.
     """
-    path = Path(os.path.realpath(path))
+    given, path = path, Path(os.path.realpath(path))
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path.parent}: no such folder: make it before writing {path.name}")
     if path.exists() and not path.is_file():
@@ -372,8 +372,27 @@ def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -
         if path.exists():
             shutil.copymode(path, temporary)
         os.replace(temporary, path)
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, f"cannot be written: {os.strerror(error.errno)}", os.fspath(given)) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_ending(path: str | os.PathLike, what: str, *endings: str) -> None:
+    """Raise FileFormatError unless the name of a file to be written has the ending of what is written.
+
+    Parameters
+    ----------
+    path : path-like
+    what : str
+        For the message, such as ``"preview is a picture"``.
+    *endings : str
+        With their dots; the message names the first.
+    """
+    if Path(path).suffix.lower() not in endings:
+        raise FileFormatError(f"{os.fspath(path)}: the {what} and its name ends in {endings[0]}")
 
 
 def _existing(path) -> Path:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.analysis import assess, compare, save_picture
-from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.interop.files import save_skeleton
 from glsk_o3d.samples import torus
 from glsk_o3d.skeleton import Skeleton
@@ -148,7 +148,17 @@ def test_the_picture_tells_good_from_bad(ring, moved, tmp_path):
     assert list(counts.values()) == [good, bad, bad, bad, good, (False, False)]
 
 
+def test_the_legend_tells_what_black_is(ring, moved, tmp_path):
+    legends = []
+    for value in (0.5, np.nan):
+        save_picture(moved, ring.points, np.full(len(moved.edges), value), tmp_path / "p.png", label="measure")
+        legends.append((imread(tmp_path / "p.png")[85:110, 1400:, :3] < 0.5).sum())
+    assert legends[0] == 0 < legends[1]
+
+
 def test_the_picture_needs_a_value_per_edge(ring, moved, tmp_path):
     with pytest.raises(InvalidParameterError, match="128 edges need as many values"):
         save_picture(moved, ring.points, np.zeros(3), tmp_path / "p.png", label="measure")
+    with pytest.raises(FileFormatError, match=r"p\.jpg: the picture is a PNG"):
+        save_picture(moved, ring.points, np.zeros(128), tmp_path / "p.jpg", label="measure")
     assert list(tmp_path.iterdir()) == []
