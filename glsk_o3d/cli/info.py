@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import holding_interrupts, print_iterations, print_json, print_rows, reporting
-from .options import Json, Verbose
+from .options import Json, Quiet, Verbose
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -20,10 +20,11 @@ def info(
         typer.Argument(metavar="FILE", help="A cloud, a mesh or a skeleton, in any format that is read or written."),
     ],
     as_json: Json = False,
+    quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Say what is in a cloud or skeleton file."""
-    with reporting(verbose=verbose):
+    with reporting(quiet=quiet, verbose=verbose):
         from ..interop.files import holds_skeleton, read_scan, read_skeleton
 
         if holds_skeleton(file):
@@ -37,6 +38,8 @@ def info(
         if as_json:
             iterations = {"iterations": skeleton.report.to_dict()["iterations"]} if records else {}
             print_json({"file": str(file), **told, **iterations})
+            return
+        if quiet:
             return
         print_rows({name: _words(value) for name, value in told.items()}, title=str(file))
         if records:
