@@ -48,6 +48,7 @@ PUBLISHED = ("wen2024", "cao2010")
 IDEAS = {
     "neighbours by size": "RingBuilder.k=published",
     "frame that turns along": "RingBuilder.frame=box",
+    "thinning": "RingBuilder.thin_to=all",
     "outliers set aside": "RingBuilder.outlier_factor=0",
     "denoising": "RingBuilder.denoise=0",
     "point reduction": "Contractor.reducer=none",

@@ -58,7 +58,8 @@ def main(path, folder, api="legacy"):
 
         # the skeleton: a graph to compute with, lines and tubes to look at, a table to read
         skeleton.save(folder / f"{number}_skeleton.json")
-        o3d.io.write_line_set(str(folder / f"{number}_lines.ply"), skeleton.to_line_set(color="radius"))
+        if len(skeleton.edges):  # a blob may become a single vertex, and Open3D writes no lines where there are none
+            o3d.io.write_line_set(str(folder / f"{number}_lines.ply"), skeleton.to_line_set(color="radius"))
         o3d.io.write_triangle_mesh(str(folder / f"{number}_tubes.ply"), skeleton.to_tubes())
         table.to_csv(folder / f"{number}_branches.csv")
         print(f"object {number}: {len(skeleton.points)} points, {skeleton}")

@@ -31,10 +31,10 @@ class Connector(Filter):
 
     Notes
     -----
-    The published codes use one radius of 2 % of the diagonal, and join a point's vertex to that of its first foreign
-    neighbour in the ring, so that their loops depend on where a ring happens to start. ``links="nearest"`` takes the
-    nearest foreign neighbour instead, which depends on nothing but the points; ``links="all"`` takes all of them, so
-    that what is connected by rings stays connected.
+    The published codes use one radius of 2 % of the bounding box's diagonal, and join a point's vertex to that of its
+    first foreign neighbour in the ring, so that their loops depend on where a ring happens to start.
+    ``links="nearest"`` takes the nearest foreign neighbour instead, which depends on nothing but the points;
+    ``links="all"`` takes all of them, so that what is connected by rings stays connected.
 
     References
     ----------

@@ -204,7 +204,7 @@ def _record(state, **facts):
         before, n_before = iterations[-1].explained, iterations[-1].n_points
     else:
         before, n_before = explained_score(state.cloud), len(state)
-    kept = 1 - (n_before - len(state)) / state.report.n_distinct
+    kept = 1 - (n_before - len(state)) / state.report.n_contracted
     record = IterationRecord(
         iteration=len(iterations) + 1,
         n_points=len(state),

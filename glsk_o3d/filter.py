@@ -46,8 +46,8 @@ def parameter(
     doc : str
         One sentence; it appears in the class's docstring and in ``glsk filters``.
     type : {"int", "float", "bool", "length", "choice", "reducer", "stop"}
-        A length is a float in the cloud's units or a string such as ``"2%"`` of the bounding-box diagonal. A trailing
-        ``?`` allows None.
+        A length is a float in the cloud's units or a string such as ``"2%"`` of the diagonal of the box that
+        `RingBuilder.frame` names. A trailing ``?`` allows None.
     unit : str
     low, high : float, optional
         Inclusive limits (`low` is exclusive with `open_low`); for a length in percent they limit nothing.
@@ -144,13 +144,14 @@ def _percent(text: str) -> float | None:
 
 
 def resolve_length(length: float | str, diagonal: float) -> float:
-    """A length in the cloud's units: a number as it is, ``"2%"`` as a share of the bounding-box diagonal.
+    """A length in the cloud's units: a number as it is, ``"2%"`` as a share of the diagonal.
 
     Parameters
     ----------
     length : float or str
     diagonal : float
-        Bounding-box diagonal, in the cloud's units.
+        In the cloud's units: of the bounding box or of the box with the spread of the points, as `RingBuilder.frame`
+        says.
 
     Returns
     -------

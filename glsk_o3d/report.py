@@ -86,8 +86,9 @@ class Report:
 
     Attributes
     ----------
-    n_input, n_dropped, n_outliers, n_distinct : int
-        Input points, those dropped as not finite, those set aside as outliers, and the distinct ones among the rest.
+    n_input, n_dropped, n_outliers, n_distinct, n_contracted : int
+        Input points, those dropped as not finite, those set aside as outliers, the distinct ones among the rest, and
+        those of them that were contracted; large clouds are thinned before.
     n_bridges : int
         Gaps between parts that were bridged.
     stages : tuple of str
@@ -109,6 +110,7 @@ class Report:
     n_dropped: int = 0
     n_outliers: int = 0
     n_distinct: int = 0
+    n_contracted: int = 0
     n_bridges: int = 0
     stages: tuple[str, ...] = ()
     recipe: dict[str, Any] = field(default_factory=dict)

@@ -16,6 +16,7 @@ from .numerics.neighbourhoods import isolation, nearest_neighbours, principal
 from .numerics.ordering import morton_order
 from .numerics.ridges import noise_share, to_ridges
 from .numerics.rings import star_rings
+from .numerics.thinning import thin
 from .report import Report
 from .state import Contraction
 
@@ -33,6 +34,14 @@ def usual_k(n: int) -> int:
     In a sparse cloud 16 neighbours would reach across thin parts.
     """
     return int(np.clip(np.floor(16 * np.cbrt(n / 4096) + 0.5), 8, 16))
+
+
+def usual_number(n: int) -> int:
+    """Points to contract: all up to 8192, and 64 times the square root of their number from 16384 on.
+
+    More points make the axis no more exact, since neither noise nor the thickness of parts shrinks with their spacing.
+    """
+    return min(n, max(8192, round(64 * np.sqrt(n))))
 
 
 def published_k(n: int) -> int:
@@ -86,6 +95,15 @@ class RingBuilder(Filter):
         low=0,
         open_low=True,
     )
+    thin_to: int | str = parameter(
+        "auto",
+        "Points to contract; the others are merged into a near one, which takes over their mass. 'auto' is 8192, but "
+        "64 times the square root of their number from 16384 points on; 'all' keeps them, as published.",
+        type="int",
+        unit="points",
+        low=8,
+        choices=("auto", "all"),
+    )
     outlier_factor: float = parameter(
         2.5,
         "A point this many times farther from its neighbours than these are from theirs is set aside: it goes to the "
@@ -115,9 +133,13 @@ class RingBuilder(Filter):
     def __post_init__(self):
         # as plain numbers they can be compared, printed and written to files
         if not isinstance(self.k, (int, str)):
-            for name, value in search_parameters(self.k).items():
-                if name == "radius" and self.radius is not None:
-                    raise InvalidParameterError(f"RingBuilder.radius = {self.radius!r}: {self.k!r} already has one")
+            given = search_parameters(self.k)
+            if self.radius not in (None, given.get("radius", self.radius)):
+                raise InvalidParameterError(
+                    f"RingBuilder.radius = {self.radius!r}: the {type(self.k).__name__} already has one, "
+                    f"{given['radius']!r}: give radius=None with it"
+                )
+            for name, value in given.items():
                 object.__setattr__(self, name, value)
 
     def _run(self, cloud, watch):
@@ -151,9 +173,14 @@ class RingBuilder(Filter):
                 stray | (left[nearest] != np.arange(len(nearest)))[row],
             )
             axes = principal(distinct, neighbours)[1]
-        n = len(distinct)
-        rings = star_rings(distinct, np.arange(n), self._within(distinct, neighbours[:, 1:], frame), axes[:, :, 1:])
-        _, ring_size = rings.nearest(distinct)
+        into = thin(distinct, neighbours, self._number(len(distinct)))
+        survivors = np.flatnonzero(into == np.arange(len(into)))
+        n, positions, axes = len(survivors), distinct[survivors], axes[survivors]
+        if n < len(distinct):
+            neighbours = nearest_neighbours(positions, self._neighbours(n))[1]
+        rings = star_rings(positions, np.arange(n), self._within(positions, neighbours[:, 1:], frame), axes[:, :, 1:])
+        owner = (np.cumsum(into == np.arange(len(into))) - 1)[into]
+        _, ring_size = rings.nearest(positions)
         return Contraction(
             points=points,
             row_of_point=row_of_point,
@@ -162,23 +189,24 @@ class RingBuilder(Filter):
             cloud=distinct,
             noise=noise,
             normals=normals,
-            survivors=np.arange(n),
-            owner=np.arange(n),
-            positions=distinct,
-            previous=distinct,
+            survivors=survivors,
+            owner=owner,
+            positions=positions,
+            previous=positions,
             laplacian_coordinates=np.zeros((n, 3)),
             rings=rings,
-            mass=np.ones(n),
+            mass=np.bincount(owner, minlength=n).astype(float),
             ring_size0=ring_size,
             ring_size=ring_size,
             ring_ratio_drop=0.0,
-            mean_ring_edge=float(rings.mean_lengths(distinct).mean()),
+            mean_ring_edge=float(rings.mean_lengths(positions).mean()),
             contraction_weight=0.0,
             report=Report(
                 n_input=len(points),
                 n_dropped=int((~finite).sum()),
                 n_outliers=int(outlier.sum()),
-                n_distinct=n,
+                n_distinct=len(distinct),
+                n_contracted=n,
             ),
         )
 
@@ -217,6 +245,9 @@ class RingBuilder(Filter):
 
     def _neighbours(self, n):
         return min({"auto": usual_k, "published": published_k}[self.k](n) if isinstance(self.k, str) else self.k, n)
+
+    def _number(self, n):
+        return {"auto": usual_number(n), "all": n}[self.thin_to] if isinstance(self.thin_to, str) else self.thin_to
 
     def _finite(self, points):
         finite = np.isfinite(points).all(axis=1)

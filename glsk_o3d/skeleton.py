@@ -223,7 +223,7 @@ class Skeleton:
         return to_line_set(self, color)
 
     def to_tensor_line_set(self, color=None):
-        """The skeleton as an ``open3d.t.geometry.LineSet`` with the point attributes ``radii`` and ``confidence``.
+        """The skeleton as an ``open3d.t.geometry.LineSet`` with the point attributes ``radius`` and ``confidence``.
 
         Parameters
         ----------

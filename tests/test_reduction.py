@@ -82,6 +82,16 @@ def test_duplicates_and_outliers():
     assert 1500 not in remove_redundant_points(far, rings=RingBuilder())[1]
 
 
+def test_neither_denoises_nor_waits_for_many_points():
+    noisy = samples.y_junction(400, noise=0.02).points
+    _, kept = remove_redundant_points(noisy)
+    assert 200 < len(kept) < 300  # small clouds, too
+    np.testing.assert_array_equal(
+        remove_redundant_points(noisy, rings=RingBuilder(outlier_factor=0, denoise=0))[1], kept
+    )
+    assert len(remove_redundant_points(noisy, rings=RingBuilder(outlier_factor=0))[1]) != len(kept)
+
+
 def test_parameters():
     assert len(remove_redundant_points(POINTS, reducer=LPRReducer(phi=1e-12))[1]) > len(KEPT)
     with pytest.raises(InvalidParameterError, match="phi"):

@@ -6,10 +6,20 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay, cKDTree
 
-from glsk_o3d import Contraction, InvalidCloudError, InvalidParameterError, RingBuilder, samples
+from glsk_o3d import (
+    Connector,
+    Contraction,
+    Contractor,
+    InvalidCloudError,
+    InvalidParameterError,
+    LPRReducer,
+    Refiner,
+    RingBuilder,
+    samples,
+)
 from glsk_o3d.numerics.neighbourhoods import isolation, nearest_neighbours, principal
 from glsk_o3d.numerics.ridges import noise_share, to_ridges
-from glsk_o3d.ring_builder import ALONE, FAIRLY_NOISY, MIN_POINTS, published_k, usual_k
+from glsk_o3d.ring_builder import ALONE, FAIRLY_NOISY, MIN_POINTS, published_k, usual_k, usual_number
 
 TORUS = samples.torus(n=600).points
 SHEET = samples.sheet(n=500, bend=0).points
@@ -255,7 +265,8 @@ def test_denoising_moves_the_cloud_to_its_ridges_before_the_rings(passes):
     spread, axes = principal(plain.cloud, nearest_neighbours(plain.cloud, 16)[1])
     noise = noise_share(spread, nearest_neighbours(plain.cloud, 16)[1])
     np.testing.assert_array_equal(calm.cloud, to_ridges(plain.cloud, noise, passes))
-    assert calm.cloud is calm.positions is calm.previous
+    np.testing.assert_array_equal(calm.positions, calm.cloud)
+    assert calm.positions is calm.previous
     np.testing.assert_array_equal(calm.row_of_point, plain.row_of_point)
     np.testing.assert_array_equal(calm.points, points)
     # a ridge has no normals, and is not noisy any more
@@ -407,8 +418,19 @@ def test_open3d_search_parameters_that_do_not_fit(search):
     ):
         with pytest.raises(InvalidParameterError, match=message):
             RingBuilder(k=k)(TORUS)
-    with pytest.raises(InvalidParameterError, match="already has one"):
-        RingBuilder(k=search.KDTreeSearchParamRadius(0.5), radius=0.2)
+    message = "radius = 0.2: the KDTreeSearchParamHybrid already has one, 0.5: give radius=None"
+    with pytest.raises(InvalidParameterError, match=message):
+        RingBuilder(k=search.KDTreeSearchParamHybrid(0.5, 20), radius=0.2)
+
+
+def test_open3d_search_parameters_in_place_of_others(search):
+    first, second = search.KDTreeSearchParamHybrid(0.5, 20), search.KDTreeSearchParamHybrid(0.25, 12)
+    builder = RingBuilder(k=first)
+    assert replace(builder, k=first) == builder
+    assert replace(builder, k=second, radius=None) == RingBuilder(k=12, radius=0.25)
+    assert replace(builder, k=search.KDTreeSearchParamKNN(12)) == RingBuilder(k=12, radius=0.5)
+    with pytest.raises(InvalidParameterError, match="give radius=None"):  # one of two radii would be lost unsaid
+        replace(builder, k=second)
 
 
 def test_radius_limits_the_rings():
@@ -429,3 +451,38 @@ def test_radius_limits_the_rings():
 def test_a_radius_in_the_wrong_units_is_refused():
     with pytest.raises(InvalidParameterError, match=r"points have fewer than 3 neighbours so near"):
         RingBuilder(radius=1e-6)(TORUS)
+
+
+# ---- thinning
+
+
+@pytest.mark.parametrize(
+    ("n", "expected"), [(8, 8), (8192, 8192), (8193, 8192), (16384, 8192), (65536, 16384), (10**6, 64000)]
+)
+def test_usual_number(n, expected):
+    assert usual_number(n) == expected
+
+
+@pytest.mark.parametrize("thin_to", [300, 1000, 2500])
+def test_thinned_clouds_keep_all_points_and_their_mass(thin_to):
+    points = samples.torus(2000).points
+    state, whole = RingBuilder(thin_to=thin_to)(points), RingBuilder(thin_to="all")(points)
+    n = min(thin_to, 2000)
+    assert len(state) == n == state.report.n_contracted
+    assert state.report.n_distinct == 2000
+    np.testing.assert_array_equal(state.cloud, whole.cloud)
+    np.testing.assert_array_equal(state.normals, whole.normals)
+    np.testing.assert_array_equal(state.positions, state.cloud[state.survivors])
+    np.testing.assert_array_equal(state.owner[state.survivors], np.arange(n))
+    np.testing.assert_array_equal(state.mass, np.bincount(state.owner))
+    skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
+    assert len(skeleton.vertex_of_point) == 2000
+    assert skeleton.n_loops == 1
+
+
+def test_small_clouds_are_not_thinned():
+    points = samples.torus(2000).points
+    for name in ("positions", "mass", "ring_size"):
+        np.testing.assert_array_equal(
+            getattr(RingBuilder()(points), name), getattr(RingBuilder(thin_to="all")(points), name)
+        )

@@ -64,8 +64,8 @@ class SkeletonAgreement:
     Attributes
     ----------
     distance, distance_in_radii : float
-        Mean distance from one to the nearest place on the other, the mean of both directions: as a share of the cloud's
-        diagonal, and in local radii (the mean of the two skeletons' at these places).
+        Mean distance from one to the nearest place on the other, the mean of both directions: as a share of the
+        diagonal that lengths in percent refer to, and in local radii (the mean of the two skeletons' at these places).
     hausdorff95, hausdorff95_in_radii : float
         The 95 % quantile of these distances, of the worse direction.
     components, loops, leaves : (int, int)

@@ -49,8 +49,8 @@ class BranchTable:
     mean_radius, start_radius, end_radius : (B,) float arrays
     angle : (B,) float array
         Degrees between the direction in which the parent arrives and that in which the branch leaves: 0 goes straight
-        on. Each is taken from one to three radii away from the junction, without
-        radii from the nearest quarter. NaN without a parent, and where it is closed.
+        on. Each is taken from one to three radii away from the junction, without radii from the nearest quarter. NaN
+        without a parent, and where the branch or its parent is closed: it has no direction.
     mean_curvature, mean_torsion : (B,) float arrays
         See `curvature_torsion`.
     points : (B,) int array
@@ -97,7 +97,9 @@ class BranchTable:
         return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
 
     def to_csv(self, path: str | os.PathLike) -> None:
-        """Write the table as CSV: a line of names, then a line per branch; NaN is left empty.
+        """Write the table as CSV: a line of names, then a line per branch.
+
+        NaN and infinity are left empty, as JSON has null for both.
 
         Parameters
         ----------
@@ -116,7 +118,7 @@ class BranchTable:
                 for i, row in enumerate(self):
                     if i == 0:
                         out.writerow(row)
-                    out.writerow("" if isinstance(v, float) and math.isnan(v) else v for v in row.values())
+                    out.writerow("" if isinstance(v, float) and not math.isfinite(v) else v for v in row.values())
 
         write_atomically(path, write)
 
@@ -156,8 +158,8 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
 
     section = mean((skeleton.radii / np.nanmax(skeleton.radii, initial=np.finfo(float).tiny)) ** 2)
     parent, level, backwards = _grow(skeleton, paths, length, np.where(np.isnan(section), 1, section), chosen)
-    paths = [path[::-1] if turn else path for path, turn in zip(paths, backwards, strict=True)]
-    start, end = (np.array([path[i] for path in paths]) for i in (0, -1))
+    outward = [path[::-1] if turn else path for path, turn in zip(paths, backwards, strict=True)]
+    start, end = (np.array([path[i] for path in outward]) for i in (0, -1))
     first, last = skeleton.vertices[start], skeleton.vertices[end]
     with np.errstate(divide="ignore", invalid="ignore"):
         tortuosity = length / np.linalg.norm(last - first, axis=1)
@@ -177,7 +179,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         mean_radius=mean(skeleton.radii),
         start_radius=skeleton.radii[start],
         end_radius=skeleton.radii[end],
-        angle=np.array([_angle(skeleton, paths, i, parent[i]) for i in range(len(paths))]),
+        angle=np.array([_angle(skeleton, outward, i, parent[i]) for i in range(len(paths))]),
         mean_curvature=mean(curvature),
         mean_torsion=mean(torsion),
         points=np.bincount(label[label >= 0], minlength=len(paths)),
@@ -263,9 +265,9 @@ def _kinds(skeleton, paths):
 
 
 def _angle(skeleton, paths, row, parent):
-    if parent < 0 or paths[parent][0] == paths[parent][-1]:
-        return np.nan
     path, before = paths[row], paths[parent]
+    if parent < 0 or path[0] == path[-1] or before[0] == before[-1]:
+        return np.nan
     radius = skeleton.radii[path[0]]
     leaves = _heading(skeleton.vertices[path], radius)
     arrives = -_heading(skeleton.vertices[before[::-1] if before[-1] == path[0] else before], radius)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -178,7 +178,7 @@ def cross_check(
     points = cloud_points(cloud)
     n_input = len(points)
     points = _thinned(points, max_points)
-    state = pipeline.stages[0](points)
+    state = replace(pipeline.stages[0], thin_to="all")(points)
     skeleton = Pipeline(*pipeline.stages[1:])(state)
     if not isinstance(skeleton, Skeleton):
         raise InvalidParameterError(f"{pipeline!r} does not lead to a skeleton")

@@ -142,7 +142,7 @@ def mesh_state(state, vertices, faces):
         ring_size0=ring_size,
         ring_size=ring_size,
         mean_ring_edge=float(rings.mean_lengths(positions).mean()),
-        report=Report(n_input=len(state.points), n_distinct=n),
+        report=Report(n_input=len(state.points), n_distinct=n, n_contracted=n),
     )
     return begun, faces
 

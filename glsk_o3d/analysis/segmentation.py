@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.open3d import cloud_points
 from ..refinement.medial import nearest_on_edges
-from .metrics import along, pieces
+from .curves import along, pieces
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -69,17 +69,35 @@ def vertex_of_cloud(skeleton, cloud=None):
             raise InvalidCloudError("this skeleton came without its cloud: give the cloud, too")
         return skeleton.points, skeleton.vertex_of_point
     points = cloud_points(cloud)
-    if np.array_equal(points, skeleton.points, equal_nan=True):
-        return points, skeleton.vertex_of_point
+    if (skeleton.vertex_of_point >= 0).any():
+        return points, label_of_nearest(skeleton.points, skeleton.vertex_of_point, points)
     vertex = np.full(len(points), -1)
     finite = np.isfinite(points).all(axis=1)
-    known = np.flatnonzero(skeleton.vertex_of_point >= 0)
-    if len(known):
-        nearest = cKDTree(skeleton.points[known]).query(points[finite])[1]
-        vertex[finite] = skeleton.vertex_of_point[known[nearest]]
-    else:
-        vertex[finite] = _nearest_vertex(skeleton, points[finite])
+    vertex[finite] = _nearest_vertex(skeleton, points[finite])
     return points, vertex
+
+
+def label_of_nearest(points, label, others):
+    """Labels of the points of another cloud: that of the nearest point that has one.
+
+    Parameters
+    ----------
+    points : (N, 3) float array
+    label : (N,) int array
+        -1 for none; not for all.
+    others : (n, 3) float array
+
+    Returns
+    -------
+    (n,) int array
+        `label` itself if the points are the same; otherwise -1 only for points that are not finite.
+    """
+    if np.array_equal(points, others, equal_nan=True):
+        return label
+    known, finite = np.flatnonzero(label >= 0), np.isfinite(others).all(axis=1)
+    found = np.full(len(others), -1)
+    found[finite] = label[known[cKDTree(points[known]).query(others[finite])[1]]]
+    return found
 
 
 def _nearest_vertex(skeleton, points):

@@ -42,7 +42,7 @@ def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pip
     --------
     >>> from glsk_o3d import Connector, RingBuilder, pipelines
     >>> override(pipelines.default(), ["RingBuilder.k=20", "Connector.radius=0.5"]).stages[0]
-    RingBuilder(k=20, radius=None, outlier_factor=2.5, denoise=4, frame='spread', drop_invalid=False)
+    RingBuilder(k=20, radius=None, thin_to='auto', outlier_factor=2.5, denoise=4, frame='spread', drop_invalid=False)
     """
     changes = [(setting, *_parse(setting)) for setting in settings]
     changes.sort(key=lambda change: not isinstance(change[3], Parameters | None))

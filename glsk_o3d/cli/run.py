@@ -46,10 +46,9 @@ def run(
     The whole script is checked before anything is run. Filters of MeshLab's own need pymeshlab.
     """
     with reporting(quiet=quiet, verbose=verbose):
-        from ..interop.files import read_cloud
         from ..interop.meshlab.layers import Layer, check_ending
         from ..interop.meshlab.plan import PlainLayers, find_script, read_steps
-        from .running import check_outputs
+        from .running import check_outputs, write_each
 
         if listed:
             _list(as_json)
@@ -58,14 +57,14 @@ def run(
             raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
         steps = read_steps(find_script(script))
         outputs, last = output or [], steps[-1]
-        edges = last.verb.makes_edges if last.verb else None
+        what = last.verb.makes if last.verb else "skeleton, points or mesh"
         if outputs or not last.name.startswith("get_"):  # a script that ends in a measurement needs no file
-            check_outputs(outputs, None, scan, check_ending=partial(check_ending, edges=edges))
+            check_outputs(outputs, None, scan, check_ending=partial(check_ending, what=what))
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")
             with holding_interrupts():
                 if all(step.verb for step in steps):
-                    layers: Any = PlainLayers(Layer.of(read_cloud(scan), scan.name))
+                    layers: Any = PlainLayers(Layer.read(scan))
                 else:
                     from ..interop.meshlab.meshset import MeshSet
 
@@ -75,17 +74,18 @@ def run(
             for i, step in enumerate(steps, 1):
                 doing = f"{i} of {len(steps)}: {step.call.name}"
                 update(doing)
-                results.append(layers.apply_step(step, partial(_solved, update, doing)))
-            for path in outputs:
-                update(f"writing {path.name}")
-                layers.save(path, cut_loops=cut_loops)
+                results.append(_plain(layers.apply_step(step, partial(_solved, update, doing)) or {}))
+            save = partial(layers.save, cut_loops=cut_loops)
+            written, problems = write_each(dict.fromkeys(outputs, save), update)
         if as_json:
             done = [{"filter": step.call.name, "result": result} for step, result in zip(steps, results, strict=True)]
-            print_json({"steps": done, "files": [str(path) for path in outputs]})
+            print_json({"steps": done, "files": [str(path) for path in written]})
         elif not quiet:
             _print_results(steps, results)
-            for path in outputs:
+            for path in written:
                 typer.echo(f"wrote {path}")
+        if problems:
+            raise OSError("; ".join(problems))
 
 
 def _solved(update: Callable[..., None], doing: str, record: IterationRecord) -> None:
@@ -94,12 +94,29 @@ def _solved(update: Callable[..., None], doing: str, record: IterationRecord) ->
 
 def _print_results(steps: Sequence[Step], results: Sequence[dict[str, Any]]) -> None:
     for i, (step, result) in enumerate(zip(steps, results, strict=True), 1):
-        said = ", ".join(
-            f"{key.replace('_', ' ')} {value:.6g}" if isinstance(value, float) else f"{key.replace('_', ' ')} {value}"
-            for key, value in (result or {}).items()
-            if key != "warnings"
-        )
+        said = _said({key: value for key, value in result.items() if key != "warnings"})
         typer.echo(f"{i}. {step.call.name}" + f": {said}" * bool(said))
+
+
+def _plain(result: Any) -> Any:
+    """What a filter says, without the classes of NumPy and pymeshlab."""
+    if isinstance(result, dict):
+        return {key: _plain(value) for key, value in result.items()}
+    if isinstance(result, list | tuple):
+        return [_plain(value) for value in result]
+    if hasattr(result, "diagonal") and hasattr(result, "dim_x"):  # pymeshlab.BoundingBox
+        return {name: _plain(getattr(result, name)()) for name in ("min", "max", "diagonal")}
+    if hasattr(result, "tolist"):
+        return result.tolist()
+    return result if isinstance(result, bool | int | float | str | None) else str(result)
+
+
+def _said(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key.replace('_', ' ')} {_said(each)}" for key, each in value.items())
+    if isinstance(value, list):
+        return f"[{', '.join(map(_said, value))}]"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _list(as_json: bool) -> None:

@@ -219,8 +219,26 @@ def write(
         writers[preview] = partial(save_preview, skeleton, title=title)
     if page is not None:
         writers[page] = partial(save_report, skeleton, recorder=recorder, title=title)
+    return write_each({**writers, **others}, update)
+
+
+def write_each(writers: Mapping[Path, Callable[[Path], object]], update) -> tuple[list[Path], list[str]]:
+    """Write all files that can be written; one that cannot does not keep the others from it.
+
+    Parameters
+    ----------
+    writers : mapping of Path to callable
+        The files, and what writes each.
+    update : callable
+        From `console.progress`.
+
+    Returns
+    -------
+    list of Path, list of str
+        The files that were written, and what was wrong with the others.
+    """
     written, problems = [], []
-    for path, save in {**writers, **others}.items():
+    for path, save in writers.items():
         update(f"writing {path.name}")
         try:
             save(path)
@@ -228,7 +246,7 @@ def write(
         except OSError as error:
             problems.append(f"{path}: {error.strerror or f'cannot be written: {error}'}")
         except GlskError as error:
-            problems.append(f"{path}: {error}")
+            problems.append(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}")
     return written, problems
 
 
@@ -249,6 +267,7 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
         "points": report.n_input,
         "dropped": report.n_dropped,
         "distinct": report.n_distinct,
+        "contracted": report.n_contracted,
         **structure(skeleton),
         "iterations": len(report.iterations),
         "converged": report.converged,
@@ -312,6 +331,8 @@ def print_results(
         print_json({**facts, "warnings": warnings, "files": [str(path) for path in written]})
     elif not quiet:
         hidden = {"dropped": facts["dropped"] or None, "converged": None, "seconds": f"{seconds:.2f}"}
+        if facts["contracted"] == facts["distinct"]:
+            hidden["contracted"] = None
         print_rows({**facts, **hidden})
         for path in written:
             typer.echo(f"wrote {path}")

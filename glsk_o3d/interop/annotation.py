@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .colors import shades
 from .open3d import cloud_points, import_open3d, open3d_class
@@ -91,13 +90,10 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
     Open3D writes the attribute to npz as it is, to PLY as three columns ``contracted_0`` to ``contracted_2``, and not
     to PCD.
     """
+    from ..analysis.segmentation import label_of_nearest
+
     points = state.points if cloud is None else cloud_points(cloud)
-    survivor = state.survivor_of_point
-    if not np.array_equal(points, state.points, equal_nan=True):
-        known, finite = np.flatnonzero(survivor >= 0), np.isfinite(points).all(axis=1)
-        found = np.full(len(points), -1)
-        found[finite] = survivor[known[cKDTree(state.points[known]).query(points[finite])[1]]]
-        survivor = found
+    survivor = label_of_nearest(state.points, state.survivor_of_point, points)
     geometry, put = _copy(points if cloud is None else cloud)
     put("contracted", np.where((survivor >= 0)[:, None], state.contracted[survivor], np.nan))
     return geometry

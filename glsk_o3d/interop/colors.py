@@ -38,7 +38,7 @@ def shades(skeleton: Skeleton, color, branch: np.ndarray, vertices: np.ndarray) 
     ------
     InvalidParameterError
     """
-    if not isinstance(color, str):
+    if not isinstance(color, str) or color not in NAMES:
         try:
             one = np.asarray(color, float)
         except (TypeError, ValueError):
@@ -46,8 +46,6 @@ def shades(skeleton: Skeleton, color, branch: np.ndarray, vertices: np.ndarray) 
         if one.shape != (3,) or not ((one >= 0) & (one <= 1)).all():
             raise InvalidParameterError(f"color = {color!r}: must be one of {NAMES} or three numbers from 0 to 1")
         return np.tile(one, (len(branch), 1))
-    if color not in NAMES:
-        raise InvalidParameterError(f"color = {color!r}: must be one of {NAMES} or three numbers from 0 to 1")
     from matplotlib import colormaps
 
     if color == "branch":
@@ -59,6 +57,6 @@ def shades(skeleton: Skeleton, color, branch: np.ndarray, vertices: np.ndarray) 
         values = (skeleton.radii - low) / (high - low) if high > low else np.where(np.isnan(skeleton.radii), np.nan, 0)
     else:
         values = skeleton.confidence
-    vertices = vertices.reshape(len(vertices), -1)
+    vertices = vertices if vertices.ndim == 2 else vertices[:, None]
     shown = np.where((vertices >= 0).all(axis=1), values[vertices].mean(axis=1), np.nan)
     return np.where(np.isnan(shown)[:, None], GREY, colormaps["viridis"](np.nan_to_num(shown))[:, :3])

@@ -14,6 +14,7 @@ import os
 import shutil
 import uuid
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -97,7 +98,7 @@ def read_scan(path: str | os.PathLike) -> tuple[Any, np.ndarray]:
     try:
         with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
             mesh = o3d.geometry.TriangleMesh()
-            if ending in MESH_ENDINGS or (ending == ".ply" and _ply_counts(path).get("face")):
+            if ending in MESH_ENDINGS or (ending == ".ply" and "face" in ply_elements(path)):
                 mesh = o3d.io.read_triangle_mesh(str(path))
             if ending in CLOUD_ENDINGS:
                 cloud = o3d.io.read_point_cloud(str(path), format=ending[1:])
@@ -115,8 +116,8 @@ def read_scan(path: str | os.PathLike) -> tuple[Any, np.ndarray]:
     if _coarse(np.asarray(mesh.vertices), triangles):
         with following_open3d():
             _log.warning(
-                "%s: only the %d vertices of this mesh count and they lie far apart: take points from its surface, "
-                "for example with Open3D's sample_points_uniformly",
+                "%s: the %d vertices of this mesh are far apart, and only vertices count as points: sample its surface "
+                "first, for example with Open3D's sample_points_uniformly",
                 *(path, len(cloud.points)),
             )
     return cloud, triangles
@@ -326,13 +327,12 @@ def holds_skeleton(path: str | os.PathLike) -> bool:
     ending = path.suffix.lower()
     if not path.is_file() or ending not in (".ply", ".obj"):
         return path.is_file() and ending not in CLOUD_ENDINGS + MESH_ENDINGS
-    if ending == ".ply":
-        try:
-            counts = _ply_counts(path)
-        except ValueError:
-            return False
-        return "edge" in counts and not counts.get("face")
     with path.open("rb") as stream:
+        if ending == ".ply":
+            with suppress(ValueError):
+                counts = {name: count for name, count, _ in _ply_header(stream)[1]}
+                return "edge" in counts and not counts.get("face")
+            return False
         if stream.readline().startswith(_OBJ_MARK):
             return True
         keywords = {line.split(maxsplit=1)[0] for line in stream if line.strip()}
@@ -578,9 +578,20 @@ def _ply_header(stream: BinaryIO) -> tuple[str, list[tuple[str, int, list[tuple[
     raise ValueError("its header does not end")
 
 
-def _ply_counts(path: Path) -> dict[str, int]:
-    with path.open("rb") as stream:
-        return {name: count for name, count, _ in _ply_header(stream)[1]}
+def ply_elements(path: str | os.PathLike) -> dict[str, list[str]]:
+    """The elements that a PLY file holds at least one of, with the names of their properties.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    dict of str to list of str
+    """
+    with open(path, "rb") as stream:
+        _, elements = _ply_header(stream)
+    return {name: [key for key, _ in fields] for name, count, fields in elements if count}
 
 
 def _ply_dtype(fields, order: str) -> np.dtype:

@@ -245,7 +245,7 @@ def to_tensor_line_set(skeleton: Skeleton, color: Any = None) -> Any:
     Returns
     -------
     open3d.t.geometry.LineSet
-        On the CPU: ``point.positions`` (M, 3), ``point.radii`` and ``point.confidence`` (M, 1) float64, and
+        On the CPU: ``point.positions`` (M, 3), ``point.radius`` and ``point.confidence`` (M, 1) float64, and
         ``line.indices`` (E, 2) int64 and ``line.branch`` (E, 1) int32; with a color, ``line.colors`` (E, 3) float64.
 
     Raises
@@ -259,7 +259,7 @@ def to_tensor_line_set(skeleton: Skeleton, color: Any = None) -> Any:
     o3d = import_open3d()
     lines = o3d.t.geometry.LineSet()
     lines.point.positions = o3d.core.Tensor(_rows(skeleton.vertices, float, 3))
-    lines.point.radii = o3d.core.Tensor(_rows(skeleton.radii, float, 1))
+    lines.point.radius = o3d.core.Tensor(_rows(skeleton.radii, float, 1))
     lines.point.confidence = o3d.core.Tensor(_rows(skeleton.confidence, float, 1))
     lines.line.indices = o3d.core.Tensor(_rows(skeleton.edges, np.int64, 2))
     lines.line.branch = o3d.core.Tensor(_rows(branch_of_edge(skeleton), np.int32, 1))

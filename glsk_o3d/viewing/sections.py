@@ -141,6 +141,7 @@ def origin(report: Report) -> str:
         "dropped, not finite": report.n_dropped,
         "set aside as outliers": report.n_outliers,
         "distinct points": report.n_distinct,
+        "contracted points": report.n_contracted,
         "gaps bridged": report.n_bridges,
     }
     numbers = {name: f"{n:,}" for name, n in counts.items()} if report.n_input else {}

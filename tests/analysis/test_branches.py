@@ -8,7 +8,7 @@ import open3d as o3d
 import pytest
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, samples, skeletonize
-from glsk_o3d.analysis.segmentation import branch_of_edge
+from glsk_o3d.analysis.segmentation import branch_of_edge, vertex_of_cloud
 
 RNG = np.random.default_rng(0)
 ANGLES, SHARE = (30.0, 50.0), 0.6
@@ -127,6 +127,47 @@ def test_loops():
     assert np.isnan(table.mean_radius).all()
 
 
+def closed_branch_on_a_stick():
+    turn = np.arange(12) * np.pi / 6
+    ring = np.column_stack([1 - np.cos(turn), -np.sin(turn), 0 * turn])
+    edges = [(i, i + 1) for i in range(11)] + [(0, 11), (0, 12), (12, 13)]
+    return Skeleton(np.r_[ring, [[-1, 0, 0], [-12, 0, 0]]], edges, np.full(14, 0.1), (), (), ())
+
+
+@pytest.mark.parametrize("root", [13, 6])
+def test_a_closed_branch_has_no_direction(root):
+    table = closed_branch_on_a_stick().branch_table(root)
+    (loop,), (stick,) = (np.flatnonzero(table.kind == kind) for kind in ("loop", "tip"))
+    assert table.start[loop] == table.end[loop] == 0
+    assert table.parent[[loop, stick]].tolist() == ([stick, -1] if root == 13 else [-1, loop])
+    assert np.isnan(table.angle).all()
+    assert np.isinf(table.tortuosity[loop])
+
+
+def test_means_are_along_the_curve():
+    cone = Skeleton([[0, 0, 0], [1, 0, 0], [3, 0, 0]], [(0, 1), (1, 2)], [1, 2, 4], (), (), ())
+    for root in (0, 2):
+        assert cone.branch_table(root).mean_radius.tolist() == [(1 * 1.5 + 2 * 3) / 3]
+
+
+def test_without_a_choice_the_thicker_end_is_the_start():
+    for radii in ([0.1, 0.2, 0.3], [0.3, 0.2, 0.1]):
+        bar = Skeleton([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1), (1, 2)], radii, (), (), ())
+        assert bar.branch_table().start.tolist() == [2 * (radii[2] > radii[0])]
+
+
+def test_the_parent_lies_on_the_shortest_way_from_the_root():
+    # from junction 1 to junction 2 it is 3 straight on, and 4 by junction 3, whose second half is shorter than 3
+    vertices = [[-1, 0, 0], [0, 0, 0], [3, 0, 0], [1.5, np.sqrt(1.75), 0], [1.5, 3, 0], [4, 0, 0]]
+    edges = [(0, 1), (1, 2), (1, 3), (2, 3), (2, 5), (3, 4)]
+    skeleton = Skeleton(vertices, edges, np.full(6, 0.1), (), (), ())
+    table = skeleton.branch_table(root=0)
+    row = {frozenset(pair): i for i, pair in enumerate(zip(table.start.tolist(), table.end.tolist(), strict=True))}
+    assert table.parent[row[frozenset((2, 5))]] == row[frozenset((1, 2))]
+    assert table.parent[row[frozenset((2, 3))]] == row[frozenset((1, 3))]
+    assert (table.start[row[frozenset((2, 3))]], table.end[row[frozenset((2, 3))]]) == (3, 2)
+
+
 def test_sauropod():
     table = axis_of(samples.sauropod(1000)).branch_table()
     assert sorted(table.kind.tolist()) == ["inner"] * 2 + ["loop"] * 2 + ["tip"] * 6
@@ -135,10 +176,11 @@ def test_sauropod():
     assert table.length.sum() == pytest.approx(axis_of(samples.sauropod(1000)).length)
 
 
-def test_csv_and_dicts(tmp_path):
-    table = TREE.branch_table()
+@pytest.mark.parametrize("skeleton", [TREE, closed_branch_on_a_stick()])
+def test_csv_and_dicts(tmp_path, skeleton):
+    table = skeleton.branch_table()
     rows = list(table)
-    assert [row["branch"] for row in rows] == list(range(15))
+    assert [row["branch"] for row in rows] == list(range(len(table)))
     assert all(type(value) in (int, float, str) for row in rows for value in row.values())
     path = tmp_path / "table.csv"
     table.to_csv(path)
@@ -148,7 +190,8 @@ def test_csv_and_dicts(tmp_path):
     for read, row in zip(back, rows, strict=True):
         for name, value in row.items():
             text = read[name]
-            assert (text == "") if value != value else (type(value)(text) == value)
+            known = not isinstance(value, float) or math.isfinite(value)
+            assert (type(value)(text) == value) if known else (text == "")
     with pytest.raises(FileNotFoundError, match="no such folder"):
         table.to_csv(tmp_path / "none" / "table.csv")
     assert list(tmp_path.iterdir()) == [path]
@@ -227,6 +270,7 @@ def test_dropped_points_and_vertices_without_edges():
     assert skeleton.segment(points).tolist() == [0, -1, 1, 2, 0]
     bare = Skeleton(vertices, [(0, 1)], np.ones(4), (), (), ())
     assert bare.segment(points).tolist() == [0, -1, 1, 2, 0]
+    assert vertex_of_cloud(bare, points)[1].tolist() == [0, -1, 2, 3, 1]  # the nearer end of the nearest edge
     assert Skeleton(vertices, [], np.ones(4), (), (), ()).segment(points).tolist() == [0, -1, 2, 3, 1]
     assert skeleton.branch_table().points.tolist() == [2, 1, 1]
 

@@ -43,7 +43,7 @@ def convex_rings(points, faces):
 
 def cloud_and_mesh(points, **parameters):
     """The state, and a ball-pivoting mesh, both in the user's units; the exact copies of points that rows mean."""
-    state = RingBuilder(**parameters)(points)
+    state = RingBuilder(thin_to="all", **parameters)(points)
     vertices, faces = ball_pivoting(state.cloud, state.normals, state.rings)
     assert vertices is state.cloud
     return state, state.frame.out_of(state.cloud), faces
@@ -122,7 +122,7 @@ def test_a_sphere_that_is_sampled_evenly_has_two_over_its_radius(even_ball):
     errors = []
     for n in (500, 2000, 8000):
         points, faces = even_ball(n)
-        state = RingBuilder()(points)
+        state = RingBuilder(thin_to="all")(points)
         assert state.rings.closed.all()
         every, cloud = np.ones(n, bool), state.frame.out_of(state.cloud)
         ours = curvature_normals(cotangent_laplacian(cloud, state.rings), ring_areas(cloud, state.rings), cloud)

@@ -37,6 +37,17 @@ def test_table_file_and_json_agree(invoke, tmp_path, y):
     assert invoke("branches", y, "-q").stdout == ""
 
 
+def test_a_closed_branch_in_json_and_csv(invoke, tmp_path):
+    ring = samples.torus(100)
+    Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ()).save(tmp_path / "ring.json")
+    (row,) = json.loads(invoke("branches", "ring.json", "-o", "ring.csv", "--json").stdout)["branches"]
+    assert row["start"] == row["end"]
+    with (tmp_path / "ring.csv").open(newline="") as stream:
+        (line,) = csv.DictReader(stream)
+    assert (row["tortuosity"], line["tortuosity"]) == (None, "")
+    assert {name for name in row if row[name] is None} == {name for name in line if line[name] == ""}
+
+
 @pytest.mark.parametrize(("root", "start"), [("2", 2), ("-0.3,0,0.4", 2), ("0.4, 0, 1", 3)])
 def test_root(invoke, y, root, start):
     facts = json.loads(invoke("branches", y, "--json", "--root", root).stdout)

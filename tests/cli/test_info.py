@@ -99,7 +99,7 @@ def test_a_mesh_is_a_cloud(told, invoke, tmp_path):
     assert (facts["kind"], facts["points"], facts["triangles"]) == ("cloud", 3, 1)
     result = invoke("info", "m.obj")
     assert "triangles" in result.stdout
-    assert "m.obj: only the 3 vertices of this mesh count" in result.stderr
+    assert "m.obj: the 3 vertices of this mesh are far apart" in result.stderr
     assert invoke("info", "m.obj", "-q").output == ""
     assert json.loads(invoke("info", "m.obj", "-q", "--json").stdout)["points"] == 3
 

@@ -8,6 +8,7 @@ import pytest
 
 import glsk_o3d
 from glsk_o3d import read_cloud, read_skeleton
+from glsk_o3d.interop.meshlab.layers import Layer
 from glsk_o3d.interop.meshlab.plan import scripts
 
 OURS = '<FilterScript>\n<filter name="{}">\n{}\n</filter>\n</FilterScript>\n'
@@ -141,3 +142,94 @@ def test_the_list_says_what_each_script_does(invoke):
     assert set(told) == set(scripts()) >= {"glskeleton", "cao2010", "scan_cleanup", "scan_cleanup_then_skeleton"}
     assert all(len(doc) > 40 for doc in told.values())
     assert "scan_cleanup" in invoke("run", "--list").stdout
+
+
+def _mesh(path):
+    o3d = pytest.importorskip("open3d")
+    mesh = o3d.geometry.TriangleMesh.create_torus(radial_resolution=40)
+    mesh.compute_vertex_normals()
+    assert o3d.io.write_triangle_mesh(str(path), mesh)
+    return len(mesh.vertices), len(mesh.triangles)
+
+
+def test_measures_are_plain(invoke, script, tmp_path):
+    pytest.importorskip("pymeshlab")
+    _mesh(tmp_path / "m.ply")
+    name = script("Compute Geometric Measures")
+    (step,) = json.loads(invoke("run", name, "m.ply", "--json").stdout)["steps"]
+    assert np.shape(step["result"]["inertia_tensor"]) == (3, 3)
+    assert step["result"]["bbox"]["max"] == pytest.approx([1.5, 1.5, 0.5])
+    said = invoke("run", name, "m.ply").stdout
+    assert said.count("\n") == 1
+    assert "bbox min [-1.5, -1.5, -0.5], max [1.5, 1.5, 0.5], diagonal 4.3589, " in said
+
+
+def test_a_layer_that_is_not_there(refused, script, scans):
+    pytest.importorskip("pymeshlab")
+    name = script("Hausdorff Distance", '<Param type="RichInt" name="SampledMesh" value="9"/>')
+    said = refused(1, "run", name, scans / "sample.ply")
+    assert said == "s.mlx, line 2: filter 'Hausdorff Distance': sampledmesh = 9: there is no such layer"
+
+
+def test_one_file_that_cannot_be_written_does_not_cost_the_others(invoke, scans, tmp_path):
+    words = ("run", "glskeleton", scans / "ring.ply", "-o", "1.swc", "-o", "2.json")
+    result = invoke(*words)
+    assert result.exit_code == 1
+    assert result.stdout.endswith("\nwrote 2.json\n")
+    assert "glsk: error: 1.swc: SWC holds trees only" in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["2.json"]
+    assert json.loads(invoke(*words, "--json").stdout)["files"] == ["2.json"]
+    assert invoke(*words, "--cut-loops").exit_code == 0
+    cut, whole = read_skeleton(tmp_path / "1.swc"), read_skeleton(tmp_path / "2.json")
+    assert (cut.n_loops, whole.n_loops) == (0, 1)
+    assert len(cut.edges) == len(whole.edges) - 1
+
+
+@pytest.mark.parametrize("ending", ["ply", "obj", "stl"])
+def test_scripts_of_ours_alone_and_mixed_see_the_same_scan(invoke, tmp_path, ending):
+    pytest.importorskip("pymeshlab")
+    n_vertices, n_faces = _mesh(tmp_path / f"m.{ending}")
+    ours = '<filter name="Generate Segmented Cloud (GLSkeleton)"/>'
+    (tmp_path / "ours.mlx").write_text(f"<FilterScript>{ours}</FilterScript>")
+    (tmp_path / "mixed.mlx").write_text(f'<FilterScript><filter name="Select None"/>{ours}</FilterScript>')
+    meshes = glsk_o3d.MeshSet()
+    meshes.load_scan(tmp_path / f"m.{ending}")
+    meshes.load_filter_script(tmp_path / "ours.mlx")
+    meshes.apply_filter_script()
+    assert (meshes.current_mesh().vertex_number(), meshes.current_mesh().face_number()) == (n_vertices, n_faces)
+    for name in ("ours", "mixed"):
+        result = invoke("run", f"{name}.mlx", f"m.{ending}", "-o", f"{name}.ply", "-o", f"{name}.obj")
+        assert result.exit_code == 0, result.stderr
+        back = Layer.read(tmp_path / f"{name}.ply")
+        np.testing.assert_array_equal(back.faces, meshes.current_mesh().face_matrix())
+        np.testing.assert_allclose(back.vertices, meshes.current_mesh().vertex_matrix(), rtol=1e-6)
+        np.testing.assert_allclose(back.colors, meshes.current_mesh().vertex_color_matrix())
+
+
+def test_normals_and_colours_of_a_scan_survive(invoke, scans, tmp_path, script):
+    points = np.asarray(read_cloud(scans / "sample.ply").points)
+    colors = np.tile([0.2, 0.4, 0.6, 1], (len(points), 1))
+    Layer(points, normals=np.tile([0.0, 0, 1], (len(points), 1)), colors=colors).save(tmp_path / "c.ply")
+    assert invoke("run", script("Generate Reduced Cloud (GLSkeleton)"), "c.ply", "-o", "r.ply").exit_code == 0
+    back = Layer.read(tmp_path / "r.ply")
+    assert 0 < len(back.vertices) < len(points)
+    np.testing.assert_array_equal(back.normals, np.tile([0, 0, 1], (len(back.vertices), 1)))
+    np.testing.assert_allclose(back.colors, colors[: len(back.vertices)])
+
+
+@pytest.mark.parametrize("ending", ["ply", "obj"])
+def test_a_skeleton_is_no_scan(invoke, scans, tmp_path, ending):
+    pytest.importorskip("pymeshlab")
+    assert invoke("run", "glskeleton", scans / "sample.ply", "-o", f"s.{ending}").exit_code == 0
+    for name in ("glskeleton", "scan_cleanup_then_skeleton"):
+        result = invoke("run", name, f"s.{ending}", "-o", "t.json")
+        assert result.exit_code == 1
+        assert f"the current layer (s.{ending}) is a skeleton or another line drawing" in result.stderr
+
+
+def test_a_mesh_can_be_written_as_points(invoke, tmp_path):
+    pytest.importorskip("pymeshlab")
+    n_vertices, _ = _mesh(tmp_path / "m.ply")
+    for ending in ("pcd", "xyz"):
+        assert invoke("run", "scan_cleanup", "m.ply", "-o", f"c.{ending}").exit_code == 0
+        assert n_vertices / 2 < len(read_cloud(tmp_path / f"c.{ending}").points) <= n_vertices

@@ -170,6 +170,18 @@ def test_colours_without_radii_or_confidence(skeleton):
     assert np.ptp(np.asarray(even.to_line_set("radius").colors)) > 0
 
 
+@pytest.mark.parametrize("count", [0, 1])
+@pytest.mark.parametrize("color", ["branch", "radius", "confidence", (0.1, 0.2, 0.3)])
+def test_line_sets_in_colour_without_edges(count, color):
+    lone = glsk.Skeleton(np.zeros((count, 3)), (), np.ones(count), (), (), (), confidence=np.ones(count))
+    legacy, tensor = lone.to_line_set(color), lone.to_tensor_line_set(color)
+    assert (len(legacy.points), len(legacy.lines), len(legacy.colors)) == (count, 0, 0)
+    assert tuple(tensor.point.positions.shape) == (count, 3)
+    assert tuple(tensor.line.indices.shape) == (0, 2)
+    assert tuple(tensor.line.colors.shape) == (0, 3)
+    assert len(lone.to_tubes(color).vertex_colors) == len(lone.to_tubes(color).vertices)
+
+
 def test_line_sets_in_colour(skeleton):
     for color, distinct in (("branch", 3), ((0.1, 0.2, 0.3), 1), ("radius", None), ("confidence", None)):
         legacy = np.asarray(skeleton.to_line_set(color).colors)

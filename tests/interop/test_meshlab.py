@@ -292,7 +292,7 @@ def test_listings_have_both_kinds(capfd, meshes):
     meshes.print_filter_list()
     assert capfd.readouterr().out.split() == names
     meshes.print_filter_parameter_list("generate_skeleton_graph_glsk")
-    assert "\tradius : PercentageValue = 1% [min: 0]\n" in capfd.readouterr().out
+    assert "\tradius : PercentageValue = 1% [above: 0]\n" in capfd.readouterr().out
     with pytest.raises(InvalidParameterError, match="did you mean 'generate_skeleton_graph_glsk'"):
         meshes.print_filter_parameter_list("generate_skeleton_graf_glsk")
     meshes.search("curve skeleton")
@@ -376,3 +376,186 @@ glsk_o3d.MeshSet
     assert run.stderr.rstrip().endswith(
         'MissingPackageError: pymeshlab cannot be imported: pip install "glsk-o3d[meshlab]"'
     )
+
+
+def test_what_meshlab_does_to_our_layers_is_kept(meshes, points, tmp_path):
+    o3d = pytest.importorskip("open3d")
+
+    def saved():
+        meshes.save(tmp_path / "c.ply")
+        return o3d.t.io.read_point_cloud(str(tmp_path / "c.ply")).point
+
+    meshes.generate_segmented_cloud_glsk()
+    meshes.compute_color_by_function_per_vertex(x="255", y="0", z="0")
+    np.testing.assert_array_equal(saved()["colors"].numpy(), np.tile([255, 0, 0], (len(points), 1)))
+    meshes.generate_contracted_cloud_glsk(layer=0)
+    contracted = meshes.layer().flow
+    meshes.compute_scalar_by_function_per_vertex(q="42")
+    assert (saved()["quality"].numpy() == 42).all()
+    assert meshes.layer().flow is contracted
+    meshes.generate_reduced_cloud_glsk(layer=0)
+    meshes.compute_normal_for_point_clouds()
+    np.testing.assert_array_equal(saved()["normals"].numpy(), meshes.current_mesh().vertex_normal_matrix())
+
+
+def test_scalars_of_a_skeleton_are_its_radii(meshes, tmp_path):
+    meshes.generate_curve_skeleton_glsk()
+    before = meshes.current_skeleton()
+    for factor in (10, 0):
+        meshes.compute_scalar_by_function_per_vertex(q=f"{factor}*q")
+        after = meshes.current_skeleton()
+        np.testing.assert_allclose(after.radii, factor * before.radii, rtol=1e-6)
+        assert after.report is before.report
+        np.testing.assert_array_equal(after.points, before.points)
+        for save in (meshes.save, meshes.save_current_mesh):
+            save(tmp_path / "s.ply")
+            np.testing.assert_array_equal(read_skeleton(tmp_path / "s.ply").radii, after.radii)
+
+
+def test_a_segmentation_has_the_points_of_its_skeleton(points):
+    n = len(points) // 3
+    meshes = glsk.MeshSet()
+    meshes.add_mesh(pymeshlab.Mesh(points, np.arange(3 * n, dtype=np.int32).reshape(n, 3)))
+    meshes.generate_reduced_cloud_glsk()
+    reduced = meshes.current_mesh().vertex_matrix()
+    for filters in (
+        ["generate_curve_skeleton_glsk", "generate_segmented_cloud_glsk"],
+        ["generate_segmented_cloud_glsk"],
+    ):
+        meshes.set_current_mesh(1)
+        for name in filters:
+            meshes.apply_filter(name)
+        np.testing.assert_array_equal(meshes.current_mesh().vertex_matrix(), reduced)
+        assert meshes.current_mesh().face_number() == 0
+    meshes.set_current_mesh(1)
+    meshes.generate_skeleton_graph_glsk()  # goes on from the flow, which is of all points
+    meshes.generate_segmented_cloud_glsk()
+    np.testing.assert_array_equal(meshes.current_mesh().vertex_matrix(), points)
+    assert meshes.current_mesh().face_number() == n
+
+
+def test_a_contracted_cloud_is_no_scan(meshes):
+    meshes.generate_contracted_cloud_glsk()
+    for name in ("curve_skeleton", "one_rings", "refined_skeleton", "segmented_cloud"):
+        with pytest.raises(InvalidCloudError, match=r"\(Contracted Cloud of cloud\) is contracted and no scan"):
+            meshes.apply_filter(f"generate_{name}_glsk")
+    meshes.generate_skeleton_graph_glsk()
+    meshes.generate_one_rings_glsk(layer=0)
+    meshes.generate_curve_skeleton_glsk()  # where rings are made nothing has moved yet
+
+
+def test_a_layer_that_is_not_there_is_refused_before_meshlab_looks(meshes):
+    for number in (9, -3):
+        with pytest.raises(InvalidParameterError, match=f"sampledmesh = {number}: there is no such layer"):
+            meshes.get_hausdorff_distance(sampledmesh=number)
+
+
+def test_which_parameters_are_layers():
+    from glsk_o3d.interop.meshlab import builtin
+
+    later = pymeshlab.MeshSet()
+    for _ in range(3):
+        later.add_mesh(builtin.trial().mesh(0))
+    for number in (0, 1):
+        later.set_current_mesh(number)
+        later.delete_current_mesh()
+    later.set_current_mesh(2)
+    unlike_elsewhere = set()
+    for name in pymeshlab.filter_list():
+        here, there = builtin.defaults(name), later.filter_parameter_values(name)
+        ours = {key for key, value in here.items() if builtin.is_layer(key, value)}
+        theirs = {key for key, value in here.items() if type(value) is int and value != there[key]}
+        assert theirs <= ours
+        unlike_elsewhere |= ours - theirs
+    assert unlike_elsewhere == {"referencemesh", "sourcemesh", "basemesh"}  # the first layer, whatever there is
+
+
+THIRDS = np.array([[1 / 3, 0, 0, 1e3 / 7], [0, 1 / 7, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    ("name", "params"),
+    [
+        ("create_sphere", {"radius": 1 / 3}),
+        ("apply_coord_taubin_smoothing", {"lambda_": 1 / 3, "mu": -0.37}),
+        ("set_matrix", {"transformmatrix": THIRDS}),
+        ("compute_matrix_from_rotation", {"rotaxis": 3, "customaxis": np.array([1 / 3, 1 / 7, 1]), "angle": 33.3}),
+        ("meshing_merge_close_vertices", {"threshold": pymeshlab.PercentageValue(3.3)}),
+    ],
+)
+def test_a_saved_script_repeats_the_session_to_the_last_bit(tmp_path, name, params):
+    def start():
+        meshes = glsk.MeshSet()
+        if name != "create_sphere":  # which is for an empty one
+            meshes.add_mesh(sphere.current_mesh())
+        return meshes
+
+    sphere = pymeshlab.MeshSet()
+    sphere.create_sphere(radius=1.0)
+    session, again = start(), start()
+    session.apply_filter(name, **params)
+    session.save_filter_script(tmp_path / "s.mlx")
+    again.load_filter_script(tmp_path / "s.mlx")
+    again.apply_filter_script()
+    np.testing.assert_array_equal(again.current_mesh().vertex_matrix(), session.current_mesh().vertex_matrix())
+
+
+def test_normals_turn_with_the_matrix_of_a_layer(points):
+    normals = np.random.default_rng(0).normal(size=points.shape)
+    turn = np.eye(4)
+    turn[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    meshes = glsk.MeshSet()
+    meshes.add_mesh(pymeshlab.Mesh(points, v_normals_matrix=normals))
+    meshes.set_matrix(transformmatrix=turn, freeze=False)
+    meshes.generate_segmented_cloud_glsk()
+    mesh = meshes.current_mesh()
+    np.testing.assert_allclose(mesh.vertex_matrix(), points @ turn[:3, :3].T)
+    np.testing.assert_allclose(mesh.vertex_normal_matrix(), normals @ turn[:3, :3].T)
+    meshes.set_current_mesh(0)
+    meshes.set_matrix(transformmatrix=np.diag([2.0, 1, 1, 1]), freeze=False)
+    stretched = meshes.layer().normals
+    slopes = normals / [2, 1, 1]
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    np.testing.assert_allclose(stretched, slopes * lengths / np.linalg.norm(slopes, axis=1, keepdims=True))
+
+
+def test_layers_that_are_gone_are_forgotten(meshes, points):
+    for _ in range(2):
+        meshes.generate_contracted_cloud_glsk(layer=0)
+    meshes.delete_current_mesh()
+    meshes.generate_one_rings_glsk(layer=0)
+    assert set(meshes._flows) == {1, 3}
+    contracted = meshes.mesh(1).vertex_matrix()
+    meshes.clear()
+    assert meshes.mesh_number() == 0
+    meshes.add_points(points)
+    meshes.add_points(contracted)  # as layer 1 was, but nobody says from where
+    assert meshes.layer().flow is None
+
+
+def test_steps_of_a_session_say_which_filter_failed(meshes):
+    meshes.generate_one_rings_glsk(layer=0)
+    meshes.meshing_remove_duplicate_vertices()
+    with pytest.raises(ScriptError, match=r"^filter 'Generate One Rings \(GLSkeleton\)': there is no layer"):
+        _emptied(meshes).apply_filter_script()
+    meshes._steps = meshes._steps[1:]
+    with pytest.raises(ScriptError, match=r"^filter 'Remove Duplicate Vertices': "):
+        _emptied(meshes).apply_filter_script()
+
+
+def _emptied(meshes):
+    meshes.clear()
+    return meshes
+
+
+def test_listings_have_limits_and_words(capfd):
+    for name in ("generate_curve_skeleton_glsk", "generate_one_rings_glsk"):
+        glsk.MeshSet.print_filter_parameter_list(name)
+    told = capfd.readouterr().out
+    assert "\tringbuilder_k : int or str = auto [min: 4; max: 256] (auto, published)\n" in told
+    assert "\tradius : PercentageValue or str = None [above: 0] (none)\n" in told
+
+
+def test_no_name_is_no_filter(meshes):
+    with pytest.raises(InvalidParameterError, match="no filter is called 'None'"):
+        meshes.apply_filter(None)

@@ -209,7 +209,7 @@ def test_files_that_are_no_scripts(tmp_path, monkeypatch):
 def test_meshlab_filters_without_pymeshlab(tmp_path, monkeypatch):
     from glsk_o3d.interop.meshlab import builtin
 
-    builtin._trial.cache_clear()
+    builtin.trial.cache_clear()
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.mlx").write_text(_theirs())
@@ -360,3 +360,76 @@ def test_scripts_are_found_by_name_or_path():
     assert str(caught.value) == (
         "no filter script is called 'glskeletn': did you mean 'glskeleton'? (a file's name ends in .mlx)"
     )
+
+
+def test_a_file_does_not_hide_a_script_of_that_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "glskeleton").write_text("mine")
+    assert find_script("glskeleton").suffix == ".mlx"
+    assert find_script(f".{os.sep}glskeleton").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("filter", "param", "message"),
+    [
+        ("Perlin color", 'RichColor" name="color1" r="99999999999999" g="1" b="5" a="5', "whole numbers from 0 to 255"),
+        ("Perlin color", 'RichColor" name="color1" r="300" g="1" b="5" a="5', "whole numbers from 0 to 255"),
+        ("Perlin color", 'RichColor" name="color1" r="3" g="1" b="-5" a="5', "whole numbers from 0 to 255"),
+        ("Perlin color", 'RichColor" name="color1" r="3" g="1" b="5" a="0.5', "'0.5' is not an int"),
+        ("Select Outliers", 'RichInt" name="KNearest" value="1_0', "'1_0' is not an int"),
+        ("Hausdorff Distance", 'RichMesh" name="SampledMesh" value="-3', "there is no layer -3"),
+    ],
+)
+def test_values_that_meshlab_would_not_check(tmp_path, filter, param, message):
+    pytest.importorskip("pymeshlab")
+    (tmp_path / "s.mlx").write_text(_script(f' <filter name="{filter}">', f'  <Param type="{param}"/>', " </filter>"))
+    with pytest.raises(ScriptError, match=f"s.mlx, line 4: filter '{filter}': parameter '\\w+': .*{message}"):
+        read_steps(tmp_path / "s.mlx")
+
+
+def test_a_parameter_given_twice_in_different_case(tmp_path):
+    pytest.importorskip("pymeshlab")
+    names = ("KNearest", "knearest")
+    (tmp_path / "s.mlx").write_text(_theirs(*[f'<Param type="RichInt" name="{name}" value="9"/>' for name in names]))
+    with pytest.raises(ScriptError, match="line 5: filter 'Select Outliers': parameter 'knearest' is given twice"):
+        read_steps(tmp_path / "s.mlx")
+
+
+@pytest.mark.parametrize("ending", ["ply", "obj", "off", "stl", "pcd", "xyz"])
+def test_a_mesh_is_read_as_it_was_written(tmp_path, ending):
+    o3d = pytest.importorskip("open3d")
+    mesh = o3d.geometry.TriangleMesh.create_torus()
+    mesh.compute_vertex_normals()
+    points, faces, normals = (np.array(each) for each in (mesh.vertices, mesh.triangles, mesh.vertex_normals))
+    bytes = np.random.default_rng(0).integers(256, size=(len(points), 3))
+    colors = np.column_stack([bytes / 255, np.ones(len(points))])
+    layer = Layer(points, faces=faces, normals=normals, colors=colors, scalars=np.arange(len(points)) / 3)
+    layer.save(tmp_path / f"m.{ending}")
+    back = Layer.read(tmp_path / f"m.{ending}")
+    assert back.label == f"m.{ending}"
+    if ending in ("stl", "obj"):  # in the reader's own order
+        assert (back.vertices.shape, back.faces.shape) == (points.shape, faces.shape)
+        corners, its = (np.sort(each.vertices[each.faces].mean(axis=1), axis=0) for each in (layer, back))
+        np.testing.assert_allclose(its, corners, atol=1e-5)  # six digits
+        return
+    np.testing.assert_allclose(back.vertices, points, atol=0 if ending in ("ply", "xyz") else 1e-5)
+    if ending in ("pcd", "xyz"):
+        assert back.faces is None
+    else:
+        np.testing.assert_array_equal(back.faces, faces)
+    if ending in ("ply", "pcd"):
+        np.testing.assert_allclose(back.normals, normals, atol=1e-6)
+        np.testing.assert_allclose(back.colors, colors)
+    if ending == "ply":
+        np.testing.assert_array_equal(back.scalars, layer.scalars)
+
+
+def test_a_reduced_cloud_keeps_normals_and_colours():
+    points = samples.torus(1000).points
+    colors = np.column_stack([np.random.default_rng(0).random((1000, 3)), np.ones(1000)])
+    scan = Layer(points, normals=-points, colors=colors)
+    reduced = verbs()["generate_reduced_cloud_glsk"].run(scan, {})
+    kept = [np.flatnonzero((points == vertex).all(axis=1))[0] for vertex in reduced.vertices]
+    assert 0 < len(kept) < 1000
+    np.testing.assert_array_equal(reduced.normals, -points[kept])
+    np.testing.assert_array_equal(reduced.colors, colors[kept])

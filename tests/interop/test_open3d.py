@@ -150,7 +150,8 @@ def test_tensor_line_set(skeleton, o3d):
     assert isinstance(lines, o3d.t.geometry.LineSet)
     assert lines.point.positions.dtype == o3d.core.float64
     np.testing.assert_array_equal(lines.point.positions.numpy(), skeleton.vertices)
-    np.testing.assert_array_equal(lines.point.radii.numpy().ravel(), skeleton.radii)
+    np.testing.assert_array_equal(lines.point.radius.numpy(), skeleton.radii[:, None])
+    assert set(lines.point) == {"positions", "radius", "confidence"}
     assert lines.point.confidence.dtype == o3d.core.float64
     np.testing.assert_array_equal(lines.point.confidence.numpy(), skeleton.confidence[:, None])
     np.testing.assert_array_equal(lines.line.indices.numpy(), skeleton.edges)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -31,7 +32,7 @@ def names() -> dict[str, str]:
 
 
 @cache
-def _trial() -> Any:
+def trial() -> Any:
     """A MeshSet to ask what filters take: they raise, or crash the process, where there is nothing to apply them to."""
     pymeshlab = require("pymeshlab", EXTRA)
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -59,7 +60,7 @@ def defaults(name: str) -> dict[str, Any]:
     -------
     dict of str to object
     """
-    return dict(_trial().filter_parameter_values(name))
+    return dict(trial().filter_parameter_values(name))
 
 
 def arguments(name: str, params: tuple[Param, ...]) -> dict[str, Any]:
@@ -87,9 +88,11 @@ def arguments(name: str, params: tuple[Param, ...]) -> dict[str, Any]:
         raise ValueError("the pymeshlab that is installed has no such filter", None)
     known, found = defaults(name), {}
     for param in params:
-        key = next((key for key in known if key.rstrip("_") == pythonic(param.name)), None)
+        key = keyword(param.name, known)
         if key is None:
             raise ValueError(nearest(param.name, known, "parameter"), param.line)
+        if key in found:
+            raise ValueError(f"parameter {param.name!r} is given twice", param.line)
         try:
             found[key] = _argument(name, key, param, known[key])
         except ValueError as error:
@@ -108,15 +111,27 @@ def _argument(name, key, param, default):
         except Exception as error:  # here and below: pymeshlab's exceptions have no base of their own
             raise ValueError(str(error)) from None
     elif param.type == "RichColor":
-        value = pymeshlab.Color(*map(int, value))
+        value = pymeshlab.Color(*value)
     elif isinstance(value, list):
         value = np.reshape(value, np.shape(default))
+    elif is_layer(key, default) and value < 0:
+        raise ValueError(f"there is no layer {value}")
     try:
-        _trial().filter_parameter_values(name, **{key: value})
+        trial().filter_parameter_values(name, **{key: value})
     except Exception as error:
         reason = str(error).partition("\n")[0]
         raise ValueError(f"a {param.type} is not what it takes" if "Unable to cast" in reason else reason) from None
     return value
+
+
+def keyword(name: str, known: Iterable[str]) -> str | None:
+    """Which of pymeshlab's keywords a parameter in a script is, or None: its ``lambda_`` is ``lambda`` there."""
+    return next((key for key in known if key.rstrip("_") == pythonic(name)), None)
+
+
+def is_layer(key: str, value: Any) -> bool:
+    """Whether a parameter is the number of a layer, of which pymeshlab does not tell and which MeshLab never checks."""
+    return type(value) is int and ("mesh" in key or key == "point_cloud")
 
 
 def pythonic(name: str) -> str:

@@ -12,11 +12,12 @@ import numpy as np
 from ...errors import FileFormatError
 from ...skeleton import Skeleton
 from ...state import Contraction
-from ..files import graph_skeleton, save_skeleton, skeleton_ending, write_atomically
+from .. import files
+from ..files import graph_skeleton, read_cloud, read_skeleton, save_skeleton, skeleton_ending, write_atomically
 from ..open3d import cloud_points, import_open3d, require
 
-CLOUD_ENDINGS = (".ply", ".pcd", ".xyz")
-MESH_ENDINGS = (".ply", ".obj", ".off", ".stl")
+ENDINGS = {"points": (".ply", ".pcd", ".xyz"), "mesh": (".ply", ".obj", ".off", ".stl")}
+"""What layers without edges are written as."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +73,57 @@ class Layer:
             return cls(data.contracted, scalars=data.mass, flow=data, **common)
         return cls(cloud_points(data), **common)
 
+    @classmethod
+    def read(cls, path: str | os.PathLike) -> Layer:
+        """A scan from a file, with whatever hangs on its vertices.
+
+        Parameters
+        ----------
+        path : path-like
+            As in `glsk_o3d.read_cloud`. Of a mesh the faces are kept, of a PLY or OBJ file of lines the edges, and of a
+            PLY file the property ``quality``. What STL repeats for every triangle around it becomes one vertex.
+
+        Returns
+        -------
+        Layer
+            Its label is the name of the file.
+
+        Raises
+        ------
+        FileNotFoundError, FileFormatError, MissingPackageError
+        """
+        path, scalars = files.check_scan(path), None
+        ending, o3d = path.suffix.lower(), import_open3d()
+        held = _elements(path, ending)
+        if "edge" in held and "face" not in held:
+            drawing = read_skeleton(path)
+            return cls(
+                drawing.vertices,
+                edges=drawing.edges if len(drawing.edges) else None,
+                scalars=None if np.isnan(drawing.radii).all() else drawing.radii,
+                label=path.name,
+            )
+        cloud = read_cloud(path)  # knows best what may be wrong with the file
+        points, normals, colors = cloud.points, cloud.normals, cloud.colors
+        faces = np.empty((0, 3), int)
+        if "face" in held or ending in files.MESH_ENDINGS:
+            with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+                mesh = o3d.io.read_triangle_mesh(str(path))
+            if ending == ".stl":
+                mesh.remove_duplicated_vertices()
+            points, normals, colors = mesh.vertices, mesh.vertex_normals, mesh.vertex_colors
+            faces = np.array(mesh.triangles)
+        if "quality" in held.get("vertex", ()):
+            scalars = o3d.t.io.read_point_cloud(str(path)).point["quality"].numpy().ravel().astype(float)
+        return cls(
+            cloud_points(points),
+            faces=faces if len(faces) else None,
+            normals=np.array(normals) if len(normals) else None,
+            scalars=scalars,
+            colors=np.column_stack([colors, np.ones(len(colors))]) if len(colors) else None,
+            label=path.name,
+        )
+
     def shows(self, other: Layer) -> bool:
         """Whether both have the same vertices and edges, so that the one's flow is still the other's."""
         none = np.empty((0, 2), int)
@@ -104,13 +156,14 @@ class Layer:
         return graph_skeleton(self.vertices, np.empty((0, 2)) if self.edges is None else self.edges, self.scalars)
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write the layer: one with edges as `save_skeleton` does, points with scalars and colours as a cloud.
+        """Write the layer: one with edges as `save_skeleton` does, others with their faces, scalars and colours.
 
         Parameters
         ----------
         path : path-like
             The ending of a skeleton's format; for points ``.ply`` (with the scalars as the property ``quality``, as
-            MeshLab has it), ``.pcd`` (float32, with colours) or ``.xyz``.
+            MeshLab has it), ``.pcd`` (float32, with normals and colours) or ``.xyz``; for a mesh also ``.obj``,
+            ``.off`` or ``.stl``.
         **options
             As in `save_skeleton`.
 
@@ -122,49 +175,80 @@ class Layer:
             The file cannot be written.
         """
         path = Path(path)
-        if self.edges is not None:
+        if self.edges is not None and self.faces is None:
             save_skeleton(self.to_skeleton(), path, **options)
             return
-        check_ending(path)
-        writers = {".ply": self._write_ply, ".pcd": self._write_pcd, ".xyz": self._write_xyz}
-        write_atomically(path, writers[path.suffix.lower()])
+        check_ending(path, "points" if self.faces is None else "points or mesh")
+        writers = {".ply": self._write_ply, ".xyz": self._write_xyz}
+        write_atomically(path, writers.get(path.suffix.lower(), self._write_open3d))
 
     def _write_ply(self, path: Path) -> None:
-        o3d = import_open3d()
-        columns = {
-            "normals": (self.normals, float),
-            "colors": (None if self.colors is None else np.round(255 * self.colors[:, :3]), np.uint8),
-            "quality": (None if self.scalars is None else self.scalars[:, None], float),
-        }
-        cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(np.ascontiguousarray(self.vertices, float)))
-        for name, (array, kind) in columns.items():
-            if array is not None:
-                cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(array, kind))
-        if not o3d.t.io.write_point_cloud(str(path), cloud):
-            raise FileFormatError(f"{path}: Open3D cannot write it")
-
-    def _write_pcd(self, path: Path) -> None:
-        o3d = import_open3d()
-        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.ascontiguousarray(self.vertices, float)))
+        columns = [(self.vertices, "f8", "x y z"), (self.normals, "f8", "nx ny nz")]
         if self.colors is not None:
-            cloud.colors = o3d.utility.Vector3dVector(np.ascontiguousarray(self.colors[:, :3], float))
-        if not o3d.io.write_point_cloud(str(path), cloud):
+            columns.append((np.round(255 * self.colors[:, :3]), "u1", "red green blue"))
+        columns = [(array, kind, names.split()) for array, kind, names in columns if array is not None]
+        if self.scalars is not None:
+            columns.append((self.scalars[:, None], "f8", ["quality"]))
+        fields = [(name, f"<{kind}") for _, kind, names in columns for name in names]
+        vertices = np.empty(len(self.vertices), fields)
+        for array, _, names in columns:
+            for name, column in zip(names, array.T, strict=True):
+                vertices[name] = column
+        said = {"f8": "double", "u1": "uchar"}
+        header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
+        header += [f"property {said[kind[1:]]} {name}" for name, kind in fields]
+        faces = np.empty(0 if self.faces is None else len(self.faces), [("n", "u1"), ("corners", "<i4", 3)])
+        if len(faces):
+            faces["n"], faces["corners"] = 3, self.faces
+            header += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+        path.write_bytes("\n".join([*header, "end_header\n"]).encode() + vertices.tobytes() + faces.tobytes())
+
+    def _write_open3d(self, path: Path) -> None:
+        o3d = import_open3d()
+        vector = o3d.utility.Vector3dVector
+        points, normals, colors = (
+            vector(np.empty((0, 3)) if array is None else np.ascontiguousarray(array[:, :3], float))
+            for array in (self.vertices, self.normals, self.colors)
+        )
+        if path.suffix.lower() in ENDINGS["points"]:
+            cloud = o3d.geometry.PointCloud(points)
+            cloud.normals, cloud.colors = normals, colors
+            done = o3d.io.write_point_cloud(str(path), cloud)
+        else:
+            mesh = o3d.geometry.TriangleMesh(
+                points, o3d.utility.Vector3iVector(np.ascontiguousarray(self.faces, np.int32))
+            )
+            mesh.vertex_normals, mesh.vertex_colors = normals, colors
+            if path.suffix.lower() == ".stl":
+                mesh.compute_triangle_normals()
+            done = o3d.io.write_triangle_mesh(str(path), mesh)
+        if not done:
             raise FileFormatError(f"{path}: Open3D cannot write it")
 
     def _write_xyz(self, path: Path) -> None:
         np.savetxt(path, self.vertices, fmt="%.17g")
 
 
-def check_ending(path: Path, edges: bool | None = False) -> None:
+def _elements(path, ending) -> dict[str, list[str]]:
+    if ending == ".obj":  # without faces Open3D finds nothing in it
+        with path.open("rb") as stream:
+            return {"face" if any(line.split()[:1] == [b"f"] for line in stream) else "edge": []}
+    return files.ply_elements(path) if ending == ".ply" else {}
+
+
+def check_ending(path: Path, what: str) -> None:
     """Raise FileFormatError unless the ending is that of a format for such a layer.
 
     Parameters
     ----------
     path : Path
-    edges : bool or None
-        Whether the layer has edges; None where that is not known yet, and it may also have faces.
+    what : {"skeleton", "points", "points or mesh", "skeleton, points or mesh"}
+        What the layer may be.
     """
-    if edges or (edges is None and path.suffix.lower() not in CLOUD_ENDINGS + MESH_ENDINGS):
+    known = [ending for kind, endings in ENDINGS.items() if kind in what for ending in endings]
+    if path.suffix.lower() in known:
+        return
+    if "skeleton" in what:
         skeleton_ending(path)
-    elif edges is False and path.suffix.lower() not in CLOUD_ENDINGS:
-        raise FileFormatError(f"{path}: unknown ending for points; known are {', '.join(CLOUD_ENDINGS)}")
+    else:
+        raise FileFormatError(f"{path}: unknown ending for {what}; known are {', '.join(dict.fromkeys(known))}")

@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...catalogue import nearest
-from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError, ScriptError
+from ...errors import FileFormatError, GlskError, InvalidCloudError, InvalidParameterError
 from ...skeleton import Skeleton
-from ..files import CLOUD_ENDINGS, check_scan, read_cloud, save_skeleton, skeleton_ending, write_atomically
+from ..files import CLOUD_ENDINGS, MESH_ENDINGS, check_scan, save_skeleton, skeleton_ending, write_atomically
 from ..open3d import require
 from . import builtin
 from .layers import Layer
@@ -29,11 +30,13 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
 
     Ours are applied as MeshLab's are, by name or as methods, and can be mixed with them in filter scripts. Each makes a
     new layer from the current one, which becomes the current layer: a skeleton has vertices, edges, and the radii as
-    vertex scalars. Where a layer came from one of our filters and was not changed since, the next one goes on from
-    there; on any other layer the vertices are the cloud, and whatever must run first is run with its defaults.
+    vertex scalars. Where a layer came from one of our filters and its vertices and edges are as they were, the next one
+    goes on from there; on any other layer the vertices are the cloud, and whatever must run first is run with its
+    defaults.
 
-    Lengths are ``pymeshlab.PercentageValue`` (of the diagonal of the cloud) or ``pymeshlab.PureValue`` (in its units);
-    a float and a string such as ``"2%"`` are understood too.
+    Lengths are ``pymeshlab.PercentageValue`` (of the diagonal of the box that has the spread of the points, unless the
+    parameter ``frame`` is ``"box"``) or ``pymeshlab.PureValue`` (in the units of the cloud); a float and a string such
+    as ``"2%"`` are understood too.
 
     Raises
     ------
@@ -70,7 +73,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         self.add_mesh(Layer.of(points).to_pymeshlab(), name)
 
     def layer(self, number: int = -1) -> Layer:
-        """A layer as our filters see it, with what they passed on if it is unchanged since.
+        """A layer as our filters see it, with what they passed on if its vertices and edges are unchanged since.
 
         Parameters
         ----------
@@ -94,20 +97,28 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         if not self.mesh_id_exists(number):
             raise InvalidParameterError(f"layer = {number}: there is no such layer")
         mesh = self.mesh(number)
+        scalars = mesh.vertex_scalar_array()
         layer = Layer(
             mesh.transformed_vertex_matrix(),
             faces=mesh.face_matrix() if mesh.face_number() else None,
             edges=mesh.edge_matrix().reshape(-1, 2) if mesh.edge_number() else None,
-            normals=_unless(mesh.vertex_normal_matrix(), 0),
-            scalars=_unless(mesh.vertex_scalar_array(), 0),
+            normals=_unless(_turned(mesh.vertex_normal_matrix(), mesh.transform_matrix()), 0),
+            scalars=_unless(scalars, 0),
             colors=_unless(mesh.vertex_color_matrix(), 1),
             label=mesh.label(),
         )
         known = self._flows.get(number)
-        return known if known is not None and known.shows(layer) else layer
+        if known is None or not known.shows(layer):
+            return layer
+        flow = known.flow
+        if isinstance(flow, Skeleton) and not np.array_equal(scalars, flow.radii, equal_nan=True):
+            flow = replace(flow, radii=scalars)
+        return replace(layer, edges=known.edges, flow=flow, source=known.source)
 
     def current_skeleton(self) -> Skeleton:
-        """The skeleton in the current layer, with its report and its points if nothing changed it since it was made.
+        """The skeleton in the current layer; its radii are the layer's scalars.
+
+        It has its report and its points if nothing changed its vertices and edges since they were made.
 
         Raises
         ------
@@ -153,7 +164,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         FileFormatError, OSError
         """
         layer = self.layer()
-        if layer.faces is None:
+        if layer.faces is None or Path(path).suffix.lower() in (".pcd", ".xyz"):  # which hold no faces
             layer.save(path, **options)
             return
         try:
@@ -162,26 +173,32 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             raise FileFormatError(f"{path}: MeshLab cannot write it: {' '.join(str(error).split())}") from error
 
     def load_scan(self, path: str | os.PathLike) -> None:
-        """Add a scan as a new layer: meshes are read by MeshLab, files of points as `glsk_o3d.read_cloud` does.
+        """Add a scan as a new layer: what `Layer.read` reads as it does, all else by MeshLab.
 
         Parameters
         ----------
         path : path-like
+            Of formats that both read, `load_new_mesh` also has colours of faces and textures.
 
         Raises
         ------
         FileNotFoundError, FileFormatError
         """
         path = check_scan(path)
-        if path.suffix.lower() in CLOUD_ENDINGS and path.suffix.lower() != ".ply":
-            self.add_points(read_cloud(path), path.name)
-            return
         try:
+            if path.suffix.lower() in CLOUD_ENDINGS + MESH_ENDINGS:
+                self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)
+                return
             self.load_new_mesh(str(path))
         except pymeshlab.PyMeshLabException as error:
             raise FileFormatError(f"{path}: MeshLab cannot read it: {' '.join(str(error).split())}") from error
         if not self.current_mesh().vertex_number():
             raise FileFormatError(f"{path}: no points could be read")
+
+    def clear(self) -> None:
+        """Remove all layers."""
+        super().clear()
+        self._flows = {}
 
     # ---------------------------------------------------------------------------------------------------- filters
 
@@ -215,7 +232,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         elif filter_name in pymeshlab.filter_list():
             done, result = self._run_theirs(filter_name, params)
         else:
-            raise InvalidParameterError(nearest(filter_name, self.filter_list(), "filter"))
+            raise InvalidParameterError(nearest(str(filter_name), self.filter_list(), "filter"))
         self._steps.append(done)
         return result
 
@@ -243,19 +260,23 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             try:
                 return self._run_theirs(step.name, step.values)[1]
             except Exception as error:  # pymeshlab's have no base of their own
-                reason = " ".join(str(error).split())
-                raise ScriptError(f"{step.place}: filter {step.call.name!r}: {reason}") from error
+                raise GlskError(" ".join(str(error).split())) from error
 
     def _run_ours(self, step: Step, on_iteration=None) -> dict[str, Any]:
         verb = step.verb
         assert verb is not None
         layer = verb.run(self.layer(step.values.get("layer", -1)), step.values, on_iteration)
         self.add_mesh(layer.to_pymeshlab(), layer.label)
+        self._flows = {number: known for number, known in self._flows.items() if self.mesh_id_exists(number)}
         self._flows[self.current_mesh_id()] = layer
         return {"layer": self.current_mesh_id(), **facts(layer)}
 
     def _run_theirs(self, name: str, params: dict[str, Any]) -> tuple[Step, dict[str, Any]]:
-        exact = super().filter_parameter_values(name, **params) if self.mesh_number() else {}  # crashes without a mesh
+        asked: Any = super() if self.mesh_number() else builtin.trial()  # without a mesh it crashes
+        exact = asked.filter_parameter_values(name, **params)
+        for key, value in exact.items():
+            if self.mesh_number() and builtin.is_layer(key, value) and not self.mesh_id_exists(value):
+                raise InvalidParameterError(f"{key} = {value}: there is no such layer")
         super().clear_filter_script()
         result = super().apply_filter(name, **params)
         with tempfile.TemporaryDirectory() as folder:  # MeshLab alone knows how they are written
@@ -368,6 +389,13 @@ def _unless(array: np.ndarray, blank: float) -> np.ndarray | None:
     return None if (array == blank).all() else array
 
 
+def _turned(normals: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Normals as a layer's matrix shows them: they keep their lengths and stay normal where it is no rotation."""
+    turned = normals @ np.linalg.pinv(matrix[:3, :3])
+    before, after = (np.linalg.norm(vectors, axis=1, keepdims=True) for vectors in (normals, turned))
+    return turned * np.divide(before, after, out=np.ones_like(after), where=after > 0)
+
+
 def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
     """MeshLab's classes for lengths, which hold float32, as what our filters take."""
 
@@ -382,9 +410,10 @@ def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
 def _described(verb: Verb) -> Iterator[str]:
     values = verb.values({})
     for slot in verb.slots.values():
-        limits = {"min": slot.facts["low"], "max": slot.facts["high"]}
-        said = "; ".join(f"{key}: {limit:g}" for key, limit in limits.items() if limit is not None)
-        said = f" [{said}]" if said else f" ({', '.join(slot.words)})" if slot.words else ""
+        limits = {"above" if slot.facts["open_low"] else "min": slot.facts["low"], "max": slot.facts["high"]}
+        limits = {key: limit for key, limit in limits.items() if limit is not None}
+        said = f" [{'; '.join(f'{key}: {limit:g}' for key, limit in limits.items())}]" if limits else ""
+        said += f" ({', '.join(slot.words)})" if slot.words else ""
         default = values.get(slot.name, "as the pipeline has it")
         yield f"\t{slot.name} : {slot.python_type()} = {default}{said}\n\t\t{slot.facts['doc']}"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ from ...catalogue import nearest
 from ...errors import GlskError, InvalidParameterError, MissingPackageError, ScriptError
 from . import builtin
 from .layers import Layer
-from .script import Call, read_script
+from .script import VECTORS, Call, read_script
 from .verbs import Verb, facts, verbs
 
 
@@ -54,9 +55,8 @@ class Step:
         except ScriptError:
             raise
         except GlskError as error:
-            if not self.place:
-                raise
-            raise ScriptError(f"{self.place}: filter {self.call.name!r}: {error}") from error
+            place = f"{self.place}: " if self.place else ""
+            raise ScriptError(f"{place}filter {self.call.name!r}: {error}") from error
 
 
 def step(verb: Verb, values: Mapping[str, Any]) -> Step:
@@ -148,7 +148,7 @@ def scripts() -> dict[str, Path]:
 
 
 def find_script(name: str | os.PathLike) -> Path:
-    """The file of a script: a path that ends in .mlx, or the name of one that comes with the package.
+    """The file of a script: a path that ends in .mlx or names a folder, or the name of one that comes with the package.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def find_script(name: str | os.PathLike) -> Path:
         There is no script of that name; the message says which there are.
     """
     path, known = Path(name), scripts()
-    if path.suffix.lower() == ".mlx" or len(path.parts) > 1 or path.is_file():
+    if path.suffix.lower() == ".mlx" or str(name) != path.name:
         return path
     if str(name) not in known:
         raise InvalidParameterError(f"{nearest(str(name), known, 'filter script')} (a file's name ends in .mlx)")
@@ -215,7 +215,8 @@ def exact_digits(step: Step, values: Mapping[str, Any]) -> Step:
     ----------
     step : Step
     values : mapping of str to object
-        By pymeshlab's names. MeshLab's parameters are float32.
+        By pymeshlab's names. MeshLab's numbers and vectors are float32, its matrices float64. What differs by more than
+        the digits lost stays as MeshLab wrote it.
 
     Returns
     -------
@@ -223,9 +224,19 @@ def exact_digits(step: Step, values: Mapping[str, Any]) -> Step:
     """
 
     def exact(param):
-        value = values.get(builtin.pythonic(param.name))
-        if not isinstance(value, float):
+        value = values.get(builtin.keyword(param.name, values) or "")
+        names = VECTORS.get(param.type, ("value",))
+        if not isinstance(value, float | np.ndarray) or np.size(value) != len(names):
             return param
-        return replace(param, attributes={**param.attributes, "value": str(np.float32(value))})
+        numbers = dict(zip(names, map(float, np.ravel(value)), strict=True))
+        if not all(math.isclose(float(param.attributes[key]), number, rel_tol=1e-5) for key, number in numbers.items()):
+            return param
+        return replace(param, attributes={**param.attributes, **{key: _digits(n) for key, n in numbers.items()}})
 
     return replace(step, call=replace(step.call, params=tuple(map(exact, step.call.params))))
+
+
+def _digits(number: float) -> str:
+    """The shortest text that is exactly the number, for float32 in float32."""
+    short = np.float32(number)
+    return str(short) if float(short) == number else repr(number)

@@ -36,7 +36,7 @@ LENGTH = ("RichAbsPerc", "RichPercentage")
 TEXT = ("RichString", "RichOpenFile", "RichSaveFile", "RichFileOpen", "RichFileSave")
 POINT = ("RichPosition", "RichDirection", "RichPoint3f")
 MATRIX = ("RichMatrix44f", "RichMatrix44")
-_VECTORS = {
+VECTORS = {
     "RichColor": ("r", "g", "b", "a"),
     **dict.fromkeys(POINT, ("x", "y", "z")),
     **dict.fromkeys(MATRIX, tuple(f"val{i}" for i in range(16))),
@@ -69,19 +69,23 @@ class Param:
             raise ValueError(f"a {self.type} is not what it takes: {fitting}")
 
     def value(self) -> Any:
-        """What stands there: bool, int, float, str, a list of floats, or for a length a float or text such as "2%".
+        """What stands there: bool, int, float, str, a list of floats (of ints for a colour), or for a
+        length a float or text such as "2%".
 
         Raises
         ------
         ValueError
             It is not of the type that it claims to be; the message says so.
         """
-        if self.type in _VECTORS:
-            names = _VECTORS[self.type]
+        if self.type in VECTORS:
+            names = VECTORS[self.type]
             lost = [name for name in names if name not in self.attributes]
             if lost:
                 raise ValueError(f"a {self.type} has the attributes {', '.join(names)}, and {lost[0]} is not there")
-            return [self._number(float, self.attributes[name]) for name in names]
+            numbers = [self._number(self._kind, self.attributes[name]) for name in names]
+            if self._kind is int and not all(0 <= number <= 255 for number in numbers):
+                raise ValueError("a RichColor is of whole numbers from 0 to 255")
+            return numbers
         if "value" not in self.attributes:
             raise ValueError("it has no value")
         text = self.attributes["value"].strip()
@@ -94,11 +98,15 @@ class Param:
         if self.type in LENGTH and text.endswith("%"):
             self._number(float, text[:-1])
             return text
-        return self._number(int if self.type in INT else float, text)
+        return self._number(self._kind, text)
+
+    @property
+    def _kind(self):
+        return int if self.type in (*INT, "RichColor") else float
 
     def _number(self, kind, text):
         try:
-            number = kind(text)
+            number = kind(text.replace("_", "?"))  # Python alone reads 1_0 as 10
         except ValueError:
             raise ValueError(f"{text[:40]!r} is not {'an int' if kind is int else 'a number'}") from None
         if number != number or number in (float("inf"), float("-inf")):

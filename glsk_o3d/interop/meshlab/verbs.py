@@ -160,9 +160,9 @@ class Verb:
     default: ClassVar[str] = "default"
 
     @property
-    def makes_edges(self) -> bool:
-        """Whether the result is a skeleton."""
-        return True
+    def makes(self) -> str:
+        """What the result may be, as `check_ending` has it."""
+        return "skeleton"
 
     def start(self, values: Mapping[str, Any]) -> Pipeline:
         """The pipeline whose parameters the values change."""
@@ -250,7 +250,7 @@ class Verb:
         InvalidParameterError, InvalidCloudError
         """
         pipeline = self.plan(given)
-        return self.shown(pipeline(_cloud(layer), on_iteration=on_iteration), _plain(layer))
+        return self.shown(pipeline(_cloud(layer), on_iteration=on_iteration), layer)
 
     def shown(self, result: Any, source: Layer) -> Layer:
         """The layer that shows a result."""
@@ -264,8 +264,8 @@ class FilterVerb(Verb):
     filter: type[Filter]
 
     @property
-    def makes_edges(self):
-        return self.filter.produces == "Skeleton"
+    def makes(self):
+        return "skeleton" if self.filter.produces == "Skeleton" else "points"
 
     def start(self, values):
         found = [stage for stage in named_pipeline(self.default).stages if type(stage) is self.filter]
@@ -277,7 +277,7 @@ class FilterVerb(Verb):
         if wanted is not None and isinstance(layer.flow, wanted):
             return self.shown(pipeline(layer.flow, on_iteration=on_iteration), _plain(layer))
         pipeline = Pipeline(*self.before(), *pipeline.stages)
-        return self.shown(pipeline(_cloud(layer), on_iteration=on_iteration), _plain(layer))
+        return self.shown(pipeline(_cloud(layer), on_iteration=on_iteration), layer)
 
     def before(self) -> tuple[Filter, ...]:
         """What turns a cloud into what the filter takes: the default pipeline's filters before it."""
@@ -292,7 +292,10 @@ class FilterVerb(Verb):
     def shown(self, result, source):
         layer = super().shown(result, source)
         if self.filter is LPRReducer:  # a reduction is seen best where the points were
-            return dataclasses.replace(layer, vertices=result.points[result.point_of_survivor])
+            kept = result.point_of_survivor
+            hung = {name: getattr(source, name) for name in ("normals", "colors")}
+            hung = {name: array[kept] for name, array in hung.items() if array is not None}
+            return dataclasses.replace(layer, vertices=result.points[kept], **hung)
         return layer
 
 
@@ -301,16 +304,16 @@ class SegmentVerb(Verb):
     """Points labelled by the branch of the skeleton that they belong to."""
 
     @property
-    def makes_edges(self):
-        return False
+    def makes(self):
+        return "points or mesh"
 
     def run(self, layer, given, on_iteration=None):
         pipeline = self.plan(given)
-        skeleton = (
-            layer.flow if isinstance(layer.flow, Skeleton) else pipeline(_cloud(layer), on_iteration=on_iteration)
-        )
+        if isinstance(layer.flow, Skeleton):
+            skeleton, layer = layer.flow, _plain(layer)
+        else:
+            skeleton = pipeline(_cloud(layer), on_iteration=on_iteration)
         labels = skeleton.segment()
-        layer = _plain(layer)
         colors = shades(skeleton, "branch", labels, skeleton.vertex_of_point)
         return dataclasses.replace(
             self.shown(skeleton.points, layer),
@@ -411,5 +414,11 @@ def _cloud(layer: Layer) -> np.ndarray:
     if layer.edges is not None and layer.faces is None:
         raise InvalidCloudError(
             f"the current layer ({layer.label}) is a skeleton or another line drawing: make the scan the current layer"
+        )
+    flow = layer.flow
+    if isinstance(flow, Contraction) and flow.report.iterations and np.array_equal(layer.vertices, flow.contracted):
+        raise InvalidCloudError(
+            f"the current layer ({layer.label}) is contracted and no scan: make the scan the current layer, or go on "
+            "with generate_skeleton_graph_glsk"
         )
     return layer.vertices
