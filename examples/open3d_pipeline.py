@@ -82,9 +82,7 @@ if __name__ == "__main__":
     parser.add_argument("api", nargs="?", choices=["legacy", "tensor"], default="legacy", help="of Open3D")
     parser.add_argument("--ground", type=float, default=0.0, help="only what is higher counts [%(default)s]")
     parser.add_argument("--voxel", type=float, help="cell to thin the scene with [1/400 of its diagonal]")
-    parser.add_argument(
-        "--gap", type=float, help="how far apart objects are [5 cells, or 4 spacings of the points]"
-    )
+    parser.add_argument("--gap", type=float, help="how far apart objects are [5 cells, or 4 spacings of the points]")
     parser.add_argument("--least", type=int, default=300, help="points of the smallest object [%(default)s]")
     try:
         main(**vars(parser.parse_args()))
