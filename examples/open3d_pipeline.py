@@ -1,10 +1,6 @@
-"""An Open3D pipeline with skeletons dropped in: crop, thin, clean, cluster, a skeleton per cluster, annotate, write.
+"""An Open3D pipeline with skeletons dropped in: crop, thin, clean, cluster, a skeleton per cluster, annotate, write."""
 
-    python examples/open3d_pipeline.py SCENE.ply FOLDER [legacy | tensor]
-
-The scene is cropped to the space above the ground (z > 0). Lengths are in its units.
-"""
-
+import argparse
 import sys
 from pathlib import Path
 
@@ -13,39 +9,49 @@ import open3d as o3d
 
 import glsk_o3d as glsk
 
-VOXEL, APART, LEAST = 0.012, 0.06, 300  # voxel size, gap between objects, points of the smallest object
 
-
-def legacy_objects(path):
+def legacy_objects(path, floor, voxel, gap, least):
     """The objects of a scene, with Open3D's first API."""
     scene = o3d.io.read_point_cloud(str(path))
     box = scene.get_axis_aligned_bounding_box()
-    box.min_bound = (*box.min_bound[:2], 1e-6)
+    box.min_bound = (*box.min_bound[:2], floor)
     scene = scene.crop(box)
-    scene = scene.voxel_down_sample(VOXEL)
+    scene = scene.voxel_down_sample(voxel)
     scene, _ = scene.remove_statistical_outlier(nb_neighbors=16, std_ratio=3.0)
-    labels = np.asarray(scene.cluster_dbscan(eps=APART, min_points=8))
-    objects = [scene.select_by_index(np.flatnonzero(labels == label)) for label in range(labels.max() + 1)]
-    return [cloud for cloud in objects if len(cloud.points) >= LEAST]
+    labels = np.asarray(scene.cluster_dbscan(eps=gap, min_points=8))
+    objects = [scene.select_by_index(np.flatnonzero(labels == label)) for label in range(labels.max(initial=-1) + 1)]
+    return [cloud for cloud in objects if len(cloud.points) >= least]
 
 
-def tensor_objects(path):
+def tensor_objects(path, floor, voxel, gap, least):
     """The objects of a scene, with the tensor API: attributes such as the intensity come along."""
     scene = o3d.t.io.read_point_cloud(str(path))
     low, high = scene.get_min_bound(), scene.get_max_bound()
-    low[2] = 1e-6
+    low[2] = floor
     scene = scene.crop(o3d.t.geometry.AxisAlignedBoundingBox(low, high))
-    scene = scene.voxel_down_sample(VOXEL)
+    scene = scene.voxel_down_sample(voxel)
     scene, _ = scene.remove_statistical_outliers(nb_neighbors=16, std_ratio=3.0)
-    labels = scene.cluster_dbscan(eps=APART, min_points=8)
-    objects = [scene.select_by_mask(labels == label) for label in range(labels.max().item() + 1)]
-    return [cloud for cloud in objects if len(cloud.point.positions) >= LEAST]
+    labels = scene.cluster_dbscan(eps=gap, min_points=8)
+    objects = [scene.select_by_mask(labels == label) for label in range(labels.numpy().max(initial=-1) + 1)]
+    return [cloud for cloud in objects if len(cloud.point.positions) >= least]
 
 
-def main(path, folder, api="legacy"):
+def main(path, folder, api="legacy", ground=0.0, voxel=None, gap=None, least=300):
+    scene = glsk.read_cloud(path)  # says what is wrong where Open3D gives an empty cloud
+    points = np.asarray(scene.points)
+    points = points[points[:, 2] > ground]
+    if len(points) == 0:
+        sys.exit(f"error: {path}: no point lies above z = {ground:g}: give another --ground")
+    voxel = voxel or np.linalg.norm(np.ptp(points, axis=0)) / 400
+    gap = gap or max(5 * voxel, 4 * np.median(scene.compute_nearest_neighbor_distance()))
+    floor = ground + voxel / 100  # the ground itself stays below
+    objects = {"legacy": legacy_objects, "tensor": tensor_objects}[api](path, floor, voxel, gap, least)
+    found = f"{len(objects)} of at least {least} points, {gap:.3g} apart, in cells of {voxel:.3g}"
+    if not objects:
+        sys.exit(f"error: {path}: no object found: {found}: try other values of --voxel, --gap and --least")
+    print(f"objects: {found}")
     folder = Path(folder)
     folder.mkdir(exist_ok=True)
-    objects = {"legacy": legacy_objects, "tensor": tensor_objects}[api](path)
     for number, cloud in enumerate(objects):
         skeleton = glsk.skeletonize(cloud)
 
@@ -70,4 +76,15 @@ def main(path, folder, api="legacy"):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, epilog="Lengths are in the units of the scene.")
+    parser.add_argument("path", metavar="SCENE", help="a point cloud that Open3D reads")
+    parser.add_argument("folder", metavar="FOLDER", help="for the results; made if it is not there")
+    parser.add_argument("api", nargs="?", choices=["legacy", "tensor"], default="legacy", help="of Open3D")
+    parser.add_argument("--ground", type=float, default=0.0, help="only what is higher counts [%(default)s]")
+    parser.add_argument("--voxel", type=float, help="cell to thin the scene with [1/400 of its diagonal]")
+    parser.add_argument("--gap", type=float, help="how far apart objects are [5 cells, or 4 spacings of the points]")
+    parser.add_argument("--least", type=int, default=300, help="points of the smallest object [%(default)s]")
+    try:
+        main(**vars(parser.parse_args()))
+    except (OSError, glsk.GlskError) as error:
+        sys.exit(f"error: {error}")

@@ -12,7 +12,8 @@ from collections.abc import Callable
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from .errors import InvalidParameterError, StageError
+from .errors import InvalidCloudError, InvalidParameterError, StageError
+from .interop.open3d import cloud_points
 from .interop.verbosity import following_open3d
 
 if TYPE_CHECKING:
@@ -212,6 +213,10 @@ class Filter(Parameters):
         if not isinstance(result, promised) if promised else isinstance(result, (*flows.values(), type(None))):
             raise StageError(f"{type(self).__name__} should give a {self.produces} and gave a {type(result).__name__}")
         if promised is None:
+            try:
+                cloud_points(result)
+            except InvalidCloudError as error:
+                raise InvalidCloudError(f"{type(self).__name__} gave no usable cloud: {error}") from error
             return result
         return dataclasses.replace(result, report=result.report.with_stage(self, seconds))
 

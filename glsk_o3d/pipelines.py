@@ -76,9 +76,11 @@ def named_pipeline(name: str) -> Pipeline:
     Raises
     ------
     InvalidParameterError
-        If there is none; the message lists the names.
+        If there is none; the message says which was meant, or lists the names.
     """
+    from .catalogue import nearest
+
     make = PIPELINES.get(name) or known_pipelines().get(name)
     if make is None:
-        raise InvalidParameterError(f"no pipeline is called {name!r}: there are {', '.join(known_pipelines())}")
+        raise InvalidParameterError(nearest(name, known_pipelines(), "pipeline"))
     return make()

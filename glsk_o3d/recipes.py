@@ -348,7 +348,9 @@ def _part(table: Any, path: str, role: str) -> Parameters:
     cls = find(name) if isinstance(name, str) else None
     if cls is None or not serves(cls, role):
         fitting = [other for other, its in catalogue().items() if serves(its, role)]
-        raise RecipeError(f"{path}.{kind}: {nearest(str(name), fitting, role.replace('stop', 'stopping rule'))}")
+        message = nearest(str(name), fitting, role.replace("stop", "stopping rule"))
+        plugin = " (or install the plugin that it is from)" * (cls is None)
+        raise RecipeError(f"{path}.{kind}: {message}{plugin}")
     values = _values(cls, {key: value for key, value in table.items() if key != kind}, path)
     return _valid(lambda: cls(**values), path)
 

@@ -38,7 +38,7 @@ def test_open3d_pipeline(root, tmp_path, monkeypatch, capsys, api, dtype):
     runpy.run_path(str(example), run_name="__main__")
     names = ("cloud.ply", "longest.ply", "skeleton.json", "lines.ply", "tubes.ply", "branches.csv")
     assert {path.name for path in folder.iterdir()} == {f"{i}_{name}" for i in range(2) for name in names}
-    assert capsys.readouterr().out.count("object ") == 2
+    assert capsys.readouterr().out.count("\nobject ") == 2
     shapes = set()
     for i in range(2):
         skeleton = read_skeleton(folder / f"{i}_skeleton.json")
@@ -78,3 +78,27 @@ def test_open3d_pipeline_outlives_skeletons_of_a_single_vertex(root, tmp_path, m
         assert len(skeleton.vertices) == 1
         part = o3d.t.io.read_point_cloud(str(tmp_path / "out" / f"{i}_longest.ply"))
         assert len(part.point.positions) == len(skeleton.points)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "usage: "),
+        (["none.ply", "out"], "error: none.ply: no such file"),
+        (["scene.ply", "out", "--ground", "9"], "error: scene.ply: no point lies above z = 9: give another --ground"),
+        (
+            ["scene.ply", "out", "tensor", "--voxel", "0.5"],
+            "error: scene.ply: no object found: 0 of at least 300",
+        ),
+        (["scene.ply", "out", "--least", "9999"], "error: scene.ply: no object found: 0 of at least 9999 points"),
+    ],
+)
+def test_open3d_pipeline_says_what_is_wrong(root, tmp_path, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(tmp_path)
+    write_scene(tmp_path / "scene.ply", "f8")
+    monkeypatch.setattr(sys, "argv", ["open3d_pipeline.py", *words])
+    with pytest.raises(SystemExit) as raised:
+        runpy.run_path(str(root / "examples" / "open3d_pipeline.py"), run_name="__main__")
+    assert (capsys.readouterr().err or raised.value.code).startswith(said)
+    assert raised.value.code
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.ply"]

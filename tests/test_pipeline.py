@@ -145,9 +145,11 @@ def test_default_is_the_default():
     assert_same(skeletonize(POINTS), pipelines.default()(POINTS))
 
 
-def test_unknown_names_list_the_known_ones():
-    with pytest.raises(InvalidParameterError, match=r"'cao2011'.*default, wen2024, cao2010"):
+def test_unknown_names_tell_the_nearest_or_list_the_known_ones():
+    with pytest.raises(InvalidParameterError, match="'cao2011': did you mean 'cao2010'"):
         skeletonize(POINTS, "cao2011")
+    with pytest.raises(InvalidParameterError, match=r"'best': there are default, wen2024, cao2010"):
+        skeletonize(POINTS, "best")
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, Pipeline, PluginWarning, RecipeError, StageError, samples, skeletonize
+from glsk_o3d import (
+    InvalidCloudError,
+    InvalidParameterError,
+    Pipeline,
+    PluginWarning,
+    RecipeError,
+    StageError,
+    samples,
+    skeletonize,
+)
 from glsk_o3d.catalogue import BUILTIN, catalogue
 from glsk_o3d.filter import Filter
 from glsk_o3d.pipelines import PIPELINES, known_pipelines, named_pipeline
@@ -140,12 +149,20 @@ def test_a_filter_that_breaks_its_promise(produces, given, message):
         wrong()(POINTS)
 
 
+def test_a_filter_that_leaves_nothing_is_named():
+    nothing = type("Crop", (Filter,), {"produces": "cloud", "_run": lambda *_: POINTS[:0], "check": lambda self: None})
+    with pytest.raises(InvalidCloudError, match=r"^Crop gave no usable cloud: the cloud \(ndarray\) is empty"):
+        nothing()(POINTS)
+
+
 @pytest.mark.usefixtures("example")
 def test_a_recipe_whose_plugin_is_gone(monkeypatch):
     recipe = named_pipeline("coarse").to_recipe()
     assert Pipeline.from_recipe(recipe) == named_pipeline("coarse")
     monkeypatch.setattr("glsk_o3d.plugins._found", {"glsk_o3d.filters": {}})
-    with pytest.raises(RecipeError, match=r"^pipeline\[0\]\.filter: no filter is called 'Voxel': there are Ring"):
+    with pytest.raises(
+        RecipeError, match=r"^pipeline\[0\]\.filter: no filter is called 'Voxel': there are Ring.*install the plugin"
+    ):
         Pipeline.from_recipe(recipe)
 
 

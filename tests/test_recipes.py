@@ -182,7 +182,8 @@ WRONG = {
         **HEAD,
         "pipeline": [GOOD, "Contractor"],
     },
-    "pipeline[1].filter: no filter is called 'Contracter': did you mean 'Contractor'?": {
+    "pipeline[1].filter: no filter is called 'Contracter': did you mean 'Contractor'? "
+    "(or install the plugin that it is from)": {
         **HEAD,
         "pipeline": [GOOD, {"filter": "Contracter"}],
     },
@@ -227,7 +228,8 @@ WRONG = {
         **HEAD,
         "pipeline": [{"filter": "Contractor", "stop": {"filter": "RingSizeRatio"}}],
     },
-    "pipeline[0].stop.rule: no stopping rule is called 'RingRatio': did you mean 'RingSizeRatio'?": {
+    "pipeline[0].stop.rule: no stopping rule is called 'RingRatio': did you mean 'RingSizeRatio'? "
+    "(or install the plugin that it is from)": {
         **HEAD,
         "pipeline": [{"filter": "Contractor", "stop": {"rule": "RingRatio"}}],
     },

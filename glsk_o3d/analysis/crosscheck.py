@@ -142,9 +142,9 @@ def cross_check(
     Raises
     ------
     InvalidCloudError
-        The points cannot be skeletonised, or no surface be reconstructed from them.
+        The points cannot be skeletonised, no surface be reconstructed from them, or the mesh lies elsewhere.
     InvalidParameterError
-        An argument is wrong, or the mesh lies elsewhere than the cloud.
+        An argument is wrong.
     MissingPackageError
         libigl or Open3D is not installed.
 
@@ -186,7 +186,7 @@ def cross_check(
     surface, vertices, faces = _surface(state, mesh)
     angle, length, share, rows = compare_rows(state, vertices, faces)
     if rows.compared == 0 and surface == "given":
-        raise InvalidParameterError("no point of the cloud lies on the mesh: both must be in the same units and place")
+        raise InvalidCloudError("no point of the cloud lies on the mesh: both must be in the same units and place")
     other = mesh_skeleton(state, vertices, faces, pipeline)
     diagonal = state.frame.diagonal * state.frame.scale
     skeletons = compare_skeletons(skeleton, other, diagonal)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..interop.files import write_atomically
+from ..interop.files import check_ending, write_atomically
 from ..interop.open3d import require
 from ..interop.preview import DPI, INK, MOST_POINTS
 
@@ -33,7 +33,7 @@ def save_crosscheck_picture(
     ----------
     check : CrossCheck
     path : path-like
-        Written whatever its ending, as PNG, complete or not at all.
+        PNG; it appears complete or not at all.
     size : (width, height)
         In pixels.
     title : str, optional
@@ -41,11 +41,14 @@ def save_crosscheck_picture(
 
     Raises
     ------
+    FileFormatError
+        The ending is not ``.png``.
     MissingPackageError
         matplotlib is not installed.
     OSError
         The folder does not exist, or the file cannot be written.
     """
+    check_ending(path, "picture is a PNG", ".png")
     figure = _draw(check, np.asarray(size) / DPI, title)
     write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=DPI))
 

@@ -298,7 +298,8 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     apart = ~_at_junctions(skeleton, sections.places, cloud)
     counted = apart if (apart & found).any() else np.ones_like(found)
     found &= counted
-    centred = np.maximum(0, 1 - sections.offsets / np.maximum(sections.radii, np.finfo(float).tiny))[found]
+    offsets, radii = sections.offsets[found], sections.radii[found]
+    centred = 1 - np.divide(offsets, radii, out=np.sign(offsets), where=offsets < radii)
     bounded = found & (sections.open_angles < OPEN)
     nearest = cKDTree(sections.places[found])
     thickness = sections.radii[found][nearest.query(skeleton.vertices)[1]]

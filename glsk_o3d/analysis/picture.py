@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InvalidParameterError
 from ..interop import preview
-from ..interop.files import write_atomically
+from ..interop.files import check_ending, write_atomically
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -27,6 +27,7 @@ def save_picture(
     *,
     label: str,
     best: int = 0,
+    unknown: str = "not measured",
     size: tuple[int, int] = (1800, 760),
     title: str | None = None,
 ) -> None:
@@ -38,13 +39,15 @@ def save_picture(
     points : (N, 3) float array
         The cloud, in grey.
     values : (E,) float array
-        One per edge, shown from 0 to 1; those outside have the colour of the nearer end, and NaN is drawn in dark grey.
+        One per edge, shown from 0 to 1; those outside have the colour of the nearer end, and NaN is drawn in black.
     path : path-like
-        Written whatever its ending, as PNG, complete or not at all.
+        PNG; it appears complete or not at all.
     label : str
         What the values are, on the colour bar.
     best : {0, 1}
         The good end of the scale, dark blue; the bad one is orange.
+    unknown : str
+        What NaN means, below the colour bar if there is any.
     size : (width, height)
         In pixels.
     title : str, optional
@@ -54,20 +57,23 @@ def save_picture(
     ------
     InvalidParameterError
         There is not one value per edge.
+    FileFormatError
+        The ending is not ``.png``.
     MissingPackageError
         matplotlib is not installed.
     OSError
         The folder does not exist, or the file cannot be written.
     """
+    check_ending(path, "picture is a PNG", ".png")
     if np.shape(values) != (len(skeleton.edges),):
         raise InvalidParameterError(f"{len(skeleton.edges)} edges need as many values, not {np.shape(values)}")
     shown = dataclasses.replace(skeleton, points=points, vertex_of_point=np.empty(0), normals=np.empty(0))
     figure = preview.draw(shown, size, title)
-    _colour(figure, values, label, best)
+    _colour(figure, values, label, best, unknown)
     write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=preview.DPI))
 
 
-def _colour(figure, values, label, best):
+def _colour(figure, values, label, best, unknown):
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
@@ -90,3 +96,6 @@ def _colour(figure, values, label, best):
     bar.ax.tick_params(length=0, pad=2, labelsize=7, labelcolor=preview.INK)
     middle = (box[1] + _BAR[1] / 2) / height
     figure.text((box[0] - 0.1) / width, middle, label, ha="right", va="center_baseline", color=preview.INK, fontsize=8)
+    if np.isnan(values).any():
+        right, below = (width - _CORNER[0]) / width, (box[1] - 0.3) / height
+        figure.text(right, below, f"black: {unknown}", ha="right", va="top", color=preview.INK, fontsize=7)

@@ -14,17 +14,19 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import typer
 
-from ..errors import GlskError, InvalidParameterError, PluginWarning, SkeletonWarning
+from ..errors import GlskError, InvalidCloudError, InvalidParameterError, PluginWarning, SkeletonWarning
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
 
 # The library speaks Python; these are the same cures on the command line.
 _SAID_HERE = {
     "let RingBuilder(drop_invalid=True) drop them": "drop them with --drop-invalid",
+    "make one with glsk_o3d.skeletonize": "run 'glsk skeletonize' first",
     "pass cut_loops=True to drop": "add --cut-loops to drop",
     "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
 }
@@ -69,11 +71,13 @@ def print_table(table: Any, *, stderr: bool = False, whole: bool = False) -> Non
 
 
 @contextmanager
-def reporting(*, quiet: bool = False, verbose: bool = False) -> Iterator[None]:
+def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool = False) -> Iterator[None]:
     """Run a command: errors become one line and an exit code, warnings one line each.
 
     Parameters
     ----------
+    cloud : Path, optional
+        The file that the points are from: what is wrong with them is said with its name.
     quiet : bool
         Hide the warnings.
     verbose : bool
@@ -106,6 +110,10 @@ def reporting(*, quiet: bool = False, verbose: bool = False) -> Iterator[None]:
             raise  # the reader of our output has gone; typer ends quietly
         except (WrongUsage, InvalidParameterError) as error:
             problem, code = error, WRONG_USAGE
+        except InvalidCloudError as error:
+            problem, code = error, FAILED
+            if cloud is not None:
+                error.args = (f"{cloud}: {error}",)
         except (GlskError, OSError, MemoryError) as error:
             problem, code = error, FAILED
         except KeyboardInterrupt as error:

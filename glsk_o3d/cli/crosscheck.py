@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from .console import WrongUsage, holding_interrupts, print_json, print_rows, progress, reporting
-from .options import PipelineName, Quiet, Verbose
+from .options import Json, PipelineName, Quiet, Verbose
 
 
 def crosscheck(
@@ -33,7 +33,7 @@ def crosscheck(
         ),
     ] = "auto",
     output: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write all numbers as JSON; - is stdout.")
+        Path | None, typer.Option("--output", "-o", metavar="JSON", help="Write all numbers to a file.")
     ] = None,
     picture: Annotated[
         Path | None,
@@ -46,14 +46,16 @@ def crosscheck(
     drop_invalid: Annotated[
         bool, typer.Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")
     ] = False,
+    as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Check a scan's skeleton against that of a mesh made from it, computed with libigl.
+    """Check a scan against a mesh made from it.
 
-    The verdict is one of 'agrees', 'agrees in part' and 'do not trust'; whatever it is, the exit code is 0.
+    Both skeletons are computed, that of the mesh with libigl's Laplacian, and compared. The verdict is one of
+    'agrees', 'agrees in part' and 'do not trust'; whatever it is, the exit code is 0.
     """
-    with reporting(quiet=quiet, verbose=verbose):
+    with reporting(scan, quiet=quiet, verbose=verbose):
         from ..analysis import cross_check, save_crosscheck_picture
         from ..analysis.crosscheck import SURFACES
         from ..catalogue import nearest
@@ -67,8 +69,8 @@ def crosscheck(
             raise WrongUsage("--mesh gives a mesh: there is none to make with --method")
         if method not in ("auto", *SURFACES):
             raise WrongUsage(nearest(method, ("auto", *SURFACES), "method"))
-        to_stdout = output == Path("-")
-        check_findings(None if to_stdout else output, picture, scan, mesh)
+        files = [path for path in (output, picture) if path is not None]
+        check_findings(output, picture, scan, mesh)
         settings = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
         chosen = override(named_pipeline(pipeline), settings, name=pipeline)
         with progress(not quiet and not verbose) as update:
@@ -79,19 +81,18 @@ def crosscheck(
             update("comparing with a mesh")
             check = cross_check(cloud, surface, pipeline=chosen, max_points=max_points or None)
             told = {"scan": str(scan), "given_mesh": None if mesh is None else str(mesh), **check.to_dict()}
-            if output is not None and not to_stdout:
+            if output is not None:
                 text = json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
                 write_atomically(output, lambda temporary: temporary.write_text(text, encoding="utf-8"))
             if picture is not None:
                 update(f"drawing {picture.name}")
                 save_crosscheck_picture(check, picture, title=scan.name)
-        if to_stdout:
-            print_json(told)
+        if as_json:
+            print_json({**told, "files": [str(path) for path in files]})
         elif not quiet:
             print_rows(_rows(told), title=f"{scan}: {check.verdict}")
-            for path in (output, picture):
-                if path is not None:
-                    typer.echo(f"wrote {path}")
+            for path in files:
+                typer.echo(f"wrote {path}")
 
 
 def _rows(told: dict[str, Any]) -> dict[str, Any]:

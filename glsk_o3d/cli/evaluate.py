@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,8 +13,11 @@ from .console import holding_interrupts, print_json, print_table, progress, repo
 from .options import Json, Quiet, Verbose
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ..analysis import Assessment, Comparison
 
+_BLACK = "around a junction, not measured"
 _NUMBERS = {  # measure: (best, what it is), as the table shows them
     "centredness": ("1", "1 - offset from the section's middle, in radii"),
     "boundedness": ("1", "share of the length inside the cloud"),
@@ -58,9 +62,9 @@ def evaluate(
     From the cloud alone: is it centred, inside, smooth, in as many parts, and without false loops. With a truth also:
     how far is it from the true axis.
     """
-    with reporting(quiet=quiet, verbose=verbose):
+    with reporting(cloud, quiet=quiet, verbose=verbose):
         from ..analysis import assess, compare, read_truth, save_picture
-        from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
+        from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
         from ..interop.files import read_cloud, read_skeleton, write_atomically
         from ..interop.open3d import cloud_points
         from .running import check_findings
@@ -81,8 +85,12 @@ def evaluate(
                 assessment = assess(curve, points) if comparison is None or curve.edge_lengths.any() else None
             except InvalidParameterError as error:  # the file's fault, not that of the command line
                 raise FileFormatError(f"{skeleton}: {error}") from error
-            except InvalidCloudError as error:
-                raise InvalidCloudError(f"{cloud}: {error}") from error
+            if assessment is not None and _elsewhere(assessment, curve.vertices, points):
+                warnings.warn(
+                    f"{cloud}: the skeleton does not lie in it: is this the cloud it was made from, in its units?",
+                    SkeletonWarning,
+                    stacklevel=1,
+                )
             told = {
                 "skeleton": str(skeleton),
                 "cloud": str(cloud),
@@ -99,13 +107,24 @@ def evaluate(
                     values, label, best = comparison.edge_error, "error in true radii", 0
                 elif assessment is not None:
                     values, label, best = assessment.edge_centredness, "centredness", 1
-                save_picture(curve, points, values, preview, label=label, best=best, title=skeleton.name)
+                save_picture(
+                    curve, points, values, preview, label=label, best=best, unknown=_BLACK, title=skeleton.name
+                )
         if as_json:
             print_json({**told, "files": [str(path) for path in files]})
         elif not quiet:
             _print_measures(assessment, comparison)
             for path in files:
                 typer.echo(f"wrote {path}")
+
+
+def _elsewhere(assessment: Assessment, vertices: np.ndarray, points: np.ndarray) -> bool:
+    """Whether a skeleton can hardly be that of the points: it is not inside, longer than they, or very much shorter."""
+    import numpy as np
+
+    points = points[np.isfinite(points).all(axis=1)]
+    cloud, curve = (np.linalg.norm(np.ptp(places, axis=0)) for places in (points, vertices))
+    return min(assessment.boundedness, assessment.centredness) < 0.1 or not 0.8 * curve < cloud < 20 * curve
 
 
 def _print_measures(assessment: Assessment | None, comparison: Comparison | None) -> None:

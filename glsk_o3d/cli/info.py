@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .console import holding_interrupts, print_iterations, print_json, print_rows, reporting
-from .options import Json, Verbose
+from .options import Json, Quiet, Verbose
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -21,11 +20,12 @@ def info(
         typer.Argument(metavar="FILE", help="A cloud, a mesh or a skeleton, in any format that is read or written."),
     ],
     as_json: Json = False,
+    quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Say what is in a cloud or skeleton file."""
-    with reporting(verbose=verbose):
-        from ..interop.files import read_cloud, read_skeleton
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..interop.files import holds_skeleton, read_scan, read_skeleton
 
         if holds_skeleton(file):
             skeleton = read_skeleton(file)
@@ -33,50 +33,27 @@ def info(
             records = skeleton.report.iterations
         else:
             with holding_interrupts():
-                cloud = read_cloud(file)
-            told, records = cloud_facts(cloud), ()
+                cloud, triangles = read_scan(file)
+            told, records = cloud_facts(cloud, len(triangles)), ()
         if as_json:
             iterations = {"iterations": skeleton.report.to_dict()["iterations"]} if records else {}
             print_json({"file": str(file), **told, **iterations})
+            return
+        if quiet:
             return
         print_rows({name: _words(value) for name, value in told.items()}, title=str(file))
         if records:
             print_iterations(records)
 
 
-def holds_skeleton(path: Path) -> bool:
-    """Whether a file holds a skeleton: PLY with an element ``edge``, OBJ with lines and no faces, or by the ending.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    bool
-        False also for what does not exist or is unknown: reading it as a cloud says so.
-    """
-    from ..interop.files import CLOUD_ENDINGS, MESH_ENDINGS
-
-    ending = path.suffix.lower()
-    if not path.is_file() or ending not in (".ply", ".obj"):
-        return path.is_file() and ending not in CLOUD_ENDINGS + MESH_ENDINGS
-    with path.open("rb") as stream:
-        if ending == ".obj":
-            keywords = {line.split(maxsplit=1)[0] for line in stream if line.strip()}
-            return b"l" in keywords and b"f" not in keywords
-        for line in islice(stream, 1000):
-            if line.startswith((b"element edge", b"end_header")):
-                return line.startswith(b"element edge")
-    return False
-
-
-def cloud_facts(cloud: Any) -> dict[str, Any]:
+def cloud_facts(cloud: Any, triangles: int = 0) -> dict[str, Any]:
     """What there is to know about a cloud before skeletonising it.
 
     Parameters
     ----------
     cloud : open3d.geometry.PointCloud
+    triangles : int
+        Of the mesh whose vertices the points are, if they are.
 
     Returns
     -------
@@ -96,6 +73,7 @@ def cloud_facts(cloud: Any) -> dict[str, Any]:
     return {
         "kind": "cloud",
         "points": len(points),
+        "triangles": triangles or None,
         "not_finite": len(points) - len(finite),
         "duplicates": len(finite) - len(distinct),
         "lowest": low.tolist(),
@@ -121,7 +99,6 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
     """
     import numpy as np
 
-    from ..recipes import gaps
     from .running import structure
 
     report = skeleton.report
@@ -139,10 +116,21 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
         "stages": [stage for i, stage in enumerate(report.stages) if stage not in report.stages[:i]],
         "converged": report.converged,
         "stop_reason": report.stop_reason,
-        "repeatable": bool(report.recipe) and not any(gaps(report.recipe)),
+        "repeatable": _repeatable(report.recipe),
         "warnings": list(report.warnings),
         "versions": report.versions,
     }
+
+
+def _repeatable(recipe) -> bool:
+    """Whether a recipe can be run here: some cannot be written, and some need a plugin."""
+    from ..errors import RecipeError
+    from ..recipes import from_recipe
+
+    try:
+        return bool(recipe and from_recipe(recipe))
+    except RecipeError:
+        return False
 
 
 def _words(value):

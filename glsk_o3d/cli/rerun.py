@@ -27,12 +27,13 @@ def rerun(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Repeat the run that made a result, with the recipe that it holds.
+    """Repeat the run that made a result.
 
-    On the points of the result the skeleton is the same to the last bit; where other releases make it differ, there is
-    a warning. 'glsk skeletonize --recipe' runs recipes from files of their own.
+    It is run with the recipe that the result holds. On the points of the result the skeleton is the same to the last
+    bit; where other releases make it differ, there is a warning. 'glsk skeletonize --recipe' runs recipes from files
+    of their own.
     """
-    with reporting(quiet=quiet, verbose=verbose):
+    with reporting(scan or result, quiet=quiet, verbose=verbose):
         from ..errors import RecipeError
         from ..interop.files import read_cloud, read_skeleton
         from ..recipes import rerun as run_again

@@ -244,7 +244,7 @@ def write_each(writers: Mapping[Path, Callable[[Path], object]], update) -> tupl
             save(path)
             written.append(path)
         except OSError as error:
-            problems.append(f"{path}: cannot be written: {error.strerror or error}")
+            problems.append(f"{path}: {error.strerror or f'cannot be written: {error}'}")
         except GlskError as error:
             problems.append(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}")
     return written, problems

@@ -57,7 +57,7 @@ def skeletonize(
 
     Everything that can be checked is checked before the computation starts. Files appear complete or not at all.
     """
-    with reporting(quiet=quiet, verbose=verbose):
+    with reporting(scan, quiet=quiet, verbose=verbose):
         from ..interop.files import read_cloud
         from ..pipelines import named_pipeline
         from ..recipes import load_recipe, recipe_ending

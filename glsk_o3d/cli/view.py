@@ -24,17 +24,17 @@ def view(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Look at a skeleton or a scan in a window, where there is a display.
+    """Look at a skeleton or a scan in a window.
 
-    In the window, C, S and T show and hide the cloud, the skeleton, and its tubes of true radius; H helps, Q closes.
+    That needs a display; --preview and --report make files instead. In the window, C, S and T show and hide the cloud,
+    the skeleton, and its tubes of true radius; H helps, Q closes.
     """
     with reporting(quiet=quiet, verbose=verbose):
         import numpy as np
 
-        from ..interop.files import read_cloud, read_skeleton
+        from ..interop.files import holds_skeleton, read_cloud, read_skeleton
         from ..skeleton import Skeleton
         from ..viewing.window import show
-        from .info import holds_skeleton
         from .running import check_outputs, write
 
         elsewhere = preview is not None or report is not None

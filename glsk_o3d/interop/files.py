@@ -14,6 +14,7 @@ import os
 import shutil
 import uuid
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -60,11 +61,34 @@ def read_cloud(path: str | os.PathLike) -> Any:
     ------
     FileNotFoundError
     FileFormatError
-        A folder, an unknown ending, or a file that is empty, damaged, broken off, or without points.
+        A folder, a skeleton, an unknown ending, or a file that is empty, damaged, broken off, or without points.
     MissingPackageError
+
+    Notes
+    -----
+    Where the triangles of a mesh are large, its vertices say little about the surface: then there is a warning in the
+    log.
+    """
+    cloud, _ = read_scan(path)
+    return cloud
+
+
+def read_scan(path: str | os.PathLike) -> tuple[Any, np.ndarray]:
+    """Read a point cloud as `read_cloud` does, and the triangles between its points if it is a mesh.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    cloud : open3d.geometry.PointCloud
+    triangles : (T, 3) int array
     """
     path = check_scan(path)
     ending, rows = path.suffix.lower(), 0
+    if _is_skeleton(path):
+        raise FileFormatError(f"{path}: is a skeleton, not a scan")
     if ending not in CLOUD_ENDINGS + MESH_ENDINGS:
         raise _unknown(path, CLOUD_ENDINGS + MESH_ENDINGS)
     if ending.startswith(".xyz"):
@@ -73,10 +97,12 @@ def read_cloud(path: str | os.PathLike) -> Any:
     o3d = import_open3d()
     try:
         with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+            mesh = o3d.geometry.TriangleMesh()
+            if ending in MESH_ENDINGS or (ending == ".ply" and "face" in ply_elements(path)):
+                mesh = o3d.io.read_triangle_mesh(str(path))
             if ending in CLOUD_ENDINGS:
                 cloud = o3d.io.read_point_cloud(str(path), format=ending[1:])
             else:
-                mesh = o3d.io.read_triangle_mesh(str(path))
                 cloud = o3d.geometry.PointCloud(mesh.vertices)
                 cloud.normals, cloud.colors = mesh.vertex_normals, mesh.vertex_colors
     except Exception as error:  # std::bad_alloc, undecodable text
@@ -86,7 +112,37 @@ def read_cloud(path: str | os.PathLike) -> Any:
     if rows > len(cloud.points):
         with following_open3d():
             _log.warning("%s: %d of %d lines hold no point and were skipped", path, rows - len(cloud.points), rows)
-    return cloud
+    triangles = np.asarray(mesh.triangles)
+    if _coarse(np.asarray(mesh.vertices), triangles):
+        with following_open3d():
+            _log.warning(
+                "%s: the %d vertices of this mesh are far apart, and only vertices count as points: sample its surface "
+                "first, for example with Open3D's sample_points_uniformly",
+                *(path, len(cloud.points)),
+            )
+    return cloud, triangles
+
+
+def _coarse(vertices, triangles) -> bool:
+    """Whether triangles with a side of more than a tenth of the diagonal make up half of the surface."""
+    if len(triangles) == 0 or triangles.min() < 0 or triangles.max() >= len(vertices):
+        return False
+    with np.errstate(all="ignore"):  # vertices may be anything
+        sides = vertices[triangles] - vertices[np.roll(triangles, 1, axis=1)]
+        area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+        large = np.linalg.norm(sides, axis=2).max(axis=1) > np.linalg.norm(np.ptp(vertices, axis=0)) / 10
+        return bool(area[large].sum() > area.sum() / 2)
+
+
+def _is_skeleton(path: Path) -> bool:
+    """Whether a file is a skeleton: for endings that scans do not have, whether it can be read as one."""
+    if path.suffix.lower() in (".ply", ".obj"):
+        return holds_skeleton(path)
+    try:
+        read_skeleton(path)
+    except FileFormatError:
+        return False
+    return True
 
 
 def check_scan(path: str | os.PathLike) -> Path:
@@ -240,7 +296,7 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     ------
     FileNotFoundError
     FileFormatError
-        A folder, an unknown ending, or a file that is damaged or from a newer release.
+        A folder, a cloud, an unknown ending, or a file that is damaged or from a newer release.
     """
     path = _existing(path)
     ending = skeleton_ending(path, format)
@@ -249,8 +305,42 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
         return _FORMATS[ending][1](data)
     except MissingPackageError:
         raise
+    except _NoEdges:
+        raise FileFormatError(f"{path}: is a cloud, not a skeleton: make one with glsk_o3d.skeletonize") from None
     except Exception as error:  # whatever a parser raises on a hostile file
         raise FileFormatError(f"{path}: not a valid {ending} skeleton: {error}") from error
+
+
+def holds_skeleton(path: str | os.PathLike) -> bool:
+    """Whether a file holds a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    bool
+        False also for what does not exist or is unknown: reading it as a cloud says so.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if not path.is_file() or ending not in (".ply", ".obj"):
+        return path.is_file() and ending not in CLOUD_ENDINGS + MESH_ENDINGS
+    with path.open("rb") as stream:
+        if ending == ".ply":
+            with suppress(ValueError):
+                counts = {name: count for name, count, _ in _ply_header(stream)[1]}
+                return "edge" in counts and not counts.get("face")
+            return False
+        if stream.readline().startswith(_OBJ_MARK):
+            return True
+        keywords = {line.split(maxsplit=1)[0] for line in stream if line.strip()}
+        return b"l" in keywords and b"f" not in keywords
+
+
+class _NoEdges(Exception):
+    """A file in a format that clouds have too holds no edges, and was not written as a skeleton."""
 
 
 def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -> None:
@@ -269,9 +359,9 @@ def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -
     FileNotFoundError
         The folder does not exist.
     OSError
-        `path` is a folder or a device, or cannot be written.
+        `path` is a folder or a device, or cannot be written; the message names it, not the temporary file.
     """
-    path = Path(os.path.realpath(path))
+    given, path = path, Path(os.path.realpath(path))
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path.parent}: no such folder: make it before writing {path.name}")
     if path.exists() and not path.is_file():
@@ -282,8 +372,27 @@ def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -
         if path.exists():
             shutil.copymode(path, temporary)
         os.replace(temporary, path)
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, f"cannot be written: {os.strerror(error.errno)}", os.fspath(given)) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_ending(path: str | os.PathLike, what: str, *endings: str) -> None:
+    """Raise FileFormatError unless the name of a file to be written has the ending of what is written.
+
+    Parameters
+    ----------
+    path : path-like
+    what : str
+        For the message, such as ``"preview is a picture"``.
+    *endings : str
+        With their dots; the message names the first.
+    """
+    if Path(path).suffix.lower() not in endings:
+        raise FileFormatError(f"{os.fspath(path)}: the {what} and its name ends in {endings[0]}")
 
 
 def _existing(path) -> Path:
@@ -510,6 +619,11 @@ end_header
 def _read_ply(data: bytes) -> Skeleton:
     stream = io.BytesIO(data)
     order, elements = _ply_header(stream)
+    names = [name for name, _, _ in elements]
+    if "vertex" not in names:
+        raise ValueError("it has no element 'vertex'")
+    if "edge" not in names:
+        raise _NoEdges
     start, tables = stream.tell(), {}
     words = data[start:].split() if order == "" else []
     for name, count, fields in elements:
@@ -528,9 +642,7 @@ def _read_ply(data: bytes) -> Skeleton:
             if len(table) < count:
                 raise ValueError(f"it breaks off in element {name!r}")
             tables[name], start = {key: table[key] for key in keys}, start + size
-    if "vertex" not in tables:
-        raise ValueError("it has no element 'vertex'")
-    vertex, edge = tables["vertex"], tables.get("edge", {"vertex1": [], "vertex2": []})
+    vertex, edge = tables["vertex"], tables["edge"]
     xyz = np.column_stack([vertex[axis] for axis in "xyz"]).astype(float)
     radii = np.array(vertex["radius"], float) if "radius" in vertex else None
     return graph_skeleton(xyz, np.column_stack([edge["vertex1"], edge["vertex2"]]), radii)
@@ -553,10 +665,13 @@ def _lines(data: bytes) -> list[list[str]]:
     return [words for words in lines if words]
 
 
+_OBJ_MARK = b"# curve skeleton written by glsk-o3d"
+
+
 def _write_obj(skeleton: Skeleton) -> bytes:
     points = [_line("v", *vertex) for vertex in skeleton.vertices.tolist()]
     lines = [_line("l", *edge) for edge in (skeleton.edges + 1).tolist()]
-    return _text(["# curve skeleton written by glsk-o3d", *points, *lines])
+    return _text([_OBJ_MARK.decode(), *points, *lines])
 
 
 def _read_obj(data: bytes) -> Skeleton:
@@ -572,6 +687,8 @@ def _read_obj(data: bytes) -> Skeleton:
             edges += pairwise(ends)
     if not vertices:
         raise ValueError("it has no 'v' line")
+    if not (edges or data.startswith(_OBJ_MARK)):
+        raise _NoEdges
     return graph_skeleton(vertices, edges)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .files import write_atomically
+from .files import check_ending, write_atomically
 from .open3d import require
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def save_preview(
     ----------
     skeleton : Skeleton
     path : path-like
-        Written whatever its ending, as PNG, complete or not at all.
+        PNG; it appears complete or not at all.
     size : (width, height)
         In pixels.
     title : str, optional
@@ -40,6 +40,8 @@ def save_preview(
 
     Raises
     ------
+    FileFormatError
+        The ending is not ``.png``.
     MissingPackageError
         matplotlib is not installed.
     FileNotFoundError
@@ -47,6 +49,7 @@ def save_preview(
     OSError
         The file cannot be written.
     """
+    check_ending(path, "preview is a picture", ".png")
     figure = draw(skeleton, size, title)
     write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=DPI))
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..analysis.segmentation import branch_of_edge, branch_of_point, branch_of_vertex
 from ..errors import InvalidParameterError
-from ..interop.files import write_atomically
+from ..interop.files import check_ending, write_atomically
 from . import sections
 from .notebook import picture
 from .recorder import MOST_POINTS, ContractionRecorder, thinned
@@ -45,7 +45,7 @@ def save_report(
     ----------
     skeleton : Skeleton
     path : path-like
-        Written whatever its ending, complete or not at all.
+        HTML; it appears complete or not at all.
     recorder : ContractionRecorder, optional
         What was given as ``on_state`` to the run that made the skeleton. Without it there is no slider.
     title : str
@@ -53,6 +53,8 @@ def save_report(
 
     Raises
     ------
+    FileFormatError
+        The ending is neither ``.html`` nor ``.htm``.
     InvalidParameterError
         The recorder watched another run.
     FileNotFoundError
@@ -73,6 +75,7 @@ def save_report(
     >>> skeleton = glsk.skeletonize(torus(600).points, on_state=recorder)
     >>> glsk.save_report(skeleton, "report.html", recorder=recorder, title="A torus")  # doctest: +SKIP
     """
+    check_ending(path, "report is a page", ".html", ".htm")
     page = _page(skeleton, recorder, title).encode("utf-8", "replace")  # a file name may be no Unicode
     write_atomically(path, lambda temporary: temporary.write_bytes(page))
 

@@ -251,12 +251,16 @@ def test_poisson_and_a_single_method(ring):
         ((np.eye(3), [[0.0, 1, 2]]), "names a vertex that is not there"),
         ((np.eye(3) * np.nan, [[0, 1, 2]]), "not finite"),
         (o3d.geometry.TriangleMesh(), "needs"),
-        ((np.eye(3) + 100, [[0, 1, 2]]), "same units and place"),
     ],
 )
 def test_useless_meshes(ring, mesh, message):
     with pytest.raises(InvalidParameterError, match=message):
         cross_check(ring.points, mesh)
+
+
+def test_a_mesh_that_lies_elsewhere(ring):
+    with pytest.raises(InvalidCloudError, match="same units and place"):
+        cross_check(ring.points, (np.eye(3) + 100, [[0, 1, 2]]))
 
 
 def test_arrays_of_a_mesh_are_copies():

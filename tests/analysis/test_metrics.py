@@ -315,6 +315,12 @@ def test_no_curve_to_assess(pipe, vertices):
         assess(curve(vertices), pipe.points)
 
 
+@pytest.mark.parametrize(("away", "centredness"), [(0, 1), (1, 0), (100, 0)])
+def test_points_in_a_row_have_sections_without_a_radius(away, centredness):
+    row = np.linspace(LINE[0], LINE[1], 200) + np.cross(np.subtract(*LINE), [1, 2, 3]) * away
+    assert assess(curve(LINE), row).centredness == centredness
+
+
 @pytest.mark.parametrize("cloud", [np.zeros((20, 3)), np.full((20, 3), np.nan), np.eye(3)])
 def test_clouds_with_too_few_points(cloud):
     with pytest.raises(InvalidCloudError, match="6 points around"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.analysis import assess, compare, save_picture
-from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.interop.files import save_skeleton
 from glsk_o3d.samples import torus
 from glsk_o3d.skeleton import Skeleton
@@ -122,6 +122,13 @@ def test_a_cloud_of_something_else(refused, folder, tmp_path_factory, write_scan
     assert "few.ply: no part of the skeleton has 6 points around it" in refused(1, "evaluate", folder / "s.json", cloud)
 
 
+def test_a_cloud_elsewhere_or_in_other_units(invoke, folder, tmp_path, write_scan, ring):
+    for points in (ring.points + [9, 0, 0], 1000 * ring.points, ring.points / 1000):
+        result = invoke("evaluate", folder / "s.json", write_scan(tmp_path / "c.ply", points))
+        assert result.exit_code == 0
+        assert "c.ply: the skeleton does not lie in it: is this the cloud it was made from" in result.stderr
+
+
 def test_help_loads_nothing_heavy():
     code = "import sys\nfrom glsk_o3d.cli.main import app\ntry:\n    app(['evaluate', '--help'])\nexcept SystemExit:\n"
     code += "    print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr)"
@@ -141,7 +148,17 @@ def test_the_picture_tells_good_from_bad(ring, moved, tmp_path):
     assert list(counts.values()) == [good, bad, bad, bad, good, (False, False)]
 
 
+def test_the_legend_tells_what_black_is(ring, moved, tmp_path):
+    legends = []
+    for value in (0.5, np.nan):
+        save_picture(moved, ring.points, np.full(len(moved.edges), value), tmp_path / "p.png", label="measure")
+        legends.append((imread(tmp_path / "p.png")[85:110, 1400:, :3] < 0.5).sum())
+    assert legends[0] == 0 < legends[1]
+
+
 def test_the_picture_needs_a_value_per_edge(ring, moved, tmp_path):
     with pytest.raises(InvalidParameterError, match="128 edges need as many values"):
         save_picture(moved, ring.points, np.zeros(3), tmp_path / "p.png", label="measure")
+    with pytest.raises(FileFormatError, match=r"p\.jpg: the picture is a PNG"):
+        save_picture(moved, ring.points, np.zeros(128), tmp_path / "p.jpg", label="measure")
     assert list(tmp_path.iterdir()) == []

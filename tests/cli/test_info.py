@@ -33,6 +33,14 @@ def test_cloud(told, scans):
     assert 0.005 < facts["median_spacing"] < 0.05
 
 
+def test_a_scan_is_no_skeleton_and_a_skeleton_no_scan(refused, invoke, scans, tmp_path):
+    line = refused(1, "branches", scans / "ring.ply")
+    assert line == f"{scans / 'ring.ply'}: is a cloud, not a skeleton: run 'glsk skeletonize' first"
+    invoke("skeletonize", scans / "ring.ply", "-o", "s.json", "-o", "s.obj")
+    for words in (["skeletonize", "s.obj"], ["rerun", "s.json", "s.obj"]):
+        assert refused(1, *words, "-o", "a.ply") == "s.obj: is a skeleton, not a scan"
+
+
 def test_numbers_of_a_small_cloud(told, tmp_path):
     rows = [[x, 2 * y, 0] for x in range(3) for y in range(2)]
     np.savetxt(tmp_path / "grid.xyz", [*rows, rows[0]])
@@ -78,9 +86,22 @@ def test_the_report_of_the_run(told, skeleton, invoke):
     assert all(f"{each.explained:.4f}" in table for each in report.iterations)
 
 
-def test_a_mesh_is_a_cloud(told, tmp_path):
+def test_a_run_with_a_filter_that_is_not_installed_cannot_be_repeated(told, skeleton, tmp_path):
+    data = json.loads((tmp_path / "s.json").read_text())
+    data["report"]["recipe"]["pipeline"].insert(0, {"filter": "Slab"})
+    (tmp_path / "s.json").write_text(json.dumps(data))
+    assert told("s.json")["repeatable"] is False
+
+
+def test_a_mesh_is_a_cloud(told, invoke, tmp_path):
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    assert (told("m.obj")["kind"], told("m.obj")["points"]) == ("cloud", 3)
+    facts = told("m.obj")
+    assert (facts["kind"], facts["points"], facts["triangles"]) == ("cloud", 3, 1)
+    result = invoke("info", "m.obj")
+    assert "triangles" in result.stdout
+    assert "m.obj: the 3 vertices of this mesh are far apart" in result.stderr
+    assert invoke("info", "m.obj", "-q").output == ""
+    assert json.loads(invoke("info", "m.obj", "-q", "--json").stdout)["points"] == 3
 
 
 @pytest.mark.parametrize(

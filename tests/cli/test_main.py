@@ -48,19 +48,25 @@ def test_demo(glsk, tmp_path):
     assert run.stdout.count("wrote there/demo/") == 4
 
 
-def test_nothing_is_half_written_on_a_full_disk(glsk, scans, tmp_path):
+def test_nothing_is_half_written_on_a_full_disk(glsk, scans, tmp_path, tree):
     old = tmp_path / "s.ply"
     old.write_text("kept")
 
-    def little_room():
+    def little_room(size=1000):
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
     files = ("-o", "s.ply", "-o", "s.json", "--preview", "s.png")
     line = failed(glsk("skeletonize", scans / "sample.ply", *files, "--quiet", preexec_fn=little_room), 1)
-    assert all(f"{name}: cannot be written" in line for name in ("s.ply", "s.json", "s.png"))
+    assert all(f"{name}: cannot be written: File too large" in line for name in ("s.ply", "s.json", "s.png"))
     assert [path.name for path in tmp_path.iterdir()] == ["s.ply"]
     assert old.read_text() == "kept"
+
+    tree.save(old)
+    for words in (["branches", old, "-o", "s.csv"], ["evaluate", old, scans / "sample.ply", "-o", "s.json"]):
+        line = failed(glsk(*words, "--quiet", preexec_fn=lambda: little_room(100)), 1)
+        assert line == f"glsk: error: {words[-1]}: cannot be written: File too large\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["s.ply"]
 
 
 def test_failure_and_wrong_usage_differ(glsk, scans, tmp_path):
@@ -75,7 +81,7 @@ def test_failure_and_wrong_usage_differ(glsk, scans, tmp_path):
 
 def test_points_that_are_not_finite(glsk, scans, tmp_path):
     line = failed(glsk("skeletonize", scans / "nan.ply", "-o", "s.npz"), 1)
-    assert "2 of 1000 points" in line
+    assert f"{scans / 'nan.ply'}: 2 of 1000 points" in line
     assert "--drop-invalid" in line
     assert "RingBuilder(" not in line
     run = glsk("skeletonize", scans / "nan.ply", "-o", "s.npz", "--drop-invalid", "--json")
@@ -100,6 +106,17 @@ except SystemExit as done:
         assert code_ == "0"
         assert not set(loaded) & {"open3d", "matplotlib", "numpy", "scipy", "networkx"}
     assert run.stdout == f"glsk-o3d {glsk_o3d.__version__}\n"
+
+
+def test_help_cuts_no_line(invoke, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert "..." not in invoke("--help").stdout.partition("Commands:")[2]
+
+
+def test_as_a_module(tmp_path):
+    words = [sys.executable, "-m", "glsk_o3d", "info", "none.ply"]
+    run = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
+    assert (run.returncode, run.stderr) == (1, "glsk: error: none.ply: no such file\n")
 
 
 def test_help_tells_the_exit_codes(invoke):

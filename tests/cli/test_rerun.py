@@ -58,6 +58,9 @@ def test_settings_change_a_recipe(invoke, scans, tmp_path, made):
         (1, ["rerun", "s.json", "none.ply", "-o", "a.ply"], "none.ply: no such file"),
         (1, ["rerun", "s.ply", "-o", "a.ply"], "s.ply: cannot be repeated: it holds no recipe"),
         (1, ["rerun", "gap.json", "-o", "a.ply"], "gap.json: cannot be repeated: pipeline[1].reducer: a recipe cannot"),
+        (1, ["rerun", "gone.json", "-o", "a.ply"], "gone.json: cannot be repeated: pipeline[0].filter: no filter is"),
+        (1, ["rerun", "gone.json", "-o", "a.ply"], "(or install the plugin that it is from)"),
+        (1, ["rerun", "s.json", "few.xyz", "-o", "a.ply"], "few.xyz: 3 finite points"),
         (2, ["skeletonize", "SCAN", "--recipe", "r.toml", "-o", "r.toml"], "r.toml: unknown ending"),
         (
             2,
@@ -87,6 +90,9 @@ def test_refused_before_anything_runs(invoke, scans, tmp_path, made, code, words
     data = json.loads((tmp_path / "s.json").read_text())
     data["report"]["recipe"]["pipeline"][1]["reducer"] = {"unwritten": "a function"}
     (tmp_path / "gap.json").write_text(json.dumps(data))
+    data["report"]["recipe"]["pipeline"] = [{"filter": "Slab"}]
+    (tmp_path / "gone.json").write_text(json.dumps(data))
+    np.savetxt("few.xyz", np.eye(3))
     for name, k in (("bad", 1), ("part", 9)):
         recipe = {"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "RingBuilder", "k": k}]}
         (tmp_path / f"{name}.json").write_text(json.dumps(recipe))

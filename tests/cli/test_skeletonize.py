@@ -40,7 +40,7 @@ def no_run(monkeypatch):
         (1, ["-o", "s.ply", "--preview", "no/s.png"], "no: no such folder"),
         (1, ["--report", "no/s.html"], "no: no such folder"),
         (1, ["-o", "/proc/s.ply"], "/proc/s.ply: no file can be made in this folder"),
-        (2, ["-o", "s.ply", "--pipeline", "wen2042"], "no pipeline is called 'wen2042': there are default, wen2024"),
+        (2, ["-o", "s.ply", "--pipeline", "wen2042"], "no pipeline is called 'wen2042': did you mean 'wen2024'?"),
         (2, ["-o", "s.ply", "--set", "Connector.radius=-1"], "Connector.radius = -1.0: must be above 0"),
         (2, ["-o", "s.ply", "--set", "RingSizeRatio.threshold=1"], "RingSizeRatio is not in the pipeline 'default'"),
     ],
@@ -143,7 +143,7 @@ def test_verbose_shows_where_an_error_comes_from(invoke, scans):
     result = invoke("skeletonize", scans / "nan.ply", "-o", "s.ply", "--verbose")
     assert result.exit_code == 1
     assert "Traceback" in result.stderr
-    assert result.stderr.splitlines()[-1].startswith("glsk: error: 2 of 1000 points")
+    assert result.stderr.splitlines()[-1].startswith(f"glsk: error: {scans / 'nan.ply'}: 2 of 1000 points")
 
 
 def test_json_is_all_there_is_on_stdout(invoke, scans):

@@ -541,9 +541,57 @@ def test_meshes_give_their_vertices(tmp_path, ending):
     np.testing.assert_array_equal(back, np.unique(np.asarray(mesh.vertices), axis=0))
 
 
-def test_a_skeleton_in_ply_is_also_a_cloud(tree, tmp_path):
-    tree.save(tmp_path / "s.ply")
-    np.testing.assert_array_equal(np.asarray(read_cloud(tmp_path / "s.ply").points), tree.vertices)
+@pytest.mark.parametrize("ending", ALL)
+def test_a_skeleton_is_no_scan(skeleton, tmp_path, ending):
+    skeleton.save(tmp_path / f"s{ending}", **({"cut_loops": True} if ending == ".swc" else {}))
+    with pytest.raises(FileFormatError, match=rf"s\{ending}: is a skeleton, not a scan"):
+        read_cloud(tmp_path / f"s{ending}")
+
+
+@pytest.mark.parametrize("name", ["c.npz", "c.json", "c.txt"])
+def test_what_is_neither_scan_nor_skeleton(tmp_path, name):
+    (tmp_path / name).write_text("{}")
+    with pytest.raises(FileFormatError, match=rf"{name}: unknown ending; known are \.ply, \.pcd"):
+        read_cloud(tmp_path / name)
+
+
+@pytest.mark.parametrize("ending", [".ply", ".obj"])
+@pytest.mark.parametrize("mesh", [False, True])
+def test_a_scan_is_no_skeleton(cloud, tmp_path, ending, mesh):
+    import open3d as o3d
+
+    path = tmp_path / f"c{ending}"
+    if mesh:
+        o3d.io.write_triangle_mesh(str(path), o3d.geometry.TriangleMesh.create_octahedron())
+    elif ending == ".ply":
+        o3d.io.write_point_cloud(str(path), cloud)
+    else:
+        path.write_text("v 0 0 0\nv 1 0 0\n")
+    with pytest.raises(FileFormatError, match=rf"c\{ending}: is a cloud, not a skeleton: make one with"):
+        read_skeleton(path)
+
+
+@pytest.mark.parametrize("ending", ["ply", "off", "obj", "stl", "gltf"])
+@pytest.mark.parametrize(("resolution", "coarse"), [(5, True), (40, False)])
+def test_a_mesh_with_few_vertices_is_told(tmp_path, caplog, ending, resolution, coarse):
+    import open3d as o3d
+
+    mesh = o3d.geometry.TriangleMesh.create_sphere(2.0, resolution).translate((1000, 0, 0))
+    mesh.compute_vertex_normals()
+    o3d.io.write_triangle_mesh(str(tmp_path / f"m.{ending}"), mesh)
+    cloud, triangles = files.read_scan(tmp_path / f"m.{ending}")
+    assert len(triangles) == len(mesh.triangles)
+    assert triangles.max() < len(cloud.points)
+    assert ("vertices of this mesh are far apart" in caplog.text) == coarse
+
+
+def test_a_mesh_whose_triangles_name_what_is_not_there(tmp_path, caplog):
+    (tmp_path / "m.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"
+    )
+    assert len(read_cloud(tmp_path / "m.ply").points) == 3
+    assert not caplog.text
 
 
 def test_nan_passes_through(tmp_path):

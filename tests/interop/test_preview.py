@@ -4,7 +4,7 @@ import sys
 import numpy as np
 import pytest
 
-from glsk_o3d.errors import MissingPackageError
+from glsk_o3d.errors import FileFormatError, MissingPackageError
 from glsk_o3d.interop import preview
 from glsk_o3d.interop.preview import save_preview
 
@@ -87,6 +87,13 @@ def test_failure_leaves_nothing(tree, tmp_path, monkeypatch):
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, path, **_: path.write_bytes(b"half") / 0)
     with pytest.raises(ZeroDivisionError):
         save_preview(tree, tmp_path / "p.png")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["p.jpg", "p", "p.png.bak"])
+def test_other_endings_are_refused(tree, tmp_path, name):
+    with pytest.raises(FileFormatError, match=rf"{name}: the preview is a picture and its name ends in \.png"):
+        save_preview(tree, tmp_path / name)
     assert not list(tmp_path.iterdir())
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import ContractionRecorder, Contractor, InvalidParameterError, RingBuilder, save_report
+from glsk_o3d import ContractionRecorder, Contractor, FileFormatError, InvalidParameterError, RingBuilder, save_report
 from glsk_o3d.report import IterationRecord
 from glsk_o3d.samples import torus
 from glsk_o3d.viewing import sections
@@ -147,6 +147,13 @@ def test_any_skeleton_makes_a_page_that_asks_for_nothing(skeleton, tmp_path):
 def test_names_that_are_no_unicode(tree, tmp_path):
     save_report(tree, tmp_path / "r.html", title="caf\udce9.ply")
     assert "<title>caf?.ply</title>" in (tmp_path / "r.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", ["r.txt", "r"])
+def test_other_endings_are_refused(tree, tmp_path, name):
+    with pytest.raises(FileFormatError, match=rf"{name}: the report is a page and its name ends in \.html"):
+        save_report(tree, tmp_path / name)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_failure_leaves_what_was_there(tree, tmp_path, monkeypatch):
