@@ -45,7 +45,7 @@ def run(
 
     The whole script is checked before anything is run. Filters of MeshLab's own need pymeshlab.
     """
-    with reporting(quiet=quiet, verbose=verbose):
+    with reporting(scan, quiet=quiet, verbose=verbose):
         from ..interop.meshlab.layers import Layer, check_ending
         from ..interop.meshlab.plan import PlainLayers, find_script, read_steps
         from .running import check_outputs, write_each

@@ -356,9 +356,9 @@ def test_obj_of_meshlab_keeps_the_edges(tree, tmp_path):
     np.testing.assert_array_equal(back.edges, tree.edges)
 
 
-def test_without_pymeshlab_the_extra_is_named(tree, monkeypatch):
+def test_without_pymeshlab_it_is_named(tree, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
-    with pytest.raises(MissingPackageError, match=r"pymeshlab.*glsk-o3d\[meshlab\]"):
+    with pytest.raises(MissingPackageError, match=r"pymeshlab.*pip install .pymeshlab"):
         tree.to_pymeshlab()
 
 
@@ -374,7 +374,7 @@ glsk_o3d.MeshSet
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert run.stderr.rstrip().endswith(
-        'MissingPackageError: pymeshlab cannot be imported: pip install "glsk-o3d[meshlab]"'
+        'MissingPackageError: pymeshlab cannot be imported: pip install "pymeshlab>=2023.12"'
     )
 
 

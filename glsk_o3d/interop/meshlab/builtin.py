@@ -14,7 +14,7 @@ from ...catalogue import nearest
 from ..open3d import require
 from .script import BOOL, FLOAT, INT, LENGTH, MATRIX, POINT, TEXT, Param
 
-EXTRA = "glsk-o3d[meshlab]"
+EXTRA = "pymeshlab>=2023.12"
 
 
 @cache

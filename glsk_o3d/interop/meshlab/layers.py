@@ -15,6 +15,7 @@ from ...state import Contraction
 from .. import files
 from ..files import graph_skeleton, read_cloud, read_skeleton, save_skeleton, skeleton_ending, write_atomically
 from ..open3d import cloud_points, import_open3d, require
+from .builtin import EXTRA
 
 ENDINGS = {"points": (".ply", ".pcd", ".xyz"), "mesh": (".ply", ".obj", ".off", ".stl")}
 """What layers without edges are written as."""
@@ -137,7 +138,7 @@ class Layer:
         ------
         MissingPackageError
         """
-        pymeshlab = require("pymeshlab", "glsk-o3d[meshlab]")
+        pymeshlab = require("pymeshlab", EXTRA)
         given = dict(
             vertex_matrix=(self.vertices, float),
             face_matrix=(self.faces, np.int32),
