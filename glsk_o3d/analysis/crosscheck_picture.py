@@ -9,7 +9,7 @@ import numpy as np
 
 from ..interop.files import write_atomically
 from ..interop.open3d import require
-from ..interop.preview import DPI, INK, MOST_POINTS
+from ..interop.preview import DPI, INK, MOST_POINTS, printable
 
 if TYPE_CHECKING:
     from .crosscheck import CrossCheck
@@ -109,7 +109,7 @@ def _shown(check):
 
 
 def _write(figure, check, title, height):
-    head = f"{title}: {check.verdict}" if title else check.verdict
+    head = f"{printable(title)}: {check.verdict}" if title else check.verdict
     style = dict(ha="center", color=INK, parse_math=False)
     figure.text(0.5, 1 - 0.33 / height, head, fontsize=12, **style)
     for row, reason in enumerate(check.reasons[:3]):

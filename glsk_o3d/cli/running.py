@@ -229,6 +229,8 @@ def write(
             problems.append(f"{path}: cannot be written: {error.strerror or error}")
         except GlskError as error:
             problems.append(f"{path}: {error}")
+        except Exception as error:  # a mistake in one writer: what was computed goes into the other files all the same
+            problems.append(f"{path}: cannot be written: {type(error).__name__}: {error}")
     return written, problems
 
 
