@@ -307,6 +307,9 @@ def _check_head(recipe: Any) -> None:
         raise RecipeError(f"glsk_o3d.version: must be {VERSION}, not {_short(version)}")
     if version > VERSION:
         raise RecipeError(f"glsk_o3d.version: is {version} and this release reads {VERSION}: update glsk-o3d")
+    for key in head:
+        if key != "version":
+            raise RecipeError(f"glsk_o3d.{key}: there is only 'version' in this table")
     for key in recipe:
         if key not in ("glsk_o3d", "pipeline", "extends", "set"):
             raise RecipeError(f"{key}: {nearest(str(key), ('pipeline', 'extends', 'set'), 'key of a recipe')}")
