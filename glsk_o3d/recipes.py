@@ -396,6 +396,23 @@ def _short(value: Any) -> str:
 # ---------------------------------------------------------------------------------------------------------- repeating
 
 
+def identical(skeleton: Skeleton, other: Skeleton) -> bool:
+    """Whether two skeletons have the same vertices, edges and radii, to the last bit.
+
+    Parameters
+    ----------
+    skeleton, other : Skeleton
+
+    Returns
+    -------
+    bool
+    """
+    return all(
+        np.array_equal(getattr(skeleton, name), getattr(other, name), equal_nan=name == "radii")
+        for name in ("vertices", "edges", "radii")
+    )
+
+
 def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -> Skeleton:
     """Make a skeleton again with the recipe in its report.
 
@@ -444,7 +461,7 @@ def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -
         for stage in pipeline.stages[:first]:
             ahead = ahead.with_stage(stage, 0.0)
         again = dataclasses.replace(again, report=again.report.after(ahead))
-    if not (np.array_equal(again.vertices, skeleton.vertices) and np.array_equal(again.edges, skeleton.edges)):
+    if not identical(again, skeleton):
         then, now = skeleton.report.versions, again.report.versions
         others = [f"{name} {then.get(name)} instead of {now[name]}" for name in now if then.get(name) != now[name]]
         warnings.warn(

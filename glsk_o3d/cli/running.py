@@ -286,6 +286,7 @@ def print_results(
     seconds: float,
     written: Sequence[Path],
     problems: Sequence[str],
+    more: Mapping[str, Any] = MappingProxyType({}),
     *,
     quiet,
     verbose,
@@ -299,6 +300,8 @@ def print_results(
     seconds : float
     written : sequence of Path
     problems : sequence of str
+    more : mapping of str to object
+        Facts beyond the summary.
     quiet, verbose, as_json : bool
 
     Raises
@@ -308,13 +311,14 @@ def print_results(
     """
     if verbose:
         print_iterations(skeleton.report.iterations, stderr=True)
-    facts = summary(skeleton, seconds)
+    facts = {**summary(skeleton, seconds), **more}
     if as_json:
         warnings = list(skeleton.report.warnings)
         print_json({**facts, "warnings": warnings, "files": [str(path) for path in written]})
     elif not quiet:
         hidden = {"dropped": facts["dropped"] or None, "converged": None, "seconds": f"{seconds:.2f}"}
-        print_rows({**facts, **hidden})
+        words = {name: "yes" if value else "no" for name, value in facts.items() if isinstance(value, bool)}
+        print_rows({**facts, **words, **hidden})
         for path in written:
             typer.echo(f"wrote {path}")
     if problems:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileFormatError, InvalidParameterError
-from .files import MESH_ENDINGS, read_cloud
+from .files import MESH_ENDINGS, check_scan
 from .open3d import import_open3d
 
 
@@ -34,10 +34,13 @@ def read_mesh(path: str | os.PathLike) -> Any:
     endings = (".ply", *MESH_ENDINGS)
     if not str(path).lower().endswith(endings):
         raise FileFormatError(f"{path}: unknown ending of a mesh; known are {', '.join(endings)}")
-    read_cloud(path)  # checks that the file is there and holds what it promises
+    check_scan(path)
     o3d = import_open3d()
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        mesh = o3d.io.read_triangle_mesh(str(path))
+    try:
+        with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+            mesh = o3d.io.read_triangle_mesh(str(path))
+    except Exception as error:  # std::bad_alloc, undecodable text
+        raise FileFormatError(f"{path}: Open3D cannot read it: {error}") from error
     if not mesh.has_triangles():
         raise FileFormatError(f"{path}: no triangles could be read: it is a cloud, or damaged")
     return mesh

@@ -116,6 +116,15 @@ def test_large_clouds_are_thinned_and_the_page_says_so(data, tree, tmp_path):
     assert (tmp_path / "r.html").stat().st_size < 1_000_000
 
 
+def test_points_that_are_not_finite_are_not_called_thinned(run, tmp_path):
+    points = np.vstack([torus(300).points, np.full((5, 3), np.nan)])
+    recorder = ContractionRecorder()
+    pipeline = RingBuilder(drop_invalid=True) | Contractor(max_iterations=2) | glsk.Connector() | glsk.Refiner()
+    for watched in (recorder, None):
+        save_report(pipeline(points, on_state=recorder), tmp_path / "r.html", recorder=watched)
+        assert "drawn at random" not in (tmp_path / "r.html").read_text("utf-8")
+
+
 def test_unknown_radii_and_lone_vertices(data, forest):
     held = data(dataclasses.replace(forest, radii=[1, math.nan, 1, 1, 1, 1], confidence=[math.nan] * 6))
     assert list(held["ranges"]) == ["branch"]
