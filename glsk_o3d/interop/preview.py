@@ -120,7 +120,7 @@ def printable(text: object) -> str:
 
 def _dot(n: int) -> float:
     """Area of a dot of the cloud, in square points."""
-    return float(np.clip(9000 / max(n, 1), 0.8, 5))
+    return float(np.clip(4500 / max(n, 1), 0.8, 3))
 
 
 def _caption(skeleton: Skeleton) -> str:
