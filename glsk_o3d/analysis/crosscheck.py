@@ -34,6 +34,7 @@ SAME = 1e-6  # of the diagonal: nearer vertices are points of the cloud, whichev
 TURNED = 30.0  # degrees
 NEAR, FAR = 0.2, 0.5  # local radii
 ASTRAY = 1.0  # local radii
+WHOLE = 0.99  # share of rings that close where the cloud has no gaps
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,6 +287,7 @@ def judge(
         30 degrees, neither run warned of anything, and the contraction of the mesh did not fail.
     reasons : tuple of str
     """
+    failed = mesh_report is not None and REFUSED in mesh_report.stop_reason
     grave, slight = [], []
     for name in ("components", "loops"):
         ours, theirs = getattr(skeletons, name)
@@ -298,15 +300,19 @@ def judge(
         slight.append(
             f"5 % of a skeleton are more than {skeletons.hausdorff95_in_radii:.1f} local radii from the other"
         )
+    turned = rows.angle and rows.angle["p75"] > TURNED
+    if slight or apart > FAR:
+        agree = rows.one_to_one and rows.covered >= COVERED and not turned
+        if agree and rows.closed >= WHOLE * rows.rows and skeletons.topology and not failed:
+            slight.append("the rings agree: it is the shape, not the sampling; in a blob a curve may run anywhere")
     if not rows.compared:
         grave.append("no Laplacian coordinates could be compared")
     elif rows.covered < COVERED:
         slight.append(f"the mesh closes around {rows.covered:.0%} of the points whose rings close")
-    if rows.angle and rows.angle["p75"] > TURNED:
+    if turned:
         slight.append(f"a quarter of the Laplacian coordinates are turned by more than {rows.angle['p75']:.0f} degrees")
     slight += [f"the run itself warns: {message}" for message in warned]
     if mesh_report is not None:
-        if REFUSED in mesh_report.stop_reason:
-            slight.append(f"the mesh's own contraction failed: {mesh_report.stop_reason}")
         slight += [f"the mesh's run warns: {message}" for message in mesh_report.warnings if message not in warned]
-    return (DISTRUST if grave else IN_PART if slight else AGREES), (*grave, *slight)
+    first = [f"the mesh's own contraction failed: {mesh_report.stop_reason}"] if failed else []  # it explains the others
+    return (DISTRUST if grave else IN_PART if first or slight else AGREES), (*first, *grave, *slight)
