@@ -282,9 +282,10 @@ def judge(
     -------
     verdict : {"agrees", "agrees in part", "do not trust"}
         "do not trust" where the skeletons differ in components or loops, or lie more than half a radius apart on
-        average, or no Laplacian coordinates could be compared. "agrees" where they lie within a fifth of a radius on average and a radius in 95 % of their length, the
-        mesh closes around 70 % of the points whose rings close, three quarters of the Laplacian coordinates lie within
-        30 degrees, neither run warned of anything, and the contraction of the mesh did not fail.
+        average, or no Laplacian coordinates could be compared. "agrees" where they lie within a fifth of a radius on
+        average and a radius in 95 % of their length, the mesh closes around 70 % of the points whose rings close, three
+        quarters of the Laplacian coordinates lie within 30 degrees, neither run warned of anything, and the contraction
+        of the mesh did not fail.
     reasons : tuple of str
     """
     failed = mesh_report is not None and REFUSED in mesh_report.stop_reason
@@ -314,5 +315,7 @@ def judge(
     slight += [f"the run itself warns: {message}" for message in warned]
     if mesh_report is not None:
         slight += [f"the mesh's run warns: {message}" for message in mesh_report.warnings if message not in warned]
-    first = [f"the mesh's own contraction failed: {mesh_report.stop_reason}"] if failed else []  # it explains the others
+    first = (
+        [f"the mesh's own contraction failed: {mesh_report.stop_reason}"] if failed else []
+    )  # it explains the others
     return (DISTRUST if grave else IN_PART if first or slight else AGREES), (*first, *grave, *slight)

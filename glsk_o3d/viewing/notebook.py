@@ -38,7 +38,9 @@ def picture(skeleton: Skeleton) -> str:
     drawn = np.asarray(figure.canvas.buffer_rgba())[..., :3]
     rows = np.flatnonzero((drawn < 250).any(axis=(1, 2)))  # without the white bands above and below flat drawings
     drawn = drawn[max(rows[0] - MARGIN, 0) : rows[-1] + MARGIN]
-    Image.fromarray(drawn.copy()).quantize(COLOURS, method=Image.Quantize.MEDIANCUT).save(stream, format="png", optimize=True)
+    Image.fromarray(drawn.copy()).quantize(COLOURS, method=Image.Quantize.MEDIANCUT).save(
+        stream, format="png", optimize=True
+    )
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 

@@ -211,7 +211,7 @@ def test_the_chart_of_the_score_shows_where_its_rule_stops(stop, words):
     assert not words or float(tops[5]) >= 0.2
 
 
-@pytest.mark.parametrize("stop", [None, 3, {}, {"rule": "ExplainedScore"}, {"rule": "ExplainedScore", "threshold": "x"}])
+@pytest.mark.parametrize("stop", [None, 3, {}, {"rule": "ExplainedScore"}, {"rule": "ExplainedScore", "threshold": ""}])
 def test_recipes_that_tell_no_threshold(tree, stop):
     report = dataclasses.replace(tree.report, recipe={"pipeline": ["?", {"filter": "Contractor", "stop": stop}]})
     assert "stops below" not in sections.contraction(report)
