@@ -288,8 +288,9 @@ def judge(
         of the mesh did not fail.
     reasons : tuple of str
     """
-    failed = mesh_report is not None and REFUSED in mesh_report.stop_reason
-    grave, slight = [], []
+    failed, grave, slight = [], [], []
+    if mesh_report is not None and REFUSED in mesh_report.stop_reason:
+        failed.append(f"the mesh's own contraction failed: {mesh_report.stop_reason}")  # it explains the others
     for name in ("components", "loops"):
         ours, theirs = getattr(skeletons, name)
         if ours != theirs:
@@ -315,7 +316,4 @@ def judge(
     slight += [f"the run itself warns: {message}" for message in warned]
     if mesh_report is not None:
         slight += [f"the mesh's run warns: {message}" for message in mesh_report.warnings if message not in warned]
-    first = (
-        [f"the mesh's own contraction failed: {mesh_report.stop_reason}"] if failed else []
-    )  # it explains the others
-    return (DISTRUST if grave else IN_PART if first or slight else AGREES), (*first, *grave, *slight)
+    return (DISTRUST if grave else IN_PART if failed or slight else AGREES), (*failed, *grave, *slight)

@@ -183,7 +183,8 @@ def _chart(
     solves = [record.iteration for record in records]
     values = [(record.iteration, float(getattr(record, name))) for record in records]
     values = [(solve, value) for solve, value in values if math.isfinite(value)]
-    highest = _round_up(max([value for _, value in values] + [threshold] * (threshold is not None), default=1.0))
+    levels = [value for _, value in values] + ([] if threshold is None else [threshold])
+    highest = _round_up(max(levels, default=1.0))
 
     def x(solve):
         share = (solve - solves[0]) / max(solves[-1] - solves[0], 1)
