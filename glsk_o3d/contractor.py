@@ -14,7 +14,7 @@ from .numerics.cotangent import cotangent_laplacian
 from .numerics.eigen import largest_eigenvalue
 from .numerics.neighbourhoods import nearest_neighbours
 from .numerics.solver import SolveError, solve_contraction
-from .report import STOPPED_BY_CALLER, IterationRecord
+from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord
 from .state import Contraction
 from .stopping import ExplainedScore, StopRule
 
@@ -93,9 +93,7 @@ class Contractor(Filter):
             try:
                 state, facts = self._solve(state)
             except SolveError as problem:
-                return _finished(
-                    state, f"solve {len(state.report.iterations) + 1} refused, last sound state kept: {problem}"
-                )
+                return _finished(state, f"solve {len(state.report.iterations) + 1} {REFUSED}: {problem}")
             state = _record(state, **facts, seconds=time.perf_counter() - start)
             reason = self.stop(state.report.iterations)
             if reason is None and reducer is not None and len(state) > self.reduce_above:

@@ -14,7 +14,7 @@ class InvalidParameterError(GlskError, ValueError):
 
 
 class StageError(GlskError, TypeError):
-    """A filter was given something that another stage should have made first."""
+    """A filter was given what another stage should make first, gave what it should not, or is a plugin and failed."""
 
 
 class FileFormatError(GlskError, ValueError):

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from .errors import InvalidCloudError, InvalidParameterError, StageError
+from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageError
 from .interop.open3d import cloud_points
 from .interop.verbosity import following_open3d
 
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     OnState = Callable[[Contraction], object]
 
 _log = logging.getLogger(__name__)
+
+
+TYPES = ("int", "float", "bool", "length", "choice", "reducer", "stop")
+"""What a parameter may be; with a trailing ``?`` also None."""
 
 
 def parameter(
@@ -206,7 +210,7 @@ class Filter(Parameters):
             )
         start = time.perf_counter()
         with following_open3d():
-            result = self._run(data, _watch(on_iteration, on_state))
+            result = self._ran(data, _watch(on_iteration, on_state))
             seconds = time.perf_counter() - start
             _log.debug("%s took %.3f s: %r", type(self).__name__, seconds, result)
         promised = flows.get(self.produces)
@@ -228,6 +232,18 @@ class Filter(Parameters):
     def _run(self, data, watch):
         """The work itself; `watch` is None or wants the Contraction after each solve, and says False to stop."""
         raise NotImplementedError
+
+    def _ran(self, data, watch):
+        """What `_run` gives; where it fails and is not of this package, the error says whose it is."""
+        try:
+            return self._run(data, watch)
+        except (GlskError, MemoryError, Warning):
+            raise
+        except Exception as error:
+            cls = type(self)
+            if cls.__module__.startswith(f"{__package__}."):
+                raise
+            raise StageError(f"{cls.__name__} of {cls.__module__} failed: {type(error).__name__}: {error}") from error
 
 
 def _watch(on_iteration, on_state):

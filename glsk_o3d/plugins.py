@@ -11,7 +11,7 @@ from typing import Any
 
 from .catalogue import BUILTIN
 from .errors import PluginWarning
-from .filter import FLOWS, RESERVED, Filter, Parameters
+from .filter import FLOWS, RESERVED, TYPES, Filter, Parameters
 from .pipeline import Pipeline
 from .pipelines import PIPELINES
 from .report import outside
@@ -68,22 +68,34 @@ def _plugins(group, builtin, check):
     with _lock:
         if group not in _found:
             found = _found[group] = {}  # already there for plugins that themselves ask for plugins
-            problems = []
-            for distribution, entry in _entries(group, problems):
-                try:
-                    if entry.name in builtin or entry.name in found:
-                        owner = "the built-in one" if entry.name in builtin else "one of another plugin"
-                        raise _Unfit(f"the name is that of {owner}")
-                    plugin = entry.load()
-                    check(entry.name, plugin)
-                except (Exception, SystemExit) as error:  # whatever code of others raises
-                    cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
-                    problems.append(f"plugin {entry.name!r} ({entry.value}) of {distribution} left out: {cause}")
-                else:
-                    found[entry.name] = plugin
+            try:
+                problems = _load(group, builtin, check, found)
+            except BaseException:  # interrupted: next time from the start
+                del _found[group]
+                raise
             for problem in problems:
                 warnings.warn(problem, PluginWarning, stacklevel=outside())
         return _found[group]
+
+
+def _load(group, builtin, check, found):
+    """Fill `found` with plugins; gives what is wrong with the others."""
+    problems: list[str] = []
+    for distribution, entry in _entries(group, problems):
+        try:
+            if entry.name in builtin or entry.name in found:
+                owner = "the built-in one" if entry.name in builtin else "one of another plugin"
+                raise _Unfit(f"the name is that of {owner}")
+            plugin = entry.load()
+            check(entry.name, plugin)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # whatever code of others raises; some is no Exception
+            cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
+            problems.append(f"plugin {entry.name!r} ({entry.value}) of {distribution} left out: {cause}")
+        else:
+            found[entry.name] = plugin
+    return problems
 
 
 def _entries(group: str, problems: list[str]) -> Iterator[tuple[str, metadata.EntryPoint]]:
@@ -93,13 +105,17 @@ def _entries(group: str, problems: list[str]) -> Iterator[tuple[str, metadata.En
     """
     seen = set()
     for distribution in metadata.distributions():
-        if group not in (distribution.read_text("entry_points.txt") or ""):
+        text = distribution.read_text("entry_points.txt") or ""
+        if group not in text:
             continue
         name = str(distribution.metadata["Name"])
         if name in seen:
             continue
         seen.add(name)
+        heads = [line for line in map(str.strip, text.splitlines()) if line.strip("[] ") == group]
         try:
+            if any(head != f"[{group}]" for head in heads):  # importlib.metadata passes over it
+                raise _Unfit(f"a line should be '[{group}]'")
             entries = list(distribution.entry_points.select(group=group))
         except Exception as error:
             problems.append(f"the plugins of {name} left out: its entry_points.txt is malformed: {error}")
@@ -118,6 +134,8 @@ def _check_filter(name: str, cls: Any) -> None:
             raise _Unfit(f"its field {field.name!r} is not made by glsk_o3d.filter.parameter")
         if field.name in RESERVED:
             raise _Unfit(f"recipes have another meaning for a parameter {field.name!r}")
+        if str(field.metadata["type"]).removesuffix("?") not in TYPES:
+            raise _Unfit(f"its parameter {field.name!r} has a type that is none of {', '.join(TYPES)}")
         if field.metadata["type"].endswith("?") and "none" in field.metadata["choices"]:
             raise _Unfit(f"the choice 'none' of its parameter {field.name!r} cannot be told from None")
     if not issubclass(cls, Filter):

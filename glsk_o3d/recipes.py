@@ -307,6 +307,9 @@ def _check_head(recipe: Any) -> None:
         raise RecipeError(f"glsk_o3d.version: must be {VERSION}, not {_short(version)}")
     if version > VERSION:
         raise RecipeError(f"glsk_o3d.version: is {version} and this release reads {VERSION}: update glsk-o3d")
+    for key in head:
+        if key != "version":
+            raise RecipeError(f"glsk_o3d.{key}: there is only 'version' in this table")
     for key in recipe:
         if key not in ("glsk_o3d", "pipeline", "extends", "set"):
             raise RecipeError(f"{key}: {nearest(str(key), ('pipeline', 'extends', 'set'), 'key of a recipe')}")
@@ -395,6 +398,23 @@ def _short(value: Any) -> str:
 # ---------------------------------------------------------------------------------------------------------- repeating
 
 
+def identical(skeleton: Skeleton, other: Skeleton) -> bool:
+    """Whether two skeletons have the same vertices, edges and radii, to the last bit.
+
+    Parameters
+    ----------
+    skeleton, other : Skeleton
+
+    Returns
+    -------
+    bool
+    """
+    return all(
+        np.array_equal(getattr(skeleton, name), getattr(other, name), equal_nan=name == "radii")
+        for name in ("vertices", "edges", "radii")
+    )
+
+
 def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -> Skeleton:
     """Make a skeleton again with the recipe in its report.
 
@@ -443,7 +463,7 @@ def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -
         for stage in pipeline.stages[:first]:
             ahead = ahead.with_stage(stage, 0.0)
         again = dataclasses.replace(again, report=again.report.after(ahead))
-    if not (np.array_equal(again.vertices, skeleton.vertices) and np.array_equal(again.edges, skeleton.edges)):
+    if not identical(again, skeleton):
         then, now = skeleton.report.versions, again.report.versions
         others = [f"{name} {then.get(name)} instead of {now[name]}" for name in now if then.get(name) != now[name]]
         warnings.warn(

@@ -14,6 +14,7 @@ from .errors import SkeletonWarning
 from .interop.verbosity import QUIET, open3d_is
 
 STOPPED_BY_CALLER = "stopped by the caller"
+REFUSED = "refused, last sound state kept"
 
 
 @dataclass(frozen=True)

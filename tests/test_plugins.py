@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 import warnings
@@ -22,7 +24,9 @@ from glsk_o3d import (
 )
 from glsk_o3d.catalogue import BUILTIN, catalogue
 from glsk_o3d.filter import Filter
+from glsk_o3d.interop.meshlab.verbs import verbs
 from glsk_o3d.pipelines import PIPELINES, known_pipelines, named_pipeline
+from glsk_o3d.plugins import forget_plugins
 
 POINTS = samples.y_junction(n=800).points
 
@@ -79,6 +83,89 @@ def scan(tmp_path):
     path = tmp_path / "scan.xyz"
     np.savetxt(path, POINTS)
     return path
+
+
+ITERATING = """
+from dataclasses import dataclass, replace
+from typing import ClassVar
+import numpy as np
+from scipy.spatial import cKDTree
+from glsk_o3d import Filter
+from glsk_o3d.filter import documented, parameter
+from glsk_o3d.report import IterationRecord
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Gather(Filter):
+    \"\"\"Move points to the mean of their neighbours, again and again.\"\"\"
+
+    consumes: ClassVar[str] = "Contraction"
+
+    rounds: int = parameter(5, "Times.", type="int", low=1)
+
+    def _run(self, state, watch):
+        for i in range(self.rounds):
+            positions = state.positions[cKDTree(state.positions).query(state.positions, 12)[1]].mean(axis=1)
+            record = IterationRecord(i + 1, len(state), 0, 0, 0.5, 0.1, 1.0, 1.0, 0.0, 0.0)
+            report = replace(state.report, iterations=(*state.report.iterations, record))
+            state = replace(state, previous=state.positions, positions=positions, report=report)
+            if watch is not None and watch(state) is False:
+                break
+        return state
+"""
+
+
+def test_a_filter_that_iterates(install):
+    install("glsk-gather", "1", ITERATING, "[glsk_o3d.filters]\nGather = glsk_gather:Gather\n")
+    gather = catalogue()["Gather"]
+    records, states = [], []
+    pipeline = glsk.RingBuilder() | gather() | glsk.Connector() | glsk.Refiner()
+    skeleton = pipeline(POINTS, on_iteration=records.append, on_state=states.append)
+    assert [record.iteration for record in records] == [1, 2, 3, 4, 5]
+    assert tuple(records) == skeleton.report.iterations
+    assert [state.report.iterations[-1] for state in states] == records
+    stopped = pipeline(POINTS, on_iteration=lambda record: record.iteration < 3)
+    assert len(stopped.report.iterations) == 3
+    np.testing.assert_array_equal(gather()(glsk.RingBuilder()(POINTS)).positions, states[-1].positions)
+
+
+def test_the_documentation_and_the_example_say_what_the_work_is_given(root):
+    for path in ("docs/plugins.md", "tests/example_plugin/glsk_example.py"):
+        arguments = re.findall(r"def _run\((.*?)\)", (root / path).read_text("utf-8"))
+        assert arguments
+        assert all(words.endswith(", watch") for words in arguments)
+
+
+# ---- in scripts
+
+
+@pytest.fixture
+def fresh_verbs(monkeypatch):
+    monkeypatch.setattr("glsk_o3d.interop.meshlab.plan.verbs", verbs.__wrapped__)  # not those of other tests
+
+
+SCRIPT = """<!DOCTYPE FilterScript>
+<FilterScript>
+ <filter name="Generate By Voxel (GLSkeleton)"><Param type="RichAbsPerc" name="size" value="4%"/></filter>
+ <filter name="Generate Curve Skeleton (GLSkeleton)">
+  <Param type="RichString" name="pipeline" value="coarse"/>
+  <Param type="RichInt" name="solvecount_count" value="5"/>
+ </filter>
+</FilterScript>
+"""
+
+
+@pytest.mark.usefixtures("example", "fresh_verbs")
+def test_in_a_script(invoke_anywhere, scan, tmp_path):
+    (tmp_path / "s.mlx").write_text(SCRIPT)
+    result = invoke_anywhere("run", "s.mlx", scan, "-o", "s.json")
+    assert result.exit_code == 0, result.output
+    report = glsk.read_skeleton(tmp_path / "s.json").report
+    assert report.stages[0] == "Voxel(size='2%')"
+    assert report.stop_reason == "5 solves are done"
+    import glsk_example
+
+    assert report.n_input == len(glsk_example.Voxel()(glsk_example.Voxel(size="4%")(POINTS)))
 
 
 # ---- filters of clouds
@@ -155,6 +242,51 @@ def test_a_filter_that_leaves_nothing_is_named():
         nothing()(POINTS)
 
 
+FAILING = """
+from dataclasses import dataclass
+from typing import ClassVar
+from glsk_o3d import Filter, pipelines
+
+@dataclass(frozen=True, kw_only=True)
+class Fragile(Filter):
+    \"\"\"Fails.\"\"\"
+
+    consumes: ClassVar[str] = "cloud"
+    produces: ClassVar[str] = "cloud"
+
+    def _run(self, cloud, watch):
+        raise KeyError("inside")
+
+def fragile():
+    return Fragile() | pipelines.default()
+"""
+
+
+@pytest.mark.usefixtures("fresh_verbs")
+def test_a_filter_that_fails(install, invoke_anywhere, scan, tmp_path):
+    entries = "[glsk_o3d.filters]\nFragile = glsk_fragile:Fragile\n"
+    entries += "[glsk_o3d.pipelines]\nfragile = glsk_fragile:fragile\n"
+    install("glsk-fragile", "1", FAILING, entries)
+    message = "Fragile of glsk_fragile failed: KeyError: 'inside'"
+    with pytest.raises(StageError, match=f"^{message}$") as caught:
+        skeletonize(POINTS, "fragile")
+    assert isinstance(caught.value.__cause__, KeyError)
+    result = invoke_anywhere("skeletonize", scan, "-o", "s.ply", "--pipeline", "fragile")
+    assert (result.exit_code, result.stderr) == (1, f"glsk: error: {message}\n")
+    script = re.sub("<Param.*?/>", "", SCRIPT).replace("By Voxel", "By Fragile")
+    (tmp_path / "s.mlx").write_text(script)
+    result = invoke_anywhere("run", "s.mlx", scan, "-o", "s.ply")
+    place = "s.mlx, line 3: filter 'Generate By Fragile (GLSkeleton)'"
+    assert (result.exit_code, result.stderr) == (1, f"glsk: error: {place}: {message}\n")
+
+
+def test_errors_of_this_package_pass_through_a_filter(example):
+    import glsk_example
+
+    with pytest.raises(glsk.InvalidCloudError):
+        glsk_example.Voxel()("no cloud")
+
+
 @pytest.mark.usefixtures("example")
 def test_a_recipe_whose_plugin_is_gone(monkeypatch):
     recipe = named_pipeline("coarse").to_recipe()
@@ -177,6 +309,8 @@ BROKEN_FILTERS = {
     "import error": ("import not_there", "No module named 'not_there'"),
     "syntax error": ("def", "SyntaxError: "),
     "exit": ("raise SystemExit(3)", "SystemExit: 3"),
+    "no Exception": ("raise GeneratorExit('odd')", "GeneratorExit: odd"),
+    "no Exception, of its own": ("class Panic(BaseException): pass\nraise Panic('rust')", "Panic: rust"),
     "no such name": ("", "has no attribute 'Thing'"),
     "function": ("def Thing(): pass", "it is no frozen dataclass derived from glsk_o3d.Filter"),
     "other class": ("class Thing: pass", "it is no frozen dataclass derived from glsk_o3d.Filter"),
@@ -199,6 +333,14 @@ BROKEN_FILTERS = {
     "reserved": (
         HEAD + "class Thing(Filter):\n    rule: int = parameter(3, 'A.', type='int')\n    _run = print",
         "recipes have another meaning for a parameter 'rule'",
+    ),
+    "strange type": (
+        HEAD + "class Thing(Filter):\n    a: int = parameter(3, 'A.', type='strange')\n    _run = print",
+        "its parameter 'a' has a type that is none of int, float, bool, length, choice, reducer, stop",
+    ),
+    "class as type": (
+        HEAD + "class Thing(Filter):\n    a: int = parameter(3, 'A.', type=int)\n    _run = print",
+        "its parameter 'a' has a type that is none of int, ",
     ),
     "none": (
         HEAD + "class Thing(Filter):\n    a: str = parameter('none', 'A.', type='choice?', choices=('none',))\n"
@@ -285,10 +427,37 @@ def test_names_of_pipelines_that_are_taken(install):
 
 
 @pytest.mark.usefixtures("example")
-def test_a_malformed_file_of_entry_points(install):
-    install("glsk-garbled", "1", "", "[glsk_o3d.filters]\nno equals sign\n")
+@pytest.mark.parametrize(
+    "entries",
+    [
+        "[glsk_o3d.filters]\nno equals sign\n",
+        "[glsk_o3d.filters\nThing = glsk_garbled:Thing\n",
+        "[ glsk_o3d.filters ]\nThing = glsk_garbled:Thing\n",
+        "glsk_o3d.filters]\n",
+    ],
+)
+def test_a_malformed_file_of_entry_points(install, entries):
+    install("glsk-garbled", "1", "", entries)
     assert "the plugins of glsk-garbled left out: its entry_points.txt is malformed" in only_warning(catalogue)
     assert "Voxel" in catalogue()
+
+
+def test_a_distribution_found_twice_is_one(example, tmp_path, monkeypatch):
+    shutil.copytree(example, tmp_path / "again")
+    monkeypatch.syspath_prepend(tmp_path / "again")
+    forget_plugins()
+    assert {"Voxel", "RadiusFloor", "SolveCount"} <= catalogue().keys()
+    assert "coarse" in known_pipelines()  # a second one would be a warning, which is an error here
+
+
+@pytest.mark.usefixtures("example")
+def test_an_interrupt_leaves_nothing_half_done(install):
+    code = HEAD + "class Thing(Filter):\n    _run = print\n"
+    folder = install("zz-slow", "1", "raise KeyboardInterrupt", "[glsk_o3d.filters]\nThing = zz_slow:Thing\n")
+    with pytest.raises(KeyboardInterrupt):
+        catalogue()
+    (folder / "zz_slow.py").write_text(code)
+    assert {"Voxel", "Thing"} <= catalogue().keys()
 
 
 def test_a_plugin_that_asks_for_plugins(install):

@@ -166,6 +166,10 @@ WRONG = {
         "glsk_o3d": {"version": 2},
         "stages": "of whatever shape",
     },
+    "glsk_o3d.extra: there is only 'version' in this table": {
+        "glsk_o3d": {"version": 1, "extra": 4},
+        "pipeline": [GOOD],
+    },
     "glsk_o3d.version: must be 1, not '1'": {"glsk_o3d": {"version": "1"}, "pipeline": [GOOD]},
     "a recipe is a table such as "
     '{"glsk_o3d": {"version": 1}, "pipeline": [...]}, not [{\'filter\': \'RingBuilder\'}]': [GOOD],
@@ -331,7 +335,7 @@ def thin(state):
 class Homemade(Filter):
     consumes = produces = "Contraction"
 
-    def _run(self, state, on_iteration):
+    def _run(self, state, watch):
         return state
 
 

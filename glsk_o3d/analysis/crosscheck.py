@@ -17,6 +17,7 @@ from ..numerics.meshes import clean_faces, umbrellas
 from ..numerics.ordering import morton_order
 from ..pipeline import Pipeline
 from ..pipelines import named_pipeline
+from ..report import REFUSED, Report
 from ..ring_builder import MIN_POINTS, RingBuilder
 from ..skeleton import Skeleton
 from .agreement import RowAgreement, SkeletonAgreement, compare_rows, compare_skeletons
@@ -33,6 +34,7 @@ SAME = 1e-6  # of the diagonal: nearer vertices are points of the cloud, whichev
 TURNED = 30.0  # degrees
 NEAR, FAR = 0.2, 0.5  # local radii
 ASTRAY = 1.0  # local radii
+WHOLE = 0.99  # share of rings that close where the cloud has no gaps
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +192,7 @@ def cross_check(
     other = mesh_skeleton(state, vertices, faces, pipeline)
     diagonal = state.frame.diagonal * state.frame.scale
     skeletons = compare_skeletons(skeleton, other, diagonal)
-    verdict, reasons = judge(rows, skeletons, skeleton.report.warnings)
+    verdict, reasons = judge(rows, skeletons, skeleton.report.warnings, other.report)
     of_point = state.row_of_point
     angle, length, share = (
         np.where((of_point >= 0) & ~state.outlier, values[of_point], np.nan) for values in (angle, length, share)
@@ -234,14 +236,21 @@ def _surface(state, mesh):
     """The name of a surface, its vertices in the frame (`state.cloud` itself if these are its points), its faces."""
     if not isinstance(mesh, str):
         return "given", *_given(state, *mesh_arrays(mesh))
-    for name in ("ball_pivoting", "poisson") if mesh == "auto" else (mesh,):
+    names = ("ball_pivoting", "poisson") if mesh == "auto" else (mesh,)
+    found = None
+    for name in names:
         vertices, faces = SURFACES[name](state.cloud, state.normals, state.rings)
+        if len(np.unique(faces)) < MIN_POINTS:
+            continue
+        found = name, vertices, faces
         closes = state.rings.closed & umbrellas(len(vertices), faces) if vertices is state.cloud else state.rings.closed
-        if mesh == name or closes.sum() >= COVERED * state.rings.closed.sum() > 0:
+        if closes.sum() >= COVERED * state.rings.closed.sum() > 0:
             break
-    if len(np.unique(faces)) < MIN_POINTS:
-        raise InvalidCloudError(f"no surface can be reconstructed from {len(state.cloud)} points by {name}")
-    return name, vertices, faces
+    if found is None:
+        raise InvalidCloudError(
+            f"no surface can be reconstructed from {len(state.cloud)} points by {' or '.join(names)}"
+        )
+    return found
 
 
 def _given(state, vertices, faces):
@@ -255,7 +264,9 @@ def _given(state, vertices, faces):
     return without_bare(vertices, clean_faces(vertices, faces))
 
 
-def judge(rows: RowAgreement, skeletons: SkeletonAgreement, warned: Sequence[str] = ()) -> tuple[str, tuple[str, ...]]:
+def judge(
+    rows: RowAgreement, skeletons: SkeletonAgreement, warned: Sequence[str] = (), mesh_report: Report | None = None
+) -> tuple[str, tuple[str, ...]]:
     """The verdict on a cloud, and what speaks against a better one.
 
     Parameters
@@ -264,17 +275,22 @@ def judge(rows: RowAgreement, skeletons: SkeletonAgreement, warned: Sequence[str
     skeletons : SkeletonAgreement
     warned : sequence of str
         What the cloud's own run warns of.
+    mesh_report : Report, optional
+        Of the mesh's run.
 
     Returns
     -------
     verdict : {"agrees", "agrees in part", "do not trust"}
         "do not trust" where the skeletons differ in components or loops, or lie more than half a radius apart on
-        average. "agrees" where they lie within a fifth of a radius on average and a radius in 95 % of their length, the
-        mesh closes around 70 % of the points whose rings close, three quarters of the Laplacian coordinates lie within
-        30 degrees, and the run itself warned of nothing.
+        average, or no Laplacian coordinates could be compared. "agrees" where they lie within a fifth of a radius on
+        average and a radius in 95 % of their length, the mesh closes around 70 % of the points whose rings close, three
+        quarters of the Laplacian coordinates lie within 30 degrees, neither run warned of anything, and the contraction
+        of the mesh did not fail.
     reasons : tuple of str
     """
-    grave, slight = [], []
+    failed, grave, slight = [], [], []
+    if mesh_report is not None and REFUSED in mesh_report.stop_reason:
+        failed.append(f"the mesh's own contraction failed: {mesh_report.stop_reason}")  # it explains the others
     for name in ("components", "loops"):
         ours, theirs = getattr(skeletons, name)
         if ours != theirs:
@@ -286,11 +302,18 @@ def judge(rows: RowAgreement, skeletons: SkeletonAgreement, warned: Sequence[str
         slight.append(
             f"5 % of a skeleton are more than {skeletons.hausdorff95_in_radii:.1f} local radii from the other"
         )
+    turned = rows.angle and rows.angle["p75"] > TURNED
+    if slight or apart > FAR:
+        agree = rows.one_to_one and rows.covered >= COVERED and not turned
+        if agree and rows.closed >= WHOLE * rows.rows and skeletons.topology and not failed:
+            slight.append("the rings agree: it is the shape, not the sampling; in a blob a curve may run anywhere")
     if not rows.compared:
-        slight.append("no Laplacian coordinates could be compared")
+        grave.append("no Laplacian coordinates could be compared")
     elif rows.covered < COVERED:
         slight.append(f"the mesh closes around {rows.covered:.0%} of the points whose rings close")
-    if rows.angle and rows.angle["p75"] > TURNED:
+    if turned:
         slight.append(f"a quarter of the Laplacian coordinates are turned by more than {rows.angle['p75']:.0f} degrees")
     slight += [f"the run itself warns: {message}" for message in warned]
-    return (DISTRUST if grave else IN_PART if slight else AGREES), (*grave, *slight)
+    if mesh_report is not None:
+        slight += [f"the mesh's run warns: {message}" for message in mesh_report.warnings if message not in warned]
+    return (DISTRUST if grave else IN_PART if failed or slight else AGREES), (*failed, *grave, *slight)

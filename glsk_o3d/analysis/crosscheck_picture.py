@@ -9,13 +9,14 @@ import numpy as np
 
 from ..interop.files import check_ending, write_atomically
 from ..interop.open3d import require
-from ..interop.preview import DPI, INK, MOST_POINTS
+from ..interop.preview import DPI, INK, MOST_POINTS, printable
 
 if TYPE_CHECKING:
     from .crosscheck import CrossCheck
 
 _VIEWS = ((0, 1), (0, 2), (1, 2))
 _OURS, _THEIRS, _UNKNOWN = "#111111", "#0a6fc2", "#c9c9c9"
+_MOST_REASONS = 3
 _MOST = 60.0  # degrees at which the colours end
 _PAD, _HEAD, _FOOT = 0.3, 0.95, 0.85  # inches
 
@@ -67,7 +68,8 @@ def _draw(check, size, title):
     FigureCanvasAgg(figure)
     scale = ScalarMappable(Normalize(0, _MOST, clip=True), colormaps["YlOrRd"])
     points, angle = _shown(check)
-    low, high = points.min(axis=0), points.max(axis=0)
+    shown = np.concatenate([points, check.skeleton.vertices, check.mesh_skeleton.vertices])  # they may differ widely
+    low, high = shown.min(axis=0), shown.max(axis=0)
     centre, extent = low + (high - low) / 2, np.maximum(high - low, 0.08 * (high - low).max())
     points = points - centre  # small numbers: matplotlib's transforms lose digits
     colours = np.where(np.isnan(angle)[:, None], _rgba(_UNKNOWN), scale.to_rgba(np.nan_to_num(angle)))
@@ -85,11 +87,10 @@ def _draw(check, size, title):
         for skeleton, colour, line in ((check.mesh_skeleton, _THEIRS, 2.6), (check.skeleton, _OURS, 1.2)):
             places = (skeleton.vertices - centre)[:, [a, b]]
             for paint, wider in (("white", 1.4), (colour, 0)):  # a white edge lifts it off the cloud
-                axes.add_collection(
-                    LineCollection(places[skeleton.edges], colors=paint, linewidths=line + wider, capstyle="round")
-                )
+                style = dict(colors=paint, linewidths=line + wider, capstyle="round", clip_on=False)
+                axes.add_collection(LineCollection(places[skeleton.edges], **style))
             alone = skeleton.degree == 0
-            axes.scatter(*places[alone].T, s=16, c=colour, linewidths=0, zorder=3)
+            axes.scatter(*places[alone].T, s=16, c=colour, linewidths=0, zorder=3, clip_on=False)
         names = f"{'xyz'[a]}\N{RIGHTWARDS ARROW} {'xyz'[b]}\N{UPWARDS ARROW}"
         figure.text((left + box[2] / 2) / width, 0.62 / height, names, ha="center", color="#999999", fontsize=7)
         left += box[2] + gap
@@ -112,10 +113,13 @@ def _shown(check):
 
 
 def _write(figure, check, title, height):
-    head = f"{title}: {check.verdict}" if title else check.verdict
+    head = f"{printable(title)}: {check.verdict}" if title else check.verdict
     style = dict(ha="center", color=INK, parse_math=False)
     figure.text(0.5, 1 - 0.33 / height, head, fontsize=12, **style)
-    for row, reason in enumerate(check.reasons[:3]):
+    reasons = [*check.reasons[:_MOST_REASONS]]
+    if len(check.reasons) > _MOST_REASONS:
+        reasons[-1] += f"; and {len(check.reasons) - _MOST_REASONS} more"
+    for row, reason in enumerate(reasons):
         figure.text(0.5, 1 - (0.55 + 0.16 * row) / height, reason, fontsize=7.5, **style)
     beside = dict(va="center_baseline", fontsize=8)
     level = 0.34 / height

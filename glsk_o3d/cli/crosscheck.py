@@ -61,6 +61,7 @@ def crosscheck(
         from ..catalogue import nearest
         from ..interop.files import read_cloud, write_atomically
         from ..interop.meshes import read_mesh
+        from ..interop.preview import printable
         from ..pipelines import named_pipeline
         from .overrides import override
         from .running import check_findings
@@ -80,7 +81,8 @@ def crosscheck(
                 surface = method if mesh is None else read_mesh(mesh)
             update("comparing with a mesh")
             check = cross_check(cloud, surface, pipeline=chosen, max_points=max_points or None)
-            told = {"scan": str(scan), "given_mesh": None if mesh is None else str(mesh), **check.to_dict()}
+            names = {"scan": printable(scan), "given_mesh": None if mesh is None else printable(mesh)}
+            told = {**names, **check.to_dict()}
             if output is not None:
                 text = json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
                 write_atomically(output, lambda temporary: temporary.write_text(text, encoding="utf-8"))

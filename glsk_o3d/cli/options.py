@@ -18,6 +18,12 @@ Output = Annotated[
     ),
 ]
 Preview = Annotated[Path | None, typer.Option("--preview", metavar="PNG", help="Also draw cloud and skeleton.")]
+ReportPage = Annotated[
+    Path | None,
+    typer.Option(
+        "--report", metavar="HTML", help="Also write a page to look at: turn, zoom, watch the contraction, read."
+    ),
+]
 CutLoops = Annotated[bool, typer.Option("--cut-loops", help="Cut loops open for formats that hold only trees (swc).")]
 PipelineName = Annotated[
     str,

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from .console import holding_interrupts, progress, reporting
-from .options import CutLoops, Json, Output, Preview, Quiet, Verbose
+from .options import CutLoops, Json, Output, Preview, Quiet, ReportPage, Verbose
 
 
 def rerun(
@@ -22,6 +22,7 @@ def rerun(
     ] = None,
     output: Output = None,
     preview: Preview = None,
+    report: ReportPage = None,
     cut_loops: CutLoops = False,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -30,26 +31,48 @@ def rerun(
     """Repeat the run that made a result.
 
     It is run with the recipe that the result holds. On the points of the result the skeleton is the same to the last
-    bit; where other releases make it differ, there is a warning. 'glsk skeletonize --recipe' runs recipes from files
+    bit; where other releases make it differ, there is a warning. Without outputs it only says whether it is the same.
+    'glsk skeletonize --recipe' runs recipes from files
     of their own.
     """
     with reporting(scan or result, quiet=quiet, verbose=verbose):
         from ..errors import RecipeError
         from ..interop.files import read_cloud, read_skeleton
+        from ..recipes import identical
         from ..recipes import rerun as run_again
+        from ..viewing.recorder import ContractionRecorder
         from .running import check_outputs, print_results, run, write
 
         outputs = output or []
-        check_outputs(outputs, preview, scan, result=result)
+        if outputs or preview is not None or report is not None:
+            check_outputs(outputs, preview, scan, report, result=result)
+        recorder = ContractionRecorder() if report is not None else None
         with progress(not quiet and not verbose) as update:
             update(f"reading {result.name}")
             made = read_skeleton(result)
             with holding_interrupts():
                 cloud = read_cloud(scan) if scan is not None else None
             try:
-                skeleton, seconds = run(partial(run_again, made), cloud, update)
+                skeleton, seconds = run(partial(run_again, made), cloud, update, recorder)
             except RecipeError as error:
                 raise RecipeError(f"{result}: cannot be repeated: {error}") from error
-            title = (scan or result).name
-            written, problems = write(skeleton, outputs, preview, title=title, cut_loops=cut_loops, update=update)
-        print_results(skeleton, seconds, written, problems, quiet=quiet, verbose=verbose, as_json=as_json)
+            written, problems = write(
+                skeleton,
+                outputs,
+                preview,
+                report,
+                title=(scan or result).name,
+                cut_loops=cut_loops,
+                update=update,
+                recorder=recorder,
+            )
+        print_results(
+            skeleton,
+            seconds,
+            written,
+            problems,
+            {"identical": identical(skeleton, made)},
+            quiet=quiet,
+            verbose=verbose,
+            as_json=as_json,
+        )

@@ -247,6 +247,8 @@ def write_each(writers: Mapping[Path, Callable[[Path], object]], update) -> tupl
             problems.append(f"{path}: {error.strerror or f'cannot be written: {error}'}")
         except GlskError as error:
             problems.append(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}")
+        except Exception as error:  # a mistake in one writer: what was computed goes into the other files all the same
+            problems.append(f"{path}: cannot be written: {type(error).__name__}: {error}")
     return written, problems
 
 
@@ -303,6 +305,7 @@ def print_results(
     seconds: float,
     written: Sequence[Path],
     problems: Sequence[str],
+    more: Mapping[str, Any] = MappingProxyType({}),
     *,
     quiet,
     verbose,
@@ -316,6 +319,8 @@ def print_results(
     seconds : float
     written : sequence of Path
     problems : sequence of str
+    more : mapping of str to object
+        Facts beyond the summary.
     quiet, verbose, as_json : bool
 
     Raises
@@ -325,7 +330,7 @@ def print_results(
     """
     if verbose:
         print_iterations(skeleton.report.iterations, stderr=True)
-    facts = summary(skeleton, seconds)
+    facts = {**summary(skeleton, seconds), **more}
     if as_json:
         warnings = list(skeleton.report.warnings)
         print_json({**facts, "warnings": warnings, "files": [str(path) for path in written]})
@@ -333,7 +338,8 @@ def print_results(
         hidden = {"dropped": facts["dropped"] or None, "converged": None, "seconds": f"{seconds:.2f}"}
         if facts["contracted"] == facts["distinct"]:
             hidden["contracted"] = None
-        print_rows({**facts, **hidden})
+        words = {name: "yes" if value else "no" for name, value in facts.items() if isinstance(value, bool)}
+        print_rows({**facts, **words, **hidden})
         for path in written:
             typer.echo(f"wrote {path}")
     if problems:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .console import WrongUsage, holding_interrupts, progress, reporting
-from .options import CutLoops, Json, Output, PipelineName, Preview, Quiet, Verbose
+from .options import CutLoops, Json, Output, PipelineName, Preview, Quiet, ReportPage, Verbose
 
 
 def skeletonize(
@@ -20,12 +20,7 @@ def skeletonize(
     ],
     output: Output = None,
     preview: Preview = None,
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            "--report", metavar="HTML", help="Also write a page to look at: turn, zoom, watch the contraction, read."
-        ),
-    ] = None,
+    report: ReportPage = None,
     pipeline: PipelineName = "default",
     recipe: Annotated[
         Path | None,

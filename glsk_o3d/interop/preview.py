@@ -103,13 +103,27 @@ def draw(skeleton: Skeleton, size, title, caption=True):
     if caption:
         figure.text(0.5, 0.12 / height, _caption(skeleton), ha="center", color=INK, fontsize=8)
     if title:
-        figure.text(0.5, 1 - 0.33 / height, title, ha="center", color=INK, fontsize=12, parse_math=False)
+        figure.text(0.5, 1 - 0.33 / height, printable(title), ha="center", color=INK, fontsize=12, parse_math=False)
     return figure
+
+
+def printable(text: object) -> str:
+    """A text that may be a file name, which may be no Unicode, as one that can be drawn and encoded.
+
+    Parameters
+    ----------
+    text : object
+
+    Returns
+    -------
+    str
+    """
+    return str(text).encode("utf-8", "replace").decode()
 
 
 def _dot(n: int) -> float:
     """Area of a dot of the cloud, in square points."""
-    return float(np.clip(9000 / max(n, 1), 0.8, 5))
+    return float(np.clip(4500 / max(n, 1), 0.8, 3))
 
 
 def _caption(skeleton: Skeleton) -> str:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 SIZE = (1200, 500)
+MARGIN = 16  # in pixels
 COLOURS = 48  # of the picture: greys, red, and what lies between; a third of the bytes of the full range
 
 
@@ -34,8 +35,12 @@ def picture(skeleton: Skeleton) -> str:
     figure, stream = draw(skeleton, SIZE, None, caption=False), io.BytesIO()
     figure.set_dpi(DPI)
     figure.canvas.draw()
-    drawn = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3].copy())
-    drawn.quantize(COLOURS, method=Image.Quantize.MEDIANCUT).save(stream, format="png", optimize=True)
+    drawn = np.asarray(figure.canvas.buffer_rgba())[..., :3]
+    rows = np.flatnonzero((drawn < 250).any(axis=(1, 2)))  # without the white bands above and below flat drawings
+    drawn = drawn[max(rows[0] - MARGIN, 0) : rows[-1] + MARGIN]
+    Image.fromarray(drawn.copy()).quantize(COLOURS, method=Image.Quantize.MEDIANCUT).save(
+        stream, format="png", optimize=True
+    )
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
@@ -61,15 +66,17 @@ def to_html(skeleton: Skeleton) -> str:
         "junctions": f"{len(skeleton.junctions):,}",
         "length": f"{skeleton.length:.4g}",
     }
-    heads = "".join(f'<th style="text-align:right">{name}</th>' for name in told)
-    cells = "".join(f'<td style="text-align:right">{value}</td>' for value in told.values())
+    style = 'style="text-align:right;padding:2px 10px"'  # all here, since not every notebook has Jupyter's sheet
+    heads = "".join(f"<th {style}>{name}</th>" for name in told)
+    cells = "".join(f"<td {style}>{value}</td>" for value in told.values())
     warnings = "".join(
         f'<p style="margin:4px 0;border-left:3px solid #c77700;padding-left:8px">{escape(text)}</p>'
         for text in dict.fromkeys(report.warnings)
     )
     return (
-        '<div style="max-width:1100px">'
+        '<div style="max-width:1100px;font:13px/1.5 system-ui,sans-serif">'
         f'<img alt="{escape(repr(skeleton))}" style="width:100%;background:#fff;border-radius:4px" '
         f'src="{picture(skeleton)}">'
-        f"<table><thead><tr>{heads}</tr></thead><tbody><tr>{cells}</tr></tbody></table>{warnings}</div>"
+        f'<table style="font:inherit;border-collapse:collapse;margin-top:4px"><thead>'
+        f"<tr>{heads}</tr></thead><tbody><tr>{cells}</tr></tbody></table>{warnings}</div>"
     )

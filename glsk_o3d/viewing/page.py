@@ -94,7 +94,7 @@ def _page(skeleton, recorder, title) -> str:
         "figures": sections.figures(skeleton),
         "warnings": sections.warnings(skeleton.report.warnings),
         "still": picture(skeleton),
-        "thinning": _thinning(len(shown), len(skeleton.points)),
+        "thinning": _thinning(len(shown), int(np.isfinite(skeleton.points).all(axis=1).sum())),
         "sections": sections.contraction(skeleton.report)
         + sections.branches(skeleton)
         + sections.origin(skeleton.report),

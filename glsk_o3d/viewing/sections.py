@@ -74,8 +74,19 @@ def contraction(report: Report) -> str:
     for record in records:
         cells = (f"<td{_extra(hidden)}>{getattr(record, name):{form}}</td>" for _, name, form, hidden in _COLUMNS)
         rows += f'<tr data-solve="{record.iteration:d}">{"".join(cells)}</tr>'
-    charts = "".join(_chart(caption, records, name, form) for caption, name, form in _CHARTS)
+    marks = {"explained_change": _threshold(report.recipe)}
+    charts = "".join(_chart(caption, records, name, form, marks.get(name)) for caption, name, form in _CHARTS)
     return f'{told}<div class="charts">{charts}</div><h2>Solve by solve</h2>{_table(heads, rows)}'
+
+
+def _threshold(recipe) -> float | None:
+    """The De below which the contraction stops, if that is its rule."""
+    for stage in recipe.get("pipeline", ()):
+        rule = stage.get("stop") if isinstance(stage, dict) else None
+        if isinstance(rule, dict) and rule.get("rule") == "ExplainedScore":
+            value = rule.get("threshold")
+            return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+    return None
 
 
 def branches(skeleton: Skeleton) -> str:
@@ -135,7 +146,7 @@ def hexadecimal(colors: np.ndarray) -> list[str]:
 def origin(report: Report) -> str:
     """What it takes to repeat the run: the recipe, the counts and times of the run, the versions."""
     text = json.dumps(report.recipe, indent=2, ensure_ascii=False) if report.recipe else "\n".join(report.stages)
-    told = f"<h2>Recipe</h2><pre>{escape(text)}</pre>" if text else ""
+    told = f"<details><summary>Recipe</summary><pre>{escape(text)}</pre></details>" if text else ""
     counts = {
         "input points": report.n_input,
         "dropped, not finite": report.n_dropped,
@@ -166,12 +177,15 @@ def _facts(heading: str, told: dict[str, str], kind: str = "") -> str:
     return f'<div><h2>{heading}</h2><table class="facts"><tbody>{rows}</tbody></table></div>' if rows else ""
 
 
-def _chart(caption: str, records: Sequence[IterationRecord], name: str, form: str) -> str:
+def _chart(
+    caption: str, records: Sequence[IterationRecord], name: str, form: str, threshold: float | None = None
+) -> str:
     """A number per solve, from zero, as SVG; what is not finite is left out."""
     solves = [record.iteration for record in records]
     values = [(record.iteration, float(getattr(record, name))) for record in records]
     values = [(solve, value) for solve, value in values if math.isfinite(value)]
-    highest = _round_up(max((value for _, value in values), default=1.0))
+    levels = [value for _, value in values] + ([] if threshold is None else [threshold])
+    highest = _round_up(max(levels, default=1.0))
 
     def x(solve):
         share = (solve - solves[0]) / max(solves[-1] - solves[0], 1)
@@ -185,6 +199,11 @@ def _chart(caption: str, records: Sequence[IterationRecord], name: str, form: st
         f'<text x="{_LEFT - 7}" y="{y(value, 4)}" text-anchor="end">{value:{form}}</text>'
         for value in (0, highest / 2, highest)
     )
+    if threshold is not None:
+        grid += (
+            f'<line class="threshold" x1="{_LEFT}" x2="{_WIDTH}" y1="{y(threshold)}" y2="{y(threshold)}"/>'
+            f'<text x="{_WIDTH}" y="{y(threshold, -4)}" text-anchor="end">stops below {threshold:g}</text>'
+        )
     ticks = "".join(
         f'<text x="{x(solve)}" y="{_HEIGHT - 5}" text-anchor="middle">{solve}</text>'
         for solve in solves[:: -(-len(solves) // 10)]

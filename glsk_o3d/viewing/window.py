@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import os
+import socket
 import sys
-from pathlib import Path
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -124,8 +125,9 @@ def has_display() -> bool:
     if sys.platform in ("win32", "darwin"):
         return True
     if "WAYLAND_DISPLAY" in os.environ:
-        socket = Path(os.environ.get("XDG_RUNTIME_DIR", "/"), os.environ["WAYLAND_DISPLAY"])
-        if socket.is_socket():
+        with socket.socket(socket.AF_UNIX) as compositor, suppress(OSError):  # its file outlives it
+            compositor.settimeout(2)
+            compositor.connect(os.path.join(os.environ.get("XDG_RUNTIME_DIR", "/"), os.environ["WAYLAND_DISPLAY"]))
             return True
     if not os.environ.get("DISPLAY"):
         return False

@@ -10,12 +10,15 @@ from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Connector, Contractor, LPRReducer, Refiner, RingBuilder, read_cloud, samples, skeletonize
 from glsk_o3d.analysis import cross_check, save_crosscheck_picture
-from glsk_o3d.analysis.agreement import RowAgreement, SkeletonAgreement
+from glsk_o3d.analysis.agreement import RowAgreement, SkeletonAgreement, compare_rows, compare_skeletons
 from glsk_o3d.analysis.crosscheck import judge
+from glsk_o3d.analysis.crosscheck_picture import _draw
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
-from glsk_o3d.interop.meshes import mesh_arrays
+from glsk_o3d.interop.meshes import mesh_arrays, read_mesh
+from glsk_o3d.report import REFUSED, Report
 
 matplotlib = pytest.importorskip("matplotlib")
+from matplotlib.collections import LineCollection  # noqa: E402
 from matplotlib.image import imread  # noqa: E402
 
 SPIKY = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
@@ -109,10 +112,13 @@ def apart(**changed):
         ("agrees", {}, {"leaves": (3, 4)}, None),
         ("agrees in part", {"angle": {"median": 1.0, "p75": 31.0}}, {}, "turned by more than 31 degrees"),
         ("agrees in part", {"covered": 0.69}, {}, "closes around 69%"),
-        ("agrees in part", {"compared": 0, "angle": {}}, {}, "no Laplacian coordinates"),
-        ("agrees in part", {}, {"distance_in_radii": 0.3}, "0.30 local radii apart"),
+        ("do not trust", {"compared": 0, "covered": 0.0, "angle": {}}, {}, "no Laplacian coordinates"),
+        ("agrees", {"angle": {"median": 1.0, "p75": 29.0}, "covered": 0.71}, {}, None),
+        ("agrees", {}, {"distance_in_radii": 0.19, "hausdorff95_in_radii": 0.95}, None),
+        ("agrees in part", {}, {"distance_in_radii": 0.21}, "0.21 local radii apart"),
+        ("agrees in part", {}, {"distance_in_radii": 0.49}, "0.49 local radii apart"),
         ("agrees in part", {}, {"hausdorff95_in_radii": 1.2}, "1.2 local radii"),
-        ("do not trust", {}, {"distance_in_radii": 0.6}, "0.60 local radii apart"),
+        ("do not trust", {}, {"distance_in_radii": 0.51}, "0.51 local radii apart"),
         ("do not trust", {}, {"loops": (2, 1)}, "loops: 2 in the skeleton of the cloud, 1 in that of the mesh"),
         ("do not trust", {}, {"components": (1, 2)}, "components: 1"),
     ],
@@ -123,7 +129,69 @@ def test_thresholds(verdict, of_rows, of_skeletons, reason):
     assert [reason in text for text in reasons] == ([] if reason is None else [True])
 
 
+SHAPE = "the rings agree: it is the shape, not the sampling; in a blob a curve may run anywhere"
+
+
+@pytest.mark.parametrize("changed", [{"distance_in_radii": 0.6}, {"hausdorff95_in_radii": 1.2}])
+def test_where_the_rings_agree_it_is_the_shape(changed):
+    whole = {"rows": 100, "closed": 99, "compared": 99}
+    assert SHAPE in judge(rows(**whole), apart(**changed))[1]
+    assert SHAPE not in judge(rows(**whole), apart())[1]
+    for of_rows in ({"closed": 98}, {"angle": {"p75": 31.0}}, {"covered": 0.6}, {"one_to_one": False}):
+        assert SHAPE not in judge(rows(**whole | of_rows), apart(**changed))[1]
+    assert SHAPE not in judge(rows(**whole), apart(**changed, loops=(1, 2)))[1]
+    assert SHAPE not in judge(rows(**whole), apart(**changed), (), FAILED)[1]
+
+
+FAILED = Report(stop_reason=f"solve 3 {REFUSED}: it broke", warnings=("spiky", "flat"))
+
+
+def test_a_mesh_that_fails_is_named():
+    message = f"the mesh's own contraction failed: solve 3 {REFUSED}: it broke"
+    warned = ("the mesh's run warns: spiky", "the mesh's run warns: flat")
+    assert judge(rows(), apart(), (), FAILED) == ("agrees in part", (message, *warned))
+    verdict, reasons = judge(rows(), apart(components=(1, 9)), ("flat",), FAILED)
+    assert (verdict, reasons[0], len(reasons)) == ("do not trust", message, 4)
+    assert judge(rows(), apart(), (), Report(stop_reason="settled")) == ("agrees", ())
+
+
+@SPIKY
+def test_a_mesh_whose_contraction_fails(shared_dir):
+    found = cross_check(read_cloud(shared_dir / "data" / "duck.ply"))
+    assert REFUSED in found.mesh_skeleton.report.stop_reason
+    assert found.reasons[0] == f"the mesh's own contraction failed: {found.mesh_skeleton.report.stop_reason}"
+    assert any(reason.startswith("the mesh's run warns: weakly supported") for reason in found.reasons)
+
+
 # -------------------------------------------------------------------------------------------------------- the numbers
+
+
+@pytest.mark.parametrize("tilt", [0, 0.4])
+def test_flat_rows_have_one_direction(tilt):
+    x, y = (grid.ravel() + 0.0 for grid in np.meshgrid(np.arange(12), np.arange(12)))
+    points = np.column_stack([x, y, tilt * x])
+    state = RingBuilder(denoise=0)(points)
+    order = np.lexsort(state.points[state.point_of_survivor].T[:2])  # rows of the grid
+    corner = (np.arange(11)[:, None] * 12 + np.arange(11)).ravel()
+    faces = order[np.concatenate([corner[:, None] + [0, 1, 13], corner[:, None] + [0, 13, 12]])]
+    angle, length, _, found = compare_rows(state, state.cloud, faces)
+    compared = np.isfinite(angle)
+    assert compared.sum() == found.compared > 50
+    assert found.flat > 0.9
+    assert (angle[compared] == 0).mean() >= found.flat
+    assert (length[compared] == 1).mean() >= found.flat
+
+
+def test_the_astray_end_of_either_skeleton_counts(make):
+    def path(end):
+        line = make(np.column_stack([np.linspace(0, end, 50), np.zeros((50, 2))]), np.arange(49)[:, None] + [0, 1])
+        return replace(line, radii=np.full(50, 0.5))
+
+    for ours, theirs in ((1, 3), (3, 1)):
+        found = compare_skeletons(path(ours), path(theirs), 3.0)
+        # of 3 units the last 2 are up to 2 from the other, whose radius is the same
+        assert found.hausdorff95_in_radii == pytest.approx(1.85 / 0.5, rel=0.01)
+        assert found.hausdorff95 == pytest.approx(1.85 / 3, rel=0.01)
 
 
 def test_it_is_the_skeleton_of_skeletonize(ring, check):
@@ -263,6 +331,17 @@ def test_a_mesh_that_lies_elsewhere(ring):
         cross_check(ring.points, (np.eye(3) + 100, [[0, 1, 2]]))
 
 
+def test_a_mesh_is_read_once(surface, tmp_path, monkeypatch):
+    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(surface[0]), o3d.utility.Vector3iVector(surface[1]))
+    read = o3d.io.read_triangle_mesh
+    for ending in ("ply", "off"):
+        o3d.io.write_triangle_mesh(str(tmp_path / f"m.{ending}"), mesh)
+        once = iter([read])
+        for name in ("read_triangle_mesh", "read_point_cloud"):
+            monkeypatch.setattr(o3d.io, name, lambda *words, once=once, **_: next(once)(*words))
+        assert len(read_mesh(tmp_path / f"m.{ending}").triangles) == len(surface[1])
+
+
 def test_arrays_of_a_mesh_are_copies():
     vertices, faces = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)
     found = mesh_arrays((vertices, faces))
@@ -300,6 +379,18 @@ def test_points_that_are_not_finite_and_outliers(ring, check):
     assert len(thinned.points) == 1001
 
 
+@SPIKY
+def test_where_poisson_fails_the_balls_surface_is_better_than_none():
+    ring = samples.torus(800).points
+    far = np.vstack([ring, ring + [300, 0, 0]])  # cells as wide as a ring
+    found = cross_check(far)
+    assert found.surface == "ball_pivoting"
+    assert found.rows.compared > 300
+    assert found.skeletons.components == (2, 2)
+    with pytest.raises(InvalidCloudError, match="no surface can be reconstructed from 1600 points by poisson"):
+        cross_check(far, "poisson")
+
+
 def test_duplicates_share_their_row(ring, check):
     found = cross_check(np.vstack([ring.points, ring.points[:10]]))
     np.testing.assert_array_equal(found.angle[1500:], found.angle[:10])
@@ -311,6 +402,10 @@ def test_clouds_without_a_surface():
     line = np.column_stack([np.linspace(0, 1, 50), np.zeros(50), np.zeros(50)])
     with pytest.raises(InvalidCloudError, match="no surface can be reconstructed from 50 points"):
         cross_check(line, "ball_pivoting")
+    found = cross_check(np.column_stack([np.linspace(0, 1, 500), np.zeros((500, 2))]))  # Poisson invents one
+    assert found.rows.compared == 0
+    assert found.verdict == "do not trust"
+    assert "no Laplacian coordinates could be compared" in found.reasons
     for wrong in (np.eye(3), np.empty((0, 3))):
         with pytest.raises(InvalidCloudError):
             cross_check(wrong)
@@ -354,6 +449,22 @@ def test_the_picture_shows_where_it_disagrees(check, tmp_path):
     shares = np.array(shares)
     assert (np.diag(shares) > 0.01).all()
     assert (shares - np.diag(np.diag(shares)) < 1e-3).all()
+
+
+def test_the_picture_has_room_for_both_skeletons(check):
+    below = check.mesh_skeleton.vertices - [0, 0, 3]  # its vertices lie far out of the cloud
+    reasons = tuple(f"reason {i}" for i in range(5))
+    moved = replace(check, mesh_skeleton=replace(check.mesh_skeleton, vertices=below), reasons=reasons)
+    figure = _draw(moved, (12, 5.7), None)
+    words = [text.get_text() for text in figure.texts]
+    assert "reason 2; and 2 more" in words
+    for axes in figure.axes[:3]:
+        low, high = np.sort([axes.get_xlim(), axes.get_ylim()], axis=1).T
+        for lines in axes.collections[1:]:
+            if isinstance(lines, LineCollection):
+                places = np.concatenate(lines.get_segments())
+                assert (places >= low - 1e-9).all()
+                assert (places <= high + 1e-9).all()
 
 
 def test_the_picture_of_a_skeleton_of_one_vertex_and_of_points_that_are_not_finite(check, tmp_path):

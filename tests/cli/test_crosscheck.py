@@ -1,6 +1,7 @@
 """`glsk crosscheck`: whether a scan is dense and clean enough."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -58,6 +59,16 @@ def test_json_on_stdout_and_quiet(invoke, scans, tmp_path):
     told = json.loads(result.stdout)
     assert (told["verdict"], told["files"]) == ("agrees", [])
     assert (invoke("crosscheck", scans / "ring.ply", "--quiet").output, list(tmp_path.iterdir())) == ("", [])
+
+
+@pytest.mark.skipif(sys.platform in ("darwin", "win32"), reason="file names are Unicode there")
+def test_a_name_that_is_no_unicode(invoke, scans, tmp_path):
+    scan = tmp_path / os.fsdecode(b"bad\xff\xfename.ply")
+    scan.write_bytes((scans / "ring.ply").read_bytes())
+    result = invoke("crosscheck", scan, "-o", "r.json", "--picture", "p.png")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert json.loads((tmp_path / "r.json").read_text("utf-8"))["scan"].endswith("/bad??name.ply")
+    assert imread(tmp_path / "p.png").shape[:2] == (860, 1800)
 
 
 @pytest.mark.parametrize("mesh", ["ring.ply", "ring.off"])

@@ -1,6 +1,8 @@
 """`glsk rerun`, and the options of `glsk skeletonize` for recipes."""
 
+import dataclasses
 import json
+import re
 
 import numpy as np
 import pytest
@@ -16,6 +18,30 @@ def made(invoke, scans, tmp_path):
     assert result.exit_code == 0, result.output
     assert result.stdout.endswith("wrote s.json\nwrote s.npz\nwrote r.toml\n")
     return read_skeleton(tmp_path / "s.json")
+
+
+def test_without_outputs_it_says_whether_it_is_the_same(invoke, scans, tmp_path, made):
+    before = sorted(tmp_path.iterdir())
+    result = invoke("rerun", "s.json")
+    assert (result.exit_code, result.stderr) == (0, "")
+    told = dict(line.split(maxsplit=1) for line in result.stdout.splitlines())
+    assert (told["identical"], told["vertices"]) == ("yes", str(len(made.vertices)))
+    assert json.loads(invoke("rerun", "s.json", "--json").stdout)["identical"] is True
+    assert "identical    no\n" in invoke("rerun", "s.json", scans / "ring.ply").stdout
+    dataclasses.replace(made, radii=made.radii * 2).save(tmp_path / "s.json")
+    result = invoke("rerun", "s.json")
+    assert "identical    no\n" in result.stdout
+    assert "glsk: warning: the rerun differs from the result" in result.stderr
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_page_of_it(invoke, tmp_path, made):
+    result = invoke("rerun", "s.json", "--report", "s.html")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.endswith("wrote s.html\n")
+    text = (tmp_path / "s.html").read_text("utf-8")
+    held = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1])
+    assert len(held["captions"]) == len(made.report.iterations) + 1  # the contraction was watched
 
 
 @pytest.mark.parametrize("words", [["s.json"], ["s.npz"], ["s.json", "SCAN"]])
@@ -52,7 +78,6 @@ def test_settings_change_a_recipe(invoke, scans, tmp_path, made):
 @pytest.mark.parametrize(
     ("code", "words", "message"),
     [
-        (2, ["rerun", "s.json"], "nothing to write"),
         (2, ["rerun", "s.json", "-o", "s.json"], "s.json: is the result itself: choose another name"),
         (1, ["rerun", "none.json", "-o", "a.ply"], "none.json: no such file"),
         (1, ["rerun", "s.json", "none.ply", "-o", "a.ply"], "none.ply: no such file"),

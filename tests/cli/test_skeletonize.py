@@ -2,7 +2,9 @@
 
 import json
 import logging
+import os
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -166,3 +168,24 @@ def test_demo_refuses(refused, invoke, tmp_path):
     result = invoke("demo", "-o", "file")
     assert (result.exit_code, result.stderr) == (1, "glsk: error: file: is a file, not a folder\n")
     assert invoke("demo", "--points", "0").exit_code == 2
+
+
+needs_bytes = pytest.mark.skipif(sys.platform in ("darwin", "win32"), reason="file names are Unicode there")
+
+
+@needs_bytes
+def test_a_name_that_is_no_unicode(invoke, scans, tmp_path):
+    scan = tmp_path / os.fsdecode(b"bad\xff\xfename.ply")
+    scan.write_bytes((scans / "ring.ply").read_bytes())
+    result = invoke("skeletonize", scan, "-o", "s.json", "--preview", "s.png", "--report", "s.html")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert "<title>bad??name.ply</title>" in (tmp_path / "s.html").read_text("utf-8")
+    assert (tmp_path / "s.png").stat().st_size > 1000
+
+
+def test_a_writer_that_breaks_does_not_keep_the_others_from_it(invoke, scans, tmp_path, monkeypatch):
+    monkeypatch.setattr("glsk_o3d.cli.running.save_preview", lambda *_, **__: 1 / 0)
+    result = invoke("skeletonize", scans / "ring.ply", "--preview", "s.png", "--report", "s.html")
+    assert result.exit_code == 1
+    assert result.stderr == "glsk: error: s.png: cannot be written: ZeroDivisionError: division by zero\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["s.html"]

@@ -329,7 +329,7 @@ def test_a_new_filter_is_a_verb_by_itself(monkeypatch, tmp_path):
         consumes = produces = "Skeleton"
         factor: float = parameter(2.0, "How much.", type="float", low=1)
 
-        def _run(self, skeleton, on_iteration):
+        def _run(self, skeleton, watch):
             return dataclasses.replace(skeleton, vertices=self.factor * skeleton.vertices)
 
     known = {**catalogue(), "VertexDoubler": VertexDoubler}

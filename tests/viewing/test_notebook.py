@@ -59,6 +59,16 @@ def test_is_small_even_for_large_clouds(tree):
     assert len(many._repr_html_()) < 200_000
 
 
+def test_no_white_band_around_the_drawing(make):
+    long = make(np.array([[0, 0, 0], [9, 0, 0], [9, 0.5, 0.5]]), [[0, 1], [1, 2]])
+    long = dataclasses.replace(long, points=(), normals=(), vertex_of_point=())
+    (image,) = parsed(long._repr_html_()).images
+    picture = imread(io.BytesIO(base64.b64decode(image.removeprefix("data:image/png;base64,"))))
+    inked = np.flatnonzero((picture[..., :3] < 0.9).any(axis=(1, 2)))
+    assert inked[0] < 25
+    assert inked[-1] > len(picture) - 25
+
+
 def test_warnings_are_texts(tree):
     html = dataclasses.replace(tree, report=Report(warnings=("<b>&",)))._repr_html_()
     assert "<b>&" in parsed(html).words

@@ -116,6 +116,15 @@ def test_large_clouds_are_thinned_and_the_page_says_so(data, tree, tmp_path):
     assert (tmp_path / "r.html").stat().st_size < 1_000_000
 
 
+def test_points_that_are_not_finite_are_not_called_thinned(run, tmp_path):
+    points = np.vstack([torus(300).points, np.full((5, 3), np.nan)])
+    recorder = ContractionRecorder()
+    pipeline = RingBuilder(drop_invalid=True) | Contractor(max_iterations=2) | glsk.Connector() | glsk.Refiner()
+    for watched in (recorder, None):
+        save_report(pipeline(points, on_state=recorder), tmp_path / "r.html", recorder=watched)
+        assert "drawn at random" not in (tmp_path / "r.html").read_text("utf-8")
+
+
 def test_unknown_radii_and_lone_vertices(data, forest):
     held = data(dataclasses.replace(forest, radii=[1, math.nan, 1, 1, 1, 1], confidence=[math.nan] * 6))
     assert list(held["ranges"]) == ["branch"]
@@ -171,7 +180,7 @@ def test_a_failure_leaves_what_was_there(tree, tmp_path, monkeypatch):
 
 
 def test_a_recipe_takes_the_place_of_the_stages(tree):
-    assert "<h2>Recipe</h2>" not in sections.origin(tree.report)
+    assert "<summary>Recipe</summary>" not in sections.origin(tree.report)
     told = dataclasses.replace(tree.report, stages=("RingBuilder(k=5)",))
     assert "RingBuilder(k=5)" in sections.origin(told)
     told = dataclasses.replace(told, recipe={"pipeline": [{"filter": "RingBuilder", "k": "<5>"}]})
@@ -189,6 +198,30 @@ def test_charts_leave_out_what_is_not_finite():
     zero, top = 128, 12
     np.testing.assert_allclose(ys, [top, zero - (zero - top) / 2, zero - (zero - top) / 4], atol=0.06)
     assert re.findall(r'data-at="(\d)"', sections._chart("De", records, "explained_change", ".3g")) == ["1", "3"]
+
+
+@pytest.mark.parametrize(
+    ("stop", "words"),
+    [
+        (glsk.ExplainedScore(threshold=0.2), ["stops below 0.2"]),
+        (glsk.RingSizeRatio(), []),
+        (lambda iterations: "enough", []),
+    ],
+)
+def test_the_chart_of_the_score_shows_where_its_rule_stops(stop, words):
+    report = (RingBuilder() | Contractor(stop=stop, max_iterations=2))(torus(300).points).report
+    text = sections.contraction(report)
+    assert re.findall("stops below [0-9.]+", text) == words
+    lines = re.findall(r'class="threshold".*? y1="([\d.]+)"', text)
+    tops = re.findall(r'text-anchor="end">([\d.]+)</text>', text)  # three of each chart
+    assert [float(y) for y in lines] == [pytest.approx(128 - 0.2 / float(tops[5]) * 116, abs=0.06) for _ in words]
+    assert not words or float(tops[5]) >= 0.2
+
+
+@pytest.mark.parametrize("stop", [None, 3, {}, {"rule": "ExplainedScore"}, {"rule": "ExplainedScore", "threshold": ""}])
+def test_recipes_that_tell_no_threshold(tree, stop):
+    report = dataclasses.replace(tree.report, recipe={"pipeline": ["?", {"filter": "Contractor", "stop": stop}]})
+    assert "stops below" not in sections.contraction(report)
 
 
 @pytest.mark.parametrize(("value", "top"), [(0, 1), (0.03, 0.03), (0.031, 0.04), (22367, 30000), (1, 1), (9.5, 10)])

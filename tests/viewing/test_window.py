@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import socket
 import subprocess
 import sys
 
@@ -60,6 +61,21 @@ def test_without_a_display(run, monkeypatch, display):
 def test_a_wayland_socket_that_is_not_there(monkeypatch, tmp_path):
     monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    assert not has_display()
+
+
+@needs_x11
+@pytest.mark.usefixtures("no_display")
+def test_a_wayland_socket_that_nobody_listens_at_any_more(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)  # the names of sockets must be short
+    monkeypatch.setenv("XDG_RUNTIME_DIR", ".")
+    monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
+    with socket.socket(socket.AF_UNIX) as compositor:
+        compositor.bind("wayland-0")
+        assert not has_display()
+        compositor.listen()
+        assert has_display()
+    assert (tmp_path / "wayland-0").is_socket()
     assert not has_display()
 
 

@@ -237,7 +237,7 @@
       attach(points.attribute("after"), places, 3, gl.SHORT, 0, 6 * nPoints * to);
       use(points);
       gl.uniform1f(points.uniform("between"), shown - from);
-      gl.uniform1f(points.uniform("size"), Math.min(0.9 / Math.sqrt(nPoints), 0.016) * ZOOM * canvas.height / 2);
+      gl.uniform1f(points.uniform("size"), Math.min(0.55 / Math.sqrt(nPoints), 0.009) * ZOOM * canvas.height / 2);
       gl.uniform3fv(points.uniform("paper"), paper);
       gl.drawArrays(gl.POINTS, 0, nPoints);
     }
