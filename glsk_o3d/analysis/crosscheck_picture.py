@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..interop.files import check_ending, write_atomically
+from ..interop.files import check_ending
 from ..interop.open3d import require
-from ..interop.preview import DPI, INK, MOST_POINTS, printable
+from ..interop.preview import DPI, INK, MOST_POINTS, colour_bar, printable, room, save_figure, three_views
 
 if TYPE_CHECKING:
     from .crosscheck import CrossCheck
 
-_VIEWS = ((0, 1), (0, 2), (1, 2))
 _OURS, _THEIRS, _UNKNOWN = "#111111", "#0a6fc2", "#c9c9c9"
 _MOST_REASONS = 3
 _MOST = 60.0  # degrees at which the colours end
-_PAD, _HEAD, _FOOT = 0.3, 0.95, 0.85  # inches
+_HEAD, _FOOT = 0.95, 0.85  # inches
 
 
 def save_crosscheck_picture(
@@ -50,8 +49,7 @@ def save_crosscheck_picture(
         The folder does not exist, or the file cannot be written.
     """
     check_ending(path, "picture is a PNG", ".png")
-    figure = _draw(check, np.asarray(size) / DPI, title)
-    write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=DPI))
+    save_figure(_draw(check, np.asarray(size) / DPI, title), path)
 
 
 def _draw(check, size, title):
@@ -69,19 +67,10 @@ def _draw(check, size, title):
     scale = ScalarMappable(Normalize(0, _MOST, clip=True), colormaps["YlOrRd"])
     points, angle = _shown(check)
     shown = np.concatenate([points, check.skeleton.vertices, check.mesh_skeleton.vertices])  # they may differ widely
-    low, high = shown.min(axis=0), shown.max(axis=0)
-    centre, extent = low + (high - low) / 2, np.maximum(high - low, 0.08 * (high - low).max())
-    points = points - centre  # small numbers: matplotlib's transforms lose digits
+    centre, extent = room(shown)
+    points = points - centre
     colours = np.where(np.isnan(angle)[:, None], _rgba(_UNKNOWN), scale.to_rgba(np.nan_to_num(angle)))
-    across, up = np.array([extent[[a, b]] for a, b in _VIEWS]).T
-    unit = min((width - 4 * _PAD) / across.sum(), (height - _HEAD - _FOOT) / up.max())
-    gap = (width - unit * across.sum()) / 4
-    left, middle = gap, _FOOT + (height - _HEAD - _FOOT) / 2
-    for a, b in _VIEWS:
-        box = [left, middle - unit * extent[b] / 2, unit * extent[a], unit * extent[b]]
-        axes = figure.add_axes(np.divide(box, [width, height] * 2))
-        axes.set_axis_off()
-        axes.set(xlim=extent[a] * np.array([-0.5, 0.5]), ylim=extent[b] * np.array([-0.5, 0.5]))
+    for a, b, axes in three_views(figure, extent, head=_HEAD, foot=_FOOT, names=0.62):
         dot = float(np.clip(16000 / max(len(points), 1), 2, 6))
         axes.scatter(points[:, a], points[:, b], s=dot, c=colours, linewidths=0, clip_on=False)
         for skeleton, colour, line in ((check.mesh_skeleton, _THEIRS, 2.6), (check.skeleton, _OURS, 1.2)):
@@ -91,16 +80,9 @@ def _draw(check, size, title):
                 axes.add_collection(LineCollection(places[skeleton.edges], **style))
             alone = skeleton.degree == 0
             axes.scatter(*places[alone].T, s=16, c=colour, linewidths=0, zorder=3, clip_on=False)
-        names = f"{'xyz'[a]}\N{RIGHTWARDS ARROW} {'xyz'[b]}\N{UPWARDS ARROW}"
-        figure.text((left + box[2] / 2) / width, 0.62 / height, names, ha="center", color="#999999", fontsize=7)
-        left += box[2] + gap
     _write(figure, check, title, height)
-    bar = figure.colorbar(
-        scale, cax=figure.add_axes([0.42, 0.3 / height, 0.16, 0.09 / height]), orientation="horizontal"
-    )
-    bar.set_ticks([0, 30, 60], labels=["0", "30", "60\N{DEGREE SIGN} and more"])
-    bar.outline.set_visible(False)
-    bar.ax.tick_params(length=0, pad=2, labelsize=7, labelcolor=INK)
+    box = [0.42, 0.3 / height, 0.16, 0.09 / height]
+    colour_bar(figure, scale, box, [0, 30, 60], ["0", "30", "60\N{DEGREE SIGN} and more"])
     return figure
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InvalidParameterError
 from ..interop import preview
-from ..interop.files import check_ending, write_atomically
+from ..interop.files import check_ending
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -70,7 +70,7 @@ def save_picture(
     shown = dataclasses.replace(skeleton, points=points, vertex_of_point=np.empty(0), normals=np.empty(0))
     figure = preview.draw(shown, size, title)
     _colour(figure, values, label, best, unknown)
-    write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=preview.DPI))
+    preview.save_figure(figure, path)
 
 
 def _colour(figure, values, label, best, unknown):
@@ -90,10 +90,7 @@ def _colour(figure, values, label, best, unknown):
                 drawn.set_edgecolor(preview.INK)
     width, height = figure.get_size_inches()
     box = [width - _CORNER[0] - _BAR[0], height - _CORNER[1] - _BAR[1], *_BAR]
-    bar = figure.colorbar(scale, cax=figure.add_axes(np.divide(box, [width, height] * 2)), orientation="horizontal")
-    bar.set_ticks([0, 0.5, 1])
-    bar.outline.set_visible(False)
-    bar.ax.tick_params(length=0, pad=2, labelsize=7, labelcolor=preview.INK)
+    preview.colour_bar(figure, scale, np.divide(box, [width, height] * 2), [0, 0.5, 1])
     middle = (box[1] + _BAR[1] / 2) / height
     figure.text((box[0] - 0.1) / width, middle, label, ha="right", va="center_baseline", color=preview.INK, fontsize=8)
     if np.isnan(values).any():

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 MOST_POINTS = 20_000
 DPI = 150
-_VIEWS = ((0, 1), (0, 2), (1, 2))
+_VIEWS, _PAD = ((0, 1), (0, 2), (1, 2)), 0.3  # inches between them at least
 INK, _RED, _PAPER = "#333333", "#d0121f", "white"
 _FAR, _NEAR = np.array([0.90] * 3), np.array([0.68] * 3)
 
@@ -50,8 +51,7 @@ def save_preview(
         The file cannot be written.
     """
     check_ending(path, "preview is a picture", ".png")
-    figure = draw(skeleton, size, title)
-    write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=DPI))
+    save_figure(draw(skeleton, size, title), path)
 
 
 def draw(skeleton: Skeleton, size, title, caption=True):
@@ -66,23 +66,9 @@ def draw(skeleton: Skeleton, size, title, caption=True):
     FigureCanvasAgg(figure)
     cloud = skeleton.points[np.isfinite(skeleton.points).all(axis=1)]
     cloud = cloud[:: max(1, -(-len(cloud) // MOST_POINTS))]
-    shown = np.concatenate([cloud, skeleton.vertices])
-    low, high = (shown.min(axis=0), shown.max(axis=0)) if len(shown) else np.zeros((2, 3))
-    centre = low + (high - low) / 2
-    cloud, vertices = cloud - centre, skeleton.vertices - centre  # small numbers: matplotlib's transforms lose digits
-    extent = np.maximum(high - low, 0.08 * (high - low).max() or 1.0)
-
-    pad, foot, head = 0.3, 0.6, 0.55 if title else 0.25
-    across, up = np.array([extent[[a, b]] for a, b in _VIEWS]).T
-    scale = min((width - 4 * pad) / across.sum(), (height - foot - head) / up.max())
-    gap = (width - scale * across.sum()) / 4
-    left = gap
-    for (a, b), view_width in zip(_VIEWS, scale * across, strict=True):
-        middle = foot + (height - foot - head) / 2
-        box = [left, middle - scale * extent[b] / 2, view_width, scale * extent[b]]
-        axes = figure.add_axes(np.divide(box, [width, height, width, height]))
-        axes.set_axis_off()
-        axes.set(xlim=extent[a] * np.array([-0.5, 0.5]), ylim=extent[b] * np.array([-0.5, 0.5]))
+    centre, extent = room(np.concatenate([cloud, skeleton.vertices]))
+    cloud, vertices = cloud - centre, skeleton.vertices - centre
+    for a, b, axes in three_views(figure, extent, head=0.55 if title else 0.25, foot=0.6, names=0.36):
         style = {"linewidths": 0, "clip_on": False}
         depth, toward = cloud[:, 3 - a - b], 1 if (a, b) != (0, 2) else -1  # x, y, z are right-handed
         order = np.argsort(toward * depth, kind="stable")
@@ -97,14 +83,92 @@ def draw(skeleton: Skeleton, size, title, caption=True):
         ):
             spots = {"s": area, "facecolors": face, "edgecolors": _RED if face == _PAPER else face, "linewidths": 0.9}
             axes.scatter(*vertices[chosen][:, [a, b]].T, zorder=3, clip_on=False, **spots)
-        names = f"{'xyz'[a]}\N{RIGHTWARDS ARROW} {'xyz'[b]}\N{UPWARDS ARROW}"
-        figure.text((left + view_width / 2) / width, 0.36 / height, names, ha="center", color="#999999", fontsize=7)
-        left += view_width + gap
     if caption:
         figure.text(0.5, 0.12 / height, _caption(skeleton), ha="center", color=INK, fontsize=8)
     if title:
         figure.text(0.5, 1 - 0.33 / height, printable(title), ha="center", color=INK, fontsize=12, parse_math=False)
     return figure
+
+
+def room(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Middle and size of the box that is drawn: matplotlib's transforms lose digits unless the middle is taken off.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+
+    Returns
+    -------
+    centre, extent : (3,) float array
+    """
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else np.zeros((2, 3))
+    return low + (high - low) / 2, np.maximum(high - low, 0.08 * (high - low).max() or 1.0)
+
+
+def three_views(
+    figure, extent: np.ndarray, *, head: float, foot: float, names: float
+) -> Iterator[tuple[int, int, Any]]:
+    """Axes for the views along the coordinate axes, all at one scale, with the names of their axes below.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    extent : (3,) float array
+        Of what is drawn, around the origin.
+    head, foot : float
+        Room above and below, in inches.
+    names : float
+        Height of the names, in inches.
+
+    Yields
+    ------
+    across, up : int
+        The coordinates that are drawn.
+    axes : matplotlib.axes.Axes
+    """
+    width, height = figure.get_size_inches()
+    across, up = np.array([extent[[a, b]] for a, b in _VIEWS]).T
+    scale = min((width - 4 * _PAD) / across.sum(), (height - foot - head) / up.max())
+    gap = (width - scale * across.sum()) / 4
+    left, middle = gap, foot + (height - foot - head) / 2
+    for a, b in _VIEWS:
+        box = [left, middle - scale * extent[b] / 2, scale * extent[a], scale * extent[b]]
+        axes = figure.add_axes(np.divide(box, [width, height] * 2))
+        axes.set_axis_off()
+        axes.set(xlim=extent[a] * np.array([-0.5, 0.5]), ylim=extent[b] * np.array([-0.5, 0.5]))
+        yield a, b, axes
+        told = f"{'xyz'[a]}\N{RIGHTWARDS ARROW} {'xyz'[b]}\N{UPWARDS ARROW}"
+        figure.text((left + box[2] / 2) / width, names / height, told, ha="center", color="#999999", fontsize=7)
+        left += box[2] + gap
+
+
+def colour_bar(figure, scale, box, ticks: list[float], labels: list[str] | None = None) -> None:
+    """A small horizontal colour bar.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    scale : matplotlib.cm.ScalarMappable
+    box : 4 floats
+        Left, bottom, width and height, as shares of the figure.
+    ticks : list of float
+    labels : list of str, optional
+    """
+    bar = figure.colorbar(scale, cax=figure.add_axes(box), orientation="horizontal")
+    bar.set_ticks(ticks, labels=labels)
+    bar.outline.set_visible(False)
+    bar.ax.tick_params(length=0, pad=2, labelsize=7, labelcolor=INK)
+
+
+def save_figure(figure, path: str | os.PathLike) -> None:
+    """Write a figure as PNG; it appears complete or not at all.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    path : path-like
+    """
+    write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=DPI))
 
 
 def printable(text: object) -> str:
