@@ -12,7 +12,7 @@ import numpy as np
 from .filter import Filter, documented, parameter
 from .numerics.cotangent import cotangent_laplacian
 from .numerics.eigen import largest_eigenvalue
-from .numerics.neighbourhoods import nearest_neighbours
+from .numerics.neighbourhoods import nearest_neighbours, scatter
 from .numerics.solver import SolveError, solve_contraction
 from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord
 from .state import Contraction
@@ -166,11 +166,9 @@ def linearity(points):
         1 on a line.
     """
     _, neighbours = nearest_neighbours(points, min(LINE_NEIGHBOURS, len(points)))
-    patch = points[neighbours]
-    patch -= patch.mean(axis=1, keepdims=True)
-    covariance = np.matmul(patch.transpose(0, 2, 1), patch)
-    total = np.trace(covariance, axis1=1, axis2=2)
-    return largest_eigenvalue(covariance) / np.maximum(total, np.finfo(float).tiny)
+    spread = scatter(points, neighbours)
+    total = np.trace(spread, axis1=1, axis2=2)
+    return largest_eigenvalue(spread) / np.maximum(total, np.finfo(float).tiny)
 
 
 def explained_score(points) -> float:

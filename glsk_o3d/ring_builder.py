@@ -18,7 +18,7 @@ from .numerics.ridges import noise_share, to_ridges
 from .numerics.rings import star_rings
 from .numerics.thinning import thin
 from .report import Report
-from .state import Contraction
+from .state import Contraction, at_rest
 
 MIN_POINTS = 8
 LEAST_RING = 3
@@ -149,9 +149,8 @@ class RingBuilder(Filter):
         good = points[finite]
         frame, distinct, row, distance, neighbours = self._distinct(good)
         stray = np.zeros(len(good), bool)
-        for _ in range(
-            ROUNDS if self.outlier_factor else 0
-        ):  # what is left of a group stands out once the rest is gone
+        # in rounds, since what is left of a group stands out once the rest is gone
+        for _ in range(ROUNDS if self.outlier_factor else 0):
             found = np.zeros(len(good), bool)
             found[~stray] = isolation(distance, neighbours)[row[~stray]] > self.outlier_factor
             if not found.any() or len(np.unique(row[~stray & ~found])) < MIN_POINTS:
@@ -169,19 +168,17 @@ class RingBuilder(Filter):
         if self.denoise and noise.any():
             distinct, neighbours, left, nearest = self._denoised(distinct, neighbours.shape[1], noise)
             normals, noise = normals[left], noise[left]
-            row_of_point[finite], outlier[finite] = (
-                nearest[row],
-                stray | (left[nearest] != np.arange(len(nearest)))[row],
-            )
+            row_of_point[finite] = nearest[row]
+            outlier[finite] |= (left[nearest] != np.arange(len(nearest)))[row]
             axes = principal(distinct, neighbours)[1]
         into = thin(distinct, neighbours, self._number(len(distinct)))
-        survivors = np.flatnonzero(into == np.arange(len(into)))
+        kept = into == np.arange(len(into))
+        survivors = np.flatnonzero(kept)
         n, positions, axes = len(survivors), distinct[survivors], axes[survivors]
         if n < len(distinct):
             neighbours = nearest_neighbours(positions, self._neighbours(n))[1]
         rings = star_rings(positions, np.arange(n), self._within(positions, neighbours[:, 1:], frame), axes[:, :, 1:])
-        owner = (np.cumsum(into == np.arange(len(into))) - 1)[into]
-        _, ring_size = rings.nearest(positions)
+        owner = (np.cumsum(kept) - 1)[into]
         return Contraction(
             points=points,
             row_of_point=row_of_point,
@@ -192,16 +189,8 @@ class RingBuilder(Filter):
             normals=normals,
             survivors=survivors,
             owner=owner,
-            positions=positions,
-            previous=positions,
-            laplacian_coordinates=np.zeros((n, 3)),
-            rings=rings,
             mass=np.bincount(owner, minlength=n).astype(float),
-            ring_size0=ring_size,
-            ring_size=ring_size,
-            ring_ratio_drop=0.0,
-            mean_ring_edge=float(rings.mean_lengths(positions).mean()),
-            contraction_weight=0.0,
+            **at_rest(positions, rings),
             report=Report(
                 n_input=len(points),
                 n_dropped=int((~finite).sum()),
@@ -221,11 +210,8 @@ class RingBuilder(Filter):
         left = np.flatnonzero(~alone)
         nearest = np.cumsum(~alone) - 1
         nearest[alone] = cKDTree(calm[left]).query(calm[alone])[1]
-        calm, neighbours, changed = (
-            calm[left],
-            nearest[neighbours[left]],
-            np.flatnonzero(alone[neighbours[left]].any(axis=1)),
-        )
+        changed = np.flatnonzero(alone[neighbours[left]].any(axis=1))
+        calm, neighbours = calm[left], nearest[neighbours[left]]
         neighbours[changed] = nearest_neighbours(calm, k, of=calm[changed])[1]
         return calm, neighbours, left, nearest
 

@@ -3,12 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from .numerics.frame import Frame
 from .numerics.rings import Rings
 from .report import Report
+
+
+def at_rest(positions: np.ndarray, rings: Rings) -> dict[str, Any]:
+    """What a Contraction says of points that have not moved yet, as keywords.
+
+    Parameters
+    ----------
+    positions : (n, 3) float array
+    rings : Rings
+
+    Returns
+    -------
+    dict
+    """
+    _, ring_size = rings.nearest(positions)
+    return dict(
+        positions=positions,
+        previous=positions,
+        laplacian_coordinates=np.zeros((len(positions), 3)),
+        rings=rings,
+        ring_size0=ring_size,
+        ring_size=ring_size,
+        ring_ratio_drop=0.0,
+        mean_ring_edge=float(rings.mean_lengths(positions).mean()),
+        contraction_weight=0.0,
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from ..lpr_reducer import LPRReducer
 from ..numerics.cotangent import WEIGHT_CAP
 from ..numerics.meshes import mesh_rings
 from ..report import Report
+from ..state import at_rest
 
 
 def mesh_laplacian(vertices, faces, cap=WEIGHT_CAP):
@@ -129,19 +130,12 @@ def mesh_state(state, vertices, faces):
     positions = vertices[survivors]
     n = len(positions)
     rings = mesh_rings(n, faces)
-    _, ring_size = rings.nearest(positions)
     begun = replace(
         state,
         survivors=survivors,
         owner=cKDTree(positions).query(vertices)[1],
-        positions=positions,
-        previous=positions,
-        laplacian_coordinates=np.zeros((n, 3)),
-        rings=rings,
         mass=np.ones(n),
-        ring_size0=ring_size,
-        ring_size=ring_size,
-        mean_ring_edge=float(rings.mean_lengths(positions).mean()),
+        **at_rest(positions, rings),
         report=Report(n_input=len(state.points), n_distinct=n, n_contracted=n),
     )
     return begun, faces

@@ -46,6 +46,23 @@ def isolation(distance, neighbours):
     return mean / np.median(mean[neighbours[:, 1:]], axis=1)
 
 
+def scatter(points, neighbours):
+    """Scatter matrix of every neighbourhood: the sums of products of what its points deviate from their mean.
+
+    Parameters
+    ----------
+    points : (m, 3) float array
+    neighbours : (n, k) int array
+
+    Returns
+    -------
+    (n, 3, 3) float array
+    """
+    patch = points[neighbours]
+    patch -= patch.mean(axis=1, keepdims=True)
+    return np.matmul(patch.transpose(0, 2, 1), patch)
+
+
 def principal(points, neighbours):
     """Principal components of every neighbourhood.
 
@@ -64,9 +81,7 @@ def principal(points, neighbours):
     spread, axes = np.empty((len(points), 3)), np.empty((len(points), 3, 3))
     for start in range(0, len(points), _CHUNK):
         part = slice(start, start + _CHUNK)
-        patch = points[neighbours[part]]
-        patch -= patch.mean(axis=1, keepdims=True)
-        spread[part], axes[part] = np.linalg.eigh(np.matmul(patch.transpose(0, 2, 1), patch))
+        spread[part], axes[part] = np.linalg.eigh(scatter(points, neighbours[part]))
     return np.maximum(spread, 0), axes
 
 

@@ -13,6 +13,34 @@ class SolveError(ArithmeticError):
     """The contraction system is singular or too ill-conditioned to be solved."""
 
 
+def factorised(matrix, **options):
+    """LU factors of a sparse, symmetric, positive definite matrix: SuperLU in symmetric mode.
+
+    Parameters
+    ----------
+    matrix : (n, n) csc_array or csc_matrix
+    **options
+        More of SuperLU's own.
+
+    Returns
+    -------
+    scipy.sparse.linalg.SuperLU
+
+    Raises
+    ------
+    RuntimeError
+        It is singular.
+    """
+    return splu(
+        matrix,
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        relax=1,
+        panel_size=1,  # a fifth faster than the usual 10 at 1000 points, a twentieth at 50000
+        options={"SymmetricMode": True, **options},
+    )
+
+
 def solve_contraction(laplacian, row_weight, position_weight, points):
     r"""Minimise :math:`\|W_L L X\|^2 + \|W_H (X - P)\|^2` (Wen et al. 2024, equation 3; Cao et al. 2010).
 
@@ -46,14 +74,7 @@ def solve_contraction(laplacian, row_weight, position_weight, points):
     attraction = position_weight[:, None] ** 2
     normal = (transposed @ scaled + diags_array(attraction[:, 0], format="csr")).T  # symmetric, so that .T is free
     try:
-        factor = splu(
-            normal,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            relax=1,
-            panel_size=1,  # a fifth faster than the usual 10 at 1000 points, a twentieth at 50000
-            options={"SymmetricMode": True, "Equil": False},
-        )
+        factor = factorised(normal, Equil=False)
     except RuntimeError as error:
         raise SolveError(f"the contraction system cannot be factorised ({error})") from error
     x = factor.solve(attraction * points)

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix
-from scipy.sparse.linalg import splu
 
 from ..numerics.groups import group_median, group_sum
+from ..numerics.solver import factorised
 
 BENDING = 2.0  # weight of a vertex's distance from the chord of its neighbours, per point
 BLUR = 0.3  # how much more of that where there is doubt, over the squared ratio of noise to spacing
@@ -198,12 +198,4 @@ def _solve(x, ends, near, p, weight, pull, inner, beside, blur):
     ]
     value = np.concatenate([blocks.ravel(), np.repeat(bend.ravel(), 3)])
     system = coo_matrix((value, (np.concatenate(row), np.concatenate(column))), shape=(3 * m, 3 * m)).tocsc()
-    factor = splu(
-        system,
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        relax=1,
-        panel_size=1,
-        options=dict(SymmetricMode=True),
-    )
-    return factor.solve(right.ravel()).reshape(m, 3)
+    return factorised(system).solve(right.ravel()).reshape(m, 3)
