@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from .connector import Connector
@@ -66,6 +66,35 @@ def changed(item: Any, cls: type[Parameters], name: str, value: Any) -> Any:
         if isinstance(inner, Parameters) and field.name not in changes:
             changes[field.name] = changed(inner, cls, name, value)
     return dataclasses.replace(item, **changes)
+
+
+def changed_by(
+    pipeline: Pipeline,
+    changes: Iterable[tuple[type[Parameters], str, Any, str]],
+    absent: Callable[[str, str, str], Exception],
+) -> Pipeline:
+    """A pipeline with many changes, reducers and rules first: what is put in has parameters that others may change.
+
+    Parameters
+    ----------
+    pipeline : Pipeline
+    changes : iterable of (class, str, object, str)
+        As for `changed`, and what the user calls the change.
+    absent : callable
+        Makes the error for a change of what is not in the pipeline, from the change's name, the filter's, and the names
+        of those that are there.
+
+    Returns
+    -------
+    Pipeline
+        Not checked.
+    """
+    for cls, name, value, told in sorted(changes, key=lambda change: not isinstance(change[2], Parameters | None)):
+        present = list(dict.fromkeys(type(part).__name__ for part in parts(pipeline)))
+        if cls.__name__ not in present:
+            raise absent(told, cls.__name__, ", ".join(present))
+        pipeline = changed(pipeline, cls, name, value)
+    return pipeline
 
 
 def catalogue() -> dict[str, type[Parameters]]:

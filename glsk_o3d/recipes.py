@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .catalogue import catalogue, changed, find, nearest, parts, serves
+from .catalogue import catalogue, changed_by, find, nearest, serves
 from .errors import InvalidParameterError, RecipeError, SkeletonWarning
 from .filter import Filter, Parameters, problem_with
 from .pipeline import Pipeline
@@ -332,13 +332,12 @@ def _extended(name: Any, changes: Any) -> Pipeline:
         cls = find(owner)
         if cls is None:
             raise RecipeError(f"set.{owner}: {nearest(str(owner), catalogue(), 'filter or rule')}")
-        read += [(cls, field, value) for field, value in _values(cls, values, f"set.{owner}").items()]
-    # Filters and rules first: what is set of them may be put in by another line.
-    for cls, field, value in sorted(read, key=lambda change: not isinstance(change[2], Parameters | None)):
-        present = list(dict.fromkeys(type(part).__name__ for part in parts(pipeline)))
-        if cls.__name__ not in present:
-            raise RecipeError(f"set.{cls.__name__}: it is not in the pipeline {name!r}, which has {', '.join(present)}")
-        pipeline = changed(pipeline, cls, field, value)
+        read += [(cls, field, value, owner) for field, value in _values(cls, values, f"set.{owner}").items()]
+
+    def absent(_, owner, there):
+        return RecipeError(f"set.{owner}: it is not in the pipeline {name!r}, which has {there}")
+
+    pipeline = changed_by(pipeline, read, absent)
     return _valid(lambda: pipeline, "set")
 
 

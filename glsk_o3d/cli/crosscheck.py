@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -59,7 +58,7 @@ def crosscheck(
         from ..analysis import cross_check, save_crosscheck_picture
         from ..analysis.crosscheck import SURFACES
         from ..catalogue import nearest
-        from ..interop.files import read_cloud, write_atomically
+        from ..interop.files import read_cloud, write_json
         from ..interop.meshes import read_mesh
         from ..interop.preview import printable
         from ..pipelines import named_pipeline
@@ -84,8 +83,7 @@ def crosscheck(
             names = {"scan": printable(scan), "given_mesh": None if mesh is None else printable(mesh)}
             told = {**names, **check.to_dict()}
             if output is not None:
-                text = json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-                write_atomically(output, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+                write_json(output, told)
             if picture is not None:
                 update(f"drawing {picture.name}")
                 save_crosscheck_picture(check, picture, title=scan.name)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -65,7 +64,7 @@ def evaluate(
     with reporting(cloud, quiet=quiet, verbose=verbose):
         from ..analysis import assess, compare, read_truth, save_picture
         from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
-        from ..interop.files import read_cloud, read_skeleton, write_atomically
+        from ..interop.files import read_cloud, read_skeleton, write_json
         from ..interop.open3d import cloud_points
         from .running import check_findings
 
@@ -99,8 +98,7 @@ def evaluate(
                 "comparison": None if comparison is None else comparison.as_dict(),
             }
             if output is not None:
-                text = json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-                write_atomically(output, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+                write_json(output, told)
             if preview is not None:
                 update(f"drawing {preview.name}")
                 if comparison is not None:

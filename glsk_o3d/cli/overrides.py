@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
-from ..catalogue import catalogue, changed, find, nearest, parts, serves
+from ..catalogue import catalogue, changed_by, find, nearest, serves
 from ..errors import InvalidParameterError
 from ..filter import Parameters
 from ..pipeline import Pipeline
@@ -44,16 +44,13 @@ def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pip
     >>> override(pipelines.default(), ["RingBuilder.k=20", "Connector.radius=0.5"]).stages[0]
     RingBuilder(k=20, radius=None, thin_to='auto', outlier_factor=2.5, denoise=4, frame='spread', drop_invalid=False)
     """
-    changes = [(setting, *_parse(setting)) for setting in settings]
-    changes.sort(key=lambda change: not isinstance(change[3], Parameters | None))
-    for setting, cls, field, value in changes:
-        present = list(dict.fromkeys(type(part).__name__ for part in parts(pipeline)))
-        if cls.__name__ not in present:
-            place = f"the pipeline {name!r}" if name else "the pipeline"
-            raise InvalidParameterError(
-                f"--set {setting}: {cls.__name__} is not in {place}, which has {', '.join(present)}{_how_to_add(cls)}"
-            )
-        pipeline = changed(pipeline, cls, field, value)
+    place = f"the pipeline {name!r}" if name else "the pipeline"
+
+    def absent(setting, owner, there):
+        hint = _how_to_add(catalogue()[owner])
+        return InvalidParameterError(f"--set {setting}: {owner} is not in {place}, which has {there}{hint}")
+
+    pipeline = changed_by(pipeline, [(*_parse(setting), setting) for setting in settings], absent)
     pipeline.check()
     return pipeline
 

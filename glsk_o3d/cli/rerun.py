@@ -32,8 +32,7 @@ def rerun(
 
     It is run with the recipe that the result holds. On the points of the result the skeleton is the same to the last
     bit; where other releases make it differ, there is a warning. Without outputs it only says whether it is the same.
-    'glsk skeletonize --recipe' runs recipes from files
-    of their own.
+    'glsk skeletonize --recipe' runs recipes from files of their own.
     """
     with reporting(scan or result, quiet=quiet, verbose=verbose):
         from ..errors import RecipeError

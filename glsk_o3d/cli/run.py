@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import WrongUsage, holding_interrupts, print_json, print_table, progress, reporting
-from .options import Json, Quiet, Verbose
+from .options import CutLoops, Json, Quiet, Verbose
 
 if TYPE_CHECKING:
     from ..interop.meshlab.plan import Step
@@ -34,9 +34,7 @@ def run(
         ),
     ] = None,
     listed: Annotated[bool, typer.Option("--list", help="List the scripts that come with the package.")] = False,
-    cut_loops: Annotated[
-        bool, typer.Option("--cut-loops", help="Cut loops open for formats that hold only trees (swc).")
-    ] = False,
+    cut_loops: CutLoops = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,

@@ -1,4 +1,4 @@
-"""From a cloud to files: what `skeletonize` and `demo` share."""
+"""From a cloud to files: what the commands that run something share."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ def read_scan(path: str | os.PathLike) -> tuple[Any, np.ndarray]:
             mesh = o3d.geometry.TriangleMesh()
             if ending in MESH_ENDINGS or (ending == ".ply" and "face" in ply_elements(path)):
                 mesh = o3d.io.read_triangle_mesh(str(path))
-            if ending in CLOUD_ENDINGS:
+            if ending in CLOUD_ENDINGS and not mesh.has_triangles():
                 cloud = o3d.io.read_point_cloud(str(path), format=ending[1:])
             else:
                 cloud = o3d.geometry.PointCloud(mesh.vertices)
@@ -341,6 +341,23 @@ def holds_skeleton(path: str | os.PathLike) -> bool:
 
 class _NoEdges(Exception):
     """A file in a format that clouds have too holds no edges, and was not written as a skeleton."""
+
+
+def write_json(path: str | os.PathLike, data: Any) -> None:
+    """Write what JSON can hold, indented; it appears complete or not at all.
+
+    Parameters
+    ----------
+    path : path-like
+    data : object
+
+    Raises
+    ------
+    OSError
+        As for `write_atomically`.
+    """
+    text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
 def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -> None:

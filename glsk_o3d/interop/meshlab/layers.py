@@ -13,7 +13,7 @@ from ...errors import FileFormatError
 from ...skeleton import Skeleton
 from ...state import Contraction
 from .. import files
-from ..files import graph_skeleton, read_cloud, read_skeleton, save_skeleton, skeleton_ending, write_atomically
+from ..files import graph_skeleton, read_skeleton, save_skeleton, skeleton_ending, write_atomically
 from ..open3d import cloud_points, import_open3d, require
 from .builtin import EXTRA
 
@@ -104,16 +104,13 @@ class Layer:
                 scalars=None if np.isnan(drawing.radii).all() else drawing.radii,
                 label=path.name,
             )
-        cloud = read_cloud(path)  # knows best what may be wrong with the file
+        cloud, faces = files.read_scan(path)  # knows best what may be wrong with the file
         points, normals, colors = cloud.points, cloud.normals, cloud.colors
-        faces = np.empty((0, 3), int)
-        if "face" in held or ending in files.MESH_ENDINGS:
-            with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-                mesh = o3d.io.read_triangle_mesh(str(path))
-            if ending == ".stl":
-                mesh.remove_duplicated_vertices()
-            points, normals, colors = mesh.vertices, mesh.vertex_normals, mesh.vertex_colors
-            faces = np.array(mesh.triangles)
+        if ending == ".stl":
+            mesh = o3d.geometry.TriangleMesh(points, o3d.utility.Vector3iVector(faces))
+            mesh.vertex_normals = normals
+            mesh.remove_duplicated_vertices()
+            points, normals, faces = mesh.vertices, mesh.vertex_normals, np.array(mesh.triangles)
         if "quality" in held.get("vertex", ()):
             scalars = o3d.t.io.read_point_cloud(str(path)).point["quality"].numpy().ravel().astype(float)
         return cls(

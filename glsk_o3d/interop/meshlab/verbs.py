@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...catalogue import catalogue, changed, nearest, parts, serves
+from ...catalogue import catalogue, changed_by, nearest, parts, serves
 from ...contractor import Contractor
 from ...errors import InvalidCloudError, InvalidParameterError
 from ...filter import Filter, Parameters, parameter, problem_with
@@ -193,17 +193,9 @@ class Verb:
                 made[name] = self.slots[name].checked(value)
             except ValueError as error:
                 raise InvalidParameterError(f"{name} = {value!r}: {error}") from None
-        pipeline = self.start(made)
-        for name in sorted(made, key=lambda name: self.slots[name].kind not in _PARTS):  # what is put in has parameters
-            owner = self.slots[name].owner
-            if owner is None:
-                continue
-            present = list(dict.fromkeys(type(part) for part in parts(pipeline)))
-            if owner not in present:
-                there = ", ".join(cls.__name__ for cls in present)
-                raise InvalidParameterError(f"{name}: there is no {owner.__name__} here, only {there}")
-            field = self.slots[name].field
-            pipeline = changed(pipeline, owner, field, made[name])
+        slots = ((self.slots[name], value) for name, value in made.items())
+        changes = [(slot.owner, slot.field, value, slot.name) for slot, value in slots if slot.owner is not None]
+        pipeline = changed_by(self.start(made), changes, _absent)
         pipeline.check()
         return pipeline
 
@@ -390,6 +382,10 @@ def verbs() -> dict[str, Verb]:
     )
     layer = Slot("layer", _facts("The layer to act on; -1 is the current one.", "int", low=-1), default=-1)
     return {verb.name: dataclasses.replace(verb, slots={**verb.slots, layer.name: layer}) for verb in found}
+
+
+def _absent(name, owner, there):
+    return InvalidParameterError(f"{name}: there is no {owner} here, only {there}")
 
 
 def _facts(doc, type, choices=(), low=None):
