@@ -13,6 +13,7 @@ import tomlkit
 
 from glsk_o3d.plugins import forget_plugins
 from glsk_o3d.report import IterationRecord, Report
+from glsk_o3d.ring_builder import RingBuilder
 from glsk_o3d.skeleton import Skeleton
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -31,6 +32,16 @@ def shared_dir() -> Path:
     if not place.is_dir():
         pytest.skip(f"needs the data folder {place}, which is not in the repository (set GLSK_SHARED)")
     return place
+
+
+@pytest.fixture
+def no_run(monkeypatch):
+    """Fail if anything is computed."""
+
+    def run(self, data, watch):
+        pytest.fail("computed before everything was checked")
+
+    monkeypatch.setattr(RingBuilder, "_run", run)
 
 
 @pytest.fixture(scope="session")

@@ -9,20 +9,9 @@ from pathlib import Path
 
 import pytest
 
-import glsk_o3d
 from glsk_o3d import read_skeleton, samples
 from glsk_o3d.cli.options import PipelineName
 from glsk_o3d.pipelines import PIPELINES
-
-
-@pytest.fixture
-def no_run(monkeypatch):
-    """Fail if anything is computed."""
-
-    def run(self, data, on_iteration):
-        pytest.fail("computed before everything was checked")
-
-    monkeypatch.setattr(glsk_o3d.RingBuilder, "_run", run)
 
 
 @pytest.mark.usefixtures("no_run")

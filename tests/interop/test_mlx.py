@@ -166,16 +166,6 @@ BROKEN = {
 }
 
 
-@pytest.fixture
-def no_run(monkeypatch):
-    """Fail if anything is computed."""
-
-    def run(self, data, on_iteration):
-        pytest.fail("computed before everything was checked")
-
-    monkeypatch.setattr(glsk_o3d.RingBuilder, "_run", run)
-
-
 @pytest.mark.usefixtures("no_run")
 @pytest.mark.parametrize("name", BROKEN)
 def test_broken_and_hostile_scripts(tmp_path, monkeypatch, name):
