@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from .filter import Filter, documented, parameter, resolve_length
 from .numerics.components import component_labels
 from .numerics.groups import group_median, group_sum
-from .numerics.neighbourhoods import nearest_neighbours, uprightness
+from .numerics.neighbourhoods import nearest_neighbours, row_medians, uprightness
 from .numerics.sampling import farthest_point_sampling
 from .skeleton import Skeleton, plane_distance_radii
 
@@ -192,4 +192,4 @@ def local_thickness(state):
     distance = np.linalg.norm(state.cloud - state.positions[state.owner], axis=1)
     thickness = group_median(distance, state.owner, len(state))
     _, neighbours = nearest_neighbours(state.positions, min(16, len(state)))
-    return np.median(thickness[neighbours], axis=1)
+    return row_medians(thickness[neighbours])

@@ -12,13 +12,13 @@ import numpy as np
 from .filter import Filter, documented, parameter
 from .numerics.cotangent import cotangent_laplacian
 from .numerics.eigen import largest_eigenvalue
-from .numerics.neighbourhoods import nearest_neighbours, scatter
+from .numerics.neighbourhoods import PAIRS
 from .numerics.solver import SolveError, solve_contraction
 from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord
 from .state import Contraction
 from .stopping import ExplainedScore, StopRule
 
-LINE, LINE_NEIGHBOURS = 0.97, 16  # linearity of a neighbourhood of so many points that counts as a line
+LINE, REACH = 0.98, 3  # linearity that counts as a line, of what so many rings reach
 
 
 @documented
@@ -117,7 +117,7 @@ class Contractor(Filter):
         with np.errstate(divide="ignore"):
             attraction = state.ring_size0 / state.ring_size
         if self.line_hold > 1 and state.report.iterations:
-            attraction = np.where(linearity(state.positions) > LINE, self.line_hold, 1) * attraction
+            attraction = np.where(linearity(state.positions, state.rings) > LINE, self.line_hold, 1) * attraction
         attraction = np.clip(attraction, self.min_attraction, self.max_attraction)
         laplacian = self._laplacian(state)
         mass = np.sqrt(state.mass)
@@ -153,21 +153,28 @@ class Contractor(Filter):
         raise SolveError(f"it would throw {outside.sum()} of {len(state)} points far out of the cloud")
 
 
-def linearity(points):
-    """Share of the largest principal component in the spread of every point's neighbourhood, (n,) float array.
+def linearity(points, rings):
+    """Share of the largest principal component in the spread of the surroundings of every point.
+
+    These are what can be reached along three rings at most, by all ways.
 
     Parameters
     ----------
     points : (n, 3) float array
+    rings : Rings
 
     Returns
     -------
     (n,) float array
         1 on a line.
     """
-    _, neighbours = nearest_neighbours(points, min(LINE_NEIGHBOURS, len(points)))
-    spread = scatter(points, neighbours)
-    total = np.trace(spread, axis1=1, axis2=2)
+    points = points - points.mean(axis=0)
+    moments = np.column_stack([np.ones(len(points)), points, *(points[:, i] * points[:, j] for i, j in PAIRS)])
+    for _ in range(REACH):
+        moments += rings.sums(moments)
+    mean = moments[:, 1:4] / moments[:, :1]
+    spread = np.stack([m / moments[:, 0] - mean[:, i] * mean[:, j] for m, (i, j) in zip(moments.T[4:], PAIRS, strict=True)])
+    total = spread[0] + spread[3] + spread[5]
     return largest_eigenvalue(spread) / np.maximum(total, np.finfo(float).tiny)
 
 

@@ -12,7 +12,7 @@ from .errors import InvalidCloudError, InvalidParameterError
 from .filter import Filter, documented, parameter, resolve_length
 from .interop.open3d import cloud_points, search_parameters
 from .numerics.frame import Frame
-from .numerics.neighbourhoods import isolation, nearest_neighbours, principal
+from .numerics.neighbourhoods import isolation, nearest_neighbours, plane_axes, principal
 from .numerics.ordering import morton_order
 from .numerics.ridges import noise_share, to_ridges
 from .numerics.rings import star_rings
@@ -162,22 +162,22 @@ class RingBuilder(Filter):
         row_of_point, outlier = np.full(len(points), -1), np.zeros(len(points), bool)
         row_of_point[finite], outlier[finite] = row, stray
 
-        spread, axes = principal(distinct, neighbours)
-        normals = np.ascontiguousarray(axes[:, :, 0])  # a ridge has none: those of the cloud as it came
+        spread, normals = principal(distinct, neighbours)
+        across = normals  # of the planes that the rings lie in
         noise = noise_share(spread, neighbours)
         if self.denoise and noise.any():
             distinct, neighbours, left, nearest = self._denoised(distinct, neighbours.shape[1], noise)
-            normals, noise = normals[left], noise[left]
+            normals, noise = normals[left], noise[left]  # a ridge has none: those of the cloud as it came
             row_of_point[finite] = nearest[row]
             outlier[finite] |= (left[nearest] != np.arange(len(nearest)))[row]
-            axes = principal(distinct, neighbours)[1]
+            across = principal(distinct, neighbours)[1]
         into = thin(distinct, neighbours, self._number(len(distinct)))
         kept = into == np.arange(len(into))
         survivors = np.flatnonzero(kept)
-        n, positions, axes = len(survivors), distinct[survivors], axes[survivors]
+        n, positions, axes = len(survivors), distinct[survivors], plane_axes(across[survivors])
         if n < len(distinct):
             neighbours = nearest_neighbours(positions, self._neighbours(n))[1]
-        rings = star_rings(positions, np.arange(n), self._within(positions, neighbours[:, 1:], frame), axes[:, :, 1:])
+        rings = star_rings(positions, np.arange(n), self._within(positions, neighbours[:, 1:], frame), axes)
         owner = (np.cumsum(kept) - 1)[into]
         return Contraction(
             points=points,

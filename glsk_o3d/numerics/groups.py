@@ -21,35 +21,40 @@ def group_median(values, group, n):
     (n,) float array
         0 for an empty group.
     """
-    order = np.lexsort((values, group))
+    order = np.argsort(values)
+    # NumPy sorts small integers by their digits: ten times faster than lexsort
+    ordered = values[order[np.argsort(group[order].astype(np.min_scalar_type(n)), kind="stable")]]
     count = np.bincount(group, minlength=n)
     last = np.cumsum(count)
     median = np.zeros(n)
     has = count > 0
     low, high = (last - count + (count - 1) // 2)[has], (last - count + count // 2)[has]
-    ordered = values[order]
     median[has] = (ordered[low] + ordered[high]) / 2
     return median
 
 
-def group_sum(values, group, n):
+def group_sum(values, group, n, weight=None):
     """Sum of the rows of each group.
 
     Parameters
     ----------
     values : (m, ...) float array
-    group : (m,) int array
-        Group 0 .. n-1 of each row.
+    group : (m,) int array, or (m, c) int array with `weight`
+        Group 0 .. n-1 of each row, or groups.
     n : int
+    weight : (m, c) float array, optional
+        Of every row in each of its groups.
 
     Returns
     -------
     (n, ...) float array
     """
     flat = values.reshape(len(values), math.prod(values.shape[1:]))
-    if flat.shape[1] < 4:
+    if weight is None and flat.shape[1] < 4:
         total = np.stack([np.bincount(group, column, n) for column in flat.T], axis=1)
     else:  # one sweep over the rows: 3 to 7 times faster than one over every column
-        members = csc_array((np.ones(len(group)), group, np.arange(len(group) + 1)), shape=(n, len(group)))
+        weight = np.ones_like(group, float) if weight is None else weight
+        each = np.arange(len(group) + 1) * (group.size // max(len(group), 1))
+        members = csc_array((weight.ravel(), group.ravel(), each), shape=(n, len(group)))
         total = members @ flat
     return total.reshape(n, *values.shape[1:])

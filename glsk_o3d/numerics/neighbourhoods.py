@@ -3,7 +3,10 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-_CHUNK = 16384
+from .eigen import eigenvalues, least_direction
+
+PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # the entries of a symmetric matrix
+_CHUNK = 4096  # rows at a time: the (3, rows, k) work array then stays in the cache
 
 
 def nearest_neighbours(points, k, of=None):
@@ -43,7 +46,14 @@ def isolation(distance, neighbours):
     (n,) float array
     """
     mean = distance[:, 1:].mean(axis=1)
-    return mean / np.median(mean[neighbours[:, 1:]], axis=1)
+    return mean / row_medians(mean[neighbours[:, 1:]])
+
+
+def row_medians(values):
+    """Median of every row, (n,) float array from `values` (n, k): several times faster than NumPy's on short rows."""
+    k = values.shape[1]
+    ordered = np.sort(values, axis=1)
+    return (ordered[:, (k - 1) // 2] + ordered[:, k // 2]) / 2
 
 
 def scatter(points, neighbours):
@@ -56,11 +66,18 @@ def scatter(points, neighbours):
 
     Returns
     -------
-    (n, 3, 3) float array
+    (6, n) float array
+        Its entries xx, xy, xz, yy, yz, zz.
     """
-    patch = points[neighbours]
-    patch -= patch.mean(axis=1, keepdims=True)
-    return np.matmul(patch.transpose(0, 2, 1), patch)
+    coordinates, entries = np.ascontiguousarray(points.T), np.empty((6, len(neighbours)))
+    share = np.full(neighbours.shape[1], 1 / neighbours.shape[1])
+    for start in range(0, len(neighbours), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        patch = coordinates[:, neighbours[part]]
+        patch -= (patch @ share)[:, :, None]
+        for entry, (i, j) in zip(entries, PAIRS, strict=True):
+            np.einsum("nk,nk->n", patch[i], patch[j], out=entry[part])
+    return entries
 
 
 def principal(points, neighbours):
@@ -68,21 +85,18 @@ def principal(points, neighbours):
 
     Parameters
     ----------
-    points : (n, 3) float array
+    points : (m, 3) float array
     neighbours : (n, k) int array
 
     Returns
     -------
     spread : (n, 3) float array
         Sums of squares along the axes, ascending, not negative.
-    axes : (n, 3, 3) float array
-        Orthonormal columns in the same order: column 0 is the normal, columns 1 and 2 span the tangent plane.
+    normals : (n, 3) float array
+        Unit vectors along the first axis.
     """
-    spread, axes = np.empty((len(points), 3)), np.empty((len(points), 3, 3))
-    for start in range(0, len(points), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        spread[part], axes[part] = np.linalg.eigh(scatter(points, neighbours[part]))
-    return np.maximum(spread, 0), axes
+    entries = scatter(points, neighbours)
+    return np.maximum(eigenvalues(entries).T, 0), least_direction(entries)
 
 
 def uprightness(points, normals, p, q):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .eigen import main_direction
-from .neighbourhoods import nearest_neighbours
+from .neighbourhoods import PAIRS, nearest_neighbours, row_medians
 
 NEIGHBOURS = 32  # among which a ridge is sought: more than for rings, a noisy shell is thick
 CLEAN, NOISY = 0.2, 0.35  # scatter of clean neighbourhoods at most, and of nothing but noise
@@ -28,7 +28,7 @@ def noise_share(spread, neighbours):
     (n,) float array
     """
     ratio = spread[:, 0] / np.maximum(spread[:, 2], np.finfo(float).tiny)
-    return np.clip((np.median(ratio[neighbours], axis=1) - CLEAN) / (NOISY - CLEAN), 0, 1)
+    return np.clip((row_medians(ratio[neighbours]) - CLEAN) / (NOISY - CLEAN), 0, 1)
 
 
 def to_ridges(points, noise, passes):
@@ -64,7 +64,8 @@ def to_ridges(points, noise, passes):
             kernel /= kernel.sum(axis=1, keepdims=True)
             mean = np.matmul(kernel[:, None], patch)[:, 0]
             offset = patch - mean[:, None]
-            along = main_direction(np.matmul((kernel[:, :, None] * offset).transpose(0, 2, 1), offset))
+            spread = np.matmul((kernel[:, :, None] * offset).transpose(0, 2, 1), offset)
+            along = main_direction(np.stack([spread[:, i, j] for i, j in PAIRS]))
             shift = mean - x
             shift -= np.einsum("ni,ni->n", shift, along)[:, None] * along
             x = x + step * shift

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from .delaunay_star import delaunay_star
 
@@ -85,14 +86,13 @@ class Rings:
         first = np.append(True, owner[1:] != owner[:-1])
         return self.indices[hits[first]], distance
 
+    def sums(self, values):
+        """Sum of the neighbours' values, (n, d) float array from `values` (n, d)."""
+        return csr_array((np.ones(len(self.indices)), self.indices, self.indptr), shape=(len(self),) * 2) @ values
+
     def mean_over(self, values):
         """Mean of the neighbours' values, (n, d) float array from `values` (n, d); 0 for an empty ring."""
-        return self._sum(values[self.indices]) / np.maximum(self.sizes, 1)[:, None]
-
-    def _sum(self, values):
-        """Sum over every ring of values per entry, (n, d) from (m, d)."""
-        total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-        return total[self.indptr[1:]] - total[self.indptr[:-1]]
+        return self.sums(values) / np.maximum(self.sizes, 1)[:, None]
 
     def take(self, points):
         """The rings of some points, in the order given; the indices stay as they are."""

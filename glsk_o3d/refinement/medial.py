@@ -63,6 +63,7 @@ def fit_axis(skeleton, passes):
     around = edges_at[skeleton.vertex_of_point[owned]]
     inner = np.flatnonzero(skeleton.degree == 2)
     beside = ends[edges_at[inner, :2]].sum(axis=2) - inner[:, None]  # the other end of either edge
+    far = np.sqrt(np.einsum("ni,ni->n", p, p).max())
     for step in range(passes):
         near = _nearest(x, ends, around, p, n)
         weight, pull = np.ones(len(p)), np.zeros(len(p))
@@ -71,7 +72,6 @@ def fit_axis(skeleton, passes):
             weight = 1 / (1 + near.miss / np.maximum((OUTLYING * radius) ** 2, TINY))
             pull = CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1)
         x = _solve(x, ends, near, p, weight, pull, inner, beside, BLUR if step else 0)
-        far = np.linalg.norm(p, axis=1).max()
         size = np.linalg.norm(x, axis=1)
         run = np.where((size > far) & (skeleton.degree > 0), far / np.maximum(size, TINY), 1)
         x = run[:, None] * x  # normals that mean nothing may meet anywhere
@@ -145,10 +145,10 @@ def _nearest(x, ends, around, p, n):
     across = np.cross(n, tangent[edge])
     offset = np.einsum("ns,nsi->ni", share, x[ends[edge]]) - p
     miss = np.einsum("ni,ni->n", across, offset) ** 2
-    apart = (offset**2).sum(axis=1) - np.einsum("ni,ni->n", offset, tangent[edge]) ** 2
-    facts = np.column_stack([miss, apart, np.full(len(p), 0.5)])
-    at = group_sum(np.repeat(facts, 2, axis=0), ends[edge].ravel(), len(x))
+    apart = np.einsum("ni,ni->n", offset, offset) - np.einsum("ni,ni->n", offset, tangent[edge]) ** 2
     a, b = ends.T
+    at = group_sum(np.column_stack([miss, apart, np.full(len(p), 0.5)]), edge, len(ends))
+    at = group_sum(np.concatenate([at, at]), np.concatenate([a, b]), len(x))
     miss_at, apart_at, support = (at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))).T
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
     doubt = np.where(apart_at > 0, np.clip(2 * miss_at / np.maximum(apart_at, TINY), 0, 1), 1)
@@ -166,11 +166,10 @@ def _solve(x, ends, near, p, weight, pull, inner, beside, blur):
     matrix = np.column_stack([weighted[:, ROWS] * near.across[:, COLUMNS], pull])
     target = np.einsum("ni,ni->n", near.across, p)[:, None] * weighted
     target = np.column_stack([target, pull[:, None] * p, np.ones(len(p))])
-    first, second = near.share[:, [0]], near.share[:, [1]]
-    parts = [matrix * first**2, matrix * first * second, matrix * second**2, target * first, target * second]
-    parts = np.split(group_sum(np.concatenate(parts, axis=1), near.edge, e), 5, axis=1)
-    at_edges = [part[:, ENTRIES].reshape(e, 3, 3) + part[:, 6, None, None] * upright for part in parts[:3]]
-    at_ends = np.concatenate(parts[3:])
+    share, pairs = near.share, near.share[:, [0, 0, 1]] * near.share[:, [0, 1, 1]]
+    at_pairs = group_sum(matrix, near.edge[:, None] + e * np.arange(3), 3 * e, pairs)
+    at_ends = group_sum(target, near.edge[:, None] + e * np.arange(2), 2 * e, share)
+    at_edges = at_pairs[:, ENTRIES].reshape(3, e, 3, 3) + at_pairs[:, 6].reshape(3, e, 1, 1) * upright
     wanted = at_ends[:, :3] + np.einsum("eij,ej->ei", np.tile(upright, (2, 1, 1)), at_ends[:, 3:6])
     facts = np.column_stack([wanted, at_ends[:, 6], np.tile(along.reshape(e, 9), (2, 1))])
     facts = group_sum(facts, ends.T.ravel(), m)
