@@ -16,7 +16,7 @@ from .numerics.neighbourhoods import isolation, nearest_neighbours, plane_axes, 
 from .numerics.ordering import morton_order
 from .numerics.ridges import noise_share, to_ridges
 from .numerics.rings import star_rings
-from .numerics.thinning import thin
+from .numerics.thinning import thin, thin_smooth
 from .report import Report
 from .state import Contraction, at_rest
 
@@ -96,9 +96,18 @@ class RingBuilder(Filter):
         low=0,
         open_low=True,
     )
+    around: float = parameter(
+        22.0,
+        "Points around a part that are enough: where the surface has more, near ones are merged, at most four into "
+        "one, which takes over their mass. Fewer are faster; edges, thin and noisy parts stay as they are. 0 merges "
+        "none, as published.",
+        type="float",
+        unit="points",
+        low=0,
+    )
     thin_to: int | str = parameter(
         "auto",
-        "Points to contract; the others are merged into a near one, which takes over their mass. 'auto' is at most "
+        "Most points to contract; the others are merged into a near one, which takes over their mass. 'auto' is at most "
         "25000, but 64 times the square root of their number from 152588 on; 'all' keeps them, as published.",
         type="int",
         unit="points",
@@ -170,8 +179,8 @@ class RingBuilder(Filter):
             normals, noise = normals[left], noise[left]  # a ridge has none: those of the cloud as it came
             row_of_point[finite] = nearest[row]
             outlier[finite] |= (left[nearest] != np.arange(len(nearest)))[row]
-            across = principal(distinct, neighbours)[1]
-        into = thin(distinct, neighbours, self._number(len(distinct)))
+            spread, across = principal(distinct, neighbours)
+        into = self._thinned(distinct, neighbours, spread)
         kept = into == np.arange(len(into))
         survivors = np.flatnonzero(kept)
         n, positions, axes = len(survivors), distinct[survivors], plane_axes(across[survivors])
@@ -214,6 +223,17 @@ class RingBuilder(Filter):
         calm, neighbours = calm[left], nearest[neighbours[left]]
         neighbours[changed] = nearest_neighbours(calm, k, of=calm[changed])[1]
         return calm, neighbours, left, nearest
+
+    def _thinned(self, cloud, neighbours, spread):
+        """The point that each is merged into before the contraction."""
+        into = thin_smooth(cloud, neighbours, spread, self.around) if self.around else np.arange(len(cloud))
+        kept = into == np.arange(len(into))
+        left, n = np.flatnonzero(kept), self._number(len(cloud))
+        if n >= len(left):
+            return into
+        if len(left) < len(cloud):
+            neighbours = nearest_neighbours(cloud[left], min(neighbours.shape[1], len(left)))[1]
+        return left[thin(cloud[left], neighbours, n)][(np.cumsum(kept) - 1)[into]]
 
     def _within(self, cloud, neighbours, frame):
         """The neighbours without those beyond the radius, which become -1."""

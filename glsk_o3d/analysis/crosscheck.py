@@ -180,7 +180,7 @@ def cross_check(
     points = cloud_points(cloud)
     n_input = len(points)
     points = _thinned(points, max_points)
-    state = replace(pipeline.stages[0], thin_to="all")(points)
+    state = replace(pipeline.stages[0], around=0, thin_to="all")(points)
     skeleton = Pipeline(*pipeline.stages[1:])(state)
     if not isinstance(skeleton, Skeleton):
         raise InvalidParameterError(f"{pipeline!r} does not lead to a skeleton")

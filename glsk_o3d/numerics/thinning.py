@@ -2,8 +2,10 @@
 
 import numpy as np
 
-from .neighbourhoods import nearest_neighbours
+from .neighbourhoods import nearest_neighbours, row_medians
 
+MOST = 4  # points that one may stand for, where the surface has more than enough
+WORTH = 0.01  # share of the points that another round must merge
 SPARSE = 0.25  # share of the points left, below which the neighbours are looked up anew
 
 
@@ -41,12 +43,56 @@ def thin(points, neighbours, n):
             keeper, swallowed = keeper[nearest], swallowed[nearest]
         into[swallowed] = keeper
         left[swallowed] = False
-    while (into != into[into]).any():
-        into = into[into]
+    into = _ends(into)
     rows = np.flatnonzero(left)
     if n < len(rows) < len(points):
         around = nearest_neighbours(points[rows], min(neighbours.shape[1], len(rows)))[1]
         into = rows[thin(points[rows], around, n)][(np.cumsum(left) - 1)[into]]
+    return into
+
+
+def thin_smooth(points, neighbours, spread, around):
+    r"""Merge mutual nearest neighbours, at most four into one, where the surface has more points than it takes.
+
+    A disc of k points of a tube with N points around it rises above its plane by :math:`\sigma_1 / \sigma_3 =
+    \pi k / (4 N^2)`, the least over the largest principal spread. Merged m into one, the tube has
+    :math:`N / \sqrt m` points around it. Points are merged as long as `around` are left; edges, thin parts and noise,
+    where the ratio is large, stay as they are.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        All different.
+    neighbours : (n, k) int array
+        Their nearest neighbours, the point itself first.
+    spread : (n, 3) float array
+        As from `principal`.
+    around : float
+        Positive.
+
+    Returns
+    -------
+    (n,) int array
+        The point that each was merged into; itself for those that are left.
+    """
+    ratio = spread[:, 0] / np.maximum(spread[:, 2], np.finfo(float).tiny)
+    needed = np.pi * neighbours.shape[1] / (4 * around**2)
+    most = np.minimum(needed / np.maximum(row_medians(ratio[neighbours]), needed / MOST), MOST)
+    left, into, mass = np.ones(len(points), bool), np.arange(len(points)), np.ones(len(points))
+    while True:
+        keeper, swallowed = _mutual(points, neighbours, left & (mass + 1 <= most))
+        both = mass[keeper] + mass[swallowed]
+        fine = both <= np.minimum(most[keeper], most[swallowed])
+        if np.count_nonzero(fine) < WORTH * len(points):
+            return _ends(into)
+        keeper, swallowed = keeper[fine], swallowed[fine]
+        into[swallowed], mass[keeper] = keeper, both[fine]
+        left[swallowed] = False
+
+
+def _ends(into):
+    while (into != into[into]).any():
+        into = into[into]
     return into
 
 
