@@ -116,17 +116,15 @@ def points_of(case: Case) -> int:
 # ----------------------------------------------------------------------------------------------------------- in turns
 
 
-def in_turns(tasks: dict, repeat: int, stages=(), seconds: float = 0) -> dict[Any, tuple[Any, dict]]:
+def in_turns(tasks: dict, repeat: int, stages=()) -> dict[Any, tuple[Any, dict]]:
     """Run tasks one after the other, again and again, so that what disturbs the machine disturbs them all.
 
     Parameters
     ----------
     tasks : dict of callables
     repeat : int
-        Runs of each, at least.
+        Runs of each, at least; it goes on for `LEAST` seconds of CPU time.
     stages : mapping of str to Stage, optional
-    seconds : float
-        CPU time until which it goes on, up to `MOST` runs.
 
     Returns
     -------
@@ -135,7 +133,7 @@ def in_turns(tasks: dict, repeat: int, stages=(), seconds: float = 0) -> dict[An
         every stage in ``stages``.
     """
     watches, results = {name: [] for name in tasks}, {}
-    end = time.process_time() + seconds
+    end = time.process_time() + LEAST
     turns = 0
     while turns < repeat or (turns < MOST and time.process_time() < end):
         for name, task in tasks.items():
@@ -167,7 +165,7 @@ def timed(path: Path, pipelines: dict[str, Pipeline], repeat: int) -> dict:
     points = np.load(path)
     tasks = {"1 kNN": partial(yardstick, points)}
     tasks |= {name: lambda pipeline=pipeline: told(pipeline(points)) for name, pipeline in pipelines.items()}
-    found = in_turns(tasks, repeat, STAGES, LEAST)
+    found = in_turns(tasks, repeat, STAGES)
     _, knn = found.pop("1 kNN")
     knn = {f"knn_{clock}": knn[clock] for clock in ("cpu", "wall")}
     return {name: facts | result | knn for name, (result, facts) in found.items()}
@@ -310,13 +308,16 @@ class Scan:
 
 
 def objects(folder: Path | None, own: bool, shapes: str, sizes: list[int]) -> list[tuple[int, Case | Scan]]:
-    """The shapes with known axes in all sizes and, where there is a folder of clouds and nothing narrower is asked for,
-    those that are large enough.
+    """The shapes with known axes in all sizes, built-in ones in sizes that the folder does not have; and, where there
+    is a folder of scans and nothing narrower is asked for, those that are large enough.
     """
     clean = ",".join(f"clean_{n}" for n in sizes)
     found: list[tuple[int, Case | Scan]] = [(points_of(case), case) for case in cases(folder, own, clean, shapes)]
     if own or shapes:
         return found
+    if missing := [n for n in sizes if n not in dict(found)]:
+        typer.echo(f"the built-in shapes instead for {', '.join(map(str, missing))} points", err=True)
+        found += objects(None, True, "", missing)
     try:
         folder = folder_or(None, "GLSK_DATA", "shared/data")
     except typer.BadParameter as problem:
@@ -419,8 +420,8 @@ def figure_tables(rows: list[dict]) -> Tables:
             left, spent, made = (np.array([it[what] for it in runs], float) for what in ("left", "cpu", "solves"))
             refused = str(sum(it["refused"] for it in runs))
             cells = [quartiles(left / n), quartiles(1000 * spent, 0), quartiles(made, 0), refused]
-            lines.append([str(n), name, *cells])
-    header = ["points", "pipeline", "share left", "CPU ms", "solves", "refused"]
+            lines.append([name, str(n), *cells])
+    header = ["", "points", "share left", "CPU ms", "solves", "refused"]
     tables.append(("the contraction, median (quartiles)", header, lines))
     if failed := [row for row in rows if "failure" in row]:
         words = [[str(row["n"]), row["shape"], row["failure"]] for row in failed]
@@ -451,7 +452,7 @@ def draw(rows: list[dict], folder: Path) -> list[Path]:
                 axes.plot(values, mark, color=colour, markersize=4, label=name)
                 axes.axhline(median(values), color=colour, linewidth=0.8, zorder=0)
         above.set(ylabel="contraction, CPU s", ylim=(0, None), title=f"{n} points; lines are medians")
-        below.set(ylabel="points left", yscale="log")
+        below.set(ylabel="points left", ylim=(0, None))
         below.set_xticks(range(len(here)), [row["shape"] for row in here], rotation=90, fontsize=7)
         above.legend(frameon=False, ncols=3, fontsize=8)
         for axes in (above, below):
