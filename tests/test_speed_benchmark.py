@@ -189,7 +189,8 @@ class TestArithmetic:
         assert math.isnan(tool.growth([256, 4096], [1, 2], *tool.MIDDLE))
         assert math.isnan(tool.growth([256, 4096], [0, 2]))
 
-    def test_turns(self, tool):
+    def test_turns(self, tool, monkeypatch):
+        monkeypatch.setattr(tool, "LEAST", 0.0)
         order = []
         found = tool.in_turns({name: lambda name=name: order.append(name) or name for name in "ab"}, 3)
         assert order == [*"ababab"]
@@ -197,6 +198,13 @@ class TestArithmetic:
             "a": ("a", 3),
             "b": ("b", 3),
         }
+
+    def test_turns_go_on_while_they_are_short(self, tool, monkeypatch):
+        now = iter(range(100))
+        monkeypatch.setattr(tool, "LEAST", 8.0)
+        monkeypatch.setattr(tool.time, "process_time", lambda: float(next(now)))
+        monkeypatch.setattr(sys.modules["_stopwatch"], "_clocks", lambda: (0.0, 0.0))
+        assert tool.in_turns({"a": str}, 1)["a"][1]["runs"] == 8
 
     def test_short(self, tool):
         assert [tool.short(value) for value in (0.1234, 9.876, 98.76, 987.6)] == ["0.12", "9.88", "98.8", "988"]
