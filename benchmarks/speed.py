@@ -86,7 +86,7 @@ LEAST, MOST = 2.0, 50  # seconds that runs in turns go on for, however few were 
 MIDDLE = (4096, 65536)  # sizes of the second growth exponent
 BASES: dict[str, Callable[[], Pipeline]] = {"wen2024": wen2024, "default": default}
 BASELINE = ("wen2024", False, "rings")  # the contraction of cao2010
-RULES = {
+RULES: dict[str, list[str]] = {
     "own": [],
     "rings": ["Contractor.stop=RingSizeRatio", "Contractor.max_iterations=20"],
 }
@@ -116,7 +116,7 @@ def points_of(case: Case) -> int:
 # ----------------------------------------------------------------------------------------------------------- in turns
 
 
-def in_turns(tasks: dict, repeat: int, stages=()) -> dict[Any, tuple[Any, dict]]:
+def in_turns(tasks: dict, repeat: int, stages: Mapping[str, Stage] | None = None) -> dict[Any, tuple[Any, dict]]:
     """Run tasks one after the other, again and again, so that what disturbs the machine disturbs them all.
 
     Parameters
@@ -137,7 +137,7 @@ def in_turns(tasks: dict, repeat: int, stages=()) -> dict[Any, tuple[Any, dict]]
     turns = 0
     while turns < repeat or (turns < MOST and time.process_time() < end):
         for name, task in tasks.items():
-            with Stopwatch(dict(stages)) as watch:
+            with Stopwatch(stages or {}) as watch:
                 results[name] = task()
             watches[name].append(watch)
         turns += 1
