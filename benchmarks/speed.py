@@ -534,14 +534,14 @@ def machine() -> str:
     told = surroundings()
     it, versions = told["machine"], ", ".join(f"{name} {version}" for name, version in told["versions"].items())
     return (
-        f"{it['processor']}, {it['cores']} cores, {it['memory_gb']} GB, load {it['load']}, {it['system']}; {versions}; "
+        f"Measured on {it['processor']}, {it['cores']} cores, {it['memory_gb']} GB, load {it['load']}, {it['system']}; {versions}; "
         f"commit {told['commit']}; one thread."
     )
 
 
-def present(parts: dict[str, Tables], markdown: bool) -> None:
-    """Print the tables of the parts, and what they were measured on."""
-    typer.echo(f"Measured on {machine()}\n")
+def present(where: str, parts: dict[str, Tables], markdown: bool) -> None:
+    """Print where it was measured, and the tables of the parts."""
+    typer.echo(f"{where}\n")
     for table in (table for tables in parts.values() for table in tables):
         show(*table, markdown)
 
@@ -601,7 +601,7 @@ def stages(
     """What every stage and the whole cost over the size of the cloud, and how they grow."""
     rows = measure_stages(numbers(sizes), named(pipeline), shapes, kind, published_to, repeat, jobs)
     save(output, rows)
-    present({"stages": stage_tables(rows)}, markdown)
+    present(machine(), {"stages": stage_tables(rows)}, markdown)
 
 
 @app.command()
@@ -622,7 +622,7 @@ def figures(
     save(output, rows)
     if pictures is not None:
         draw(rows, pictures)
-    present({"figures": figure_tables(rows)}, markdown)
+    present(machine(), {"figures": figure_tables(rows)}, markdown)
 
 
 @app.command()
@@ -640,7 +640,7 @@ def rate(
         raise typer.BadParameter(f"no shape {shape}: there are {', '.join(BUILTIN)}")
     rows = measure_rate(numbers(sizes), pipeline.split(","), shape, repeat, jobs)
     save(output, rows)
-    present({"rate": rate_tables(rows)}, markdown)
+    present(machine(), {"rate": rate_tables(rows)}, markdown)
 
 
 @app.command("all")
@@ -667,7 +667,7 @@ def everything(
 ) -> None:
     """The three together."""
     chosen, found = named(pipeline), objects(None, own, shapes, numbers(figure_sizes))
-    start = time.perf_counter()
+    start, where = time.perf_counter(), machine()  # now, since writing the page changes the working tree
 
     def said(what, rows):
         typer.echo(f"{what} done, {time.perf_counter() - start:.0f} s so far", err=True)
@@ -683,8 +683,8 @@ def everything(
     if page is not None:
         if pictures is None and (page.parent / "images").is_dir():
             draw(compared, page.parent / "images")
-        fill(page, {"machine": f"Measured on {machine()}\n", **parts})
-    present(parts, markdown)
+        fill(page, {"machine": f"{where}\n", **parts})
+    present(where, parts, markdown)
 
 
 if __name__ == "__main__":
