@@ -534,8 +534,8 @@ def machine() -> str:
     told = surroundings()
     it, versions = told["machine"], ", ".join(f"{name} {version}" for name, version in told["versions"].items())
     return (
-        f"Measured on {it['processor']}, {it['cores']} cores, {it['memory_gb']} GB, load {it['load']}, {it['system']}; {versions}; "
-        f"commit {told['commit']}; one thread."
+        f"Measured on {it['processor']}, {it['cores']} cores, {it['memory_gb']} GB, load {it['load']}, {it['system']}; "
+        f"{versions}; commit {told['commit']}; one thread."
     )
 
 
