@@ -7,11 +7,12 @@ PIP    := $(BIN)/python -m pip --disable-pip-version-check -qq
 PYTEST_ARGS ?= -n 2
 # See benchmarks/README.md for what else there is.
 ACCURACY_ARGS ?= truth --builtin
+BENCH_ARGS ?= all --builtin --pictures benchmarks/results -o benchmarks/results/speed.json
 
 PYTHON_HINT = glsk-o3d needs Python 3.10 or newer: install it, or say 'make ... PYTHON=/path/to/python3'.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test accuracy lint format clean system-deps browser
+.PHONY: help demo test accuracy bench lint format clean system-deps browser
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -25,6 +26,10 @@ test: $(VENV)/.installed-test | browser ## run the whole test suite (PYTEST_ARGS
 accuracy: $(VENV)/.installed-demo ## how far skeletons are from known axes (ACCURACY_ARGS="ablation --builtin" for more)
 	$(BIN)/python benchmarks/accuracy.py $(ACCURACY_ARGS)
 
+bench: $(VENV)/.installed-demo ## how fast skeletons are, stage by stage (BENCH_ARGS="stages --sizes 1048576" for more)
+	@mkdir -p benchmarks/results
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/speed.py $(BENCH_ARGS)
+
 lint: $(VENV)/.installed-test ## ruff and mypy
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -35,7 +40,7 @@ format: $(VENV)/.installed-test ## let ruff mend what it can
 	$(BIN)/ruff format .
 
 clean: ## remove what the other targets made, the virtual environment too
-	rm -rf $(VENV) demo build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf $(VENV) demo benchmarks/results build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Checked on every run (0.1 s), since the machine may have changed under an old .venv.

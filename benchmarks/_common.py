@@ -11,7 +11,8 @@ import sys
 import warnings
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
@@ -27,8 +28,9 @@ from rich.progress import track
 from rich.table import Table
 from scipy.spatial import cKDTree
 
-from glsk_o3d import Pipeline, pipelines, samples
+from glsk_o3d import Contractor, Pipeline, pipelines, samples
 from glsk_o3d.analysis import Truth, read_truth
+from glsk_o3d.cli.overrides import override
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.report import Report
 
@@ -137,6 +139,19 @@ def named(names: str) -> dict[str, Pipeline]:
         raise typer.BadParameter(str(error)) from None
 
 
+def with_solves(pipeline: Pipeline, n: int) -> Pipeline:
+    """The pipeline with exactly n solves, fewer only where one is refused."""
+    if n == 0:
+        return Pipeline(*(stage for stage in pipeline.stages if not isinstance(stage, Contractor)))
+    at_once = ["Contractor.stop=ExplainedScore", "ExplainedScore.threshold=1e9", f"ExplainedScore.min_iterations={n}"]
+    return override(pipeline, at_once)
+
+
+def pick(rows: list[dict], **facts) -> list[dict]:
+    """The rows with these facts."""
+    return [row for row in rows if all(row[name] == value for name, value in facts.items())]
+
+
 def folder_or(folder: Path | None, variable: str, beside: str) -> Path:
     """The folder if given, else that of an environment variable, else the one beside the repository."""
     folder = folder or Path(os.environ.get(variable, ROOT.parent / beside))
@@ -166,7 +181,9 @@ def _offered(case: Case, coverage: dict[str, float]) -> bool:
 # --------------------------------------------------------------------------------------------------------------- runs
 
 
-def run(work: Callable[..., dict], jobs: Sequence[tuple[dict, tuple]], processes: int) -> list[dict]:
+def run(
+    work: Callable[..., dict], jobs: Sequence[tuple[dict, tuple]], processes: int, fresh: bool = False
+) -> list[dict]:
     """Work through jobs in parallel.
 
     Parameters
@@ -175,6 +192,10 @@ def run(work: Callable[..., dict], jobs: Sequence[tuple[dict, tuple]], processes
         A function of a module; gives what it measured.
     jobs : sequence of (facts, arguments)
     processes : int
+        At once; 0 for none but this one.
+    fresh : bool
+        Each job in a process of its own, in which nothing but the warm-up has run, and whose death is a failure of that
+        job alone.
 
     Returns
     -------
@@ -187,14 +208,23 @@ def run(work: Callable[..., dict], jobs: Sequence[tuple[dict, tuple]], processes
             return [_row(work, job) for job in jobs]
     # CPU seconds are those of one thread: NumPy reads this when it is imported, which is in the processes yet to start
     os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
-    with ProcessPoolExecutor(processes, get_context("spawn"), _warm_up) as pool:
-        rows = pool.map(partial(_row, work), jobs)
+    pool = ThreadPoolExecutor(processes) if fresh else ProcessPoolExecutor(processes, get_context("spawn"), _warm_up)
+    with pool:
+        rows = pool.map(partial(_alone if fresh else _row, work), jobs)
         return list(track(rows, "", len(jobs), console=Console(stderr=True), transient=True))
 
 
 def _warm_up() -> None:
     warnings.simplefilter("ignore")  # what a skeleton warns of shows in its measures
     pipelines.default()(samples.tube(256).points)  # loads what is imported when first needed, so that it is not timed
+
+
+def _alone(work, job):
+    try:
+        with ProcessPoolExecutor(1, get_context("spawn"), _warm_up) as pool:
+            return pool.submit(_row, work, job).result()
+    except BrokenProcessPool:
+        return job[0] | {"failure": "its process died, perhaps for want of memory"}
 
 
 def _row(work, job):
@@ -228,14 +258,11 @@ Markdown = Annotated[bool, typer.Option("--markdown", help="Print Markdown.")]
 
 def show(title: str, header: list[str], rows: list[list[str]], markdown: bool) -> None:
     """Print a table of words; the columns in `TEXT` and the first lean left, the numbers right."""
-    right = [i > 0 and name not in TEXT for i, name in enumerate(header)]
     if markdown:
-        line = ["--:" if numbers else "---" for numbers in right]
-        lines = ["| " + " | ".join(cells) + " |" for cells in (header, line, *rows)]
-        typer.echo("\n".join([f"**{title}**", "", *lines, ""]))
+        typer.echo(markdown_table(title, header, rows))
         return
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False, header_style="")
-    for name, numbers in zip(header, right, strict=True):
+    for name, numbers in zip(header, _numbers(header), strict=True):
         table.add_column(name, justify="right" if numbers else "left", no_wrap=name not in TEXT)
     for cells in rows:
         table.add_row(*cells)
@@ -243,6 +270,17 @@ def show(title: str, header: list[str], rows: list[list[str]], markdown: bool) -
     with console.capture() as captured:
         console.print(table)
     typer.echo("\n".join(line.rstrip() for line in captured.get().splitlines()))
+
+
+def markdown_table(title: str, header: list[str], rows: list[list[str]]) -> str:
+    """The same in Markdown."""
+    line = ["--:" if numbers else "---" for numbers in _numbers(header)]
+    lines = ["| " + " | ".join(cells) + " |" for cells in (header, line, *rows)]
+    return "\n".join([f"**{title}**", "", *lines, ""])
+
+
+def _numbers(header):
+    return [i > 0 and name not in TEXT for i, name in enumerate(header)]
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -254,15 +292,25 @@ def save(path: Path | None, rows: list[dict]) -> None:
     """Write all rows, with where they come from, as JSON."""
     if path is None:
         return
-    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True)
-    told: dict[str, Any] = {
-        "command": sys.argv[1:],
-        "commit": commit.stdout.strip() or None,
-        "machine": {"system": platform.platform(), "processor": _processor(), "cores": os.cpu_count()},
-        "versions": {"python": platform.python_version(), **Report().versions},
-        "rows": rows,
-    }
+    told = {"command": sys.argv[1:], **surroundings(), "rows": rows}
     path.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def surroundings() -> dict[str, Any]:
+    """The commit, the machine and the versions that results are of."""
+    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True)
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
+    return {
+        "commit": commit.stdout.strip() or None,
+        "machine": {
+            "system": platform.platform(),
+            "processor": _processor(),
+            "cores": os.cpu_count(),
+            "memory_gb": round(memory, 1),
+            "load": round(os.getloadavg()[0], 1),
+        },
+        "versions": {"python": platform.python_version(), **Report().versions},
+    }
 
 
 def _processor() -> str:

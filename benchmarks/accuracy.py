@@ -29,14 +29,16 @@ from _common import (
     folder_or,
     named,
     number,
+    pick,
     run,
     save,
     show,
+    with_solves,
 )
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import Contractor, Pipeline, read_cloud
+from glsk_o3d import Pipeline, read_cloud
 from glsk_o3d.analysis import compare
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.pipelines import default
@@ -113,11 +115,6 @@ def summary(rows: list[dict]) -> dict:
     right = [row for row in good if row["topology"]]
     counts = dict(n=len(rows), right=len(right), leaves=sum(row["leaves"] == 0 for row in right))
     return counts | {name: fmean(found) if found else float("nan") for name, found in values.items()}
-
-
-def pick(rows: list[dict], **facts) -> list[dict]:
-    """The rows with these facts."""
-    return [row for row in rows if all(row[name] == value for name, value in facts.items())]
 
 
 def by_variant(rows: list[dict]) -> dict[str, list[dict]]:
@@ -216,14 +213,6 @@ def ablation_table(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
 
 
 # ---------------------------------------------------------------------------------------------------- the contraction
-
-
-def with_solves(pipeline: Pipeline, n: int) -> Pipeline:
-    """The pipeline with exactly n solves, fewer only where one is refused."""
-    if n == 0:
-        return Pipeline(*(stage for stage in pipeline.stages if not isinstance(stage, Contractor)))
-    at_once = ["Contractor.stop=ExplainedScore", "ExplainedScore.threshold=1e9", f"ExplainedScore.min_iterations={n}"]
-    return override(pipeline, at_once)
 
 
 @app.command()

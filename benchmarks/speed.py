@@ -1,0 +1,692 @@
+"""How fast skeletons are, where the time goes, and how both grow with the cloud.
+
+python benchmarks/speed.py all --builtin
+
+The README beside this file says what each command shows.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from _common import (
+    BUILTIN,
+    Case,
+    Folder,
+    Jobs,
+    Markdown,
+    Output,
+    Own,
+    Pipelines,
+    Shapes,
+    builtin,
+    cases,
+    folder_or,
+    markdown_table,
+    named,
+    number,
+    pick,
+    run,
+    save,
+    show,
+    surroundings,
+    with_solves,
+)
+from _stopwatch import MB, REST, Stage, Stopwatch, find, peak, resident
+from scipy.spatial import cKDTree
+
+from glsk_o3d import Contractor, Pipeline, read_cloud
+from glsk_o3d.cli.overrides import override
+from glsk_o3d.interop.files import write_atomically
+from glsk_o3d.interop.open3d import cloud_points
+from glsk_o3d.interop.preview import save_figure
+from glsk_o3d.pipelines import default, wen2024
+from glsk_o3d.report import REFUSED
+
+STAGES = {
+    "order": Stage(("numerics.ordering:morton_order",)),
+    "kNN": Stage(("numerics.neighbourhoods:nearest_neighbours",)),
+    "outliers, noise": Stage(
+        ("numerics.neighbourhoods:isolation", "numerics.ridges:noise_share", "numerics.ridges:to_ridges")
+    ),
+    "planes": Stage(("numerics.neighbourhoods:principal",)),
+    "thinning": Stage(("numerics.thinning:thin",)),
+    "rings": Stage(("numerics.rings:star_rings",)),
+    "rest of the rings": Stage(("ring_builder:RingBuilder._run",), open=True),
+    "Laplacian": Stage(("numerics.cotangent:cotangent_laplacian",)),
+    "lines": Stage(("contractor:linearity",)),
+    "normal matrix": Stage(("numerics.solver:solve_contraction",), open=True),
+    "factorisation": Stage(("numerics.solver:factorised",)),
+    "refinement of the solve": Stage((), open=True, after=("normal matrix", "factorisation")),
+    "LPR": Stage(("lpr_reducer:LPRReducer._run",)),
+    "rest of the contraction": Stage(("contractor:Contractor._run",), open=True),
+    "sampling": Stage(("connector:local_thickness", "numerics.sampling:farthest_point_sampling")),
+    "connection": Stage(("connector:Connector._run",), open=True),
+    "refinement of the graph": Stage(("refiner:Refiner._run",)),
+}
+"""The stages in the order of the tables, and the functions that do their work; to be mended as the package changes."""
+
+PUBLISHED = ("wen2024", "cao2010")
+NEIGHBOURS = 30  # of the yardstick
+LEAST, MOST = 2.0, 50  # seconds that runs in turns go on for, however few were asked for, and turns at most
+MIDDLE = (4096, 65536)  # sizes of the second growth exponent
+BASES: dict[str, Callable[[], Pipeline]] = {"wen2024": wen2024, "default": default}
+BASELINE = ("wen2024", False, "rings")  # the contraction of cao2010
+RULES: dict[str, list[str]] = {
+    "own": [],
+    "rings": ["Contractor.stop=RingSizeRatio", "Contractor.max_iterations=20"],
+}
+"""Stop rules by the settings that give them, besides a fixed number of solves: the pipeline's own, that of cao2010."""
+CLAIMS = {1024: "about 1", 4096: "about 0.5", 16384: "less still"}
+"""What Wen et al. 2024 find for the cost of their contraction over that of the baseline, figures 4 to 6."""
+
+app = typer.Typer(
+    help=__doc__, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
+)
+PARTS = ("machine", "stages", "figures", "rate")  # of the page that `all` fills
+Tables = list[tuple[str, list[str], list[list[str]]]]  # title, header, lines
+
+
+def numbers(text: str) -> list[int]:
+    """Numbers with commas."""
+    if not re.fullmatch(r"\d+(,\d+)*", text):
+        raise typer.BadParameter(f"{text}: give numbers with commas, such as 1024,4096")
+    return [int(word) for word in text.split(",")]
+
+
+def points_of(case: Case) -> int:
+    """The size that its variant names."""
+    return int(case.variant.partition("_")[2])
+
+
+# ----------------------------------------------------------------------------------------------------------- in turns
+
+
+def in_turns(tasks: dict, repeat: int, stages: Mapping[str, Stage] | None = None) -> dict[Any, tuple[Any, dict]]:
+    """Run tasks one after the other, again and again, so that what disturbs the machine disturbs them all.
+
+    Parameters
+    ----------
+    tasks : dict of callables
+    repeat : int
+        Runs of each, at least; it goes on for `LEAST` seconds of CPU time.
+    stages : mapping of str to Stage, optional
+
+    Returns
+    -------
+    dict of (object, dict)
+        For each task what its last run gave, and medians over the runs: ``cpu`` and ``wall`` seconds, and the same for
+        every stage in ``stages``.
+    """
+    watches, results = {name: [] for name in tasks}, {}
+    end = time.process_time() + LEAST
+    turns = 0
+    while turns < repeat or (turns < MOST and time.process_time() < end):
+        for name, task in tasks.items():
+            with Stopwatch(stages or {}) as watch:
+                results[name] = task()
+            watches[name].append(watch)
+        turns += 1
+    found = {}
+    for name, taken in watches.items():
+        facts = {clock: median(getattr(watch, clock) for watch in taken) for clock in ("cpu", "wall")}
+        parts = {
+            stage: {clock: median(getattr(watch.shares[stage], clock) for watch in taken) for clock in ("cpu", "wall")}
+            for stage in taken[0].shares
+        }
+        found[name] = results[name], dict(facts, runs=turns, stages=parts)
+    return found
+
+
+def yardstick(points) -> None:
+    """1 kNN."""
+    cKDTree(points).query(points, NEIGHBOURS)
+
+
+# ------------------------------------------------------------------------------------------------------------- stages
+
+
+def timed(path: Path, pipelines: dict[str, Pipeline], repeat: int) -> dict:
+    """The yardstick and the pipelines in turns, on a saved cloud."""
+    points = np.load(path)
+    tasks = {"1 kNN": partial(yardstick, points)}
+    tasks |= {name: lambda pipeline=pipeline: told(pipeline(points)) for name, pipeline in pipelines.items()}
+    found = in_turns(tasks, repeat, STAGES)
+    _, knn = found.pop("1 kNN")
+    knn = {f"knn_{clock}": knn[clock] for clock in ("cpu", "wall")}
+    return {name: facts | result | knn for name, (result, facts) in found.items()}
+
+
+def told(skeleton) -> dict:
+    """What a table says of a skeleton besides its costs."""
+    report = skeleton.report
+    counts = dict(contracted=report.n_contracted, iterations=len(report.iterations))
+    return counts | dict(vertices=len(skeleton.vertices), loops=skeleton.n_loops)
+
+
+def most_memory(path: Path, pipeline: Pipeline) -> dict:
+    """Peaks in MB beyond the imports, the cloud included; to be run in a fresh process."""
+    before = resident()
+    points = np.load(path)
+    with Stopwatch(STAGES, memory=True) as watch:
+        pipeline(points)
+    peaks = {name: (share.peak - before) / MB for name, share in watch.shares.items() if share.peak}
+    return dict(peak=max(peaks.values(), default=(peak() - before) / MB), stage_peaks=peaks)
+
+
+def measure_stages(
+    sizes: list[int], pipelines: dict[str, Pipeline], shapes: str, kind: str, published_to: int, repeat: int, jobs: int
+) -> list[dict]:
+    """Costs of every stage and of the whole: a row for each size, shape and pipeline."""
+    find(STAGES)  # now, not after an hour
+
+    def wanted(n):
+        return {name: it for name, it in pipelines.items() if name not in PUBLISHED or n <= published_to}
+
+    for n in sizes:
+        if left := ", ".join(name for name in pipelines if name not in wanted(n)):
+            typer.echo(f"left out: {left} on {n} points; see --published-to", err=True)
+    found = cases(None, True, ",".join(f"{kind}_{n}" for n in sizes), shapes)
+    with tempfile.TemporaryDirectory() as folder:
+        places = []
+        for case in found:
+            points, _ = case.load()
+            n = points_of(case)
+            places.append((dict(n=n, shape=case.shape, kind=kind), Path(folder, f"{case.shape}_{n}.npy")))
+            np.save(places[-1][1], points)
+        # Timings alone, one after the other; how much memory is used does not depend on what else runs.
+        each = [(facts, (path, wanted(facts["n"]), repeat)) for facts, path in places if wanted(facts["n"])]
+        timings = run(timed, each, min(jobs, 1), fresh=True)
+        each = [
+            (facts | dict(pipeline=name), (path, it))
+            for facts, path in places
+            for name, it in wanted(facts["n"]).items()
+        ]
+        peaks = run(most_memory, each, jobs, fresh=True)
+    rows = []
+    for row in peaks:
+        timing = pick(timings, n=row["n"], shape=row["shape"])[0]
+        failed = {name: text for name, text in timing.items() if name == "failure"}
+        rows.append(dict(measure="stages") | row | (failed or timing[row["pipeline"]]))
+    return rows
+
+
+def growth(sizes: Iterable[int], seconds: Iterable[float], low: float = 0, high: float = np.inf) -> float:
+    """Exponent b of a n^b, by least squares of the logarithms over the sizes from `low` to `high`; NaN for one size."""
+    used = np.array([(n, s) for n, s in zip(sizes, seconds, strict=True) if low <= n <= high and s > 0])
+    return float(np.polyfit(*np.log(used).T, 1)[0]) if len(used) > 1 else float("nan")
+
+
+def over(rows: list[dict], value: Callable[[dict], float]) -> float:
+    """Median of a value over the rows, that is the shapes."""
+    return float(np.median([value(row) for row in rows]))
+
+
+def stage_tables(rows: list[dict]) -> Tables:
+    """The whole of every pipeline, then a table of stages for each."""
+    header = ["", "points", "1 kNN ms", "CPU ms", "in kNN", "wall ms", "MB", "solves", "contracted", "vertices", "note"]
+    names = list(dict.fromkeys(row["pipeline"] for row in rows))
+    lines, tables = [], []
+    for name in names:
+        mine = pick(rows, pipeline=name)
+        good = [row for row in mine if "failure" not in row]
+        sizes = sorted({row["n"] for row in good})
+        at = {n: pick(good, n=n) for n in sizes}
+        for n in sorted({row["n"] for row in mine}):
+            note = "; ".join(f"{row['shape']}: {row['failure']}" for row in pick(mine, n=n) if "failure" in row)
+            if n not in at:
+                lines.append([name, str(n), *"-" * 8, note])
+                continue
+            knn, cpu, wall = (1000 * over(at[n], lambda row, key=key: row[key]) for key in ("knn_cpu", "cpu", "wall"))
+            counts = [f"{over(at[n], lambda row, key=key: row[key]):.0f}" for key in ("peak", *COUNTS)]
+            cells = [short(knn), short(cpu), number(cpu / knn, 1), short(wall)]
+            lines.append([name, str(n), *cells, *counts, note])
+        if sizes:
+            tables.append((f"{name}: CPU ms (in kNN)", *stage_table(at)))
+    return [("end to end", header, lines), *tables]
+
+
+COUNTS = ("iterations", "contracted", "vertices")
+
+
+def stage_table(at: dict[int, list[dict]]) -> tuple[list[str], list[list[str]]]:
+    """Header and lines of one pipeline: costs of the stages over the sizes, how they grow, memory at the largest."""
+    largest = max(at)
+    costs: dict[str, Callable[[dict], float]] = {"1 kNN": lambda row: row["knn_cpu"]}
+    costs |= {name: lambda row, name=name: row["stages"][name]["cpu"] for name in (*STAGES, REST)}
+    costs["whole"] = lambda row: row["cpu"]
+    lines = []
+    for name, cost in costs.items():
+        seconds = [over(here, cost) for here in at.values()]
+        if name in STAGES and not any(seconds):
+            continue  # no such stage in this pipeline
+        cells = [
+            f"{short(1000 * spent)} ({number(spent / over(here, costs['1 kNN']), 2)})"
+            for spent, here in zip(seconds, at.values(), strict=True)
+        ]
+        slopes = [number(growth(at, seconds), 2), number(growth(at, seconds, *MIDDLE), 2)]
+        peaks = [row["peak"] if name == "whole" else row["stage_peaks"].get(name, np.nan) for row in at[largest]]
+        lines.append([name, *cells, *slopes, number(float(np.median(peaks)), 0)])
+    low, high = MIDDLE
+    return ["", *map(str, at), "growth", f"growth {low} to {high}", f"MB at {largest}"], lines
+
+
+def short(value: float) -> str:
+    """Three digits, but not more than two decimals."""
+    return f"{value:.{0 if value >= 100 else 1 if value >= 10 else 2}f}"
+
+
+# ------------------------------------------------------------------------------------------------------------ figures
+
+
+@dataclass(frozen=True)
+class Scan:
+    """A cloud in a file, or so many of its points drawn at random."""
+
+    shape: str
+    path: Path
+    n: int
+
+    def load(self) -> tuple[np.ndarray, None]:
+        """The points, and no axis."""
+        points = cloud_points(read_cloud(self.path))
+        return np.random.default_rng(1).choice(points, self.n, replace=False), None
+
+
+def objects(folder: Path | None, own: bool, shapes: str, sizes: list[int]) -> list[tuple[int, Case | Scan]]:
+    """The shapes with known axes in all sizes, built-in ones in sizes that the folder does not have; and, where there
+    is a folder of scans and nothing narrower is asked for, those that are large enough.
+    """
+    clean = ",".join(f"clean_{n}" for n in sizes)
+    found: list[tuple[int, Case | Scan]] = [(points_of(case), case) for case in cases(folder, own, clean, shapes)]
+    if own or shapes:
+        return found
+    if missing := [n for n in sizes if n not in dict(found)]:
+        typer.echo(f"the built-in shapes instead for {', '.join(map(str, missing))} points", err=True)
+        found += objects(None, True, "", missing)
+    try:
+        folder = folder_or(None, "GLSK_DATA", "shared/data")
+    except typer.BadParameter as problem:
+        typer.echo(f"left out: scans, {problem}", err=True)
+        return found
+    listed = json.loads((folder / "manifest.json").read_text())
+    for n in sizes:
+        large = [it for it in listed if it["n_points"] >= n]
+        if len(large) < len(listed):
+            typer.echo(f"left out: {len(listed) - len(large)} clouds of less than {n} points", err=True)
+        found += [(n, Scan(it["name"], folder / it["path"], n)) for it in large]
+    return found
+
+
+def contractors(solves: int) -> dict[tuple[str, bool, str], tuple[Pipeline, Contractor]]:
+    """Contractions to compare: by (pipeline, whether it reduces, stop rule) the stages ahead, and the contractor."""
+    found = {}
+    for base, make in BASES.items():
+        for reduces in (True, False):
+            pipeline = make() if reduces else override(make(), ["Contractor.reducer=none"])
+            stops = {rule: override(pipeline, settings) for rule, settings in RULES.items()}
+            stops["fixed"] = with_solves(pipeline, solves)
+            for rule, changed in stops.items():
+                ahead = [isinstance(stage, Contractor) for stage in changed.stages].index(True)
+                found[base, reduces, rule] = Pipeline(*changed.stages[:ahead]), changed.stages[ahead]
+    return found
+
+
+def contraction(cloud: Case | Scan, solves: int, repeat: int) -> dict:
+    """What all the contractions of a cloud cost, and leave of it."""
+    points, _ = cloud.load()
+    tasks, states = {}, {}
+    for key, (rings, contractor) in contractors(solves).items():
+        if key[0] not in states:
+            states[key[0]] = rings(points)
+        tasks[key] = partial(contractor, states[key[0]])
+    runs = []
+    for key, (state, facts) in in_turns(tasks, repeat).items():
+        report = state.report
+        counts = dict(left=len(state), contracted=report.n_contracted, solves=len(report.iterations))
+        refused = REFUSED in report.stop_reason
+        runs.append(dict(key=list(key), cpu=facts["cpu"], wall=facts["wall"], refused=refused) | counts)
+    return dict(runs=runs)
+
+
+def measure_figures(found: list[tuple[int, Case | Scan]], solves: int, repeat: int, jobs: int) -> list[dict]:
+    """A row for each cloud and size, the larger sizes first."""
+    found = sorted(found, key=lambda item: -item[0])
+    work = [
+        (dict(measure="figures", n=n, shape=cloud.shape, fixed=solves), (cloud, solves, repeat)) for n, cloud in found
+    ]
+    return run(contraction, work, jobs)
+
+
+def take(row: dict, key: tuple) -> dict:
+    """The run of a row that has this key."""
+    return pick(row["runs"], key=list(key))[0]
+
+
+def ratios(rows: list[dict], over: tuple, under: tuple) -> np.ndarray:
+    """CPU of one contraction over that of another, paired; with a fixed number of solves where both reached it."""
+    pairs = [(take(row, over), take(row, under), row["fixed"]) for row in rows]
+    if "fixed" in over:
+        pairs = [
+            (a, b, n) for a, b, n in pairs if a["solves"] == b["solves"] == n and not (a["refused"] or b["refused"])
+        ]
+    return np.array([a["cpu"] / b["cpu"] for a, b, _ in pairs])
+
+
+def quartiles(values: np.ndarray, digits: int = 2) -> str:
+    """Median and quartiles in words."""
+    if len(values) == 0:
+        return "-"
+    low, middle, high = (f"{value:.{digits}f}" for value in np.quantile(values, [0.25, 0.5, 0.75]))
+    return f"{middle} ({low} to {high})"
+
+
+def figure_tables(rows: list[dict]) -> Tables:
+    """For each pipeline the ratio to the baseline and what it is made of; then what is left of the clouds."""
+    good = [row for row in rows if "failure" not in row]
+    at = {n: pick(good, n=n) for n in sorted({row["n"] for row in good})}
+    solves = rows[0]["fixed"]
+    header = ["points", "clouds", "against cao2010", "paper", f"LPR, {solves} solves", "of these"]
+    header += ["LPR, own rule", "LPR, ring sizes", "own rule, no LPR", "own rule, LPR"]
+    tables: Tables = []
+    for base in BASES:
+        lines = []
+        for n, here in at.items():
+            fixed = ratios(here, (base, True, "fixed"), (base, False, "fixed"))
+            lpr = [quartiles(ratios(here, (base, True, rule), (base, False, rule))) for rule in RULES]
+            rule = [quartiles(ratios(here, (base, lpr, "own"), (base, lpr, "rings"))) for lpr in (False, True)]
+            whole = quartiles(ratios(here, (base, True, "own"), BASELINE))
+            claim = CLAIMS.get(n, "-") if base == "wen2024" else ""
+            lines.append([str(n), str(len(here)), whole, claim, quartiles(fixed), str(len(fixed)), *lpr, *rule])
+        tables.append((f"{base}: CPU ratios of the contraction, median (quartiles)", header, lines))
+    lines = []
+    for n, here in at.items():
+        for name, key in shown().items():
+            runs = [take(row, key) for row in here]
+            left, spent, made = (np.array([it[what] for it in runs], float) for what in ("left", "cpu", "solves"))
+            refused = str(sum(it["refused"] for it in runs))
+            cells = [quartiles(left / n), quartiles(1000 * spent, 0), quartiles(made, 0), refused]
+            lines.append([name, str(n), *cells])
+    header = ["", "points", "share left", "CPU ms", "solves", "refused"]
+    tables.append(("the contraction, median (quartiles)", header, lines))
+    if failed := [row for row in rows if "failure" in row]:
+        words = [[str(row["n"]), row["shape"], row["failure"]] for row in failed]
+        tables.append(("failures", ["points", "cloud", "note"], words))
+    return tables
+
+
+def shown() -> dict[str, tuple[str, bool, str]]:
+    """The named pipelines among the contractions."""
+    return {"cao2010": BASELINE} | {base: (base, True, "own") for base in BASES}
+
+
+def draw(rows: list[dict], folder: Path) -> list[Path]:
+    """A picture for each size: cost and remaining points of every cloud, in the order of what the baseline costs."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    good = [row for row in rows if "failure" not in row]
+    paths = []
+    for n in sorted({row["n"] for row in good}):
+        here = sorted(pick(good, n=n), key=lambda row: take(row, BASELINE)["cpu"])
+        figure = Figure((max(6, 2.5 + 0.16 * len(here)), 5.5), layout="constrained")
+        FigureCanvasAgg(figure)
+        above, below = figure.subplots(2, 1, sharex=True)
+        for (name, key), colour, mark in zip(shown().items(), ("#777777", "#d95f02", "#1f4e9c"), "s^o", strict=True):
+            runs = [take(row, key) for row in here]
+            for axes, values in ((above, [it["cpu"] for it in runs]), (below, [it["left"] for it in runs])):
+                axes.plot(values, mark, color=colour, markersize=4, label=name)
+                axes.axhline(median(values), color=colour, linewidth=0.8, zorder=0)
+        above.set(ylabel="contraction, CPU s", ylim=(0, None), title=f"{n} points; lines are medians")
+        below.set(ylabel="points left", ylim=(0, None))
+        below.set_xticks(range(len(here)), [row["shape"] for row in here], rotation=90, fontsize=7)
+        above.legend(frameon=False, ncols=3, fontsize=8)
+        for axes in (above, below):
+            axes.spines[["top", "right"]].set_visible(False)
+        paths.append(folder / f"contraction_{n}.png")
+        save_figure(figure, paths[-1])
+    return paths
+
+
+# --------------------------------------------------------------------------------------------------------------- rate
+
+COLD = """
+import json, sys, time
+start = time.perf_counter(), time.process_time()
+from glsk_o3d import skeletonize
+imported = time.perf_counter(), time.process_time()
+import numpy
+points = numpy.load(sys.argv[1])
+begun = time.perf_counter(), time.process_time()
+skeletonize(points, sys.argv[2])
+done = time.perf_counter(), time.process_time()
+spent = dict(import_wall=imported[0] - start[0], import_cpu=imported[1] - start[1])
+print(json.dumps(dict(spent, first_wall=done[0] - begun[0], first_cpu=done[1] - begun[1])))
+"""
+"""A fresh process: what the import and the first call take."""
+
+
+def cold(path: Path, pipeline: str, repeat: int) -> dict[str, float]:
+    """Medians over fresh processes."""
+    found = []
+    for _ in range(repeat):
+        start = time.perf_counter()
+        words = [sys.executable, "-W", "ignore", "-c", COLD, str(path), pipeline]
+        done = subprocess.run(words, capture_output=True, text=True)
+        if done.returncode:
+            raise RuntimeError(done.stderr.strip().splitlines()[-1])
+        found.append(json.loads(done.stdout) | dict(process_wall=time.perf_counter() - start))
+    return {name: median(each[name] for each in found) for name in found[0]}
+
+
+def first_and_next(path: Path, pipeline: str, repeat: int) -> dict:
+    """Cold and warm, one after the other."""
+    return cold(path, pipeline, repeat) | timed(path, named(pipeline), repeat)[pipeline]
+
+
+def measure_rate(sizes: list[int], pipelines: list[str], shape: str, repeat: int, jobs: int) -> list[dict]:
+    """A row for each size and pipeline."""
+    named(",".join(pipelines))
+    with tempfile.TemporaryDirectory() as folder:
+        work = []
+        for n in sizes:
+            path = Path(folder, f"{n}.npy")
+            np.save(path, builtin(shape, f"clean_{n}")[0])
+            facts = dict(measure="rate", n=n, shape=shape)
+            work += [(facts | dict(pipeline=name), (path, name, repeat)) for name in pipelines]
+        return run(first_and_next, work, min(jobs, 1))
+
+
+def rate_tables(rows: list[dict]) -> Tables:
+    """Cold and warm."""
+    header = ["", "points", "1 kNN ms", "import ms", "first call ms", "process ms"]
+    header += ["next call ms", "CPU ms", "per second", "first process per second", "note"]
+    lines = []
+    for row in rows:
+        if "failure" in row:
+            lines.append([row["pipeline"], str(row["n"]), *"-" * 8, row["failure"]])
+            continue
+        keys = ("knn_wall", "import_wall", "first_wall", "process_wall", "wall", "cpu")
+        rates = [number(1 / row[key], 1) for key in ("wall", "process_wall")]
+        lines.append([row["pipeline"], str(row["n"]), *(short(1000 * row[key]) for key in keys), *rates, ""])
+    return [("skeletons per second, wall time", header, lines)]
+
+
+# ----------------------------------------------------------------------------------------------------------- commands
+
+
+def machine() -> str:
+    """A line that says where and what was measured."""
+    told = surroundings()
+    it, versions = told["machine"], ", ".join(f"{name} {version}" for name, version in told["versions"].items())
+    return (
+        f"Measured on {it['processor']}, {it['cores']} cores, {it['memory_gb']} GB, load {it['load']}, {it['system']}; "
+        f"{versions}; commit {told['commit']}; one thread."
+    )
+
+
+def present(where: str, parts: dict[str, Tables], markdown: bool) -> None:
+    """Print where it was measured, and the tables of the parts."""
+    typer.echo(f"{where}\n")
+    for table in (table for tables in parts.values() for table in tables):
+        show(*table, markdown)
+
+
+def fill(page: Path, parts: Mapping[str, Tables | str], check: bool = False) -> None:
+    """Put tables, or texts, into a page between the lines ``<!-- NAME -->`` and ``<!-- end -->``; or only look."""
+    text = page.read_text(encoding="utf-8")
+    for name, body in parts.items():
+        if not isinstance(body, str):
+            body = "\n".join(markdown_table(*table) for table in body)
+        pattern = rf"(<!-- {name} -->\n).*?(<!-- end -->)"
+        text, found = re.subn(pattern, lambda match, body=body: f"{match[1]}\n{body}\n{match[2]}", text, flags=re.S)
+        if found != 1:
+            raise typer.BadParameter(f"{page} has no lines <!-- {name} --> and <!-- end -->")
+    if check:
+        return
+    write_atomically(page, lambda temporary: Path(temporary).write_text(text, encoding="utf-8"))
+
+
+def _folder(path: Path | None) -> Path | None:
+    if path is not None:
+        path.mkdir(parents=True, exist_ok=True)
+    return path
+
+
+def _page(path: Path | None) -> Path | None:
+    if path is not None:
+        if not path.is_file():
+            raise typer.BadParameter(f"there is no page {path}")
+        fill(path, dict.fromkeys(PARTS, ""), check=True)
+    return path
+
+
+Sizes = Annotated[str, typer.Option("--sizes", metavar="NUMBERS", help="Points, with commas.")]
+Kind = Annotated[str, typer.Option("--kind", metavar="KIND", help="clean, noise1, ...; see the README.")]
+PublishedTo = Annotated[int, typer.Option("--published-to", help="wen2024 and cao2010 only up to so many points.")]
+Repeat = Annotated[int, typer.Option("--repeat", min=1, help="Runs of which medians are taken, at least.")]
+Solves = Annotated[int, typer.Option("--solves", min=1, max=10, help="Where the number of solves is fixed.")]
+Pictures = Annotated[
+    Path | None, typer.Option("--pictures", metavar="DIR", help="Also draw them, as PNG.", callback=_folder)
+]
+ALL_SIZES, FIGURE_SIZES, ALL_PIPELINES = "1024,4096,16384,65536", "1024,4096,16384", "default,wen2024,cao2010"
+
+
+@app.command()
+def stages(
+    sizes: Sizes = ALL_SIZES,
+    pipeline: Pipelines = ALL_PIPELINES,
+    published_to: PublishedTo = 65536,
+    shapes: Shapes = "sauropod",
+    kind: Kind = "clean",
+    repeat: Repeat = 3,
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """What every stage and the whole cost over the size of the cloud, and how they grow."""
+    rows = measure_stages(numbers(sizes), named(pipeline), shapes, kind, published_to, repeat, jobs)
+    save(output, rows)
+    present(machine(), {"stages": stage_tables(rows)}, markdown)
+
+
+@app.command()
+def figures(
+    folder: Folder = None,
+    own: Own = False,
+    sizes: Sizes = FIGURE_SIZES,
+    shapes: Shapes = "",
+    solves: Solves = 4,
+    repeat: Repeat = 1,
+    jobs: Jobs = 2,
+    pictures: Pictures = None,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """The contraction against the baseline (figures 4 to 6 of Wen et al. 2024), and what the difference is made of."""
+    rows = measure_figures(objects(folder, own, shapes, numbers(sizes)), solves, repeat, jobs)
+    save(output, rows)
+    if pictures is not None:
+        draw(rows, pictures)
+    present(machine(), {"figures": figure_tables(rows)}, markdown)
+
+
+@app.command()
+def rate(
+    sizes: Sizes = FIGURE_SIZES,
+    pipeline: Pipelines = "default",
+    shape: Annotated[str, typer.Option("--shape", metavar="NAME", help="A built-in shape.")] = "sauropod",
+    repeat: Repeat = 3,
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Skeletons per second, in a fresh process and after."""
+    if shape not in BUILTIN:
+        raise typer.BadParameter(f"no shape {shape}: there are {', '.join(BUILTIN)}")
+    rows = measure_rate(numbers(sizes), pipeline.split(","), shape, repeat, jobs)
+    save(output, rows)
+    present(machine(), {"rate": rate_tables(rows)}, markdown)
+
+
+@app.command("all")
+def everything(
+    page: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="PAGE", help="Markdown page to put the tables into; pictures beside it.", callback=_page
+        ),
+    ] = None,
+    own: Own = False,
+    sizes: Sizes = ALL_SIZES,
+    figure_sizes: Annotated[
+        str, typer.Option("--figure-sizes", metavar="NUMBERS", help="Of `figures` and `rate`.")
+    ] = FIGURE_SIZES,
+    pipeline: Pipelines = ALL_PIPELINES,
+    published_to: PublishedTo = 65536,
+    shapes: Annotated[str, typer.Option("--shapes", metavar="NAMES", help="Of `figures`.")] = "",
+    repeat: Repeat = 3,
+    jobs: Jobs = 2,
+    pictures: Pictures = None,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """The three together."""
+    chosen, found = named(pipeline), objects(None, own, shapes, numbers(figure_sizes))
+    start, where = time.perf_counter(), machine()  # now, since writing the page changes the working tree
+
+    def said(what, rows):
+        typer.echo(f"{what} done, {time.perf_counter() - start:.0f} s so far", err=True)
+        return rows
+
+    by_stage = said("stages", measure_stages(numbers(sizes), chosen, "sauropod", "clean", published_to, repeat, jobs))
+    compared = said("figures", measure_figures(found, 4, 1, jobs))
+    fast = said("rate", measure_rate(numbers(figure_sizes), ["default"], "sauropod", repeat, jobs))
+    save(output, [*by_stage, *compared, *fast])
+    parts = {"stages": stage_tables(by_stage), "figures": figure_tables(compared), "rate": rate_tables(fast)}
+    if pictures is not None:
+        draw(compared, pictures)
+    if page is not None:
+        if pictures is None and (page.parent / "images").is_dir():
+            draw(compared, page.parent / "images")
+        fill(page, {"machine": f"{where}\n", **parts})
+    present(where, parts, markdown)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("MPLBACKEND", "Agg")
+    app()
