@@ -83,8 +83,8 @@ class Connector(Filter):
         vertices = group_sum(state.mass[:, None] * state.positions, owner, len(samples)) / mass
         survivor = state.survivor_of_point
         vertex_of_point = np.where(survivor >= 0, owner[survivor], -1)
-        known = (state.row_of_point >= 0) & ~state.outlier
-        normals = np.where(known[:, None], state.normals[state.row_of_point], np.nan)
+        normals = np.full_like(state.points, np.nan)
+        normals[state.witness] = state.normals[state.row_of_point[state.witness]]
         vertices = state.frame.out_of(vertices)
         skeleton = Skeleton(
             vertices=vertices,

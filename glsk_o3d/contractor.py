@@ -12,13 +12,13 @@ import numpy as np
 from .filter import Filter, documented, parameter
 from .numerics.cotangent import cotangent_laplacian
 from .numerics.eigen import largest_eigenvalue
-from .numerics.neighbourhoods import PAIRS
+from .numerics.neighbourhoods import nearest_neighbours, scatter
 from .numerics.solver import SolveError, solve_contraction
 from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord
 from .state import Contraction
 from .stopping import ExplainedScore, StopRule
 
-LINE, REACH = 0.98, 3  # linearity that counts as a line, of what so many rings reach
+LINE, LINE_NEIGHBOURS = 0.97, 16  # linearity of a neighbourhood of so many points that counts as a line
 
 
 @documented
@@ -117,7 +117,7 @@ class Contractor(Filter):
         with np.errstate(divide="ignore"):
             attraction = state.ring_size0 / state.ring_size
         if self.line_hold > 1 and state.report.iterations:
-            attraction = np.where(linearity(state.positions, state.rings) > LINE, self.line_hold, 1) * attraction
+            attraction = np.where(linearity(state.positions) > LINE, self.line_hold, 1) * attraction
         attraction = np.clip(attraction, self.min_attraction, self.max_attraction)
         laplacian = self._laplacian(state)
         mass = np.sqrt(state.mass)
@@ -153,27 +153,19 @@ class Contractor(Filter):
         raise SolveError(f"it would throw {outside.sum()} of {len(state)} points far out of the cloud")
 
 
-def linearity(points, rings):
-    """Share of the largest principal component in the spread of the surroundings of every point.
-
-    These are what can be reached along three rings at most, by all ways.
+def linearity(points):
+    """Share of the largest principal component in the spread of every point's neighbourhood, (n,) float array.
 
     Parameters
     ----------
     points : (n, 3) float array
-    rings : Rings
 
     Returns
     -------
     (n,) float array
         1 on a line.
     """
-    points = points - points.mean(axis=0)
-    moments = np.column_stack([np.ones(len(points)), points, *(points[:, i] * points[:, j] for i, j in PAIRS)])
-    for _ in range(REACH):
-        moments += rings.sums(moments)
-    mean = moments[:, 1:4] / moments[:, :1]
-    spread = np.stack([m / moments[:, 0] - mean[:, i] * mean[:, j] for m, (i, j) in zip(moments.T[4:], PAIRS, strict=True)])
+    spread = scatter(points, nearest_neighbours(points, min(LINE_NEIGHBOURS, len(points)))[1])
     total = spread[0] + spread[3] + spread[5]
     return largest_eigenvalue(spread) / np.maximum(total, np.finfo(float).tiny)
 

@@ -87,9 +87,9 @@ class Report:
 
     Attributes
     ----------
-    n_input, n_dropped, n_outliers, n_distinct, n_contracted : int
-        Input points, those dropped as not finite, those set aside as outliers, the distinct ones among the rest, and
-        those of them that were contracted; large clouds are thinned before.
+    n_input, n_dropped, n_sampled, n_outliers, n_distinct, n_contracted : int
+        Input points, those dropped as not finite, those that a large cloud was sampled to (all of a smaller one), those
+        set aside as outliers, the distinct ones of the sample, and those of them that were contracted.
     n_bridges : int
         Gaps between parts that were bridged.
     stages : tuple of str
@@ -109,6 +109,7 @@ class Report:
 
     n_input: int = 0
     n_dropped: int = 0
+    n_sampled: int = 0
     n_outliers: int = 0
     n_distinct: int = 0
     n_contracted: int = 0

@@ -16,7 +16,7 @@ from .numerics.neighbourhoods import isolation, nearest_neighbours, plane_axes, 
 from .numerics.ordering import morton_order
 from .numerics.ridges import noise_share, to_ridges
 from .numerics.rings import star_rings
-from .numerics.thinning import thin, thin_smooth
+from .numerics.thinning import thin, thin_smooth, thin_to_grid
 from .report import Report
 from .state import Contraction, at_rest
 
@@ -25,6 +25,7 @@ LEAST_RING = 3
 ROUNDS = 4  # of setting outliers aside
 SMALLEST, LARGEST = 1e-120, 1e120  # extents whose squares and products a float64 holds
 ALONE, FAIRLY_NOISY = 1.8, 0.2  # isolation of a denoised point that is set aside, and its least noise
+ENOUGH, STEADY = 8192, 0.9  # points, and share of them left, at which merging where there are more than enough ends
 COINCIDENT = 4e-15  # points nearer than this in the working frame, a few roundings, are duplicates
 
 
@@ -155,7 +156,9 @@ class RingBuilder(Filter):
     def _run(self, cloud, watch):
         points = cloud_points(cloud)
         finite = self._finite(points)
-        good = points[finite]
+        most = self._number(np.count_nonzero(finite))
+        sample, stands_for = _sample(points[finite], 2 * most)
+        good = points[finite][sample]
         frame, distinct, row, distance, neighbours = self._distinct(good)
         stray = np.zeros(len(good), bool)
         # in rounds, since what is left of a group stands out once the rest is gone
@@ -168,8 +171,6 @@ class RingBuilder(Filter):
             frame, distinct, row[~stray], distance, neighbours = self._distinct(good[~stray])
         if stray.any():
             row[stray] = cKDTree(distinct).query(frame.into(good[stray]))[1]
-        row_of_point, outlier = np.full(len(points), -1), np.zeros(len(points), bool)
-        row_of_point[finite], outlier[finite] = row, stray
 
         spread, normals = principal(distinct, neighbours)
         across = normals  # of the planes that the rings lie in
@@ -177,33 +178,33 @@ class RingBuilder(Filter):
         if self.denoise and noise.any():
             distinct, neighbours, left, nearest = self._denoised(distinct, neighbours.shape[1], noise)
             normals, noise = normals[left], noise[left]  # a ridge has none: those of the cloud as it came
-            row_of_point[finite] = nearest[row]
-            outlier[finite] |= (left[nearest] != np.arange(len(nearest)))[row]
+            stray |= (left[nearest] != np.arange(len(nearest)))[row]
+            row = nearest[row]
             spread, across = principal(distinct, neighbours)
-        into = self._thinned(distinct, neighbours, spread)
-        kept = into == np.arange(len(into))
-        survivors = np.flatnonzero(kept)
+        survivors, owner, neighbours = self._thinned(distinct, neighbours, spread, most)
         n, positions, axes = len(survivors), distinct[survivors], plane_axes(across[survivors])
-        if n < len(distinct):
-            neighbours = nearest_neighbours(positions, self._neighbours(n))[1]
         rings = star_rings(positions, np.arange(n), self._within(positions, neighbours[:, 1:], frame), axes)
-        owner = (np.cumsum(kept) - 1)[into]
+        row_of_point, outlier, witness = np.full(len(points), -1), np.zeros(len(points), bool), np.zeros(len(points), bool)
+        row_of_point[finite], outlier[finite] = row[stands_for], stray[stands_for]
+        witness[np.flatnonzero(finite)[sample]] = ~stray
         return Contraction(
             points=points,
             row_of_point=row_of_point,
             outlier=outlier,
+            witness=witness,
             frame=frame,
             cloud=distinct,
             noise=noise,
             normals=normals,
             survivors=survivors,
             owner=owner,
-            mass=np.bincount(owner, minlength=n).astype(float),
+            mass=np.bincount(owner, minlength=n) * (n / len(owner)),
             **at_rest(positions, rings),
             report=Report(
                 n_input=len(points),
                 n_dropped=int((~finite).sum()),
                 n_outliers=int(outlier.sum()),
+                n_sampled=len(good),
                 n_distinct=len(distinct),
                 n_contracted=n,
             ),
@@ -224,16 +225,24 @@ class RingBuilder(Filter):
         neighbours[changed] = nearest_neighbours(calm, k, of=calm[changed])[1]
         return calm, neighbours, left, nearest
 
-    def _thinned(self, cloud, neighbours, spread):
-        """The point that each is merged into before the contraction."""
-        into = thin_smooth(cloud, neighbours, spread, self.around) if self.around else np.arange(len(cloud))
-        kept = into == np.arange(len(into))
-        left, n = np.flatnonzero(kept), self._number(len(cloud))
-        if n >= len(left):
-            return into
-        if len(left) < len(cloud):
-            neighbours = nearest_neighbours(cloud[left], min(neighbours.shape[1], len(left)))[1]
-        return left[thin(cloud[left], neighbours, n)][(np.cumsum(kept) - 1)[into]]
+    def _thinned(self, cloud, neighbours, spread, most):
+        """Rows of the points to contract, the one of these that stands for each point, and their neighbours."""
+        left, owner = np.arange(len(cloud)), np.arange(len(cloud))
+
+        def merge(into):
+            kept = into == np.arange(len(into))
+            rows, rank = left[kept], np.cumsum(kept) - 1
+            return rows, rank[into][owner], nearest_neighbours(cloud[rows], self._neighbours(len(rows)))[1]
+
+        while self.around:
+            n = len(left)
+            left, owner, neighbours = merge(thin_smooth(cloud[left], neighbours, spread, self.around))
+            if len(left) < ENOUGH or len(left) > STEADY * n:
+                break
+            spread = principal(cloud[left], neighbours)[0]
+        if most < len(left):
+            left, owner, neighbours = merge(thin(cloud[left], neighbours, most))
+        return left, owner, neighbours
 
     def _within(self, cloud, neighbours, frame):
         """The neighbours without those beyond the radius, which become -1."""
@@ -302,3 +311,10 @@ class RingBuilder(Filter):
             cloud, row = cloud[order], position[inverse.reshape(-1)[row]]
             distance, neighbours = nearest_neighbours(cloud, self._neighbours(len(cloud)))
         return frame, cloud, row, distance, neighbours
+
+
+def _sample(points, n):
+    """About n points that stand for a cloud of more than twice as many, and which of them stands for each."""
+    if len(points) > 2 * n:
+        return thin_to_grid(points, n)
+    return np.arange(len(points)), np.arange(len(points))

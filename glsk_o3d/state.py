@@ -53,6 +53,8 @@ class Contraction:
         Row of `cloud` that each input point is; -1 if it was dropped as not finite.
     outlier : (N,) bool array
         Input points that were set aside; `row_of_point` is the distinct point nearest to them.
+    witness : (N,) bool array
+        Input points that say where the surface is: no outliers, and of a large cloud a sample; others are only mapped.
     frame : Frame
     cloud : (m, 3) float64 array
         Distinct input points, noisy ones denoised.
@@ -86,6 +88,7 @@ class Contraction:
     points: np.ndarray
     row_of_point: np.ndarray
     outlier: np.ndarray
+    witness: np.ndarray
     frame: Frame
     cloud: np.ndarray
     noise: np.ndarray
@@ -123,7 +126,7 @@ class Contraction:
     @property
     def point_of_survivor(self) -> np.ndarray:
         """For every survivor the first input point that it is, (n,) int array."""
-        valid = np.flatnonzero((self.row_of_point >= 0) & ~self.outlier)
+        valid = np.flatnonzero(self.witness)
         first = np.empty(len(self.cloud), int)
         first[self.row_of_point[valid[::-1]]] = valid[::-1]
         return first[self.survivors]

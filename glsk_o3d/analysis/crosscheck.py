@@ -195,7 +195,7 @@ def cross_check(
     verdict, reasons = judge(rows, skeletons, skeleton.report.warnings, other.report)
     of_point = state.row_of_point
     angle, length, share = (
-        np.where((of_point >= 0) & ~state.outlier, values[of_point], np.nan) for values in (angle, length, share)
+        np.where(state.witness, values[of_point], np.nan) for values in (angle, length, share)
     )
     return CrossCheck(
         verdict=verdict,
@@ -255,7 +255,7 @@ def _surface(state, mesh):
 
 def _given(state, vertices, faces):
     """A user's mesh in the frame, on the cloud's own points if these are its vertices."""
-    good = (state.row_of_point >= 0) & ~state.outlier
+    good = state.witness
     distance, nearest = cKDTree(state.frame.into(state.points[good])).query(state.frame.into(vertices))
     if distance.max() < SAME * state.frame.diagonal:
         row = state.row_of_point[good][nearest]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-_BITS = 21  # per axis: 63 bits in all
+BITS = 21  # per axis: 63 bits in all
 
 
 def morton_order(points):
@@ -17,11 +17,28 @@ def morton_order(points):
     (n,) int array
         Stable: equal points keep their order.
     """
-    low = points.min(axis=0)
+    return np.argsort(morton_codes(points, 2**BITS - 1), kind="stable")
+
+
+def morton_codes(points, cells):
+    """Morton code of the cell of every point, in a cubic grid with its corner in that of the bounding box.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    cells : float
+        Cells along the longest side of the bounding box; at most 2^21 - 1.
+
+    Returns
+    -------
+    (n,) uint64 array
+    """
     extent = max(np.ptp(points, axis=0).max(), np.finfo(float).tiny)
-    cell = ((points - low) / extent * (2**_BITS - 1)).astype(np.uint64)
-    code = _spread(cell[:, 0]) | _spread(cell[:, 1]) << np.uint64(1) | _spread(cell[:, 2]) << np.uint64(2)
-    return np.argsort(code, kind="stable")
+    code = np.zeros(len(points), np.uint64)
+    for axis, column in enumerate(points.T):
+        cell = ((column - column.min()) / extent * cells).astype(np.uint64)
+        code |= _spread(cell) << np.uint64(axis)
+    return code
 
 
 def _spread(x):

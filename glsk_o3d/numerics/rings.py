@@ -86,13 +86,10 @@ class Rings:
         first = np.append(True, owner[1:] != owner[:-1])
         return self.indices[hits[first]], distance
 
-    def sums(self, values):
-        """Sum of the neighbours' values, (n, d) float array from `values` (n, d)."""
-        return csr_array((np.ones(len(self.indices)), self.indices, self.indptr), shape=(len(self),) * 2) @ values
-
     def mean_over(self, values):
         """Mean of the neighbours' values, (n, d) float array from `values` (n, d); 0 for an empty ring."""
-        return self.sums(values) / np.maximum(self.sizes, 1)[:, None]
+        ring = csr_array((np.ones(len(self.indices)), self.indices, self.indptr), shape=(len(self),) * 2)
+        return ring @ values / np.maximum(self.sizes, 1)[:, None]
 
     def take(self, points):
         """The rings of some points, in the order given; the indices stay as they are."""

@@ -1,7 +1,7 @@
 """The linear solve of the contraction."""
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu
 
 TOLERANCE = 1e-7  # of the cloud's size; refinement ends here
@@ -67,21 +67,18 @@ def solve_contraction(laplacian, row_weight, position_weight, points):
     SolveError
         If the factorisation breaks down or the error estimate stays above 1e-4.
     """
-    laplacian = laplacian.tocsr()
-    weight = np.repeat(row_weight, np.diff(laplacian.indptr))
-    scaled = csr_array((weight * laplacian.data, laplacian.indices, laplacian.indptr), shape=laplacian.shape)
-    transposed = scaled.T.tocsr()
-    attraction = position_weight[:, None] ** 2
-    normal = (transposed @ scaled + diags_array(attraction[:, 0], format="csr")).T  # symmetric, so that .T is free
+    system = _stacked(laplacian.tocsr(), row_weight, position_weight)
+    transposed = system.T.tocsr()
+    wanted = np.concatenate([np.zeros_like(points), position_weight[:, None] * points])
     try:
-        factor = factorised(normal, Equil=False)
+        factor = factorised((transposed @ system).tocsc(), Equil=False)  # this also sorts it
     except RuntimeError as error:
         raise SolveError(f"the contraction system cannot be factorised ({error})") from error
-    x = factor.solve(attraction * points)
+    x = factor.solve(transposed @ wanted)
     size = np.ptp(points, axis=0).max()
     error = np.inf
     for _ in range(MAX_REFINEMENTS):
-        correction = factor.solve(attraction * (points - x) - transposed @ (scaled @ x))
+        correction = factor.solve(transposed @ (wanted - system @ x))
         change = np.abs(correction).max() / size
         if not change < error:  # also when it is NaN
             break
@@ -92,8 +89,17 @@ def solve_contraction(laplacian, row_weight, position_weight, points):
         raise SolveError(f"the contraction system is too ill-conditioned: corrections stay at {error:.1e} of the size")
     # The sum of all equations. The rows of a Laplacian sum to zero, so only W_H keeps the cloud in its place: where
     # it drowns beside L^T L in rounding, the corrections vanish but the points drift.
-    pull = (attraction * (points - x)).sum(axis=0) - scaled.sum(axis=1).T @ (scaled @ x)
-    drift = np.abs(pull).max() / (attraction.sum() * size)
+    pull = system.sum(axis=1) @ (wanted - system @ x)
+    drift = np.abs(pull).max() / ((position_weight**2).sum() * size)
     if not drift < ACCEPTABLE:
         raise SolveError(f"the contraction system is too ill-conditioned: the cloud drifts by {drift:.1e} of its size")
     return x, float(error)
+
+
+def _stacked(laplacian, row_weight, position_weight):
+    """The rows of W_L L, and below them W_H."""
+    n = len(position_weight)
+    data = np.concatenate([np.repeat(row_weight, np.diff(laplacian.indptr)) * laplacian.data, position_weight])
+    indices = np.concatenate([laplacian.indices, np.arange(n, dtype=laplacian.indices.dtype)])
+    indptr = np.concatenate([laplacian.indptr, laplacian.indptr[-1] + np.arange(1, n + 1, dtype=laplacian.indptr.dtype)])
+    return csr_array((data, indices, indptr), shape=(2 * n, n))

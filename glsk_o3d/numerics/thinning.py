@@ -3,6 +3,7 @@
 import numpy as np
 
 from .neighbourhoods import nearest_neighbours, row_medians
+from .ordering import BITS, morton_codes
 
 MOST = 4  # points that one may stand for, where the surface has more than enough
 WORTH = 0.01  # share of the points that another round must merge
@@ -49,6 +50,48 @@ def thin(points, neighbours, n):
         around = nearest_neighbours(points[rows], min(neighbours.shape[1], len(rows)))[1]
         into = rows[thin(points[rows], around, n)][(np.cumsum(left) - 1)[into]]
     return into
+
+
+def thin_to_grid(points, n):
+    """Keep of every cell of a cubic grid with about n occupied cells the point nearest to the mean of its points.
+
+    Parameters
+    ----------
+    points : (m, 3) float array
+    n : int
+        Less than m.
+
+    Returns
+    -------
+    kept : (c,) int array
+        Points left; about n, but all where that takes finer cells than numbers have, beside points very far off.
+    into : (m,) int array
+        Position in `kept` of the point that stands for each.
+    """
+    code = morton_codes(points, 2**BITS - 1)
+    order = np.argsort(code, kind="stable")
+    ordered = code[order]
+    counts = [1]
+    while counts[-1] < n:  # cells half as wide
+        if len(counts) > BITS:
+            return np.arange(len(points)), np.arange(len(points))
+        counts.append(1 + np.count_nonzero(np.diff(ordered >> np.uint64(3 * (BITS - len(counts))))))
+    wider = np.log(counts[-1] / n) / np.log(counts[-1] / counts[-2])
+    code = morton_codes(points, 2 ** (len(counts) - 1 - wider))[order]
+    again = np.argsort(code, kind="stable")
+    order, code = order[again], code[again]
+    begin = np.flatnonzero(np.append(True, code[1:] != code[:-1]))
+    size = np.diff(np.append(begin, len(code)))
+    ordered = points[order]
+    away = ordered - np.repeat(np.add.reduceat(ordered, begin) / size[:, None], size, axis=0)
+    squared = np.einsum("ni,ni->n", away, away)
+    nearest = np.flatnonzero(squared == np.repeat(np.minimum.reduceat(squared, begin), size))
+    cell = np.repeat(np.arange(len(begin)), size)
+    kept = np.empty(len(begin), int)
+    kept[cell[nearest[::-1]]] = order[nearest[::-1]]
+    into = np.empty(len(points), int)
+    into[order] = cell
+    return kept, into
 
 
 def thin_smooth(points, neighbours, spread, around):
