@@ -164,12 +164,14 @@ def say(kind: str, message: str) -> None:
 
 
 @contextmanager
-def progress(shown: bool) -> Iterator[Callable[..., None]]:
+def progress(shown: bool, *, remaining: bool = False) -> Iterator[Callable[..., None]]:
     """A line with a bar on stderr that goes away in the end, if stderr is a terminal.
 
     Parameters
     ----------
     shown : bool
+    remaining : bool
+        Also say how many are done of how many, and how long the others will take.
 
     Yields
     ------
@@ -179,9 +181,19 @@ def progress(shown: bool) -> Iterator[Callable[..., None]]:
     if not (shown and sys.stderr is not None and sys.stderr.isatty()):
         yield lambda text, done=None, total=None: None
         return
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        SpinnerColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
+    columns = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn()]
+    if remaining:
+        columns += [MofNCompleteColumn(), TextColumn("left:"), TimeRemainingColumn()]
     with Progress(*columns, console=console(stderr=True), transient=True) as bars:
         task = bars.add_task("starting", total=None)
 
@@ -272,7 +284,20 @@ def _message(problem: BaseException) -> str:
         return f"out of memory ({problem}): thin the cloud first, for example with voxel_down_sample"
     if isinstance(problem, OSError) and problem.strerror and problem.filename is not None:
         return f"{problem.filename}: {problem.strerror}"
-    message = str(problem) or type(problem).__name__
+    return said_here(str(problem) or type(problem).__name__)
+
+
+def said_here(message: str) -> str:
+    """What the library says, with the cures of the command line.
+
+    Parameters
+    ----------
+    message : str
+
+    Returns
+    -------
+    str
+    """
     for there, here in _SAID_HERE.items():
         message = message.replace(there, here)
     return message
