@@ -27,7 +27,7 @@ DONE, FAILED = "done", "failed"
 COLUMNS = (
     *("name", "input", "status", "error", "seconds", "points", "dropped", "distinct", "contracted", "vertices"),
     *("edges", "components", "loops", "leaves", "junctions", "length", "iterations", "converged", "stop_reason"),
-    *("warnings", "messages", "parameters", "input_hash", "outputs", "host", "version", "finished"),
+    *("warnings", "messages", "parameters", "input_hash", "outputs", "worker", "version", "finished"),
 )
 """What a row tells."""
 _log = logging.getLogger(__name__)

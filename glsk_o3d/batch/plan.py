@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import InvalidParameterError
+from ..errors import FileFormatError, InvalidParameterError
 from ..filter import Filter
 from ..interop.files import skeleton_ending
 from ..pipeline import Pipeline, as_pipeline
@@ -121,7 +121,10 @@ def plan_batch(
         No recipe can hold the pipeline: then it cannot be told whether two runs are the same.
     """
     recipe = as_pipeline(pipeline).to_recipe()
-    endings = list(dict.fromkeys(skeleton_ending(Path(), ending) for ending in formats)) + [".png"] * preview
+    try:
+        endings = list(dict.fromkeys(skeleton_ending(Path(), ending) for ending in formats)) + [".png"] * preview
+    except FileFormatError as error:
+        raise InvalidParameterError(str(error)) from None
     if not endings:
         raise InvalidParameterError("there is nothing to write: give a format")
     given = [inputs] if isinstance(inputs, str | os.PathLike) else list(inputs)

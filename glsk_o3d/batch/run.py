@@ -195,14 +195,14 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
                 raise KeyboardInterrupt
             if interrupts and not warned:
                 warned = True
-                _log.warning(
-                    "no more clouds are begun; %d are being finished: Ctrl-C again to stop at once", len(running)
-                )
+                _log.warning("finishing what is in work (%d), nothing else: Ctrl-C again stops at once", len(running))
             for future in ready:
                 task = running.pop(future)
                 if future.cancelled():
                     raise BatchError("the work was cancelled, or its scheduler has gone: run the same batch to go on")
                 error = future.exception()
+                if isinstance(error, BatchError):
+                    raise error
                 if died(error) and not alone:
                     again.append(task)
                 else:
@@ -218,7 +218,7 @@ def _row(task: Task, future: Future, error: BaseException | None) -> Row:
         row = future.result()
         missing = row["error"].startswith("no such file") or ": no such folder" in row["error"]
         if missing and Path(task.job.path).exists():
-            row["error"] += f" (on {row['host']}; there is one here: workers need the same files by the same paths)"
+            row["error"] += f" (on {row['worker']}; there is one here: workers need the same files by the same paths)"
         return row
     return {
         "status": FAILED,

@@ -62,7 +62,8 @@ def work(job: Job) -> Row:
         What the ledger is to say. Whatever goes wrong is in it: nothing is raised.
     """
     start = time.perf_counter()
-    row: Row = {"error": "", "outputs": [], "host": socket.gethostname(), "version": __version__}
+    row: Row = {"error": "", "outputs": [], "version": __version__}
+    row["worker"] = f"{socket.gethostname()}, process {os.getpid()}"
     with _Heard() as heard:
         try:
             for path in job.stale:

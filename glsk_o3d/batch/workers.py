@@ -16,7 +16,6 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
-from queue import SimpleQueue
 from typing import Any, Protocol
 
 from ..errors import BatchError, PluginWarning, SkeletonWarning
@@ -24,6 +23,7 @@ from ..interop.open3d import import_open3d, require
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 _PATIENCE = 10  # seconds until a scheduler must answer
+_DASK_LOG = logging.getLogger("distributed.client")
 _log = logging.getLogger(__name__)
 
 
@@ -79,30 +79,36 @@ class LocalWorkers:
 
     def __init__(self, count: int):
         self._seats = [_Seat() for _ in range(count)]
-        self._free: SimpleQueue[_Seat] = SimpleQueue()
-        for seat in self._seats:
-            self._free.put(seat)
+        self._free = list(self._seats)
         self._stillborn = 0
 
     def capacity(self) -> int:
         return len(self._seats)
 
     def submit(self, function: Callable, *arguments: Any) -> Future:
-        if self._stillborn > len(self._seats):
-            raise BatchError(
-                "worker processes die before they begin; stderr may say why. In a script, call run_batch under "
-                'if __name__ == "__main__": every worker runs the rest of it too'
-            )
-        seat = self._free.get()
-        future = seat.submit(function, *arguments)
-        future.add_done_callback(partial(self._release, seat))
-        return future
+        seat, told = self._free.pop(), Future()
+        seat.submit(function, *arguments).add_done_callback(partial(self._settle, seat, told))
+        return told
 
-    def _release(self, seat: _Seat, future: Future) -> None:
-        if not future.cancelled() and died(future.exception()):
+    def _settle(self, seat: _Seat, told: Future, done: Future) -> None:
+        """Free the seat, and only then pass on what came of the work."""
+        if done.cancelled():
+            told.cancel()
+            return
+        error = done.exception()
+        if died(error):
             self._stillborn = 0 if seat.began() else self._stillborn + 1
             seat.close(wait=False)
-        self._free.put(seat)
+            if self._stillborn > len(self._seats):
+                error = BatchError(
+                    "worker processes die before they begin; stderr may say why. In a script, call run_batch under "
+                    'if __name__ == "__main__": every worker runs the rest of it too'
+                )
+        self._free.append(seat)
+        if error is None:
+            told.set_result(done.result())
+        else:
+            told.set_exception(error)
 
     def close(self, *, at_once: bool) -> None:
         for seat in self._seats:
@@ -227,11 +233,15 @@ class DaskWorkers:
         if self._own:
             text = os.fspath(scheduler)
             try:
-                where = {"scheduler_file": text} if Path(text).is_file() else {"address": text}
+                if Path(text).is_file():
+                    where = {"scheduler_file": text}
+                else:
+                    where = {"address": distributed.comm.resolve_address(text)}  # a client that cannot is slow to go
                 scheduler = distributed.Client(**where, timeout=_PATIENCE, set_as_default=False)
             except Exception as error:  # no answer, no address, no such protocol
                 raise BatchError(f"{text}: no Dask scheduler answers there: {error}") from error
-        self._client = scheduler
+        self._client, self._level = scheduler, _DASK_LOG.level
+        _DASK_LOG.setLevel(logging.CRITICAL)  # we say ourselves, in one line, that a scheduler has gone
         self._executor = scheduler.get_executor(pure=False)
         self._asked, self._threads = -1.0, 0
 
@@ -260,6 +270,7 @@ class DaskWorkers:
         self._executor.shutdown(wait=not at_once)
         if self._own:
             self._client.close(timeout=5)
+        _DASK_LOG.setLevel(self._level)
 
 
 # ------------------------------------------------------------------------------------------------------ any executor
