@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -144,20 +145,24 @@ def main(
         make_scans(scans, count, smallest, largest)
         rows = []
         for n in map(int, workers.split(",")):
-            here = glsk_batch(scans, folder / f"local{n}", "--workers", str(n))
-            rows.append({"where": "this machine", "workers": n, **here})
-            again = glsk_batch(scans, folder / f"local{n}", "--workers", str(n))
-            rows.append({"where": "this machine, again", "workers": n, **again})
-            with dask_cluster(n, folder) as (file, _):
-                there = glsk_batch(scans, folder / f"dask{n}", "--scheduler", file)
-            rows.append({"where": "Dask", "workers": n, **there})
+            for where in ("this machine", "this machine, again", "Dask"):
+                row = {"where": where, "workers": n, "load": os.getloadavg()[0]}
+                before = resource.getrusage(resource.RUSAGE_CHILDREN)
+                if where == "Dask":
+                    with dask_cluster(n, folder) as (file, _):
+                        row |= glsk_batch(scans, folder / f"dask{n}", "--scheduler", file)
+                else:
+                    row |= glsk_batch(scans, folder / f"local{n}", "--workers", str(n))
+                after = resource.getrusage(resource.RUSAGE_CHILDREN)
+                row["cpu"] = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+                rows.append(row)
         killed = kill_test(scans, folder / "killed", folder, after=count // 4)
         told = ledger(folder / "local1")
     title = f"{count} clouds of {smallest} to {largest} points and 5 corrupt ones, {os.cpu_count()} cores"
-    header = ["where", "workers", "done", "skipped", "failed", "seconds", "clouds/s"]
+    header = ["where", "workers", "done", "skipped", "failed", "seconds", "CPU s", "clouds/s", "load before"]
     cells = [
         [row["where"], *(str(row[key]) for key in ("workers", "done", "skipped", "failed"))]
-        + [number(row["wall"], 1), number(row["clouds_per_second"], 1)]
+        + [number(row[key], 1) for key in ("wall", "cpu", "clouds_per_second", "load")]
         for row in rows
     ]
     show(title, header, cells, markdown)

@@ -191,26 +191,31 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
                 alone = True
                 hand_out(again.popleft())
             ready, _ = wait(running, _POLL, FIRST_COMPLETED)
+            lost: BatchError | None = None
+            for future in ready:
+                task = running.pop(future)
+                error = _gone() if future.cancelled() else future.exception()
+                if isinstance(error, BatchError):
+                    lost = error
+                elif died(error) and not alone:
+                    again.append(task)
+                else:
+                    enter(task, _row(task, future, error))
+            if lost is not None:
+                raise lost
             if len(interrupts) > 1:
                 raise KeyboardInterrupt
             if interrupts and not warned:
                 warned = True
                 _log.warning("finishing what is in work (%d), nothing else: Ctrl-C again stops at once", len(running))
-            for future in ready:
-                task = running.pop(future)
-                if future.cancelled():
-                    raise BatchError("the work was cancelled, or its scheduler has gone: run the same batch to go on")
-                error = future.exception()
-                if isinstance(error, BatchError):
-                    raise error
-                if died(error) and not alone:
-                    again.append(task)
-                else:
-                    enter(task, _row(task, future, error))
             if not ready:
                 workers.capacity()  # notices that a scheduler has gone
         if interrupts:
             raise KeyboardInterrupt
+
+
+def _gone() -> BatchError:
+    return BatchError("the work was cancelled, or its scheduler has gone: run the same batch to go on")
 
 
 def _row(task: Task, future: Future, error: BaseException | None) -> Row:
@@ -235,7 +240,6 @@ def _counted_interrupts() -> Iterator[list[int]]:
     if threading.current_thread() is not threading.main_thread():
         yield pressed
         return
-
     before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
     try:
         yield pressed

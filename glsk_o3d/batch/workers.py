@@ -112,8 +112,8 @@ class LocalWorkers:
 
     def close(self, *, at_once: bool) -> None:
         for seat in self._seats:
-            if at_once and seat.process is not None:
-                seat.process.kill()
+            if at_once:
+                seat.kill()
         for seat in self._seats:
             seat.close(wait=True)
 
@@ -139,10 +139,15 @@ class _Seat:
         """Whether the process ever got as far as work."""
         return self._first.done() and self._first.exception() is None
 
+    def kill(self) -> None:
+        process = self.process
+        if process is not None:
+            process.kill()
+
     def close(self, *, wait: bool) -> None:
-        if self.pool is not None:
-            self.pool.shutdown(wait=wait, cancel_futures=True)
-        self.pool = self.process = None
+        pool, self.pool, self.process = self.pool, None, None
+        if pool is not None:
+            pool.shutdown(wait=wait, cancel_futures=True)
 
 
 class _Process(SpawnProcess):

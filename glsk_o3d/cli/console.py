@@ -28,6 +28,7 @@ _SAID_HERE = {
     "let RingBuilder(drop_invalid=True) drop them": "drop them with --drop-invalid",
     "make one with glsk_o3d.skeletonize": "run 'glsk skeletonize' first",
     "pass cut_loops=True to drop": "add --cut-loops to drop",
+    "taken with recursive": "taken with --recursive",
     "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
 }
 

@@ -113,14 +113,15 @@ def rows():
 
 @pytest.fixture
 def start(tmp_path):
-    """Start ``glsk batch`` as a process of its own, in an empty folder."""
+    """Start ``glsk batch`` in an empty folder, as a terminal does: Ctrl-C goes to all its processes."""
     begun = []
 
     def run(*words) -> subprocess.Popen:
         command = [sys.executable, "-m", "glsk_o3d", "batch", *map(str, words)]
         pipe = subprocess.PIPE
-        begun.append(subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True))
-        return begun[-1]
+        process = subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
+        begun.append(process)
+        return process
 
     yield run
     for process in begun:

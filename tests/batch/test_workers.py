@@ -89,7 +89,7 @@ def test_ctrl_c_and_on_again(start, until, slow, saboteur, rows, tmp_path):
     out = tmp_path / "out"
     run = start(*slow)
     until(lambda: finished(out) >= 2)
-    os.kill(run.pid, signal.SIGINT)
+    os.killpg(run.pid, signal.SIGINT)
     _, said = run.communicate(timeout=30)
     assert run.returncode == 130, said
     assert "finishing what is in work (1), nothing else" in said
@@ -119,9 +119,9 @@ def test_ctrl_c_twice_and_a_batch_that_is_killed_leave_no_worker(start, until, s
     [worker] = until(lambda: workers(run))
     time.sleep(1)
     begun = time.monotonic()
-    os.kill(run.pid, signal.SIGINT)
+    os.killpg(run.pid, signal.SIGINT)
     time.sleep(0.3)
-    os.kill(run.pid, signal.SIGINT)
+    os.killpg(run.pid, signal.SIGINT)
     _, said = run.communicate(timeout=20)
     assert run.returncode == 130, said
     assert time.monotonic() - begun < 15

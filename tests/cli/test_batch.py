@@ -53,6 +53,7 @@ def here(monkeypatch):
     [
         (1, ["none"], "none: no such file or folder"),
         (1, ["in/*.pcd"], "in/*.pcd: no cloud matches; known endings are .ply"),
+        (1, ["."], "sub-folders are taken with --recursive"),
         (2, ["in", "--format", "stl"], "unknown ending; known are .ply"),
         (2, ["in", "--format", ","], "nothing to write"),
         (2, ["in", "--pipeline", "wen2042"], "did you mean 'wen2024'?"),
