@@ -1,11 +1,14 @@
 """What `glsk batch` takes, refuses and says; what it does is tested in tests/batch."""
 
+import io
 import json
+import re
 
 import pytest
 
 from glsk_o3d import read_skeleton
 from glsk_o3d.batch import run_batch
+from glsk_o3d.cli.console import progress
 
 
 @pytest.fixture
@@ -149,3 +152,17 @@ def test_no_more_workers_than_scans(folder, tmp_path, here):
 def test_verbose(invoke, folder):
     result = invoke("batch", "in/a.ply", "-o", "out", "--verbose")
     assert f"glsk: {folder / 'a.ply'}: " in result.stderr
+
+
+def test_progress_tells_how_many_and_how_long(monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    screen = Terminal()
+    monkeypatch.setattr("sys.stderr", screen)
+    with progress(True, remaining=True) as update:
+        update("3 scans/s, 1 failed", 7, 10)
+    assert re.search(
+        r"3 scans/s, 1 failed .* 7/10 left: -?\S+", re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
+    )
