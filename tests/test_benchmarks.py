@@ -233,15 +233,13 @@ class TestCrosscheck:
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # the work is done in this process
-def test_scans_for_batches(root, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(root / "benchmarks"))
+def test_scans_for_batches(tool, tmp_path):
     batch = importlib.import_module("batch")
     (tmp_path / "in").mkdir()
     batch.make_scans(tmp_path / "in", 12, 256, 400)
     with ThreadPoolExecutor(1) as pool:
         result = run_batch(tmp_path / "in", tmp_path / "out", executor=pool)
-    for name in ("batch", "_common"):
-        del sys.modules[name]
+    del sys.modules["batch"]
     failed = {name[5:] for name, row in result.rows.items() if row["status"] == "failed"}
     assert failed == {name.partition(".")[0] for name in batch.CORRUPT}
     sizes = [row["points"] for row in result.rows.values() if row["status"] == "done"]
