@@ -1,9 +1,11 @@
 # The public names and where they live; the package imports each when it is first asked for.
 from . import analysis as analysis
+from . import batch as batch
 from . import pipelines as pipelines
 from .connector import Connector
 from .contractor import Contractor
 from .errors import (
+    BatchError,
     DisplayError,
     FileFormatError,
     GlskError,
@@ -36,6 +38,7 @@ from .viewing.recorder import ContractionRecorder
 __version__: str
 
 __all__ = [
+    "BatchError",
     "Connector",
     "Contraction",
     "ContractionRecorder",
@@ -63,6 +66,7 @@ __all__ = [
     "SkeletonWarning",
     "StageError",
     "analysis",
+    "batch",
     "load_recipe",
     "pipelines",
     "read_cloud",

@@ -29,6 +29,10 @@ class RecipeError(GlskError, ValueError):
     """A recipe is malformed, or a pipeline cannot be written as one."""
 
 
+class BatchError(GlskError, RuntimeError):
+    """A batch cannot run on: its folder is in use, or there is nobody to work."""
+
+
 class MissingPackageError(GlskError, ImportError):
     """An optional package, or a system library it needs, is not installed."""
 

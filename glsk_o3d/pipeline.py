@@ -148,6 +148,25 @@ def skeletonize(
     RecipeError
         If the recipe is wrong.
     """
+    return as_pipeline(pipeline)(cloud, on_iteration=on_iteration, on_state=on_state)
+
+
+def as_pipeline(pipeline: Pipeline | Filter | str | os.PathLike) -> Pipeline:
+    """The pipeline that is meant, from a cloud to a skeleton.
+
+    Parameters
+    ----------
+    pipeline : Pipeline, Filter, name, or path of a recipe
+
+    Returns
+    -------
+    Pipeline
+
+    Raises
+    ------
+    InvalidParameterError, RecipeError
+        As in `skeletonize`.
+    """
     if isinstance(pipeline, os.PathLike) or (
         isinstance(pipeline, str) and Path(pipeline).suffix.lower() in (".json", ".toml")
     ):
@@ -163,4 +182,4 @@ def skeletonize(
             f"pipeline = {pipeline!r}: must be a Pipeline, the name of one, or the path of a recipe"
         )
     pipeline.check_complete()
-    return pipeline(cloud, on_iteration=on_iteration, on_state=on_state)
+    return pipeline

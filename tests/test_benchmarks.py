@@ -4,6 +4,7 @@ import importlib
 import json
 import math
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
 from types import SimpleNamespace
 
@@ -13,6 +14,7 @@ from scipy.spatial import cKDTree
 from typer.testing import CliRunner
 
 from glsk_o3d import pipelines
+from glsk_o3d.batch import run_batch
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.samples import torus
 
@@ -228,3 +230,18 @@ class TestCrosscheck:
         table = call("scans", tmp_path / "ring.xyz", "--pictures", tmp_path, "--jobs", 0)
         assert "agrees (ball pivoting)" in table
         assert (tmp_path / "ring.png").is_file()
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # the work is done in this process
+def test_scans_for_batches(tool, tmp_path):
+    batch = importlib.import_module("batch")
+    (tmp_path / "in").mkdir()
+    batch.make_scans(tmp_path / "in", 12, 256, 400)
+    with ThreadPoolExecutor(1) as pool:
+        result = run_batch(tmp_path / "in", tmp_path / "out", executor=pool)
+    del sys.modules["batch"]
+    failed = {name[5:] for name, row in result.rows.items() if row["status"] == "failed"}
+    assert failed == {name.partition(".")[0] for name in batch.CORRUPT}
+    sizes = [row["points"] for row in result.rows.values() if row["status"] == "done"]
+    assert len(sizes) == 12
+    assert 256 <= min(sizes) < max(sizes) <= 400

@@ -28,6 +28,7 @@ _SAID_HERE = {
     "let RingBuilder(drop_invalid=True) drop them": "drop them with --drop-invalid",
     "make one with glsk_o3d.skeletonize": "run 'glsk skeletonize' first",
     "pass cut_loops=True to drop": "add --cut-loops to drop",
+    "taken with recursive": "taken with --recursive",
     "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
 }
 
@@ -164,12 +165,14 @@ def say(kind: str, message: str) -> None:
 
 
 @contextmanager
-def progress(shown: bool) -> Iterator[Callable[..., None]]:
+def progress(shown: bool, *, remaining: bool = False) -> Iterator[Callable[..., None]]:
     """A line with a bar on stderr that goes away in the end, if stderr is a terminal.
 
     Parameters
     ----------
     shown : bool
+    remaining : bool
+        Also say how many are done of how many, and how long the others will take.
 
     Yields
     ------
@@ -179,9 +182,19 @@ def progress(shown: bool) -> Iterator[Callable[..., None]]:
     if not (shown and sys.stderr is not None and sys.stderr.isatty()):
         yield lambda text, done=None, total=None: None
         return
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        SpinnerColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
+    columns = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn()]
+    if remaining:
+        columns += [MofNCompleteColumn(), TextColumn("left:"), TimeRemainingColumn()]
     with Progress(*columns, console=console(stderr=True), transient=True) as bars:
         task = bars.add_task("starting", total=None)
 
@@ -272,7 +285,20 @@ def _message(problem: BaseException) -> str:
         return f"out of memory ({problem}): thin the cloud first, for example with voxel_down_sample"
     if isinstance(problem, OSError) and problem.strerror and problem.filename is not None:
         return f"{problem.filename}: {problem.strerror}"
-    message = str(problem) or type(problem).__name__
+    return said_here(str(problem) or type(problem).__name__)
+
+
+def said_here(message: str) -> str:
+    """What the library says, with the cures of the command line.
+
+    Parameters
+    ----------
+    message : str
+
+    Returns
+    -------
+    str
+    """
     for there, here in _SAID_HERE.items():
         message = message.replace(there, here)
     return message

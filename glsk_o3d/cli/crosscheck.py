@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from .console import WrongUsage, holding_interrupts, print_json, print_rows, progress, reporting
-from .options import Json, PipelineName, Quiet, Verbose
+from .options import DropInvalid, Json, PipelineName, Quiet, Verbose
 
 
 def crosscheck(
@@ -42,9 +42,7 @@ def crosscheck(
     max_points: Annotated[
         int, typer.Option("--max-points", metavar="N", help="Thin larger clouds to so many points; 0 for no limit.")
     ] = 16384,
-    drop_invalid: Annotated[
-        bool, typer.Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")
-    ] = False,
+    drop_invalid: DropInvalid = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,

@@ -99,7 +99,7 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
     """
     import numpy as np
 
-    from .running import structure
+    from ..summary import structure
 
     report = skeleton.report
     radii = skeleton.radii[np.isfinite(skeleton.radii)]

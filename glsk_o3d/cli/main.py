@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from .batch import batch
 from .branches import branches
 from .crosscheck import crosscheck
 from .demo import demo
@@ -34,7 +35,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (skeletonize, run, rerun, evaluate, crosscheck, branches, view, demo, filters, info):
+for command in (skeletonize, batch, run, rerun, evaluate, crosscheck, branches, view, demo, filters, info):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
 
 

@@ -33,6 +33,19 @@ PipelineName = Annotated[
         help="One of default, wen2024 and cao2010, or a plugin's; 'glsk filters' says what they are.",
     ),
 ]
+Recipe = Annotated[
+    Path | None,
+    typer.Option("--recipe", metavar="FILE", help="Run a pipeline from a json or toml file instead of a named one."),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="FILTER.PARAMETER=VALUE",
+        help="Change a parameter, such as Connector.radius=2%; may be repeated. See 'glsk filters'.",
+    ),
+]
+DropInvalid = Annotated[bool, typer.Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout instead of tables.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors (and JSON, if asked for).")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print each iteration, the log, and tracebacks.")]

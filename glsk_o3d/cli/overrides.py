@@ -5,14 +5,52 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from ..catalogue import catalogue, changed_by, find, nearest, serves
 from ..errors import InvalidParameterError
 from ..filter import Parameters
 from ..pipeline import Pipeline
+from ..pipelines import named_pipeline
+from ..recipes import load_recipe
+from .console import WrongUsage
 
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
+
+
+def choose(pipeline: str, recipe: Path | None, settings: Iterable[str], drop_invalid: bool) -> Pipeline:
+    """The pipeline that the options of a command ask for.
+
+    Parameters
+    ----------
+    pipeline : str
+        Its name.
+    recipe : Path or None
+        A file to take instead.
+    settings : iterable of str
+        See `override`.
+    drop_invalid : bool
+        Drop points that are not finite.
+
+    Returns
+    -------
+    Pipeline
+        Checked, from a cloud to a skeleton.
+
+    Raises
+    ------
+    WrongUsage
+        A recipe and the name of a pipeline.
+    InvalidParameterError, RecipeError
+    """
+    if recipe is not None and pipeline != "default":
+        raise WrongUsage(f"--recipe {recipe} and --pipeline {pipeline}: give one of them")
+    base = named_pipeline(pipeline) if recipe is None else load_recipe(recipe)
+    drop = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
+    chosen = override(base, [*settings, *drop], name=pipeline if recipe is None else str(recipe))
+    chosen.check_complete()
+    return chosen
 
 
 def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pipeline:

@@ -17,6 +17,7 @@ from ..errors import FileFormatError, GlskError
 from ..interop.files import skeleton_ending
 from ..interop.preview import save_preview
 from ..skeleton import Skeleton
+from ..summary import summary
 from ..viewing.page import save_report
 from ..viewing.recorder import ContractionRecorder
 from .console import WrongUsage, print_iterations, print_json, print_rows
@@ -250,54 +251,6 @@ def write_each(writers: Mapping[Path, Callable[[Path], object]], update) -> tupl
         except Exception as error:  # a mistake in one writer: what was computed goes into the other files all the same
             problems.append(f"{path}: cannot be written: {type(error).__name__}: {error}")
     return written, problems
-
-
-def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
-    """A run in a few numbers.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    seconds : float
-
-    Returns
-    -------
-    dict of str to int, float, bool or str
-    """
-    report = skeleton.report
-    return {
-        "points": report.n_input,
-        "dropped": report.n_dropped,
-        "distinct": report.n_distinct,
-        "contracted": report.n_contracted,
-        **structure(skeleton),
-        "iterations": len(report.iterations),
-        "converged": report.converged,
-        "stop_reason": report.stop_reason,
-        "seconds": seconds,
-    }
-
-
-def structure(skeleton: Skeleton) -> dict[str, Any]:
-    """The counts of a skeleton's graph, and its length.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-
-    Returns
-    -------
-    dict of str to int or float
-    """
-    return {
-        "vertices": len(skeleton.vertices),
-        "edges": len(skeleton.edges),
-        "components": skeleton.n_components,
-        "loops": skeleton.n_loops,
-        "leaves": len(skeleton.leaves),
-        "junctions": len(skeleton.junctions),
-        "length": skeleton.length,
-    }
 
 
 def print_results(

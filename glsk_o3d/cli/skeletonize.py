@@ -7,8 +7,20 @@ from typing import Annotated
 
 import typer
 
-from .console import WrongUsage, holding_interrupts, progress, reporting
-from .options import CutLoops, Json, Output, PipelineName, Preview, Quiet, ReportPage, Verbose
+from .console import holding_interrupts, progress, reporting
+from .options import (
+    CutLoops,
+    DropInvalid,
+    Json,
+    Output,
+    PipelineName,
+    Preview,
+    Quiet,
+    Recipe,
+    ReportPage,
+    Settings,
+    Verbose,
+)
 
 
 def skeletonize(
@@ -22,27 +34,13 @@ def skeletonize(
     preview: Preview = None,
     report: ReportPage = None,
     pipeline: PipelineName = "default",
-    recipe: Annotated[
-        Path | None,
-        typer.Option(
-            "--recipe", metavar="FILE", help="Run a pipeline from a json or toml file instead of a named one."
-        ),
-    ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FILTER.PARAMETER=VALUE",
-            help="Change a parameter, such as Connector.radius=2%; may be repeated. See 'glsk filters'.",
-        ),
-    ] = None,
+    recipe: Recipe = None,
+    settings: Settings = None,
     save_recipe: Annotated[
         Path | None,
         typer.Option("--save-recipe", metavar="FILE", help="Also write the pipeline as run to a json or toml file."),
     ] = None,
-    drop_invalid: Annotated[
-        bool, typer.Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")
-    ] = False,
+    drop_invalid: DropInvalid = False,
     cut_loops: CutLoops = False,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -54,18 +52,12 @@ def skeletonize(
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
         from ..interop.files import read_cloud
-        from ..pipelines import named_pipeline
-        from ..recipes import load_recipe, recipe_ending
+        from ..recipes import recipe_ending
         from ..viewing.recorder import ContractionRecorder
-        from .overrides import override
+        from .overrides import choose
         from .running import check_outputs, print_results, run, write
 
-        drop = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
-        if recipe is not None and pipeline != "default":
-            raise WrongUsage(f"--recipe {recipe} and --pipeline {pipeline}: give one of them")
-        base = named_pipeline(pipeline) if recipe is None else load_recipe(recipe)
-        chosen = override(base, [*(settings or []), *drop], name=pipeline if recipe is None else str(recipe))
-        chosen.check_complete()
+        chosen = choose(pipeline, recipe, settings or [], drop_invalid)
         outputs = output or []
         others = {}
         if save_recipe is not None:

@@ -1,0 +1,176 @@
+"""``glsk batch`` on many generated clouds, some of them corrupt: the ledger, the rate, and what a killed worker costs.
+
+Everything is run as its users run it: the command ``glsk`` and the commands of Dask, as processes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from _common import Markdown, Output, number, save, show
+
+from glsk_o3d import samples
+
+SHAPES = (
+    *(samples.tube, samples.torus, samples.y_junction, samples.two_rings, samples.helix),
+    partial(samples.sauropod, cameras=None),
+)
+CORRUPT = ("empty.ply", "truncated.ply", "garbage.xyz", "nan.ply", "a_ply.pcd")
+app = typer.Typer(add_completion=False)
+
+
+def write_ply(path: Path, points) -> None:
+    """Write points as binary PLY."""
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+    header += "property double x\nproperty double y\nproperty double z\nend_header\n"
+    path.write_bytes(header.encode() + np.asarray(points, "<f8").tobytes())
+
+
+def make_scans(folder: Path, count: int, smallest: int, largest: int) -> None:
+    """Write clouds of all kinds, sizes and seeds, and in their midst five that are corrupt."""
+    rng = np.random.default_rng(0)
+    for i in range(count):
+        n = int(smallest * (largest / smallest) ** rng.random())
+        write_ply(folder / f"{i:04}.ply", SHAPES[i % len(SHAPES)](n, noise=0.002 * (i % 3), seed=i).points)
+    whole = samples.torus(1024).points
+    empty, cut, garbage, nan, other = (folder / f"{count * i // 6:04}_{name}" for i, name in enumerate(CORRUPT, 1))
+    empty.touch()
+    write_ply(cut, whole)
+    cut.write_bytes(cut.read_bytes()[:-5000])
+    garbage.write_text("this is no cloud\n" * 100)
+    write_ply(nan, np.full_like(whole, np.nan))
+    write_ply(other, whole)
+
+
+def glsk_batch(scans: Path, out: Path, *words: str) -> dict:
+    """Run the command; gives what it printed, with the seconds it took from start to end."""
+    begun = time.perf_counter()
+    run = subprocess.run(command(scans, out, *words), capture_output=True, text=True)
+    if run.returncode not in (0, 1):
+        raise RuntimeError(run.stderr)
+    return {**json.loads(run.stdout), "wall": time.perf_counter() - begun}
+
+
+def command(scans: Path, out: Path, *words: str) -> list[str]:
+    """The command as a list of words."""
+    return [sys.executable, "-m", "glsk_o3d", "batch", str(scans), "-o", str(out), "--json", *words]
+
+
+@contextmanager
+def dask_cluster(workers: int, folder: Path) -> Iterator[tuple[str, list[subprocess.Popen]]]:
+    """A scheduler and workers of one thread each; gives the file of the scheduler, and the workers."""
+    file = folder / "scheduler.json"
+    file.unlink(missing_ok=True)
+    begun = []
+
+    def dask(*words):
+        line = [sys.executable, "-m", "dask", *words, "--scheduler-file", str(file), "--no-dashboard"]
+        begun.append(subprocess.Popen([*line, "--host", "127.0.0.1"], stderr=subprocess.DEVNULL))
+        return begun[-1]
+
+    try:
+        dask("scheduler", "--port", "0")
+        while not file.exists():
+            time.sleep(0.1)
+        yield str(file), [dask("worker", "--no-nanny", "--nthreads", "1") for _ in range(workers)]
+    finally:
+        for process in reversed(begun):
+            process.terminate()
+            process.wait()
+
+
+def ledger(out: Path) -> list[dict]:
+    """The rows of a ledger."""
+    path = out / "ledger.jsonl"
+    return [json.loads(line) for line in path.read_bytes().splitlines()] if path.exists() else []
+
+
+def kill_test(scans: Path, out: Path, folder: Path, after: int) -> dict:
+    """Kill one of two Dask workers once some scans are done; gives what became of all."""
+    with dask_cluster(2, folder) as (file, workers):
+        run = subprocess.Popen(
+            command(scans, out, "--scheduler", file), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
+        path = out / "ledger.jsonl"
+        while not path.exists() or path.read_bytes().count(b"\n") < after:
+            time.sleep(0.02)
+        workers[0].send_signal(signal.SIGKILL)
+        told, _ = run.communicate()
+    rows = ledger(out)
+    per_worker = Counter(int(row["worker"].split()[-1]) for row in rows)
+    done = [row for row in rows if row["status"] == "done"]
+    return {
+        "exit_code": run.returncode,
+        "scans": len(list(scans.iterdir())),
+        "lines": len(rows),
+        "inputs_named_twice": len(rows) - len({row["input"] for row in rows}),
+        "done": len(done),
+        "done_without_output": sum(not (out / name).is_file() for row in done for name in row["outputs"]),
+        "failed": sorted(row["name"] for row in rows if row["status"] == "failed"),
+        "by_the_killed_worker": per_worker[workers[0].pid],
+        "by_the_other": per_worker[workers[1].pid],
+        "seconds": json.loads(told)["seconds"],
+    }
+
+
+@app.command()
+def main(
+    count: Annotated[int, typer.Option("--count", min=10, help="Clouds, besides the five corrupt ones.")] = 495,
+    smallest: Annotated[int, typer.Option("--smallest", min=256, help="Points.")] = 1024,
+    largest: Annotated[int, typer.Option("--largest", min=256, help="Points.")] = 8192,
+    workers: Annotated[str, typer.Option("--workers", metavar="NUMBERS", help="With commas.")] = "1,2",
+    markdown: Markdown = False,
+    output: Output = None,
+) -> None:
+    """Measure the rate of batches, and kill a worker in the midst of one."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        scans = folder / "scans"
+        scans.mkdir()
+        make_scans(scans, count, smallest, largest)
+        rows = []
+        for n in map(int, workers.split(",")):
+            for where in ("this machine", "this machine, again", "Dask"):
+                row = {"where": where, "workers": n, "load": os.getloadavg()[0]}
+                before = resource.getrusage(resource.RUSAGE_CHILDREN)
+                if where == "Dask":
+                    with dask_cluster(n, folder) as (file, _):
+                        row |= glsk_batch(scans, folder / f"dask{n}", "--scheduler", file)
+                else:
+                    row |= glsk_batch(scans, folder / f"local{n}", "--workers", str(n))
+                after = resource.getrusage(resource.RUSAGE_CHILDREN)
+                row["cpu"] = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+                rows.append(row)
+        killed = kill_test(scans, folder / "killed", folder, after=count // 4)
+        told = ledger(folder / "local1")
+    title = f"{count} clouds of {smallest} to {largest} points and 5 corrupt ones, {os.cpu_count()} cores"
+    header = ["where", "workers", "done", "skipped", "failed", "seconds", "CPU s", "clouds/s", "load before"]
+    cells = [
+        [row["where"], *(str(row[key]) for key in ("workers", "done", "skipped", "failed"))]
+        + [number(row[key], 1) for key in ("wall", "cpu", "clouds_per_second", "load")]
+        for row in rows
+    ]
+    show(title, header, cells, markdown)
+    failures = [[Path(row["input"]).name, row["error"]] for row in told if row["status"] == "failed"]
+    show("What failed", ["input", "note"], failures, markdown)
+    show("One of two Dask workers killed", ["", "note"], [[key, str(value)] for key, value in killed.items()], markdown)
+    save(output, [*rows, {"where": "one of two Dask workers killed", **killed}])
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,4 @@
+from .plan import Plan, Task, plan_batch
+from .run import BatchResult, run_batch
+
+__all__ = ["BatchResult", "Plan", "Task", "plan_batch", "run_batch"]

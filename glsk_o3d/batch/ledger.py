@@ -1,0 +1,162 @@
+"""The ledger of a batch: one line per input, which a later batch reads."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import logging
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from ..errors import BatchError
+from ..interop.files import write_atomically
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+Row = dict[str, Any]
+DONE, FAILED = "done", "failed"
+COLUMNS = (
+    *("name", "input", "status", "error", "seconds", "points", "dropped", "distinct", "contracted", "vertices"),
+    *("edges", "components", "loops", "leaves", "junctions", "length", "iterations", "converged", "stop_reason"),
+    *("warnings", "messages", "parameters", "input_hash", "outputs", "worker", "version", "finished"),
+)
+"""What a row tells."""
+_log = logging.getLogger(__name__)
+
+
+class Ledger:
+    """The rows of an output folder, by name; in the folder they are ``ledger.jsonl``, and a table in ``ledger.csv``.
+
+    Parameters
+    ----------
+    folder : Path
+        Need not be there for reading.
+
+    Notes
+    -----
+    While a batch runs, every row is a line that is added to the end. A process that dies may leave half a line: it is
+    passed over, and gone when the ledger is next written whole.
+    """
+
+    def __init__(self, folder: Path):
+        self.path, self.table = folder / "ledger.jsonl", folder / "ledger.csv"
+        self.rows: dict[str, Row] = {}
+        self._stream: BinaryIO | None = None
+        lines = self.path.read_bytes().splitlines() if self.path.exists() else []
+        broken = 0
+        for line in lines:
+            try:
+                row = json.loads(line)
+                self._keep({**row, "name": str(row["name"]), "input": str(row["input"]), "status": row["status"]})
+            except (ValueError, TypeError, KeyError):
+                broken += 1
+        if broken:
+            _log.warning("%s: %d broken lines passed over; their inputs are done anew", self.path, broken)
+
+    def _keep(self, row: Row) -> None:
+        self.rows.pop(row["name"], None)  # the last comes last
+        self.rows[row["name"]] = row
+
+    def rewrite(self) -> None:
+        """Write one line per input, in the place of all that was there."""
+        last = {row["input"]: name for name, row in self.rows.items()}
+        self.rows = {name: self.rows[name] for name in sorted(last.values())}
+        data = b"".join(map(_line, self.rows.values()))
+        write_atomically(self.path, lambda temporary: temporary.write_bytes(data))
+
+    def add(self, row: Row) -> None:
+        """Add a row, to the file at once; it replaces the one of its name.
+
+        Parameters
+        ----------
+        row : dict
+        """
+        self._keep(row)
+        if self._stream is None:
+            self._stream = self.path.open("ab")
+        self._stream.write(_line(row))
+        self._stream.flush()
+
+    def close(self) -> None:
+        """Write one line per input, and the table."""
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
+        self.rewrite()
+        text = io.StringIO(newline="")
+        writer = csv.DictWriter(text, COLUMNS, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({name: _cell(value) for name, value in row.items()} for row in self.rows.values())
+        data = text.getvalue().encode("utf-8", "replace")
+        write_atomically(self.table, lambda temporary: temporary.write_bytes(data))
+
+
+def _line(row: Row) -> bytes:
+    try:
+        return json.dumps(row, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+    except UnicodeEncodeError:  # a file name that is no Unicode
+        return json.dumps(row, allow_nan=False).encode() + b"\n"
+
+
+def _cell(value: Any) -> Any:
+    return "; ".join(map(str, value)) if isinstance(value, list) else value
+
+
+def file_hash(path: str | os.PathLike) -> str:
+    """SHA-256 of the bytes of a file, as ``sha256sum`` prints it.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    str
+    """
+    digest = hashlib.sha256()
+    with open(path, "rb") as stream:
+        while chunk := stream.read(1 << 20):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Keep other batches out of an output folder.
+
+    The lock is one of the operating system: it ends with the process that holds it, however that dies.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    BatchError
+        Another process has it.
+    """
+    with (folder / ".ledger.lock").open("a+", encoding="utf-8") as stream:
+        try:
+            if fcntl is not None:
+                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            stream.seek(0)
+            raise BatchError(
+                f"{folder}: another batch ({stream.read().strip()}) writes there: wait until it is done, or give "
+                "another folder"
+            ) from None
+        except OSError as error:
+            _log.warning("%s: this file system has no locks (%s): start no second batch there", folder, error.strerror)
+        stream.truncate(0)
+        stream.write(f"process {os.getpid()} on {socket.gethostname()}")
+        stream.flush()
+        yield

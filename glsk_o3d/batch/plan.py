@@ -1,0 +1,184 @@
+"""What a batch has to do, and what is done already."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import FileFormatError, InvalidParameterError
+from ..filter import Filter
+from ..interop.files import skeleton_ending
+from ..pipeline import Pipeline, as_pipeline
+from .inputs import find_inputs
+from .ledger import DONE, Ledger, Row, file_hash
+from .work import Job
+
+SKIP = "done"
+NEW, AGAIN, FAILED_BEFORE = "new", "asked for", "failed before"
+OTHER_PARAMETERS, OUTPUTS_GONE, INPUT_CHANGED = "other parameters", "outputs are gone", "input changed"
+
+
+@dataclass(frozen=True)
+class Task:
+    """An input of a batch.
+
+    Attributes
+    ----------
+    job : Job
+    why : str
+        ``"done"`` if it is to be skipped, else why not: ``"new"``, ``"failed before"``, ``"other parameters"``,
+        ``"outputs are gone"``, ``"input changed"`` or ``"asked for"``.
+    """
+
+    job: Job
+    why: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a batch has to do.
+
+    Attributes
+    ----------
+    out_dir : Path
+        Absolute.
+    recipe : dict
+        The pipeline.
+    parameters : str
+        The hash by which it is known.
+    tasks : tuple of Task
+        One per input, in the order of their names.
+    ledger : Ledger
+        As it is in the folder.
+    """
+
+    out_dir: Path
+    recipe: dict[str, Any]
+    parameters: str
+    tasks: tuple[Task, ...]
+    ledger: Ledger
+
+    @property
+    def todo(self) -> list[Task]:
+        """Those that are not done."""
+        return [task for task in self.tasks if task.why != SKIP]
+
+    @property
+    def skipped(self) -> int:
+        """How many are done."""
+        return len(self.tasks) - len(self.todo)
+
+
+def plan_batch(
+    inputs: str | os.PathLike | Iterable[str | os.PathLike],
+    out_dir: str | os.PathLike,
+    *,
+    pipeline: Pipeline | Filter | str | os.PathLike = "default",
+    formats: Sequence[str] = ("ply",),
+    preview: bool = False,
+    cut_loops: bool = False,
+    recursive: bool = False,
+    force: bool = False,
+) -> Plan:
+    """Find out what a batch would do. Nothing is written.
+
+    Parameters
+    ----------
+    inputs : path-like, or several
+        Folders, glob patterns, lists of files (``.txt``, one path a line, from the working folder) and clouds.
+    out_dir : path-like
+        Where results and ledger go; sub-folders as there are below the common folder of the inputs.
+    pipeline : Pipeline, name, or path of a recipe
+        See `glsk_o3d.skeletonize`.
+    formats : sequence of str
+        Endings that `glsk_o3d.save_skeleton` knows; one file of each per cloud.
+    preview : bool
+        Also a picture of each.
+    cut_loops : bool
+        Cut loops open for formats that hold only trees.
+    recursive : bool
+        Take also the clouds in sub-folders.
+    force : bool
+        Do everything anew.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    FileNotFoundError
+        A file is not there, or a folder or pattern has no cloud.
+    InvalidParameterError
+        The pipeline or a format is wrong, there is nothing to write, or a result would replace an input.
+    RecipeError
+        No recipe can hold the pipeline: then it cannot be told whether two runs are the same.
+    """
+    recipe = as_pipeline(pipeline).to_recipe()
+    try:
+        endings = list(dict.fromkeys(skeleton_ending(Path(), ending) for ending in formats)) + [".png"] * preview
+    except FileFormatError as error:
+        raise InvalidParameterError(str(error)) from None
+    if not endings:
+        raise InvalidParameterError("there is nothing to write: give a format")
+    given = [inputs] if isinstance(inputs, str | os.PathLike) else list(inputs)
+    out = Path(os.path.abspath(out_dir))
+    found = find_inputs(given, out, recursive=recursive)
+    sources = {str(path) for path in found.values()}
+    parameters = _hash({"recipe": recipe, "cut_loops": cut_loops} if cut_loops else recipe)
+    ledger, tasks = Ledger(out), []
+    for name, path in found.items():
+        outputs = tuple(name + ending for ending in endings)
+        for output in outputs:
+            if str(out / output) in sources:
+                raise InvalidParameterError(f"{out / output}: is an input: give the results another folder")
+        row = ledger.rows.get(name, {})
+        stale = tuple(each for each in row.get("outputs", ()) if _is_of(name, each))
+        job = Job(name, str(path), str(out), outputs, recipe, cut_loops, stale)
+        tasks.append(Task(job, AGAIN if force else _why(job, row, parameters)))
+    return Plan(out, recipe, parameters, _compared(tasks, ledger.rows), ledger)
+
+
+def _why(job: Job, row: Row, parameters: str) -> str:
+    """Why a cloud is to be done, as far as the cloud itself has no say."""
+    if not row:
+        return NEW
+    if row["status"] != DONE:
+        return FAILED_BEFORE
+    if row.get("parameters") != parameters:
+        return OTHER_PARAMETERS
+    there = set(job.outputs) <= set(row.get("outputs", ())) and all(
+        Path(job.out_dir, each).is_file() for each in job.outputs
+    )
+    return SKIP if there else OUTPUTS_GONE
+
+
+def _is_of(name: str, output: str) -> bool:
+    """Whether a file is one of the results of this name: it will be removed, whatever has happened to the ledger."""
+    return output.startswith(f"{name}.") and not set(output[len(name) :]) & {"/", os.sep}
+
+
+def _compared(tasks: list[Task], rows: dict[str, Row]) -> tuple[Task, ...]:
+    """The tasks, after a look at the inputs that seem done."""
+
+    def look(task: Task) -> Task:
+        if task.why != SKIP:
+            return task
+        try:
+            same = file_hash(task.job.path) == rows[task.job.name].get("input_hash")
+        except OSError:  # gone, or not to be read: the worker will say so
+            same = False
+        return task if same else Task(task.job, INPUT_CHANGED)
+
+    with ThreadPoolExecutor() as pool:
+        return tuple(pool.map(look, tasks))
+
+
+def _hash(data: Any) -> str:
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()

@@ -1,0 +1,247 @@
+"""The batch itself: clouds to workers, rows to the ledger."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .. import __version__
+from ..errors import BatchError, InvalidParameterError
+from ..interop.files import write_json
+from .ledger import COLUMNS, DONE, FAILED, Row, locked
+from .plan import Plan, Task, plan_batch
+from .work import told, work
+from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, cores, died
+
+if TYPE_CHECKING:
+    import distributed
+
+_POLL = 0.2  # seconds until Ctrl-C is noticed
+WORKER_DIED = "the worker died with it, twice: out of memory, or a crash in native code"
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """What a batch did.
+
+    Attributes
+    ----------
+    rows : dict of str to dict
+        What the ledger says about the inputs, by name, those skipped included.
+    done, skipped, failed : int
+    seconds : float
+        Wall time, from the first cloud handed out.
+    ledger : Path
+    """
+
+    rows: dict[str, Row]
+    done: int
+    skipped: int
+    failed: int
+    seconds: float
+    ledger: Path
+
+    @property
+    def rate(self) -> float:
+        """Clouds done or failed per second."""
+        return (self.done + self.failed) / self.seconds if self.seconds > 0 else 0.0
+
+
+def run_batch(
+    inputs: str | os.PathLike | Iterable[str | os.PathLike],
+    out_dir: str | os.PathLike,
+    *,
+    workers: int | None = None,
+    scheduler: str | os.PathLike | distributed.Client | None = None,
+    executor: Executor | None = None,
+    on_plan: Callable[[Plan], object] | None = None,
+    on_result: Callable[[Row], object] | None = None,
+    **options: Any,
+) -> BatchResult:
+    """Skeletonise many clouds, several at a time.
+
+    One bad file does not stop the others. What is done is in the ledger, ``ledger.jsonl`` in `out_dir`; the same call
+    again skips it, and tries again what failed. The first Ctrl-C hands out no more work and waits for what is in work;
+    the second one does not wait. Both leave a ledger from which the next call goes on.
+
+    Parameters
+    ----------
+    inputs : path-like, or several
+        Folders, glob patterns, lists of files (``.txt``) and clouds.
+    out_dir : path-like
+        Made if it is not there.
+    workers : int, optional
+        Processes on this machine, by default one for each core that this process may use.
+    scheduler : str, path-like or distributed.Client, optional
+        Instead, a Dask cluster: the address of its scheduler, or the file that this wrote. Its workers read and write
+        the same files, by the same paths.
+    executor : concurrent.futures.Executor, optional
+        Instead, any other executor; `workers` says how many clouds it gets at a time.
+    on_plan : callable, optional
+        Called with the `Plan` before the work begins.
+    on_result : callable, optional
+        Called with each row as it enters the ledger.
+    **options
+        As in `plan_batch`.
+
+    Returns
+    -------
+    BatchResult
+
+    Raises
+    ------
+    BatchError
+        Another batch writes into `out_dir`, or the workers cannot be had any more.
+    KeyboardInterrupt
+        After the ledger has been put in order.
+    FileNotFoundError, InvalidParameterError, RecipeError
+        As in `plan_batch`.
+
+    Notes
+    -----
+    A worker that dies, say for lack of memory, is replaced. What it was doing is done again in the end, by itself, and
+    has failed if the worker dies again.
+
+    Examples
+    --------
+    >>> from glsk_o3d.batch import run_batch
+    >>> result = run_batch("scans", "skeletons", formats=["ply", "json"])  # doctest: +SKIP
+    >>> [row["input"] for row in result.rows.values() if row["status"] == "failed"]  # doctest: +SKIP
+    []
+    """
+    if scheduler is not None and (executor is not None or workers is not None):
+        raise InvalidParameterError("scheduler: the cluster has its own workers: give neither workers nor an executor")
+    if workers is not None and workers < 1:
+        raise InvalidParameterError(f"workers = {workers}: must be at least 1")
+    folder = Path(os.path.abspath(out_dir))
+    if not folder.is_dir():
+        plan_batch(inputs, folder, **options)  # what is wrong is said before there is a folder
+        folder.mkdir(parents=True)
+    with locked(folder):
+        plan = plan_batch(inputs, folder, **options)
+        if on_plan is not None:
+            on_plan(plan)
+        crew, left = _hired(plan, workers, scheduler, executor), True
+        start = time.perf_counter()
+        try:
+            _make_room(plan)
+            try:
+                _work_through(plan, crew, on_result)
+            finally:
+                plan.ledger.close()
+            left = False
+        finally:
+            crew.close(at_once=left)
+    rows = {task.job.name: plan.ledger.rows[task.job.name] for task in plan.tasks}
+    failed = sum(row["status"] == FAILED for row in rows.values())
+    done = len(plan.todo) - failed
+    return BatchResult(rows, done, plan.skipped, failed, time.perf_counter() - start, plan.ledger.path)
+
+
+def _hired(plan: Plan, workers, scheduler, executor) -> Workers:
+    if scheduler is not None and plan.todo:
+        return DaskWorkers(scheduler)
+    if executor is not None:
+        return GivenWorkers(executor, workers)
+    return LocalWorkers(min(workers or cores(), len(plan.todo)))
+
+
+def _make_room(plan: Plan) -> None:
+    """Drop what is no longer true from the ledger, and make the folders: a worker's own would be where nobody looks."""
+    for task in plan.todo:
+        if plan.ledger.rows.get(task.job.name, {}).get("status") == DONE:
+            del plan.ledger.rows[task.job.name]
+    plan.ledger.rewrite()
+    write_json(plan.out_dir / "recipe.json", plan.recipe)
+    for folder in {(plan.out_dir / task.job.name).parent for task in plan.todo}:
+        folder.mkdir(parents=True, exist_ok=True)
+
+
+def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], object] | None) -> None:
+    queue, again = deque(plan.todo), deque[Task]()
+    running: dict[Future, Task] = {}
+    alone = warned = False
+
+    def hand_out(task):
+        running[workers.submit(work, task.job)] = task
+
+    def enter(task, row):
+        row |= {"name": task.job.name, "input": task.job.path, "parameters": plan.parameters}
+        row = {name: row[name] for name in COLUMNS if name in row}
+        plan.ledger.add(row)
+        if on_result is not None:
+            on_result(row)
+
+    with _counted_interrupts() as interrupts:
+        while running or ((queue or again) and not interrupts):
+            while queue and not interrupts and len(running) < workers.capacity():
+                hand_out(queue.popleft())
+            if again and not running and not interrupts:
+                alone = True
+                hand_out(again.popleft())
+            ready, _ = wait(running, _POLL, FIRST_COMPLETED)
+            lost: BatchError | None = None
+            for future in ready:
+                task = running.pop(future)
+                error = _gone() if future.cancelled() else future.exception()
+                if isinstance(error, BatchError):
+                    lost = error
+                elif died(error) and not alone:
+                    again.append(task)
+                else:
+                    enter(task, _row(task, future, error))
+            if lost is not None:
+                raise lost
+            if len(interrupts) > 1:
+                raise KeyboardInterrupt
+            if interrupts and not warned:
+                warned = True
+                _log.warning("finishing what is in work (%d), nothing else: Ctrl-C again stops at once", len(running))
+            if not ready:
+                workers.capacity()  # notices that a scheduler has gone
+        if interrupts:
+            raise KeyboardInterrupt
+
+
+def _gone() -> BatchError:
+    return BatchError("the work was cancelled, or its scheduler has gone: run the same batch to go on")
+
+
+def _row(task: Task, future: Future, error: BaseException | None) -> Row:
+    if error is None:
+        row = future.result()
+        missing = row["error"].startswith("no such file") or ": no such folder" in row["error"]
+        if missing and Path(task.job.path).exists():
+            row["error"] += f" (on {row['worker']}; there is one here: workers need the same files by the same paths)"
+        return row
+    return {
+        "status": FAILED,
+        "error": WORKER_DIED if died(error) else told(error),
+        "outputs": [],
+        "version": __version__,
+    }
+
+
+@contextmanager
+def _counted_interrupts() -> Iterator[list[int]]:
+    """Count Ctrl-C instead of being torn out of a line of the ledger by it."""
+    pressed: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield pressed
+        return
+    before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, before)

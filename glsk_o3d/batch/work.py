@@ -1,0 +1,140 @@
+"""What a worker does: one cloud, from file to files."""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+import socket
+import threading
+import time
+import traceback
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..errors import GlskError
+from .ledger import DONE, FAILED, Row, file_hash
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that a worker needs to know, as plain data.
+
+    Attributes
+    ----------
+    name : str
+    path : str
+        The cloud.
+    out_dir : str
+        A folder; the sub-folders of the outputs are there.
+    outputs : tuple of str
+        From `out_dir`. The ending chooses what is written; ``.png`` is a preview.
+    recipe : dict
+    cut_loops : bool
+    stale : tuple of str
+        Outputs of an earlier batch, from `out_dir`, which are no longer true.
+    """
+
+    name: str
+    path: str
+    out_dir: str
+    outputs: tuple[str, ...]
+    recipe: dict[str, Any]
+    cut_loops: bool = False
+    stale: tuple[str, ...] = ()
+
+
+def work(job: Job) -> Row:
+    """Skeletonise a cloud and write the results.
+
+    Parameters
+    ----------
+    job : Job
+
+    Returns
+    -------
+    dict
+        What the ledger is to say. Whatever goes wrong is in it: nothing is raised.
+    """
+    start = time.perf_counter()
+    row: Row = {"error": "", "outputs": [], "version": __version__}
+    row["worker"] = f"{socket.gethostname()}, process {os.getpid()}"
+    with _Heard() as heard:
+        try:
+            for path in job.stale:
+                Path(job.out_dir, path).unlink(missing_ok=True)
+            with suppress(OSError):  # what it is shows when it is read
+                row["input_hash"] = file_hash(job.path)
+            _skeletonize(job, row, heard.messages)
+            row["status"] = DONE
+        except Exception as error:  # whatever it is, the other clouds are to be done
+            row |= {"status": FAILED, "error": told(error).removeprefix(f"{job.path}: ")}
+    messages = list(dict.fromkeys(heard.messages))
+    row |= {"seconds": round(time.perf_counter() - start, 4), "warnings": len(messages), "messages": messages}
+    finished = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    return {**row, "finished": finished}
+
+
+def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
+    from ..interop.files import read_cloud
+    from ..interop.preview import save_preview
+    from ..recipes import from_recipe
+    from ..summary import summary
+
+    skeleton = from_recipe(job.recipe)(read_cloud(job.path))
+    messages += skeleton.report.warnings
+    facts = summary(skeleton, 0.0).items()
+    row |= {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in facts}
+    for output in job.outputs:
+        save = partial(skeleton.save, cut_loops=job.cut_loops)
+        if output.endswith(".png"):
+            save = partial(save_preview, skeleton, title=os.path.basename(job.path))
+        save(Path(job.out_dir, output))
+        row["outputs"].append(output)
+
+
+def told(error: BaseException) -> str:
+    """An error in one line; of a mistake in the code also the place.
+
+    Parameters
+    ----------
+    error : BaseException
+
+    Returns
+    -------
+    str
+    """
+    if isinstance(error, MemoryError):
+        return f"out of memory {error}".strip()
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    if isinstance(error, GlskError | OSError):
+        return " ".join(str(error).split()) or type(error).__name__
+    place = traceback.extract_tb(error.__traceback__)
+    where = f" ({os.path.basename(place[-1].filename)}, line {place[-1].lineno})" if place else ""
+    return " ".join(f"{type(error).__name__}: {error}{where}".split())
+
+
+class _Heard(logging.Handler):
+    """Keeps the warnings that this thread logs; they would otherwise go to the stderr of the worker."""
+
+    def __init__(self):
+        super().__init__(logging.WARNING)
+        self.messages: list[str] = []
+        self._thread = threading.get_ident()
+
+    def emit(self, record):
+        if record.thread == self._thread:
+            self.messages.append(record.getMessage())
+
+    def __enter__(self):
+        logging.getLogger("glsk_o3d").addHandler(self)
+        return self
+
+    def __exit__(self, *_):
+        logging.getLogger("glsk_o3d").removeHandler(self)

@@ -1,0 +1,147 @@
+"""``glsk batch``: many clouds."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .console import WrongUsage, print_json, print_rows, progress, reporting, said_here, say
+from .options import CutLoops, DropInvalid, Json, PipelineName, Quiet, Recipe, Settings, Verbose
+
+if TYPE_CHECKING:
+    from ..batch import Plan
+
+
+def batch(
+    inputs: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="DIR|GLOB|LIST|SCAN...",
+            help="Folders, glob patterns in quotes, lists (.txt, a path per line, from the working folder), and scans.",
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="FOLDER", help="For the skeletons and the ledger; made if needed."),
+    ],
+    formats: Annotated[
+        str,
+        typer.Option(
+            "--format", metavar="NAMES", help="With commas: ply, obj, json, npz, swc, graphml, cgal, polylines.txt."
+        ),
+    ] = "ply",
+    preview: Annotated[bool, typer.Option("--preview", help="Also draw each cloud with its skeleton (png).")] = False,
+    recursive: Annotated[bool, typer.Option("--recursive", "-r", help="Take also the sub-folders of folders.")] = False,
+    pipeline: PipelineName = "default",
+    recipe: Recipe = None,
+    settings: Settings = None,
+    drop_invalid: DropInvalid = False,
+    cut_loops: CutLoops = False,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", metavar="N", min=1, help="Processes; by default one for each core at hand."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            metavar="ADDRESS|FILE",
+            help="Work on a Dask cluster: tcp://host:port, or the file that its scheduler wrote. Its workers need the "
+            "same files by the same paths.",
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Do also what is done already.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be done, and why.")] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Skeletonise many scans, several at a time.
+
+    A scan that fails does not stop the others. FOLDER/ledger.jsonl (and ledger.csv) has a line for each; the same
+    command again skips what is done and tries again what failed. Ctrl-C leaves all that in order; press it twice not to
+    wait for scans that are in work. The exit code is 1 if a scan failed.
+    """
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..batch import plan_batch, run_batch
+        from ..errors import BatchError
+        from .overrides import choose
+
+        if workers is not None and scheduler is not None:
+            raise WrongUsage("--workers and --scheduler: the cluster has its own workers: give one of them")
+        endings = [word.strip() for word in formats.split(",") if word.strip()]
+        what: dict[str, Any] = dict(
+            pipeline=choose(pipeline, recipe, settings or [], drop_invalid),
+            formats=endings,
+            preview=preview,
+            cut_loops=cut_loops,
+            recursive=recursive,
+            force=force,
+        )
+        if dry_run:
+            _print_plan(plan_batch(inputs, output, **what), as_json, quiet)
+            return
+        with progress(not quiet, remaining=True) as update:
+            watch = _Watch(update, quiet, verbose)
+            update("looking for what is done")
+            result = run_batch(
+                inputs,
+                output,
+                workers=workers,
+                scheduler=scheduler,
+                on_plan=watch.begin,
+                on_result=watch.step,
+                **what,
+            )
+        told = {
+            **{"done": result.done, "skipped": result.skipped, "failed": result.failed},
+            **{"seconds": round(result.seconds, 3), "clouds_per_second": round(result.rate, 3)},
+            "ledger": str(result.ledger),
+        }
+        if as_json:
+            failures = [
+                {name: row.get(name) for name in ("input", "error")}
+                for row in result.rows.values()
+                if row["status"] == "failed"
+            ]
+            print_json({**told, "failures": failures})
+        elif not quiet:
+            print_rows(told)
+        if result.failed:
+            table = result.ledger.with_suffix(".csv")
+            raise BatchError(f"{result.failed} of {len(result.rows)} scans failed: {table} says why")
+
+
+class _Watch:
+    """Shows how far a batch is; says what fails as soon as it does."""
+
+    def __init__(self, update, quiet: bool, verbose: bool):
+        self._update, self._quiet, self._verbose = update, quiet, verbose
+        self._done = self._failed = self._total = 0
+
+    def begin(self, plan: Plan) -> None:
+        self._start, self._total = time.perf_counter(), len(plan.todo)
+        self._update("starting", 0, self._total)
+
+    def step(self, row: dict[str, Any]) -> None:
+        failed = row["status"] == "failed"
+        self._done, self._failed = self._done + 1, self._failed + failed
+        rate = self._done / (time.perf_counter() - self._start)
+        self._update(f"{rate:.3g} scans/s" + f", {self._failed} failed" * (self._failed > 0), self._done, self._total)
+        if failed and not self._quiet:
+            say("warning", f"{row['input']}: {said_here(row['error'])}")
+        elif self._verbose:
+            say("info", f"{row['input']}: {row['vertices']} vertices in {row['seconds']:.2f} s")
+
+
+def _print_plan(plan: Plan, as_json: bool, quiet: bool) -> None:
+    if as_json:
+        tasks = [{"input": task.job.path, "why": task.why, "outputs": task.job.outputs} for task in plan.tasks]
+        print_json({"todo": len(plan.todo), "skipped": plan.skipped, "output": str(plan.out_dir), "tasks": tasks})
+    elif not quiet:
+        for task in plan.todo:
+            typer.echo(f"{task.job.path} ({task.why}) -> {', '.join(task.job.outputs)}")
+        typer.echo(f"{len(plan.todo)} to do, {plan.skipped} to skip")

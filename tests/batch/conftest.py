@@ -1,0 +1,143 @@
+"""Small scans, a plugin that does harm to those that ask for it, and what always holds for an output folder."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from glsk_o3d import read_skeleton
+from glsk_o3d.samples import torus
+
+SABOTEUR = '''
+"""Does what the x of the first point says."""
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from glsk_o3d import Filter
+from glsk_o3d.filter import documented, parameter
+from glsk_o3d.interop.open3d import cloud_points
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Saboteur(Filter):
+    """Harm."""
+
+    consumes: ClassVar[str] = "cloud"
+    produces: ClassVar[str] = "cloud"
+    seconds: float = parameter(0.0, "Wait for so long.", type="float", low=0)
+
+    def _run(self, cloud, watch):
+        points = cloud_points(cloud)
+        time.sleep(self.seconds)
+        order = int(points[0, 0]) // 1000 * 1000
+        if order == 1000:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if order == 2000 and Path(os.environ["ONCE"]).exists():
+            Path(os.environ["ONCE"]).unlink()
+            os._exit(3)
+        if order == 3000:
+            raise ZeroDivisionError("a bug")
+        return points
+'''
+
+
+@pytest.fixture
+def saboteur(install, monkeypatch, tmp_path) -> Path:
+    """A recipe with a filter that kills, here and in the processes that tests start; gives the recipe."""
+    folder = install("glsk-saboteur", "1", SABOTEUR, "[glsk_o3d.filters]\nSaboteur = glsk_saboteur:Saboteur\n")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.setenv("ONCE", str(tmp_path / "once"))
+    stages = [{"filter": name} for name in ("Saboteur", "RingBuilder", "Contractor", "Connector", "Refiner")]
+    recipe = tmp_path / "saboteur.json"
+    recipe.write_text(json.dumps({"glsk_o3d": {"version": 1}, "pipeline": stages}))
+    return recipe
+
+
+@pytest.fixture
+def write():
+    """Write a scan of 256 points; gives its path. The first `order` thousand say what the saboteur does."""
+
+    def save(path: Path, seed=0, order=0) -> Path:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        points = torus(256, seed=seed).points + [order + 500 * bool(order), 0, 0]
+        if path.suffix == ".ply":
+            header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+            header += "property double x\nproperty double y\nproperty double z\nend_header\n"
+            path.write_bytes(header.encode() + np.asarray(points, "<f8").tobytes())
+        else:
+            np.savetxt(path, points)
+        return path
+
+    return save
+
+
+@pytest.fixture
+def rows():
+    """The lines of the ledger of a folder, which must be sound, by name.
+
+    Strictly, there are no other results than those that it tells of.
+    """
+
+    def read(out: Path, strict=True) -> dict[str, dict]:
+        lines = [json.loads(line) for line in (out / "ledger.jsonl").read_bytes().splitlines()]
+        for key in ("name", "input"):
+            assert max(Counter(line[key] for line in lines).values(), default=1) == 1, f"a {key} is there twice"
+        found = {line["name"]: line for line in lines}
+        for line in lines:
+            assert (line["status"], line["error"] == "") in (("done", True), ("failed", False))
+            for output in line["outputs"]:
+                if not output.endswith((".png", ".swc")):  # the latter has no loops
+                    skeleton = read_skeleton(out / output)
+                    assert (len(skeleton.vertices), skeleton.n_loops) == (line["vertices"], line["loops"])
+        written = {output for line in lines for output in line["outputs"]}
+        own = {"ledger.jsonl", "ledger.csv", "recipe.json", ".ledger.lock"}
+        there = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()} - own
+        assert written == there if strict else written <= there
+        return found
+
+    return read
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Start ``glsk batch`` in an empty folder, as a terminal does: Ctrl-C goes to all its processes."""
+    begun = []
+
+    def run(*words) -> subprocess.Popen:
+        command = [sys.executable, "-m", "glsk_o3d", "batch", *map(str, words)]
+        pipe = subprocess.PIPE
+        process = subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
+        begun.append(process)
+        return process
+
+    yield run
+    for process in begun:
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def until():
+    """Wait until something is true."""
+
+    def wait(condition, seconds=30.0):
+        end = time.monotonic() + seconds
+        while not (found := condition()):
+            assert time.monotonic() < end, "waited in vain"
+            time.sleep(0.02)
+        return found
+
+    return wait

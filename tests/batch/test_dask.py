@@ -1,0 +1,103 @@
+"""A real Dask cluster on this machine: a scheduler and two workers, each a process."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from glsk_o3d import BatchError
+from glsk_o3d.batch import plan_batch, run_batch
+from glsk_o3d.batch.run import WORKER_DIED
+
+pytest.importorskip("distributed")
+
+
+@pytest.fixture
+def cluster(tmp_path, until):
+    """Start a scheduler and workers; gives the scheduler's file and the workers' processes."""
+    begun = []
+
+    def dask(*words, **environment):
+        command = [sys.executable, "-m", "dask", *words, "--no-dashboard"]
+        with (tmp_path / f"dask{len(begun)}.log").open("w") as log:
+            begun.append(subprocess.Popen(command, stdout=log, stderr=log, env={**os.environ, **environment}))
+        return begun[-1]
+
+    def make(workers, **environment):
+        file = tmp_path / "scheduler.json"
+        make.scheduler = dask(
+            "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file), **environment
+        )
+        until(lambda: file.exists() and file.read_text().endswith("}"))
+        options = ("--scheduler-file", str(file), "--no-nanny", "--nthreads", "1", "--host", "127.0.0.1")
+        return file, [dask("worker", *options) for _ in range(workers)]
+
+    yield make
+    for process in reversed(begun):
+        process.kill()
+        process.wait()
+
+
+def worker(row):
+    return int(re.search(r"process (\d+)$", row["worker"])[1])
+
+
+def test_a_worker_is_killed_and_then_the_scheduler(cluster, saboteur, write, rows, tmp_path):
+    for i in range(16):
+        write(tmp_path / "in" / f"{i:02}.ply", seed=i)
+    (tmp_path / "in" / "bad.ply").write_text("no")
+    file, processes = cluster(2)
+    pids = [process.pid for process in processes]
+    recipe = saboteur.read_text().replace('"Saboteur"', '"Saboteur", "seconds": 0.2')
+    saboteur.write_text(recipe)
+    seen = []
+
+    def watch(row):
+        seen.append(row)
+        if {worker(each) for each in seen} == set(pids) and processes[0].poll() is None and len(seen) >= 4:
+            os.kill(pids[0], signal.SIGKILL)  # it waits in the middle of a scan
+            processes[0].wait()
+            watch.killed = len(seen)
+
+    result = run_batch(tmp_path / "in", tmp_path / "out", pipeline=saboteur, scheduler=file, on_result=watch)
+    assert processes[0].returncode == -signal.SIGKILL
+    found = rows(tmp_path / "out")
+    assert (result.done, result.failed) == (16, 1)
+    assert found["bad"]["error"].startswith("not a valid .ply file")
+    assert sorted(row["name"] for row in seen) == sorted(found)  # nothing lost, nothing twice
+    assert watch.killed < 12
+    late = {worker(row) for row in seen[watch.killed + 2 :]}  # two may have been under way
+    assert late == {pids[1]}
+    again = run_batch(tmp_path / "in", tmp_path / "out", pipeline=saboteur, scheduler=file)
+    assert (again.done, again.skipped, again.failed) == (0, 16, 1)
+
+    def stop(row):
+        cluster.scheduler.kill()
+
+    with pytest.raises(BatchError, match="the same batch to go on"):
+        run_batch(tmp_path / "in", tmp_path / "new", pipeline=saboteur, scheduler=file, on_result=stop)
+    first = rows(tmp_path / "new", strict=False)
+    assert 1 <= len(first) < 16
+    assert plan_batch(tmp_path / "in", tmp_path / "new", pipeline=saboteur).skipped == len(first) - ("bad" in first)
+
+
+def test_a_scan_that_kills_its_workers(cluster, saboteur, write, rows, tmp_path):
+    for i in range(4):
+        write(tmp_path / "in" / f"{i}.ply", seed=i, order=1000 * (i == 0))
+    file, processes = cluster(3, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0")
+    result = run_batch(tmp_path / "in", tmp_path / "out", pipeline=saboteur, scheduler=file)
+    found = rows(tmp_path / "out")
+    assert (result.done, result.failed) == (3, 1)
+    assert found["0"]["error"] == WORKER_DIED
+    assert sum(process.poll() is None for process in processes) == 1
+
+
+@pytest.mark.parametrize("address", ["nonsense", "foo://a:1", "tcp://127.0.0.1:1"])
+def test_nobody_there(write, tmp_path, monkeypatch, address):
+    write(tmp_path / "in" / "a.ply")
+    monkeypatch.setattr("glsk_o3d.batch.workers._PATIENCE", 0.5)
+    with pytest.raises(BatchError, match=f"{address}: no Dask scheduler answers there"):
+        run_batch(tmp_path / "in", tmp_path / "out", scheduler=address)

@@ -1,0 +1,115 @@
+"""The ledger as a file, and its lock."""
+
+import csv
+import hashlib
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from glsk_o3d import BatchError
+from glsk_o3d.batch.ledger import COLUMNS, Ledger, file_hash, locked
+
+
+def row(name, **values):
+    return {"name": name, "input": f"/in/{name}.ply", "status": "done", "outputs": [f"{name}.ply"]} | values
+
+
+def lines(folder):
+    return [json.loads(line) for line in (folder / "ledger.jsonl").read_bytes().splitlines()]
+
+
+def test_rows_are_in_the_file_at_once(tmp_path):
+    ledger = Ledger(tmp_path)
+    for name in "ab":
+        ledger.add(row(name))
+        assert lines(tmp_path)[-1] == row(name)
+    assert Ledger(tmp_path).rows == ledger.rows
+    ledger.close()
+
+
+def test_the_last_line_of_a_name_and_of_an_input_counts(tmp_path):
+    ledger = Ledger(tmp_path)
+    for each in (row("b", status="failed"), row("a"), row("b"), row("sub/a", input="/in/a.ply")):
+        ledger.add(each)
+    ledger.close()
+    assert lines(tmp_path) == [row("b"), row("sub/a", input="/in/a.ply")]
+
+
+@pytest.mark.parametrize("end", [b'{"name": "c", "inp', b"\xff\xfe", b"[1]", b'{"name": "c"}', b"\0" * 100])
+def test_a_broken_end_is_mended(tmp_path, end, caplog):
+    ledger = Ledger(tmp_path)
+    ledger.add(row("a"))
+    ledger.add(row("b"))
+    ledger.close()
+    whole = ledger.path.read_bytes()
+    ledger.path.write_bytes(whole + end)
+    again = Ledger(tmp_path)
+    assert list(again.rows) == ["a", "b"]
+    assert "1 broken lines passed over" in caplog.text
+    again.rewrite()
+    again.add(row("c"))
+    again.close()
+    assert lines(tmp_path) == [row("a"), row("b"), row("c")]
+
+
+@pytest.mark.parametrize("cut", [1, 10, 60])
+def test_every_line_but_the_cut_one_survives(tmp_path, cut):
+    ledger = Ledger(tmp_path)
+    ledger.add(row("a"))
+    ledger.add(row("b"))
+    ledger.path.write_bytes(ledger.path.read_bytes()[:-cut])
+    ledger.close()
+    (tmp_path / "ledger.jsonl").write_bytes((tmp_path / "ledger.jsonl").read_bytes()[:-cut])
+    assert list(Ledger(tmp_path).rows) == ["a", "b"][: 1 + (cut == 1)]  # the newline alone is no loss
+
+
+def test_the_table(tmp_path):
+    ledger = Ledger(tmp_path)
+    ledger.add(row('a, \n"b"', messages=["x", "y"], outputs=["a.ply", "a.png"], loops=2, unknown=1))
+    ledger.add(row(os.fsdecode(b"\xff"), status="failed", error="no"))
+    ledger.close()
+    with (tmp_path / "ledger.csv").open(encoding="utf-8", newline="") as stream:
+        table = list(csv.DictReader(stream))
+    assert tuple(table[0]) == COLUMNS
+    assert (table[0]["name"], table[0]["messages"], table[0]["outputs"]) == ('a, \n"b"', "x; y", "a.ply; a.png")
+    assert (table[1]["status"], table[1]["error"], table[1]["loops"]) == ("failed", "no", "")
+    assert list(Ledger(tmp_path).rows)[1] == os.fsdecode(b"\xff")
+
+
+def test_hash(tmp_path):
+    data = os.urandom((1 << 20) + 17)
+    (tmp_path / "a").write_bytes(data)
+    assert file_hash(tmp_path / "a") == hashlib.sha256(data).hexdigest()
+
+
+def test_the_lock(tmp_path):
+    with (
+        locked(tmp_path),
+        pytest.raises(BatchError, match=f"another batch .process {os.getpid()} on"),
+        locked(tmp_path),
+    ):
+        pytest.fail("two hold it")
+    with locked(tmp_path):
+        pass
+
+
+def test_the_lock_dies_with_its_owner(tmp_path):
+    code = """
+import sys, time
+from pathlib import Path
+from glsk_o3d.batch.ledger import locked
+with locked(Path(sys.argv[1])):
+    print("mine", flush=True)
+    time.sleep(60)
+"""
+    owner = subprocess.Popen([sys.executable, "-c", code, tmp_path], stdout=subprocess.PIPE, text=True)
+    assert owner.stdout.readline() == "mine\n"
+    with pytest.raises(BatchError, match=f"process {owner.pid} on"), locked(tmp_path):
+        pytest.fail("two hold it")
+    owner.kill()
+    owner.communicate()
+    with locked(tmp_path):
+        pass

@@ -1,0 +1,264 @@
+"""A batch in this process: what is done, skipped and done again, and what the ledger says."""
+
+import json
+import os
+import re
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import glsk_o3d
+from glsk_o3d import BatchError, Connector, InvalidParameterError, RecipeError, pipelines, read_skeleton, skeletonize
+from glsk_o3d.batch import plan_batch, run_batch
+from glsk_o3d.batch.ledger import COLUMNS, file_hash, locked
+
+# the work is done in this process, where a skeleton's warnings are errors
+pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+
+
+@pytest.fixture
+def batch(tmp_path):
+    """Run a batch from ``in`` to ``out`` in a thread; gives what each input that was done had as reason."""
+
+    def run(inputs=None, **options):
+        plans = []
+        with ThreadPoolExecutor(1) as pool:
+            run.result = run_batch(
+                inputs or tmp_path / "in", tmp_path / "out", executor=pool, on_plan=plans.append, **options
+            )
+        return {task.job.name: task.why for task in plans[0].todo}
+
+    return run
+
+
+@pytest.fixture
+def scans(tmp_path, write):
+    for i, name in enumerate("abc"):
+        write(tmp_path / "in" / f"{name}.ply", seed=i)
+    return tmp_path / "in"
+
+
+def test_every_scan_is_done_once(batch, scans, rows, tmp_path):
+    seen = []
+    assert batch(on_result=seen.append) == dict.fromkeys("abc", "new")
+    found = rows(tmp_path / "out")
+    assert (batch.result.done, batch.result.skipped, batch.result.failed) == (3, 0, 0)
+    assert batch.result.rate > 0
+    assert batch.result.rows == found == {row["name"]: row for row in seen}
+    for name, row in found.items():
+        assert tuple(row) == COLUMNS
+        assert (row["status"], row["outputs"], row["version"]) == ("done", [f"{name}.ply"], glsk_o3d.__version__)
+        assert row["input_hash"] == file_hash(scans / f"{name}.ply")
+        skeleton = skeletonize(glsk_o3d.read_cloud(scans / f"{name}.ply"))
+        assert (row["points"], row["loops"], row["stop_reason"]) == (256, 1, skeleton.report.stop_reason)
+        assert row["leaves"] == len(skeleton.leaves)
+        same = read_skeleton(tmp_path / "out" / f"{name}.ply")
+        assert (same.vertices == skeleton.vertices).all()
+    assert json.loads((tmp_path / "out" / "recipe.json").read_text()) == pipelines.default().to_recipe()
+
+
+def test_a_second_run_skips(batch, scans, rows, tmp_path):
+    batch()
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("?.ply")}
+    lines = rows(tmp_path / "out")
+    assert batch() == {}
+    assert (batch.result.done, batch.result.skipped) == (0, 3)
+    assert rows(tmp_path / "out") == lines == batch.result.rows
+    assert before == {path: path.stat().st_mtime_ns for path in before}
+    assert batch(force=True) == dict.fromkeys("abc", "asked for")
+
+
+def test_a_second_run_does_what_has_changed(batch, scans, rows, write, tmp_path):
+    (scans / "bad.ply").write_text("no")
+    out = tmp_path / "out"
+    assert len(batch()) == 4
+    assert rows(out)["bad"]["error"].startswith("not a valid .ply file")
+    write(scans / "a.ply", seed=9)
+    (out / "b.ply").unlink()
+    write(scans / "d.ply", seed=4)
+    os.utime(scans / "c.ply")  # a date is no change
+    assert batch() == {"a": "input changed", "b": "outputs are gone", "bad": "failed before", "d": "new"}
+    write(scans / "bad.ply")
+    assert batch() == {"bad": "failed before"}
+    assert {row["status"] for row in rows(out).values()} == {"done"}
+
+
+def test_other_parameters_are_another_result(batch, scans, rows, tmp_path):
+    batch()
+    assert batch(pipeline="wen2024") == dict.fromkeys("abc", "other parameters")
+    hashes = {row["parameters"] for row in rows(tmp_path / "out").values()}
+    assert batch(pipeline=pipelines.wen2024()) == {}
+    assert batch(pipeline="wen2024", cut_loops=True) == dict.fromkeys("abc", "other parameters")
+    assert len(hashes | {row["parameters"] for row in rows(tmp_path / "out").values()}) == 2
+    assert batch(pipeline="wen2024", cut_loops=True, formats=["ply", "npz"]) == dict.fromkeys("abc", "outputs are gone")
+    assert batch(pipeline="wen2024", cut_loops=True, formats=["npz"]) == {}
+
+
+def test_results_that_are_no_longer_true_are_taken_away(batch, scans, rows, tmp_path):
+    out = tmp_path / "out"
+    batch(formats=["ply", "json"])
+    (scans / "a.ply").write_text("no")
+    batch()
+    assert rows(out)["a"]["status"] == "failed"
+    assert sorted(path.name for path in out.glob("a.*")) == []
+    assert sorted(path.name for path in out.glob("b.*")) == ["b.json", "b.ply"]
+
+
+def test_a_ledger_from_elsewhere_removes_nothing(batch, scans, tmp_path):
+    batch()
+    ledger = tmp_path / "out" / "ledger.jsonl"
+    treasure = tmp_path / "treasure.ply"
+    treasure.write_text("kept")
+    ledger.write_text(ledger.read_text().replace('["a.ply"]', '["a.ply", "a./../../treasure.ply", "../treasure.ply"]'))
+    (scans / "a.ply").write_text("no")
+    assert batch() == {"a": "input changed"}
+    assert treasure.read_text() == "kept"
+
+
+def test_bad_files_stop_nothing(batch, scans, rows, write, tmp_path):
+    (scans / "empty.ply").touch()
+    (scans / "text.xyz").write_text("no numbers\n" * 9)
+    (scans / "nan.xyz").write_text("nan nan nan\n" * 300)
+    (scans / "cut.ply").write_bytes((scans / "a.ply").read_bytes()[:-100])
+    (scans / "other.pcd").write_bytes((scans / "a.ply").read_bytes())
+    (tmp_path / "list.txt").write_text(f"{scans}/gone.ply\n{scans}\n{scans}/list.doc\n")
+    batch([scans, tmp_path / "list.txt"])
+    failed = {Path(row["input"]).name: row["error"] for row in rows(tmp_path / "out").values() if row["error"]}
+    assert failed.pop("empty.ply") == "the file is empty"
+    assert failed.pop("text.xyz").startswith("no points could be read")
+    assert "points" in failed.pop("nan.xyz")
+    assert failed.pop("cut.ply") == "promises 256 points and holds 251: it breaks off"
+    assert failed.pop("other.pcd").startswith("not a valid .pcd file")
+    assert failed.pop("gone.ply") == "no such file"
+    assert failed.pop("in") == "is a folder, not a file"
+    assert failed.pop("list.doc") == "no such file"
+    assert failed == {}
+    assert (batch.result.done, batch.result.failed) == (3, 8)
+
+
+@pytest.mark.parametrize("change", [{"path": "/no/where/a.ply"}, {"out_dir": "/no/where"}])
+def test_workers_that_see_other_files(scans, rows, tmp_path, change):
+    class Elsewhere(ThreadPoolExecutor):
+        def submit(self, work, job):
+            return super().submit(work, replace(job, **change))
+
+    with Elsewhere(1) as pool:
+        run_batch(scans / "a.ply", tmp_path / "out", executor=pool)
+    error = rows(tmp_path / "out")["a"]["error"]
+    assert "no such f" in error
+    assert re.search(
+        r"\(on .+, process \d+; there is one here: workers need the same files by the same paths\)$", error
+    )
+
+
+def test_a_writer_that_fails(batch, scans, rows, tmp_path):
+    batch(formats=["ply", "swc"])
+    found = rows(tmp_path / "out")["a"]
+    assert found["status"] == "failed"
+    assert "SWC holds trees only" in found["error"]
+    assert (found["outputs"], found["loops"]) == (["a.ply"], 1)
+    batch(formats=["swc"], cut_loops=True, preview=True)
+    found = rows(tmp_path / "out")["a"]
+    assert found["outputs"] == ["a.swc", "a.png"]
+
+
+def test_mistakes_are_told_with_their_place(batch, scans, rows, tmp_path, monkeypatch):
+    def broken(self, data, watch):
+        raise ZeroDivisionError("a bug")
+
+    monkeypatch.setattr(glsk_o3d.Refiner, "_run", broken)
+    batch([scans / "a.ply"])
+    assert re.fullmatch(r"ZeroDivisionError: a bug \(test_run\.py, line \d+\)", rows(tmp_path / "out")["a"]["error"])
+
+
+def test_warnings_are_counted_and_kept(batch, write, rows, tmp_path):
+    path = write(tmp_path / "in" / "a.xyz")
+    path.write_text(path.read_text() + "no point\n")
+    batch()
+    found = rows(tmp_path / "out")["a"]
+    assert found["warnings"] == len(found["messages"]) >= 1
+    assert any("1 of 257 lines hold no point" in message for message in found["messages"])
+
+
+def test_sub_folders_are_mirrored(batch, write, rows, tmp_path):
+    write(tmp_path / "in" / "x" / "a.ply")
+    write(tmp_path / "in" / "y" / "z" / "a.xyz")
+    batch(recursive=True)
+    assert {row["outputs"][0] for row in rows(tmp_path / "out").values()} == {"x/a.ply", "y/z/a.ply"}
+
+
+def test_rows_of_other_inputs_stay(batch, scans, rows, tmp_path):
+    batch()
+    batch([scans / "a.ply"], pipeline="wen2024")
+    found = rows(tmp_path / "out")
+    assert list(found) == ["a", "b", "c"]
+    assert found["a"]["parameters"] != found["b"]["parameters"] == found["c"]["parameters"]
+
+
+def test_a_broken_line_costs_one_run(batch, scans, rows, tmp_path):
+    batch()
+    ledger = tmp_path / "out" / "ledger.jsonl"
+    ledger.write_bytes(ledger.read_bytes()[:-40])
+    assert batch() == {"c": "new"}
+    assert list(rows(tmp_path / "out")) == ["a", "b", "c"]
+
+
+def test_a_name_that_is_no_unicode(batch, scans, write, rows, tmp_path):
+    write(scans / os.fsdecode(b"\xff.ply"))
+    batch()
+    assert os.fsdecode(b"\xff") in rows(tmp_path / "out")
+    assert batch() == {}
+
+
+@pytest.mark.usefixtures("no_run")
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"pipeline": "wen2042"}, "no pipeline is called"),
+            ({"pipeline": Connector()}, "does not lead from a cloud"),
+            ({"formats": ["stl"]}, "unknown ending"),
+            ({"formats": []}, "nothing to write"),
+            ({"workers": 0}, "workers = 0"),
+            ({"workers": 2, "scheduler": "tcp://x:1"}, "neither workers nor"),
+        ],
+    )
+    def test_wrong_arguments(self, scans, tmp_path, options, message):
+        with pytest.raises(ValueError, match=message):
+            run_batch(scans, tmp_path / "out", **options)
+        assert not (tmp_path / "out").exists()
+
+    def test_a_pipeline_that_no_file_can_hold(self, scans, tmp_path):
+        pipeline = pipelines.default()
+        contractor = glsk_o3d.Contractor(reducer=lambda state: state)
+        pipeline = glsk_o3d.Pipeline(pipeline.stages[0], contractor, *pipeline.stages[2:])
+        with pytest.raises(RecipeError):
+            run_batch(scans, tmp_path / "out", pipeline=pipeline)
+
+    def test_results_over_inputs(self, scans, tmp_path):
+        with pytest.raises(InvalidParameterError, match=r"a\.ply: is an input"):
+            plan_batch([scans / "a.ply", scans / "b.ply"], scans)
+
+    def test_two_batches_in_one_folder(self, scans, tmp_path):
+        (tmp_path / "out").mkdir()
+        with locked(tmp_path / "out"), pytest.raises(BatchError, match="another batch"):
+            run_batch(scans, tmp_path / "out")
+
+    def test_a_plan_writes_nothing(self, scans, tmp_path):
+        plan = plan_batch(scans, tmp_path / "out", formats=["ply", ".JSON", "json"], preview=True)
+        assert plan.tasks[0].job.outputs == ("a.ply", "a.json", "a.png")
+        assert (plan.skipped, len(plan.parameters)) == (0, 64)
+        assert not (tmp_path / "out").exists()
+
+
+def test_an_error_of_the_caller_leaves_all_in_order(batch, scans, rows, tmp_path):
+    def stop(row):
+        raise LookupError("mine")
+
+    with pytest.raises(LookupError, match="mine"):
+        batch(on_result=stop)
+    assert len(rows(tmp_path / "out")) >= 1
+    assert len(batch()) <= 2
+    assert len(rows(tmp_path / "out")) == 3
