@@ -98,7 +98,7 @@ class RingBuilder(Filter):
         open_low=True,
     )
     around: float = parameter(
-        22.0,
+        25.0,
         "Points around a part that are enough: where the surface has more, near ones are merged, at most four into "
         "one, which takes over their mass. Fewer are faster; edges, thin and noisy parts stay as they are. 0 merges "
         "none, as published.",
