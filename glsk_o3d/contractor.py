@@ -182,7 +182,8 @@ def explained_score(points) -> float:
     -------
     float
     """
-    spread = np.linalg.eigvalsh(np.cov(points, rowvar=False))
+    offset = points - points.mean(axis=0)
+    spread = np.linalg.eigvalsh(offset.T @ offset)
     return float((spread.sum() + spread[-1]) / (2 * spread.sum()))
 
 

@@ -235,9 +235,11 @@ class RingBuilder(Filter):
             return rows, rank[into][owner], nearest_neighbours(cloud[rows], self._neighbours(len(rows)))[1]
 
         while self.around:
-            n = len(left)
-            left, owner, neighbours = merge(thin_smooth(cloud[left], neighbours, spread, self.around))
-            if len(left) < ENOUGH or len(left) > STEADY * n:
+            into = thin_smooth(cloud[left], neighbours, spread, self.around)
+            if np.count_nonzero(into == np.arange(len(into))) > STEADY * len(into):
+                break
+            left, owner, neighbours = merge(into)
+            if len(left) < ENOUGH:
                 break
             spread = principal(cloud[left], neighbours)[0]
         if most < len(left):

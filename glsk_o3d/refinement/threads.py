@@ -30,9 +30,11 @@ def bonds(skeleton, among=None):
     weight : (B,) float array
     """
     owned = skeleton.witnesses
-    order = np.lexsort(skeleton.points[owned].T)
-    step = np.diff(skeleton.points[owned[order]], axis=0, prepend=np.nan)
-    owned = np.sort(owned[order[(step != 0).any(axis=1)]])  # copies are near to nothing else
+    places = skeleton.points[owned]
+    if len(np.unique(places[:, 0])) < len(owned):  # perhaps copies, which are near to nothing else
+        order = np.lexsort(places.T)
+        step = np.diff(places[order], axis=0, prepend=np.nan)
+        owned = np.sort(owned[order[(step != 0).any(axis=1)]])
     if len(owned) < 2:
         return np.empty((0, 2), int), np.empty(0)
     points, normals, owner = skeleton.points[owned], skeleton.normals[owned], skeleton.vertex_of_point[owned]

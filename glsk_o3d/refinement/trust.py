@@ -32,7 +32,7 @@ def trust_warnings(skeleton):
     if len(owned) == 0:
         return []
     owner, normals = skeleton.vertex_of_point[owned], skeleton.normals[owned]
-    along = normals[:, :, None] * normals[:, None, :]
+    along = np.einsum("ni,nj->nij", normals, normals)
 
     count = np.bincount(owner, minlength=len(skeleton.vertices))
     one_way = np.linalg.eigvalsh(group_sum(along, owner, len(count)))[:, 2] > SHEET * np.maximum(count, 1)
@@ -45,15 +45,14 @@ def trust_warnings(skeleton):
 
     component, n = skeleton.component_of_vertex[owner], skeleton.n_components
     points = skeleton.points[owned] - skeleton.vertices[0]
-    across = np.eye(3) - along
     size = np.bincount(component, minlength=n)[:, None]
-    weight = group_sum(across, component, n) + 1e-9 * np.maximum(size, 1)[:, :, None] * np.eye(3)
-    meet = np.linalg.solve(weight, group_sum(np.einsum("nij,nj->ni", across, points), component, n)[:, :, None])[
-        :, :, 0
-    ]
+    # of every normal line I - n n^T, which takes away what is along it
+    weight = (size[:, :, None] + 1e-9 * np.maximum(size, 1)[:, :, None]) * np.eye(3) - group_sum(along, component, n)
+    height = np.einsum("ni,ni->n", normals, points)[:, None]
+    meet = np.linalg.solve(weight, group_sum(points - height * normals, component, n)[:, :, None])[:, :, 0]
     offset = points - meet[component]
     distance = np.einsum("ni,ni->n", offset, offset)
-    miss = np.einsum("ni,nij,nj->n", offset, across, offset)
+    miss = distance - np.einsum("ni,ni->n", normals, offset) ** 2
     spread = group_sum(np.column_stack([miss, distance]), component, n)
     ball = spread[:, 0] < BALL**2 * spread[:, 1]
     share = size[ball].sum() / len(owner)
@@ -62,7 +61,7 @@ def trust_warnings(skeleton):
             f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
             "so that no curve skeleton is meaningful there"
         ]
-    spread = group_sum(points[:, :, None] * points[:, None], component, n) / np.maximum(size, 1)[:, :, None]
+    spread = group_sum(np.einsum("ni,nj->nij", points, points), component, n) / np.maximum(size, 1)[:, :, None]
     mean = group_sum(points, component, n) / np.maximum(size, 1)
     length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread - mean[:, :, None] * mean[:, None])[:, 2], 0))
     reach = np.linalg.norm(skeleton.points[owned] - skeleton.vertices[owner], axis=1)
