@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def cao2010() -> Pipeline:
     """The baseline: contraction without reduction, stopped by the ring sizes (Cao et al. 2010)."""
     return (
-        RingBuilder(k="published", around=0, thin_to="all", outlier_factor=0, denoise=0, frame="box")
+        RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
         | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0, line_hold=1, keep_last=False, retries=0)
         | Connector(radius="2%", thickness=0, links="nearest", stray=0)
         | Refiner(opening=0, twig=0, spacing=0, recentre=0, weak=0, sure=0, bridge=0)
@@ -34,7 +34,7 @@ def wen2024() -> Pipeline:
     the fourth solve. The pages of the filters list every difference.
     """
     return (
-        RingBuilder(k="published", around=0, thin_to="all", outlier_factor=0, denoise=0, frame="box")
+        RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
         | Contractor(
             reducer=LPRReducer(conserve_mass=False, order="index", mend_rings=False),
             reduce_above=0,

@@ -60,7 +60,7 @@ def remove_redundant_points(
     name, tensor = open3d_class(cloud)
     if name == "TriangleMesh":
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
-    rings = RingBuilder(around=0, thin_to="all", outlier_factor=0, denoise=0) if rings is None else rings
+    rings = RingBuilder(thin_to="all", outlier_factor=0, denoise=0) if rings is None else rings
     contractor = Contractor(
         reducer=LPRReducer() if reducer is None else reducer,
         reduce_above=0,

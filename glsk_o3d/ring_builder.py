@@ -25,7 +25,11 @@ LEAST_RING = 3
 ROUNDS = 4  # of setting outliers aside
 SMALLEST, LARGEST = 1e-120, 1e120  # extents whose squares and products a float64 holds
 ALONE, FAIRLY_NOISY = 1.8, 0.2  # isolation of a denoised point that is set aside, and its least noise
-ENOUGH, STEADY = 8192, 0.9  # points, and share of them left, at which merging where there are more than enough ends
+FEW, ENOUGH, STEADY = (
+    1000,
+    8192,
+    0.9,
+)  # points, and share of them left, from and up to which more than enough are merged
 COINCIDENT = 4e-15  # points nearer than this in the working frame, a few roundings, are duplicates
 
 
@@ -100,16 +104,17 @@ class RingBuilder(Filter):
     around: float = parameter(
         25.0,
         "Points around a part that are enough: where the surface has more, near ones are merged, at most four into "
-        "one, which takes over their mass. Fewer are faster; edges, thin and noisy parts stay as they are. 0 merges "
-        "none, as published.",
+        "one at a time, which takes over their mass. Fewer are faster; edges, thin and noisy parts, and clouds of less "
+        "than 1000 points stay as they are. 0 merges none for this.",
         type="float",
         unit="points",
         low=0,
     )
     thin_to: int | str = parameter(
         "auto",
-        "Most points to contract; the others are merged into a near one, which takes over their mass. 'auto' is at most "
-        "25000, but 64 times the square root of their number from 152588 on; 'all' keeps them, as published.",
+        "Most points to contract; the others are merged into a near one, which takes over their mass. 'auto' is 25000, "
+        "but 64 times the square root of their number from 152588 on; 'all' merges none, whatever `around` says, as "
+        "published.",
         type="int",
         unit="points",
         low=8,
@@ -156,9 +161,10 @@ class RingBuilder(Filter):
     def _run(self, cloud, watch):
         points = cloud_points(cloud)
         finite = self._finite(points)
-        most = self._number(np.count_nonzero(finite))
-        sample, stands_for = _sample(points[finite], 2 * most)
-        good = points[finite][sample]
+        good = points if finite.all() else points[finite]
+        most = self._number(len(good))
+        sample, stands_for = _sample(good, 2 * most)
+        good = good[sample]
         frame, distinct, row, distance, neighbours = self._distinct(good)
         stray = np.zeros(len(good), bool)
         # in rounds, since what is left of a group stands out once the rest is gone
@@ -184,7 +190,11 @@ class RingBuilder(Filter):
         survivors, owner, neighbours = self._thinned(distinct, neighbours, spread, most)
         n, positions, axes = len(survivors), distinct[survivors], plane_axes(across[survivors])
         rings = star_rings(positions, np.arange(n), self._within(positions, neighbours[:, 1:], frame), axes)
-        row_of_point, outlier, witness = np.full(len(points), -1), np.zeros(len(points), bool), np.zeros(len(points), bool)
+        row_of_point, outlier, witness = (
+            np.full(len(points), -1),
+            np.zeros(len(points), bool),
+            np.zeros(len(points), bool),
+        )
         row_of_point[finite], outlier[finite] = row[stands_for], stray[stands_for]
         witness[np.flatnonzero(finite)[sample]] = ~stray
         return Contraction(
@@ -234,7 +244,7 @@ class RingBuilder(Filter):
             rows, rank = left[kept], np.cumsum(kept) - 1
             return rows, rank[into][owner], nearest_neighbours(cloud[rows], self._neighbours(len(rows)))[1]
 
-        while self.around:
+        while self.around and self.thin_to != "all" and len(left) >= FEW:
             into = thin_smooth(cloud[left], neighbours, spread, self.around)
             if np.count_nonzero(into == np.arange(len(into))) > STEADY * len(into):
                 break

@@ -91,7 +91,7 @@ class Skeleton:
     @property
     def witnesses(self) -> np.ndarray:
         """Input points that have a vertex and a normal, int array: those that say where the skeleton is."""
-        return np.flatnonzero((self.vertex_of_point >= 0) & np.isfinite(self.normals).all(axis=1))
+        return witnesses(self.vertex_of_point, self.normals)
 
     @property
     def leaves(self) -> np.ndarray:
@@ -256,6 +256,11 @@ class Skeleton:
         save_skeleton(self, path, **options)
 
 
+def witnesses(vertex_of_point, normals):
+    """Points that have a vertex and a normal, int array."""
+    return np.flatnonzero((vertex_of_point >= 0) & np.isfinite(np.einsum("ni->n", normals)))
+
+
 def plane_distance_radii(vertices, vertex_of_point, points, normals, otherwise=0.0):
     """Local thickness: median distance from each vertex to the tangent planes of the points it owns.
 
@@ -275,7 +280,7 @@ def plane_distance_radii(vertices, vertex_of_point, points, normals, otherwise=0
     -------
     (M,) float array
     """
-    owned = np.flatnonzero((vertex_of_point >= 0) & np.isfinite(normals).all(axis=1))
+    owned = witnesses(vertex_of_point, normals)
     owner = vertex_of_point[owned]
     offset = points[owned] - vertices[owner]
     distance = np.abs(np.einsum("ij,ij->i", offset, normals[owned]))

@@ -13,12 +13,15 @@ from glsk_o3d import (
     InvalidCloudError,
     InvalidParameterError,
     LPRReducer,
+    Pipeline,
     Refiner,
     RingBuilder,
     samples,
 )
+from glsk_o3d.analysis import compare
 from glsk_o3d.numerics.neighbourhoods import isolation, nearest_neighbours, principal
 from glsk_o3d.numerics.ridges import noise_share, to_ridges
+from glsk_o3d.pipelines import default
 from glsk_o3d.ring_builder import ALONE, FAIRLY_NOISY, MIN_POINTS, published_k, usual_k, usual_number
 
 TORUS = samples.torus(n=600).points
@@ -100,7 +103,7 @@ def test_state_says_what_it_is():
 
 def test_normals_of_a_torus():
     sample = samples.torus(n=3000)
-    state = RingBuilder()(sample.points)
+    state = RingBuilder(thin_to="all")(sample.points)
     p = sample.points[state.point_of_survivor]
     centre = p * [1, 1, 0]
     centre *= 0.4 / np.linalg.norm(centre, axis=1, keepdims=True)
@@ -262,7 +265,7 @@ def test_no_denoising_leaves_the_points():
 def test_denoising_moves_the_cloud_to_its_ridges_before_the_rings(passes):
     points = noisy_tube()
     plain, calm = RAW(points), replace(BY_16, denoise=passes, outlier_factor=0)(points)
-    spread, axes = principal(plain.cloud, nearest_neighbours(plain.cloud, 16)[1])
+    spread, normals = principal(plain.cloud, nearest_neighbours(plain.cloud, 16)[1])
     noise = noise_share(spread, nearest_neighbours(plain.cloud, 16)[1])
     np.testing.assert_array_equal(calm.cloud, to_ridges(plain.cloud, noise, passes))
     np.testing.assert_array_equal(calm.positions, calm.cloud)
@@ -271,7 +274,7 @@ def test_denoising_moves_the_cloud_to_its_ridges_before_the_rings(passes):
     np.testing.assert_array_equal(calm.points, points)
     # a ridge has no normals, and is not noisy any more
     for state in (plain, calm):
-        np.testing.assert_array_equal(state.normals, axes[:, :, 0])
+        np.testing.assert_array_equal(state.normals, normals)
         np.testing.assert_array_equal(state.noise, noise)
     # rings are those of the moved cloud
     np.testing.assert_array_equal(calm.ring_size, calm.rings.nearest(calm.cloud)[1])
@@ -463,26 +466,99 @@ def test_usual_number(n, expected):
     assert usual_number(n) == expected
 
 
-@pytest.mark.parametrize("thin_to", [300, 1000, 2500])
+@pytest.mark.parametrize("thin_to", [500, 1000, 2500])
 def test_thinned_clouds_keep_all_points_and_their_mass(thin_to):
     points = samples.torus(2000).points
-    state, whole = RingBuilder(thin_to=thin_to)(points), RingBuilder(thin_to="all")(points)
+    state, whole = RingBuilder(around=0, thin_to=thin_to)(points), RingBuilder(thin_to="all")(points)
     n = min(thin_to, 2000)
     assert len(state) == n == state.report.n_contracted
-    assert state.report.n_distinct == 2000
+    assert state.report.n_sampled == state.report.n_distinct == 2000
+    assert state.witness.all()
     np.testing.assert_array_equal(state.cloud, whole.cloud)
     np.testing.assert_array_equal(state.normals, whole.normals)
     np.testing.assert_array_equal(state.positions, state.cloud[state.survivors])
     np.testing.assert_array_equal(state.owner[state.survivors], np.arange(n))
-    np.testing.assert_array_equal(state.mass, np.bincount(state.owner))
+    np.testing.assert_allclose(state.mass, np.bincount(state.owner) * n / 2000, rtol=1e-14)
     skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
     assert len(skeleton.vertex_of_point) == 2000
     assert skeleton.n_loops == 1
 
 
+@pytest.mark.parametrize("n", [4000, 16000, 64000])
+def test_a_tube_is_contracted_with_as_many_points_around_it_as_are_enough(n):
+    """Whatever their number: the points contracted have the spacing of a tube with `around` points around it."""
+    sample = samples.torus(n, radius=0.1)
+    builder = RingBuilder(around=25)
+    state = builder(sample.points)
+    area = 4 * np.pi**2 * 0.4 * 0.1
+    around = 2 * np.pi * 0.1 / np.sqrt(area / len(state))
+    assert 20 < around < 45
+    assert len(state) < 0.9 * n
+    assert state.mass.mean() == pytest.approx(1, rel=1e-12)
+    finer = replace(builder, around=35)(sample.points)
+    assert len(finer) > len(state)
+
+
+def test_thin_parts_and_edges_keep_their_points():
+    """A thick and a thin tube, equally dense: the thick one is merged, the thin one stays."""
+    thick, thin = samples.tube(9000, radius=0.3, length=1.5).points, samples.tube(600, radius=0.02, length=1.5).points
+    state = RingBuilder()(np.concatenate([thick, thin + [0, 1, 0]]))
+    kept = state.point_of_survivor
+    assert (kept < 9000).sum() < 0.5 * 9000
+    assert (kept >= 9000).sum() > 0.9 * 600
+
+
+@pytest.mark.parametrize("around", [0, 25])
+def test_all_are_contracted_if_asked_for(around):
+    state = RingBuilder(around=around, thin_to="all")(samples.torus(3000).points)
+    assert len(state) == 3000
+    np.testing.assert_array_equal(state.mass, 1)
+
+
 def test_small_clouds_are_not_thinned():
-    points = samples.torus(2000).points
+    points = samples.torus(999).points
     for name in ("positions", "mass", "ring_size"):
         np.testing.assert_array_equal(
             getattr(RingBuilder()(points), name), getattr(RingBuilder(thin_to="all")(points), name)
         )
+
+
+# ---- large clouds
+
+
+def test_a_large_cloud_is_sampled_and_every_point_has_its_place():
+    points = samples.torus(8000, noise=0.001).points
+    points[17] = [np.nan, 0, 0]
+    points[4000] = [0, 0, 3]
+    state = RingBuilder(thin_to=800, drop_invalid=True)(points)
+    assert 800 < state.report.n_sampled < 3 * 1600
+    assert state.report.n_contracted <= 800
+    assert state.witness.sum() == state.report.n_distinct
+    assert state.row_of_point[17] == -1
+    assert state.outlier[4000]
+    assert not state.witness[[17, 4000]].any()
+    np.testing.assert_allclose(
+        state.frame.out_of(state.cloud[state.row_of_point[state.witness]]), points[state.witness], atol=1e-12
+    )
+    others = np.flatnonzero(np.isfinite(points).all(axis=1) & ~state.outlier)
+    away = np.linalg.norm(state.frame.out_of(state.cloud[state.row_of_point[others]]) - points[others], axis=1)
+    assert away.max() < 0.1
+    skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
+    assert skeleton.n_loops == 1
+    assert (skeleton.vertex_of_point >= 0).sum() == 7999
+    assert len(skeleton.witnesses) == state.witness.sum()
+    # who says where the surface is has a normal, nobody else
+    np.testing.assert_array_equal(np.isfinite(skeleton.normals[:, 0]), state.witness)
+
+
+def test_a_sampled_cloud_has_the_skeleton_of_the_whole():
+    sample = samples.y_junction(60000)
+    whole = default()(sample.points)
+    sampled = Pipeline(RingBuilder(thin_to=4096), *default().stages[1:])(sample.points)
+    assert sampled.report.n_sampled < 12000 < whole.report.n_sampled
+    assert len(sampled.leaves) == len(whole.leaves) == 3
+    for skeleton in (whole, sampled):
+        found = compare(skeleton, sample)
+        assert found.topology
+        assert found.error < 0.1
+        assert found.inside == 1

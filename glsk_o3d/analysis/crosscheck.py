@@ -180,7 +180,7 @@ def cross_check(
     points = cloud_points(cloud)
     n_input = len(points)
     points = _thinned(points, max_points)
-    state = replace(pipeline.stages[0], around=0, thin_to="all")(points)
+    state = replace(pipeline.stages[0], thin_to="all")(points)
     skeleton = Pipeline(*pipeline.stages[1:])(state)
     if not isinstance(skeleton, Skeleton):
         raise InvalidParameterError(f"{pipeline!r} does not lead to a skeleton")
@@ -194,9 +194,7 @@ def cross_check(
     skeletons = compare_skeletons(skeleton, other, diagonal)
     verdict, reasons = judge(rows, skeletons, skeleton.report.warnings, other.report)
     of_point = state.row_of_point
-    angle, length, share = (
-        np.where(state.witness, values[of_point], np.nan) for values in (angle, length, share)
-    )
+    angle, length, share = (np.where(state.witness, values[of_point], np.nan) for values in (angle, length, share))
     return CrossCheck(
         verdict=verdict,
         reasons=reasons,

@@ -121,6 +121,7 @@ def mesh_state(state, vertices, faces):
             points=state.frame.out_of(vertices),
             row_of_point=np.arange(m),
             outlier=np.zeros(m, bool),
+            witness=np.ones(m, bool),
             cloud=vertices,
             noise=np.zeros(m),
             normals=igl.per_vertex_normals(vertices, faces),

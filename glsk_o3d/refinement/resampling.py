@@ -9,6 +9,7 @@ from .merging import support
 
 SUPPORT = 8  # an edge is cut into at most one piece for every so many input points, begun ones counted
 TINY = np.finfo(float).tiny
+_CHUNK = 65536  # points at a time: memory stays flat
 
 
 def resample(skeleton, spacing):
@@ -44,21 +45,25 @@ def resample(skeleton, spacing):
     edges = np.sort(np.column_stack([start, stop]), axis=1)
     edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
 
-    owned = np.flatnonzero(skeleton.vertex_of_point >= 0)
-    owner, points = skeleton.vertex_of_point[owned], skeleton.points[owned]
-    choice, best = owner.copy(), ((points - skeleton.vertices[owner]) ** 2).sum(axis=1)
-    for column in incident_edges(ends, m)[owner].T:
-        some = np.flatnonzero(column >= 0)
-        some = some[inner[column[some]] > 0]
-        e = column[some]
-        a, along = skeleton.vertices[ends[e, 0]], skeleton.vertices[ends[e, 1]] - skeleton.vertices[ends[e, 0]]
-        place = pieces[e] * np.einsum("ni,ni->n", points[some] - a, along) / np.maximum((along**2).sum(axis=1), TINY)
-        sample = first[e] + np.clip(np.rint(place), 1, inner[e]).astype(int) - 1
-        squared = ((points[some] - vertices[sample]) ** 2).sum(axis=1)
-        nearer = squared < best[some]
-        choice[some[nearer]], best[some[nearer]] = sample[nearer], squared[nearer]
-    vertex_of_point = skeleton.vertex_of_point.copy()
-    vertex_of_point[owned] = choice
+    around, vertex_of_point = incident_edges(ends, m), skeleton.vertex_of_point.copy()
+    owned = np.flatnonzero(vertex_of_point >= 0)
+    for begin in range(0, len(owned), _CHUNK):
+        part = owned[begin : begin + _CHUNK]
+        owner, points = vertex_of_point[part], skeleton.points[part]
+        choice, best = owner.copy(), ((points - skeleton.vertices[owner]) ** 2).sum(axis=1)
+        for column in around[owner].T:
+            some = np.flatnonzero(column >= 0)
+            some = some[inner[column[some]] > 0]
+            e = column[some]
+            a, along = skeleton.vertices[ends[e, 0]], skeleton.vertices[ends[e, 1]] - skeleton.vertices[ends[e, 0]]
+            place = (
+                pieces[e] * np.einsum("ni,ni->n", points[some] - a, along) / np.maximum((along**2).sum(axis=1), TINY)
+            )
+            sample = first[e] + np.clip(np.rint(place), 1, inner[e]).astype(int) - 1
+            squared = ((points[some] - vertices[sample]) ** 2).sum(axis=1)
+            nearer = squared < best[some]
+            choice[some[nearer]], best[some[nearer]] = sample[nearer], squared[nearer]
+        vertex_of_point[part] = choice
     radii = np.concatenate(
         [skeleton.radii, ((1 - t[:, 0]) * skeleton.radii[ends[edge, 0]] + t[:, 0] * skeleton.radii[ends[edge, 1]])]
     )

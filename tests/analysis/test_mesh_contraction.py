@@ -141,7 +141,7 @@ def test_a_cylinder_that_is_sampled_evenly_has_one_over_its_radius():
     turn = 2 * np.pi * (u + v / 2) / m
     height = radius * 2 * np.pi / m * np.sqrt(3) / 2
     points = np.stack([radius * np.cos(turn), radius * np.sin(turn), height * v], -1).reshape(-1, 3)
-    state = RingBuilder(denoise=0, outlier_factor=0)(points)
+    state = RingBuilder(thin_to="all", denoise=0, outlier_factor=0)(points)
     cloud = state.frame.out_of(state.cloud)
     found = curvature_normals(cotangent_laplacian(cloud, state.rings), ring_areas(cloud, state.rings), cloud)
     exact = -cloud * [1, 1, 0] / radius**2
@@ -184,7 +184,7 @@ def test_it_is_the_contractor_where_rings_and_one_rings_are_the_same():
     rng = np.random.default_rng(3)
     points = rng.normal(size=(400, 3))
     points *= [[1, 0.6, 2.5]] / np.linalg.norm(points, axis=1, keepdims=True)
-    state = RingBuilder(denoise=0, outlier_factor=0)(points)
+    state = RingBuilder(thin_to="all", denoise=0, outlier_factor=0)(points)
     faces = ConvexHull(state.cloud).simplices.astype(np.int64)
     begun, faces = mesh_state(state, state.cloud, faces)
     centred = state.cloud - state.cloud.mean(axis=0)

@@ -11,7 +11,7 @@ from glsk_o3d.samples import sheet, torus, tube
 
 
 def reconstructed(by, points):
-    state = RingBuilder()(points)
+    state = RingBuilder(thin_to="all")(points)
     return state, *by(state.cloud, state.normals, state.rings)
 
 

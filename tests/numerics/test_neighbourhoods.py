@@ -5,7 +5,14 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from glsk_o3d.numerics import neighbourhoods as module
-from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, plane_axes, principal
+from glsk_o3d.numerics.neighbourhoods import (
+    PAIRS,
+    nearest_neighbours,
+    plane_axes,
+    principal,
+    row_medians,
+    scatter,
+)
 
 RNG = np.random.default_rng(0)
 CLOUD = RNG.normal(size=(300, 3))
@@ -26,27 +33,25 @@ def test_plane_of_an_exact_plane(seed):
     rng = np.random.default_rng(seed)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     points = np.column_stack([rng.uniform(size=(200, 2)), np.zeros(200)]) @ turn.T + rng.normal(size=3)
-    axes = principal(points, nearest_neighbours(points, 10)[1])[1]
-    np.testing.assert_allclose(np.abs(axes[:, :, 0] @ turn[:, 2]), 1, atol=1e-12)
-    np.testing.assert_allclose(axes[:, :, 1:].transpose(0, 2, 1) @ turn[:, 2], 0, atol=1e-7)
+    normals = principal(points, nearest_neighbours(points, 10)[1])[1]
+    np.testing.assert_allclose(np.abs(normals @ turn[:, 2]), 1, atol=1e-12)
 
 
-def test_axes_are_orthonormal_and_sorted_by_variance():
+def test_against_covariances():
     neighbours = nearest_neighbours(CLOUD, 12)[1]
-    axes = principal(CLOUD, neighbours)[1]
-    np.testing.assert_allclose(axes.transpose(0, 2, 1) @ axes, np.tile(np.eye(3), (300, 1, 1)), atol=1e-13)
-    patch = CLOUD[neighbours]
-    variance = ((patch - patch.mean(axis=1, keepdims=True)) @ axes).var(axis=1)
-    assert (np.diff(variance, axis=1) >= 0).all()
-    # least of all directions, not just of these three
-    covariance = np.stack([np.cov(p.T, bias=True) for p in patch])
-    np.testing.assert_allclose(variance[:, 0], np.linalg.eigvalsh(covariance)[:, 0], rtol=1e-9)
+    spread, normals = principal(CLOUD, neighbours)
+    covariance = np.stack([np.cov(p.T, bias=True) for p in CLOUD[neighbours]])
+    np.testing.assert_allclose(spread / 12, np.linalg.eigvalsh(covariance), rtol=1e-9)
+    across = np.einsum("ni,nij,nj->n", normals, covariance, normals)
+    np.testing.assert_allclose(across, spread[:, 0] / 12, rtol=1e-9)
+    entries = scatter(CLOUD, neighbours)
+    np.testing.assert_allclose(entries / 12, np.stack([covariance[:, i, j] for i, j in PAIRS]), atol=1e-14)
 
 
 def test_normals_of_a_sphere():
     points = CLOUD / np.linalg.norm(CLOUD, axis=1, keepdims=True)
     points = np.concatenate([points, points + 1e-3 * np.random.default_rng(1).normal(size=points.shape)])
-    normals = principal(points, nearest_neighbours(points, 12)[1])[1][:, :, 0]
+    normals = principal(points, nearest_neighbours(points, 12)[1])[1]
     assert np.median(np.abs(np.einsum("ij,ij->i", normals, points))) > 0.99
 
 
@@ -58,13 +63,20 @@ def test_chunks_do_not_show(monkeypatch):
 
 
 @pytest.mark.parametrize("k", [3, 8])
-def test_degenerate_neighbourhoods_still_give_axes(k):
+def test_degenerate_neighbourhoods_still_give_normals(k):
     line = np.outer(np.arange(20.0), [1, 2, 2])
     for points in (line, np.ones((20, 3))):
-        axes = principal(points, np.arange(20)[:, None] * 0 + np.arange(k))[1]
-        np.testing.assert_allclose(axes.transpose(0, 2, 1) @ axes, np.tile(np.eye(3), (20, 1, 1)), atol=1e-13)
-    axes = principal(line, nearest_neighbours(line, k)[1])[1]
-    np.testing.assert_allclose(np.abs(axes[:, :, 2] @ np.array([1, 2, 2]) / 3), 1, atol=1e-12)
+        spread, normals = principal(points, np.arange(20)[:, None] * 0 + np.arange(k))
+        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-13)
+        assert (spread >= 0).all()
+    normals = principal(line, nearest_neighbours(line, k)[1])[1]
+    np.testing.assert_allclose(normals @ np.array([1, 2, 2]) / 3, 0, atol=1e-7)
+
+
+@pytest.mark.parametrize("k", range(1, 9))
+def test_medians_of_rows(k):
+    values = RNG.normal(size=(50, k))
+    np.testing.assert_array_equal(row_medians(values), np.median(values, axis=1))
 
 
 NORMALS = {

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import samples
-from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
-from glsk_o3d.numerics.thinning import thin
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
+from glsk_o3d.numerics.thinning import MOST, thin, thin_smooth, thin_to_grid
 
 
 def thinned(points, n, k=16):
@@ -72,3 +72,81 @@ def test_grids_end_somewhere():
     into = thinned(grid, 10)
     assert 10 <= len(left(into)) < 144
     np.testing.assert_array_equal(into[into], into)
+
+
+# ---- where there are more than enough
+
+
+def smoothed(points, around, k=16):
+    neighbours = nearest_neighbours(points, k)[1]
+    return thin_smooth(points, neighbours, principal(points, neighbours)[0], around)
+
+
+@pytest.mark.parametrize("around", [20, 40])
+def test_dense_tubes_are_merged_as_far_as_allowed_and_sparse_ones_stay(around):
+    """A cylinder with 100 points around it, and one with half as many as are enough."""
+    for many in (100, around / 2):
+        spacing = 2 * np.pi / many
+        n = int(2 * np.pi * 4 / spacing**2)
+        rng = np.random.default_rng(0)
+        turn = rng.uniform(0, 2 * np.pi, n)
+        points = np.column_stack([np.cos(turn), np.sin(turn), rng.uniform(0, 4, n)])
+        into = smoothed(points, around)
+        np.testing.assert_array_equal(into[into], into)
+        mass = np.bincount(into)[left(into)]
+        assert mass.max() <= MOST
+        if many == 100:
+            assert len(left(into)) < 0.6 * n
+        else:
+            assert len(left(into)) > 0.98 * n
+
+
+def test_the_formula_of_the_ratio():
+    """sigma_1 / sigma_3 = pi k / (4 N^2) on a tube with N points around it."""
+    rng = np.random.default_rng(0)
+    n, k = 60000, 200
+    turn = rng.uniform(0, 2 * np.pi, n)
+    points = np.column_stack([np.cos(turn), np.sin(turn), rng.uniform(0, 4, n)])
+    neighbours = nearest_neighbours(points, k)[1]
+    spread = principal(points, neighbours)[0]
+    around = 2 * np.pi / np.sqrt(2 * np.pi * 4 / n)
+    assert np.median(spread[:, 0] / spread[:, 2]) == pytest.approx(np.pi * k / (4 * around**2), rel=0.1)
+
+
+def test_noise_is_not_smooth(surface):
+    noisy = surface + np.random.default_rng(0).normal(0, 0.03, surface.shape)
+    assert len(left(smoothed(noisy, 10))) > 0.97 * 3000 > len(left(smoothed(surface, 10)))
+
+
+# ---- on a grid
+
+
+@pytest.mark.parametrize("n", [100, 700, 2500])
+def test_a_grid_keeps_about_so_many_each_the_nearest_to_the_middle_of_its_cell(surface, n):
+    kept, into = thin_to_grid(surface, n)
+    assert 0.6 * n < len(kept) < 1.7 * n
+    np.testing.assert_array_equal(into[kept], np.arange(len(kept)))
+    for cell in range(len(kept)):
+        members = np.flatnonzero(into == cell)
+        away = np.linalg.norm(surface[members] - surface[members].mean(axis=0), axis=1)
+        assert away[members == kept[cell]] <= away.min() * (1 + 1e-12)
+    # cells are cubes of one size, anywhere along the axes
+    spans = [np.ptp(surface[into == cell], axis=0).max() for cell in range(len(kept))]
+    assert max(spans) < 3 * np.ptp(surface, axis=0).max() / np.sqrt(n)
+
+
+def test_a_grid_does_not_depend_on_the_order_or_scale(surface):
+    order = np.random.default_rng(0).permutation(len(surface))
+    kept, into = thin_to_grid(surface, 500)
+    again, into_again = thin_to_grid(64 * surface[order], 500)
+    assert set(order[again].tolist()) == set(kept.tolist())
+    np.testing.assert_array_equal(order[again[into_again]], kept[into[order]])
+
+
+def test_a_grid_that_is_too_coarse_keeps_all():
+    """Two points so far off that all others would be in a few of the finest cells."""
+    rng = np.random.default_rng(0)
+    points = np.concatenate([rng.normal(size=(500, 3)), [[1e9, 0, 0], [-1e9, 0, 0]]])
+    kept, into = thin_to_grid(points, 100)
+    np.testing.assert_array_equal(kept, np.arange(502))
+    np.testing.assert_array_equal(into, np.arange(502))
