@@ -25,11 +25,8 @@ LEAST_RING = 3
 ROUNDS = 4  # of setting outliers aside
 SMALLEST, LARGEST = 1e-120, 1e120  # extents whose squares and products a float64 holds
 ALONE, FAIRLY_NOISY = 1.8, 0.2  # isolation of a denoised point that is set aside, and its least noise
-FEW, ENOUGH, STEADY = (
-    1000,
-    8192,
-    0.9,
-)  # points, and share of them left, from and up to which more than enough are merged
+FEW, ENOUGH = 1000, 8192  # points from which on, and down to which, more than enough are merged
+STEADY = 0.9  # share of the points left at which that ends
 COINCIDENT = 4e-15  # points nearer than this in the working frame, a few roundings, are duplicates
 
 

@@ -24,6 +24,7 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
     return {
         "points": report.n_input,
         "dropped": report.n_dropped,
+        "sampled": report.n_sampled,
         "distinct": report.n_distinct,
         "contracted": report.n_contracted,
         **structure(skeleton),

@@ -289,6 +289,8 @@ def print_results(
         print_json({**facts, "warnings": warnings, "files": [str(path) for path in written]})
     elif not quiet:
         hidden = {"dropped": facts["dropped"] or None, "converged": None, "seconds": f"{seconds:.2f}"}
+        if facts["sampled"] in (0, facts["points"] - facts["dropped"]):
+            hidden["sampled"] = None
         if facts["contracted"] == facts["distinct"]:
             hidden["contracted"] = None
         words = {name: "yes" if value else "no" for name, value in facts.items() if isinstance(value, bool)}

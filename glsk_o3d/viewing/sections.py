@@ -150,6 +150,7 @@ def origin(report: Report) -> str:
     counts = {
         "input points": report.n_input,
         "dropped, not finite": report.n_dropped,
+        "sampled from a large cloud": report.n_sampled,
         "set aside as outliers": report.n_outliers,
         "distinct points": report.n_distinct,
         "contracted points": report.n_contracted,

@@ -127,7 +127,7 @@ def test_every_occurrence_is_changed():
         ),
         (
             "RingBuilder.zzz=2",
-            "no parameter of RingBuilder is called 'zzz': there are k, radius, around, thin_to, outlier_factor, denoise, ",
+            "no parameter of RingBuilder is called 'zzz': there are k, radius, around, thin_to, outlier_factor, ",
         ),
         ("RingBuilder.consumes=cloud", "no parameter of RingBuilder is called 'consumes'"),
         ("RingSizeRatio.threshold=1", "RingSizeRatio is not in the pipeline, which has RingBuilder"),
