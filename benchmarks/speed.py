@@ -64,7 +64,7 @@ STAGES = {
         ("numerics.neighbourhoods:isolation", "numerics.ridges:noise_share", "numerics.ridges:to_ridges")
     ),
     "planes": Stage(("numerics.neighbourhoods:principal",)),
-    "thinning": Stage(("numerics.thinning:thin",)),
+    "thinning": Stage(("numerics.thinning:thin", "numerics.thinning:thin_smooth", "numerics.thinning:thin_to_grid")),
     "rings": Stage(("numerics.rings:star_rings",)),
     "rest of the rings": Stage(("ring_builder:RingBuilder._run",), open=True),
     "Laplacian": Stage(("numerics.cotangent:cotangent_laplacian",)),

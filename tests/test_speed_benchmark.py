@@ -162,7 +162,7 @@ class TestTableOfStages:
             tool.find({"rings": tool.Stage((), after=("no", "such"))})
 
     def test_the_default_pipeline_goes_through_every_stage(self, tool):
-        points = sauropod(800, noise=0.01).points
+        points = sauropod(1200, noise=0.01).points
         pipelines.default()(points)  # so that nothing is imported below
         start = time.process_time(), time.perf_counter()
         with tool.Stopwatch(tool.STAGES) as watch:
