@@ -50,7 +50,9 @@ def test_a_worker_that_dies_costs_its_own_scan_alone(tmp_path, write, rows, sabo
     assert (result.done, result.failed, len(found)) == (5, 1, 6)
     assert not (tmp_path / "once").exists()
     assert (found["1"]["status"], found["1"]["error"]) == ("failed", WORKER_DIED)
-    assert len({row["worker"] for row in found.values() if row["status"] == "done"}) >= 2  # one that lived, or a new one
+    assert (
+        len({row["worker"] for row in found.values() if row["status"] == "done"}) >= 2
+    )  # one that lived, or a new one
 
 
 def test_a_script_without_a_guard_blames_no_scan(tmp_path, write):
