@@ -8,7 +8,7 @@ import os
 import warnings
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -68,8 +68,8 @@ class GraspCandidates:
 
     def __getitem__(self, rows) -> GraspCandidates:
         rows = np.atleast_1d(np.arange(len(self))[rows])
-        arrays = (self.positions, self.approach, self.closing, self.opening, self.branch, self.confidence, self.quality)
-        return GraspCandidates(*(array[rows] for array in arrays), self.places, self.left_out)
+        arrays = {name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return replace(self, **arrays)
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         columns = [column for array in self._vectors for column in array.T] + self._numbers
