@@ -17,8 +17,8 @@ print(skeleton)
 
 # %%
 # It is a graph in space: vertices, edges, the local radius at each vertex, and for every point the vertex it belongs
-# to. The loop is the handle. The leaves are nose, tail, four feet, and a small twig in the hind leg whose inner
-# side no camera saw.
+# to. The loop is the handle. The leaves are nose, tail, four feet, and a small twig in the hind leg whose inner side
+# no camera saw.
 
 glsk.plot_skeleton(skeleton, color="radius")
 plt.show()
@@ -30,6 +30,4 @@ plt.show()
 report = skeleton.report
 print(report.stop_reason)
 for record in report.iterations:
-    print(
-        f"solve {record.iteration}: {record.n_points} points, {record.n_merged} merged, De = {record.explained_change:.3f}"
-    )
+    print(f"solve {record.iteration}: {record.n_points} points, {record.n_merged} merged")

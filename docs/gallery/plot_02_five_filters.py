@@ -14,9 +14,10 @@ from glsk_o3d.samples import sauropod
 cloud = sauropod(4096, noise=0.002).points
 
 # %%
-# **Rings**: which neighbours surround each point. **Contraction**: the rings' Laplacian draws the points inwards, while
-# local point reduction (**LPR**) merges those that say little more than their neighbours. **Connection**: clusters of
-# contracted points become a graph. **Refinement**: the graph becomes a curve in the middle of the surface.
+# **Rings**: which neighbours surround each point. **Contraction**: the rings' Laplacian draws the points inwards,
+# while local point reduction (**LPR**) merges those that say little more than their neighbours. **Connection**:
+# clusters of contracted points become a graph. **Refinement**: the graph becomes a curve in the middle of the
+# surface.
 
 rings = glsk.RingBuilder()(cloud)
 contracted = glsk.Contractor(reducer=glsk.LPRReducer())(rings)
@@ -26,8 +27,8 @@ for state in (rings, contracted, graph, skeleton):
     print(state)
 
 # %%
-# In the contracted cloud the thick trunk is not yet a line, and the raw graph shows it: many small triangles. Refinement
-# closes them, and moves the curve to the middle of the surface.
+# In the contracted cloud the thick trunk is not yet a line, and the raw graph shows it: many small triangles.
+# Refinement closes them, and moves the curve to the middle of the surface.
 
 figure = plt.figure(figsize=(10, 6), layout="constrained")
 panels = {

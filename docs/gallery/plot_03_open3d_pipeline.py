@@ -55,8 +55,8 @@ for cluster, skeleton in zip(clusters, skeletons, strict=True):
     print(skeleton, annotated.point, lines, tubes, sep="\n  ")
 
 # %%
-# Left what went in, right what came out. A few strays next to the objects survive Open3D's filter; the skeletons do not
-# mind them.
+# Left what went in, right what came out. A few strays next to the objects survive Open3D's filter; the skeletons do
+# not mind them.
 
 figure = plt.figure(figsize=(11, 3.6), layout="constrained")
 left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))

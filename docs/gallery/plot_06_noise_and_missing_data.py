@@ -31,9 +31,9 @@ clouds = {
 }
 
 # %%
-# Compare the titles. Strays hardly matter, noise moves the curve a little. Where a tenth of the points is left the handle
-# is too thin to be told from strays, and its loop is gone. What one camera did not see is missing, parts come apart, and
-# where a side is missing the curve may leave the middle; a second camera mends most of that.
+# Compare the titles. Strays hardly matter, noise moves the curve a little. Where a tenth of the points is left the
+# handle is too thin to be told from strays, and its loop is gone. What one camera did not see is missing, parts come
+# apart, and where a side is missing the curve may leave the middle; a second camera mends most of that.
 
 figure = plt.figure(figsize=(12, 6.5), layout="constrained")
 for place, (name, cloud) in enumerate(clouds.items(), start=1):

@@ -64,10 +64,10 @@ for order in range(table.level.max() + 1):
     )
 
 # %%
-# The first three orders come out within a few per cent. The tips come out too short, and their angles with them: the end
-# of a curve is where its points say least about it, and near a fork the parts blend.
+# The first three orders come out within a few per cent. The tips come out too short, and their angles with them: the
+# end of a curve is where its points say least about it, and near a fork the parts blend.
 
-figure = plt.figure(figsize=(10, 5.5), layout="constrained")
+figure = plt.figure(figsize=(10, 6), layout="constrained")
 left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))
 glsk.plot_skeleton(skeleton, left, color="branch", view=(10, -50)).set_title(f"{len(table)} branches")
 glsk.plot_skeleton(skeleton, right, color="radius", view=(10, -50)).set_title("radius")

@@ -17,8 +17,8 @@ cloud = sauropod(6000, noise=0.002).points
 graph = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(cloud)
 
 # %%
-# The raw graph is full of small loops. Those of three edges are no loops but triangles, and the refinement closes them,
-# as published. Larger ones are left: they open less than a part is thick.
+# The raw graph is full of small loops. Those of three edges are no loops but triangles, and the refinement closes
+# them, as published. Larger ones are left: they open less than a part is thick.
 
 published = glsk.Refiner(opening=0, twig=0, spacing=0, recentre=0, weak=0, sure=0, bridge=0)(graph)
 skeleton = glsk.Refiner()(graph)

@@ -16,8 +16,8 @@ thinned = scan[::5]
 skeleton = glsk.skeletonize(thinned)
 
 # %%
-# ``segment`` labels the points with rows of the branch table. Any cloud in the same place will do: here the skeleton is
-# that of 6000 points, and the labels are for all 30 000.
+# ``segment`` labels the points with rows of the branch table. Any cloud in the same place will do: here the skeleton
+# is that of 6000 points, and the labels are for all 30 000.
 
 label = skeleton.segment(scan)
 table = skeleton.branch_table()
@@ -36,6 +36,4 @@ plt.show()
 # One part by itself is a mask away, and is a cloud like any other.
 
 longest = scan[label == table.length.argmax()]
-print(
-    f"the longest branch has {len(longest)} points, from {longest.min(axis=0).round(2)} to {longest.max(axis=0).round(2)}"
-)
+print(f"the longest branch: {len(longest)} points, {np.ptp(longest, axis=0).round(2)} large")

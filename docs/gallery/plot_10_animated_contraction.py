@@ -10,14 +10,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import matplotlib.pyplot as plt
-import numpy as np
 from matplotlib.animation import FuncAnimation
 
 import glsk_o3d as glsk
 from glsk_o3d.samples import sample_object
 
 # %%
-# A recorder keeps where each point is after each solve. A point that was merged into another stands where that stands.
+# A recorder keeps where each point is after each solve. A point that was merged into another stands where that
+# stands.
 
 recorder = glsk.ContractionRecorder(most_points=4000)
 skeleton = glsk.skeletonize(sample_object(8192).points, on_state=recorder)
@@ -25,9 +25,9 @@ solves = len(recorder.positions) - 1
 print(f"{solves} solves: {skeleton.report.stop_reason}")
 
 # %%
-# Thin parts are lines after a solve or two; the later ones draw the trunk together. It is no line even in the end: the rule
-# stops when another solve would hardly change the whole. The skeleton (red) lies where the surface has its middle, and
-# need not run through the contracted points.
+# Thin parts are lines after a solve or two; the later ones draw the trunk together. It is no line even in the end:
+# the rule stops when another solve would hardly change the whole. The skeleton (red) lies where the surface has its
+# middle, and need not run through the contracted points.
 
 figure = plt.figure(figsize=(12, 6), layout="constrained")
 columns = (solves + 3) // 2
@@ -52,9 +52,7 @@ class Film(bytes):
 
 axes = glsk.plot_skeleton(None, cloud=recorder.positions[0])
 dots = axes.collections[0]
-steps = np.concatenate(
-    [[i] * 3 + list(i + np.linspace(0, 1, 6, endpoint=False)[1:]) for i in range(solves)] + [[solves] * 6]
-)
+steps = [solve + part for solve in range(solves) for part in (0, 0, 0, 0, 0.2, 0.4, 0.6, 0.8)] + [solves] * 8
 
 
 def draw(step):
@@ -69,4 +67,4 @@ with TemporaryDirectory() as folder:
     FuncAnimation(axes.figure, draw, frames=steps).save(Path(folder, "film.gif"), writer="pillow", fps=10, dpi=70)
     film = Film(Path(folder, "film.gif").read_bytes())
 plt.close(axes.figure)
-film
+film  # noqa: B018

@@ -24,8 +24,8 @@ names = {"cao2010": "Cao et al. 2010", "wen2024": "Wen et al. 2024", "default": 
 
 # %%
 # *Error* is the mean distance from the true axis in local radii. Look at the bends in the second row: merging points
-# without keeping their mass draws a torus to its centre and cuts the turns of a helix, which is why our reduction conserves
-# mass. (``wen2024`` follows the authors' code where it departs from the paper.)
+# without keeping their mass draws a torus to its centre and cuts the turns of a helix, which is why our reduction
+# conserves mass. (``wen2024`` follows the authors' code where it departs from the paper.)
 
 figure = plt.figure(figsize=(11, 10), layout="constrained")
 for row, (pipeline, name) in enumerate(names.items()):

@@ -4,8 +4,8 @@ Noise of 5, 10 and 20 %
 
 The same pipelines under growing noise, in the spirit of figure 8 of Wen et al. (2024).
 
-A percentage means nothing without what it is of. Here it is the standard deviation of the noise on every coordinate over
-the median radius of the object's parts: at 20 % points stray by a fifth of a leg's thickness. Elsewhere in this
+A percentage means nothing without what it is of. Here it is the standard deviation of the noise on every coordinate
+over the median radius of the object's parts: at 20 % points stray by a fifth of a leg's radius. Elsewhere in this
 documentation noise is a share of the diagonal, of which 20 % here are 0.6 %.
 """
 

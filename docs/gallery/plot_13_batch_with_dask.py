@@ -29,10 +29,10 @@ for name in ("sauropod", "tube", "torus", "helix", "y_junction", "two_rings"):
 (scans / "broken.ply").write_text("this is no cloud")
 
 # %%
-# The cluster. On one machine ``run_batch(scans, results)`` is simpler and needs no Dask. These workers are two threads of
-# this process, so that the page needs no ports and no new processes. For real work leave ``processes=False`` out, and
-# put the rest under ``if __name__ == "__main__":``, because every process imports the script; or give the address of a
-# scheduler.
+# The cluster. On one machine ``run_batch(scans, results)`` is simpler and needs no Dask. These workers are two
+# threads of this process, so that the page needs no ports and no new processes. For real work leave
+# ``processes=False`` out, and put the rest under ``if __name__ == "__main__":``, because every process imports the
+# script; or give the address of a scheduler.
 
 cluster = LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None)
 client = Client(cluster)

@@ -21,23 +21,26 @@ cloud = sauropod(8192, noise=0.001).points
 skeleton = glsk.skeletonize(cloud)
 
 # %%
-# A gripper that opens 0.17. The trunk is thicker, as what is said about the places that were not taken shows; neck, tail,
-# legs and handle are not. Each fork is drawn where the fingers would be, and its colour is the quality: yellow is best.
+# A gripper that opens 0.17. The trunk is thicker, and what is told about the places that were not taken says so; neck,
+# tail, legs and handle are not. Each fork is drawn where the fingers would be; yellow ones are best. The quality
+# prefers sure parts that leave room in the gripper and do not taper.
 
 
 def show(grasps, axes):
     lines = grasps.to_line_set()
-    ends = np.asarray(lines.points)[np.asarray(lines.lines)]
-    axes.add_collection(Line3DCollection(ends, colors=np.asarray(lines.colors), linewidths=1, zorder=3, clip_on=False))
+    ends, colours = np.asarray(lines.points)[np.asarray(lines.lines)], np.asarray(lines.colors)
+    axes.add_collection(Line3DCollection(ends, colors=colours, linewidths=1, zorder=3, clip_on=False))
 
 
-grasps = grasp_candidates(skeleton, max_opening=0.17, clearance=0.03, around=8, spacing=0.04)
+grasps = grasp_candidates(skeleton, max_opening=0.17, clearance=0.03, around=4, spacing=0.08)
 print(grasps)
+show(grasps, glsk.plot_skeleton(skeleton))
+plt.show()
 
 # %%
-# What stands in the way is for a planner to find out, who knows the hand. For a simple hand it takes the cloud and a few
-# lines: in the frame of the gripper (x closing, y along the part, z approach), no point may lie in the boxes of the
-# fingers and in that of the hand behind them.
+# What stands in the way is for a planner to find out, who knows the hand. For a simple hand it takes the cloud and a
+# few lines: in the frame of the gripper (x closing, y along the part, z approach), no point may lie in the boxes of
+# the fingers and in that of the hand behind them.
 
 FINGER, HAND = 0.015, 0.25
 
@@ -57,15 +60,10 @@ for row in best:
     print(f"  branch {row['branch']}: opening {row['opening']:.3f}, quality {row['quality']:.2f}")
 
 # %%
-# Between the legs and inside the handle forks are gone in the middle picture. The last one has the best of each branch.
+# Between the legs, and from inside the handle, the hand has no room. Of what is left, the best on each branch:
 
-figure = plt.figure(figsize=(12, 3.3), layout="constrained")
-for place, (title, some) in enumerate(
-    {"candidates": grasps, "free": free, "best of each branch": best}.items(), start=1
-):
-    axes = glsk.plot_skeleton(skeleton, figure.add_subplot(1, 3, place, projection="3d"))
-    axes.set_title(f"{title}: {len(some)}")
-    show(some, axes)
+axes = glsk.plot_skeleton(skeleton)
+show(best, axes)
 plt.show()
 
 # %%

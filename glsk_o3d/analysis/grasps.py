@@ -108,7 +108,7 @@ class GraspCandidates:
         """Each gripper as a fork of four lines, an ``open3d.geometry.LineSet``.
 
         The tips of its fingers are `opening` apart at the height of the axis, the fingers are as long; colours go from
-        dark blue, quality 0, to yellow, quality 1.
+        dark blue, the least quality among them, to yellow, the best.
 
         Raises
         ------
@@ -126,7 +126,9 @@ class GraspCandidates:
         drawn = o3d.geometry.LineSet()
         drawn.points = o3d.utility.Vector3dVector(ends)
         drawn.lines = o3d.utility.Vector2iVector(lines.reshape(-1, 2).astype(np.int32))
-        drawn.colors = o3d.utility.Vector3dVector(np.repeat(colormaps["viridis"](self.quality)[:, :3], 4, axis=0))
+        worst, best = self.quality.min(initial=1), self.quality.max(initial=0)
+        shade = (self.quality - worst) / (best - worst) if best > worst else np.ones(len(self))
+        drawn.colors = o3d.utility.Vector3dVector(np.repeat(colormaps["viridis"](shade)[:, :3], 4, axis=0))
         return drawn
 
     def to_csv(self, path: str | os.PathLike) -> None:

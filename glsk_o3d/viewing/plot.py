@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 _PAPER, _INK = 0.93, 0.55  # greys of the farthest and of the nearest point
+_TITLE = 0.3  # inches
 _ROOM = 0.09  # from the middle of what matplotlib's orthographic eye sees to its edge
 
 
@@ -113,8 +114,18 @@ def plot_skeleton(
     axes.set_box_aspect(half)
     if len(shown):  # matplotlib leaves room for the corners of the box, which is empty there
         across, up, _ = proj_transform(*shown.T, axes.get_proj())
-        room = _ROOM * axes.get_position(original=True).size * axes.figure.get_size_inches()
-        room = room / room.min()  # it sees a square
-        axes.set_box_aspect(half, zoom=_ROOM * min(room[0] / np.abs(across).max(), room[1] / np.abs(up).max()))
+        room = _ROOM * _squares(axes)
+        axes.set_box_aspect(half, zoom=min(room[0] / np.abs(across).max(), room[1] / np.abs(up).max()))
     axes.set_axis_off()
     return axes
+
+
+def _squares(axes):
+    """Width and height that are free for the drawing, over the side of the square that matplotlib gives it."""
+    size, spec = axes.figure.get_size_inches(), axes.get_subplotspec()
+    if spec is None:
+        width, height = axes.get_position().size * size
+    else:
+        rows, columns, *_ = spec.get_geometry()
+        width, height = size * [len(spec.colspan) / columns, len(spec.rowspan) / rows]
+    return np.array([width, min(max(height - _TITLE, height / 2), width)]) / min(width, height)

@@ -258,6 +258,8 @@ def test_lines_of_the_gripper():
     np.testing.assert_allclose(tips[:, 0] - tips[:, 1], grasps.opening[:, None] * grasps.closing, atol=1e-12)
     np.testing.assert_allclose(points[:, 4], grasps.positions - grasps.opening[:, None] * grasps.approach, atol=1e-12)
     assert np.asarray(lines.lines).shape == np.asarray(lines.colors).shape[:1] + (2,) == (4 * len(grasps), 2)
+    colour = np.asarray(lines.colors)[::4]
+    assert (colour[0] > colour[-1]).tolist() == [True, True, False]  # yellow is best, dark blue worst
     ends = np.asarray(lines.points)[np.asarray(lines.lines)]
     assert np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).min() > 0.4 * grasps.opening.min()
 
