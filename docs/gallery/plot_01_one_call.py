@@ -11,14 +11,13 @@ import matplotlib.pyplot as plt
 import glsk_o3d as glsk
 from glsk_o3d.samples import sample_object
 
-cloud = sample_object().points  # (8192, 3); or glsk.read_cloud("scan.ply"), or what Open3D gives you
+cloud = sample_object().points  # or glsk.read_cloud("scan.ply"), or one of Open3D's
 skeleton = glsk.skeletonize(cloud)
 print(skeleton)
 
 # %%
 # It is a graph in space: vertices, edges, the local radius at each vertex, and for every point the vertex it belongs
-# to. The loop is the handle. The leaves are nose, tail, four feet, and a small twig in the hind leg whose inner side
-# no camera saw.
+# to. The loop is the handle. Leaves are nose, tail and feet; a leg whose inner side no camera saw may have a twig more.
 
 glsk.plot_skeleton(skeleton, color="radius")
 plt.show()

@@ -38,7 +38,8 @@ plt.show()
 # The same with noise on one arm. The rows notice noise long before the skeleton does: that arm is red, and both
 # skeletons are still one.
 
-noisy = clean + np.where(clean[:, :1] < -0.1, 0.003, 0) * np.random.default_rng(0).normal(size=clean.shape)
+noise = np.random.default_rng(0).normal(scale=0.003, size=clean.shape)
+noisy = clean + noise * (clean[:, :1] < -0.1)
 check = cross_check(noisy)
 print(check.verdict, *check.reasons, sep="\n  ")
 print(

@@ -34,9 +34,9 @@ columns = (solves + 3) // 2
 for solve, points in enumerate([*recorder.positions, None]):
     axes = figure.add_subplot(2, columns, solve + 1, projection="3d")
     drawn = None if points is not None else skeleton
-    points = recorder.positions[-1] if points is None else points
-    glsk.plot_skeleton(drawn, axes, cloud=points)
-    axes.set_title("skeleton" if drawn else f"after solve {solve}" if solve else "the cloud", fontsize=10)
+    glsk.plot_skeleton(drawn, axes, cloud=recorder.positions[-1] if points is None else points)
+    title = "skeleton" if drawn else f"after solve {solve}" if solve else "the cloud"
+    axes.set_title(title, fontsize=10)
 plt.show()
 
 # %%
@@ -47,7 +47,8 @@ class Film(bytes):
     """A GIF that shows itself in notebooks and on this page."""
 
     def _repr_html_(self):
-        return f'<img alt="the contraction" src="data:image/gif;base64,{base64.b64encode(self).decode()}">'
+        data = base64.b64encode(self).decode()
+        return f'<img alt="the contraction" src="data:image/gif;base64,{data}">'
 
 
 axes = glsk.plot_skeleton(None, cloud=recorder.positions[0])
@@ -57,9 +58,8 @@ steps = [solve + part for solve in range(solves) for part in (0, 0, 0, 0, 0.2, 0
 
 def draw(step):
     before = int(step)
-    after = min(before + 1, solves)
-    points = (1 - step % 1) * recorder.positions[before] + step % 1 * recorder.positions[after]
-    dots._offsets3d = points.T
+    one, other = recorder.positions[before], recorder.positions[min(before + 1, solves)]
+    dots._offsets3d = (one + step % 1 * (other - one)).T
     axes.set_title(f"solve {before}")
 
 
@@ -67,4 +67,4 @@ with TemporaryDirectory() as folder:
     FuncAnimation(axes.figure, draw, frames=steps).save(Path(folder, "film.gif"), writer="pillow", fps=10, dpi=70)
     film = Film(Path(folder, "film.gif").read_bytes())
 plt.close(axes.figure)
-film  # noqa: B018
+film
