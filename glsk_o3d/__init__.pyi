@@ -33,6 +33,7 @@ from .skeleton import Skeleton
 from .state import Contraction
 from .stopping import ExplainedScore, RingSizeRatio
 from .viewing.page import save_report
+from .viewing.plot import plot_skeleton
 from .viewing.recorder import ContractionRecorder
 
 __version__: str
@@ -69,6 +70,7 @@ __all__ = [
     "batch",
     "load_recipe",
     "pipelines",
+    "plot_skeleton",
     "read_cloud",
     "read_skeleton",
     "remove_redundant_points",

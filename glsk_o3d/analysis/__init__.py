@@ -4,6 +4,7 @@ from .branches import BranchTable, branch_table
 from .crosscheck import CrossCheck, cross_check
 from .crosscheck_picture import save_crosscheck_picture
 from .curvature import curvature_torsion
+from .grasps import GraspCandidates, grasp_candidates
 from .metrics import Assessment, Comparison, Loop, assess, compare
 from .picture import save_picture
 from .segmentation import segment
@@ -14,6 +15,7 @@ __all__ = [
     "BranchTable",
     "Comparison",
     "CrossCheck",
+    "GraspCandidates",
     "Loop",
     "Truth",
     "assess",
@@ -21,6 +23,7 @@ __all__ = [
     "compare",
     "cross_check",
     "curvature_torsion",
+    "grasp_candidates",
     "read_truth",
     "save_crosscheck_picture",
     "save_picture",

@@ -1,0 +1,284 @@
+"""Grasp candidates on axes whose openings, counts and directions are known."""
+
+import csv
+import json
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from glsk_o3d import InvalidParameterError, Skeleton, SkeletonWarning, samples, skeletonize
+from glsk_o3d.analysis import GraspCandidates, grasp_candidates
+
+ARRAYS = [field.name for field in fields(GraspCandidates)][:7]
+WIDE = 10.0
+
+
+def axis_of(sample, confidence=1.0):
+    sure = np.full(len(sample.nodes), confidence)
+    return Skeleton(sample.nodes, sample.edges, sample.radii, (), (), (), confidence=sure)
+
+
+def cone(start=0.1, end=0.25, length=1.0, pieces=7):
+    """A tapered tube along x; the radii are those of the balls that touch it, as in `samples`."""
+    x = np.linspace(0, length, pieces + 1)
+    row = np.arange(pieces)
+    radii = start + (end - start) / length * x
+    return Skeleton(x[:, None] * [1.0, 0, 0], np.column_stack([row, row + 1]), radii, (), (), (), confidence=0 * x + 1)
+
+
+TUBE = axis_of(samples.tube(10, length=1.0, radius=0.1))
+SAUROPOD = axis_of(samples.sauropod(10))
+
+
+def directions_are_sound(grasps):
+    identity = grasps.poses[:, :3, :3].transpose(0, 2, 1) @ grasps.poses[:, :3, :3]
+    np.testing.assert_allclose(identity, np.tile(np.eye(3), (len(grasps), 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(grasps.poses), 1)
+
+
+# -------------------------------------------------------------------------------------------------------- closed forms
+
+
+def test_a_straight_tube():
+    grasps = grasp_candidates(TUBE, 0.5, clearance=0.03, around=6, spacing=0.1)
+    directions_are_sound(grasps)
+    assert (len(grasps), grasps.places, grasps.left_out) == (54, 9, {})
+    np.testing.assert_allclose(grasps.positions[::6], np.linspace(-0.4, 0.4, 9)[:, None] * [1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(grasps.opening, 0.23)
+    np.testing.assert_allclose(grasps.quality, 1 - 0.2 / 0.5)
+    np.testing.assert_allclose(grasps.axis, np.tile([1, 0, 0], (54, 1)), atol=1e-12)
+    np.testing.assert_allclose(grasps.approach[0], [0, 0, -1], atol=1e-12)  # from above
+    turn = np.einsum("gij,gkj->gik", *[grasps.approach.reshape(9, 6, 3)] * 2)
+    step = np.arange(6)
+    np.testing.assert_allclose(turn, np.tile(np.cos(np.pi / 3 * (step - step[:, None])), (9, 1, 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize("skeleton", [TUBE, cone(), cone(0.25, 0.04), cone(0.02, 0.3)])
+def test_jaws_without_clearance_touch_the_surface(skeleton):
+    grasps = grasp_candidates(skeleton, WIDE, clearance=0, around=5)
+    for side in (-1, 1):
+        jaws = grasps.positions + side * grasps.opening[:, None] / 2 * grasps.closing
+        distance = samples.signed_distance(jaws, skeleton.vertices, skeleton.edges, skeleton.radii)
+        np.testing.assert_allclose(distance, 0, atol=1e-12)
+
+
+def test_a_cone_is_wider_across_than_the_ball_in_it():
+    grasps = grasp_candidates(cone(0.1, 0.25), 1.0, clearance=0.01, spacing=0.1)
+    slope, radius = 0.15, 0.1 + 0.15 * grasps.positions[:, 0]
+    width = 2 * radius / np.sqrt(1 - slope**2)
+    np.testing.assert_allclose(grasps.opening, width + 0.01)
+    np.testing.assert_allclose(grasps.quality, (1 - width) * np.sqrt(1 - slope**2))
+    assert (np.diff(grasps.positions[:, 0]) >= 0).all()  # the thin end is best
+
+
+def test_a_cone_that_is_one_ball_has_no_width():
+    with pytest.warns(SkeletonWarning, match="5 too wide"):
+        assert len(grasp_candidates(cone(0.1, 1.2), WIDE, spacing=0.25, margin=0)) == 0
+
+
+def test_a_torus():
+    skeleton = axis_of(samples.torus(10, ring_radius=0.4, radius=0.1))
+    grasps = grasp_candidates(skeleton, 0.5, clearance=0.05, around=4)
+    directions_are_sound(grasps)
+    assert grasps.places == round(2 * np.pi * 0.4 / 0.1) == 25
+    np.testing.assert_allclose(grasps.opening, 0.25)
+    position, out = grasps.positions[::4], grasps.positions / np.linalg.norm(grasps.positions, axis=1, keepdims=True)
+    gap = np.linalg.norm(position - np.roll(position, 1, axis=0), axis=1)
+    np.testing.assert_allclose(gap, 2 * 0.4 * np.sin(np.pi / 25), rtol=2e-3)
+    turned = np.abs(np.einsum("ij,ij->i", grasps.axis, out))
+    assert turned.max() <= np.sin(np.pi / 128)  # of the polygon that stands for the circle
+    np.testing.assert_allclose(grasps.approach[::4], np.tile([0, 0, -1], (25, 1)), atol=1e-9)
+
+
+@pytest.mark.parametrize(("spacing", "count"), [(0.1, 9), (0.8, 2), (0.81, 1), (5.0, 1), (0.05, 17)])
+def test_places_share_the_room_between_the_margins(spacing, count):
+    x = grasp_candidates(TUBE, WIDE, spacing=spacing, around=1).positions[:, 0]
+    assert len(x) == count
+    np.testing.assert_allclose(np.diff(np.sort(x)), spacing)
+    np.testing.assert_allclose(x.min(), -x.max(), atol=1e-12)
+
+
+def test_turned_moved_and_scaled():
+    turn, shift, scale = Rotation.from_rotvec([0.3, -1.1, 0.7]), np.array([3.0, -7.0, 1.0]), 25.0
+    moved = replace(SAUROPOD, vertices=scale * turn.apply(SAUROPOD.vertices) + shift, radii=scale * SAUROPOD.radii)
+    here = grasp_candidates(SAUROPOD, 0.2, around=3)
+    there = grasp_candidates(moved, 0.2 * scale, around=3, up=turn.apply([0, 0, 1]))
+    assert len(here) == len(there) > 100
+    assert here.left_out == there.left_out
+    np.testing.assert_allclose(there.positions, scale * turn.apply(here.positions) + shift, atol=1e-9)
+    np.testing.assert_allclose(there.opening, scale * here.opening)
+    np.testing.assert_allclose(there.quality, here.quality)
+    for name in ("approach", "closing"):
+        np.testing.assert_allclose(getattr(there, name), turn.apply(getattr(here, name)), atol=1e-9)
+
+
+@pytest.mark.parametrize("up", [(1, 0, 0), (-2, 0, 0), (1, 1e-9, 0)])
+def test_an_axis_that_points_up(up):
+    grasps = grasp_candidates(TUBE, 0.5, up=up, around=2)
+    directions_are_sound(grasps)
+    np.testing.assert_allclose(grasps.approach[::2], np.tile(grasps.approach[0], (grasps.places, 1)))
+
+
+# ------------------------------------------------------------------------------------------------------ what is taken
+
+
+def test_places_keep_away_from_ends_and_junctions():
+    sample = samples.y_junction(10, radii=(0.09, 0.05, 0.05))
+    grasps = grasp_candidates(axis_of(sample), WIDE, margin=1.5, spacing=0.01)
+    distance = np.linalg.norm(grasps.positions[:, None] - sample.nodes, axis=2)
+    assert (distance >= 1.5 * sample.radii - 1e-12).all()
+    np.testing.assert_allclose(distance.min(axis=0), 1.5 * sample.radii, atol=0.01)
+    assert set(grasps.branch) == {0, 1, 2}
+
+
+def test_a_loop_with_a_junction_has_margins_too(loop):
+    skeleton = replace(loop, radii=np.full(6, 0.2), confidence=np.ones(6), edges=[[0, 1], [1, 2], [2, 3], [0, 3]])
+    whole = grasp_candidates(skeleton, WIDE, spacing=0.01, around=1)
+    tailed = replace(skeleton, edges=[*skeleton.edges, [0, 5]])
+    assert whole.places == round(skeleton.length / 0.01)
+    grasps = grasp_candidates(tailed, WIDE, spacing=0.01, around=1)
+    ring = grasps.branch == next(i for i, path in enumerate(tailed.branches) if path[0] == path[-1])
+    assert np.linalg.norm(grasps.positions[ring] - tailed.vertices[0], axis=1).min() > 0.19
+    assert 0 < ring.sum() == int((skeleton.length - 0.4) / 0.01) + 1
+
+
+def test_every_place_is_taken_or_told():
+    doubtful = replace(SAUROPOD, confidence=np.where(SAUROPOD.vertices[:, 0] > 0.3, 0.2, 0.9))
+    grasps = grasp_candidates(doubtful, 0.16, min_opening=0.065, clearance=0.01, around=3)
+    assert set(grasps.left_out) >= {"too wide", "too thin", "uncertain"}
+    places = sum(count for reason, count in grasps.left_out.items() if not reason.startswith("branches"))
+    assert len(grasps) == 3 * (grasps.places - places)
+    assert grasps.opening.max() <= 0.16
+    assert grasps.opening.min() > 0.065 + 0.01
+    assert grasps.confidence.min() >= 0.5
+    assert (np.diff(grasps.quality) <= 0).all()
+    assert (grasps.quality > 0).all()
+    assert (grasps.quality < 0.9).all()
+    assert "too wide" in repr(grasps)
+
+
+@pytest.mark.parametrize(
+    ("skeleton", "options", "why"),
+    [
+        (TUBE, dict(max_opening=0.2), "no grasp at 9 places: 9 too wide"),
+        (TUBE, dict(max_opening=0.3, min_opening=0.21), "9 too thin"),
+        (axis_of(samples.tube(10), 0.3), dict(max_opening=1.0), "9 uncertain"),
+        (TUBE, dict(max_opening=1.0, margin=6), "no grasp at 0 places: 1 branches without a place"),
+        (replace(TUBE, edges=()), dict(max_opening=1.0), "the skeleton has no branch"),
+        (replace(TUBE, vertices=[[1, 2, 3]] * 2), dict(max_opening=1.0), "1 branches without a place"),
+    ],
+)
+def test_nothing_to_grasp_is_told(skeleton, options, why, tmp_path):
+    with pytest.warns(SkeletonWarning, match=why) as warned:
+        grasps = grasp_candidates(skeleton, **options)
+    assert warned[0].filename == __file__
+    assert len(grasps) == len(list(grasps)) == 0
+    assert grasps.positions.shape == grasps.approach.shape == grasps.closing.shape == grasps.axis.shape == (0, 3)
+    assert grasps.poses.shape == (0, 4, 4)
+    assert len(grasps.to_line_set().lines) == 0
+    grasps.to_csv(tmp_path / "g.csv")
+    assert (tmp_path / "g.csv").read_text().startswith("position_x,")
+    grasps.to_json(tmp_path / "g.json")
+    assert json.loads((tmp_path / "g.json").read_text())["grasps"] == []
+
+
+def test_unknown_confidence_and_radii():
+    unknown = replace(TUBE, confidence=())
+    with pytest.raises(InvalidParameterError, match="min_confidence=0"):
+        grasp_candidates(unknown, 0.5)
+    grasps = grasp_candidates(unknown, 0.5, min_confidence=0)
+    assert np.isnan(grasps.confidence).all()
+    np.testing.assert_array_equal(grasps.quality, grasp_candidates(TUBE, 0.5).quality)
+    with pytest.raises(InvalidParameterError, match="radii"):
+        grasp_candidates(replace(TUBE, radii=[np.nan] * 2), 0.5)
+    half = replace(cone(), radii=np.where(np.arange(8) < 4, 0.1, np.nan))
+    grasps = grasp_candidates(half, 0.5)
+    assert grasps.left_out["unknown radius"] > 0
+    assert grasps.positions[:, 0].max() < 3 / 7
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (dict(max_opening=0), "max_opening = 0: .* above 0"),
+        (dict(max_opening=np.inf), "max_opening"),
+        (dict(max_opening="wide"), "max_opening = 'wide'"),
+        (dict(max_opening=1.0, min_opening=1.5), "min_opening = 1.5: .* at most 1.0"),
+        (dict(max_opening=1.0, clearance=-0.1), "clearance"),
+        (dict(max_opening=1.0, spacing=0.0), "spacing"),
+        (dict(max_opening=1.0, margin=np.nan), "margin"),
+        (dict(max_opening=1.0, min_confidence=1.1), "min_confidence"),
+        (dict(max_opening=1.0, around=0), "around = 0"),
+        (dict(max_opening=1.0, around=2.0), "around = 2.0"),
+        (dict(max_opening=1.0, up=(0, 0, 0)), "up"),
+        (dict(max_opening=1.0, up="z"), "up = 'z'"),
+    ],
+)
+def test_wrong_parameters(options, said):
+    with pytest.raises(InvalidParameterError, match=said):
+        grasp_candidates(TUBE, **options)
+
+
+def test_an_empty_skeleton():
+    with pytest.raises(InvalidParameterError, match="empty"):
+        grasp_candidates(Skeleton((), (), (), (), (), ()), 1.0)
+
+
+def test_on_the_skeleton_of_a_cloud():
+    sample = samples.tube(2048, radius=0.08, noise=0.001)
+    grasps = grasp_candidates(skeletonize(sample.points), 0.5, clearance=0)
+    assert grasps.places > 5
+    np.testing.assert_allclose(grasps.opening, 0.16, rtol=0.05)
+    np.testing.assert_allclose(np.abs(grasps.axis[:, 0]), 1, atol=0.005)
+    assert np.hypot(*grasps.positions[:, 1:].T).max() < 0.05 * 0.08
+
+
+# ------------------------------------------------------------------------------------------------------------- results
+
+
+def test_some_of_them():
+    grasps = grasp_candidates(SAUROPOD, 0.2)
+    for some, rows in ((grasps[:3], [0, 1, 2]), (grasps[5], [5]), (grasps[grasps.branch == 2], None)):
+        rows = np.flatnonzero(grasps.branch == 2) if rows is None else rows
+        for name in ARRAYS:
+            np.testing.assert_array_equal(getattr(some, name), getattr(grasps, name)[rows])
+    with pytest.raises(IndexError):
+        grasps[len(grasps)]
+
+
+def test_lines_of_the_gripper():
+    grasps = grasp_candidates(SAUROPOD, 0.2, around=2)
+    lines = grasps.to_line_set()
+    points = np.asarray(lines.points).reshape(-1, 6, 3)
+    assert len(points) == len(grasps)
+    tips = points[:, [0, 3]]
+    np.testing.assert_allclose(tips.mean(axis=1), grasps.positions, atol=1e-12)
+    np.testing.assert_allclose(tips[:, 0] - tips[:, 1], grasps.opening[:, None] * grasps.closing, atol=1e-12)
+    np.testing.assert_allclose(points[:, 4], grasps.positions - grasps.opening[:, None] * grasps.approach, atol=1e-12)
+    assert np.asarray(lines.lines).shape == np.asarray(lines.colors).shape[:1] + (2,) == (4 * len(grasps), 2)
+    colour = np.asarray(lines.colors)[::4]
+    assert (colour[0] > colour[-1]).tolist() == [True, True, False]  # yellow is best, dark blue worst
+    ends = np.asarray(lines.points)[np.asarray(lines.lines)]
+    assert np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).min() > 0.4 * grasps.opening.min()
+
+
+def test_files(tmp_path):
+    grasps = grasp_candidates(replace(SAUROPOD, confidence=()), 0.2, min_confidence=0)
+    grasps.to_csv(tmp_path / "g.csv")
+    with (tmp_path / "g.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == len(grasps)
+    assert {row["confidence"] for row in rows} == {""}
+    for name in ("position", "approach", "closing"):
+        values = np.array([[float(row[f"{name}_{axis}"]) for axis in "xyz"] for row in rows])
+        np.testing.assert_array_equal(values, getattr(grasps, f"{name}s" if name == "position" else name))
+    grasps.to_json(tmp_path / "g.json")
+    data = json.loads((tmp_path / "g.json").read_text())
+    assert (data["places"], data["left_out"]) == (grasps.places, grasps.left_out)
+    np.testing.assert_array_equal([row["pose"] for row in data["grasps"]], grasps.poses)
+    np.testing.assert_array_equal([row["opening"] for row in data["grasps"]], grasps.opening)
+    assert {row["confidence"] for row in data["grasps"]} == {None}
+    with pytest.raises(FileNotFoundError):
+        grasps.to_json(tmp_path / "none" / "g.json")

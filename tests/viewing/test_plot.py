@@ -1,0 +1,89 @@
+"""A skeleton in matplotlib's axes."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from glsk_o3d import InvalidCloudError, InvalidParameterError, plot_skeleton, samples
+
+plt = pytest.importorskip("matplotlib.pyplot")
+
+
+@pytest.fixture(autouse=True)
+def agg():
+    plt.switch_backend("Agg")
+    yield
+    plt.close("all")
+
+
+def pixels(axes):
+    axes.figure.canvas.draw()
+    return np.asarray(axes.figure.canvas.buffer_rgba())[..., :3] / 255
+
+
+def is_red(image):
+    return (image[..., 0] > 0.7) & (image[..., 1] < 0.4) & (image[..., 2] < 0.4)
+
+
+def box_of(mask):
+    rows, columns = np.nonzero(mask)
+    return np.ptp(columns) + 1, np.ptp(rows) + 1
+
+
+def frame(make, width, height):
+    """A rectangle in the plane y = 0, as a skeleton without a cloud."""
+    corners = np.array([[0, 0, 0], [width, 0, 0], [width, 0, height], [0, 0, height]], float)
+    rectangle = make(corners, [[0, 1], [1, 2], [2, 3], [0, 3]])
+    return dataclasses.replace(rectangle, points=(), vertex_of_point=(), normals=())
+
+
+@pytest.mark.parametrize(("width", "height"), [(3, 1), (1, 1), (1, 4), (1e6, 7e5)])
+@pytest.mark.parametrize("grid", [None, (1, 3), (2, 2)])
+def test_one_scale_and_all_of_it(make, width, height, grid):
+    axes = None
+    if grid is not None:
+        axes = plt.figure(figsize=(9, 4), layout="constrained").add_subplot(*grid, 2, projection="3d")
+        axes.set_title("above")
+    image = pixels(plot_skeleton(frame(make, width, height), axes, view=(0, -90)))
+    across, up = box_of(is_red(image))
+    assert (across - 3) / (up - 3) == pytest.approx(width / height, rel=0.06)
+    assert is_red(image).sum() == is_red(image[1:-1, 1:-1]).sum()  # nothing is cut off
+    if grid is None:
+        assert max(across / image.shape[1], up / image.shape[0]) > 0.85
+
+
+def test_the_skeleton_is_on_top_and_the_cloud_below(tree):
+    full = dataclasses.replace(tree, points=np.concatenate([tree.points[2:]] * 3), vertex_of_point=(), normals=())
+    image = pixels(plot_skeleton(full))
+    grey = (np.ptp(image, axis=-1) < 0.02) & (image[..., 0] < 0.95)
+    assert is_red(image).sum() > 100
+    assert grey.sum() > 5
+
+
+def test_a_cloud_alone_in_colours():
+    points = samples.torus(500).points
+    points[3] = np.nan
+    axes = plot_skeleton(None, cloud=points, point_colors=np.tile([0.9, 0.1, 0.1], (500, 1)), point_size=8)
+    assert is_red(pixels(axes)).sum() > 500
+    assert len(axes.collections) == 1
+    assert len(axes.collections[0].get_facecolor()) in (1, 499)
+    few = plot_skeleton(None, cloud=points, most_points=100)
+    assert len(few.collections[0].get_facecolor()) <= 100
+
+
+@pytest.mark.parametrize("color", ["branch", "radius", "confidence", (0, 0, 1)])
+def test_colours_of_edges(skeleton, color):
+    axes = plot_skeleton(skeleton, color=color)
+    pixels(axes)
+    for drawn in axes.collections[1:]:
+        assert len(drawn.get_edgecolor()) == len(skeleton.edges)
+
+
+def test_what_is_wrong(tree):
+    with pytest.raises(InvalidParameterError, match="color"):
+        plot_skeleton(tree, color="size")
+    with pytest.raises(InvalidParameterError, match="7 points need as many colours"):
+        plot_skeleton(tree, point_colors=np.zeros((3, 3)))
+    with pytest.raises(InvalidCloudError):
+        plot_skeleton(tree, cloud="scan.ply")
