@@ -22,7 +22,8 @@ def curvature_torsion(skeleton: Skeleton, window: float | None = None) -> tuple[
     """Curvature and torsion of a skeleton's branches, as curves in space.
 
     Around every vertex a polynomial of fourth degree is fitted to the branch by weighted least squares, in arc length
-    over a window; the Frenet formulas give curvature |r' x r''| / |r'|^3 and torsion (r' x r'') . r''' / |r' x r''|^2.
+    over a window; the Frenet formulas give curvature ``|r' x r''| / |r'|^3`` and torsion
+    ``(r' x r'') . r''' / |r' x r''|^2``.
     Closed branches are taken as closed. Near an open end, within half of half a window, they are those half of half a
     window away from it: one-sided fits mean little.
 

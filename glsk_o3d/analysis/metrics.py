@@ -49,7 +49,7 @@ class Comparison:
         Mean over the axis's leaves of the distance to the nearest leaf of the skeleton (to its nearest vertex, if it
         has no leaf) over the radius at the axis's leaf. 0 is best. None if the axis has no leaf.
     radius_error : float or None
-        Mean over the skeleton of |r - radius| / radius, with its own radii r interpolated along its edges. 0 is best.
+        Mean over the skeleton of ``|r - radius| / radius``, with its own radii r interpolated along its edges. 0 is best.
         None if the skeleton has no radii; places between vertices of which one has none do not count.
     components, loops, leaves, junctions : int
         Their number in the skeleton minus that in the axis. Loops are counted by the cycle rank.
