@@ -8,7 +8,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "_ext")]
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-import glsk_o3d
+import glsk_o3d  # noqa: E402
 
 project = "glsk-o3d"
 author = "glsk-o3d contributors"

@@ -64,7 +64,18 @@ def parameter(
 
 
 def documented(cls):
-    """Class decorator: append the numpydoc "Parameters" section made from the fields' own facts."""
+    """Class decorator: append the numpydoc "Parameters" section made from the fields' own facts.
+
+    Parameters
+    ----------
+    cls : dataclass
+        All of whose fields are made by `parameter`.
+
+    Returns
+    -------
+    class
+        The same.
+    """
     lines = []
     for field in dataclasses.fields(cls):
         facts = field.metadata

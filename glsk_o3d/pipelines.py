@@ -73,6 +73,14 @@ def known_pipelines() -> dict[str, Callable[[], Pipeline]]:
 def named_pipeline(name: str) -> Pipeline:
     """The pipeline of that name, built in or of a plugin.
 
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    Pipeline
+
     Raises
     ------
     InvalidParameterError

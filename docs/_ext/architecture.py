@@ -27,7 +27,7 @@ ROWS = (
     {"Open3D's clouds": ("interop.open3d", "interop.verbosity")},
     {"errors": ("errors",)},
 )
-"""Boxes by row, from those who use to those who are used, and the modules in each; the longest name that fits counts."""
+"""Boxes by row, users above the used, and the modules in each; the longest name that fits counts."""
 
 
 def box_of(module):
@@ -54,7 +54,11 @@ def imports(package=PACKAGE):
     modules = {".".join(path.relative_to(package).with_suffix("").parts): path for path in package.rglob("*.py")}
     found = defaultdict(set)
     for name, path in modules.items():
-        here = name.removesuffix("__init__").removesuffix(".").split(".") if name.endswith("__init__") else name.split(".")[:-1]
+        here = (
+            name.removesuffix("__init__").removesuffix(".").split(".")
+            if name.endswith("__init__")
+            else name.split(".")[:-1]
+        )
         for node in ast.parse(path.read_text()).body:
             if not (isinstance(node, ast.ImportFrom) and node.level):
                 continue
@@ -64,7 +68,7 @@ def imports(package=PACKAGE):
                 target = whole if whole in modules or f"{whole}.__init__" in modules else ".".join(base)
                 if target:
                     found[name.removesuffix(".__init__")].add(target)
-    return found
+    return {name.removesuffix(".__init__"): found[name.removesuffix(".__init__")] for name in modules}
 
 
 def arrows():
@@ -94,7 +98,17 @@ def draw():
             names = ", ".join(prefixes)
             names = names if names != box else ""
             half = 1.1 if len(row) > 3 else 1.5 if len(names) < 40 else 2.6
-            axes.add_patch(FancyBboxPatch((x - half, y - 0.25), 2 * half, 0.5, boxstyle="round,pad=0,rounding_size=0.08", facecolor="#f3f0ea", edgecolor="#333333", linewidth=0.8))
+            axes.add_patch(
+                FancyBboxPatch(
+                    (x - half, y - 0.25),
+                    2 * half,
+                    0.5,
+                    boxstyle="round,pad=0,rounding_size=0.08",
+                    facecolor="#f3f0ea",
+                    edgecolor="#333333",
+                    linewidth=0.8,
+                )
+            )
             axes.text(x, y + 0.09 * bool(names), box, ha="center", va="center", fontsize=9, color="#222222")
             axes.text(x, y - 0.12, names, ha="center", va="center", fontsize=6.5, color="#666666", family="monospace")
     return figure
@@ -118,5 +132,6 @@ if __name__ == "__main__":
     print(sorted(upward()))
     for name, targets in sorted(imports().items()):
         bad = [t for t in targets if (box_of(name), box_of(t)) in upward()]
-        if bad: print(name, bad)
+        if bad:
+            print(name, bad)
     draw().savefig("/tmp/arch.png", dpi=100)

@@ -114,9 +114,7 @@ def lpr_reducer():
     points = animal()
     rings = glsk.RingBuilder()(points)
     whole, less = glsk.Contractor()(rings), glsk.Contractor(reducer=glsk.LPRReducer())(rings)
-    figure, axes = panels(
-        [f"without: {len(whole)} points", f"with: {len(less)} points, larger for more mass"], 0.8
-    )
+    figure, axes = panels([f"without: {len(whole)} points", f"with: {len(less)} points, larger for more mass"], 0.8)
     dots(axes[0], whole.contracted, RED, 2)
     dots(axes[1], less.contracted, RED, 1.5 * less.mass)
     same_scale(axes)
@@ -140,7 +138,8 @@ def refiner():
     raw = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(points)
     fine = glsk.Refiner()(raw)
     figure, axes = panels(
-        [f"before: {raw.n_loops} loops, counting triangles", f"after: {fine.n_loops} loop, {len(fine.leaves)} ends"], 0.8
+        [f"before: {raw.n_loops} loops, counting triangles", f"after: {fine.n_loops} loop, {len(fine.leaves)} ends"],
+        0.8,
     )
     for each, skeleton in zip(axes, (raw, fine), strict=True):
         dots(each, points, size=1)
@@ -181,7 +180,9 @@ def hull():
     inverted = offset / (offset**2).sum(axis=1, keepdims=True)
     where = {int(point): row for row, point in enumerate(nearest)}
     ring = [where[int(point)] for point in rings[i] if int(point) in where]
-    figure, axes = panels(["the neighbours in their plane, triangulated", "inverted, q = x / |x|²: corners of the hull"])
+    figure, axes = panels(
+        ["the neighbours in their plane, triangulated", "inverted, q = x / |x|²: corners of the hull"]
+    )
     for a, b, c in Delaunay(flat).simplices:
         inside = 0 in (a, b, c)
         colors = dict(facecolor="#fde3d3" if inside else "white", edgecolor=GREY)
@@ -276,7 +277,9 @@ def loop_test():
     points = animal()
     raw = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(points)
     skeleton = glsk.Refiner()(raw)
-    figure, axes = panels(["before: every loop of four edges and more", "after: the circle fits through the handle"], 0.8)
+    figure, axes = panels(
+        ["before: every loop of four edges and more", "after: the circle fits through the handle"], 0.8
+    )
     before = collapse_triangles(raw)
     for each, shown in zip(axes, (before, skeleton), strict=True):
         dots(each, points, size=1)
@@ -287,7 +290,9 @@ def loop_test():
             two = np.linalg.svd(loop - loop.mean(axis=0), full_matrices=False)[2][:2]
             angle = np.linspace(0, 2 * np.pi, 60)[:, None]
             circle = middle + radius * (np.cos(angle) * two[0] + np.sin(angle) * two[1])
-            each.add_collection(LineCollection([view(np.concatenate([loop, loop[:1]]))[:, :2]], colors=RED, linewidths=2))
+            each.add_collection(
+                LineCollection([view(np.concatenate([loop, loop[:1]]))[:, :2]], colors=RED, linewidths=2)
+            )
             each.plot(*view(circle)[:, :2].T, color=BLUE, linewidth=1.5)
     same_scale(axes)
     return figure

@@ -47,7 +47,9 @@ class Options(Directive):
         notes = dict(line.split(": ", 1) for line in self.content if line)
         fields = dataclasses.fields(cls)
         if list(notes) != [field.name for field in fields]:
-            raise self.error(f"{cls.__name__} has the options {', '.join(field.name for field in fields)}, in this order")
+            raise self.error(
+                f"{cls.__name__} has the options {', '.join(field.name for field in fields)}, in this order"
+            )
         shown = nodes.definition_list(classes=["options"])
         for field in fields:
             facts, default = field.metadata, [f"default {plain(field.default)}"]
@@ -58,7 +60,10 @@ class Options(Directive):
             touch, _ = self.state.inline_text(notes[field.name], self.lineno)
             told = nodes.paragraph("", "", nodes.emphasis(text="Touch it: "), *touch)
             shown += nodes.definition_list_item(
-                "", term, nodes.definition("", nodes.paragraph("", "", *text), told), ids=[f"{cls.__name__}.{field.name}"]
+                "",
+                term,
+                nodes.definition("", nodes.paragraph("", "", *text), told),
+                ids=[f"{cls.__name__}.{field.name}"],
             )
         return [shown]
 
