@@ -58,6 +58,7 @@ sphinx_gallery_conf = dict(
     write_computation_times=False,
 )
 
+smartquotes = False
 templates_path = ["_templates"]
 html_static_path = ["_static"]
 html_css_files = ["site.css"]

@@ -189,6 +189,12 @@ class Filter(Parameters):
     """A stage of a pipeline: a frozen, keyword-only dataclass that maps what it `consumes` to something new.
 
     Filters keep no state between calls and never change their input. They are joined with ``|``.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Connector, RingBuilder
+    >>> RingBuilder.consumes, RingBuilder.produces, Connector.produces
+    ('cloud', 'Contraction', 'Skeleton')
     """
 
     consumes: ClassVar[str] = "cloud"

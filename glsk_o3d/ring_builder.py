@@ -74,6 +74,13 @@ class RingBuilder(Filter):
     References
     ----------
     Wen et al. 2024, section II-A and figure 3; Cao et al. 2010, section 3.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> state = RingBuilder(k=12, around=0)(torus(500).points)
+    >>> len(state), bool(state.rings.closed.mean() > 0.9)
+    (500, True)
     """
 
     consumes: ClassVar[str] = "cloud"
@@ -184,7 +191,11 @@ class RingBuilder(Filter):
         survivors, owner, neighbours = self._thinned(distinct, neighbours, spread, most)
         n, positions, axes = len(survivors), distinct[survivors], plane_axes(across[survivors])
         rings = star_rings(positions, np.arange(n), self._within(positions, neighbours[:, 1:], frame), axes)
-        row_of_point, outlier, witness = np.full(len(points), -1), np.zeros(len(points), bool), np.zeros(len(points), bool)
+        row_of_point, outlier, witness = (
+            np.full(len(points), -1),
+            np.zeros(len(points), bool),
+            np.zeros(len(points), bool),
+        )
         row_of_point[finite], outlier[finite] = row[stands_for], stray[stands_for]
         witness[np.flatnonzero(finite)[sample]] = ~stray
         return Contraction(

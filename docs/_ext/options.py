@@ -58,7 +58,7 @@ class Options(Directive):
             term += nodes.inline(text=words, classes=["kind"])
             text, _ = self.state.inline_text(facts["doc"], self.lineno)
             touch, _ = self.state.inline_text(notes[field.name], self.lineno)
-            told = nodes.paragraph("", "", nodes.emphasis(text="Touch it: "), *touch)
+            told = nodes.paragraph("", "", nodes.emphasis(text="When to touch it: "), *touch)
             shown += nodes.definition_list_item(
                 "",
                 term,
