@@ -191,11 +191,7 @@ class RingBuilder(Filter):
         survivors, owner, neighbours = self._thinned(distinct, neighbours, spread, most)
         n, positions, axes = len(survivors), distinct[survivors], plane_axes(across[survivors])
         rings = star_rings(positions, np.arange(n), self._within(positions, neighbours[:, 1:], frame), axes)
-        row_of_point, outlier, witness = (
-            np.full(len(points), -1),
-            np.zeros(len(points), bool),
-            np.zeros(len(points), bool),
-        )
+        row_of_point, outlier, witness = np.full(len(points), -1), np.zeros(len(points), bool), np.zeros(len(points), bool)
         row_of_point[finite], outlier[finite] = row[stands_for], stray[stands_for]
         witness[np.flatnonzero(finite)[sample]] = ~stray
         return Contraction(

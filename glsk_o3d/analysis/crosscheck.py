@@ -201,7 +201,9 @@ def cross_check(
     skeletons = compare_skeletons(skeleton, other, diagonal)
     verdict, reasons = judge(rows, skeletons, skeleton.report.warnings, other.report)
     of_point = state.row_of_point
-    angle, length, share = (np.where(state.witness, values[of_point], np.nan) for values in (angle, length, share))
+    angle, length, share = (
+        np.where(state.witness, values[of_point], np.nan) for values in (angle, length, share)
+    )
     return CrossCheck(
         verdict=verdict,
         reasons=reasons,

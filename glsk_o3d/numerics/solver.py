@@ -101,7 +101,5 @@ def _stacked(laplacian, row_weight, position_weight):
     n = len(position_weight)
     data = np.concatenate([np.repeat(row_weight, np.diff(laplacian.indptr)) * laplacian.data, position_weight])
     indices = np.concatenate([laplacian.indices, np.arange(n, dtype=laplacian.indices.dtype)])
-    indptr = np.concatenate(
-        [laplacian.indptr, laplacian.indptr[-1] + np.arange(1, n + 1, dtype=laplacian.indptr.dtype)]
-    )
+    indptr = np.concatenate([laplacian.indptr, laplacian.indptr[-1] + np.arange(1, n + 1, dtype=laplacian.indptr.dtype)])
     return csr_array((data, indices, indptr), shape=(2 * n, n))
