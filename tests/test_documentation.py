@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 import glsk_o3d as glsk
 from glsk_o3d import samples
 from glsk_o3d.catalogue import BUILTIN
+from glsk_o3d.cli.overrides import override
 from glsk_o3d.filter import TYPES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -188,6 +189,13 @@ def test_every_option_has_a_unit_a_default_and_a_sentence(cls):
         assert facts["unit"]
         if facts["type"].startswith("length"):
             assert facts["unit"] != "-"
+
+
+def test_the_advice_on_parameters_can_be_taken():
+    settings = re.findall(r"`(\w+\.\w+=[^`]+)`", (ROOT / "docs" / "parameters.md").read_text())
+    assert len(settings) > 15
+    for setting in settings:
+        assert override(glsk.pipelines.default(), [setting]) != glsk.pipelines.default()
 
 
 def test_every_filter_has_a_page_with_all_its_sections():

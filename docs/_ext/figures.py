@@ -348,7 +348,7 @@ def write(folder: Path) -> None:
     if stamp.exists() and stamp.read_text() == state and all(path.exists() for path in wanted):
         return
     for draw, path in zip(FIGURES, wanted, strict=True):
-        draw().savefig(path, dpi=150)
+        draw().savefig(path, dpi=150, bbox_inches="tight")
     stamp.write_text(state)
 
 
