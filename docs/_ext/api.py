@@ -53,7 +53,7 @@ def write(folder: Path) -> None:
     for module, title in {**PACKAGES, **MODULES}.items():
         loaded = importlib.import_module(module)
         new = [name for name in names(module) if done.setdefault(id(getattr(loaded, name)), module) == module]
-        index += [title, "-" * len(title), "", f".. currentmodule:: {module}", "", ".. autosummary::", ""]
+        index += [title, "-" * len(title), "", f".. automodule:: {module}", "", ".. autosummary::", ""]
         index += [*(f"   {name}" for name in new), "", ".. toctree::", "   :hidden:", ""]
         index += [*(f"   {module}.{name}" for name in new), ""]
         for name in new:
