@@ -1,5 +1,6 @@
 """The site: built from the root of the repository, so that links between its Markdown files hold here as on GitHub."""
 
+import logging
 import os
 import sys
 from pathlib import Path
@@ -8,6 +9,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "_ext")]
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("DASK_LOGGING__DISTRIBUTED", "error")  # of the gallery's page on batches
+logging.getLogger("matplotlib.animation").setLevel(logging.WARNING)
 
 import glsk_o3d  # noqa: E402
 
