@@ -12,7 +12,7 @@ BENCH_ARGS ?= all --builtin --pictures benchmarks/results -o benchmarks/results/
 PYTHON_HINT = glsk-o3d needs Python 3.10 or newer: install it, or say 'make ... PYTHON=/path/to/python3'.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test accuracy bench lint format clean system-deps browser
+.PHONY: help demo test docs accuracy bench lint format clean system-deps browser
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -22,6 +22,10 @@ demo: $(VENV)/.installed-demo ## skeletonise the built-in sample object; writes 
 
 test: $(VENV)/.installed-test | browser ## run the whole test suite (PYTEST_ARGS="-k name" for a part)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MPLBACKEND=Agg $(BIN)/python -m pytest $(PYTEST_ARGS)
+
+docs: $(VENV)/.installed-docs ## build the site into build/docs/index.html (SPHINX_ARGS for sphinx-build)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -q -W --keep-going -c docs -d build/doctrees $(SPHINX_ARGS) . build/docs
+	@echo "The site is build/docs/index.html"
 
 accuracy: $(VENV)/.installed-demo ## how far skeletons are from known axes (ACCURACY_ARGS="ablation --builtin" for more)
 	$(BIN)/python benchmarks/accuracy.py $(ACCURACY_ARGS)
@@ -40,7 +44,7 @@ format: $(VENV)/.installed-test ## let ruff mend what it can
 	$(BIN)/ruff format .
 
 clean: ## remove what the other targets made, the virtual environment too
-	rm -rf $(VENV) demo benchmarks/results build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf $(VENV) demo docs/generated benchmarks/results build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Checked on every run (0.1 s), since the machine may have changed under an old .venv.
@@ -65,4 +69,9 @@ $(VENV)/.installed-demo: pyproject.toml | $(BIN)/python
 $(VENV)/.installed-test: pyproject.toml | $(BIN)/python
 	@echo "Installing glsk-o3d and what its tests need into $(VENV); the first time this takes a minute or more"
 	@$(PIP) install --editable '.[dev]'
+	@touch $@ $(VENV)/.installed-demo
+
+$(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
+	@echo "Installing glsk-o3d and what its site needs into $(VENV); the first time this takes a minute or more"
+	@$(PIP) install --editable '.[docs]'
 	@touch $@ $(VENV)/.installed-demo

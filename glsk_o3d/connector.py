@@ -39,6 +39,14 @@ class Connector(Filter):
     References
     ----------
     Cao et al. 2010, section 5; Wen et al. 2024, section II-D.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Contractor, RingBuilder
+    >>> from glsk_o3d.samples import torus
+    >>> raw = (RingBuilder() | Contractor() | Connector(radius="2%"))(torus(1000).points)
+    >>> raw.n_components, len(raw.edges) >= len(raw.vertices)
+    (1, True)
     """
 
     consumes: ClassVar[str] = "Contraction"

@@ -39,6 +39,14 @@ class Contractor(Filter):
     ----------
     Wen et al. 2024, equations 3 to 5 and figure 2; Cao et al. 2010, section 4. Equation 5 reads as a cumulative
     product; both published codes take the ratio to the first cloud, and so does this filter.
+
+    Examples
+    --------
+    >>> from glsk_o3d import RingBuilder
+    >>> from glsk_o3d.samples import torus
+    >>> state = (RingBuilder() | Contractor(max_iterations=2))(torus(500).points)
+    >>> state.report.stop_reason
+    'reached max_iterations = 2'
     """
 
     consumes: ClassVar[str] = "Contraction"

@@ -64,7 +64,18 @@ def parameter(
 
 
 def documented(cls):
-    """Class decorator: append the numpydoc "Parameters" section made from the fields' own facts."""
+    """Class decorator: append the numpydoc "Parameters" section made from the fields' own facts.
+
+    Parameters
+    ----------
+    cls : dataclass
+        All of whose fields are made by `parameter`.
+
+    Returns
+    -------
+    class
+        The same.
+    """
     lines = []
     for field in dataclasses.fields(cls):
         facts = field.metadata
@@ -178,6 +189,12 @@ class Filter(Parameters):
     """A stage of a pipeline: a frozen, keyword-only dataclass that maps what it `consumes` to something new.
 
     Filters keep no state between calls and never change their input. They are joined with ``|``.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Connector, RingBuilder
+    >>> RingBuilder.consumes, RingBuilder.produces, Connector.produces
+    ('cloud', 'Contraction', 'Skeleton')
     """
 
     consumes: ClassVar[str] = "cloud"

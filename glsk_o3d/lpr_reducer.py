@@ -44,6 +44,14 @@ class LPRReducer(Filter):
     References
     ----------
     Wen et al. 2024, equations 6 to 12 and algorithm 1.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Contractor, RingBuilder
+    >>> from glsk_o3d.samples import torus
+    >>> state = (RingBuilder() | Contractor(max_iterations=1))(torus(500).points)
+    >>> len(LPRReducer()(state)) < len(state)
+    True
     """
 
     consumes: ClassVar[str] = "Contraction"

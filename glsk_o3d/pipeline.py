@@ -147,6 +147,13 @@ def skeletonize(
         If the pipeline is unknown, lacks a stage, or has a wrong parameter.
     RecipeError
         If the recipe is wrong.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(1000).points)
+    >>> ring.n_loops, ring.vertices.shape[1]
+    (1, 3)
     """
     return as_pipeline(pipeline)(cloud, on_iteration=on_iteration, on_state=on_state)
 

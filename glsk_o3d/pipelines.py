@@ -18,7 +18,13 @@ if TYPE_CHECKING:
 
 
 def cao2010() -> Pipeline:
-    """The baseline: contraction without reduction, stopped by the ring sizes (Cao et al. 2010)."""
+    """The baseline: contraction without reduction, stopped by the ring sizes (Cao et al. 2010).
+
+    Examples
+    --------
+    >>> cao2010().stages[1].reducer is None
+    True
+    """
     return (
         RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
         | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0, line_hold=1, keep_last=False, retries=0)
@@ -32,6 +38,11 @@ def wen2024() -> Pipeline:
 
     Merges visit the points in the order of the input and drop the mass of what they merge; the stopping rule waits for
     the fourth solve. The pages of the filters list every difference.
+
+    Examples
+    --------
+    >>> wen2024().stages[1].reducer.conserve_mass
+    False
     """
     return (
         RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
@@ -50,7 +61,14 @@ def wen2024() -> Pipeline:
 
 
 def default() -> Pipeline:
-    """What we recommend: GLSkeleton with the mass of merged points kept and the vertices centred in the surface."""
+    """What we recommend: GLSkeleton with the mass of merged points kept and the vertices centred in the surface.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> default()(torus(1000).points).n_loops
+    1
+    """
     return RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore()) | Connector() | Refiner()
 
 
@@ -72,6 +90,14 @@ def known_pipelines() -> dict[str, Callable[[], Pipeline]]:
 
 def named_pipeline(name: str) -> Pipeline:
     """The pipeline of that name, built in or of a plugin.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    Pipeline
 
     Raises
     ------

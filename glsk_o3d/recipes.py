@@ -169,6 +169,15 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
         The ending is unknown, or the pipeline cannot be written; see `to_recipe`.
     OSError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d import pipelines
+    >>> with TemporaryDirectory() as folder:
+    ...     save_recipe(pipelines.default(), f"{folder}/usual.toml")
+    ...     load_recipe(f"{folder}/usual.toml") == pipelines.default()
+    True
     """
     from .interop.files import write_atomically
 
@@ -226,6 +235,15 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
         The file cannot be read.
     RecipeError
         It is no recipe, or a wrong one; the message names the file and the place in it.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder, "mine.json")
+    ...     _ = path.write_text('{"glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {"k": 12}}}')
+    ...     load_recipe(path).stages[0].k
+    12
     """
     ending = recipe_ending(path)
     data = Path(path).read_bytes()
@@ -440,6 +458,14 @@ def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -
     -----
     SkeletonWarning
         The result on the skeleton's own points differs from it: other releases computed it.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> skeleton = skeletonize(torus(1000).points)
+    >>> bool((rerun(skeleton).vertices == skeleton.vertices).all())
+    True
     """
     recipe = skeleton.report.recipe
     if not recipe:

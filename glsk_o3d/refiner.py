@@ -51,6 +51,15 @@ class Refiner(Filter):
     References
     ----------
     Cao et al. 2010, section 5; Wen et al. 2024, section II-D.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Connector, Contractor, RingBuilder
+    >>> from glsk_o3d.samples import torus
+    >>> raw = (RingBuilder() | Contractor() | Connector())(torus(1000).points)
+    >>> refined = Refiner(twig=2)(raw)
+    >>> refined.n_loops, len(refined.leaves)
+    (1, 0)
     """
 
     consumes: ClassVar[str] = "Skeleton"

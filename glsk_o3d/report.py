@@ -43,6 +43,14 @@ class IterationRecord:
         Estimated error of the linear solve, as a share of the cloud's size.
     seconds : float
         Wall time, the reduction included.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> first = skeletonize(torus(1000).points).report.iterations[0]
+    >>> first.iteration, first.ring_ratio < 1
+    (1, True)
     """
 
     iteration: int
@@ -105,6 +113,16 @@ class Report:
     stop_reason : str
     warnings : tuple of str
     versions : dict of str to str
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> report = skeletonize(torus(1000).points).report
+    >>> report.n_input, report.converged, report.warnings
+    (1000, True, ())
+    >>> list(report.seconds)
+    ['RingBuilder', 'Contractor', 'Connector', 'Refiner']
     """
 
     n_input: int = 0

@@ -75,6 +75,13 @@ class RingBuilder(Filter):
     References
     ----------
     Wen et al. 2024, section II-A and figure 3; Cao et al. 2010, section 3.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> state = RingBuilder(k=12, around=0)(torus(500).points)
+    >>> len(state), bool(state.rings.closed.mean() > 0.9)
+    (500, True)
     """
 
     consumes: ClassVar[str] = "cloud"

@@ -34,6 +34,12 @@ class Sample:
     radii : (M,) float64 array
         Distance from each node to the surface of its own part.
     name : str
+
+    Examples
+    --------
+    >>> ring = torus(1000)
+    >>> ring.points.shape, float(ring.radii.max())
+    ((1000, 3), 0.1)
     """
 
     points: np.ndarray
@@ -69,6 +75,11 @@ def sample_object(n: int = 8192, noise: float = 0.002, seed: int = 0, name: str 
     Returns
     -------
     Sample
+
+    Examples
+    --------
+    >>> sample_object(500)
+    Sample('sauropod', 500 points, 54 nodes, 54 edges)
     """
     if name not in SAMPLES:
         raise InvalidParameterError(f"no sample is called {name!r}; there are {', '.join(SAMPLES)}")
@@ -98,6 +109,11 @@ def sauropod(
     Returns
     -------
     Sample
+
+    Examples
+    --------
+    >>> sauropod(500)
+    Sample('sauropod', 500 points, 54 nodes, 54 edges)
     """
     nodes, edges, radii = _sauropod_axis()
     return _union_sample("sauropod", nodes, edges, radii, n, noise, seed, cameras)
@@ -124,6 +140,11 @@ def tube(
     Returns
     -------
     Sample
+
+    Examples
+    --------
+    >>> tube(500)
+    Sample('tube', 500 points, 2 nodes, 1 edges)
     """
     _check(n, noise, length=length, radius=radius)
     nodes, edges, radii = _chain(np.array([[-length / 2, 0, 0], [length / 2, 0, 0]]), radius)
@@ -153,6 +174,11 @@ def torus(n: int = 4096, *, ring_radius: float = 0.4, radius: float = 0.1, noise
     Returns
     -------
     Sample
+
+    Examples
+    --------
+    >>> torus(500)
+    Sample('torus', 500 points, 128 nodes, 128 edges)
     """
     _check(n, noise, ring_radius=ring_radius, radius=radius)
     if radius >= ring_radius:
@@ -193,6 +219,11 @@ def helix(
     Returns
     -------
     Sample
+
+    Examples
+    --------
+    >>> helix(500)
+    Sample('helix', 500 points, 193 nodes, 192 edges)
     """
     _check(n, noise, coil_radius=coil_radius, radius=radius, pitch=pitch, turns=turns)
     climb = pitch / (2 * np.pi)
@@ -257,6 +288,11 @@ def y_junction(
     Returns
     -------
     Sample
+
+    Examples
+    --------
+    >>> y_junction(500)
+    Sample('y_junction', 500 points, 4 nodes, 3 edges)
     """
     half = np.deg2rad(angle) / 2
     _check(n, noise, length=length, angle=angle, stem=radii[0], left=radii[1], right=radii[2])
@@ -286,6 +322,11 @@ def two_rings(
     Returns
     -------
     Sample
+
+    Examples
+    --------
+    >>> two_rings(500)
+    Sample('two_rings', 500 points, 256 nodes, 256 edges)
     """
     _check(n, noise, ring_radius=ring_radius, radius=radius)
     if 2 * radius >= ring_radius:
@@ -317,6 +358,11 @@ def sphere(n: int = 4096, *, radius: float = 0.5, noise: float = 0.0, seed: int 
     Returns
     -------
     Sample
+
+    Examples
+    --------
+    >>> sphere(500)
+    Sample('sphere', 500 points, 1 nodes, 0 edges)
     """
     _check(n, noise, radius=radius)
     rng = np.random.default_rng(seed)
@@ -344,6 +390,11 @@ def sheet(
     Returns
     -------
     Sample
+
+    Examples
+    --------
+    >>> sheet(500)
+    Sample('sheet', 500 points, 0 nodes, 0 edges)
     """
     _check(n, noise, length=length, width=width)
     if not 0 <= bend < 360:

@@ -43,6 +43,18 @@ class Skeleton:
     confidence : (M,) float64 array
         How well its points support each vertex, from 0 to 1: the share of what they say about where the axis is that
         they agree on, less where they are few. NaN where nobody has measured it.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(1000).points)
+    >>> ring.n_components, ring.n_loops, len(ring.leaves)
+    (1, 1, 0)
+    >>> abs(ring.length - 2 * np.pi * 0.4) < 0.1  # the axis is a circle of radius 0.4
+    True
+    >>> ring.vertex_of_point.shape
+    (1000,)
     """
 
     vertices: np.ndarray

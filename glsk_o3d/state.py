@@ -84,6 +84,14 @@ class Contraction:
     contraction_weight : float
         w_L of the last solve; 0 before the first.
     report : Report
+
+    Examples
+    --------
+    >>> from glsk_o3d import Contractor, RingBuilder
+    >>> from glsk_o3d.samples import torus
+    >>> state = (RingBuilder() | Contractor())(torus(500).points)
+    >>> state.contracted.shape == (len(state), 3), state.survivor_of_point.shape
+    (True, (500,))
     """
 
     points: np.ndarray

@@ -23,6 +23,14 @@ class ExplainedScore(Parameters):
 
     De is the change of e between two solves over the share of points kept between them. The published code never stops
     before the fourth solve, and so does this rule; without that it often stops after two, on an uncontracted cloud.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Contractor, RingBuilder
+    >>> from glsk_o3d.samples import torus
+    >>> state = (RingBuilder() | Contractor(stop=ExplainedScore(threshold=1, min_iterations=2)))(torus(500).points)
+    >>> len(state.report.iterations)
+    2
     """
 
     threshold: float = parameter(
@@ -40,7 +48,16 @@ class ExplainedScore(Parameters):
 @documented
 @dataclass(frozen=True)
 class RingSizeRatio(Parameters):
-    """Stop when the rings no longer shrink: a(t) - a(t+1) < threshold (Cao et al. 2010)."""
+    """Stop when the rings no longer shrink: a(t) - a(t+1) < threshold (Cao et al. 2010).
+
+    Examples
+    --------
+    >>> from glsk_o3d import Contractor, RingBuilder
+    >>> from glsk_o3d.samples import torus
+    >>> state = (RingBuilder() | Contractor(stop=RingSizeRatio(threshold=1)))(torus(500).points)
+    >>> state.report.stop_reason.partition(":")[0]
+    'rings stopped shrinking'
+    """
 
     threshold: float = parameter(0.01, "Drop of the ring ratio below which it is finished.", type="float", low=0)
 

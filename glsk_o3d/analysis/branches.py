@@ -57,6 +57,14 @@ class BranchTable:
         Points of the skeleton's cloud that belong to the branch; see `segment`.
     confidence : (B,) float array
         Mean confidence.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import y_junction
+    >>> table = skeletonize(y_junction(2000).points).branch_table()
+    >>> len(table), list(table)[0]["kind"], table.length.shape
+    (3, 'tip', (3,))
     """
 
     kind: np.ndarray
@@ -143,6 +151,14 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     ------
     InvalidParameterError
         The skeleton is empty, or the root is neither a vertex nor a point.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import y_junction
+    >>> table = branch_table(skeletonize(y_junction(2000).points))
+    >>> sorted(table.level.tolist())
+    [0, 1, 1]
     """
     m = len(skeleton.vertices)
     if m == 0:

@@ -47,6 +47,17 @@ def save_crosscheck_picture(
         matplotlib is not installed.
     OSError
         The folder does not exist, or the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d.analysis import cross_check
+    >>> from glsk_o3d.samples import torus
+    >>> with TemporaryDirectory() as folder:
+    ...     save_crosscheck_picture(cross_check(torus(2000).points), f"{folder}/where.png")
+    ...     Path(folder, "where.png").stat().st_size > 10_000
+    True
     """
     check_ending(path, "picture is a PNG", ".png")
     save_figure(_draw(check, np.asarray(size) / DPI, title), path)

@@ -63,6 +63,18 @@ def save_picture(
         matplotlib is not installed.
     OSError
         The folder does not exist, or the file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.analysis import compare
+    >>> from glsk_o3d.samples import torus
+    >>> ring = torus(1000)
+    >>> skeleton = skeletonize(ring.points)
+    >>> error = compare(skeleton, ring).edge_error
+    >>> with TemporaryDirectory() as folder:
+    ...     save_picture(skeleton, ring.points, error, f"{folder}/error.png", label="error")
     """
     check_ending(path, "picture is a PNG", ".png")
     if np.shape(values) != (len(skeleton.edges),):

@@ -43,6 +43,14 @@ def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
         There is no cloud, or it is none.
     InvalidParameterError
         The skeleton is empty.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import y_junction
+    >>> label = segment(skeletonize(y_junction(2000).points))
+    >>> label.shape, np.unique(label).tolist()
+    ((2000,), [0, 1, 2])
     """
     points, vertex = vertex_of_cloud(skeleton, cloud)
     return branch_of_point(skeleton, points, vertex)

@@ -31,6 +31,14 @@ class Truth:
     InvalidParameterError
         There are no nodes, shapes do not fit, a number is not finite, a radius is not positive, or an edge names a node
         that is not there.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> ring = torus(1000)
+    >>> truth = Truth(ring.nodes, ring.edges, ring.radii)
+    >>> len(truth.nodes) == len(ring.nodes)
+    True
     """
 
     nodes: np.ndarray
@@ -69,6 +77,17 @@ def read_truth(path: str | os.PathLike) -> Truth:
     FileNotFoundError
     FileFormatError
         It is neither, or what it holds is no axis.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d.samples import torus
+    >>> ring = torus(1000)
+    >>> with TemporaryDirectory() as folder:
+    ...     np.savez(f"{folder}/ring.npz", nodes=ring.nodes, edges=ring.edges, radii=ring.radii)
+    ...     truth = read_truth(f"{folder}/ring.npz")
+    >>> len(truth.edges) == len(ring.edges)
+    True
     """
     path = Path(path)
     try:

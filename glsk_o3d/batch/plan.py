@@ -34,6 +34,15 @@ class Task:
     why : str
         ``"done"`` if it is to be skipped, else why not: ``"new"``, ``"failed before"``, ``"other parameters"``,
         ``"outputs are gone"``, ``"input changed"`` or ``"asked for"``.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     Path(folder, "scan.ply").touch()
+    ...     plan = plan_batch(folder, f"{folder}/skeletons")
+    >>> plan.tasks[0].why
+    'new'
     """
 
     job: Job
@@ -56,6 +65,15 @@ class Plan:
         One per input, in the order of their names.
     ledger : Ledger
         As it is in the folder.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     Path(folder, "scan.ply").touch()
+    ...     plan = plan_batch(folder, f"{folder}/skeletons")
+    >>> len(plan.todo)
+    1
     """
 
     out_dir: Path
@@ -119,6 +137,15 @@ def plan_batch(
         The pipeline or a format is wrong, there is nothing to write, or a result would replace an input.
     RecipeError
         No recipe can hold the pipeline: then it cannot be told whether two runs are the same.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     Path(folder, "scan.ply").touch()
+    ...     plan = plan_batch(folder, f"{folder}/skeletons")
+    >>> [task.why for task in plan.tasks], plan.skipped
+    (['new'], 0)
     """
     recipe = as_pipeline(pipeline).to_recipe()
     try:

@@ -43,6 +43,16 @@ class BatchResult:
     seconds : float
         Wall time, from the first cloud handed out.
     ledger : Path
+
+    Examples
+    --------
+    >>> from concurrent.futures import ThreadPoolExecutor
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder, ThreadPoolExecutor() as executor:
+    ...     _ = Path(folder, "scan.xyz").write_text("not a point")
+    ...     result = run_batch(folder, f"{folder}/skeletons", executor=executor)
+    >>> result.done, result.failed
+    (0, 1)
     """
 
     rows: dict[str, Row]

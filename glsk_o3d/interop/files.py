@@ -68,6 +68,15 @@ def read_cloud(path: str | os.PathLike) -> Any:
     -----
     Where the triangles of a mesh are large, its vertices say little about the surface: then there is a warning in the
     log.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder, "scan.xyz")
+    ...     _ = path.write_text("0 0 0\\n0 0 1\\n0 1 1\\n")
+    ...     len(read_cloud(path).points)
+    3
     """
     cloud, _ = read_scan(path)
     return cloud
@@ -268,6 +277,17 @@ def save_skeleton(
         The folder does not exist.
     OSError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> skeleton = skeletonize(torus(1000).points)
+    >>> with TemporaryDirectory() as folder:
+    ...     save_skeleton(skeleton, f"{folder}/ring.swc", cut_loops=True)
+    ...     read_skeleton(f"{folder}/ring.swc").n_loops
+    0
     """
     path = Path(path)
     write, _ = _FORMATS[skeleton_ending(path, format)]
@@ -297,6 +317,18 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     FileNotFoundError
     FileFormatError
         A folder, a cloud, an unknown ending, or a file that is damaged or from a newer release.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> skeleton = skeletonize(torus(1000).points)
+    >>> with TemporaryDirectory() as folder:
+    ...     skeleton.save(f"{folder}/ring.json")
+    ...     again = read_skeleton(f"{folder}/ring.json")
+    >>> bool((again.vertices == skeleton.vertices).all())
+    True
     """
     path = _existing(path)
     ending = skeleton_ending(path, format)

@@ -49,6 +49,17 @@ def save_preview(
         The folder does not exist.
     OSError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> with TemporaryDirectory() as folder:
+    ...     save_preview(skeletonize(torus(1000).points), f"{folder}/ring.png")
+    ...     Path(folder, "ring.png").stat().st_size > 10_000
+    True
     """
     check_ending(path, "preview is a picture", ".png")
     save_figure(draw(skeleton, size, title), path)

@@ -204,7 +204,7 @@ class PlainLayers:
         return {"layer": len(self.layers) - 1, **facts(self.layers[-1])}
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write the last layer. See `Layer.save`."""
+        """Write the last layer. See ``Layer.save``."""
         self.layer().save(path, **options)
 
 

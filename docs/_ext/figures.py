@@ -1,0 +1,356 @@
+"""The figures of the site, drawn by the package from its own samples whenever the code has changed."""
+
+import hashlib
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon
+from scipy.spatial import Delaunay
+
+import glsk_o3d as glsk
+from glsk_o3d import pipelines, samples
+from glsk_o3d.numerics.cycles import inscribed_circle, minimum_cycle_basis
+from glsk_o3d.numerics.neighbourhoods import plane_axes
+from glsk_o3d.refinement.triangles import collapse_triangles
+
+INK, RED, GREY, BLUE, ORANGE = "#333333", "#d0121f", "#b4b4b4", "#1f5fa8", "#e07b00"
+SIDE = 3.2  # inches of a panel
+
+# ------------------------------------------------------------------------------------------------------------ drawing
+
+
+def panels(titles, aspect=1.0, columns=None):
+    """A figure with a row of empty axes, or several rows of so many columns."""
+    columns = columns or len(titles)
+    rows = -(-len(titles) // columns)
+    figure = Figure((SIDE * columns, (SIDE * aspect + 0.35) * rows), layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for each in axes:
+        each.set_axis_off()
+    for each, title in zip(axes, titles, strict=False):  # the last row need not be full
+        each.set_title(title, fontsize=10, color=INK)
+        each.set_aspect("equal")
+    return figure, axes
+
+
+def view(points, azimuth=-65.0, elevation=20.0):
+    """Points as somebody sees them: right, up, and towards the eye."""
+    a, e = np.radians([azimuth, elevation])
+    right = [-np.sin(a), np.cos(a), 0]
+    up = [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]
+    return np.asarray(points) @ np.stack([right, up, np.cross(right, up)]).T
+
+
+def dots(axes, points, color=GREY, size=2.0, **angles):
+    seen = view(points, **angles)
+    order = np.argsort(seen[:, 2])
+    if isinstance(size, np.ndarray):
+        size = size[order]
+    axes.scatter(*seen[order, :2].T, s=size, c=color, linewidths=0)
+
+
+def graph(axes, skeleton, color=RED, width=1.8, ends=True, **angles):
+    seen = view(skeleton.vertices, **angles)[:, :2]
+    axes.add_collection(LineCollection(seen[skeleton.edges], colors=color, linewidths=width, capstyle="round"))
+    if ends:
+        axes.scatter(*seen[skeleton.degree > 2].T, s=18, c=INK, zorder=3)
+        axes.scatter(*seen[skeleton.degree == 1].T, s=12, facecolors="white", edgecolors=color, zorder=3)
+    axes.autoscale_view()
+
+
+def same_scale(axes):
+    """The same limits for all panels."""
+    limits = np.array([[*each.get_xlim(), *each.get_ylim()] for each in axes])
+    for each in axes:
+        each.set(xlim=(limits[:, 0].min(), limits[:, 1].max()), ylim=(limits[:, 2].min(), limits[:, 3].max()))
+
+
+def skeletonised(points, pipeline=None):
+    """A skeleton without its warnings, which the captions tell."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", glsk.SkeletonWarning)
+        return (pipeline or pipelines.default())(points)
+
+
+def animal(n=6000):
+    return samples.sample_object(n).points
+
+
+# ------------------------------------------------------------------------------------------------- pages of the filters
+
+
+def ring_builder():
+    rng = np.random.default_rng(1)
+    points = samples.y_junction(3000, noise=0.02).points
+    low, high = points.min(axis=0), points.max(axis=0)
+    points = np.concatenate([points, rng.uniform(low - 0.05, high + 0.05, (40, 3))])
+    state = glsk.RingBuilder()(points)
+    figure, axes = panels(["a cloud with 2 % noise and 40 outliers", "what the rings are made of; red: set aside"])
+    dots(axes[0], points, INK, 2.5)
+    dots(axes[1], state.frame.out_of(state.cloud), INK, 2.5)
+    dots(axes[1], points[state.outlier], RED, 7)
+    same_scale(axes)
+    return figure
+
+
+def contractor():
+    points = animal()
+    state = (glsk.RingBuilder() | glsk.Contractor())(points)
+    figure, axes = panels(["the scan", f"after {len(state.report.iterations)} solves"], 0.8)
+    dots(axes[0], points)
+    dots(axes[1], points)
+    dots(axes[1], state.contracted, RED, 2)
+    same_scale(axes)
+    return figure
+
+
+def lpr_reducer():
+    points = animal()
+    rings = glsk.RingBuilder()(points)
+    whole, less = glsk.Contractor()(rings), glsk.Contractor(reducer=glsk.LPRReducer())(rings)
+    figure, axes = panels([f"without: {len(whole)} points", f"with: {len(less)} points, larger for more mass"], 0.8)
+    dots(axes[0], whole.contracted, RED, 2)
+    dots(axes[1], less.contracted, RED, 1.5 * less.mass)
+    same_scale(axes)
+    return figure
+
+
+def connector():
+    points = animal()
+    state = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()))(points)
+    raw = glsk.Connector()(state)
+    figure, axes = panels(["contracted points", f"{len(raw.vertices)} vertices, {len(raw.edges)} edges"], 0.8)
+    dots(axes[0], state.contracted, INK, 3)
+    dots(axes[1], points, size=1)
+    graph(axes[1], raw, ends=False)
+    same_scale(axes)
+    return figure
+
+
+def refiner():
+    points = animal()
+    raw = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(points)
+    fine = glsk.Refiner()(raw)
+    figure, axes = panels(
+        [f"before: {raw.n_loops} loops, counting triangles", f"after: {fine.n_loops} loop, {len(fine.leaves)} ends"],
+        0.8,
+    )
+    for each, skeleton in zip(axes, (raw, fine), strict=True):
+        dots(each, points, size=1)
+        graph(each, skeleton, ends=skeleton is fine)
+    same_scale(axes)
+    return figure
+
+
+def stopping():
+    points = animal()
+    figure = Figure((2 * SIDE, 0.8 * SIDE), layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    records = (glsk.RingBuilder() | glsk.Contractor(max_iterations=8, stop=lambda _: None))(points).report.iterations
+    for axes, name, threshold, label in zip(
+        figure.subplots(1, 2), ("explained_change", "drop"), (0.03, 0.01), ("De", "a(t−1) − a(t)"), strict=True
+    ):
+        ratio = [1, *(record.ring_ratio for record in records)]
+        values = -np.diff(ratio) if name == "drop" else [getattr(record, name) for record in records]
+        axes.plot(np.arange(1, len(values) + 1), values, "o-", color=INK)
+        axes.axhline(threshold, color=RED, linestyle="--")
+        axes.set(xlabel="solve", ylabel=label, yscale="log")
+    return figure
+
+
+# ------------------------------------------------------------------------------------------------- pages of the method
+
+
+def hull():
+    """A neighbourhood in its plane, the Delaunay star of its centre, and the hull of the inverted neighbours."""
+    state = glsk.RingBuilder(around=0)(samples.torus(2000, noise=0.004).points)
+    rings = state.rings
+    cloud = state.cloud[state.survivors]
+    even = [lengths.min() / lengths.max() for lengths in np.split(rings.edge_lengths(cloud), rings.indptr[1:-1])]
+    i = int(np.argmax(np.where(rings.closed & (rings.sizes == 6), even, 0)))
+    nearest = np.argsort(((cloud - cloud[i]) ** 2).sum(axis=1))[1:16]
+    offset = (cloud[nearest] - cloud[i]) @ plane_axes(state.normals[state.survivors][[i]])[0]
+    flat = np.concatenate([[[0.0, 0.0]], offset])
+    inverted = offset / (offset**2).sum(axis=1, keepdims=True)
+    where = {int(point): row for row, point in enumerate(nearest)}
+    ring = [where[int(point)] for point in rings[i] if int(point) in where]
+    figure, axes = panels(
+        ["the neighbours in their plane, triangulated", "inverted, q = x / |x|²: corners of the hull"]
+    )
+    for a, b, c in Delaunay(flat).simplices:
+        inside = 0 in (a, b, c)
+        colors = dict(facecolor="#fde3d3" if inside else "white", edgecolor=GREY)
+        axes[0].add_patch(Polygon(flat[[a, b, c]], linewidth=0.8, **colors))
+    axes[0].add_patch(Polygon(offset[ring], fill=False, edgecolor=RED, linewidth=1.8))
+    axes[1].add_patch(Polygon(inverted[ring], facecolor="#fde3d3", edgecolor=RED, linewidth=1.8))
+    for each, places in zip(axes, (offset, inverted), strict=True):
+        each.scatter(*places.T, s=20, c=INK, zorder=3)
+        each.scatter(*places[ring].T, s=30, c=RED, zorder=4)
+        each.scatter(0, 0, s=50, c=BLUE, zorder=5)
+        for number, row in enumerate(ring, 1):
+            each.annotate(str(number), places[row], xytext=(5, 4), textcoords="offset points", fontsize=9, color=RED)
+        each.margins(0.12)
+        each.autoscale_view()
+    return figure
+
+
+def contraction():
+    points = animal()
+    recorder = glsk.ContractionRecorder()
+    (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()))(points, on_state=recorder)
+    left = [len(points), *(len(np.unique(places, axis=0)) for places in recorder.positions[1:])]
+    shown = range(len(recorder.positions))
+    titles = [f"solve {t}: {left[t]} points" if t else f"the scan: {left[0]} points" for t in shown]
+    figure, axes = panels(titles, 0.8, columns=3)
+    for each, places in zip(axes, recorder.positions, strict=False):
+        dots(each, places, INK, 1.5)
+    same_scale(axes[: len(titles)])
+    return figure
+
+
+def reduction():
+    points = samples.y_junction(4096).points
+    kept = glsk.remove_redundant_points(points, passes=3)[1]
+    drawn = np.random.default_rng(0).choice(len(points), len(kept), replace=False)
+    figure, axes = panels([f"all {len(points)} points", f"the {len(kept)} that LPR leaves", f"{len(kept)} at random"])
+    for each, chosen in zip(axes, (slice(None), kept, drawn), strict=True):
+        dots(each, points[chosen], INK, 3)
+    same_scale(axes)
+    return figure
+
+
+def mass():
+    points = samples.torus(4096).points
+    rings = glsk.RingBuilder(around=0)(points)
+    variants = (None, glsk.LPRReducer(), glsk.LPRReducer(conserve_mass=False))
+    states = [
+        glsk.Contractor(reducer=reducer, reduce_above=0, stop=lambda records: None, max_iterations=4)(rings)
+        for reducer in variants
+    ]
+    words = ("no reduction", "mass kept", "mass lost, as published")
+    figure, axes = panels([f"{word}: {len(state)} points" for word, state in zip(words, states, strict=True)])
+    circle = np.linspace(0, 2 * np.pi, 200)
+    axis = 0.4 * np.stack([np.cos(circle), np.sin(circle), 0 * circle], axis=1)
+    for each, state in zip(axes, states, strict=True):
+        dots(each, points, size=1, elevation=60)
+        each.plot(*view(axis, elevation=60)[:, :2].T, color=BLUE, linewidth=1)
+        dots(each, state.contracted, RED, 4, elevation=60)
+    same_scale(axes)
+    return figure
+
+
+def centring():
+    """A cross-section of a bent tube seen from one side only, before and after the fit to the axis."""
+    torus = samples.torus(6000)
+    points = torus.points[torus.points[:, 2] > 0]
+    built = glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector()
+    raw = built(points)
+    figure, axes = panels(["before the fit", "after it: where the normals meet"], 0.75)
+    for each, passes in zip(axes, (0, 3), strict=True):
+        skeleton = skeletonised(raw, glsk.Refiner(recentre=passes))
+        angle = np.arctan2(points[:, 1], points[:, 0])
+        cut = np.flatnonzero(np.abs(angle - 0.6) < 0.06)
+        across, up = np.hypot(*points[cut, :2].T), points[cut, 2]
+        normal = skeleton.normals[cut]
+        outward = normal[:, :2] @ [np.cos(0.6), np.sin(0.6)]
+        lines = np.stack([across, up], axis=1)
+        reach = np.stack([outward, normal[:, 2]], axis=1)
+        reach *= np.where(reach[:, 1:] > 0, -1, 1) * 0.13
+        each.add_collection(LineCollection(np.stack([lines, lines + reach], axis=1), colors=GREY, linewidths=0.6))
+        each.scatter(across, up, s=8, c=INK)
+        each.add_patch(Circle((0.4, 0), 0.1, fill=False, edgecolor=BLUE, linestyle=":"))
+        near = np.argmin(np.abs(np.arctan2(skeleton.vertices[:, 1], skeleton.vertices[:, 0]) - 0.6))
+        vertex = skeleton.vertices[near]
+        each.scatter(np.hypot(*vertex[:2]), vertex[2], s=60, c=RED, zorder=4)
+        each.autoscale_view()
+    same_scale(axes)
+    return figure
+
+
+def loop_test():
+    points = animal()
+    raw = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(points)
+    skeleton = glsk.Refiner()(raw)
+    figure, axes = panels(
+        ["before: every loop of four edges and more", "after: the circle fits through the handle"], 0.8
+    )
+    before = collapse_triangles(raw)
+    for each, shown in zip(axes, (before, skeleton), strict=True):
+        dots(each, points, size=1)
+        graph(each, shown, INK, 1.2, ends=False)
+        for cycle in minimum_cycle_basis(len(shown.vertices), shown.edges, shown.edge_lengths):
+            loop = shown.vertices[cycle]
+            middle, radius = inscribed_circle(loop)
+            two = np.linalg.svd(loop - loop.mean(axis=0), full_matrices=False)[2][:2]
+            angle = np.linspace(0, 2 * np.pi, 60)[:, None]
+            circle = middle + radius * (np.cos(angle) * two[0] + np.sin(angle) * two[1])
+            each.add_collection(
+                LineCollection([view(np.concatenate([loop, loop[:1]]))[:, :2]], colors=RED, linewidths=2)
+            )
+            each.plot(*view(circle)[:, :2].T, color=BLUE, linewidth=1.5)
+    same_scale(axes)
+    return figure
+
+
+# ------------------------------------------------------------------------------------------------------------- failures
+
+
+def failures():
+    rng = np.random.default_rng(0)
+    parallel = [samples.tube(2000, length=1, radius=0.1, seed=s).points + [0, y, 0] for s, y in ((0, 0), (1, 0.2))]
+    box = rng.uniform(-0.5, 0.5, (4000, 3)) * [1, 0.6, 0.5]
+    face = rng.integers(0, 3, 4000)
+    box[np.arange(4000), face] = np.sign(box[np.arange(4000), face]) * np.array([0.5, 0.3, 0.25])[face]
+    noisy = samples.y_junction(3000, noise=0.05).points
+    return {
+        "a ball": samples.sphere(3000).points,
+        "a sheet": samples.sheet(3000).points,
+        "a box": box,
+        "two tubes that touch": np.concatenate(parallel),
+        "two linked rings of 150 points": samples.two_rings(150).points,
+        "5 % noise": noisy,
+    }
+
+
+def limits():
+    cases = failures()
+    figure, axes = panels(list(cases), 0.9, columns=3)
+    for each, (name, points) in zip(axes, cases.items(), strict=True):
+        skeleton = skeletonised(points)
+        dots(each, points, size=1.5 if len(points) > 500 else 6)
+        graph(each, skeleton)
+        said = (skeleton.report.warnings or ("no warning",))[0].partition(":")[0]
+        parts = f"components: {skeleton.n_components}, loops: {skeleton.n_loops}" if len(skeleton.edges) else "no edges"
+        each.set_title(f"{name}\n{said}; {parts}", fontsize=9, color=INK)
+    return figure
+
+
+FIGURES = (
+    *(ring_builder, contractor, lpr_reducer, connector, refiner, stopping),
+    *(hull, contraction, reduction, mass, centring, loop_test, limits),
+)
+
+
+def write(folder: Path) -> None:
+    """Draw all figures, unless neither they nor the package have changed since."""
+    folder = folder / "figures"
+    folder.mkdir(parents=True, exist_ok=True)
+    sources = [Path(__file__), *sorted(Path(glsk.__file__).parent.rglob("*.py"))]
+    state = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+    stamp = folder / "drawn-from"
+    wanted = [folder / f"{draw.__name__}.png" for draw in FIGURES]
+    if stamp.exists() and stamp.read_text() == state and all(path.exists() for path in wanted):
+        return
+    for draw, path in zip(FIGURES, wanted, strict=True):
+        draw().savefig(path, dpi=150, bbox_inches="tight")
+    stamp.write_text(state)
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]))

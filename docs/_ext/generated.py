@@ -1,0 +1,25 @@
+"""Writes what is made from the code before Sphinx reads anything: the API pages, the figures, the diagram."""
+
+from pathlib import Path
+
+import api
+import architecture
+import figures
+
+GENERATED = Path(__file__).resolve().parents[1] / "generated"
+
+
+def write(app, config):
+    for part in (api, architecture, figures):
+        part.write(GENERATED)
+
+
+def plain(app, env, node, contnode):
+    """Single backticks in docstrings are also for parameters, which have no page: these stay words."""
+    return contnode if node["reftype"] == "obj" and "." not in node["reftarget"] else None
+
+
+def setup(app):
+    app.connect("missing-reference", plain)
+    app.connect("config-inited", write)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

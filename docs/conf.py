@@ -1,0 +1,72 @@
+"""The site: built from the root of the repository, so that links between its Markdown files hold here as on GitHub."""
+
+import logging
+import os
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "_ext")]
+os.environ.setdefault("MPLBACKEND", "Agg")
+os.environ.setdefault("DASK_LOGGING__DISTRIBUTED", "error")  # of the gallery's page on batches
+logging.getLogger("matplotlib.animation").setLevel(logging.WARNING)
+
+import glsk_o3d  # noqa: E402
+
+project = "glsk-o3d"
+author = "glsk-o3d contributors"
+copyright = author
+version = release = glsk_o3d.__version__
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "numpydoc",
+    "myst_parser",
+    "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
+    "sphinxcontrib.bibtex",
+    "generated",  # these three are in _ext
+    "mathml",
+    "options",
+]
+root_doc = "docs/index"
+include_patterns = ["*.md", "docs/**", "benchmarks/README.md", "filters/README.md"]
+exclude_patterns = [".*", "build", "dist", "demo", "tests", "glsk_o3d", "examples", "docs/_*", "docs/gallery", "**/.*"]
+nitpicky = True
+nitpick_ignore = [("py:class", "pymeshlab.pmeshlab.MeshSet")]
+default_role = "autolink"
+
+myst_enable_extensions = ["deflist", "dollarmath"]
+myst_heading_anchors = 4
+html_math_renderer = "mathml"  # browsers draw MathML themselves: no script, no network
+
+autodoc_typehints = "none"  # the docstrings say more: shapes, dtypes, units
+autodoc_member_order = "bysource"
+autosummary_generate = False
+numpydoc_show_class_members = False
+bibtex_bibfiles = ["references.bib"]
+bibtex_reference_style = "author_year"
+bibtex_default_style = "plain"
+
+sphinx_gallery_conf = dict(
+    examples_dirs="docs/gallery",
+    gallery_dirs="docs/generated/gallery",
+    filename_pattern=r"/plot_",
+    abort_on_example_error=True,
+    min_reported_time=float("inf"),
+    show_memory=False,
+    show_signature=False,
+    within_subsection_order="FileNameSortKey",
+    write_computation_times=False,
+)
+
+smartquotes = False
+templates_path = ["_templates"]
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_theme = "furo"
+html_title = f"glsk-o3d {release}"
+html_additional_pages = {"index": "index.html"}  # leads to docs/index.html
+html_copy_source = html_show_sourcelink = False
+html_show_sphinx = html_show_copyright = False

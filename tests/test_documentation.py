@@ -1,0 +1,287 @@
+"""The pages: every code block runs, every public name is documented, every equation has its number."""
+
+import contextlib
+import dataclasses
+import importlib
+import inspect
+import io
+import re
+import shlex
+import shutil
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import numpy as np
+import open3d as o3d
+import pytest
+import tomlkit
+from typer.testing import CliRunner
+
+import glsk_o3d as glsk
+from glsk_o3d import samples
+from glsk_o3d.catalogue import BUILTIN
+from glsk_o3d.cli.overrides import override
+from glsk_o3d.filter import TYPES
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "docs" / "_ext"))
+api, architecture = (importlib.import_module(name) for name in ("api", "architecture"))
+sys.path.pop(0)
+
+PAGES = [
+    path
+    for path in (
+        *ROOT.glob("*.md"),
+        *ROOT.glob("docs/**/*.md"),
+        ROOT / "benchmarks/README.md",
+        ROOT / "filters/README.md",
+    )
+    if "generated" not in path.parts
+]
+FENCE = re.compile(r"^( *)```(\S*)[^\n]*\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
+
+
+def blocks(path, *languages):
+    """The code blocks of a page in these languages."""
+    return [body for _, language, body in FENCE.findall(path.read_text()) if language in languages]
+
+
+def pages(*languages):
+    """The pages that have such blocks."""
+    return [pytest.param(path, id=str(path.relative_to(ROOT))) for path in PAGES if blocks(path, *languages)]
+
+
+# ------------------------------------------------------------------------------------------------------- blocks of code
+
+
+@pytest.fixture(scope="module")
+def prepared(tmp_path_factory):
+    """A folder with the files that the pages speak of."""
+    folder = tmp_path_factory.mktemp("prepared")
+    shape = samples.y_junction(1000)
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(shape.points))
+    for name in ("scan.ply", "horse.ply", "next.ply", "other.ply", "scans/a/left.pcd", "scans/b.ply"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        assert o3d.io.write_point_cloud(str(folder / name), cloud)
+    (folder / "list.txt").write_text("scan.ply\n")
+    np.savez(folder / "axis.npz", nodes=shape.nodes, edges=shape.edges, radii=shape.radii)
+    cloud.estimate_normals()
+    balls = o3d.utility.DoubleVector([0.05, 0.1, 0.2])
+    mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, balls)
+    assert o3d.io.write_triangle_mesh(str(folder / "scan_mesh.ply"), mesh)
+    skeleton = glsk.skeletonize(cloud)
+    for name in ("skeleton.ply", "skeleton.json", "s.json", "horse.json"):
+        skeleton.save(folder / name)
+    glsk.save_recipe(glsk.pipelines.default(), folder / "plant.toml")
+    (folder / "mine.mlx").write_text((ROOT / "filters" / "glskeleton.mlx").read_text())
+    return folder
+
+
+@pytest.fixture
+def workplace(prepared, tmp_path, monkeypatch):
+    """A copy of it to work in, without a screen."""
+    shutil.copytree(prepared, tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setattr(o3d.visualization, "draw_geometries", lambda shapes: None)
+    monkeypatch.setattr("glsk_o3d.viewing.window.show", lambda *arguments, **options: None)
+
+
+def run_python(code, names, page):
+    """Run a block; what it prints after ``# prints`` must be so."""
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        exec(compile(code, page, "exec"), names)
+    promised = "".join(f"{line}\n" for line in re.findall(r"# prints (.*)", code))
+    assert not promised or said.getvalue() == promised
+
+
+def run_shell(code):
+    """Run the lines for ``glsk``; of others see that what they name is there."""
+    for line in code.replace("\\\n", " ").splitlines():
+        words = shlex.split(re.sub(r"[][]", "", line), comments=True)  # brackets: what may be left out
+        if not words:
+            continue
+        if words[0] == "glsk":
+            run_glsk([word.replace("FILE", "scan.ply") for word in words[1:]])
+        else:
+            check_command(words)
+
+
+def run_glsk(words):
+    from glsk_o3d.cli.main import app
+
+    if "--scheduler" in words:  # there is none
+        words = [*words, "--dry-run"]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, f"glsk {shlex.join(words)}\n{result.output}\n{result.exception!r}"
+
+
+def check_command(words):
+    program, *rest = words
+    if program == "make":
+        assert f"\n{rest[0]}: " in (ROOT / "Makefile").read_text()
+    elif "pip" in words:
+        for extras in re.findall(r"(?:\.|glsk-o3d)\[([\w,]+)\]", " ".join(rest)):
+            assert set(extras.split(",")) <= set(PROJECT["optional-dependencies"])
+    elif program.endswith("python") and rest[0].startswith("benchmarks/"):
+        code = (ROOT / rest[0]).read_text() + (ROOT / "benchmarks" / "_common.py").read_text()
+        assert all(f'"{word}"' in code for word in rest if word.startswith("--"))
+    else:
+        assert program in ("python3", "source", "dask")
+
+
+PROJECT = tomlkit.parse((ROOT / "pyproject.toml").read_text())["project"]
+
+
+@pytest.mark.parametrize("path", pages("python", "sh", "bash"))
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # the clouds are small
+def test_every_block_runs(path, workplace, install):
+    page = str(path.relative_to(ROOT))
+    if page == "docs/plugins.md":
+        (code,), (entries,) = blocks(path, "python"), blocks(path, "toml")
+        groups = tomlkit.parse(entries).unwrap()["project"]["entry-points"]
+        install(
+            "glsk-slab", "0.1", code, "".join(f"[{g}]\n{n} = {v}\n" for g, e in groups.items() for n, v in e.items())
+        )
+    cloud = glsk.read_cloud("scan.ply")
+    names = dict(__name__="__main__", glsk=glsk, o3d=o3d, np=np, cloud=cloud, points=np.asarray(cloud.points))
+    names |= dict(skeleton=glsk.read_skeleton("skeleton.json"))
+    for _, language, body in FENCE.findall(path.read_text()):
+        if language == "python":
+            run_python(body, names, page)
+        elif language in ("sh", "bash"):
+            run_shell(body)
+
+
+# --------------------------------------------------------------------------------------------------------- public names
+
+UNTRIED = ("known_pipelines", "named_pipeline", "signed_distance")  # for those who extend the package
+NAMES = [(module, name) for module in (*api.PACKAGES, *api.MODULES) for name in api.names(module)]
+
+
+@pytest.mark.parametrize(("module", "name"), NAMES, ids=lambda word: word.removeprefix("glsk_o3d"))
+def test_every_public_name_is_documented(module, name):
+    thing = getattr(importlib.import_module(module), name)
+    told = inspect.getdoc(thing)
+    assert told
+    assert ".. math::" not in told  # has no number
+    if module in (*api.PACKAGES, "glsk_o3d.pipelines", "glsk_o3d.samples") and name not in UNTRIED:
+        assert ">>>" in told or issubclass(thing, Exception)
+    if not inspect.isclass(thing):
+        heads = re.findall(r"^([\w*, ]+?)(?: : .*)?$", told.partition("Parameters\n---")[2], re.MULTILINE)
+        named = {name.strip("* ") for head in heads for name in head.split(",")}
+        assert set(inspect.signature(thing).parameters) <= named
+        return
+    for member, value in vars(thing).items():
+        if not member.startswith("_") and (inspect.isfunction(value) or isinstance(value, property | classmethod)):
+            assert inspect.getdoc(getattr(thing, member)), member
+
+
+@pytest.mark.parametrize("cls", BUILTIN.values(), ids=lambda cls: cls.__name__)
+def test_every_option_has_a_unit_a_default_and_a_sentence(cls):
+    for field in dataclasses.fields(cls):
+        facts = field.metadata
+        assert field.default is not dataclasses.MISSING
+        assert facts["doc"].endswith(".")
+        assert facts["type"].rstrip("?") in TYPES
+        assert facts["unit"]
+        if facts["type"].startswith("length"):
+            assert facts["unit"] != "-"
+
+
+def test_the_advice_on_parameters_can_be_taken():
+    settings = re.findall(r"`(\w+\.\w+=[^`]+)`", (ROOT / "docs" / "parameters.md").read_text())
+    assert len(settings) > 15
+    for setting in settings:
+        assert override(glsk.pipelines.default(), [setting]) != glsk.pipelines.default()
+
+
+def test_every_filter_has_a_page_with_all_its_sections():
+    told = "".join(path.read_text() for path in ROOT.glob("docs/filters/*.md"))
+    for cls in BUILTIN.values():
+        assert f"```{{options}} {cls.__name__}\n" in told
+    for path in set(ROOT.glob("docs/filters/*.md")) - {ROOT / "docs/filters/index.md"}:
+        for section in ("What ", "Equations", "Example", "Options", "Cost", "Limits", "Source"):
+            assert f"\n## {section}" in path.read_text(), path
+
+
+@pytest.mark.parametrize("cls", BUILTIN.values(), ids=lambda cls: cls.__name__)
+def test_the_pages_say_when_to_touch_each_option(cls):
+    (notes,) = [
+        body
+        for path in ROOT.glob("docs/filters/*.md")
+        for body in re.findall(rf"```{{options}} {cls.__name__}\n(.*?)```", path.read_text(), re.DOTALL)
+    ]
+    assert re.findall(r"^(\w+): .", notes, re.MULTILINE) == [field.name for field in dataclasses.fields(cls)]
+
+
+# -------------------------------------------------------------------------------------------- equations, diagram, links
+
+
+def test_every_equation_has_a_number_of_its_own():
+    numbers = []
+    for path in PAGES:
+        text = FENCE.sub("", path.read_text())
+        for equation in re.findall(r"\$\$(.*?)\$\$", text, re.DOTALL):
+            (number,) = re.findall(r"\\tag\{([^}]+)\}", equation)
+            numbers.append(number)
+    assert len(numbers) > 15
+    assert len(set(numbers)) == len(numbers)
+
+
+def test_the_diagram_matches_the_imports():
+    assert architecture.upward() == set()
+    modules = {name for name in architecture.imports() if name != "__init__"}
+    assert {name for name in modules if architecture.box_of(name) is None} == set()
+    for row in architecture.ROWS:
+        for prefixes in row.values():
+            for prefix in prefixes:
+                assert any(name == prefix or name.startswith(f"{prefix}.") for name in modules)
+
+
+def test_numerics_knows_no_open3d():
+    for path in (ROOT / "glsk_o3d" / "numerics").glob("*.py"):
+        assert not re.search(r"^\s*(import|from) (open3d|matplotlib|networkx|\.\.)", path.read_text(), re.MULTILINE), (
+            path
+        )
+
+
+class Links(HTMLParser):
+    """The anchors of a page, what it links to, and what it loads."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.ids, self.targets, self.loaded = set(), [], []
+        self.feed(path.read_text("utf-8"))
+
+    def handle_starttag(self, tag, attributes):
+        facts = dict(attributes)
+        self.ids.add(facts.get("id"))
+        if tag == "a" and facts.get("href"):
+            self.targets.append(facts["href"])
+        if "src" in facts:
+            self.loaded.append(facts["src"])
+        if tag == "link" and facts.get("rel") == "stylesheet":
+            self.loaded.append(facts["href"])
+
+
+def test_the_links_of_the_site_lead_somewhere_and_nothing_is_loaded_from_elsewhere():
+    site = ROOT / "build" / "docs"
+    if not (site / "docs" / "index.html").exists():
+        pytest.skip("needs the site: make docs")
+    pages = {path: Links(path) for path in site.rglob("*.html") if "_static" not in path.parts}
+    broken = []
+    for path, page in pages.items():
+        for link in page.targets + page.loaded:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                broken += [(path.name, link)] * (link in page.loaded and parts.scheme != "data")
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            lost = target in pages and unquote(parts.fragment) not in {"", *pages[target].ids}
+            if lost or not target.exists():
+                broken.append((path.name, link))
+    assert len(pages) > 40
+    assert broken == []
