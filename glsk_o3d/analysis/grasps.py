@@ -51,6 +51,16 @@ class GraspCandidates:
         Places along the skeleton that were looked at.
     left_out : dict of str to int
         How many of these were not taken, by the first reason that holds.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Skeleton
+    >>> from glsk_o3d.samples import tube
+    >>> straight = tube(length=1.0, radius=0.1)
+    >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), (), confidence=[1, 1])
+    >>> best = grasp_candidates(axis, max_opening=0.4)[:3]
+    >>> best.poses.shape
+    (3, 4, 4)
     """
 
     positions: np.ndarray
@@ -189,10 +199,7 @@ def grasp_candidates(
     r"""Candidates for grasps with parallel jaws, from the axis and the thickness of a skeleton's branches.
 
     The jaws close across a branch: at places along its curve, from directions around it. With the radius r of the ball
-    on the axis that touches the surface and its change :math:`r' = dr/ds` along the curve, a part of round section is
-
-    .. math:: w = 2 r / \sqrt{1 - r'^2}
-
+    on the axis that touches the surface and its change :math:`r' = dr/ds` along the curve, a part of round section is :math:`w = 2 r / \sqrt{1 - r'^2}`
     wide across its axis: :math:`2 r` on a tube, more on a cone, which the ball touches ahead of its widest section.
     Direction and :math:`r'` are those of a chord of the curve, from one radius before the place to one behind.
 
