@@ -200,8 +200,9 @@ def grasp_candidates(
 
     The jaws close across a branch: at places along its curve, from directions around it. With the radius r of the ball
     on the axis that touches the surface and its change :math:`r' = dr/ds` along the curve, a part of round section is
-    :math:`w = 2 r / \sqrt{1 - r'^2}` wide across its axis: :math:`2 r` on a tube, more on a cone, which the ball touches
-    ahead of its widest section. Direction and :math:`r'` are those of a chord of the curve, from one radius before the place to one behind.
+    :math:`w = 2 r / \sqrt{1 - r'^2}` wide across its axis: :math:`2 r` on a tube, more on a cone, which the ball
+    touches ahead of its widest section. Direction and :math:`r'` are those of a chord of the curve, from one radius
+    before the place to one behind.
 
     Parameters
     ----------
