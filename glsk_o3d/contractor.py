@@ -28,7 +28,8 @@ class Contractor(Filter):
 
     Each iteration solves :math:`(w_L^2 L^T M^{-1} L + M W_H^2) P' = M W_H^2 P` with the cotangent Laplacian L of the
     current points, raises :math:`w_L`, sets :math:`W_H = s(0) / s(t)`, and lets the reducer merge points. M is the
-    diagonal of the survivors' masses; it is the identity unless the reducer conserves mass.
+    diagonal of the survivors' masses; it is the identity unless points were merged before, or by a reducer that
+    conserves mass.
 
     A late, ill-conditioned solve can throw points out of the cloud. It is detected (a point beyond 1.2 times the
     bounding box or, in a frame that turns with the cloud, the ball around it; or a solve without a trustworthy

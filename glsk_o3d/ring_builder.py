@@ -109,16 +109,18 @@ class RingBuilder(Filter):
         25.0,
         "Points around a part that are enough: where the surface has more, near ones are merged, at most four into "
         "one at a time, which takes over their mass. Fewer are faster; edges, thin and noisy parts, and clouds of less "
-        "than 1000 points stay as they are. 0 merges none for this.",
+        "than 1000 points stay as they are. 0 merges none for this, and so does a `radius`.",
         type="float",
         unit="points",
         low=0,
+        high=1000,
     )
     thin_to: int | str = parameter(
         "auto",
-        "Most points to contract; the others are merged into a near one, which takes over their mass. 'auto' is 25000, "
-        "but 64 times the square root of their number from 152588 on; 'all' merges none, whatever `around` says, as "
-        "published.",
+        "Most points to contract; the others are merged into a near one, which takes over their mass. Of more than "
+        "four times as many, a sample from a grid says where the surface is, and the others only belong to a vertex. "
+        "'auto' is 25000, but 64 times the square root of their number from 152588 on; 'all' merges none, whatever "
+        "`around` says, as published.",
         type="int",
         unit="points",
         low=8,
@@ -167,7 +169,8 @@ class RingBuilder(Filter):
         finite = self._finite(points)
         good = points if finite.all() else points[finite]
         most = self._number(len(good))
-        sample, stands_for = _sample(good, 2 * most)
+        # a radius is in terms of the spacing that the cloud came with
+        sample, stands_for = _sample(good, 2 * most if self.radius is None else len(good))
         good = good[sample]
         frame, distinct, row, distance, neighbours = self._distinct(good)
         stray = np.zeros(len(good), bool)
@@ -248,7 +251,7 @@ class RingBuilder(Filter):
             rows, rank = left[kept], np.cumsum(kept) - 1
             return rows, rank[into][owner], nearest_neighbours(cloud[rows], self._neighbours(len(rows)))[1]
 
-        while self.around and self.thin_to != "all" and len(left) >= FEW:
+        while self.around and self.radius is None and self.thin_to != "all" and len(left) >= FEW:
             into = thin_smooth(cloud[left], neighbours, spread, self.around)
             if np.count_nonzero(into == np.arange(len(into))) > STEADY * len(into):
                 break

@@ -37,7 +37,7 @@ class Skeleton:
         The input points, in the order they came in.
     normals : (N, 3) float64 array
         Unit normals estimated from the neighbourhoods, up to their sign; NaN for points that have no say, because they
-        were dropped as not finite or set aside as outliers.
+        were dropped as not finite, set aside as outliers, or left out of the sample of a large cloud.
     report : Report
         What the run did.
     confidence : (M,) float64 array

@@ -562,3 +562,19 @@ def test_a_sampled_cloud_has_the_skeleton_of_the_whole():
         assert found.topology
         assert found.error < 0.1
         assert found.inside == 1
+
+
+def test_one_point_far_off_does_not_spoil_the_sample():
+    points = samples.torus(8000).points
+    points[17] = [1e7, 0, 0]
+    state = RingBuilder(thin_to=800)(points)
+    assert state.report.n_sampled < 5000
+    assert state.outlier[17]
+
+
+def test_a_radius_is_that_of_the_cloud_as_it_came():
+    points = samples.torus(8000).points
+    radius = float(np.median(nearest_neighbours(points, 17)[0][:, -1]))
+    state = RingBuilder(radius=radius)(points)
+    assert len(state) == 8000
+    assert np.median(state.rings.sizes) == 6

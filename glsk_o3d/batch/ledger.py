@@ -59,6 +59,7 @@ class Ledger:
                 self._keep({**row, "name": str(row["name"]), "input": str(row["input"]), "status": row["status"]})
             except (ValueError, TypeError, KeyError):
                 broken += 1
+        self._once()
         if broken:
             _log.warning("%s: %d broken lines passed over; their inputs are done anew", self.path, broken)
 
@@ -66,10 +67,13 @@ class Ledger:
         self.rows.pop(row["name"], None)  # the last comes last
         self.rows[row["name"]] = row
 
-    def rewrite(self) -> None:
-        """Write one line per input, in the place of all that was there."""
+    def _once(self) -> None:
         last = {row["input"]: name for name, row in self.rows.items()}
         self.rows = {name: self.rows[name] for name in sorted(last.values())}
+
+    def rewrite(self) -> None:
+        """Write one line per input, in the place of all that was there."""
+        self._once()
         data = b"".join(map(_line, self.rows.values()))
         write_atomically(self.path, lambda temporary: temporary.write_bytes(data))
 

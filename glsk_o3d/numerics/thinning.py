@@ -5,6 +5,7 @@ import numpy as np
 from .neighbourhoods import nearest_neighbours, row_medians
 from .ordering import BITS, morton_codes
 
+TAIL = 0.001  # share of the points that may be far off, at either end of each axis
 MOST = 4  # points that one may stand for, where the surface has more than enough
 WORTH = 0.01  # share of the points that another round must merge
 SPARSE = 0.25  # share of the points left, below which the neighbours are looked up anew
@@ -64,11 +65,14 @@ def thin_to_grid(points, n):
     Returns
     -------
     kept : (c,) int array
-        Points left; about n, but all where that takes finer cells than numbers have, beside points very far off.
+        Points left, about n. Points far off share the cells at the border.
     into : (m,) int array
         Position in `kept` of the point that stands for each.
     """
-    code = morton_codes(points, 2**BITS - 1)
+    # A few points far off must not decide how wide the cells are.
+    low, high = np.quantile(points[:: 1 + len(points) // 100000], [TAIL, 1 - TAIL], axis=0)
+    inner = np.clip(points, 2 * low - high, 2 * high - low)
+    code = morton_codes(inner, 2**BITS - 1)
     order = np.argsort(code, kind="stable")
     ordered = code[order]
     counts = [1]
@@ -77,7 +81,7 @@ def thin_to_grid(points, n):
             return np.arange(len(points)), np.arange(len(points))
         counts.append(1 + np.count_nonzero(np.diff(ordered >> np.uint64(3 * (BITS - len(counts))))))
     wider = np.log(counts[-1] / n) / np.log(counts[-1] / counts[-2])
-    code = morton_codes(points, 2 ** (len(counts) - 1 - wider))[order]
+    code = morton_codes(inner, 2 ** (len(counts) - 1 - wider))[order]
     again = np.argsort(code, kind="stable")
     order, code = order[again], code[again]
     begin = np.flatnonzero(np.append(True, code[1:] != code[:-1]))
@@ -120,7 +124,7 @@ def thin_smooth(points, neighbours, spread, around):
         The point that each was merged into; itself for those that are left.
     """
     ratio = spread[:, 0] / np.maximum(spread[:, 2], np.finfo(float).tiny)
-    needed = np.pi * neighbours.shape[1] / (4 * around**2)
+    needed = np.pi * neighbours.shape[1] / (4 * max(around, 1) ** 2)
     most = np.minimum(needed / np.maximum(row_medians(ratio[neighbours]), needed / MOST), MOST)
     left, into, mass = np.ones(len(points), bool), np.arange(len(points)), np.ones(len(points))
     while True:

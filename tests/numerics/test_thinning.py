@@ -143,10 +143,18 @@ def test_a_grid_does_not_depend_on_the_order_or_scale(surface):
     np.testing.assert_array_equal(order[again[into_again]], kept[into[order]])
 
 
+@pytest.mark.parametrize("far", [1e3, 1e7, 1e12])
+def test_points_far_off_do_not_widen_the_cells(surface, far):
+    points = np.concatenate([surface, [[far, 0, 0], [0, -far, 0]]])
+    kept, into = thin_to_grid(points, 500)
+    assert 300 < len(kept) < 850
+    np.testing.assert_array_equal(into[kept], np.arange(len(kept)))
+
+
 def test_a_grid_that_is_too_coarse_keeps_all():
-    """Two points so far off that all others would be in a few of the finest cells."""
+    """Half of the points so far off that the others would be in a few of the finest cells."""
     rng = np.random.default_rng(0)
-    points = np.concatenate([rng.normal(size=(500, 3)), [[1e9, 0, 0], [-1e9, 0, 0]]])
+    points = np.concatenate([rng.normal(size=(500, 3)), 1e9 + np.zeros((500, 3))])
     kept, into = thin_to_grid(points, 100)
-    np.testing.assert_array_equal(kept, np.arange(502))
-    np.testing.assert_array_equal(into, np.arange(502))
+    np.testing.assert_array_equal(kept, np.arange(1000))
+    np.testing.assert_array_equal(into, np.arange(1000))

@@ -278,7 +278,7 @@ class FilterVerb(Verb):
         if self.filter in kinds:
             return stages[: kinds.index(self.filter)]
         if self.filter.consumes == "Contraction":
-            return (RingBuilder(), Contractor(max_iterations=1))
+            return (RingBuilder(thin_to="all"), Contractor(max_iterations=1))
         return stages if self.filter.consumes == "Skeleton" else ()
 
     def shown(self, result, source):
