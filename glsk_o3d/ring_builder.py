@@ -246,21 +246,22 @@ class RingBuilder(Filter):
         """Rows of the points to contract, the one of these that stands for each point, and their neighbours."""
         left, owner = np.arange(len(cloud)), np.arange(len(cloud))
 
-        def merge(into):
-            kept = into == np.arange(len(into))
+        def merge(into, kept):
             rows, rank = left[kept], np.cumsum(kept) - 1
             return rows, rank[into][owner], nearest_neighbours(cloud[rows], self._neighbours(len(rows)))[1]
 
         while self.around and self.radius is None and self.thin_to != "all" and len(left) >= FEW:
             into = thin_smooth(cloud[left], neighbours, spread, self.around)
-            if np.count_nonzero(into == np.arange(len(into))) > STEADY * len(into):
+            kept = into == np.arange(len(into))
+            if np.count_nonzero(kept) > STEADY * len(into):
                 break
-            left, owner, neighbours = merge(into)
+            left, owner, neighbours = merge(into, kept)
             if len(left) < ENOUGH:
                 break
             spread = principal(cloud[left], neighbours)[0]
         if most < len(left):
-            left, owner, neighbours = merge(thin(cloud[left], neighbours, most))
+            into = thin(cloud[left], neighbours, most)
+            left, owner, neighbours = merge(into, into == np.arange(len(into)))
         return left, owner, neighbours
 
     def _within(self, cloud, neighbours, frame):

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 STEM = 0.5  # of the drawn gripper behind its palm, over its opening
 _VECTORS, _NUMBERS = ("position", "approach", "closing"), ("opening", "branch", "confidence", "quality")
+_COLUMNS = [f"{name}_{axis}" for name in _VECTORS for axis in "xyz"] + list(_NUMBERS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +84,8 @@ class GraspCandidates:
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         columns = [column for array in self._vectors for column in array.T] + self._numbers
-        names = [f"{name}_{axis}" for name in _VECTORS for axis in "xyz"] + list(_NUMBERS)
         for row in zip(*(column.tolist() for column in columns), strict=True):
-            yield dict(zip(names, row, strict=True))
+            yield dict(zip(_COLUMNS, row, strict=True))
 
     def __repr__(self):
         return f"GraspCandidates({len(self)} at {self.places} places{_told(self.left_out, '; not taken: ')})"
@@ -154,11 +154,10 @@ class GraspCandidates:
         OSError
             The folder does not exist, or the file cannot be written.
         """
-        names = [f"{name}_{axis}" for name in _VECTORS for axis in "xyz"] + list(_NUMBERS)
 
         def write(temporary):
             with temporary.open("w", newline="", encoding="utf-8") as stream:
-                out = csv.DictWriter(stream, names, lineterminator="\n")
+                out = csv.DictWriter(stream, _COLUMNS, lineterminator="\n")
                 out.writeheader()
                 out.writerows({name: _plain(value, "") for name, value in row.items()} for row in self)
 

@@ -13,8 +13,8 @@ _APART = 1e-3  # distance of two eigenvalues over their spread, below which the 
 _SQUARE = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
 
 
-def eigenvalues(entries):
-    """Eigenvalues of symmetric 3 x 3 matrices.
+def principal_parts(entries):
+    """Eigenvalues of symmetric 3 x 3 matrices, and the direction of the least.
 
     Parameters
     ----------
@@ -22,12 +22,14 @@ def eigenvalues(entries):
 
     Returns
     -------
-    (3, n) float array
+    values : (3, n) float array
         Ascending.
+    direction : (n, 3) float array
+        Unit vectors; any of those with the least eigenvalue, where there is more than one.
     """
     mean, size, shape = _reduced(entries)
     least, most = _outer(shape)
-    return mean + size * np.stack([least, -least - most, most])
+    return mean + size * np.stack([least, -least - most, most]), _direction(shape, least, 0)
 
 
 def largest_eigenvalue(entries):
@@ -59,22 +61,6 @@ def main_direction(entries):
     """
     shape = _reduced(entries)[2]
     return _direction(shape, _outer(shape)[1], 2)
-
-
-def least_direction(entries):
-    """Direction of the least eigenvalue of symmetric 3 x 3 matrices.
-
-    Parameters
-    ----------
-    entries : (6, n) float array
-
-    Returns
-    -------
-    (n, 3) float array
-        Unit vectors; any of those with the least eigenvalue, where there is more than one.
-    """
-    shape = _reduced(entries)[2]
-    return _direction(shape, _outer(shape)[0], 0)
 
 
 def _reduced(entries):

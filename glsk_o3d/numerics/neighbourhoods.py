@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .eigen import eigenvalues, least_direction
+from .eigen import principal_parts
 
 PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # the entries of a symmetric matrix
 _CHUNK = 4096  # rows at a time: the (3, rows, k) work array then stays in the cache
@@ -95,8 +95,8 @@ def principal(points, neighbours):
     normals : (n, 3) float array
         Unit vectors along the first axis.
     """
-    entries = scatter(points, neighbours)
-    return np.maximum(eigenvalues(entries).T, 0), least_direction(entries)
+    values, normals = principal_parts(scatter(points, neighbours))
+    return np.maximum(values.T, 0), normals
 
 
 def uprightness(points, normals, p, q):
