@@ -46,13 +46,14 @@ from _common import (
     surroundings,
     with_solves,
 )
-from _stopwatch import MB, REST, Stage, Stopwatch, find, peak, resident
+from _stopwatch import MB, REST, Stage, Stopwatch, find, peak, reset_peak, resident
 from scipy.spatial import cKDTree
 
-from glsk_o3d import Contractor, Pipeline, read_cloud
+from glsk_o3d import Contractor, Pipeline, Skeleton, read_cloud, read_skeleton
+from glsk_o3d.analysis.curves import distances
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.interop.files import write_atomically
-from glsk_o3d.interop.open3d import cloud_points
+from glsk_o3d.interop.open3d import cloud_points, import_open3d
 from glsk_o3d.interop.preview import save_figure
 from glsk_o3d.pipelines import default, wen2024
 from glsk_o3d.report import REFUSED
@@ -82,6 +83,7 @@ STAGES = {
 
 PUBLISHED = ("wen2024", "cao2010")
 NEIGHBOURS = 30  # of the yardstick
+STEP = 0.001  # between the places of a curve at which `large` measures it, as a share of the diagonal
 LEAST, MOST = 2.0, 50  # seconds that runs in turns go on for, however few were asked for, and turns at most
 MIDDLE = (4096, 65536)  # sizes of the second growth exponent
 BASES: dict[str, Callable[[], Pipeline]] = {"wen2024": wen2024, "default": default}
@@ -526,6 +528,107 @@ def rate_tables(rows: list[dict]) -> Tables:
     return [("skeletons per second, wall time", header, lines)]
 
 
+# -------------------------------------------------------------------------------------------------------------- large
+
+COMMAND = """
+import json, resource, sys
+told, benchmarks, *words = sys.argv[1:]
+sys.path.insert(0, benchmarks)
+from _stopwatch import MB, peak
+from glsk_o3d.cli.main import app
+app(words, standalone_mode=False)
+used = resource.getrusage(resource.RUSAGE_SELF)
+with open(told, "w") as file:
+    json.dump(dict(file_cpu=used.ru_utime + used.ru_stime, file_peak=peak() / MB), file)
+"""
+"""The whole command ``glsk``, imports and all, and what it took."""
+
+
+def from_file_to_file(cloud: Path) -> dict[str, float]:
+    """CPU and wall seconds of ``glsk skeletonize``, and the most memory in MB, all of the process."""
+    told, skeleton = cloud.with_name("told.json"), cloud.with_name("skeleton.ply")
+    words = [sys.executable, "-W", "ignore", "-c", COMMAND, told, Path(__file__).parent, "skeletonize", cloud]
+    start = time.perf_counter()
+    done = subprocess.run([*map(str, words), "-o", str(skeleton)], capture_output=True, text=True)
+    wall = time.perf_counter() - start
+    if done.returncode:
+        raise RuntimeError(done.stderr.strip().splitlines()[-1])
+    return json.loads(told.read_text()) | dict(file_wall=wall)
+
+
+def once(path: Path, file: bool) -> dict:
+    """One run of `default` on a saved cloud, to be made in a fresh process; its curve is saved beside the cloud."""
+    reset_peak()
+    before = resident()
+    points = np.load(path)
+    start = time.process_time(), time.perf_counter()
+    skeleton = default()(points)
+    spent = dict(cpu=time.process_time() - start[0], wall=time.perf_counter() - start[1])
+    facts = spent | dict(peak=(peak() - before) / MB, sampled=skeleton.report.n_sampled) | told(skeleton)
+    facts["diagonal"] = float(np.linalg.norm(np.ptp(points, axis=0)))
+    curve = Skeleton(skeleton.vertices, skeleton.edges, skeleton.radii, (), (), ())
+    curve.save(path.with_suffix(".json"))
+    return facts | (from_file_to_file(path.with_suffix(".ply")) if file else {})
+
+
+def apart(curve: Skeleton, other: Skeleton, diagonal: float) -> tuple[float, float]:
+    """Mean, over both ways, and largest distance of two curves, in percent of the diagonal."""
+    ways = [distances(*pair, STEP * diagonal)[0] for pair in ((curve, other), (other, curve))]
+    mean, most = np.mean([way.mean() for way in ways]), max(way.max() for way in ways)
+    return float(100 * mean / diagonal), float(100 * most / diagonal)
+
+
+def measure_large(sizes: list[int], shapes: str, file: bool, jobs: int) -> list[dict]:
+    """A row for each shape and size, and how far its skeleton is from that of the smallest size."""
+    sizes, rows = sorted(sizes), []
+    found = cases(None, True, ",".join(f"clean_{n}" for n in sizes), shapes)
+    for shape in dict.fromkeys(case.shape for case in found):
+        with tempfile.TemporaryDirectory() as folder:
+            paths = {n: Path(folder, f"{n}.npy") for n in sizes}
+            for n, path in paths.items():
+                save_cloud(path, builtin(shape, f"clean_{n}")[0], file)
+            work = [(dict(measure="large", n=n, shape=shape), (path, file)) for n, path in paths.items()]
+            here = run(once, work, min(jobs, 1), fresh=True)
+            base = here[0]
+            for row in here[1:]:
+                if "failure" not in row and "failure" not in base:
+                    curve, other = (read_skeleton(paths[it["n"]].with_suffix(".json")) for it in (row, base))
+                    mean, most = apart(curve, other, base["diagonal"])
+                    row |= dict(base=base["n"], mean=mean, most=most, same_loops=row["loops"] == base["loops"])
+        rows += here
+    return rows
+
+
+def save_cloud(path: Path, points: np.ndarray, file: bool) -> None:
+    """As an array, and where asked for as PLY beside it."""
+    np.save(path, points)
+    if file:
+        o3d = import_open3d()
+        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+        if not o3d.io.write_point_cloud(str(path.with_suffix(".ply")), cloud):
+            raise OSError(f"{path.with_suffix('.ply')} could not be written: is the disk full?")
+
+
+def large_tables(rows: list[dict]) -> Tables:
+    """A line for each shape and size."""
+    files = any("file_cpu" in row for row in rows)
+    header = ["", "points", "CPU s", "MB", "sampled", "contracted", "vertices", "mean %", "largest %", "loops", "same"]
+    header += ["file CPU s", "file wall s", "file MB"] if files else []
+    lines = []
+    for row in rows:
+        if "failure" in row:
+            lines.append([row["shape"], str(row["n"]), *"-" * (len(header) - 2), row["failure"]])
+            continue
+        counts = [str(row[key]) for key in ("sampled", "contracted", "vertices")]
+        away = [number(row.get(key), 2) for key in ("mean", "most")]
+        same = {True: "yes", False: "no", None: "-"}[row.get("same_loops")]
+        cells = [short(row["cpu"]), number(row["peak"], 0), *counts, *away, str(row["loops"]), same]
+        if files:
+            cells += [short(row["file_cpu"]), short(row["file_wall"]), number(row["file_peak"], 0)]
+        lines.append([row["shape"], str(row["n"]), *cells, ""])
+    return [(f"default, against {min(row['n'] for row in rows)} points", [*header, "note"], lines)]
+
+
 # ----------------------------------------------------------------------------------------------------------- commands
 
 
@@ -567,12 +670,15 @@ def _folder(path: Path | None) -> Path | None:
     return path
 
 
-def _page(path: Path | None) -> Path | None:
-    if path is not None:
-        if not path.is_file():
-            raise typer.BadParameter(f"there is no page {path}")
-        fill(path, dict.fromkeys(PARTS, ""), check=True)
-    return path
+def _page(*parts: str) -> Callable[[Path | None], Path | None]:
+    def checked(path: Path | None) -> Path | None:
+        if path is not None:
+            if not path.is_file():
+                raise typer.BadParameter(f"there is no page {path}")
+            fill(path, dict.fromkeys(parts, ""), check=True)
+        return path
+
+    return checked
 
 
 Sizes = Annotated[str, typer.Option("--sizes", metavar="NUMBERS", help="Points, with commas.")]
@@ -643,12 +749,35 @@ def rate(
     present(machine(), {"rate": rate_tables(rows)}, markdown)
 
 
+@app.command()
+def large(
+    page: Annotated[
+        Path | None,
+        typer.Argument(metavar="PAGE", help="Markdown page to put the table into.", callback=_page("large")),
+    ] = None,
+    sizes: Sizes = "65536,1048576",
+    shapes: Shapes = "",
+    file: Annotated[bool, typer.Option("--file", help="Also the whole command, from a PLY file to one.")] = False,
+    jobs: Jobs = 1,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Large clouds: what they cost, and how far their skeletons are from that of the smallest size."""
+    where = machine()
+    rows = measure_large(numbers(sizes), shapes, file, jobs)
+    save(output, rows)
+    tables = large_tables(rows)
+    if page is not None:
+        fill(page, {"large": "\n".join([where, "", *(markdown_table(*table) for table in tables)])})
+    present(where, {"large": tables}, markdown)
+
+
 @app.command("all")
 def everything(
     page: Annotated[
         Path | None,
         typer.Argument(
-            metavar="PAGE", help="Markdown page to put the tables into; pictures beside it.", callback=_page
+            metavar="PAGE", help="Markdown page to put the tables into; pictures beside it.", callback=_page(*PARTS)
         ),
     ] = None,
     own: Own = False,
