@@ -8,6 +8,7 @@ The README beside this file says what each command shows.
 from __future__ import annotations
 
 import json
+import re
 import time
 from pathlib import Path
 from statistics import fmean, median
@@ -41,6 +42,8 @@ from scipy.spatial.transform import Rotation
 from glsk_o3d import Pipeline, read_cloud
 from glsk_o3d.analysis import compare
 from glsk_o3d.cli.overrides import override
+from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.interop.files import write_atomically
 from glsk_o3d.pipelines import default
 
 EVERY = "clean_1024,clean_4096,density_4096,holes_4096,scan2_4096,noise1_4096,noise2_4096,outliers_4096"
@@ -76,6 +79,10 @@ IDEAS = {
 }
 """What `default` adds to the publications, and the settings that switch it off. All of them together (but for the
 reduction and the stop rule, which are published) are `wen2024`."""
+
+Changed = Annotated[
+    list[str] | None, typer.Option("--set", metavar="FILTER.PARAMETER=VALUE", help="Change it; may be repeated.")
+]
 
 app = typer.Typer(
     help=__doc__, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
@@ -130,11 +137,20 @@ def wrong(row: dict) -> str:
     return f"{row['shape']} {' '.join(off)}" if off else ""
 
 
+def altered(pipeline: Pipeline, settings: list[str] | None) -> Pipeline:
+    """The pipeline with these settings, each as ``Filter.parameter=value``."""
+    try:
+        return override(pipeline, settings or [])
+    except InvalidParameterError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
 @app.command()
 def truth(
     folder: Folder = None,
     own: Own = False,
     pipeline: Pipelines = "default,cao2010,wen2024",
+    changed: Changed = None,
     variant: Variants = f"clean_16384,{EVERY}",
     shapes: Shapes = "",
     repeat: Annotated[int, typer.Option(min=1, help="Runs, of whose CPU seconds the median counts.")] = 1,
@@ -143,11 +159,14 @@ def truth(
     markdown: Markdown = False,
 ) -> None:
     """Pipelines on shapes with known axes, a table per variant."""
-    chosen = named(pipeline)
+    chosen = {name: altered(it, changed) for name, it in named(pipeline).items()}
     rows = measured(cases(folder, own, variant, shapes), chosen, jobs, repeat)
     save(output, rows)
     header = ["", "error", "inside", "complete", "topology", "leaves", "ends", "radius", "CPU s", "worst", "wrong"]
-    for name, group in by_variant(rows).items():
+    groups = by_variant(rows)
+    if len(groups) > 1:
+        groups["all"] = rows
+    for name, group in groups.items():
         lines = []
         for label in chosen:
             here = pick(group, pipeline=label)
@@ -173,6 +192,10 @@ def ablation(
     variant: Variants = EVERY,
     shapes: Shapes = "",
     idea: Annotated[str, typer.Option(metavar="NAMES", help="With commas; else all.")] = ",".join(IDEAS),
+    page: Annotated[
+        Path | None,
+        typer.Option(metavar="PAGE", help="Markdown page that names settings: put their effects behind them."),
+    ] = None,
     jobs: Jobs = 2,
     output: Output = None,
     markdown: Markdown = False,
@@ -180,6 +203,8 @@ def ablation(
     """The default pipeline with each idea switched off, one at a time: mean error / shapes with right topology."""
     if unknown := set(idea.split(",")) - set(IDEAS):
         raise typer.BadParameter(f"no idea {', '.join(unknown)}: there are {', '.join(IDEAS)}")
+    if page is not None and not page.is_file():
+        raise typer.BadParameter(f"there is no page {page}")
     chosen = {"default": default()}
     chosen |= {name: override(default(), IDEAS[name].split()) for name in idea.split(",")}
     chosen |= named(",".join(PUBLISHED))
@@ -187,25 +212,51 @@ def ablation(
     save(output, rows)
     header, lines = ablation_table(rows)
     show("one idea off at a time", header, lines, markdown)
+    if page is not None:
+        write_effects(page, rows)
+
+
+def lost(mean: dict, whole: dict) -> float:
+    """The relative rise of the error and the relative fall of the number of shapes with right topology."""
+    return mean["error"] / whole["error"] - mean["right"] / max(whole["right"], 1)
+
+
+def cell(mean: dict) -> str:
+    """Error / right topologies."""
+    return f"{number(mean['error'])} / {mean['right']}"
+
+
+def effect(rows: list[dict], idea: str) -> str:
+    """What is lost without an idea: over all clouds, and in the variant in which it counts most."""
+
+    def pair(here):
+        return [summary(pick(here, pipeline=name)) for name in ("default", idea)]
+
+    pairs = {variant: pair(group) for variant, group in by_variant(rows).items()}
+    most = max(pairs, key=lambda variant: lost(pairs[variant][1], pairs[variant][0]))
+    whole, there = (" → ".join(map(cell, it)) for it in (pair(rows), pairs[most]))
+    return f"{whole}; {most}: {there}"
+
+
+def write_effects(page: Path, rows: list[dict]) -> None:
+    """Put the effects behind the settings that a page names in cells of its tables, up to the end of cell or line."""
+    text = page.read_text(encoding="utf-8")
+    for name in IDEAS.keys() & {row["pipeline"] for row in rows}:
+        words = effect(rows, name)
+        text = re.sub(rf"(`{re.escape(IDEAS[name])}`: ).*?(?= \||<br>)", lambda it, words=words: it[1] + words, text)
+    write_atomically(page, lambda temporary: Path(temporary).write_text(text, encoding="utf-8"))
 
 
 def ablation_table(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
-    """Header and lines: `default`, the ideas by how much is lost without them, and the publications.
-
-    What is lost is the relative rise of the error and the relative fall of the number of shapes with right topology.
-    """
+    """Header and lines: `default`, the ideas by how much is `lost` without them, and the publications."""
     variants = by_variant(rows)
     mean = {name: summary(pick(rows, pipeline=name)) for name in dict.fromkeys(row["pipeline"] for row in rows)}
     whole = mean["default"]
-
-    def loss(name):
-        return mean[name]["error"] / whole["error"] - mean[name]["right"] / max(whole["right"], 1)
-
-    ideas = sorted((name for name in mean if name in IDEAS), key=loss, reverse=True)
+    ideas = sorted((name for name in mean if name in IDEAS), key=lambda name: lost(mean[name], whole), reverse=True)
     lines = []
     for name in ["default", *ideas, *(name for name in PUBLISHED if name in mean)]:
         parts = [summary(pick(group, pipeline=name)) for group in variants.values()]
-        cells = [f"{number(part['error'])} / {part['right']}" for part in (*parts, mean[name])]
+        cells = [cell(part) for part in (*parts, mean[name])]
         label, setting = (f"without {name}", f"`{IDEAS[name]}`") if name in IDEAS else (name, "")
         lines.append([label, *cells, setting])
     titles = [f"{variant} ({len(pick(group, pipeline='default'))})" for variant, group in variants.items()]
@@ -307,15 +358,15 @@ def local_radius(axis, points):
 # ------------------------------------------------------------------------------------------- turned clouds, real clouds
 
 
-def turned(case: Case, count: int) -> dict:
+def turned(case: Case, count: int, pipeline: Pipeline) -> dict:
     """What changes when the cloud is turned at random and its points are shuffled."""
     points, axis = case.load()
     rng = np.random.default_rng(0)
-    first = default()(points)
+    first = pipeline(points)
     moves, topology, leaves = [], 0, 0
     for _ in range(count):
         rotation = Rotation.from_quat(rng.normal(size=4)).as_matrix()
-        other = default()((points @ rotation.T)[rng.permutation(len(points))])
+        other = pipeline((points @ rotation.T)[rng.permutation(len(points))])
         back = other.vertices @ rotation
         there = feet(back, first.vertices, first.edges)[0] / local_radius(axis, back)
         here = feet(first.vertices, back, other.edges)[0] / local_radius(axis, first.vertices)
@@ -332,13 +383,17 @@ def rotations(
     variant: Variants = "clean_4096",
     shapes: Shapes = "6",
     count: Annotated[int, typer.Option(min=1, help="Turns per shape.")] = 20,
+    changed: Changed = None,
     jobs: Jobs = 2,
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
     """Whether the skeleton depends on how the cloud is turned and in which order its points come."""
     found = cases(folder, own, variant, shapes)
-    rows = run(turned, [(dict(variant=case.variant, shape=case.shape), (case, count)) for case in found], jobs)
+    pipeline = altered(default(), changed)
+    rows = run(
+        turned, [(dict(variant=case.variant, shape=case.shape), (case, count, pipeline)) for case in found], jobs
+    )
     save(output, rows)
     header = ["shape", "turns", "topology changes", "leaf changes", "median move", "largest move", "note"]
     for name, here in by_variant(rows).items():
