@@ -179,7 +179,7 @@ def truth(
                     *(f"{mean[key]}/{mean['n']}" for key in ("right", "leaves")),
                     *(number(mean[key], 2) for key in ("ends", "radius_error", "cpu")),
                     ", ".join(f"{row['shape']} {row['error']:.2f}" for row in last),
-                    ", ".join(filter(None, map(wrong, here))),
+                    ", ".join(filter(None, map(wrong, here))) if group is not rows else "",
                 ]
             )
         show(name, header, lines, markdown)
@@ -194,7 +194,7 @@ def ablation(
     idea: Annotated[str, typer.Option(metavar="NAMES", help="With commas; else all.")] = ",".join(IDEAS),
     page: Annotated[
         Path | None,
-        typer.Option(metavar="PAGE", help="Markdown page that names settings: put their effects behind them."),
+        typer.Option("--page", metavar="PAGE", help="Markdown page that names settings: put their effects behind them."),
     ] = None,
     jobs: Jobs = 2,
     output: Output = None,

@@ -3,6 +3,7 @@
 import importlib
 import json
 import math
+import re
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
@@ -104,6 +105,18 @@ class TestArithmetic:
         assert names == ["without denoising", "without threads cut", "without twigs cut", "cao2010"]
         assert lines[1] == ["without denoising", "0.500 / 1", "0.100 / 1", "0.300 / 2", "`RingBuilder.denoise=0`"]
 
+    def test_effects_go_behind_the_settings_of_a_page(self, tool, tmp_path):
+        rows = [row(), row(variant="noise1_512", error=0.3)]
+        rows += [row(pipeline="denoising"), row(pipeline="denoising", variant="noise1_512", error=0.5, topology=False)]
+        page = tmp_path / "page.md"
+        page.write_text("| a | 1 before<br>`RingBuilder.denoise=0`: ? |\n| b | `Refiner.twig=0`: old |\n")
+        tool.write_effects(page, rows)
+        told = "0.200 / 2 → 0.300 / 1; noise1_512: 0.300 / 1 → 0.500 / 0"
+        expected = f"| a | 1 before<br>`RingBuilder.denoise=0`: {told} |\n| b | `Refiner.twig=0`: old |\n"
+        assert page.read_text() == expected
+        tool.write_effects(page, rows)
+        assert page.read_text() == expected
+
     def test_feet_on_a_square(self, tool):
         nodes = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
         edges = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
@@ -165,6 +178,22 @@ class TestCommands:
         assert len(table) == 7
         assert "without twigs cut" in "".join(table[3:5])
 
+    def test_ablation_writes_into_a_page(self, call, tmp_path):
+        page = tmp_path / "page.md"
+        page.write_text("| `Refiner.twig=0`:  |")
+        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--idea", "twigs cut", "--jobs", 0)
+        call("ablation", *few, "--page", page)
+        assert re.fullmatch(r"\| `Refiner.twig=0`: 0.\d+ / 1 → 0.\d+ / 1; clean_512: 0.\d+ / 1 → .* \|", page.read_text())
+
+    def test_settings(self, call, tmp_path):
+        few = ("--builtin", "--shapes", "torus", "--pipeline", "default", "--jobs", 0, "-o", tmp_path / "out.json")
+        settings = ("--set", "Contractor.max_iterations=1", "--set", "Refiner.twig=0")
+        printed = call("truth", *few, "--variant", "clean_512,clean_300", *settings, "--markdown")
+        rows = json.loads((tmp_path / "out.json").read_text())["rows"]
+        assert [row["solves"] for row in rows] == [1, 1]
+        assert "**all**" in printed
+        assert "/2 |" in printed.partition("**all**")[2]
+
     def test_rotations(self, call, tmp_path):
         out = tmp_path / "out.json"
         few = ("--builtin", "--shapes", "1", "--variant", "clean_512", "--count", 1)
@@ -196,7 +225,10 @@ class TestCommands:
             ("truth", "--builtin", "--variant", "dirty_512"),
             ("truth", "--builtin", "--pipeline", "wen2023"),
             ("truth", "no_such_folder"),
+            ("truth", "--builtin", "--set", "Refiner.magic=1"),
+            ("rotations", "--builtin", "--set", "Refiner.magic=1"),
             ("ablation", "--builtin", "--idea", "magic"),
+            ("ablation", "--builtin", "--page", "no_such_page.md"),
             ("mass", "--builtin", "-o", "no_such_folder/out.json"),
         ],
     )

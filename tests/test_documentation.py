@@ -198,6 +198,43 @@ def test_the_advice_on_parameters_can_be_taken():
         assert override(glsk.pipelines.default(), [setting]) != glsk.pipelines.default()
 
 
+def cells(page):
+    """The cells of all lines of tables of a page."""
+    text = (ROOT / "docs" / page).read_text()
+    return [re.split(r"(?<!\\) \| ", line[2:-2]) for line in text.splitlines() if line.startswith("| ")]
+
+
+def test_every_difference_has_a_measured_effect():
+    header, *rows = [row for row in cells("differences.md") if len(row) == 5]
+    assert header == ["what", "paper", "published code", "here", "effect"]
+    assert len(rows) > 30
+    for what, *_, effect in rows:
+        for part in effect.split("<br>"):
+            assert re.search(r"\d", re.sub(r"`[^`]*`", "", part)) or len(part.split()) > 10, what
+
+
+def test_the_effects_of_settings_are_those_of_the_ablation():
+    of_all = {row[-1]: row[-2] for row in cells("accuracy.md") if len(row) == 11 and row[0].startswith("without")}
+    (whole,) = [row[-2] for row in cells("accuracy.md") if len(row) == 11 and row[0] == "default"]
+    said = re.findall(r"(`[^`]+`): ([\d.]+ / \d+) → ([\d.]+ / \d+); \w+:", (ROOT / "docs/differences.md").read_text())
+    assert {setting: without for setting, _, without in said} == of_all
+    assert {default for _, default, _ in said} == {whole}
+
+
+def test_names_in_coming_from_are_parameters():
+    calls = re.findall(rf"\b({'|'.join(BUILTIN)})\(([^()]+)\)", (ROOT / "docs" / "coming_from.md").read_text())
+    assert len(calls) > 20
+    for cls, words in calls:
+        named = re.findall(r"(\w+)=", words)
+        assert set(named) <= {field.name for field in dataclasses.fields(BUILTIN[cls])}, (cls, words)
+
+
+def test_every_work_is_cited_and_every_citation_is_in_the_bibliography():
+    works = set(re.findall(r"^@\w+\{(\w+),", (ROOT / "docs" / "references.bib").read_text(), re.MULTILINE))
+    cited = {name for path in PAGES for name in re.findall(r"\{cite:\w+\}`(\w+)`", path.read_text())}
+    assert cited == works
+
+
 def test_every_filter_has_a_page_with_all_its_sections():
     told = "".join(path.read_text() for path in ROOT.glob("docs/filters/*.md"))
     for cls in BUILTIN.values():

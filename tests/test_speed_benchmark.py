@@ -344,7 +344,7 @@ class TestCommands:
 
     def test_all_fill_a_page(self, call, tmp_path, root):
         page = tmp_path / "speed.md"
-        page.write_text((root / "docs" / "speed.md").read_text())
+        page.write_text((root / "docs" / "speed.md").read_text().partition("## Large clouds")[0])
         (tmp_path / "images").mkdir()
         words = ("--sizes", "256,512", "--figure-sizes", "256", "--pipeline", "default", "--shapes", "tube")
         printed = call("all", page, "--builtin", *words, "--repeat", 1, "--jobs", 0, "--markdown")
@@ -359,6 +359,53 @@ class TestCommands:
         ]
         assert (tmp_path / "images" / "contraction_256.png").is_file()
 
+    def test_large(self, call, tmp_path, root):
+        page, out = tmp_path / "speed.md", tmp_path / "out.json"
+        page.write_text("before\n<!-- large -->\nold\n<!-- end -->\nafter\n")
+        words = ("--sizes", "400,300", "--shapes", "tube,torus", "--jobs", 0, "--markdown")
+        printed = call("large", page, *words, "-o", out)
+        rows = json.loads(out.read_text())["rows"]
+        assert [(row["shape"], row["n"], row["sampled"]) for row in rows] == [
+            (shape, n, n) for shape in ("tube", "torus") for n in (300, 400)
+        ]
+        for row in rows:
+            assert min(row["cpu"], row["wall"], row["vertices"]) > 0
+            assert row["loops"] == (row["shape"] == "torus")
+        for row in rows[1::2]:
+            assert row["base"] == 300
+            assert row["same_loops"]
+            assert 0 < row["mean"] < row["most"] < 10
+        lines = [line for line in printed.splitlines() if line.startswith("|")]
+        assert len(lines) == 6
+        assert "file" not in lines[0]
+        assert [line for line in page.read_text().splitlines() if line.startswith("|")] == lines
+        assert page.read_text().count("\nMeasured on ") == 1
+        assert "old" not in page.read_text()
+
+    def test_large_from_file_to_file(self, call, tmp_path):
+        out = tmp_path / "out.json"
+        printed = call("large", "--sizes", 300, "--shapes", "tube", "--file", "--jobs", 0, "-o", out, "--markdown")
+        (row,) = json.loads(out.read_text())["rows"]
+        assert 0.2 < row["file_cpu"]
+        assert 0.2 < row["file_wall"]
+        assert 100 < row["file_peak"] < 2000
+        assert "file MB" in printed
+
+    def test_distance_of_curves(self, tool):
+        ends = np.array([[0.0, 0, 0], [10, 0, 0]])
+        curve, beside = (tool.Skeleton(ends + [0, y, 0], np.array([[0, 1]]), np.ones(2), (), (), ()) for y in (0, 1))
+        assert tool.apart(curve, beside, 20) == pytest.approx((5, 5))
+        longer = tool.Skeleton(ends * 2, curve.edges, curve.radii, (), (), ())
+        mean, most = tool.apart(longer, curve, 20)
+        assert most == pytest.approx(50, abs=0.1)
+        assert mean == pytest.approx((100 * 5 / 20 / 2 + 0) / 2, abs=0.1)  # half of it is 5 away on average, back none
+
+    def test_failures_of_large_clouds_are_lines(self, tool):
+        failed = dict(measure="large", shape="tube", n=300, failure="ValueError: no")
+        ((_, header, (line,)),) = tool.large_tables([failed])
+        assert len(header) == len(line)
+        assert line == ["tube", "300", *"-" * 9, "ValueError: no"]
+
     @pytest.mark.parametrize(
         "wrong",
         [
@@ -369,6 +416,9 @@ class TestCommands:
             ("figures", "no_such_folder"),
             ("rate", "--shape", "teapot"),
             ("rate", "--pipeline", "wen2023"),
+            ("large", "no_such_page.md"),
+            ("large", "README.md"),
+            ("large", "--shapes", "teapot"),
             ("all", "no_such_page.md", "--builtin"),
             ("all", "README.md", "--builtin"),
         ],
