@@ -194,7 +194,9 @@ def ablation(
     idea: Annotated[str, typer.Option(metavar="NAMES", help="With commas; else all.")] = ",".join(IDEAS),
     page: Annotated[
         Path | None,
-        typer.Option("--page", metavar="PAGE", help="Markdown page that names settings: put their effects behind them."),
+        typer.Option(
+            "--page", metavar="PAGE", help="Markdown page that names settings: put their effects behind them."
+        ),
     ] = None,
     jobs: Jobs = 2,
     output: Output = None,

@@ -183,7 +183,9 @@ class TestCommands:
         page.write_text("| `Refiner.twig=0`:  |")
         few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--idea", "twigs cut", "--jobs", 0)
         call("ablation", *few, "--page", page)
-        assert re.fullmatch(r"\| `Refiner.twig=0`: 0.\d+ / 1 → 0.\d+ / 1; clean_512: 0.\d+ / 1 → .* \|", page.read_text())
+        assert re.fullmatch(
+            r"\| `Refiner.twig=0`: 0.\d+ / 1 → 0.\d+ / 1; clean_512: 0.\d+ / 1 → .* \|", page.read_text()
+        )
 
     def test_settings(self, call, tmp_path):
         few = ("--builtin", "--shapes", "torus", "--pipeline", "default", "--jobs", 0, "-o", tmp_path / "out.json")

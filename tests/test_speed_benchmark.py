@@ -386,8 +386,8 @@ class TestCommands:
         out = tmp_path / "out.json"
         printed = call("large", "--sizes", 300, "--shapes", "tube", "--file", "--jobs", 0, "-o", out, "--markdown")
         (row,) = json.loads(out.read_text())["rows"]
-        assert 0.2 < row["file_cpu"]
-        assert 0.2 < row["file_wall"]
+        assert row["file_cpu"] > 0.2
+        assert row["file_wall"] > 0.2
         assert 100 < row["file_peak"] < 2000
         assert "file MB" in printed
 
