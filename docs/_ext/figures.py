@@ -147,7 +147,7 @@ def damaged(seed=0):
 
 
 def tree(seed, forks=3):
-    """A trunk that forks again and again, by 35 degrees to either side; each branch is 0.75 as long, 0.7 as thick as before."""
+    """A trunk that forks by 35 degrees to either side, again and again, each time 0.75 as long and 0.7 as thick."""
     parts, axes, fork = [], [], np.radians(35)
 
     def grow(start, heading, across, length, radius, forks):
