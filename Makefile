@@ -12,7 +12,7 @@ BENCH_ARGS ?= all --builtin --pictures benchmarks/results -o benchmarks/results/
 PYTHON_HINT = glsk-o3d needs Python 3.10 or newer: install it, or say 'make ... PYTHON=/path/to/python3'.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test docs accuracy bench lint format clean system-deps browser
+.PHONY: help demo test docs figures accuracy bench lint format clean system-deps browser
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -26,6 +26,9 @@ test: $(VENV)/.installed-test | browser ## run the whole test suite (PYTEST_ARGS
 docs: $(VENV)/.installed-docs ## build the site into build/docs/index.html (SPHINX_ARGS for sphinx-build)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -q -W --keep-going -c docs -d build/doctrees $(SPHINX_ARGS) . build/docs
 	@echo "The site is build/docs/index.html"
+
+figures: $(VENV)/.installed-demo ## draw the pictures of the README and of the pages anew, into docs/images
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/_ext/figures.py docs/images
 
 accuracy: $(VENV)/.installed-demo ## how far skeletons are from known axes (ACCURACY_ARGS="ablation --builtin" for more)
 	$(BIN)/python benchmarks/accuracy.py $(ACCURACY_ARGS)

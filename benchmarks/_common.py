@@ -10,7 +10,7 @@ import subprocess
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -32,12 +32,13 @@ from glsk_o3d import Contractor, Pipeline, pipelines, samples
 from glsk_o3d.analysis import Truth, read_truth
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.interop.files import write_atomically
 from glsk_o3d.report import Report
 
 ROOT = Path(__file__).resolve().parents[1]
 HOLES = 6  # in a built-in cloud with holes, each of them as far across as the part it is in
 SHOWN = 0.98  # least share of the true axis that a cloud must show for its skeleton to be scored
-TEXT = {"setting", "worst", "wrong", "note"}  # columns that are not numbers, besides the first
+TEXT = {"pipeline", "setting", "worst", "wrong", "note"}  # columns that are not numbers, besides the first
 
 # ------------------------------------------------------------------------------------------------------------- clouds
 
@@ -253,6 +254,7 @@ Jobs = Annotated[int, typer.Option("--jobs", min=0, help="Processes; 0 stays in 
 Output = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="JSON", help="Write every result.", callback=_writable)
 ]
+Tables = list[tuple[str, list[str], list[list[str]]]]  # title, header, lines
 Markdown = Annotated[bool, typer.Option("--markdown", help="Print Markdown.")]
 
 
@@ -281,6 +283,21 @@ def markdown_table(title: str, header: list[str], rows: list[list[str]]) -> str:
 
 def _numbers(header):
     return [i > 0 and name not in TEXT for i, name in enumerate(header)]
+
+
+def fill(page: Path, parts: Mapping[str, Tables | str], check: bool = False) -> None:
+    """Put tables, or texts, into a page between the lines ``<!-- NAME -->`` and ``<!-- end -->``; or only look."""
+    text = page.read_text(encoding="utf-8")
+    for name, body in parts.items():
+        if not isinstance(body, str):
+            body = "\n".join(markdown_table(*table) for table in body)
+        pattern = rf"(<!-- {name} -->\n).*?(<!-- end -->)"
+        text, found = re.subn(pattern, lambda match, body=body: f"{match[1]}\n{body}\n{match[2]}", text, flags=re.S)
+        if found != 1:
+            raise typer.BadParameter(f"{page} has no lines <!-- {name} --> and <!-- end -->")
+    if check:
+        return
+    write_atomically(page, lambda temporary: Path(temporary).write_text(text, encoding="utf-8"))
 
 
 def number(value: float | None, digits: int = 3) -> str:

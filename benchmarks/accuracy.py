@@ -7,9 +7,12 @@ The README beside this file says what each command shows.
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import time
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from statistics import fmean, median
 from typing import Annotated
@@ -25,8 +28,10 @@ from _common import (
     Own,
     Pipelines,
     Shapes,
+    Tables,
     Variants,
     cases,
+    fill,
     folder_or,
     named,
     number,
@@ -36,6 +41,7 @@ from _common import (
     show,
     with_solves,
 )
+from _plots import BLUE, INK, LOOKS, keep, look, plain_log, sheet
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -124,6 +130,11 @@ def summary(rows: list[dict]) -> dict:
     return counts | {name: fmean(found) if found else float("nan") for name, found in values.items()}
 
 
+def by_pipeline(rows: list[dict]) -> dict[str, list[dict]]:
+    """The rows of each pipeline, in their order."""
+    return {name: pick(rows, pipeline=name) for name in dict.fromkeys(row["pipeline"] for row in rows)}
+
+
 def by_variant(rows: list[dict]) -> dict[str, list[dict]]:
     """The rows of each variant, in their order."""
     return {name: pick(rows, variant=name) for name in dict.fromkeys(row["variant"] for row in rows)}
@@ -162,14 +173,18 @@ def truth(
     chosen = {name: altered(it, changed) for name, it in named(pipeline).items()}
     rows = measured(cases(folder, own, variant, shapes), chosen, jobs, repeat)
     save(output, rows)
-    header = ["", "error", "inside", "complete", "topology", "leaves", "ends", "radius", "CPU s", "worst", "wrong"]
     groups = by_variant(rows)
-    if len(groups) > 1:
-        groups["all"] = rows
+    for table in truth_tables(groups | ({"all": rows} if len(groups) > 1 else {})):
+        show(*table, markdown)
+
+
+def truth_tables(groups: dict[str, list[dict]]) -> Tables:
+    """A table per group; in that of all clouds without what is wrong, as it would be too much."""
+    header = ["", "error", "inside", "complete", "topology", "leaves", "ends", "radius", "CPU s", "worst", "wrong"]
+    tables = []
     for name, group in groups.items():
         lines = []
-        for label in chosen:
-            here = pick(group, pipeline=label)
+        for label, here in by_pipeline(group).items():
             mean = summary(here)
             last = sorted((row for row in here if "failure" not in row), key=lambda row: -row["error"])[:3]
             lines.append(
@@ -179,10 +194,43 @@ def truth(
                     *(f"{mean[key]}/{mean['n']}" for key in ("right", "leaves")),
                     *(number(mean[key], 2) for key in ("ends", "radius_error", "cpu")),
                     ", ".join(f"{row['shape']} {row['error']:.2f}" for row in last),
-                    ", ".join(filter(None, map(wrong, here))) if group is not rows else "",
+                    ", ".join(filter(None, map(wrong, here))) if name != "all" else "",
                 ]
             )
-        show(name, header, lines, markdown)
+        tables.append((name, header, lines))
+    return tables
+
+
+def overview(rows: list[dict]) -> Tables:
+    """The same in one table, without the names of shapes."""
+    lines = [
+        [name * (place == 0), f"`{line[0]}`", *line[1:5], *line[6:9]]
+        for name, _, here in truth_tables(by_variant(rows))
+        for place, line in enumerate(here)
+    ]
+    header = ["cloud", "pipeline", "error", "inside", "completeness", "topology", "ends", "radius error", "CPU s"]
+    return [("means over the shapes", header, lines)]
+
+
+def draw_truth(rows: list[dict], folder: Path) -> Path:
+    """Error and right topologies of the pipelines, variant by variant."""
+    variants = by_variant(rows)
+    names, places = list(by_pipeline(rows)), np.arange(len(variants))
+    means = {name: [summary(pick(group, pipeline=name)) for group in variants.values()] for name in names}
+    figure, (left, right) = sheet(1.0 + 0.33 * len(variants), columns=2, sharey=True, width_ratios=(3, 2))
+    for axes, key in ((left, "error"), (right, "right")):
+        axes.hlines(places, 0, 1, transform=axes.get_yaxis_transform(), color="#e4e4e4", linewidth=0.8, zorder=0)
+        for name in names[::-1]:  # the first on top
+            axes.plot([mean[key] for mean in means[name]], places, linestyle="", markersize=6, label=name, **look(name))
+        axes.set_xlim(0, 1.05 * max(mean[key] for means_of in means.values() for mean in means_of))
+        axes.tick_params(axis="y", length=0)
+    left.set(xlabel="mean error, local radii", ylim=(len(variants) - 0.5, -0.5))
+    left.set_yticks(places, list(variants))
+    right.set_xlabel(f"right topology, of {max(mean['n'] for mean in means[names[0]])}")
+    right.xaxis.get_major_locator().set_params(integer=True)
+    shown, labels = (each[::-1] for each in left.get_legend_handles_labels())
+    figure.legend(shown, labels, loc="outside upper center", ncols=len(names), frameon=False)
+    return keep(figure, folder, "accuracy_clouds")
 
 
 @app.command()
@@ -249,12 +297,16 @@ def write_effects(page: Path, rows: list[dict]) -> None:
     write_atomically(page, lambda temporary: Path(temporary).write_text(text, encoding="utf-8"))
 
 
+def losses(rows: list[dict]) -> tuple[dict[str, dict], list[str]]:
+    """Means of every pipeline over all variants, and the ideas in it by how much is `lost` without them."""
+    mean = {name: summary(here) for name, here in by_pipeline(rows).items()}
+    ideas = (name for name in mean if name in IDEAS)
+    return mean, sorted(ideas, key=lambda name: lost(mean[name], mean["default"]), reverse=True)
+
+
 def ablation_table(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
-    """Header and lines: `default`, the ideas by how much is `lost` without them, and the publications."""
-    variants = by_variant(rows)
-    mean = {name: summary(pick(rows, pipeline=name)) for name in dict.fromkeys(row["pipeline"] for row in rows)}
-    whole = mean["default"]
-    ideas = sorted((name for name in mean if name in IDEAS), key=lambda name: lost(mean[name], whole), reverse=True)
+    """Header and lines: `default`, the ideas by how much is lost without them, and the publications."""
+    variants, (mean, ideas) = by_variant(rows), losses(rows)
     lines = []
     for name in ["default", *ideas, *(name for name in PUBLISHED if name in mean)]:
         parts = [summary(pick(group, pipeline=name)) for group in variants.values()]
@@ -262,7 +314,30 @@ def ablation_table(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
         label, setting = (f"without {name}", f"`{IDEAS[name]}`") if name in IDEAS else (name, "")
         lines.append([label, *cells, setting])
     titles = [f"{variant} ({len(pick(group, pipeline='default'))})" for variant, group in variants.items()]
-    return ["", *titles, f"all ({whole['n']})", "setting"], lines
+    return ["", *titles, f"all ({mean['default']['n']})", "setting"], lines
+
+
+def draw_ablation(rows: list[dict], folder: Path) -> Path:
+    """What is lost without each idea: how much more error, how many shapes."""
+    mean, ideas = losses(rows)
+    whole = mean["default"]
+    rise = [100 * (mean[name]["error"] / whole["error"] - 1) for name in ideas]
+    lost = [whole["right"] - mean[name]["right"] for name in ideas]
+    figure, both = sheet(0.9 + 0.23 * len(ideas), columns=2, sharey=True, width_ratios=(3, 2))
+    titles = ("error rises by %", f"right topologies\nlost, of {whole['right']}")
+    for axes, title, values in zip(both, titles, (rise, lost), strict=True):
+        bars = axes.barh(range(len(ideas)), values, color=BLUE)
+        words = [f"{value:.0f}".replace("-0", "0").replace("-", "\N{MINUS SIGN}") for value in values]
+        axes.bar_label(bars, words, padding=3, fontsize=8)
+        axes.axvline(0, color=INK, linewidth=0.8)
+        axes.set_title(title, fontsize=10)
+        axes.set_xticks([])
+        axes.margins(x=0.18, y=0.01)
+        axes.spines[["left", "bottom"]].set_visible(False)
+        axes.tick_params(axis="y", length=0)
+    both[0].set_yticks(range(len(ideas)), ideas, fontsize=9)
+    both[0].invert_yaxis()
+    return keep(figure, folder, "accuracy_ideas")
 
 
 # ---------------------------------------------------------------------------------------------------- the contraction
@@ -282,15 +357,45 @@ def stop(
     chosen = {str(n): with_solves(default(), n) for n in SOLVES} | {"rule": default()}
     rows = measured(cases(folder, own, variant, shapes), chosen, jobs)
     save(output, rows)
-    for name, here in by_variant(rows).items():
-        taken = [row.get("solves") for row in pick(here, pipeline="rule")]
-        lines = []
-        for label in chosen:
-            mean = summary(pick(here, pipeline=label))
+    for table in stop_tables(rows):
+        show(*table, markdown)
+
+
+def stops(rows: list[dict]) -> Counter:
+    """At how many shapes the rule stops after how many solves."""
+    return Counter(row.get("solves") for row in pick(rows, pipeline="rule"))
+
+
+def stop_tables(rows: list[dict]) -> Tables:
+    """A table per variant."""
+    tables = []
+    for name, group in by_variant(rows).items():
+        taken, lines = stops(group), []
+        for label, here in by_pipeline(group).items():
+            mean = summary(here)
             numbers = [number(mean[key]) for key in ("error", "inside", "completeness")]
-            stops = str(taken.count(int(label))) if label != "rule" else ""
-            lines.append([label, *numbers, f"{mean['right']}/{mean['n']}", stops])
-        show(name, ["solves", "error", "inside", "complete", "topology", "rule stops"], lines, markdown)
+            count = str(taken[int(label)]) if label != "rule" else ""
+            lines.append([label, *numbers, f"{mean['right']}/{mean['n']}", count])
+        tables.append((name, ["solves", "error", "inside", "complete", "topology", "rule stops"], lines))
+    return tables
+
+
+def draw_stop(rows: list[dict], folder: Path) -> Path:
+    """The error over the number of solves, with rings where the rule stops."""
+    figure, axes = sheet(3.2)
+    styles = itertools.cycle(LOOKS.values())
+    for (name, group), style in zip(by_variant(rows).items(), styles, strict=False):
+        means = {int(label): summary(here) for label, here in by_pipeline(group).items() if label != "rule"}
+        axes.plot(list(means), [mean["error"] for mean in means.values()], markersize=4, label=name, **style)
+        for n, count in stops(group).items():
+            if n in means:
+                place, words = (n, means[n]["error"]), f"{count} of {means[n]['n']}"
+                axes.plot(*place, "o", markersize=11, markerfacecolor="none", color=INK)
+                axes.annotate(words, place, (0, 10), textcoords="offset points", ha="center", fontsize=9)
+    axes.set(xlabel="solves; rings: the rule stops here", ylabel="mean error, local radii", yscale="log")
+    plain_log(axes.yaxis)
+    axes.legend(frameon=False)
+    return keep(figure, folder, "accuracy_solves")
 
 
 def tracking(case: Case) -> dict:
@@ -453,6 +558,36 @@ def loops(
             right = "yes" if row["loops"] == row["expected"] else "no"
             lines.append([row["cloud"], str(row["points"]), number(row["cpu"], 2), cost, *counts, right, ""])
         show(f"{name}: {sum(line[7] == 'yes' for line in lines)} of {len(lines)} right", header, lines, markdown)
+
+
+# ------------------------------------------------------------------------------------------------------------ the page
+
+PAGE: dict[str, tuple[Callable[[list[dict]], Tables], Callable[[list[dict], Path], Path]]] = {
+    "truth": (overview, draw_truth),
+    "ablation": (lambda rows: [("one idea off at a time", *ablation_table(rows))], draw_ablation),
+    "stop": (stop_tables, draw_stop),
+}
+"""What a page shows of the results of each command."""
+
+
+@app.command()
+def page(
+    file: Annotated[Path, typer.Argument(metavar="PAGE", exists=True, dir_okay=False)],
+    results: Annotated[list[Path], typer.Argument(metavar="JSON...", exists=True, dir_okay=False)],
+) -> None:
+    """Put the tables of saved results into a Markdown page, and their pictures into the folder images beside it."""
+    told = {}
+    for path in results:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        command = found["command"][0]
+        if command not in PAGE:
+            raise typer.BadParameter(f"{path} holds results of {command}: a page shows those of {', '.join(PAGE)}")
+        told[command] = found["rows"]
+    fill(file, {command: PAGE[command][0](rows) for command, rows in told.items()})
+    folder = file.parent / "images"
+    folder.mkdir(exist_ok=True)
+    for command, rows in told.items():
+        PAGE[command][1](rows, folder)
 
 
 if __name__ == "__main__":

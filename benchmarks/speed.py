@@ -33,8 +33,10 @@ from _common import (
     Own,
     Pipelines,
     Shapes,
+    Tables,
     builtin,
     cases,
+    fill,
     folder_or,
     markdown_table,
     named,
@@ -46,15 +48,14 @@ from _common import (
     surroundings,
     with_solves,
 )
+from _plots import INK, keep, look, plain_log, sheet
 from _stopwatch import MB, REST, Stage, Stopwatch, find, peak, reset_peak, resident
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Contractor, Pipeline, Skeleton, read_cloud, read_skeleton
 from glsk_o3d.analysis.curves import distances
 from glsk_o3d.cli.overrides import override
-from glsk_o3d.interop.files import write_atomically
 from glsk_o3d.interop.open3d import cloud_points, import_open3d
-from glsk_o3d.interop.preview import save_figure
 from glsk_o3d.pipelines import default, wen2024
 from glsk_o3d.report import REFUSED
 
@@ -81,11 +82,24 @@ STAGES = {
 }
 """The stages in the order of the tables, and the functions that do their work; to be mended as the package changes."""
 
+SHARES = {
+    "neighbours": (("order", "kNN"), "#1f4e9c"),
+    "thinning": (("thinning",), "#5b8bd0"),
+    "rings, rest": (("outliers, noise", "planes", "rings", "rest of the rings"), "#b3cdee"),
+    "solves": (("normal matrix", "factorisation", "refinement of the solve"), "#d95f02"),
+    "contraction, rest": (("Laplacian", "lines", "rest of the contraction"), "#fbb676"),
+    "point reduction": (("LPR",), "#fde4c8"),
+    "connection": (("sampling", "connection"), "#bbbbbb"),
+    "refinement": (("refinement of the graph",), "#777777"),
+    "rest": ((REST,), "#333333"),
+}
+"""The stages in groups that a picture can show, in the order of the work, and their colours: one for each filter."""
 PUBLISHED = ("wen2024", "cao2010")
 NEIGHBOURS = 30  # of the yardstick
 STEP = 0.001  # between the places of a curve at which `large` measures it, as a share of the diagonal
 LEAST, MOST = 2.0, 50  # seconds that runs in turns go on for, however few were asked for, and turns at most
 MIDDLE = (4096, 65536)  # sizes of the second growth exponent
+GROWTH = f"growth {MIDDLE[0]} to {MIDDLE[1]}"
 BASES: dict[str, Callable[[], Pipeline]] = {"wen2024": wen2024, "default": default}
 BASELINE = ("wen2024", False, "rings")  # the contraction of cao2010
 RULES: dict[str, list[str]] = {
@@ -100,7 +114,6 @@ app = typer.Typer(
     help=__doc__, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
 )
 PARTS = ("machine", "stages", "figures", "rate")  # of the page that `all` fills
-Tables = list[tuple[str, list[str], list[list[str]]]]  # title, header, lines
 
 
 def numbers(text: str) -> list[int]:
@@ -283,8 +296,74 @@ def stage_table(at: dict[int, list[dict]]) -> tuple[list[str], list[list[str]]]:
         slopes = [number(growth(at, seconds), 2), number(growth(at, seconds, *MIDDLE), 2)]
         peaks = [row["peak"] if name == "whole" else row["stage_peaks"].get(name, np.nan) for row in at[largest]]
         lines.append([name, *cells, *slopes, number(float(np.median(peaks)), 0)])
-    low, high = MIDDLE
-    return ["", *map(str, at), "growth", f"growth {low} to {high}", f"MB at {largest}"], lines
+    return ["", *map(str, at), "growth", GROWTH, f"MB at {largest}"], lines
+
+
+def draw_stages(tables: Tables, folder: Path) -> None:
+    """Both pictures, as far as there is something to show."""
+    whole, parts = tables[0], {title.partition(":")[0]: (header, lines) for title, header, lines in tables[1:]}
+    if parts:
+        draw_growth(whole, parts, folder)
+    if "default" in parts:
+        draw_shares(*parts["default"], folder)
+
+
+def draw_growth(whole, parts: dict, folder: Path) -> Path:
+    """The whole of every pipeline over the size: CPU time, and in the yardstick, with the exponents that are fitted."""
+    _, header, lines = whole
+    columns = [header.index(name) for name in ("points", "1 kNN ms", "CPU ms", "in kNN")]
+    figure, (above, below) = sheet(6, rows=2, sharex=True)
+    yardstick: dict[float, float] = {}
+    for name, (head, stages) in parts.items():
+        good = [[line[i] for i in columns] for line in lines if line[0] == name and line[columns[2]] != "-"]
+        n, knn, cpu, ratio = np.array(good, float).T
+        yardstick |= zip(n, knn, strict=True)
+        knn_slope, slope = (stages[place][head.index(GROWTH)] for place in (0, -1))
+        above.plot(n, cpu, markersize=5, label=f"{name}, exponent {slope}", **look(name))
+        below.plot(n, ratio, markersize=5, **look(name))
+    style, sizes = dict(color=INK, linestyle=":", zorder=0), sorted(yardstick)
+    above.plot(sizes, [yardstick[n] for n in sizes], label=f"1 kNN, exponent {knn_slope}", **style)
+    below.axhline(1, **style)
+    above.set(ylabel="CPU ms", xscale="log", yscale="log")
+    above.yaxis.set_major_formatter("{x:g}")
+    below.set(ylabel="in kNN", xlabel="points", yscale="log")
+    below.set_xticks(sizes, [thousands(n) for n in sizes])
+    below.set_xticks([], minor=True)
+    plain_log(below.yaxis)
+    above.legend(frameon=False, fontsize=9)
+    return keep(figure, folder, "speed_growth")
+
+
+def draw_shares(header: list[str], lines: list[list[str]], folder: Path) -> Path:
+    """What share of the time of `default` each part of it takes over the size, with the whole above."""
+    sizes = [int(name) for name in header if name.isdecimal()]
+    cost = {line[0]: np.array([cell.split()[0] for cell in line[1 : 1 + len(sizes)]], float) for line in lines}
+    spent = {
+        name: sum(cost.get(stage, np.zeros(len(sizes))) for stage in stages) for name, (stages, _) in SHARES.items()
+    }
+    figure, axes = sheet(4.2)
+    base, total = np.zeros(len(sizes)), sum(spent.values())
+    for name, (_, color) in SHARES.items():
+        share, style = 100 * spent[name] / total, dict(color=color, edgecolor="white", linewidth=0.7)
+        axes.bar(range(len(sizes)), share, bottom=base, label=name, **style)
+        base = base + share
+    for place, whole in enumerate(cost["whole"]):
+        axes.annotate(short(whole), (place, 100), (0, 3), textcoords="offset points", ha="center", fontsize=9)
+    axes.set_title("CPU ms", fontsize=9, pad=18)
+    axes.set_xticks(range(len(sizes)), [thousands(n) for n in sizes])
+    axes.set(xlabel="points", ylabel="share of the CPU time of default, %", ylim=(0, 100))
+    axes.tick_params(axis="x", length=0)
+    handles, labels = (each[::-1] for each in axes.get_legend_handles_labels())
+    figure.legend(handles, labels, loc="outside right center", frameon=False, fontsize=9)
+    return keep(figure, folder, "speed_shares")
+
+
+def thousands(n: float) -> str:
+    """A number of points in short: 256, 4k, 1M; k is 1024."""
+    for unit, letter in ((2**20, "M"), (2**10, "k")):
+        if n >= unit:
+            return f"{n / unit:g}{letter}"
+    return f"{n:g}"
 
 
 def short(value: float) -> str:
@@ -436,31 +515,23 @@ def shown() -> dict[str, tuple[str, bool, str]]:
     return {"cao2010": BASELINE} | {base: (base, True, "own") for base in BASES}
 
 
-def draw(rows: list[dict], folder: Path) -> list[Path]:
+def draw_figures(rows: list[dict], folder: Path) -> list[Path]:
     """A picture for each size: cost and remaining points of every cloud, in the order of what the baseline costs."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     good = [row for row in rows if "failure" not in row]
     paths = []
     for n in sorted({row["n"] for row in good}):
         here = sorted(pick(good, n=n), key=lambda row: take(row, BASELINE)["cpu"])
-        figure = Figure((max(6, 2.5 + 0.16 * len(here)), 5.5), layout="constrained")
-        FigureCanvasAgg(figure)
-        above, below = figure.subplots(2, 1, sharex=True)
-        for (name, key), colour, mark in zip(shown().items(), ("#777777", "#d95f02", "#1f4e9c"), "s^o", strict=True):
-            runs = [take(row, key) for row in here]
+        figure, (above, below) = sheet(5.5, rows=2, width=max(6, 2.5 + 0.16 * len(here)), sharex=True)
+        for name, key in shown().items():
+            runs, style = [take(row, key) for row in here], look(name)
             for axes, values in ((above, [it["cpu"] for it in runs]), (below, [it["left"] for it in runs])):
-                axes.plot(values, mark, color=colour, markersize=4, label=name)
-                axes.axhline(median(values), color=colour, linewidth=0.8, zorder=0)
+                axes.plot(values, linestyle="", markersize=4, label=name, **style)
+                axes.axhline(median(values), color=style["color"], linewidth=0.8, zorder=0)
         above.set(ylabel="contraction, CPU s", ylim=(0, None), title=f"{n} points; lines are medians")
         below.set(ylabel="points left", ylim=(0, None))
         below.set_xticks(range(len(here)), [row["shape"] for row in here], rotation=90, fontsize=7)
         above.legend(frameon=False, ncols=3, fontsize=8)
-        for axes in (above, below):
-            axes.spines[["top", "right"]].set_visible(False)
-        paths.append(folder / f"contraction_{n}.png")
-        save_figure(figure, paths[-1])
+        paths.append(keep(figure, folder, f"contraction_{n}"))
     return paths
 
 
@@ -649,21 +720,6 @@ def present(where: str, parts: dict[str, Tables], markdown: bool) -> None:
         show(*table, markdown)
 
 
-def fill(page: Path, parts: Mapping[str, Tables | str], check: bool = False) -> None:
-    """Put tables, or texts, into a page between the lines ``<!-- NAME -->`` and ``<!-- end -->``; or only look."""
-    text = page.read_text(encoding="utf-8")
-    for name, body in parts.items():
-        if not isinstance(body, str):
-            body = "\n".join(markdown_table(*table) for table in body)
-        pattern = rf"(<!-- {name} -->\n).*?(<!-- end -->)"
-        text, found = re.subn(pattern, lambda match, body=body: f"{match[1]}\n{body}\n{match[2]}", text, flags=re.S)
-        if found != 1:
-            raise typer.BadParameter(f"{page} has no lines <!-- {name} --> and <!-- end -->")
-    if check:
-        return
-    write_atomically(page, lambda temporary: Path(temporary).write_text(text, encoding="utf-8"))
-
-
 def _folder(path: Path | None) -> Path | None:
     if path is not None:
         path.mkdir(parents=True, exist_ok=True)
@@ -701,13 +757,17 @@ def stages(
     kind: Kind = "clean",
     repeat: Repeat = 3,
     jobs: Jobs = 2,
+    pictures: Pictures = None,
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
     """What every stage and the whole cost over the size of the cloud, and how they grow."""
     rows = measure_stages(numbers(sizes), named(pipeline), shapes, kind, published_to, repeat, jobs)
     save(output, rows)
-    present(machine(), {"stages": stage_tables(rows)}, markdown)
+    tables = stage_tables(rows)
+    if pictures is not None:
+        draw_stages(tables, pictures)
+    present(machine(), {"stages": tables}, markdown)
 
 
 @app.command()
@@ -727,7 +787,7 @@ def figures(
     rows = measure_figures(objects(folder, own, shapes, numbers(sizes)), solves, repeat, jobs)
     save(output, rows)
     if pictures is not None:
-        draw(rows, pictures)
+        draw_figures(rows, pictures)
     present(machine(), {"figures": figure_tables(rows)}, markdown)
 
 
@@ -794,7 +854,7 @@ def everything(
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
-    """The three together."""
+    """The three together, with their pictures."""
     chosen, found = named(pipeline), objects(None, own, shapes, numbers(figure_sizes))
     start, where = time.perf_counter(), machine()  # now, since writing the page changes the working tree
 
@@ -807,13 +867,35 @@ def everything(
     fast = said("rate", measure_rate(numbers(figure_sizes), ["default"], "sauropod", repeat, jobs))
     save(output, [*by_stage, *compared, *fast])
     parts = {"stages": stage_tables(by_stage), "figures": figure_tables(compared), "rate": rate_tables(fast)}
+    if pictures is None and page is not None and (page.parent / "images").is_dir():
+        pictures = page.parent / "images"
     if pictures is not None:
-        draw(compared, pictures)
+        draw_figures(compared, pictures)
+        draw_stages(parts["stages"], pictures)
     if page is not None:
-        if pictures is None and (page.parent / "images").is_dir():
-            draw(compared, page.parent / "images")
         fill(page, {"machine": f"{where}\n", **parts})
     present(where, parts, markdown)
+
+
+@app.command()
+def redraw(
+    page: Annotated[
+        Path, typer.Argument(metavar="PAGE", help="Markdown page with the tables.", callback=_page("stages"))
+    ],
+    pictures: Annotated[Path, typer.Argument(metavar="DIR", help="For the pictures.", callback=_folder)],
+) -> None:
+    """The pictures of `stages` once more, from the tables that `all` has put into a page; nothing is measured."""
+    draw_stages(tables_of(page, "stages"), pictures)
+
+
+def tables_of(page: Path, part: str) -> Tables:
+    """The tables that `fill` has put into a page."""
+    (body,) = re.findall(rf"<!-- {part} -->\n(.*?)<!-- end -->", page.read_text(encoding="utf-8"), re.S)
+    tables = []
+    for title, block in re.findall(r"\*\*(.*?)\*\*\n\n((?:\|.*\n)+)", body):
+        header, _, *lines = ([cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines())
+        tables.append((title, header, lines))
+    return tables
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ def tool(root):
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(root / "benchmarks"))
         yield SimpleNamespace(common=importlib.import_module("_common"), **vars(importlib.import_module("accuracy")))
-    for name in ("_common", "accuracy"):
+    for name in ("_common", "_plots", "accuracy"):
         del sys.modules[name]
 
 
@@ -195,6 +195,29 @@ class TestCommands:
         assert [row["solves"] for row in rows] == [1, 1]
         assert "**all**" in printed
         assert "/2 |" in printed.partition("**all**")[2]
+
+    def test_a_page_and_its_pictures(self, call, tmp_path, monkeypatch):
+        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512,noise1_512", "--jobs", 0)
+        saved = [tmp_path / f"{command}.json" for command in ("truth", "ablation", "stop")]
+        for path in saved:
+            words = (path.stem, *few, *(("--idea", "twigs cut,thinning") if path.stem == "ablation" else ()))
+            monkeypatch.setattr(sys, "argv", ["accuracy.py", *map(str, words)])  # so that the file says what it is
+            call(*words, "-o", path)
+        page = tmp_path / "page.md"
+        page.write_text("".join(f"<!-- {path.stem} -->\nold\n<!-- end -->\n" for path in saved))
+        call("page", page, *saved)
+        text = page.read_text()
+        assert text.count("| clean_512 | `default` |") == text.count("|  | `wen2024` |") - 1 == 1
+        assert text.count("| without ") == 2
+        assert text.count("| rule |") == 2
+        assert "old" not in text
+        pictures = {path.stem: path.read_bytes() for path in (tmp_path / "images").iterdir()}
+        assert set(pictures) == {"accuracy_clouds", "accuracy_ideas", "accuracy_solves"}
+        call("page", page, *saved[::-1])
+        assert page.read_text() == text
+        assert {path.stem: path.read_bytes() for path in (tmp_path / "images").iterdir()} == pictures
+        saved[0].write_text(json.dumps(dict(command=["mass"], rows=[])))
+        assert "holds results of mass" in call("page", page, saved[0], code=2)
 
     def test_rotations(self, call, tmp_path):
         out = tmp_path / "out.json"

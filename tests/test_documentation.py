@@ -27,7 +27,7 @@ from glsk_o3d.filter import TYPES
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "_ext"))
-api, architecture = (importlib.import_module(name) for name in ("api", "architecture"))
+api, architecture, figures = (importlib.import_module(name) for name in ("api", "architecture", "figures"))
 sys.path.pop(0)
 
 PAGES = [
@@ -283,6 +283,26 @@ def test_numerics_knows_no_open3d():
         assert not re.search(r"^\s*(import|from) (open3d|matplotlib|networkx|\.\.)", path.read_text(), re.MULTILINE), (
             path
         )
+
+
+@pytest.mark.parametrize("path", [pytest.param(path, id=str(path.relative_to(ROOT))) for path in PAGES])
+def test_every_picture_is_there_and_has_words(path):
+    for words, target in re.findall(r"!\[(.*?)\]\((.*?)\)", FENCE.sub("", path.read_text())):
+        assert words
+        assert (path.parent / target).is_file(), target
+        assert "generated" not in target  # of no use to who has not built the site
+
+
+def test_the_pictures_that_are_drawn_are_shown():
+    shown = "".join(path.read_text() for path in PAGES)
+    for draw in figures.FIGURES:
+        assert f"images/{draw.__name__}.png)" in shown
+
+
+def test_the_first_picture_is_as_right_as_the_readme_says():
+    found = [figures.skeletonised(points) for _, _, points, _ in figures.damaged()]
+    counts = [(skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) for skeleton in found]
+    assert counts == [(1, 1, 6), (1, 0, 2), (1, 0, 9), (2, 2, 0), (1, 1, 0)]
 
 
 class Links(HTMLParser):

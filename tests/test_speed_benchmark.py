@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from glsk_o3d import LPRReducer, contractor, numerics, pipelines
 from glsk_o3d.samples import sauropod
 
-MODULES = ("speed", "_stopwatch", "_common")
+MODULES = ("speed", "_stopwatch", "_common", "_plots")
 
 
 @pytest.fixture(scope="module")
@@ -256,6 +256,29 @@ class TestArithmetic:
         assert tool.stage_tables([failed])[0][2] == [["default", "512", *"-" * 8, "mug: ValueError: no"]]
 
 
+class TestPictures:
+    def test_tables_come_back_from_a_page(self, tool, tmp_path):
+        tables = [("whole", ["", "points", "note"], [["default", "512", ""], ["", "-", "mug: no"]])]
+        tables += [("default: CPU ms (in kNN)", ["", "512"], [["rings", "1.0 (0.50)"]])]
+        page = tmp_path / "page.md"
+        page.write_text("<!-- machine -->\n<!-- end -->\n<!-- stages -->\n<!-- end -->\n")
+        tool.fill(page, {"machine": "| no table |\n", "stages": tables})
+        assert tool.tables_of(page, "stages") == tables
+
+    def test_every_stage_is_in_one_share(self, tool):
+        shown = [stage for stages, _ in tool.SHARES.values() for stage in stages]
+        assert sorted(shown) == sorted([*tool.STAGES, tool.REST])
+
+    @pytest.mark.parametrize(("n", "words"), [(300, "300"), (4096, "4k"), (1536, "1.5k"), (2**20, "1M")])
+    def test_thousands(self, tool, n, words):
+        assert tool.thousands(n) == words
+
+    def test_nothing_to_show_is_no_picture(self, tool, tmp_path):
+        failed = dict(measure="stages", n=512, shape="mug", pipeline="default", failure="ValueError: no")
+        tool.draw_stages(tool.stage_tables([failed]), tmp_path)
+        assert list(tmp_path.iterdir()) == []
+
+
 class TestCommands:
     def test_stages(self, call, tmp_path):
         out = tmp_path / "out.json"
@@ -357,7 +380,12 @@ class TestCommands:
         assert [line for line in printed.splitlines() if line.startswith("|")] == [
             line for line in text.splitlines() if line.startswith("|")
         ]
-        assert (tmp_path / "images" / "contraction_256.png").is_file()
+        pictures = {path.stem: path.read_bytes() for path in (tmp_path / "images").iterdir()}
+        assert set(pictures) == {"contraction_256", "speed_growth", "speed_shares"}
+        call("redraw", page, tmp_path / "again")
+        for path in (tmp_path / "again").iterdir():
+            assert path.read_bytes() == pictures.pop(path.stem)
+        assert set(pictures) == {"contraction_256"}
 
     def test_large(self, call, tmp_path, root):
         page, out = tmp_path / "speed.md", tmp_path / "out.json"

@@ -1,19 +1,28 @@
-"""The figures of the site, drawn by the package from its own samples whenever the code has changed."""
+"""The pictures of the README and of the pages, drawn by the package from its own samples.
 
-import hashlib
+make figures
+
+They are kept in docs/images, so that whoever reads the pages without building the site sees them too.
+"""
+
+import io
 import sys
 import warnings
 from pathlib import Path
 
+import architecture
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
-from scipy.spatial import Delaunay
+from PIL import Image
+from scipy.spatial import Delaunay, cKDTree
 
 import glsk_o3d as glsk
 from glsk_o3d import pipelines, samples
+from glsk_o3d.analysis.segmentation import branch_of_edge
+from glsk_o3d.interop.colors import shades
 from glsk_o3d.numerics.cycles import inscribed_circle, minimum_cycle_basis
 from glsk_o3d.numerics.neighbourhoods import plane_axes
 from glsk_o3d.refinement.triangles import collapse_triangles
@@ -80,6 +89,83 @@ def skeletonised(points, pipeline=None):
 
 def animal(n=6000):
     return samples.sample_object(n).points
+
+
+# ------------------------------------------------------------------------------------------------------- the first one
+
+
+def showcase():
+    """Five objects, each damaged in another way, with their skeletons: the first picture of README and site."""
+    height, foot = 2.75, 0.42  # inches, all of them
+    objects = damaged()
+    total = sum(wide for _, wide, _, _ in objects) + 0.2 * len(objects)
+    figure = Figure((total, height), facecolor="white")
+    FigureCanvasAgg(figure)
+    left = 0.1
+    for name, wide, points, angles in objects:
+        skeleton = skeletonised(points)
+        cloud, vertices = view(points, **angles), view(skeleton.vertices, **angles)
+        box = np.array([wide, height - foot])
+        low, high = np.percentile(cloud[:, :2], [0.8, 99.2], axis=0)  # a few points may stand out
+        low, high = np.minimum(low, vertices[:, :2].min(axis=0)), np.maximum(high, vertices[:, :2].max(axis=0))
+        room = (0.94 * box / (high - low)).min()
+        limits = (low + high) / 2 + np.array([[-0.5], [0.5]]) * box / room
+        axes = figure.add_axes([left / total, foot / height, wide / total, 1 - foot / height])
+        axes.set(xlim=limits[:, 0], ylim=limits[:, 1])
+        axes.set_axis_off()
+        order = np.argsort(cloud[:, 2])
+        greys = np.linspace(0.88, 0.55, len(order))  # the far ones lighter
+        axes.scatter(*cloud[order, :2].T, s=1.8, c=greys, cmap="gray", vmin=0, vmax=1, linewidths=0, clip_on=False)
+        colors = shades(skeleton, "branch", branch_of_edge(skeleton), skeleton.edges)
+        for edge in np.argsort(vertices[skeleton.edges, 2].mean(axis=1)):  # what is in front crosses what is behind
+            across, up = vertices[skeleton.edges[edge], :2].T
+            axes.plot(across, up, color="white", linewidth=4.2, solid_capstyle="butt")
+            axes.plot(across, up, color=colors[edge], linewidth=2.5, solid_capstyle="round")
+        figure.text((left + wide / 2) / total, 0.12 / height, name, ha="center", fontsize=12.5, color=INK)
+        left += wide + 0.2
+    return figure
+
+
+def damaged(seed=0):
+    """Label, inches across, points and the angles that they are seen from, of every object."""
+    rng = np.random.default_rng(seed)
+    grown = tree(seed)
+    height = (grown[:, 2] - grown[:, 2].min()) / np.ptp(grown[:, 2])
+    scan, spring = samples.sample_object(4096, seed=seed), samples.helix(6000, noise=0.015, seed=seed)
+    rings = samples.two_rings(5000, seed=seed).points
+    low, high = rings.min(axis=0), rings.max(axis=0)
+    strays = rng.uniform(low - 0.1 * (high - low), high + 0.1 * (high - low), (len(rings) // 50, 3))
+    torus = samples.torus(8000, seed=seed).points
+    holes = cKDTree(torus[rng.choice(len(torus), 8)])
+    return (
+        ("scanned from two sides", 2.6, scan.points, dict(azimuth=-62, elevation=16)),
+        ("1.5 % noise", 1.8, spring.points, dict(azimuth=-65, elevation=22)),
+        ("few points on top", 1.95, grown[rng.random(len(grown)) < 6**-height], dict(azimuth=-62, elevation=22)),
+        ("2 % outliers", 2.05, np.concatenate([rings, strays]), dict(azimuth=-50, elevation=32)),
+        ("holes", 2.0, torus[holes.query(torus)[0] > 0.1], dict(azimuth=-65, elevation=62)),
+    )
+
+
+def tree(seed, forks=3):
+    """A trunk that forks by 35 degrees to either side, again and again, each time 0.75 as long and 0.7 as thick."""
+    parts, axes, fork = [], [], np.radians(35)
+
+    def grow(start, heading, across, length, radius, forks):
+        n = int(30_000 * length * radius)
+        points = samples.tube(n, length=length, radius=radius, seed=100 * seed + len(parts)).points
+        side = np.cross(heading, across)
+        parts.append(start + (points + [length / 2, 0, 0]) @ np.stack([heading, across, side]))
+        end = start + length * heading
+        axes.append((np.stack([start, end]), np.full(2, radius)))
+        for turn in (fork, -fork) if forks else ():
+            onward = np.cos(turn) * heading + np.sin(turn) * across
+            grow(end, onward, side, 0.75 * length, 0.7 * radius, forks - 1)
+
+    grow(np.zeros(3), np.array([0.0, 0, 1]), np.array([1.0, 0, 0]), 1.0, 0.14, forks)
+    points = np.concatenate(parts)
+    for nodes, radii in axes:  # what is inside another branch goes
+        points = points[samples.signed_distance(points, nodes, np.array([[0, 1]]), radii) > -1e-9]
+    return points
 
 
 # ------------------------------------------------------------------------------------------------- pages of the filters
@@ -194,7 +280,9 @@ def hull():
         each.scatter(*places[ring].T, s=30, c=RED, zorder=4)
         each.scatter(0, 0, s=50, c=BLUE, zorder=5)
         for number, row in enumerate(ring, 1):
-            each.annotate(str(number), places[row], xytext=(5, 4), textcoords="offset points", fontsize=9, color=RED)
+            outward = 10 * places[row] / np.linalg.norm(places[row])
+            style = dict(textcoords="offset points", ha="center", va="center", fontsize=9, color=RED)
+            each.annotate(str(number), places[row], xytext=outward, **style)
         each.margins(0.12)
         each.autoscale_view()
     return figure
@@ -332,24 +420,19 @@ def limits():
 
 
 FIGURES = (
-    *(ring_builder, contractor, lpr_reducer, connector, refiner, stopping),
+    *(showcase, ring_builder, contractor, lpr_reducer, connector, refiner, stopping),
     *(hull, contraction, reduction, mass, centring, loop_test, limits),
 )
 
 
 def write(folder: Path) -> None:
-    """Draw all figures, unless neither they nor the package have changed since."""
-    folder = folder / "figures"
-    folder.mkdir(parents=True, exist_ok=True)
-    sources = [Path(__file__), *sorted(Path(glsk.__file__).parent.rglob("*.py"))]
-    state = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
-    stamp = folder / "drawn-from"
-    wanted = [folder / f"{draw.__name__}.png" for draw in FIGURES]
-    if stamp.exists() and stamp.read_text() == state and all(path.exists() for path in wanted):
-        return
-    for draw, path in zip(FIGURES, wanted, strict=True):
-        draw().savefig(path, dpi=150, bbox_inches="tight")
-    stamp.write_text(state)
+    """Draw all figures, and the diagram; in few colours, so that they are small."""
+    architecture.write(folder)
+    for draw in FIGURES:
+        drawn = io.BytesIO()
+        draw().savefig(drawn, dpi=150, bbox_inches=None if draw is showcase else "tight")
+        picture = Image.open(drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+        picture.save(folder / f"{draw.__name__}.png", optimize=True)
 
 
 if __name__ == "__main__":

@@ -1,17 +1,14 @@
-"""Writes what is made from the code before Sphinx reads anything: the API pages, the figures, the diagram."""
+"""Writes the API pages from the code before Sphinx reads anything."""
 
 from pathlib import Path
 
 import api
-import architecture
-import figures
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 
 
 def write(app, config):
-    for part in (api, architecture, figures):
-        part.write(GENERATED)
+    api.write(GENERATED)
 
 
 def plain(app, env, node, contnode):

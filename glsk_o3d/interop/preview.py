@@ -172,14 +172,15 @@ def colour_bar(figure, scale, box, ticks: list[float], labels: list[str] | None 
 
 
 def save_figure(figure, path: str | os.PathLike) -> None:
-    """Write a figure as PNG; it appears complete or not at all.
+    """Write a figure as PNG, without the version of matplotlib; it appears complete or not at all.
 
     Parameters
     ----------
     figure : matplotlib.figure.Figure
     path : path-like
     """
-    write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=DPI))
+    options = {"format": "png", "dpi": DPI, "metadata": {"Software": None}}
+    write_atomically(path, lambda temporary: figure.savefig(temporary, **options))
 
 
 def printable(text: object) -> str:
