@@ -63,7 +63,12 @@ STAGES = {
     "order": Stage(("numerics.ordering:morton_order",)),
     "kNN": Stage(("numerics.neighbourhoods:nearest_neighbours",)),
     "outliers, noise": Stage(
-        ("numerics.neighbourhoods:isolation", "numerics.ridges:noise_share", "numerics.ridges:to_ridges")
+        (
+            "numerics.outliers:without_outliers",
+            "numerics.ridges:noise_share",
+            "numerics.thinning:average_noisy",
+            "numerics.ridges:to_ridges",
+        )
     ),
     "planes": Stage(("numerics.neighbourhoods:principal",)),
     "thinning": Stage(("numerics.thinning:thin", "numerics.thinning:thin_smooth", "numerics.thinning:thin_to_grid")),

@@ -14,19 +14,20 @@ from .interop.open3d import cloud_points, search_parameters
 from .numerics.frame import Frame
 from .numerics.neighbourhoods import isolation, nearest_neighbours, plane_axes, principal
 from .numerics.ordering import morton_order
+from .numerics.outliers import without_outliers
 from .numerics.ridges import noise_share, to_ridges
 from .numerics.rings import star_rings
-from .numerics.thinning import thin, thin_smooth, thin_to_grid
+from .numerics.thinning import average_noisy, thin, thin_smooth, thin_to_grid
 from .report import Report
 from .state import Contraction, at_rest
 
 MIN_POINTS = 8
 LEAST_RING = 3
-ROUNDS = 4  # of setting outliers aside
 SMALLEST, LARGEST = 1e-120, 1e120  # extents whose squares and products a float64 holds
 ALONE, FAIRLY_NOISY = 1.8, 0.2  # isolation of a denoised point that is set aside, and its least noise
 FEW, ENOUGH = 1000, 8192  # points from which on, and down to which, more than enough are merged
 STEADY = 0.9  # share of the points left at which that ends
+NOISY, PLENTY = 0.05, 4096  # mean noise from which on, and number of points down to which, noisy ones are averaged
 COINCIDENT = 4e-15  # points nearer than this in the working frame, a few roundings, are duplicates
 
 
@@ -129,14 +130,16 @@ class RingBuilder(Filter):
     outlier_factor: float = parameter(
         2.5,
         "A point this many times farther from its neighbours than these are from theirs is set aside: it goes to the "
-        "nearest vertex but has no say; so does one that denoising leaves alone. 0 keeps all.",
+        "nearest vertex but has no say; so do many that float in space together, and one that denoising leaves alone. "
+        "0 keeps all.",
         type="float",
         low=0,
     )
     denoise: int = parameter(
         4,
-        "Passes that draw the points of noisy neighbourhoods to the ridge of their density before the rings are made; "
-        "clean points stay. 0 for none.",
+        "Passes that draw the points of noisy neighbourhoods to the ridge of their density before the rings are made. "
+        "Of 8192 points and more these are averaged first, unless there is a `radius` or `thin_to` is 'all'. Clean "
+        "points stay. 0 for none.",
         type="int",
         unit="passes",
         low=0,
@@ -173,23 +176,32 @@ class RingBuilder(Filter):
         sample, stands_for = _sample(good, 2 * most if self.radius is None else len(good))
         good = good[sample]
         frame, distinct, row, distance, neighbours = self._distinct(good)
-        stray = np.zeros(len(good), bool)
-        # in rounds, since what is left of a group stands out once the rest is gone
-        for _ in range(ROUNDS if self.outlier_factor else 0):
-            found = np.zeros(len(good), bool)
-            found[~stray] = isolation(distance, neighbours)[row[~stray]] > self.outlier_factor
-            if not found.any() or len(np.unique(row[~stray & ~found])) < MIN_POINTS:
-                break
-            stray |= found
-            frame, distinct, row[~stray], distance, neighbours = self._distinct(good[~stray])
+        stray, counts, weight = np.zeros(len(good), bool), np.bincount(stands_for), np.empty(len(distinct))
+        weight[row] = counts  # copies count once
+        if self.outlier_factor:
+            left = without_outliers(distinct, weight, distance, neighbours, self.outlier_factor, MIN_POINTS)
+            if len(left) < len(distinct):
+                stray = ~np.isin(row, left)
+                frame, distinct, row[~stray], _, neighbours = self._distinct(good[~stray])
+                weight = np.empty(len(distinct))
+                weight[row[~stray]] = counts[~stray]
         if stray.any():
             row[stray] = cKDTree(distinct).query(frame.into(good[stray]))[1]
 
         spread, normals = principal(distinct, neighbours)
-        across = normals  # of the planes that the rings lie in
         noise = noise_share(spread, neighbours)
+        first = row
+        while self.denoise and self._may_merge and noise.mean() > NOISY and len(distinct) >= 2 * PLENTY:
+            into, mean, weight_of_mean = average_noisy(distinct, neighbours, noise, weight, PLENTY)
+            if len(mean) > STEADY * len(distinct):
+                break
+            distinct, weight = mean, weight_of_mean
+            row, neighbours = into[row], nearest_neighbours(distinct, self._neighbours(len(distinct)))[1]
+            spread, normals = principal(distinct, neighbours)
+            noise = noise_share(spread, neighbours)
+        across = normals  # of the planes that the rings lie in
         if self.denoise and noise.any():
-            distinct, neighbours, left, nearest = self._denoised(distinct, neighbours.shape[1], noise)
+            distinct, neighbours, left, nearest = self._denoised(distinct, neighbours.shape[1], noise, weight)
             normals, noise = normals[left], noise[left]  # a ridge has none: those of the cloud as it came
             stray |= (left[nearest] != np.arange(len(nearest)))[row]
             row = nearest[row]
@@ -222,16 +234,20 @@ class RingBuilder(Filter):
                 n_dropped=int((~finite).sum()),
                 n_outliers=int(outlier.sum()),
                 n_sampled=len(good),
-                n_distinct=len(distinct),
+                n_distinct=int(np.count_nonzero(np.bincount(first[~stray]))),
                 n_contracted=n,
             ),
         )
 
-    def _denoised(self, cloud, k, noise):
+    def _denoised(self, cloud, k, noise, weight):
         """The denoised cloud and its neighbours, without points that now stand alone; who is left; nearest of these."""
-        calm = to_ridges(cloud, noise, self.denoise)
+        calm = to_ridges(cloud, noise, self.denoise, weight)
         distance, neighbours = nearest_neighbours(calm, k)
-        alone = (noise > FAIRLY_NOISY) & (isolation(distance, neighbours) > ALONE) & (self.outlier_factor > 0)
+        alone = (
+            (noise > FAIRLY_NOISY)
+            & (isolation(distance[:, 1:].mean(axis=1), neighbours) > ALONE)
+            & (self.outlier_factor > 0)
+        )
         if not 0 < alone.sum() <= len(calm) - max(k, MIN_POINTS):
             return calm, neighbours, np.arange(len(calm)), np.arange(len(calm))
         left = np.flatnonzero(~alone)
@@ -250,7 +266,7 @@ class RingBuilder(Filter):
             rows, rank = left[kept], np.cumsum(kept) - 1
             return rows, rank[into][owner], nearest_neighbours(cloud[rows], self._neighbours(len(rows)))[1]
 
-        while self.around and self.radius is None and self.thin_to != "all" and len(left) >= FEW:
+        while self.around and self._may_merge and len(left) >= FEW:
             into = thin_smooth(cloud[left], neighbours, spread, self.around)
             kept = into == np.arange(len(into))
             if np.count_nonzero(kept) > STEADY * len(into):
@@ -278,6 +294,10 @@ class RingBuilder(Filter):
             )
         far[:, :LEAST_RING] = False
         return np.where(far, -1, neighbours)
+
+    @property
+    def _may_merge(self):
+        return self.radius is None and self.thin_to != "all"
 
     def _neighbours(self, n):
         return min({"auto": usual_k, "published": published_k}[self.k](n) if isinstance(self.k, str) else self.k, n)

@@ -180,7 +180,8 @@ def group(n, wide, seed=4):
 
 
 def stands_out(points):
-    return isolation(*nearest_neighbours(points, STRICT.k)) > STRICT.outlier_factor
+    distance, neighbours = nearest_neighbours(points, STRICT.k)
+    return isolation(distance[:, 1:].mean(axis=1), neighbours) > STRICT.outlier_factor
 
 
 @pytest.mark.parametrize("seed", [2, 4, 9, 13])
@@ -296,6 +297,54 @@ def test_clean_clouds_are_not_denoised(points):
     np.testing.assert_array_equal(calm.rings.indices, plain.rings.indices)
 
 
+# ---- averaging where noise is wider than neighbourhoods
+
+
+@pytest.mark.parametrize("n", [20000, 40000])
+@pytest.mark.parametrize("noise", [0.01, 0.02])
+def test_dense_noisy_clouds_are_averaged(n, noise):
+    """Neighbourhoods as wide as those of 4096 to 8192 points, and less noise in them the more points there are."""
+    sample = samples.torus(n, noise=noise)
+    state = RingBuilder()(sample.points)
+    assert 4096 <= len(state.cloud) < 8192 + 400
+    assert state.report.n_distinct == state.report.n_input - state.report.n_outliers == state.witness.sum()
+    assert state.mass.mean() == pytest.approx(1, rel=1e-12)
+    alone = RingBuilder(thin_to="all")(sample.points)
+
+    def off(cloud):
+        x, y, z = cloud.T
+        return np.hypot(np.hypot(x, y) - 0.4, z).std()
+
+    assert off(in_order(state)) < 0.8 * off(in_order(alone))
+    # every point has its place near it
+    away = np.linalg.norm(in_order(state) - sample.points, axis=1)
+    assert np.quantile(away, 0.99) < 6 * noise * np.linalg.norm(np.ptp(sample.points, axis=0))
+
+
+def test_a_dense_noisy_ring_stays_one():
+    """With neighbourhoods narrower than the noise its axis was two radii off, and the ring broke."""
+    sample = samples.torus(50000, noise=0.01)
+    skeleton = default()(sample.points)
+    found = compare(skeleton, sample)
+    assert found.topology
+    assert found.error < 0.1
+
+
+@pytest.mark.parametrize("settings", [dict(denoise=0), dict(radius=0.1), dict(thin_to="all")])
+def test_clouds_are_not_averaged_where_points_shall_stay(settings):
+    points = samples.torus(9000, noise=0.01).points
+    state = RingBuilder(**settings)(points)
+    assert len(state.cloud) == state.report.n_distinct
+
+
+def test_clean_parts_are_not_averaged():
+    points = samples.torus(9000).points
+    noisy = samples.torus(9000, noise=0.02).points + [0, 0, 1]
+    state = RingBuilder(around=0)(np.concatenate([points, noisy]))
+    assert len(np.unique(state.row_of_point[:9000])) == 9000
+    assert len(np.unique(state.row_of_point[9000:][~state.outlier[9000:]])) < 9000 / 2
+
+
 # ---- points that stand alone after denoising
 
 
@@ -304,7 +353,9 @@ def lonely(plain, passes):
     near = nearest_neighbours(plain.cloud, 16)[1]
     noise = noise_share(principal(plain.cloud, near)[0], near)
     calm = to_ridges(plain.cloud, noise, passes)
-    return calm, (isolation(*nearest_neighbours(calm, 16)) > ALONE) & (noise > FAIRLY_NOISY), noise
+    distance, near = nearest_neighbours(calm, 16)
+    alone = isolation(distance[:, 1:].mean(axis=1), near) > ALONE
+    return calm, alone & (noise > FAIRLY_NOISY), noise
 
 
 @pytest.mark.parametrize("passes", [1, 4])
@@ -359,9 +410,9 @@ def test_lonely_points_are_left_in_where_hardly_anything_would_be_left(monkeypat
     points = samples.tube(n=24, radius=0.1, noise=0.1).points
     filter, noise = RingBuilder(k=8, outlier_factor=100.0), np.ones(24)
     monkeypatch.setattr("glsk_o3d.ring_builder.noise_share", lambda spread, neighbours: noise)
-    monkeypatch.setattr("glsk_o3d.ring_builder.to_ridges", lambda cloud, noise, passes: cloud)
+    monkeypatch.setattr("glsk_o3d.ring_builder.to_ridges", lambda cloud, noise, passes, weight: cloud)
     found = np.where(np.arange(24) < left, 1.0, 2 * ALONE)
-    monkeypatch.setattr("glsk_o3d.ring_builder.isolation", lambda distance, neighbours: found)
+    monkeypatch.setattr("glsk_o3d.ring_builder.isolation", lambda mean, neighbours: found)
     assert len(filter(points)) == (24 if stays else left)
 
 

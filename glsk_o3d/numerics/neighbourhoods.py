@@ -30,14 +30,15 @@ def nearest_neighbours(points, k, of=None):
     return cKDTree(points, leafsize=24, balanced_tree=False).query(points if of is None else of, k)
 
 
-def isolation(distance, neighbours):
+def isolation(mean, neighbours):
     """How much farther a point is from its neighbours than these are from theirs (after Breunig et al. 2000, LOF).
 
     Near 1 on a surface, whatever its density; an outlier has more.
 
     Parameters
     ----------
-    distance : (n, k) float array
+    mean : (n,) float array
+        Distance to the neighbours.
     neighbours : (n, k) int array
         As from `nearest_neighbours`.
 
@@ -45,7 +46,6 @@ def isolation(distance, neighbours):
     -------
     (n,) float array
     """
-    mean = distance[:, 1:].mean(axis=1)
     return mean / row_medians(mean[neighbours[:, 1:]])
 
 

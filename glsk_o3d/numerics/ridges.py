@@ -31,7 +31,7 @@ def noise_share(spread, neighbours):
     return np.clip((row_medians(ratio[neighbours]) - CLEAN) / (NOISY - CLEAN), 0, 1)
 
 
-def to_ridges(points, noise, passes):
+def to_ridges(points, noise, passes, weight=None):
     """Move points with noisy neighbourhoods to the ridge of the density; clean points stay.
 
     Mean shift across the main direction of the neighbourhood (subspace-constrained mean shift, Ozertem and Erdogmus
@@ -44,6 +44,8 @@ def to_ridges(points, noise, passes):
     noise : (n,) float array
         As from `noise_share`: the share of each step that is taken.
     passes : int
+    weight : (n,) float array, optional
+        Points that each stands for; one by default.
 
     Returns
     -------
@@ -52,6 +54,7 @@ def to_ridges(points, noise, passes):
     noisy = np.flatnonzero(noise)
     if passes == 0 or len(noisy) == 0:
         return points
+    weight = np.ones(len(points)) if weight is None else weight
     moved = points.copy()
     around = nearest_neighbours(points, min(NEIGHBOURS, len(points)), of=points[noisy])[1]
     for start in range(0, len(noisy), _CHUNK):
@@ -60,7 +63,7 @@ def to_ridges(points, noise, passes):
         for _ in range(passes):
             apart = patch - x[:, None]
             squared = np.einsum("nki,nki->nk", apart, apart)
-            kernel = np.exp(-squared / (2 * squared.mean(axis=1, keepdims=True)))
+            kernel = weight[around[part]] * np.exp(-squared / (2 * squared.mean(axis=1, keepdims=True)))
             kernel /= kernel.sum(axis=1, keepdims=True)
             mean = np.matmul(kernel[:, None], patch)[:, 0]
             offset = patch - mean[:, None]

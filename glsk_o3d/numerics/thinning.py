@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from .groups import group_sum
 from .neighbourhoods import nearest_neighbours, row_medians
 from .ordering import BITS, morton_codes
 
 TAIL = 0.001  # share of the points that may be far off, at either end of each axis
-MOST = 4  # points that one may stand for, where the surface has more than enough
+MOST = 4  # points that one may stand for after a pass, where there are more than enough
 WORTH = 0.01  # share of the points that another round must merge
 SPARSE = 0.25  # share of the points left, below which the neighbours are looked up anew
 
@@ -126,6 +127,58 @@ def thin_smooth(points, neighbours, spread, around):
     ratio = spread[:, 0] / np.maximum(spread[:, 2], np.finfo(float).tiny)
     needed = np.pi * neighbours.shape[1] / (4 * max(around, 1) ** 2)
     most = np.minimum(needed / np.maximum(row_medians(ratio[neighbours]), needed / MOST), MOST)
+    return merge_nearest(points, neighbours, most)
+
+
+def average_noisy(points, neighbours, noise, weight, n):
+    """Put the mean of at most four points in their place where there is noise, but keep about n points or more.
+
+    A neighbourhood that is narrower than the noise is a ball, wherever the surface is. The mean of m points has less
+    noise, and its neighbourhood is wider.
+
+    Parameters
+    ----------
+    points : (m, 3) float array
+        All different.
+    neighbours : (m, k) int array
+        Their nearest neighbours, the point itself first.
+    noise : (m,) float array
+        Points where it is 0 stay.
+    weight : (m,) float array
+        Of every point in the mean.
+    n : int
+
+    Returns
+    -------
+    into : (m,) int array
+        The mean that each point is in.
+    mean : (c, 3) float array
+    total : (c,) float array
+        Their weight.
+    """
+    into = merge_nearest(points, neighbours, np.where(noise > 0, min(MOST, len(points) / n), 1))
+    into = (np.cumsum(into == np.arange(len(into))) - 1)[into]
+    total = np.bincount(into, weight)
+    return into, group_sum(weight[:, None] * points, into, len(total)) / total[:, None], total
+
+
+def merge_nearest(points, neighbours, most):
+    """Merge mutual nearest neighbours, round by round, as long as it is worth it.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        All different.
+    neighbours : (n, k) int array
+        Their nearest neighbours, the point itself first.
+    most : (n,) float array
+        Points that may become one with each, itself included.
+
+    Returns
+    -------
+    (n,) int array
+        The point that each was merged into; itself for those that are left.
+    """
     left, into, mass = np.ones(len(points), bool), np.arange(len(points)), np.ones(len(points))
     while True:
         keeper, swallowed = _mutual(points, neighbours, left & (mass + 1 <= most))

@@ -193,3 +193,18 @@ def test_the_line_itself_stays():
     """On the ridge there is nowhere to go, at the ends neither."""
     line = np.outer(np.linspace(-1, 1, 50), [1, 2, 2])
     np.testing.assert_allclose(to_ridges(line, np.ones(50), 4), line, atol=1e-12)
+
+
+def test_a_point_that_stands_for_several():
+    """The mean shift goes where the weight is, as if there were as many points."""
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(31, 3)) * [3, 1, 1]
+    times = rng.integers(1, 4, 31)
+    ones = np.ones(31)
+    weighted = to_ridges(points, ones, 1, times.astype(float))
+    assert np.abs(weighted - to_ridges(points, ones, 1)).max() > 0.01
+    np.testing.assert_allclose(to_ridges(points, ones, 3, 5 * ones), to_ridges(points, ones, 3), atol=1e-12)
+    heavy = np.where(np.arange(31) == 4, 1e9, 1.0)
+    towards = to_ridges(points, ones, 1, heavy)
+    before, after = (np.linalg.norm(cloud - points[4], axis=1)[np.arange(31) != 4] for cloud in (points, towards))
+    assert (after < before).all()

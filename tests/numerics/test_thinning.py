@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import samples
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
-from glsk_o3d.numerics.thinning import MOST, thin, thin_smooth, thin_to_grid
+from glsk_o3d.numerics.thinning import MOST, average_noisy, thin, thin_smooth, thin_to_grid
 
 
 def thinned(points, n, k=16):
@@ -158,3 +158,25 @@ def test_a_grid_that_is_too_coarse_keeps_all():
     kept, into = thin_to_grid(points, 100)
     np.testing.assert_array_equal(kept, np.arange(1000))
     np.testing.assert_array_equal(into, np.arange(1000))
+
+
+# ---- averaging
+
+
+@pytest.mark.parametrize("n", [700, 1500])
+def test_means_of_noisy_points(surface, n):
+    rng = np.random.default_rng(0)
+    near = nearest_neighbours(surface, 16)[1]
+    noise = np.where(surface[:, 0] > 0, rng.uniform(0.1, 1, 3000), 0)
+    weight = rng.uniform(1, 9, 3000)
+    into, mean, total = average_noisy(surface, near, noise, weight, n)
+    size = np.bincount(into)
+    assert size.max() <= min(MOST, 3000 / n)
+    assert len(mean) < 2500
+    assert total.sum() == pytest.approx(weight.sum(), rel=1e-12)
+    for group in (0, len(mean) // 2, int(np.argmax(size))):
+        rows = np.flatnonzero(into == group)
+        np.testing.assert_allclose(mean[group], np.average(surface[rows], axis=0, weights=weight[rows]), rtol=1e-12)
+    clean = noise == 0
+    assert (size[into[clean]] == 1).all()
+    np.testing.assert_allclose(mean[into[clean]], surface[clean], rtol=1e-15)
