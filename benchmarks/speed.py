@@ -33,17 +33,18 @@ from _common import (
     Own,
     Pipelines,
     Shapes,
+    Tables,
     builtin,
     cases,
+    fill,
     folder_or,
-    markdown_table,
+    machine,
     named,
     number,
     pick,
     run,
     save,
     show,
-    surroundings,
     with_solves,
 )
 from _stopwatch import MB, REST, Stage, Stopwatch, find, peak, resident
@@ -51,7 +52,6 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import Contractor, Pipeline, read_cloud
 from glsk_o3d.cli.overrides import override
-from glsk_o3d.interop.files import write_atomically
 from glsk_o3d.interop.open3d import cloud_points
 from glsk_o3d.interop.preview import save_figure
 from glsk_o3d.pipelines import default, wen2024
@@ -98,7 +98,6 @@ app = typer.Typer(
     help=__doc__, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
 )
 PARTS = ("machine", "stages", "figures", "rate")  # of the page that `all` fills
-Tables = list[tuple[str, list[str], list[list[str]]]]  # title, header, lines
 
 
 def numbers(text: str) -> list[int]:
@@ -529,36 +528,11 @@ def rate_tables(rows: list[dict]) -> Tables:
 # ----------------------------------------------------------------------------------------------------------- commands
 
 
-def machine() -> str:
-    """A line that says where and what was measured."""
-    told = surroundings()
-    it, versions = told["machine"], ", ".join(f"{name} {version}" for name, version in told["versions"].items())
-    return (
-        f"Measured on {it['processor']}, {it['cores']} cores, {it['memory_gb']} GB, load {it['load']}, {it['system']}; "
-        f"{versions}; commit {told['commit']}; one thread."
-    )
-
-
 def present(where: str, parts: dict[str, Tables], markdown: bool) -> None:
     """Print where it was measured, and the tables of the parts."""
     typer.echo(f"{where}\n")
     for table in (table for tables in parts.values() for table in tables):
         show(*table, markdown)
-
-
-def fill(page: Path, parts: Mapping[str, Tables | str], check: bool = False) -> None:
-    """Put tables, or texts, into a page between the lines ``<!-- NAME -->`` and ``<!-- end -->``; or only look."""
-    text = page.read_text(encoding="utf-8")
-    for name, body in parts.items():
-        if not isinstance(body, str):
-            body = "\n".join(markdown_table(*table) for table in body)
-        pattern = rf"(<!-- {name} -->\n).*?(<!-- end -->)"
-        text, found = re.subn(pattern, lambda match, body=body: f"{match[1]}\n{body}\n{match[2]}", text, flags=re.S)
-        if found != 1:
-            raise typer.BadParameter(f"{page} has no lines <!-- {name} --> and <!-- end -->")
-    if check:
-        return
-    write_atomically(page, lambda temporary: Path(temporary).write_text(text, encoding="utf-8"))
 
 
 def _folder(path: Path | None) -> Path | None:

@@ -48,7 +48,7 @@ def row(shape="torus", variant="clean_512", pipeline="default", **values):
 
 
 class TestBuiltinClouds:
-    @pytest.mark.parametrize("variant", ["clean_300", "density_300", "holes_300", "outliers_300", "noise2_300"])
+    @pytest.mark.parametrize("variant", ["clean_300", "density_300", "holes_300", "outliers_300", "noise2_300", "scan2_300"])
     def test_have_their_size_and_are_repeatable(self, tool, variant):
         for shape in tool.common.BUILTIN:
             points, axis = tool.common.builtin(shape, variant)
