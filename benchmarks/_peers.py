@@ -214,4 +214,5 @@ PEERS = {
         for name in ("contraction", "curvature", "wavefront")
     },
     "thinning": Peer("scikit-image, voxels", ("scikit-image", "skan", *WRAP), "wrap", thinning),
+    "thinning-poisson": Peer("scikit-image, voxels", ("scikit-image", "skan"), "Poisson", thinning),
 }

@@ -7,6 +7,7 @@ The README beside this file says what it shows, docs/comparison.md how each tool
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import time
@@ -44,12 +45,12 @@ from _peers import PEERS, Peer
 from glsk_o3d import plot_skeleton
 from glsk_o3d.analysis import compare
 from glsk_o3d.analysis.graph import simple_edges
-from glsk_o3d.interop.preview import save_figure
+from glsk_o3d.interop.files import write_atomically
 from glsk_o3d.skeleton import Skeleton
 
-EVERY = "clean_4096,noise1_4096,scan2_4096,outliers_4096,holes_4096,clean_1024"
+EVERY = "clean_4096,noise1_4096,scan2_4096,outliers_4096"
 DRAWN = Case("sauropod", "scan2_4096")
-DRAWN_BY = ("default", "cgal", "thinning", "pygel-points", "pc-skeletor", "skeletor-contraction")
+DRAWN_BY = ("default", "pc-skeletor", "pygel-points", "cgal", "skeletor-contraction", "thinning-poisson")
 THREADS = ("NUMBA_NUM_THREADS", "RAYON_NUM_THREADS")  # beside those that `run` sets
 
 
@@ -157,22 +158,28 @@ def draw(rows: list[dict], path: Path) -> None:
     """Skeletons of one cloud side by side, each with its error and what is wrong with its topology."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from PIL import Image
 
     points, _ = DRAWN.load()
     columns = min(3, len(rows))
     lines = -(-len(rows) // columns)
-    figure = Figure((3.6 * columns, 2.9 * lines), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = Figure((3.4 * columns, 2.7 * lines), dpi=150, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
     for i, row in enumerate(rows):
         axes = figure.add_subplot(lines, columns, i + 1, projection="3d")
         plot_skeleton(row.get("skeleton"), axes, cloud=points, view=(14, -60))
         axes.set_title(caption(row), fontsize=9, y=0.97)
-    save_figure(figure, path)
+    canvas.draw()
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3]).quantize(
+        32
+    )  # a fifth of the size of a figure's
+    write_atomically(path, lambda temporary: image.save(temporary, "PNG", optimize=True))
 
 
 def caption(row: dict) -> str:
     """What stands above a skeleton."""
-    label = PEERS[row["tool"]].label.strip("`")
+    peer = PEERS[row["tool"]]
+    label = f"{peer.label.strip('`')} ({peer.takes})"
     if "failure" in row:
         return f"{label}\n{row['failure']}"
     off = [
@@ -192,7 +199,7 @@ def _page(path: Path | None) -> Path | None:
     return path
 
 
-app = typer.Typer(help=__doc__, pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False)
+app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False)
 
 
 @app.command(help=__doc__)
@@ -210,6 +217,9 @@ def main(
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="PNG", help="Draw some, side by side.", callback=writable)
     ] = None,
+    earlier: Annotated[
+        list[Path] | None, typer.Option("--from", metavar="JSON", help="Results of -o that are not measured again.")
+    ] = None,
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
@@ -218,13 +228,18 @@ def main(
     where = f"{machine()} {versions(peers)}."  # now, since writing the page changes the working tree
     for name in THREADS:
         os.environ[name] = "1"
+    rows = [row for path in earlier or () for row in json.loads(path.read_text(encoding="utf-8"))["rows"]]
+    known = {(row["tool"], row["variant"], row["shape"]) for row in rows}
     work = [
         (dict(tool=name, variant=case.variant, shape=case.shape), (case, peer))
         for case in found
         for name, peer in peers.items()
+        if (name, case.variant, case.shape) not in known
     ]
-    rows = run(measure, work, jobs, fresh=True, limit=limit)
+    rows += run(measure, work, jobs, fresh=True, limit=limit)
     save(output, rows)
+    order = {name: i for i, name in enumerate(PEERS)}
+    rows.sort(key=lambda row: order[row["tool"]])
     shown = tables(rows)
     if picture is not None:
         work = [(dict(tool=name), (DRAWN, peers[name], True)) for name in DRAWN_BY if name in peers]
