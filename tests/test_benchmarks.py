@@ -311,6 +311,7 @@ class TestPeers:
         call(*few, "--picture", tmp_path / "peers.png")
         assert (tmp_path / "peers.png").read_bytes().startswith(b"\x89PNG")
 
+    @pytest.mark.filterwarnings("ignore")  # theirs
     def test_tools_that_are_installed(self, tool):
         there = {name: peer for name, peer in tool.PEERS.items() if None not in peer.versions().values()}
         others = [name for name, peer in there.items() if peer.packages]
