@@ -182,10 +182,8 @@ def caption(row: dict) -> str:
     label = f"{peer.label.strip('`')} ({peer.takes})"
     if "failure" in row:
         return f"{label}\n{row['failure']}"
-    off = [
-        f"{abs(row[key])} {key} too {'many' if row[key] > 0 else 'few'}" for key in ("loops", "components") if row[key]
-    ]
-    return f"{label}\nerror {row['error']:.2f}, {', '.join(off) or 'right topology'}"
+    off = ", ".join(f"{name} {row[name]:+d}" for name in ("components", "loops") if row[name])
+    return f"{label}\nerror {row['error']:.2f}, {off or 'right topology'}"
 
 
 # ------------------------------------------------------------------------------------------------------------- command
