@@ -1,18 +1,20 @@
 # Everything works from a bare clone: each target first makes what it needs, and does so only once.
 PYTHON ?= python3
 VENV   := .venv
+PEERS  := .venv-peers
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip --disable-pip-version-check -qq
 # One BLAS thread per worker, because more only fight over the cores.
 PYTEST_ARGS ?= -n 2
 # See benchmarks/README.md for what else there is.
 ACCURACY_ARGS ?= truth --builtin
+PEERS_ARGS ?= --builtin --picture benchmarks/results/peers.png -o benchmarks/results/peers.json
 BENCH_ARGS ?= all --builtin --pictures benchmarks/results -o benchmarks/results/speed.json
 
 PYTHON_HINT = glsk-o3d needs Python 3.10 or newer: install it, or say 'make ... PYTHON=/path/to/python3'.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test docs figures accuracy bench lint format clean system-deps browser
+.PHONY: help demo test docs figures accuracy bench peers lint format clean system-deps browser
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -37,6 +39,10 @@ bench: $(VENV)/.installed-demo ## how fast skeletons are, stage by stage (BENCH_
 	@mkdir -p benchmarks/results
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/speed.py $(BENCH_ARGS)
 
+peers: $(PEERS)/.installed ## what other tools make of the same clouds; they get a virtual environment of their own
+	@mkdir -p benchmarks/results
+	$(PEERS)/bin/python benchmarks/peers.py $(PEERS_ARGS)
+
 lint: $(VENV)/.installed-test ## ruff and mypy
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -47,7 +53,7 @@ format: $(VENV)/.installed-test ## let ruff mend what it can
 	$(BIN)/ruff format .
 
 clean: ## remove what the other targets made, the virtual environment too
-	rm -rf $(VENV) demo docs/generated benchmarks/results build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf $(VENV) $(PEERS) demo docs/generated benchmarks/results build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Checked on every run (0.1 s), since the machine may have changed under an old .venv.
@@ -78,3 +84,11 @@ $(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
 	@echo "Installing glsk-o3d and what its site needs into $(VENV); the first time this takes a minute or more"
 	@$(PIP) install --editable '.[docs]'
 	@touch $@ $(VENV)/.installed-demo
+
+# pc-skeletor alone: it asks for a mistree that needs a Fortran compiler, and for torch and dgl, which it never imports.
+$(PEERS)/.installed: pyproject.toml benchmarks/peers.txt | system-deps
+	@echo "Installing glsk-o3d and other tools into $(PEERS); the first time this takes some minutes"
+	@test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
+	@$(PEERS)/bin/python -m pip --disable-pip-version-check -qq install --editable . -r benchmarks/peers.txt
+	@$(PEERS)/bin/python -m pip --disable-pip-version-check -qq install --no-deps pc-skeletor==1.0.0
+	@touch $@

@@ -6,13 +6,13 @@ import json
 import os
 import platform
 import re
+import signal
 import subprocess
 import sys
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
@@ -21,6 +21,7 @@ from typing import Annotated, Any
 from zipfile import BadZipFile
 
 import numpy as np
+import open3d as o3d
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -38,7 +39,8 @@ from glsk_o3d.report import Report
 ROOT = Path(__file__).resolve().parents[1]
 HOLES = 6  # in a built-in cloud with holes, each of them as far across as the part it is in
 SHOWN = 0.98  # least share of the true axis that a cloud must show for its skeleton to be scored
-TEXT = {"pipeline", "setting", "worst", "wrong", "note"}  # columns that are not numbers, besides the first
+# columns that are not numbers, besides the first
+TEXT = {"pipeline", "setting", "takes", "worst", "wrong", "failed", "note"}
 
 # ------------------------------------------------------------------------------------------------------------- clouds
 
@@ -54,7 +56,8 @@ BUILTIN: dict[str, Callable[..., samples.Sample]] = {
     "sauropod": partial(samples.sauropod, cameras=None),
 }
 """Samples of the package that have an axis, as whole surfaces."""
-BUILTIN_VARIANT = re.compile(r"(clean|density|holes|outliers|noise(?=\d))(\d*)_(\d+)")
+BUILTIN_VARIANT = re.compile(r"(clean|density|holes|outliers|scan(?=2_)|noise(?=\d))(\d*)_(\d+)")
+CAMERAS = np.array([[1, -2, 2], [-1, 2, 2]]) / 3  # where from a built-in scan is taken; nothing is hidden from both
 
 
 @dataclass(frozen=True)
@@ -75,14 +78,17 @@ class Case:
 
 
 def builtin(shape: str, variant: str) -> tuple[np.ndarray, Truth]:
-    """A built-in shape as KIND_SIZE, the kind being clean, density, holes, outliers, or noise with its percentage."""
+    """A built-in shape as KIND_SIZE: clean, density, holes, outliers, scan2, or noise with its percentage."""
     found = BUILTIN_VARIANT.fullmatch(variant)
     if found is None:
-        raise ValueError(f"{variant}: built-in variants are clean_N, density_N, holes_N, outliers_N and noiseP_N")
+        raise ValueError(
+            f"{variant}: built-in variants are clean_N, density_N, holes_N, outliers_N, scan2_N and noiseP_N"
+        )
     kind, percent, n = found[1], int(found[2] or 0), int(found[3])
     rng = np.random.default_rng(1)
     # the points of a sample are independent, so that the first n of those kept are a fair choice
-    drawn = BUILTIN[shape](10 * n if kind in ("density", "holes") else n, noise=percent / 100)
+    more, noise = 10 if kind in ("density", "holes", "scan") else 1, percent / 100 if kind == "noise" else 0.0
+    drawn = BUILTIN[shape](more * n, noise=noise)
     points, kept = drawn.points, np.ones(len(drawn.points), bool)
     if kind == "density":  # ten times as dense at one end as at the other
         along = points[:, np.ptp(points, axis=0).argmax()]
@@ -91,10 +97,21 @@ def builtin(shape: str, variant: str) -> tuple[np.ndarray, Truth]:
         centres = points[rng.choice(len(points), HOLES)]
         widths = drawn.radii[cKDTree(drawn.nodes).query(centres)[1]]
         kept = (np.linalg.norm(points[:, None] - centres, axis=2) > widths).all(axis=1)
+    elif kind == "scan":
+        kept = _seen(points)
     elif kind == "outliers":
         points = points.copy()
         points[: n // 100] = rng.uniform(points.min(axis=0), points.max(axis=0), (n // 100, 3))
     return points[kept][:n], Truth(drawn.nodes, drawn.edges, drawn.radii)
+
+
+def _seen(points):
+    """Which points one of the two cameras sees."""
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    size, seen = np.linalg.norm(np.ptp(points, axis=0)), np.zeros(len(points), bool)
+    for camera in cloud.get_axis_aligned_bounding_box().get_center() + 2 * size * CAMERAS:
+        seen[cloud.hidden_point_removal(camera, 1000 * size)[1]] = True
+    return seen
 
 
 def cases(folder: Path | None, own: bool, variants: str, shapes: str = "") -> list[Case]:
@@ -181,9 +198,15 @@ def _offered(case: Case, coverage: dict[str, float]) -> bool:
 
 # --------------------------------------------------------------------------------------------------------------- runs
 
+DEATHS = {it.value: it.name for it in signal.Signals} | {signal.SIGKILL.value: "killed, perhaps for want of memory"}
+
 
 def run(
-    work: Callable[..., dict], jobs: Sequence[tuple[dict, tuple]], processes: int, fresh: bool = False
+    work: Callable[..., dict],
+    jobs: Sequence[tuple[dict, tuple]],
+    processes: int,
+    fresh: bool = False,
+    limit: float | None = None,
 ) -> list[dict]:
     """Work through jobs in parallel.
 
@@ -197,6 +220,8 @@ def run(
     fresh : bool
         Each job in a process of its own, in which nothing but the warm-up has run, and whose death is a failure of that
         job alone.
+    limit : float, optional
+        How long such a process may take, everything included [s]; one that takes longer is ended, and has failed.
 
     Returns
     -------
@@ -211,7 +236,7 @@ def run(
     os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
     pool = ThreadPoolExecutor(processes) if fresh else ProcessPoolExecutor(processes, get_context("spawn"), _warm_up)
     with pool:
-        rows = pool.map(partial(_alone if fresh else _row, work), jobs)
+        rows = pool.map(partial(_alone, limit, work) if fresh else partial(_row, work), jobs)
         return list(track(rows, "", len(jobs), console=Console(stderr=True), transient=True))
 
 
@@ -220,12 +245,30 @@ def _warm_up() -> None:
     pipelines.default()(samples.tube(256).points)  # loads what is imported when first needed, so that it is not timed
 
 
-def _alone(work, job):
+def _alone(limit, work, job):
+    context = get_context("spawn")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_send, args=(sender, work, job), daemon=True)
+    process.start()
+    sender.close()  # so that the end of the process is the end of the pipe
     try:
-        with ProcessPoolExecutor(1, get_context("spawn"), _warm_up) as pool:
-            return pool.submit(_row, work, job).result()
-    except BrokenProcessPool:
-        return job[0] | {"failure": "its process died, perhaps for want of memory"}
+        if not receiver.poll(limit):
+            return job[0] | {"failure": f"not done after {limit:g} s"}
+        row = receiver.recv()
+        process.join(10)  # let it tidy up
+        return row
+    except EOFError:
+        process.join()
+        code = process.exitcode
+        return job[0] | {"failure": f"its process died: {DEATHS.get(-code, f'exit code {code}')}"}
+    finally:
+        process.kill()
+        process.join()
+
+
+def _send(sender, work, job):
+    _warm_up()
+    sender.send(_row(work, job))
 
 
 def _row(work, job):
@@ -239,7 +282,7 @@ def _row(work, job):
 # ------------------------------------------------------------------------------------------------------------- results
 
 
-def _writable(path: Path | None) -> Path | None:
+def writable(path: Path | None) -> Path | None:
     if path is not None and not path.absolute().parent.is_dir():  # found out now, not after an hour
         raise typer.BadParameter(f"there is no folder {path.parent}")
     return path
@@ -252,7 +295,7 @@ Shapes = Annotated[str, typer.Option("--shapes", metavar="NAMES", help="With com
 Pipelines = Annotated[str, typer.Option("--pipeline", metavar="NAMES", help="With commas.")]
 Jobs = Annotated[int, typer.Option("--jobs", min=0, help="Processes; 0 stays in this one, for a debugger.")]
 Output = Annotated[
-    Path | None, typer.Option("--output", "-o", metavar="JSON", help="Write every result.", callback=_writable)
+    Path | None, typer.Option("--output", "-o", metavar="JSON", help="Write every result.", callback=writable)
 ]
 Tables = list[tuple[str, list[str], list[list[str]]]]  # title, header, lines
 Markdown = Annotated[bool, typer.Option("--markdown", help="Print Markdown.")]
@@ -328,6 +371,16 @@ def surroundings() -> dict[str, Any]:
         },
         "versions": {"python": platform.python_version(), **Report().versions},
     }
+
+
+def machine() -> str:
+    """A line that says where and what was measured."""
+    told = surroundings()
+    it, versions = told["machine"], ", ".join(f"{name} {version}" for name, version in told["versions"].items())
+    return (
+        f"Measured on {it['processor']}, {it['cores']} cores, {it['memory_gb']} GB, load {it['load']}, {it['system']}; "
+        f"{versions}; commit {told['commit']}; one thread."
+    )
 
 
 def _processor() -> str:

@@ -38,6 +38,7 @@ from _common import (
     cases,
     fill,
     folder_or,
+    machine,
     markdown_table,
     named,
     number,
@@ -45,7 +46,6 @@ from _common import (
     run,
     save,
     show,
-    surroundings,
     with_solves,
 )
 from _plots import INK, keep, look, plain_log, sheet
@@ -706,16 +706,6 @@ def large_tables(rows: list[dict]) -> Tables:
 
 
 # ----------------------------------------------------------------------------------------------------------- commands
-
-
-def machine() -> str:
-    """A line that says where and what was measured."""
-    told = surroundings()
-    it, versions = told["machine"], ", ".join(f"{name} {version}" for name, version in told["versions"].items())
-    return (
-        f"Measured on {it['processor']}, {it['cores']} cores, {it['memory_gb']} GB, load {it['load']}, {it['system']}; "
-        f"{versions}; commit {told['commit']}; one thread."
-    )
 
 
 def present(where: str, parts: dict[str, Tables], markdown: bool) -> None:

@@ -15,9 +15,11 @@ from scipy.spatial import cKDTree
 from typer.testing import CliRunner
 
 from glsk_o3d import pipelines
+from glsk_o3d.analysis import compare
 from glsk_o3d.batch import run_batch
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.samples import torus
+from glsk_o3d.skeleton import Skeleton
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +51,9 @@ def row(shape="torus", variant="clean_512", pipeline="default", **values):
 
 
 class TestBuiltinClouds:
-    @pytest.mark.parametrize("variant", ["clean_300", "density_300", "holes_300", "outliers_300", "noise2_300"])
+    @pytest.mark.parametrize(
+        "variant", ["clean_300", "density_300", "holes_300", "outliers_300", "noise2_300", "scan2_300"]
+    )
     def test_have_their_size_and_are_repeatable(self, tool, variant):
         for shape in tool.common.BUILTIN:
             points, axis = tool.common.builtin(shape, variant)
@@ -68,6 +72,13 @@ class TestBuiltinClouds:
         assert 0.08 < away.max() < 0.12
         angle = np.arctan2(holed[:, 1], holed[:, 0])
         assert np.histogram(angle, 100)[0].min() > 0
+
+    def test_two_cameras_see_all_but_what_is_below(self, tool):
+        whole, seen = (tool.common.builtin("tube", f"{kind}_4096")[0] for kind in ("clean", "scan2"))
+        below = [np.count_nonzero(-points[:, 2] > abs(points[:, 1])) for points in (whole, seen)]
+        assert below[0] > 800
+        assert below[1] < 0.2 * below[0]
+        assert cKDTree(seen).query(whole[whole[:, 2] > 0])[0].max() < 0.05
 
     def test_outliers_are_one_percent(self, tool):
         points = tool.common.builtin("torus", "outliers_4096")[0]
@@ -302,3 +313,83 @@ def test_scans_for_batches(tool, tmp_path):
     sizes = [row["points"] for row in result.rows.values() if row["status"] == "done"]
     assert len(sizes) == 12
     assert 256 <= min(sizes) < max(sizes) <= 400
+
+
+BAD = """
+import os, signal, time
+import numpy as np
+
+def crash(points):
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+def hang(points):
+    time.sleep(600)
+
+def nothing(points):
+    return np.empty((0, 3)), np.empty((0, 2), int)
+"""
+
+
+class TestPeers:
+    @pytest.fixture
+    def tool(self, root, monkeypatch):
+        monkeypatch.syspath_prepend(str(root / "benchmarks"))
+        yield importlib.import_module("peers")
+        for name in ("peers", "_peers"):
+            del sys.modules[name]
+
+    def test_one_that_crashes_or_hangs_is_a_failure_and_ends_nothing(self, tool, call, tmp_path, monkeypatch):
+        (tmp_path / "bad_tools.py").write_text(BAD)
+        monkeypatch.syspath_prepend(tmp_path)
+        module = importlib.import_module("bad_tools")
+        names = ("crash", "hang", "nothing")
+        bad = {name: tool.Peer(name, (), "points", getattr(module, name)) for name in names}
+        monkeypatch.setattr(tool, "PEERS", bad | {"default": tool.PEERS["default"]})
+        page, out = tmp_path / "page.md", tmp_path / "out.json"
+        page.write_text("<!-- builtin -->\n<!-- end -->\n<!-- folder -->\nkept\n<!-- end -->\n")
+        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--limit", 10, "--jobs", 4)
+        call(*few, "-o", out, "--page", page)
+        rows = {row["tool"]: row for row in json.loads(out.read_text())["rows"]}
+        assert rows["crash"]["failure"] == "its process died: SIGSEGV"
+        assert rows["hang"]["failure"] == "not done after 10 s"
+        assert rows["nothing"]["failure"].startswith("InvalidParameterError: the skeleton is empty")
+        assert rows["default"]["topology"]
+        assert 0 < rows["default"]["error"] < 0.2
+        lines = page.read_text().splitlines()
+        assert "kept" in lines
+        assert any(line.startswith("| crash | points | - / 0 | - |") for line in lines)
+        assert any(line.endswith("| torus (not done after 10 s) |") for line in lines)
+        del sys.modules["bad_tools"]
+        again = call(*few, "--from", out)  # nothing is measured
+        assert "torus (not done after 10 s)" in again
+
+    def test_picture(self, call, tmp_path):
+        few = ("--builtin", "--shapes", "tube", "--variant", "clean_256", "--tool", "default", "--jobs", 1)
+        call(*few, "--picture", tmp_path / "peers.png")
+        assert (tmp_path / "peers.png").read_bytes().startswith(b"\x89PNG")
+
+    @pytest.mark.filterwarnings("ignore")  # theirs
+    def test_tools_that_are_installed(self, tool):
+        there = {name: peer for name, peer in tool.PEERS.items() if None not in peer.versions().values()}
+        others = [name for name, peer in there.items() if peer.packages]
+        if not others:
+            pytest.skip("none of the other tools is installed: make peers")
+        points, axis = importlib.import_module("_common").builtin("tube", "clean_4096")
+        for name in others:
+            vertices, edges = there[name](points)
+            found = compare(Skeleton(vertices, edges, [math.nan] * len(vertices), (), (), ()), axis)
+            assert found.topology, name
+            assert found.error < 0.5, name
+
+    @pytest.mark.parametrize(
+        "wrong", [("--tool", "magic"), ("--page", "no_such_page.md"), ("--picture", "no_such_folder/p.png")]
+    )
+    def test_wrong_usage_is_found_at_once(self, call, wrong):
+        assert "Invalid value" in call("--builtin", *wrong, code=2)
+
+    def test_one_that_is_absent_is_named(self, tool, call, monkeypatch):
+        absent = tool.Peer("gone", ("no-such-package",), "points", None)
+        monkeypatch.setattr(tool, "PEERS", {"gone": absent, "default": tool.PEERS["default"]})
+        assert "not installed: gone" in call("--builtin", "--tool", "gone", code=2)
+        few = ("--builtin", "--shapes", "tube", "--variant", "clean_256", "--jobs", 1)
+        assert "not installed: gone" in call(*few)

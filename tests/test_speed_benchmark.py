@@ -310,7 +310,7 @@ class TestCommands:
 
     def test_a_process_that_dies_is_a_failure_of_its_job_alone(self, tool):
         rows = sys.modules["_common"].run(os._exit, [(dict(name="bad"), (1,))], 1, fresh=True)
-        assert rows == [dict(name="bad", failure="its process died, perhaps for want of memory")]
+        assert rows == [dict(name="bad", failure="its process died: exit code 1")]
 
     def test_figures(self, call, tmp_path, tool):
         out = tmp_path / "out.json"

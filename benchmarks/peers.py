@@ -1,0 +1,255 @@
+"""How skeletons compare with those of other tools, on shapes with known axes.
+
+python benchmarks/peers.py --builtin
+
+The README beside this file says what it shows, docs/comparison.md how each tool is called.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from statistics import fmean
+from typing import Annotated
+
+import numpy as np
+import typer
+from _common import (
+    Case,
+    Folder,
+    Jobs,
+    Markdown,
+    Output,
+    Own,
+    Shapes,
+    Tables,
+    Variants,
+    cases,
+    fill,
+    machine,
+    markdown_table,
+    number,
+    pick,
+    run,
+    save,
+    show,
+    writable,
+)
+from _peers import PEERS, Peer
+
+from glsk_o3d import plot_skeleton
+from glsk_o3d.analysis import compare
+from glsk_o3d.analysis.graph import simple_edges
+from glsk_o3d.interop.files import write_atomically
+from glsk_o3d.skeleton import Skeleton
+
+EVERY = "clean_4096,noise1_4096,scan2_4096,outliers_4096"
+DRAWN = Case("sauropod", "scan2_4096")
+DRAWN_BY = ("default", "pc-skeletor", "pygel-points", "cgal", "skeletor-contraction", "thinning-poisson")
+THREADS = ("NUMBA_NUM_THREADS", "RAYON_NUM_THREADS")  # beside those that `run` sets
+
+
+# ---------------------------------------------------------------------------------------------------------------- runs
+
+
+def measure(case: Case, peer: Peer, drawn: bool = False) -> dict:
+    """One skeleton against its axis, and the skeleton too if it is to be drawn."""
+    points, truth = case.load()
+    with silence():
+        with suppress(Exception):
+            peer.warm_up()
+        start = time.process_time()
+        vertices, edges = peer(points)
+        cpu = time.process_time() - start
+    skeleton = Skeleton(vertices, simple_edges(edges), np.full(len(vertices), np.nan), (), (), ())
+    found = dict(cpu=cpu, vertices=len(vertices)) | compare(skeleton, truth).as_dict()
+    return found | dict(skeleton=skeleton) if drawn else found
+
+
+@contextmanager
+def silence() -> Iterator[None]:
+    """Let nothing be printed, not even by what is written in C++."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = {stream: os.dup(stream) for stream in (1, 2)}
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        for stream in kept:
+            os.dup2(nowhere, stream)
+        yield
+    finally:
+        for stream, copy in kept.items():
+            os.dup2(copy, stream)
+            os.close(copy)
+        os.close(nowhere)
+
+
+def chosen(names: str) -> dict[str, Peer]:
+    """The tools of these names, with commas; for no names all that are installed, and what is left out is said."""
+    wanted = names.split(",") if names else list(PEERS)
+    if unknown := [name for name in wanted if name not in PEERS]:
+        raise typer.BadParameter(f"no tool {', '.join(unknown)}: there are {', '.join(PEERS)}")
+    there = {name: PEERS[name] for name in wanted if None not in PEERS[name].versions().values()}
+    if absent := [name for name in wanted if name not in there]:
+        said = f"not installed: {', '.join(absent)}; 'make peers' installs and runs all"
+        if names:
+            raise typer.BadParameter(said)
+        typer.echo(said, err=True)
+    return there
+
+
+# -------------------------------------------------------------------------------------------------------------- tables
+
+
+def tables(rows: list[dict]) -> Tables:
+    """All at a glance, and then a table for each variant."""
+    variants, tools = (list(dict.fromkeys(row[key] for row in rows)) for key in ("variant", "tool"))
+    size = {name: len({row["shape"] for row in pick(rows, variant=name)}) for name in variants}
+    header = ["", "takes", *(f"{name} ({size[name]})" for name in variants), "CPU s"]
+    lines = []
+    for tool in tools:
+        parts = [summary(pick(rows, variant=name, tool=tool)) for name in variants]
+        cells = [f"{number(part['error'])} / {part['right']}" for part in parts]
+        lines.append([PEERS[tool].label, PEERS[tool].takes, *cells, number(parts[0]["cpu"], 2)])
+    found = [("error / right topology", header, lines)]
+    header = ["", "takes", "error", "inside", "complete", "topology", "leaves", "CPU s", "failed"]
+    for name in variants:
+        lines = []
+        for tool in tools:
+            part = summary(pick(rows, variant=name, tool=tool))
+            means = [number(part[key]) for key in ("error", "inside", "completeness")]
+            counts = [f"{part[key]}/{size[name]}" for key in ("right", "leaves")]
+            cells = [*means, *counts, number(part["cpu"], 2), part["failed"]]
+            lines.append([PEERS[tool].label, PEERS[tool].takes, *cells])
+        found.append((name, header, lines))
+    return found
+
+
+def summary(rows: list[dict]) -> dict:
+    """Means over the shapes that gave a skeleton, how many of all are right, and which failed."""
+    good = [row for row in rows if "failure" not in row]
+    right = [row for row in good if row["topology"]]
+    failed = ", ".join(f"{row['shape']} ({row['failure']})" for row in rows if "failure" in row)
+    means = {key: mean(row[key] for row in good) for key in ("error", "inside", "completeness", "cpu")}
+    return means | dict(right=len(right), leaves=sum(row["leaves"] == 0 for row in right), failed=failed)
+
+
+def mean(values: Iterable[float]) -> float:
+    """NaN for none."""
+    found = list(values)
+    return fmean(found) if found else float("nan")
+
+
+def versions(tools: Iterable[str]) -> str:
+    """A line with the packages of other tools."""
+    found = {name: it for tool in tools for name, it in PEERS[tool].versions().items()}
+    return ", ".join(f"{name} {it}" for name, it in found.items())
+
+
+# ------------------------------------------------------------------------------------------------------------- picture
+
+
+def draw(rows: list[dict], path: Path) -> None:
+    """Skeletons of one cloud side by side, each with its error and what is wrong with its topology."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from PIL import Image
+
+    points, _ = DRAWN.load()
+    columns = min(3, len(rows))
+    lines = -(-len(rows) // columns)
+    figure = Figure((3.4 * columns, 2.7 * lines), dpi=150, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    for i, row in enumerate(rows):
+        axes = figure.add_subplot(lines, columns, i + 1, projection="3d")
+        plot_skeleton(row.get("skeleton"), axes, cloud=points, view=(14, -60))
+        axes.set_title(caption(row), fontsize=9, y=0.97)
+    canvas.draw()
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3]).quantize(
+        32
+    )  # a fifth of the size of a figure's
+    write_atomically(path, lambda temporary: image.save(temporary, "PNG", optimize=True))
+
+
+def caption(row: dict) -> str:
+    """What stands above a skeleton."""
+    peer = PEERS[row["tool"]]
+    label = f"{peer.label.strip('`')} ({peer.takes})"
+    if "failure" in row:
+        return f"{label}\n{row['failure']}"
+    off = ", ".join(f"{name} {row[name]:+d}" for name in ("components", "loops") if row[name])
+    return f"{label}\nerror {row['error']:.2f}, {off or 'right topology'}"
+
+
+# ------------------------------------------------------------------------------------------------------------- command
+
+
+def _page(path: Path | None) -> Path | None:
+    if path is not None:
+        if not path.is_file():
+            raise typer.BadParameter(f"there is no page {path}")
+        fill(path, dict.fromkeys(("builtin", "folder"), ""), check=True)
+    return path
+
+
+app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False)
+
+
+@app.command(help=__doc__)
+def main(
+    folder: Folder = None,
+    own: Own = False,
+    tool: Annotated[str, typer.Option("--tool", metavar="NAMES", help="With commas; else all installed.")] = "",
+    variant: Variants = EVERY,
+    shapes: Shapes = "",
+    limit: Annotated[float, typer.Option("--limit", help="Seconds for a skeleton, imports included.")] = 60.0,
+    jobs: Jobs = 2,
+    page: Annotated[
+        Path | None, typer.Option("--page", metavar="MD", help="Put the tables into this page.", callback=_page)
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="PNG", help="Draw some, side by side.", callback=writable)
+    ] = None,
+    earlier: Annotated[
+        list[Path] | None, typer.Option("--from", metavar="JSON", help="Results of -o that are not measured again.")
+    ] = None,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    peers = chosen(tool)
+    found = cases(folder, own, variant, shapes)
+    where = f"{machine()} {versions(peers)}."  # now, since writing the page changes the working tree
+    for name in THREADS:
+        os.environ[name] = "1"
+    rows = [row for path in earlier or () for row in json.loads(path.read_text(encoding="utf-8"))["rows"]]
+    known = {(row["tool"], row["variant"], row["shape"]) for row in rows}
+    work = [
+        (dict(tool=name, variant=case.variant, shape=case.shape), (case, peer))
+        for case in found
+        for name, peer in peers.items()
+        if (name, case.variant, case.shape) not in known
+    ]
+    rows += run(measure, work, jobs, fresh=True, limit=limit)
+    save(output, rows)
+    order = {name: i for i, name in enumerate(PEERS)}
+    rows.sort(key=lambda row: order[row["tool"]])
+    shown = tables(rows)
+    if picture is not None:
+        work = [(dict(tool=name), (DRAWN, peers[name], True)) for name in DRAWN_BY if name in peers]
+        draw(run(measure, work, jobs, fresh=True, limit=limit), picture)
+    if page is not None:
+        body = "\n".join([where, "", *(markdown_table(*table) for table in shown)])
+        fill(page, {"builtin" if own else "folder": body})
+    typer.echo(f"{where}\n")
+    for table in shown:
+        show(*table, markdown)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("MPLBACKEND", "Agg")
+    app()
