@@ -27,7 +27,7 @@ SMALLEST, LARGEST = 1e-120, 1e120  # extents whose squares and products a float6
 ALONE, FAIRLY_NOISY = 1.8, 0.2  # isolation of a denoised point that is set aside, and its least noise
 FEW, ENOUGH = 1000, 8192  # points from which on, and down to which, more than enough are merged
 STEADY = 0.9  # share of the points left at which that ends
-NOISY, PLENTY = 0.05, 4096  # mean noise from which on, and number of points down to which, noisy ones are averaged
+PLENTY = 4096  # noisy points that are enough: down to about so many they are averaged
 COINCIDENT = 4e-15  # points nearer than this in the working frame, a few roundings, are duplicates
 
 
@@ -177,11 +177,13 @@ class RingBuilder(Filter):
         good = good[sample]
         frame, distinct, row, distance, neighbours = self._distinct(good)
         stray, counts, weight = np.zeros(len(good), bool), np.bincount(stands_for), np.empty(len(distinct))
-        weight[row] = counts  # copies count once
+        weight[row] = counts  # copies count once, but in a sample
         if self.outlier_factor:
             left = without_outliers(distinct, weight, distance, neighbours, self.outlier_factor, MIN_POINTS)
             if len(left) < len(distinct):
-                stray = ~np.isin(row, left)
+                kept = np.zeros(len(distinct), bool)
+                kept[left] = True
+                stray = ~kept[row]
                 frame, distinct, row[~stray], _, neighbours = self._distinct(good[~stray])
                 weight = np.empty(len(distinct))
                 weight[row[~stray]] = counts[~stray]
@@ -190,19 +192,23 @@ class RingBuilder(Filter):
 
         spread, normals = principal(distinct, neighbours)
         noise = noise_share(spread, neighbours)
-        first = row
-        while self.denoise and self._may_merge and noise.mean() > NOISY and len(distinct) >= 2 * PLENTY:
+        stands = np.ones(len(distinct))  # for so many distinct points
+        while self.denoise and self._may_merge and np.count_nonzero(noise) >= 2 * PLENTY:
             into, mean, weight_of_mean = average_noisy(distinct, neighbours, noise, weight, PLENTY)
             if len(mean) > STEADY * len(distinct):
                 break
-            distinct, weight = mean, weight_of_mean
+            distinct, weight, stands = mean, weight_of_mean, np.bincount(into, stands)
             row, neighbours = into[row], nearest_neighbours(distinct, self._neighbours(len(distinct)))[1]
             spread, normals = principal(distinct, neighbours)
             noise = noise_share(spread, neighbours)
         across = normals  # of the planes that the rings lie in
         if self.denoise and noise.any():
             distinct, neighbours, left, nearest = self._denoised(distinct, neighbours.shape[1], noise, weight)
-            normals, noise = normals[left], noise[left]  # a ridge has none: those of the cloud as it came
+            normals, noise, stands = (
+                normals[left],
+                noise[left],
+                stands[left],
+            )  # a ridge has none: those of the cloud as it came
             stray |= (left[nearest] != np.arange(len(nearest)))[row]
             row = nearest[row]
             spread, across = principal(distinct, neighbours)
@@ -227,14 +233,14 @@ class RingBuilder(Filter):
             normals=normals,
             survivors=survivors,
             owner=owner,
-            mass=np.bincount(owner, minlength=n) * (n / len(owner)),
+            mass=np.bincount(owner, stands) * (n / stands.sum()),
             **at_rest(positions, rings),
             report=Report(
                 n_input=len(points),
                 n_dropped=int((~finite).sum()),
                 n_outliers=int(outlier.sum()),
                 n_sampled=len(good),
-                n_distinct=int(np.count_nonzero(np.bincount(first[~stray]))),
+                n_distinct=int(stands.sum()),
                 n_contracted=n,
             ),
         )

@@ -339,10 +339,13 @@ def test_clouds_are_not_averaged_where_points_shall_stay(settings):
 
 def test_clean_parts_are_not_averaged():
     points = samples.torus(9000).points
-    noisy = samples.torus(9000, noise=0.02).points + [0, 0, 1]
+    noisy = samples.torus(20000, noise=0.02).points + [0, 0, 1]
     state = RingBuilder(around=0)(np.concatenate([points, noisy]))
     assert len(np.unique(state.row_of_point[:9000])) == 9000
-    assert len(np.unique(state.row_of_point[9000:][~state.outlier[9000:]])) < 9000 / 2
+    assert len(np.unique(state.row_of_point[9000:][~state.outlier[9000:]])) < 20000 / 2
+    # each counts for all that it is the mean of
+    many = np.unique(state.row_of_point[~state.outlier], return_counts=True)[1]
+    np.testing.assert_allclose(state.mass, many / many.mean(), rtol=1e-12)
 
 
 # ---- points that stand alone after denoising

@@ -131,7 +131,7 @@ def thin_smooth(points, neighbours, spread, around):
 
 
 def average_noisy(points, neighbours, noise, weight, n):
-    """Put the mean of at most four points in their place where there is noise, but keep about n points or more.
+    """Put the mean of at most four points in their place where there is noise, but keep about n of them or more.
 
     A neighbourhood that is narrower than the noise is a ball, wherever the surface is. The mean of m points has less
     noise, and its neighbourhood is wider.
@@ -156,7 +156,7 @@ def average_noisy(points, neighbours, noise, weight, n):
     total : (c,) float array
         Their weight.
     """
-    into = merge_nearest(points, neighbours, np.where(noise > 0, min(MOST, len(points) / n), 1))
+    into = merge_nearest(points, neighbours, np.where(noise > 0, min(MOST, np.count_nonzero(noise) / n), 1))
     into = (np.cumsum(into == np.arange(len(into))) - 1)[into]
     total = np.bincount(into, weight)
     return into, group_sum(weight[:, None] * points, into, len(total)) / total[:, None], total

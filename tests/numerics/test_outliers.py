@@ -46,6 +46,37 @@ def test_sparse_surfaces_stay(n, shift):
     assert len(left(np.concatenate([SURFACE, part]))) == N + n
 
 
+def limb(n, radius, noise):
+    rng = np.random.default_rng(1)
+    angle, along = rng.uniform(0, 2 * np.pi, n), rng.uniform(0, 0.6, n)
+    points = np.column_stack([along, radius * np.cos(angle), radius * np.sin(angle)])
+    return points + noise * rng.normal(size=(n, 3)) + [0.5, 0, 0]
+
+
+@pytest.mark.parametrize(("n", "radius", "noise"), [(200, 0.02, 0.005), (100, 0.01, 0.003), (400, 0.02, 0.005)])
+def test_sparse_limbs_of_a_dense_part_stay(n, radius, noise):
+    """All around a thin limb its neighbourhoods are as thick as long; a wider one knows better."""
+    points = np.concatenate([SURFACE, limb(n, radius, noise)])
+    found = np.ones(len(points), bool)
+    found[left(points)] = False
+    assert not found[:N].any()
+    assert found.sum() < 0.1 * n
+
+
+@pytest.mark.parametrize("scale", [0.2, 1, 4])
+def test_another_noisy_object_stays(scale):
+    """However much coarser it is: a tenth of the points are no outliers."""
+    other = scale * samples.torus(3000, noise=0.02, seed=1).points + [4, 0, 0]
+    assert len(left(np.concatenate([SURFACE, other]))) > N + 2900
+
+
+def test_more_neighbours_than_points_are_left():
+    points = np.concatenate([samples.torus(200).points, floating(6, reach=3)])
+    for k in (100, 203, 206):
+        kept = without_outliers(points, np.ones(206), *nearest_neighbours(points, k), 2.5, 8)
+        np.testing.assert_array_equal(kept, np.arange(200))
+
+
 @pytest.mark.parametrize("noise", [0, 0.003])
 def test_uneven_clouds_stay(noise):
     """Ten times as dense at one end as at the other."""

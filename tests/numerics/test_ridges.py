@@ -196,7 +196,7 @@ def test_the_line_itself_stays():
 
 
 def test_a_point_that_stands_for_several():
-    """The mean shift goes where the weight is, as if there were as many points."""
+    """The mean shift goes where the weight is."""
     rng = np.random.default_rng(0)
     points = rng.normal(size=(31, 3)) * [3, 1, 1]
     times = rng.integers(1, 4, 31)

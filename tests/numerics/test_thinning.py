@@ -163,7 +163,7 @@ def test_a_grid_that_is_too_coarse_keeps_all():
 # ---- averaging
 
 
-@pytest.mark.parametrize("n", [700, 1500])
+@pytest.mark.parametrize("n", [300, 700])
 def test_means_of_noisy_points(surface, n):
     rng = np.random.default_rng(0)
     near = nearest_neighbours(surface, 16)[1]
@@ -171,7 +171,7 @@ def test_means_of_noisy_points(surface, n):
     weight = rng.uniform(1, 9, 3000)
     into, mean, total = average_noisy(surface, near, noise, weight, n)
     size = np.bincount(into)
-    assert size.max() <= min(MOST, 3000 / n)
+    assert size.max() <= min(MOST, np.count_nonzero(noise) / n)
     assert len(mean) < 2500
     assert total.sum() == pytest.approx(weight.sum(), rel=1e-12)
     for group in (0, len(mean) // 2, int(np.argmax(size))):
