@@ -138,8 +138,8 @@ class RingBuilder(Filter):
     denoise: int = parameter(
         4,
         "Passes that draw the points of noisy neighbourhoods to the ridge of their density before the rings are made. "
-        "Of 8192 points and more these are averaged first, unless there is a `radius` or `thin_to` is 'all'. Clean "
-        "points stay. 0 for none.",
+        "Where there are 8192 or more, these are averaged first, unless there is a `radius` or `thin_to` is 'all'. "
+        "Clean points stay. 0 for none.",
         type="int",
         unit="passes",
         low=0,

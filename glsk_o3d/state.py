@@ -57,11 +57,11 @@ class Contraction:
         Input points that say where the surface is: no outliers, and of a large cloud a sample; others are only mapped.
     frame : Frame
     cloud : (m, 3) float64 array
-        Distinct input points, noisy ones denoised.
+        Distinct input points; noisy ones denoised, and where there are many, means of several.
     noise : (m,) float64 array
         How far the neighbourhood of each is noise, from 0 to 1.
     normals : (m, 3) float64 array
-        Unit normals of the tangent planes before denoising, up to their sign.
+        Unit normals of the tangent planes before points were moved to ridges, up to their sign.
     survivors : (n,) int array
         Rows of `cloud` still there, ascending.
     owner : (m,) int array

@@ -25,6 +25,7 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
         "points": report.n_input,
         "dropped": report.n_dropped,
         "sampled": report.n_sampled,
+        "outliers": report.n_outliers,
         "distinct": report.n_distinct,
         "contracted": report.n_contracted,
         **structure(skeleton),

@@ -76,16 +76,18 @@ def adrift(points, weight, mean, neighbours):
     densest = row_medians(mean[neighbours])
     for _ in range(HOPS):
         densest = densest[neighbours].min(axis=1)
-    near = neighbours[:, 1:5]
-    part = component_labels(
-        len(points), np.column_stack([np.repeat(np.arange(len(points)), near.shape[1]), near.ravel()])
-    )
-    island = np.bincount(part, weight)[part] < FEW * weight.sum()
-    far = np.flatnonzero(mean > ADRIFT * np.where(island, np.minimum(densest, np.median(mean)), densest))
+    island, alone = np.zeros(len(points), bool), mean > ADRIFT * np.median(mean)
+    if alone.any():
+        near = neighbours[:, 1:5]
+        ends = np.column_stack([np.repeat(np.arange(len(points)), near.shape[1]), near.ravel()])
+        part = component_labels(len(points), ends)
+        island = np.bincount(part, weight)[part] < FEW * weight.sum()
+    far = np.flatnonzero((mean > ADRIFT * densest) | (island & alone))
     found = np.zeros(len(points), bool)
     if len(far) > 3:
         among = nearest_neighbours(points[far], min(WIDE, len(far)))[1]
         third, second, first = principal(points[far], among)[0].T
-        handful = island[far] & (np.bincount(part)[part[far]] < WIDE)
-        found[far] = handful | (second > ROUND * first) & (third > FULL * first)
+        found[far] = (second > ROUND * first) & (third > FULL * first)
+    if island.any():
+        found |= island & alone & (np.bincount(part)[part] < WIDE)
     return found & (weight[found].sum() < FEW * weight.sum())

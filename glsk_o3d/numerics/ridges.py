@@ -59,11 +59,12 @@ def to_ridges(points, noise, passes, weight=None):
     around = nearest_neighbours(points, min(NEIGHBOURS, len(points)), of=points[noisy])[1]
     for start in range(0, len(noisy), _CHUNK):
         part = slice(start, start + _CHUNK)
-        patch, step, x = points[around[part]], noise[noisy[part], None], points[noisy[part]]
+        patch, mass = points[around[part]], weight[around[part]]
+        step, x = noise[noisy[part], None], points[noisy[part]]
         for _ in range(passes):
             apart = patch - x[:, None]
             squared = np.einsum("nki,nki->nk", apart, apart)
-            kernel = weight[around[part]] * np.exp(-squared / (2 * squared.mean(axis=1, keepdims=True)))
+            kernel = mass * np.exp(-squared / (2 * squared.mean(axis=1, keepdims=True)))
             kernel /= kernel.sum(axis=1, keepdims=True)
             mean = np.matmul(kernel[:, None], patch)[:, 0]
             offset = patch - mean[:, None]
