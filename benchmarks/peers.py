@@ -234,8 +234,9 @@ def main(
         for name, peer in peers.items()
         if (name, case.variant, case.shape) not in known
     ]
-    rows += run(measure, work, jobs, fresh=True, limit=limit)
-    save(output, rows)
+    for name in dict.fromkeys(facts["variant"] for facts, _ in work):
+        rows += run(measure, [job for job in work if job[0]["variant"] == name], jobs, fresh=True, limit=limit)
+        save(output, rows)  # as far as it has come: what is stopped can go on with --from
     order = {name: i for i, name in enumerate(PEERS)}
     rows.sort(key=lambda row: order[row["tool"]])
     shown = tables(rows)
