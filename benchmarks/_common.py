@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
+from statistics import fmean
 from typing import Annotated, Any
 from zipfile import BadZipFile
 
@@ -341,6 +342,29 @@ def fill(page: Path, parts: Mapping[str, Tables | str], check: bool = False) -> 
     if check:
         return
     write_atomically(page, lambda temporary: Path(temporary).write_text(text, encoding="utf-8"))
+
+
+def summary(rows: list[dict]) -> dict:
+    """Means over the shapes that gave a skeleton, and how many are right; a failure is not."""
+    good = [row for row in rows if "failure" not in row]
+    names = ("error", "inside", "completeness", "ends", "radius_error", "cpu")
+    values = {name: [row[name] for row in good if row[name] is not None] for name in names}
+    right = [row for row in good if row["topology"]]
+    counts = dict(n=len(rows), right=len(right), leaves=sum(row["leaves"] == 0 for row in right))
+    return counts | {name: fmean(found) if found else float("nan") for name, found in values.items()}
+
+
+def page_with(*parts: str) -> Callable[[Path | None], Path | None]:
+    """A check that a page is there and has the lines between which `fill` puts these parts."""
+
+    def checked(path: Path | None) -> Path | None:
+        if path is not None:
+            if not path.is_file():
+                raise typer.BadParameter(f"there is no page {path}")
+            fill(path, dict.fromkeys(parts, ""), check=True)
+        return path
+
+    return checked
 
 
 def number(value: float | None, digits: int = 3) -> str:

@@ -39,6 +39,7 @@ from _common import (
     run,
     save,
     show,
+    summary,
     with_solves,
 )
 from _plots import BLUE, INK, LOOKS, keep, look, plain_log, sheet
@@ -118,16 +119,6 @@ def measured(found: list[Case], pipelines: dict[str, Pipeline], jobs: int, repea
         for name, pipeline in pipelines.items()
     ]
     return run(measure, work, jobs)
-
-
-def summary(rows: list[dict]) -> dict:
-    """Means over the shapes that gave a skeleton, and how many are right; a failure is not."""
-    good = [row for row in rows if "failure" not in row]
-    names = ("error", "inside", "completeness", "ends", "radius_error", "cpu")
-    values = {name: [row[name] for row in good if row[name] is not None] for name in names}
-    right = [row for row in good if row["topology"]]
-    counts = dict(n=len(rows), right=len(right), leaves=sum(row["leaves"] == 0 for row in right))
-    return counts | {name: fmean(found) if found else float("nan") for name, found in values.items()}
 
 
 def by_pipeline(rows: list[dict]) -> dict[str, list[dict]]:

@@ -14,7 +14,6 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from statistics import fmean
 from typing import Annotated
 
 import numpy as np
@@ -34,10 +33,12 @@ from _common import (
     machine,
     markdown_table,
     number,
+    page_with,
     pick,
     run,
     save,
     show,
+    summary,
     writable,
 )
 from _peers import PEERS, Peer
@@ -121,28 +122,19 @@ def tables(rows: list[dict]) -> Tables:
     for name in variants:
         lines = []
         for tool in tools:
-            part = summary(pick(rows, variant=name, tool=tool))
+            here = pick(rows, variant=name, tool=tool)
+            part = summary(here)
             means = [number(part[key]) for key in ("error", "inside", "completeness")]
             counts = [f"{part[key]}/{size[name]}" for key in ("right", "leaves")]
-            cells = [*means, *counts, number(part["cpu"], 2), part["failed"]]
+            cells = [*means, *counts, number(part["cpu"], 2), failed(here)]
             lines.append([PEERS[tool].label, PEERS[tool].takes, *cells])
         found.append((name, header, lines))
     return found
 
 
-def summary(rows: list[dict]) -> dict:
-    """Means over the shapes that gave a skeleton, how many of all are right, and which failed."""
-    good = [row for row in rows if "failure" not in row]
-    right = [row for row in good if row["topology"]]
-    failed = ", ".join(f"{row['shape']} ({row['failure']})" for row in rows if "failure" in row)
-    means = {key: mean(row[key] for row in good) for key in ("error", "inside", "completeness", "cpu")}
-    return means | dict(right=len(right), leaves=sum(row["leaves"] == 0 for row in right), failed=failed)
-
-
-def mean(values: Iterable[float]) -> float:
-    """NaN for none."""
-    found = list(values)
-    return fmean(found) if found else float("nan")
+def failed(rows: list[dict]) -> str:
+    """Which failed, and how."""
+    return ", ".join(f"{row['shape']} ({row['failure']})" for row in rows if "failure" in row)
 
 
 def versions(tools: Iterable[str]) -> str:
@@ -189,14 +181,6 @@ def caption(row: dict) -> str:
 # ------------------------------------------------------------------------------------------------------------- command
 
 
-def _page(path: Path | None) -> Path | None:
-    if path is not None:
-        if not path.is_file():
-            raise typer.BadParameter(f"there is no page {path}")
-        fill(path, dict.fromkeys(("builtin", "folder"), ""), check=True)
-    return path
-
-
 app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False)
 
 
@@ -210,7 +194,10 @@ def main(
     limit: Annotated[float, typer.Option("--limit", help="Seconds for a skeleton, imports included.")] = 60.0,
     jobs: Jobs = 2,
     page: Annotated[
-        Path | None, typer.Option("--page", metavar="MD", help="Put the tables into this page.", callback=_page)
+        Path | None,
+        typer.Option(
+            "--page", metavar="MD", help="Put the tables into this page.", callback=page_with("builtin", "folder")
+        ),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="PNG", help="Draw some, side by side.", callback=writable)

@@ -42,6 +42,7 @@ from _common import (
     markdown_table,
     named,
     number,
+    page_with,
     pick,
     run,
     save,
@@ -721,17 +722,6 @@ def _folder(path: Path | None) -> Path | None:
     return path
 
 
-def _page(*parts: str) -> Callable[[Path | None], Path | None]:
-    def checked(path: Path | None) -> Path | None:
-        if path is not None:
-            if not path.is_file():
-                raise typer.BadParameter(f"there is no page {path}")
-            fill(path, dict.fromkeys(parts, ""), check=True)
-        return path
-
-    return checked
-
-
 Sizes = Annotated[str, typer.Option("--sizes", metavar="NUMBERS", help="Points, with commas.")]
 Kind = Annotated[str, typer.Option("--kind", metavar="KIND", help="clean, noise1, ...; see the README.")]
 PublishedTo = Annotated[int, typer.Option("--published-to", help="wen2024 and cao2010 only up to so many points.")]
@@ -808,7 +798,7 @@ def rate(
 def large(
     page: Annotated[
         Path | None,
-        typer.Argument(metavar="PAGE", help="Markdown page to put the table into.", callback=_page("large")),
+        typer.Argument(metavar="PAGE", help="Markdown page to put the table into.", callback=page_with("large")),
     ] = None,
     sizes: Sizes = "65536,1048576",
     shapes: Shapes = "",
@@ -832,7 +822,7 @@ def everything(
     page: Annotated[
         Path | None,
         typer.Argument(
-            metavar="PAGE", help="Markdown page to put the tables into; pictures beside it.", callback=_page(*PARTS)
+            metavar="PAGE", help="Markdown page to put the tables into; pictures beside it.", callback=page_with(*PARTS)
         ),
     ] = None,
     own: Own = False,
@@ -875,7 +865,7 @@ def everything(
 @app.command()
 def redraw(
     page: Annotated[
-        Path, typer.Argument(metavar="PAGE", help="Markdown page with the tables.", callback=_page("stages"))
+        Path, typer.Argument(metavar="PAGE", help="Markdown page with the tables.", callback=page_with("stages"))
     ],
     pictures: Annotated[Path, typer.Argument(metavar="DIR", help="For the pictures.", callback=_folder)],
 ) -> None:

@@ -204,11 +204,8 @@ class RingBuilder(Filter):
         across = normals  # of the planes that the rings lie in
         if self.denoise and noise.any():
             distinct, neighbours, left, nearest = self._denoised(distinct, neighbours.shape[1], noise, weight)
-            normals, noise, stands = (
-                normals[left],
-                noise[left],
-                stands[left],
-            )  # a ridge has none: those of the cloud as it came
+            # a ridge has no normals: those of the cloud as it came
+            normals, noise, stands = normals[left], noise[left], stands[left]
             stray |= (left[nearest] != np.arange(len(nearest)))[row]
             row = nearest[row]
             spread, across = principal(distinct, neighbours)

@@ -99,6 +99,24 @@ def principal(points, neighbours):
     return np.maximum(values.T, 0), normals
 
 
+def fullness(spread, neighbours):
+    """Least over largest principal spread, smoothed by the median: how far the surroundings fill space.
+
+    Parameters
+    ----------
+    spread : (n, 3) float array
+        As from `principal`.
+    neighbours : (n, k) int array
+
+    Returns
+    -------
+    (n,) float array
+        0 on a plane or a line, 1 in a ball.
+    """
+    ratio = spread[:, 0] / np.maximum(spread[:, 2], np.finfo(float).tiny)
+    return row_medians(ratio[neighbours])
+
+
 def uprightness(points, normals, p, q):
     """How upright two normals stand on the line between their points: sin^2 times sin^2 of their angles with it.
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .eigen import main_direction
-from .neighbourhoods import PAIRS, nearest_neighbours, row_medians
+from .neighbourhoods import PAIRS, fullness, nearest_neighbours
 
 NEIGHBOURS = 32  # among which a ridge is sought: more than for rings, a noisy shell is thick
 CLEAN, NOISY = 0.2, 0.35  # scatter of clean neighbourhoods at most, and of nothing but noise
@@ -27,8 +27,7 @@ def noise_share(spread, neighbours):
     -------
     (n,) float array
     """
-    ratio = spread[:, 0] / np.maximum(spread[:, 2], np.finfo(float).tiny)
-    return np.clip((row_medians(ratio[neighbours]) - CLEAN) / (NOISY - CLEAN), 0, 1)
+    return np.clip((fullness(spread, neighbours) - CLEAN) / (NOISY - CLEAN), 0, 1)
 
 
 def to_ridges(points, noise, passes, weight=None):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .groups import group_sum
-from .neighbourhoods import nearest_neighbours, row_medians
+from .neighbourhoods import fullness, nearest_neighbours
 from .ordering import BITS, morton_codes
 
 TAIL = 0.001  # share of the points that may be far off, at either end of each axis
@@ -124,9 +124,8 @@ def thin_smooth(points, neighbours, spread, around):
     (n,) int array
         The point that each was merged into; itself for those that are left.
     """
-    ratio = spread[:, 0] / np.maximum(spread[:, 2], np.finfo(float).tiny)
     needed = np.pi * neighbours.shape[1] / (4 * max(around, 1) ** 2)
-    most = np.minimum(needed / np.maximum(row_medians(ratio[neighbours]), needed / MOST), MOST)
+    most = np.minimum(needed / np.maximum(fullness(spread, neighbours), needed / MOST), MOST)
     return merge_nearest(points, neighbours, most)
 
 
