@@ -9,8 +9,10 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import Contractor, ExplainedScore, LPRReducer, RingBuilder, RingSizeRatio, pipelines, samples
 from glsk_o3d import contractor as module
-from glsk_o3d.contractor import LINE, LINE_NEIGHBOURS, explained_score, linearity
+from glsk_o3d.contractor import LINE, explained_score, linearity
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
+from glsk_o3d.numerics.rings import Rings
 from glsk_o3d.numerics.solver import SolveError
 
 BUILDER = pipelines.cao2010().stages[0]
@@ -444,11 +446,15 @@ def test_reducer_rests_when_few_are_left(built, above):
 # ---- what is a line already
 
 
+def rings_of(neighbours):
+    return Rings.from_padded(np.asarray(neighbours), np.ones(len(neighbours), bool))
+
+
 @pytest.mark.parametrize(
-    ("points", "expected"),
+    ("rim", "expected"),
     [
-        (np.outer(np.arange(LINE_NEIGHBOURS), [1, 2, 3]), 1),
-        (np.stack([np.cos(a := np.arange(LINE_NEIGHBOURS) * 2 * np.pi / LINE_NEIGHBOURS), np.sin(a), 0 * a], 1), 1 / 2),
+        (np.outer(np.arange(-6, 7), [1, 2, 3]), 1),
+        (np.stack([np.cos(a := np.arange(12) * np.pi / 6), np.sin(a), 0 * a], 1), 1 / 2),
         (np.stack([3 * np.cos(a), np.sin(a), 0 * a], 1), 9 / 10),
         (np.concatenate([np.eye(3), -np.eye(3)]), 1 / 3),
         (np.zeros((9, 3)), 0),
@@ -456,20 +462,26 @@ def test_reducer_rests_when_few_are_left(built, above):
     ids=["line", "circle", "ellipse", "ball", "point"],
 )
 @pytest.mark.parametrize("scale", [1e-6, 1, 1e6])
-def test_linearity_of_one_neighbourhood(points, expected, scale):
+def test_linearity_of_one_neighbourhood(rim, expected, scale):
+    """A hub in the middle of its ring, whose points know only the hub: its spread is a multiple of theirs."""
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    hub = np.zeros((1, 3))
+    neighbours = np.full((len(rim) + 1, len(rim)), -1)
+    neighbours[0], neighbours[1:, 0] = np.arange(1, len(rim) + 1), 0
     # the closed form is good to the root of rounding where two spreads are equal
-    np.testing.assert_allclose(linearity(scale * points @ turn), expected, rtol=3e-8)
+    found = linearity(scale * np.concatenate([hub, rim]) @ turn, rings_of(neighbours))
+    np.testing.assert_allclose(found[0], expected, rtol=3e-8)
 
 
 def test_linearity_is_that_of_the_place():
     """A long line and a disc in one cloud."""
     line = np.outer(np.arange(200.0), [0, 0, 1])
     disc = np.stack(np.meshgrid(np.arange(15.0), np.arange(15.0), [-50.0]), -1).reshape(-1, 3)
-    found = linearity(np.concatenate([line, disc]))
-    np.testing.assert_allclose(found[:200], 1, atol=1e-12)
+    points = np.concatenate([line, disc])
+    found = linearity(points, rings_of(nearest_neighbours(points, 9)[1][:, 1:]))
+    np.testing.assert_allclose(found[:200], 1, atol=1e-9)
     inside = ((disc[:, :2] > 3) & (disc[:, :2] < 11)).all(axis=1)
-    assert ((found[200:][inside] > 0.5) & (found[200:][inside] < 0.7)).all()
+    assert ((found[200:][inside] > 0.49) & (found[200:][inside] < 0.6)).all()
     assert (found[200:] < 0.9).all()  # nor is its rim a line
 
 
@@ -491,7 +503,7 @@ def test_no_line_hold_is_as_before(built, monkeypatch):
 def test_lines_are_held_from_the_second_solve_on(built, monkeypatch, hold, floor, cap):
     filter = Contractor(stop=never, max_iterations=1, line_hold=hold, min_attraction=floor, max_attraction=cap)
     share = np.linspace(LINE - 0.3, 1, len(built))
-    monkeypatch.setattr(module, "linearity", lambda points: share[: len(points)])
+    monkeypatch.setattr(module, "linearity", lambda points, rings: share[: len(points)])
     capture = Capture(monkeypatch)
     one = filter(built)
     filter(one)
