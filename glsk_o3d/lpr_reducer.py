@@ -245,10 +245,14 @@ def match(n, keepers, swallowed):
     -------
     (m,) int array
     """
-    free = [True] * n
-    chosen = []
-    for position, (i, m) in enumerate(zip(keepers.tolist(), swallowed.tolist(), strict=True)):
-        if free[i] and free[m]:
-            free[i] = free[m] = False
-            chosen.append(position)
-    return np.array(chosen, int)
+    # Rounds of the pairs that come before all others at both their points. Of nearest neighbours two or three do.
+    pairs = np.stack([keepers, swallowed], axis=1)
+    free, first, left, chosen = np.ones(n, bool), np.empty(n, int), np.arange(len(pairs)), [np.empty(0, int)]
+    while len(left):
+        first[pairs[left[::-1]]] = left[::-1, None]  # of several writes the last one stays: that of the least position
+        ends = pairs[left]
+        wins = (first[ends] == left[:, None]).all(axis=1)
+        chosen.append(left[wins])
+        free[ends[wins]] = False
+        left = left[free[ends].all(axis=1)]
+    return np.sort(np.concatenate(chosen))
