@@ -7,8 +7,7 @@ from scipy.sparse import coo_matrix
 
 from ..numerics.groups import group_median, group_sum
 from ..numerics.solver import factorised
-from ..skeleton import plane_distance_radii
-from .thickness import robust_radii
+from ..numerics.thickness import plane_distance_radii, robust_radii
 
 BENDING = 2.0  # weight of a vertex's distance from the chord of its neighbours, per point
 BLUR = 0.3  # how much more of that where there is doubt, over the squared ratio of noise to spacing

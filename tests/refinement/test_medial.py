@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, samples, skeletonize
+from glsk_o3d.numerics.thickness import plane_distance_radii
 from glsk_o3d.refinement import medial
 from glsk_o3d.refinement.medial import STAY, SUPPORT, fit_axis, incident_edges, nearest_on_edges
-from glsk_o3d.skeleton import plane_distance_radii
 
 R = 0.15  # of the tubes
 TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]

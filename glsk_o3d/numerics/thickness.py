@@ -1,10 +1,42 @@
-"""Local thickness around a fitted axis, also where noise has tilted the normals."""
+"""Local thickness: how far the surface is from a vertex, also where noise has tilted the normals."""
 
 import numpy as np
 
-from ..numerics.groups import group_median, group_sum
+from .groups import group_median, group_sum
 
 ROWS, COLUMNS, TIMES = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2], [1, 1, 1, 2, 2, 2]  # a symmetric matrix's entries
+
+
+def witnesses(vertex_of_point, normals):
+    """Points that have a vertex and a normal, int array."""
+    return np.flatnonzero((vertex_of_point >= 0) & np.isfinite(np.einsum("ni->n", normals)))
+
+
+def plane_distance_radii(vertices, vertex_of_point, points, normals, otherwise=0.0):
+    """Local thickness: median distance from each vertex to the tangent planes of the points it owns.
+
+    On the axis of a tube this is the tube's radius, however far along the axis a point lies from its vertex.
+
+    Parameters
+    ----------
+    vertices : (M, 3) float array
+    vertex_of_point : (N,) int array
+        -1 for points that belong to no vertex.
+    points, normals : (N, 3) float array
+        Points without a normal (NaN) do not count.
+    otherwise : (M,) float array or float
+        Radius of the vertices without points.
+
+    Returns
+    -------
+    (M,) float array
+    """
+    owned = witnesses(vertex_of_point, normals)
+    owner = vertex_of_point[owned]
+    offset = points[owned] - vertices[owner]
+    distance = np.abs(np.einsum("ij,ij->i", offset, normals[owned]))
+    radii = group_median(distance, owner, len(vertices))
+    return np.where(np.bincount(owner, minlength=len(vertices)) > 0, radii, otherwise)
 
 
 def robust_radii(planes, distance, doubt, normals, owner):
