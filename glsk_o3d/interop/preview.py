@@ -214,8 +214,8 @@ def _dot(n: int) -> float:
 def _warned(warnings: Sequence[str], width: float) -> list[str]:
     """The lines that tell the warnings in a figure so many inches wide."""
     letters = max(int((width - 2 * _PAD) / _LETTER), 20)
-    wrap = {"width": letters, "max_lines": _MOST_LINES, "placeholder": " ..."}
-    lines = [line for warning in warnings[:_MOST_WARNINGS] for line in textwrap.wrap(f"warning: {warning}", **wrap)]
+    wrapper = textwrap.TextWrapper(letters, max_lines=_MOST_LINES, placeholder=" ...")
+    lines = [line for warning in warnings[:_MOST_WARNINGS] for line in wrapper.wrap(f"warning: {warning}")]
     more = len(warnings) - _MOST_WARNINGS
     return [*lines, f"and {more} more warning{'s' * (more > 1)}"] if more > 0 else lines
 
