@@ -13,7 +13,8 @@ from .numerics.components import component_labels
 from .numerics.groups import group_median, group_sum
 from .numerics.neighbourhoods import nearest_neighbours, row_medians, uprightness
 from .numerics.sampling import farthest_point_sampling
-from .skeleton import Skeleton, plane_distance_radii
+from .numerics.thickness import plane_distance_radii
+from .skeleton import Skeleton
 
 NOISY = 0.3  # share of noise from which on a vertex may be stray
 FACING = 0.1  # uprightness of two normals below which their surfaces face each other

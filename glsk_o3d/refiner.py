@@ -15,7 +15,6 @@ from .refinement.threads import cut_threads
 from .refinement.triangles import collapse_triangles
 from .refinement.trust import trust_warnings
 from .refinement.twigs import cut_twigs
-from .skeleton import plane_distance_radii
 
 
 @documented
@@ -30,7 +29,7 @@ class Refiner(Filter):
     3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
        corners.
     4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
-       side was scanned, and to the points themselves where noise has spoilt the normals.
+       side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
     5. Loops that hang by a thread, and narrow loops where the points hardly say where the axis is, are cut.
     6. Ends of different parts that point at each other across a gap of the scan are joined.
 
@@ -116,13 +115,10 @@ class Refiner(Filter):
             skeleton = anchor(skeleton)
         if self.spacing:
             skeleton = resample(skeleton, self.spacing)
-        vertices, confidence = fit_axis(skeleton, self.recentre)
+        vertices, confidence, radii = fit_axis(skeleton, self.recentre)
         skeleton = replace(skeleton, vertices=vertices, confidence=confidence)
         if self.weak or self.sure:
             skeleton = cut_threads(skeleton, self.weak, self.sure)
-        radii = plane_distance_radii(
-            skeleton.vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals, skeleton.radii
-        )
         skeleton = replace(skeleton, radii=radii)
         report = skeleton.report
         if self.bridge:

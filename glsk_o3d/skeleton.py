@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .numerics.groups import group_median
+from .numerics.thickness import witnesses
 from .report import Report
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ class Skeleton:
     edges : (E, 2) int64 array
         Pairs i < j, sorted, each once.
     radii : (M,) float64 array
-        Local thickness: the median distance from the vertex to the tangent planes of the points it owns; on the axis of
-        a tube the tube's radius.
+        Local thickness: the median distance from the vertex to the tangent planes of the points it owns, or, where
+        noise has tilted these, from the fitted curve to the points; on the axis of a tube the tube's radius.
     vertex_of_point : (N,) int64 array
         For every input point the vertex it belongs to; -1 only for points that were dropped as not finite.
     points : (N, 3) float64 array
@@ -266,35 +266,3 @@ class Skeleton:
         from .interop.files import save_skeleton
 
         save_skeleton(self, path, **options)
-
-
-def witnesses(vertex_of_point, normals):
-    """Points that have a vertex and a normal, int array."""
-    return np.flatnonzero((vertex_of_point >= 0) & np.isfinite(np.einsum("ni->n", normals)))
-
-
-def plane_distance_radii(vertices, vertex_of_point, points, normals, otherwise=0.0):
-    """Local thickness: median distance from each vertex to the tangent planes of the points it owns.
-
-    On the axis of a tube this is the tube's radius, however far along the axis a point lies from its vertex.
-
-    Parameters
-    ----------
-    vertices : (M, 3) float array
-    vertex_of_point : (N,) int array
-        -1 for points that belong to no vertex.
-    points, normals : (N, 3) float array
-        Points without a normal (NaN) do not count.
-    otherwise : (M,) float array or float
-        Radius of the vertices without points.
-
-    Returns
-    -------
-    (M,) float array
-    """
-    owned = witnesses(vertex_of_point, normals)
-    owner = vertex_of_point[owned]
-    offset = points[owned] - vertices[owner]
-    distance = np.abs(np.einsum("ij,ij->i", offset, normals[owned]))
-    radii = group_median(distance, owner, len(vertices))
-    return np.where(np.bincount(owner, minlength=len(vertices)) > 0, radii, otherwise)

@@ -22,13 +22,32 @@ if TYPE_CHECKING:
 
 AWAY = (1.0, 3.0)  # radii from a junction between which the direction of a branch is taken: nearer, parts blend
 
+MOST_ROWS = 20  # that are printed
+COLUMNS = {  # head: (column, format), of tables that are read by people
+    "": ("branch", "d"),
+    "kind": ("kind", "s"),
+    "parent": ("parent", "d"),
+    "level": ("level", "d"),
+    "axis": ("axis", "d"),
+    "order": ("order", "d"),
+    "length": ("length", ".4g"),
+    "radius": ("mean_radius", ".3g"),
+    "first": ("start_radius", ".3g"),
+    "last": ("end_radius", ".3g"),
+    "bent": ("tortuosity", ".2f"),
+    "angle": ("angle", ".1f"),
+    "points": ("points", "d"),
+    "sure": ("confidence", ".2f"),
+}
+
 
 @dataclass(frozen=True, eq=False)
 class BranchTable:
     """One row per branch: those of `Skeleton.branches` in their order, then the vertices without edges.
 
     Lengths are in the cloud's units. Means are along the curve. NaN where something is unknown or means nothing.
-    Iteration gives a dict of plain numbers and strings per row; the two points become ``start_x`` and so on.
+    Iteration gives a dict of plain numbers and strings per row; the two points become ``start_x`` and so on. ``print``
+    shows the main columns, under the heads of ``glsk branches``.
 
     Attributes
     ----------
@@ -57,6 +76,12 @@ class BranchTable:
         Points of the skeleton's cloud that belong to the branch; see `segment`.
     confidence : (B,) float array
         Mean confidence.
+    axis : (B,) int array
+        The first row of the axis that a branch is part of. Where branches part, the one with the largest mean radius
+        times cos(`angle`) continues the axis of its parent, unless it turns back; each other one begins an axis.
+    order : (B,) int array
+        Centrifugal (Gravelius) order: 0 for axes at the root, and one more for each axis that grows from another.
+        Unlike `level` it is the same all along a stem.
 
     Examples
     --------
@@ -85,6 +110,8 @@ class BranchTable:
     mean_torsion: np.ndarray
     points: np.ndarray
     confidence: np.ndarray
+    axis: np.ndarray
+    order: np.ndarray
 
     def __len__(self):
         return len(self.kind)
@@ -103,6 +130,21 @@ class BranchTable:
 
     def __repr__(self):
         return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
+
+    def __str__(self):
+        rows = [[*COLUMNS], *([cell(row, head) for head in COLUMNS] for row in self)]
+        if len(rows) > MOST_ROWS + 1:
+            rows[MOST_ROWS - 4 : -4] = [["..."] + [""] * (len(COLUMNS) - 1)]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        texts = {head for head, (_, form) in COLUMNS.items() if form == "s"}
+        lines = (
+            "  ".join(
+                word.ljust(width) if head in texts else word.rjust(width)
+                for word, width, head in zip(row, widths, COLUMNS, strict=True)
+            )
+            for row in rows
+        )
+        return "\n".join([f"{self!r}: lengths in the cloud's units, angles in degrees", *map(str.rstrip, lines)])
 
     def to_csv(self, path: str | os.PathLike) -> None:
         """Write the table as CSV: a line of names, then a line per branch.
@@ -129,6 +171,26 @@ class BranchTable:
                     out.writerow("" if isinstance(v, float) and not math.isfinite(v) else v for v in row.values())
 
         write_atomically(path, write)
+
+
+def cell(row: dict[str, Any], head: str) -> str:
+    """A number of a row as it is read under a head of `COLUMNS`; a dash for what is unknown.
+
+    Parameters
+    ----------
+    row : dict
+        As iteration over a `BranchTable` gives it.
+    head : str
+
+    Returns
+    -------
+    str
+    """
+    name, form = COLUMNS[head]
+    value = row[name]
+    if (name == "parent" and value < 0) or (isinstance(value, float) and math.isnan(value)):
+        return "-"
+    return format(value, form)
 
 
 @np.errstate(all="ignore")  # a file may hold coordinates whose squares no float64 holds
@@ -181,6 +243,11 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         tortuosity = length / np.linalg.norm(last - first, axis=1)
     curvature, torsion = curvature_torsion(skeleton)
     label = branch_of_point(skeleton, skeleton.points, skeleton.vertex_of_point)
+    angle, mean_radius = (
+        np.array([_angle(skeleton, outward, i, parent[i]) for i in range(len(paths))]),
+        mean(skeleton.radii),
+    )
+    axis, order = _axes(parent, level, start, angle, np.where(np.isnan(mean_radius), 1, mean_radius))
     return BranchTable(
         kind=_kinds(skeleton, paths),
         component=skeleton.component_of_vertex[start],
@@ -192,14 +259,16 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         end_point=last,
         length=length,
         tortuosity=tortuosity,
-        mean_radius=mean(skeleton.radii),
+        mean_radius=mean_radius,
         start_radius=skeleton.radii[start],
         end_radius=skeleton.radii[end],
-        angle=np.array([_angle(skeleton, outward, i, parent[i]) for i in range(len(paths))]),
+        angle=angle,
         mean_curvature=mean(curvature),
         mean_torsion=mean(torsion),
         points=np.bincount(label[label >= 0], minlength=len(paths)),
         confidence=mean(skeleton.confidence),
+        axis=axis,
+        order=order,
     )
 
 
@@ -262,6 +331,22 @@ def _grow(skeleton, paths, length, section, chosen):
                 backwards[row] = ends[row][0] != vertex
                 heapq.heappush(queue, (distance + length[row], ends[row][0 if backwards[row] else 1], row))
     return parent, level, backwards
+
+
+def _axes(parent, level, start, angle, radius):
+    """First row of every row's axis, and the axes before it: of those that begin in one place, one goes straight on."""
+    onward = np.nan_to_num(radius * np.cos(np.radians(angle)))
+    straightest: dict[tuple[int, int], int] = {}
+    for row in np.lexsort((-np.arange(len(onward)), onward)).tolist():  # the last one stays
+        if onward[row] > 0:
+            straightest[int(parent[row]), int(start[row])] = row
+    axis, order = np.arange(len(parent)), np.zeros(len(parent), int)
+    for row in np.argsort(level, kind="stable").tolist():
+        before = parent[row]
+        if before >= 0:
+            same = straightest.get((int(before), int(start[row]))) == row
+            axis[row], order[row] = (axis[before], order[before]) if same else (row, order[before] + 1)
+    return axis, order
 
 
 def _kinds(skeleton, paths):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,21 +13,6 @@ from .options import Json, Quiet, Verbose
 
 if TYPE_CHECKING:
     from ..analysis import BranchTable
-
-_COLUMNS = {  # head: (column of the table, format)
-    "": ("branch", "d"),
-    "kind": ("kind", "s"),
-    "parent": ("parent", "d"),
-    "level": ("level", "d"),
-    "length": ("length", ".4g"),
-    "radius": ("mean_radius", ".3g"),
-    "first": ("start_radius", ".3g"),
-    "last": ("end_radius", ".3g"),
-    "bent": ("tortuosity", ".2f"),
-    "angle": ("angle", ".1f"),
-    "points": ("points", "d"),
-    "sure": ("confidence", ".2f"),
-}
 
 
 def branches(
@@ -55,7 +39,8 @@ def branches(
     """Measure every branch of a skeleton.
 
     Lengths are in the units of the file. 'first' and 'last' are the radii at the ends, from the root on; 'bent' is the
-    length over the distance of the ends, 'angle' in degrees to the parent, 'sure' the mean confidence.
+    length over the distance of the ends, 'angle' in degrees to the parent, 'sure' the mean confidence. Branches that
+    continue each other have the same 'axis' and 'order'; 'level' counts the branches from the root.
     """
     with reporting(quiet=quiet, verbose=verbose):
         from ..errors import FileFormatError
@@ -96,15 +81,11 @@ def _print(table: BranchTable) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
+    from ..analysis.branches import COLUMNS, cell
+
     shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
-    for head, (_, form) in _COLUMNS.items():
+    for head, (_, form) in COLUMNS.items():
         shown.add_column(head, justify="left" if form == "s" else "right")
     for row in table:
-        shown.add_row(*(_cell(row[name], form, name) for name, form in _COLUMNS.values()))
+        shown.add_row(*(cell(row, head) for head in COLUMNS))
     print_table(shown, whole=True)
-
-
-def _cell(value, form: str, name: str) -> str:
-    if (name == "parent" and value < 0) or (isinstance(value, float) and math.isnan(value)):
-        return "-"
-    return format(value, form)

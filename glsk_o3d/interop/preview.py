@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import textwrap
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
 MOST_POINTS = 20_000
 DPI = 150
 _VIEWS, _PAD = ((0, 1), (0, 2), (1, 2)), 0.3  # inches between them at least
-INK, _RED, _PAPER = "#333333", "#d0121f", "white"
+INK, _RED, _AMBER, _PAPER = "#333333", "#d0121f", "#a05000", "white"
+_LINE, _LETTER, _MOST_LINES, _MOST_WARNINGS = 0.16, 0.066, 2, 2  # inches; lines of each warning, warnings
 _FAR, _NEAR = np.array([0.90] * 3), np.array([0.68] * 3)
 
 
@@ -27,7 +29,8 @@ def save_preview(
     """Draw a skeleton and its cloud from three sides into a PNG file.
 
     The three views look along the coordinate axes, all at one scale: x across and y up, x across and z up, y across and
-    z up. The cloud is grey, lighter where it is farther; edges are red, junctions dark dots, leaves open ones.
+    z up. The cloud is grey, lighter where it is farther; edges are red, junctions dark dots, leaves open ones. Below
+    are the counts and what the run warned of: the first two warnings, long ones shortened.
 
     Parameters
     ----------
@@ -62,10 +65,10 @@ def save_preview(
     True
     """
     check_ending(path, "preview is a picture", ".png")
-    save_figure(draw(skeleton, size, title), path)
+    save_figure(draw(skeleton, size, title, warnings=skeleton.report.warnings), path)
 
 
-def draw(skeleton: Skeleton, size, title, caption=True):
+def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] = ()):
     """The figure, on a canvas of its own: pyplot and its global state stay out of it."""
     require("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -79,7 +82,10 @@ def draw(skeleton: Skeleton, size, title, caption=True):
     cloud = cloud[:: max(1, -(-len(cloud) // MOST_POINTS))]
     centre, extent = room(np.concatenate([cloud, skeleton.vertices]))
     cloud, vertices = cloud - centre, skeleton.vertices - centre
-    for a, b, axes in three_views(figure, extent, head=0.55 if title else 0.25, foot=0.6, names=0.36):
+    warned = _warned(warnings, width)[: int(height / 3 / _LINE)]
+    below = _LINE * len(warned)
+    views = three_views(figure, extent, head=0.55 if title else 0.25, foot=0.6 + below, names=0.36 + below)
+    for a, b, axes in views:
         style = {"linewidths": 0, "clip_on": False}
         depth, toward = cloud[:, 3 - a - b], 1 if (a, b) != (0, 2) else -1  # x, y, z are right-handed
         order = np.argsort(toward * depth, kind="stable")
@@ -95,7 +101,10 @@ def draw(skeleton: Skeleton, size, title, caption=True):
             spots = {"s": area, "facecolors": face, "edgecolors": _RED if face == _PAPER else face, "linewidths": 0.9}
             axes.scatter(*vertices[chosen][:, [a, b]].T, zorder=3, clip_on=False, **spots)
     if caption:
-        figure.text(0.5, 0.12 / height, _caption(skeleton), ha="center", color=INK, fontsize=8)
+        figure.text(0.5, (0.12 + below) / height, _caption(skeleton), ha="center", color=INK, fontsize=8)
+    for row, line in enumerate(reversed(warned)):
+        place = (0.1 + row * _LINE) / height
+        figure.text(0.5, place, printable(line), ha="center", color=_AMBER, fontsize=8, parse_math=False)
     if title:
         figure.text(0.5, 1 - 0.33 / height, printable(title), ha="center", color=INK, fontsize=12, parse_math=False)
     return figure
@@ -200,6 +209,15 @@ def printable(text: object) -> str:
 def _dot(n: int) -> float:
     """Area of a dot of the cloud, in square points."""
     return float(np.clip(4500 / max(n, 1), 0.8, 3))
+
+
+def _warned(warnings: Sequence[str], width: float) -> list[str]:
+    """The lines that tell the warnings in a figure so many inches wide."""
+    letters = max(int((width - 2 * _PAD) / _LETTER), 20)
+    wrapper = textwrap.TextWrapper(letters, max_lines=_MOST_LINES, placeholder=" ...")
+    lines = [line for warning in warnings[:_MOST_WARNINGS] for line in wrapper.wrap(f"warning: {warning}")]
+    more = len(warnings) - _MOST_WARNINGS
+    return [*lines, f"and {more} more warning{'s' * (more > 1)}"] if more > 0 else lines
 
 
 def _caption(skeleton: Skeleton) -> str:

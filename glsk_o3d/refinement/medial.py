@@ -7,6 +7,7 @@ from scipy.sparse import coo_matrix
 
 from ..numerics.groups import group_median, group_sum
 from ..numerics.solver import factorised
+from ..numerics.thickness import plane_distance_radii, robust_radii
 
 BENDING = 2.0  # weight of a vertex's distance from the chord of its neighbours, per point
 BLUR = 0.3  # how much more of that where there is doubt, over the squared ratio of noise to spacing
@@ -22,7 +23,7 @@ ENTRIES = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # the upper triangle of a symmetric matri
 
 
 def fit_axis(skeleton, passes):
-    r"""Vertices moved to the axis of the surface, and how well the points around say where that is.
+    r"""Vertices moved to the axis of the surface, how well the points around say where that is, and how far it is.
 
     The plane through a point p of a tube, spanned by its normal n and the tangent t of the axis, contains the axis:
     b (x(p) - p) = 0 with b = n x t and x(p) the place of the curve nearest to p. Each pass minimises, over all vertices
@@ -51,12 +52,14 @@ def fit_axis(skeleton, passes):
     confidence : (M,) float array
         (1 - d) c / (c + SUPPORT) with c over the vertex and its neighbours: near 1 on the axis of a tube, near 0 where
         the normals have no axis in common or points are few.
+    radii : (M,) float array
+        See `robust_radii`; without passes, `plane_distance_radii`.
     """
     m, ends = len(skeleton.vertices), skeleton.edges
     owned = skeleton.witnesses
     owned = owned[skeleton.degree[skeleton.vertex_of_point[owned]] > 0]
     if len(owned) == 0:
-        return skeleton.vertices, np.zeros(m)
+        return skeleton.vertices, np.zeros(m), _plane_radii(skeleton, skeleton.vertices)
     centre = skeleton.vertices.mean(axis=0)
     x, p, n = skeleton.vertices - centre, skeleton.points[owned] - centre, skeleton.normals[owned]
     edges_at = incident_edges(ends, m)
@@ -76,7 +79,15 @@ def fit_axis(skeleton, passes):
         run = np.where((size > far) & (skeleton.degree > 0), far / np.maximum(size, TINY), 1)
         x = run[:, None] * x  # normals that mean nothing may meet anywhere
     near = _nearest(x, ends, around, p, n)
-    return x + centre, (1 - near.doubt) * near.support / (near.support + SUPPORT)
+    radii = _plane_radii(skeleton, x + centre)
+    if passes:  # the distance from a curve that nobody has centred is no radius
+        distance = np.linalg.norm(near.offset, axis=1)
+        radii = robust_radii(radii, distance, near.doubt, n, skeleton.vertex_of_point[owned])
+    return x + centre, (1 - near.doubt) * near.support / (near.support + SUPPORT), radii
+
+
+def _plane_radii(skeleton, vertices):
+    return plane_distance_radii(vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals, skeleton.radii)
 
 
 def incident_edges(edges, m):

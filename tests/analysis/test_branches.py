@@ -8,6 +8,7 @@ import open3d as o3d
 import pytest
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, samples, skeletonize
+from glsk_o3d.analysis.branches import COLUMNS
 from glsk_o3d.analysis.segmentation import branch_of_edge, vertex_of_cloud
 
 RNG = np.random.default_rng(0)
@@ -166,6 +167,83 @@ def test_the_parent_lies_on_the_shortest_way_from_the_root():
     assert table.parent[row[frozenset((2, 5))]] == row[frozenset((1, 2))]
     assert table.parent[row[frozenset((2, 3))]] == row[frozenset((1, 3))]
     assert (table.start[row[frozenset((2, 3))]], table.end[row[frozenset((2, 3))]]) == (3, 2)
+
+
+def test_the_straighter_branch_continues_the_axis():
+    """At every fork of the tree the one at 30 degrees; the other one, at 50, begins an axis of the next order."""
+    table = TREE.branch_table()
+    np.testing.assert_array_equal(np.bincount(table.order), [4, 6, 4, 1])
+    straight = np.isclose(table.angle, ANGLES[0])
+    child = np.flatnonzero(table.parent >= 0)
+    before = table.parent[child]
+    np.testing.assert_array_equal(table.axis[child], np.where(straight[child], table.axis[before], child))
+    np.testing.assert_array_equal(table.order[child], table.order[before] + ~straight[child])
+    np.testing.assert_array_equal(table.order, table.order[table.axis])
+    stem = np.flatnonzero(table.order == 0)
+    np.testing.assert_allclose(np.sort(table.length[stem]), SHARE ** np.arange(3, -1, -1.0))
+
+
+def feathered(angle, thin):
+    """A bent stem along z with a straight leaf at each of five nodes, and the rows of the table that are stem."""
+    nodes = [[0.1 * np.sin(i), 0, i] for i in range(7)]
+    edges, radii = [(i, i + 1) for i in range(6)], [0.1] * 7
+    for i in range(1, 6):
+        nodes.append(np.add(nodes[i], 0.8 * np.array([np.sin(angle) * (-1) ** i, 0, np.cos(angle)])))
+        edges.append((i, len(nodes) - 1))
+        radii.append(thin)
+    return Skeleton(nodes, edges, radii, (), (), ())
+
+
+@pytest.mark.parametrize(("angle", "thin"), [(0.9, 0.05), (1.5, 0.3), (2.5, 0.9)])
+def test_a_stem_has_one_order(angle, thin):
+    """Also where leaves are thicker, if they leave it sideways."""
+    table = feathered(angle, thin).branch_table(root=0)
+    assert table.level.max() == 5
+    stem = np.abs(table.end_point[:, 2] - table.start_point[:, 2] - 1) < 1e-9
+    assert stem.sum() == 6
+    np.testing.assert_array_equal(table.order, np.where(stem, 0, 1))
+    assert set(table.axis[stem].tolist()) == {int(np.flatnonzero(table.level == 0)[0])}
+    assert table.axis[~stem].tolist() == np.flatnonzero(~stem).tolist()
+
+
+def test_without_radii_the_direction_alone_decides():
+    leafy = feathered(0.9, 0.05)
+    bare = Skeleton(leafy.vertices, leafy.edges, np.full(len(leafy.vertices), np.nan), (), (), ())
+    np.testing.assert_array_equal(bare.branch_table(0).order, leafy.branch_table(0).order)
+
+
+def test_nothing_continues_what_turns_back_or_is_closed():
+    hook = Skeleton([[0, 0, 0], [1, 0, 0], [0, 0.5, 0], [0, -0.5, 0]], [(0, 1), (1, 2), (1, 3)], [0.1] * 4, (), (), ())
+    assert hook.branch_table(0).order.tolist() == [0, 1, 1]
+    loop = closed_branch_on_a_stick().branch_table(13)
+    assert sorted(loop.order.tolist()) == [0, 1]
+
+
+def test_a_torso_goes_on_at_both_ends():
+    table = axis_of(samples.sauropod(1000)).branch_table()
+    (body,) = np.flatnonzero(table.level == 0)
+    main = table.order == 0
+    assert main.sum() == 5
+    assert set(table.axis[main].tolist()) == {int(body)}
+    ends = table.end_point[main & (table.kind == "tip")]
+    assert sorted(np.sign(ends[:, 0])) == [-1, 1]  # tail and neck; legs, and the handle, are lateral
+    assert np.abs(ends[:, 0]).min() > 0.5
+
+
+def test_print():
+    lines = str(TREE.branch_table()).splitlines()
+    assert lines[0].startswith("BranchTable(15 branches, 4 levels): lengths in")
+    assert lines[1].split() == list(filter(None, COLUMNS))
+    assert len(lines) == 17
+    words = lines[2].split()
+    table = TREE.branch_table()
+    assert words[:7] == ["0", table.kind[0], "-", "0", "0", "0", f"{table.length[0]:.4g}"]
+    assert len({len(line) for line in lines[1:]}) == 1
+    long = str(grow(5).branch_table()).splitlines()
+    assert len(long) == 22
+    assert long[17] == "..."
+    assert [line.split()[0] for line in long[2:17] + long[18:]] == [*map(str, range(15)), "59", "60", "61", "62"]
+    assert repr(table) == "BranchTable(15 branches, 4 levels)"
 
 
 def test_sauropod():

@@ -25,10 +25,10 @@ def test_table_file_and_json_agree(invoke, tmp_path, y):
     with (tmp_path / "y.csv").open(newline="") as stream:
         assert [row["kind"] for row in csv.DictReader(stream)] == [row["kind"] for row in rows]
     told = [line.split() for line in lines if line.strip()[:1].isdigit()]
-    assert [words[:5] for words in told] == [
-        ["0", "tip", "-", "0", "0.5"],
-        ["1", "tip", "0", "1", "0.5"],
-        ["2", "tip", "0", "1", "0.5"],
+    assert [words[:7] for words in told] == [
+        ["0", "tip", "-", "0", "0", "0", "0.5"],
+        ["1", "tip", "0", "1", "0", "0", "0.5"],
+        ["2", "tip", "0", "1", "2", "1", "0.5"],
     ]
     assert [words[-3] for words in told] == ["-", "40.0", "40.0"]
     facts = json.loads(invoke("branches", y, "--json").stdout)

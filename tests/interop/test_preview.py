@@ -1,4 +1,5 @@
 import dataclasses
+import re
 import sys
 
 import numpy as np
@@ -101,3 +102,32 @@ def test_without_matplotlib(tree, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingPackageError, match='pip install "matplotlib"'):
         save_preview(tree, tmp_path / "p.png")
+
+
+LONG = "weakly supported: around 31% of the points " + "they do not agree on an axis, " * 20
+
+
+@pytest.mark.parametrize("size", [(1800, 760), (900, 400)])
+@pytest.mark.parametrize(
+    ("warnings", "told"),
+    [
+        (("sheet-like: costs $5 and $6",), r"warning: sheet-like: costs \$5 and \$6"),
+        ((LONG, "second"), r"warning: weakly .* \.\.\. warning: second"),
+        (("one", "two", "three", "four"), "warning: one warning: two and 2 more warnings"),
+        ((), ""),
+    ],
+)
+def test_warnings_are_told_below_and_nothing_overlaps(tree, tmp_path, size, warnings, told):
+    warned = dataclasses.replace(tree, report=dataclasses.replace(tree.report, warnings=warnings))
+    figure = preview.draw(warned, size, None, warnings=warnings)
+    figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in figure.texts]
+    assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0 for box in boxes)
+    boxes += [axes.get_window_extent() for axes in figure.axes]
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    lines = [text.get_text() for text in reversed(figure.texts) if text.get_color() == preview._AMBER]
+    assert re.fullmatch(told, " ".join(lines))
+    assert len(lines) <= 5
+    save_preview(warned, tmp_path / "p.png", size=size)
+    image = imread(tmp_path / "p.png")[-preview.DPI // 4 :]
+    assert (image[..., 0] - image[..., 2] > 0.4).any() == bool(warnings)

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from glsk_o3d import Skeleton
+from glsk_o3d import Skeleton, samples, skeletonize
+from glsk_o3d.numerics.thickness import plane_distance_radii
 from glsk_o3d.refinement import medial
 from glsk_o3d.refinement.medial import STAY, SUPPORT, fit_axis, incident_edges, nearest_on_edges
 
@@ -114,7 +115,7 @@ def test_a_curve_comes_to_the_axis_of_an_arc_outside_its_points(degrees, turn):
 
 def test_a_polygon_comes_to_the_centre_circle_of_a_torus():
     skeleton = torus()
-    moved, confidence = fit_axis(skeleton, 6)
+    moved, confidence, _ = fit_axis(skeleton, 6)
     sagitta = 0.4 * (1 - np.cos(np.pi / 48))  # of a chord: the circle is between corners and middles
     assert np.abs(np.hypot(moved[:, 0], moved[:, 1]) - 0.4).max() < sagitta
     assert np.abs(moved[:, 2]).max() < 1e-4
@@ -286,7 +287,7 @@ def test_goes_with_the_cloud(shape, passes, turn, scale, shift):
         raw, vertices=scale * raw.vertices @ turn + shift, points=scale * raw.points @ turn + shift,
         normals=raw.normals @ turn,
     )  # fmt: skip
-    (vertices, confidence), (expected, sure) = fit_axis(moved, passes), fit_axis(raw, passes)
+    (vertices, confidence, _), (expected, sure, _) = fit_axis(moved, passes), fit_axis(raw, passes)
     np.testing.assert_allclose((vertices - shift) / scale, expected @ turn, atol=1e-8)
     np.testing.assert_allclose(confidence, sure, atol=1e-7)
 
@@ -308,14 +309,14 @@ def test_numbers_of_the_vertices_hardly_matter():
     renamed = replace(
         raw, vertices=raw.vertices[np.argsort(name)], edges=edges, vertex_of_point=name[raw.vertex_of_point]
     )
-    (vertices, confidence), (expected, sure) = fit_axis(renamed, 3), fit_axis(raw, 3)
+    (vertices, confidence, _), (expected, sure, _) = fit_axis(renamed, 3), fit_axis(raw, 3)
     np.testing.assert_allclose(vertices[name], expected, atol=0.01 * R)
     np.testing.assert_allclose(confidence[name], sure, atol=0.01)
 
 
 def test_no_passes_leave_the_vertices():
     skeleton = bent()
-    vertices, confidence = fit_axis(skeleton, 0)
+    vertices, confidence, _ = fit_axis(skeleton, 0)
     np.testing.assert_allclose(vertices, skeleton.vertices, atol=1e-15)
     assert confidence.shape == (30,)
     assert (confidence > 0.5).all()
@@ -331,7 +332,7 @@ def test_a_vertex_without_edges_stays_and_has_no_confidence(place, own):
         np.concatenate([raw.vertices, [place]]), raw.edges, np.full(21, R),
         np.concatenate([raw.vertex_of_point, [20] * own]), points, np.concatenate([normals, np.eye(3)[:own]]),
     )  # fmt: skip
-    vertices, confidence = fit_axis(lonely, 2)
+    vertices, confidence, _ = fit_axis(lonely, 2)
     np.testing.assert_allclose(vertices[20], place, atol=1e-12)
     assert confidence[20] == 0
     np.testing.assert_allclose(vertices[:20], fit_axis(raw, 2)[0], atol=1e-3 * R)
@@ -360,7 +361,7 @@ def test_without_any_say_vertices_stay_and_there_is_no_confidence(passes):
         replace(raw, points=(), normals=(), vertex_of_point=()),
         replace(raw, edges=()),
     ):
-        vertices, confidence = fit_axis(skeleton, passes)
+        vertices, confidence, _ = fit_axis(skeleton, passes)
         np.testing.assert_array_equal(vertices, raw.vertices)
         np.testing.assert_array_equal(confidence, np.zeros(30))
 
@@ -370,7 +371,7 @@ def test_vertices_between_points_bridge_them():
     raw = tube((0, 0.05), m=39)
     seen = np.abs(raw.points[:, 0]) > 0.3
     gap = replace(raw, points=raw.points[seen], normals=raw.normals[seen], vertex_of_point=raw.vertex_of_point[seen])
-    vertices, confidence = fit_axis(gap, 30)
+    vertices, confidence, _ = fit_axis(gap, 30)
     assert off_axis(vertices).max() < 0.02 * R
     middle = np.abs(raw.vertices[:, 0]) < 0.2
     assert (confidence[middle] == 0).all()
@@ -386,7 +387,7 @@ def test_is_finite_and_in_bounds_whatever_the_graph(random_skeleton, seed, m, re
         vertices[m // 2 :] = vertices[m // 2]
         points[::3] = vertices[0]
         raw = replace(raw, vertices=vertices, points=points)
-    vertices, confidence = fit_axis(raw, passes)
+    vertices, confidence, _ = fit_axis(raw, passes)
     assert np.isfinite(vertices).all()
     assert vertices.shape == (m, 3)
     assert ((confidence >= 0) & (confidence < 1)).all()
@@ -400,7 +401,7 @@ def test_all_in_one_place():
     flat = Skeleton(
         np.ones((3, 3)), [(0, 1), (1, 2)], np.ones(3), [0, 1, 2, 2], np.ones((4, 3)), np.eye(3)[[0, 1, 2, 0]]
     )
-    vertices, confidence = fit_axis(flat, 3)
+    vertices, confidence, _ = fit_axis(flat, 3)
     np.testing.assert_allclose(vertices, 1, atol=1e-12)
     np.testing.assert_array_equal(confidence, 0)
 
@@ -467,3 +468,72 @@ def test_nearest_on_edges_takes_the_first_of_equally_near():
         edge, t = nearest_on_edges(x, edges, np.tile(row, (200, 1)), p)
         assert set(edge.tolist()) == {row[0]}
         assert not t.any()
+
+
+# ---- radii
+
+
+def radii_and_planes(skeleton):
+    vertices, _, radii = fit_axis(skeleton, 1)
+    return radii, plane_distance_radii(
+        vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals, skeleton.radii
+    )
+
+
+@pytest.mark.parametrize("arc", [2 * np.pi, np.pi])
+def test_radii_of_exact_tubes_are_theirs(arc):
+    radii, planes = radii_and_planes(tube(arc=arc))
+    np.testing.assert_allclose(radii, R, rtol=1e-9)
+    np.testing.assert_allclose(planes, R, rtol=1e-9)
+
+
+def test_radii_of_a_cone_are_those_of_the_balls_in_it():
+    """The distance of its points is more."""
+    skeleton, slope = tube(), 0.1
+    normals = np.sqrt(1 - slope**2) * skeleton.normals - slope * np.array([1.0, 0, 0])
+    x = skeleton.points[:, :1]
+    cone = path(skeleton.vertices, x * [1, 0, 0] + (R + slope * x) * normals, normals)
+    radii = fit_axis(cone, 1)[2]
+    np.testing.assert_allclose(radii, R + slope * cone.vertices[:, 0], rtol=1e-3)
+    away = np.hypot(*cone.points[:, 1:].T) / (R + slope * cone.points[:, 0])
+    assert away.min() > 1.004
+
+
+def test_tilted_normals_do_not_make_a_tube_thinner():
+    """Normals that point anywhere across the axis: their planes pass at R |cos|, whose median is R / sqrt(2)."""
+    skeleton = tube()
+    angle = np.random.default_rng(0).uniform(0, 2 * np.pi, len(skeleton.points))
+    normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
+    radii, planes = radii_and_planes(replace(skeleton, normals=normals))
+    np.testing.assert_allclose(np.median(planes), R / np.sqrt(2), rtol=0.05)
+    assert np.median(radii) > 0.9 * R
+    assert radii.max() < 1.02 * R
+
+
+def test_a_flat_part_is_as_thick_as_before():
+    """Two faces of a board, 8 times as wide as thick: the points are far from its middle line, their planes are not."""
+    x, y, side = (part.ravel() for part in np.meshgrid(np.linspace(-1, 1, 120), np.linspace(-0.4, 0.4, 21), [-1, 1]))
+    flat = path(tube().vertices, np.column_stack([x, y, 0.05 * side]), np.outer(side, [0.0, 0, 1]))
+    radii, _ = radii_and_planes(flat)
+    np.testing.assert_allclose(radii, 0.05, rtol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_radii_of_a_noisy_fork(seed):
+    """Three tubes as thick as each other that meet."""
+    sample = samples.y_junction(4096, radii=(0.04, 0.04, 0.04), noise=0.01, seed=seed)
+    fork = skeletonize(sample.points)
+    planes = plane_distance_radii(fork.vertices, fork.vertex_of_point, fork.points, fork.normals)
+    near = np.linalg.norm(fork.vertices, axis=1) < 0.08
+    off, before = (np.abs(values / 0.04 - 1) for values in (fork.radii, planes))
+    assert near.sum() > 5
+    assert off[near].mean() < 0.75 * before[near].mean()
+    assert off.mean() < 0.75 * before.mean()
+    assert off.mean() < 0.1
+
+
+def test_a_curve_that_nobody_centred_has_the_distances_to_the_planes():
+    skeleton = bent()
+    _, _, radii = fit_axis(skeleton, 0)
+    expected = plane_distance_radii(skeleton.vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals)
+    np.testing.assert_allclose(radii, expected, rtol=1e-12)
