@@ -36,8 +36,10 @@ def close_loops(skeleton, opening):
         Without triangles.
     """
     while True:
-        thickness = surface_distance(skeleton)
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+        if not cycles:
+            return skeleton
+        thickness = surface_distance(skeleton)
         false = [
             cycle
             for cycle in cycles
