@@ -56,7 +56,8 @@ class Step:
             raise
         except GlskError as error:
             place = f"{self.place}: " if self.place else ""
-            raise ScriptError(f"{place}filter {self.call.name!r}: {error}") from error
+            said = str(error).replace("RingBuilder(drop_invalid=True)", "its parameter ringbuilder_drop_invalid")
+            raise ScriptError(f"{place}filter {self.call.name!r}: {said}") from error
 
 
 def step(verb: Verb, values: Mapping[str, Any]) -> Step:
