@@ -95,8 +95,8 @@ def crosscheck(
                 typer.echo(f"wrote {path}")
         if check.verdict == UNTOLD:
             raise InvalidCloudError(
-                f"the check says nothing about the skeleton: {check.reasons[0]}; give a mesh of its surface with --mesh"
-                + ", or another --method" * (mesh is None)
+                f"the check says nothing about the skeleton: {check.reasons[0]}; give "
+                + ("another mesh" if mesh else "a mesh of its surface with --mesh, or another --method")
             )
 
 

@@ -159,3 +159,13 @@ def test_the_scan_may_be_a_mesh_too(invoke, meshes):
     )  # its own triangles
     assert told["rows"]["one_to_one"]
     assert np.isclose(told["rows"]["angle"]["median"], 0, atol=1)
+
+
+def test_a_users_mesh_at_fault(invoke, scans, check, tmp_path):
+    faces = o3d.utility.Vector3iVector(check.faces[np.abs(check.vertices[check.faces[:, 0], 0]) > 0.2])
+    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(check.vertices), faces)
+    o3d.io.write_triangle_mesh(str(tmp_path / "half.ply"), mesh)
+    result = invoke("crosscheck", scans / "ring.ply", "--mesh", "half.ply")
+    assert result.exit_code == 1
+    assert "ring.ply: cannot tell" in result.stdout
+    assert result.stderr.rstrip().endswith("; give another mesh")
