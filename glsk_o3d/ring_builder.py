@@ -314,7 +314,7 @@ class RingBuilder(Filter):
         if dropped and not self.drop_invalid:
             raise InvalidCloudError(
                 f"{dropped} of {len(points)} points have NaN or infinite coordinates, the first at index "
-                f"{int(np.argmin(finite))}: remove them, or let RingBuilder(drop_invalid=True) drop them"
+                f"{int(np.argmin(finite))}: drop them with RingBuilder(drop_invalid=True), or remove them first"
             )
         return finite
 

@@ -68,6 +68,7 @@ def prepared(tmp_path_factory):
     (folder / "list.txt").write_text("scan.ply\n")
     np.savez(folder / "axis.npz", nodes=shape.nodes, edges=shape.edges, radii=shape.radii)
     cloud.estimate_normals()
+    cloud.orient_normals_consistent_tangent_plane(10)
     balls = o3d.utility.DoubleVector([0.05, 0.1, 0.2])
     mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, balls)
     assert o3d.io.write_triangle_mesh(str(folder / "scan_mesh.ply"), mesh)

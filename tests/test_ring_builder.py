@@ -157,7 +157,10 @@ def test_duplicates_are_one_point():
 def test_invalid_points_are_counted_and_dropped_only_when_asked():
     points = TORUS.copy()
     points[[5, 70, 599]] = [[np.nan, 0, 0], [0, np.inf, 0], [0, 0, -np.inf]]
-    with pytest.raises(InvalidCloudError, match=r"^3 of 600 points .*at index 5.*drop_invalid=True"):
+    with pytest.raises(
+        InvalidCloudError,
+        match=r"^3 of 600 points .*at index 5: drop them with RingBuilder.drop_invalid=True., or remove them first$",
+    ):
         RingBuilder()(points)
     state = RingBuilder(drop_invalid=True)(points)
     assert (state.report.n_input, state.report.n_dropped, state.report.n_distinct) == (600, 3, 597)

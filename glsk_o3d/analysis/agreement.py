@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..interop.open3d import require
+from ..numerics.components import component_labels
 from ..numerics.cotangent import cotangent_laplacian
-from ..numerics.meshes import common_share, umbrellas
+from ..numerics.meshes import border_lengths, common_share, umbrellas
 from .curves import distances
 from .mesh_contraction import curvature_normals, mesh_areas, mesh_laplacian, ring_areas
 from .reconstruction import REACH, spacing
 
 FLAT = 1e-3  # of the ring's size: smaller Laplacian coordinates have no direction
+TEAR = 12  # edges of a border: ball pivoting leaves shorter ones everywhere
 STEP = 0.002  # of the diagonal: spacing of the places where skeletons are compared
 
 
@@ -55,6 +57,27 @@ class RowAgreement:
     flat: float
     angle: dict[str, float]
     length: dict[str, float]
+
+
+@dataclass(frozen=True)
+class MeshFit:
+    """How well a mesh describes a cloud.
+
+    Attributes
+    ----------
+    far : float
+        Share of the cloud's points that lie more than a point spacing from the mesh.
+    open : float
+        Share of the mesh's vertices on a border of more than 12 edges, less that of the cloud's points whose rings do
+        not close: above 0 the mesh has holes where the cloud has none.
+    pieces, parts : int
+        Into how many pieces the mesh falls, and the cloud, where no ring has an edge longer than three spacings.
+    """
+
+    far: float
+    open: float
+    pieces: int
+    parts: int
 
 
 @dataclass(frozen=True)
@@ -142,6 +165,37 @@ def compare_rows(state, vertices, faces):
         length=_quantiles(length[compared & ~flat], {"p10": 10, "median": 50, "p90": 90}),
     )
     return angle, length, share, rows
+
+
+def mesh_fit(state, vertices, faces):
+    """How well a mesh describes a cloud.
+
+    Parameters
+    ----------
+    state : Contraction
+        Fresh from the ring builder.
+    vertices : (V, 3) float array
+        In its frame.
+    faces : (f, 3) int array
+        As from `clean_faces`.
+
+    Returns
+    -------
+    MeshFit
+    """
+    points, rings, step = state.cloud, state.rings, spacing(state.cloud)
+    squared = require("igl", "libigl").point_mesh_squared_distance(points, vertices, faces)[0]
+    used = np.unique(faces)
+    border = border_lengths(len(vertices), faces)[used] > TEAR
+    pieces = component_labels(len(vertices), np.concatenate([faces[:, :2], faces[:, 1:]]))[used]
+    edges = np.column_stack([rings.owners, rings.indices])
+    near = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1) < REACH * step
+    return MeshFit(
+        far=float((squared > step**2).mean()),
+        open=float(border.mean() - (~rings.closed).mean()),
+        pieces=len(np.unique(pieces)),
+        parts=int(component_labels(len(points), edges[near]).max()) + 1,
+    )
 
 
 def _on_mesh(points, vertices, faces, values):

@@ -116,7 +116,7 @@ class BranchTable:
     def __len__(self):
         return len(self.kind)
 
-    def __iter__(self) -> Iterator[dict[str, Any]]:
+    def _columns(self) -> dict[str, list]:
         columns: dict[str, list] = {"branch": list(range(len(self)))}
         for field in fields(self):
             array = getattr(self, field.name)
@@ -125,6 +125,10 @@ class BranchTable:
             else:
                 name = field.name.removesuffix("_point")
                 columns |= {f"{name}_{axis}": column.tolist() for axis, column in zip("xyz", array.T, strict=True)}
+        return columns
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        columns = self._columns()
         for row in zip(*columns.values(), strict=True):
             yield dict(zip(columns, row, strict=True))
 
@@ -165,9 +169,8 @@ class BranchTable:
         def write(temporary):
             with temporary.open("w", newline="", encoding="utf-8") as stream:
                 out = csv.writer(stream, lineterminator="\n")
-                for i, row in enumerate(self):
-                    if i == 0:
-                        out.writerow(row)
+                out.writerow(self._columns())
+                for row in self:
                     out.writerow("" if isinstance(v, float) and not math.isfinite(v) else v for v in row.values())
 
         write_atomically(path, write)

@@ -20,11 +20,11 @@ from ..pipelines import named_pipeline
 from ..report import REFUSED, Report
 from ..ring_builder import MIN_POINTS, RingBuilder
 from ..skeleton import Skeleton
-from .agreement import RowAgreement, SkeletonAgreement, compare_rows, compare_skeletons
+from .agreement import MeshFit, RowAgreement, SkeletonAgreement, compare_rows, compare_skeletons, mesh_fit
 from .mesh_contraction import mesh_skeleton
 from .reconstruction import ball_pivoting, poisson, without_bare
 
-AGREES, IN_PART, DISTRUST = VERDICTS = "agrees", "agrees in part", "do not trust"
+AGREES, IN_PART, DISTRUST, UNTOLD = VERDICTS = "agrees", "agrees in part", "do not trust", "cannot tell"
 
 SURFACES = {"ball_pivoting": ball_pivoting, "poisson": poisson}
 COVERED = 0.7  # share of the closed rings that ball pivoting must close, or Poisson steps in
@@ -34,6 +34,7 @@ SAME = 1e-6  # of the diagonal: nearer vertices are points of the cloud, whichev
 TURNED = 30.0  # degrees
 NEAR, FAR = 0.2, 0.5  # local radii
 ASTRAY = 1.0  # local radii
+UNLIKE = 0.05  # share of the cloud far from the mesh, or of the mesh on borders that the cloud has not
 WHOLE = 0.99  # share of rings that close where the cloud has no gaps
 
 
@@ -43,13 +44,15 @@ class CrossCheck:
 
     Attributes
     ----------
-    verdict : {"agrees", "agrees in part", "do not trust"}
+    verdict : {"agrees", "agrees in part", "do not trust", "cannot tell"}
+        The last where the skeletons differ and the mesh is no good, so that this says nothing about the cloud.
     reasons : tuple of str
         What speaks against a better verdict.
     surface : {"ball_pivoting", "poisson", "given"}
         The mesh.
     n_input : int
         Points that were given; fewer are in `points` if the cloud was thinned.
+    fit : MeshFit
     rows : RowAgreement
     skeletons : SkeletonAgreement
     points : (N, 3) float64 array
@@ -78,6 +81,7 @@ class CrossCheck:
     reasons: tuple[str, ...]
     surface: str
     n_input: int
+    fit: MeshFit
     rows: RowAgreement
     skeletons: SkeletonAgreement
     points: np.ndarray = field(repr=False)
@@ -106,7 +110,7 @@ class CrossCheck:
                 "turned": int((self.angle > TURNED).sum()),
                 "not_compared": int(np.isnan(self.angle).sum()),
             },
-            "mesh": {"vertices": len(self.vertices), "faces": len(self.faces)},
+            "mesh": {"vertices": len(self.vertices), "faces": len(self.faces), **asdict(self.fit)},
             "rows": asdict(self.rows),
             "skeletons": {**asdict(self.skeletons), "topology": self.skeletons.topology},
             "warnings": list(self.skeleton.report.warnings),
@@ -116,6 +120,7 @@ class CrossCheck:
                 "distance_in_radii": [NEAR, FAR],
                 "hausdorff95_in_radii": ASTRAY,
                 "covered": COVERED,
+                "far_or_open": UNLIKE,
             },
             "convention": "L = 2 igl.cotmatrix: rows sum to 0, off-diagonals are positive, L P points inward",
         }
@@ -199,7 +204,8 @@ def cross_check(
     other = mesh_skeleton(state, vertices, faces, pipeline)
     diagonal = state.frame.diagonal * state.frame.scale
     skeletons = compare_skeletons(skeleton, other, diagonal)
-    verdict, reasons = judge(rows, skeletons, skeleton.report.warnings, other.report)
+    fit = mesh_fit(state, vertices, faces)
+    verdict, reasons = judge(rows, skeletons, skeleton.report.warnings, other.report, fit)
     of_point = state.row_of_point
     angle, length, share = (np.where(state.witness, values[of_point], np.nan) for values in (angle, length, share))
     return CrossCheck(
@@ -207,6 +213,7 @@ def cross_check(
         reasons=reasons,
         surface=surface,
         n_input=n_input,
+        fit=fit,
         rows=rows,
         skeletons=skeletons,
         points=points,
@@ -270,7 +277,11 @@ def _given(state, vertices, faces):
 
 
 def judge(
-    rows: RowAgreement, skeletons: SkeletonAgreement, warned: Sequence[str] = (), mesh_report: Report | None = None
+    rows: RowAgreement,
+    skeletons: SkeletonAgreement,
+    warned: Sequence[str] = (),
+    mesh_report: Report | None = None,
+    fit: MeshFit | None = None,
 ) -> tuple[str, tuple[str, ...]]:
     """The verdict on a cloud, and what speaks against a better one.
 
@@ -282,12 +293,16 @@ def judge(
         What the cloud's own run warns of.
     mesh_report : Report, optional
         Of the mesh's run.
+    fit : MeshFit, optional
 
     Returns
     -------
-    verdict : {"agrees", "agrees in part", "do not trust"}
+    verdict : {"agrees", "agrees in part", "do not trust", "cannot tell"}
         "do not trust" where the skeletons differ in components or loops, or lie more than half a radius apart on
-        average, or no Laplacian coordinates could be compared. "agrees" where they lie within a fifth of a radius on
+        average; "cannot tell" instead where the mesh does not describe the cloud (a twentieth of it lies off, a
+        twentieth of the mesh has borders that the cloud has not, it falls into more pieces than the cloud, or it closes
+        around less than 70 % of the points whose rings close), where its contraction failed, and where no Laplacian
+        coordinates could be compared. "agrees" where they lie within a fifth of a radius on
         average and a radius in 95 % of their length, the mesh closes around 70 % of the points whose rings close, three
         quarters of the Laplacian coordinates lie within 30 degrees, neither run warned of anything, and the contraction
         of the mesh did not fail.
@@ -313,12 +328,28 @@ def judge(
         if agree and rows.closed >= WHOLE * rows.rows and skeletons.topology and not failed:
             slight.append("the rings agree: it is the shape, not the sampling; in a blob a curve may run anywhere")
     if not rows.compared:
-        grave.append("no Laplacian coordinates could be compared")
+        failed.append("no Laplacian coordinates could be compared")
     elif rows.covered < COVERED:
-        slight.append(f"the mesh closes around {rows.covered:.0%} of the points whose rings close")
+        (failed if grave else slight).append(
+            f"the mesh closes around {rows.covered:.0%} of the points whose rings close"
+        )
     if turned:
         slight.append(f"a quarter of the Laplacian coordinates are turned by more than {rows.angle['p75']:.0f} degrees")
     slight += [f"the run itself warns: {message}" for message in warned]
     if mesh_report is not None:
         slight += [f"the mesh's run warns: {message}" for message in mesh_report.warnings if message not in warned]
+    if grave and fit is not None:
+        failed += _faults(fit)
+    if failed and (grave or not rows.compared):
+        return UNTOLD, (*failed, *grave, *slight)
     return (DISTRUST if grave else IN_PART if failed or slight else AGREES), (*failed, *grave, *slight)
+
+
+def _faults(fit):
+    """Why a mesh does not describe the cloud."""
+    if fit.far > UNLIKE:
+        yield f"the mesh does not describe the cloud: {fit.far:.0%} of the points lie more than a point spacing off it"
+    if fit.open > UNLIKE:
+        yield f"the mesh does not describe the cloud: {fit.open:.0%} of it are at holes that the cloud has not"
+    if fit.pieces > fit.parts:
+        yield f"the mesh does not describe the cloud: {fit.pieces} pieces of it, {fit.parts} of the cloud"

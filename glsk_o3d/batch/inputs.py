@@ -33,26 +33,27 @@ def find_inputs(
     Returns
     -------
     dict of str to Path
-        Absolute paths in the order of their names. A name is the path from the common folder, without its ending and
-        with ``/`` between folders; the ending stays where names would be equal without it. A file that is meant twice
-        is there once. Whether the files of a list are there shows when they are read.
+        Absolute paths in the order of their names. A name is the path from the folder that was given, from the part
+        of a pattern without wildcards, or from the folder of a list (the whole path, where a list names what is not
+        below); of a file that was given, its own name. It has no ending and ``/`` between folders; the ending stays
+        where names would be equal without it. A file that is meant twice has the first of its names. Whether single
+        files of a list are there shows when they are read.
 
     Raises
     ------
     FileNotFoundError
-        A file is not there, or a folder or pattern has no cloud.
+        A file is not there, a folder or pattern has no cloud, or nothing that a list names is there.
     InvalidParameterError
         There is no input, a folder of clouds is the output folder, or two results would have one name.
     """
     out = os.path.abspath(out_dir)
-    roots, paths = [], {}
+    roots: dict[str, str] = {}
     for given in inputs:
         for root, path in _meant(os.fspath(given), out, recursive):
-            roots.append(root)
-            paths[path] = None
-    if not paths:
+            roots.setdefault(path, root)
+    if not roots:
         raise InvalidParameterError("there is no input: give a folder, a glob pattern, a list (.txt) or clouds")
-    return _named(sorted(paths), os.path.commonpath(roots))
+    return _named(roots)
 
 
 def _meant(given: str, out: str, recursive: bool) -> Iterator[tuple[str, str]]:
@@ -63,10 +64,9 @@ def _meant(given: str, out: str, recursive: bool) -> Iterator[tuple[str, str]]:
         none = f"{given}: no cloud in this folder" + " (sub-folders are taken with recursive)" * (not recursive)
         yield from ((absolute, path) for path in _clouds(found, absolute, out, none))
     elif os.path.lexists(given) and given.lower().endswith(".txt"):
-        listed = _listed(given)
-        if not listed:
-            raise FileNotFoundError(f"{given}: this list names no file")
-        yield from ((os.path.dirname(path), path) for path in listed)
+        here = os.path.dirname(absolute)
+        for path in _listed(given):
+            yield here if path.startswith(os.path.join(here, "")) else Path(path).anchor, path
     elif os.path.lexists(given):
         yield os.path.dirname(absolute), absolute
     elif glob.has_magic(given):
@@ -105,17 +105,29 @@ def _clouds(paths: Iterable[str], root: str, out: str, none: str) -> list[str]:
 def _listed(path: str) -> list[str]:
     """The files that a list names, one a line, from the working folder; blank lines and comments are skipped."""
     lines = [os.fsdecode(line.strip()) for line in Path(path).read_bytes().removeprefix(b"\xef\xbb\xbf").splitlines()]
-    return [os.path.abspath(line) for line in lines if line and not line.startswith("#")]
+    lines = [line for line in lines if line and not line.startswith("#")]
+    if not any(map(os.path.lexists, lines)):
+        what = (
+            f"none of {len(lines)} lines names one that is there, not {lines[0][:60]!r}" if lines else "it names none"
+        )
+        raise FileNotFoundError(
+            f"{path}: read as a list of files, a path per line from the working folder, and {what}; "
+            "if it is a point cloud, rename it to .xyz"
+        )
+    return list(map(os.path.abspath, lines))
 
 
-def _named(paths: list[str], root: str) -> dict[str, Path]:
-    whole = {path: Path(os.path.relpath(path, root)).as_posix() for path in paths}
+def _named(roots: dict[str, str]) -> dict[str, Path]:
+    whole = {path: Path(os.path.relpath(path, root)).as_posix() for path, root in sorted(roots.items())}
     short = {path: os.path.splitext(name)[0] for path, name in whole.items()}
     often = Counter(short.values())
     named: dict[str, Path] = {}
-    for path in paths:
+    for path in whole:
         name = short[path] if often[short[path]] == 1 and short[path] not in RESERVED else whole[path]
         if name in named:
-            raise InvalidParameterError(f"the results of {named[name]} and {path} would both be called {name}")
+            raise InvalidParameterError(
+                f"the results of {named[name]} and {path} would both be called {name}: give the folder above them, "
+                "a quoted pattern, or each an output folder"
+            )
         named[name] = Path(path)
-    return named
+    return dict(sorted(named.items()))

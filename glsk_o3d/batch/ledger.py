@@ -23,11 +23,12 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 Row = dict[str, Any]
-DONE, FAILED = "done", "failed"
+DONE, FAILED, STALE = "done", "failed", "stale"  # the last: what is there is of something else, and to be done anew
 COLUMNS = (
-    *("name", "input", "status", "error", "seconds", "points", "dropped", "distinct", "contracted", "vertices"),
-    *("edges", "components", "loops", "leaves", "junctions", "length", "iterations", "converged", "stop_reason"),
-    *("warnings", "messages", "parameters", "input_hash", "outputs", "worker", "version", "finished"),
+    *("name", "input", "status", "error", "seconds", "points", "dropped", "sampled", "outliers"),
+    *("distinct", "contracted", "vertices", "edges", "components", "loops", "leaves", "junctions", "length"),
+    *("iterations", "converged", "stop_reason", "warnings", "messages", "parameters", "input_hash"),
+    *("outputs", "worker", "version", "finished"),
 )
 """What a row tells."""
 _log = logging.getLogger(__name__)

@@ -16,11 +16,11 @@ from ..filter import Filter
 from ..interop.files import skeleton_ending
 from ..pipeline import Pipeline, as_pipeline
 from .inputs import find_inputs
-from .ledger import DONE, Ledger, Row, file_hash
+from .ledger import DONE, STALE, Ledger, Row, file_hash
 from .work import Job
 
 SKIP = "done"
-NEW, AGAIN, FAILED_BEFORE = "new", "asked for", "failed before"
+NEW, AGAIN, FAILED_BEFORE, INTERRUPTED = "new", "asked for", "failed before", "interrupted before"
 OTHER_PARAMETERS, OUTPUTS_GONE, INPUT_CHANGED = "other parameters", "outputs are gone", "input changed"
 
 
@@ -32,8 +32,8 @@ class Task:
     ----------
     job : Job
     why : str
-        ``"done"`` if it is to be skipped, else why not: ``"new"``, ``"failed before"``, ``"other parameters"``,
-        ``"outputs are gone"``, ``"input changed"`` or ``"asked for"``.
+        ``"done"`` if it is to be skipped, else why not: ``"new"``, ``"failed before"``, ``"interrupted before"``,
+        ``"other parameters"``, ``"outputs are gone"``, ``"input changed"`` or ``"asked for"``.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def plan_batch(
     inputs : path-like, or several
         Folders, glob patterns, lists of files (``.txt``, one path a line, from the working folder) and clouds.
     out_dir : path-like
-        Where results and ledger go; sub-folders as there are below the common folder of the inputs.
+        Where results and ledger go; sub-folders as there are below each folder, pattern or list that is given.
     pipeline : Pipeline, name, or path of a recipe
         See `glsk_o3d.skeletonize`.
     formats : sequence of str
@@ -134,7 +134,8 @@ def plan_batch(
     FileNotFoundError
         A file is not there, or a folder or pattern has no cloud.
     InvalidParameterError
-        The pipeline or a format is wrong, there is nothing to write, or a result would replace an input.
+        The pipeline or a format is wrong, there is nothing to write, or a result would replace an input, or the result
+        of another input that is still there.
     RecipeError
         No recipe can hold the pipeline: then it cannot be told whether two runs are the same.
 
@@ -160,16 +161,29 @@ def plan_batch(
     sources = {str(path) for path in found.values()}
     parameters = _hash({"recipe": recipe, "cut_loops": cut_loops} if cut_loops else recipe)
     ledger, tasks = Ledger(out), []
+    results = {name + ending for name in found for ending in endings}
+    names = {row["input"]: name for name, row in ledger.rows.items()}
     for name, path in found.items():
         outputs = tuple(name + ending for ending in endings)
         for output in outputs:
             if str(out / output) in sources:
                 raise InvalidParameterError(f"{out / output}: is an input: give the results another folder")
         row = ledger.rows.get(name, {})
-        stale = tuple(each for each in row.get("outputs", ()) if _is_of(name, each))
-        job = Job(name, str(path), str(out), outputs, recipe, cut_loops, stale)
+        before = names.get(str(path), name)  # otherwise its old results would be nobody's
+        stale = {each for each in row.get("outputs", ()) if _is_of(name, each)}
+        stale |= {each for each in ledger.rows.get(before, {}).get("outputs", ()) if _is_of(before, each)} - results
+        job = Job(name, str(path), str(out), outputs, recipe, cut_loops, tuple(sorted(stale)))
         tasks.append(Task(job, AGAIN if force else _why(job, row, parameters)))
-    return Plan(out, recipe, parameters, _compared(tasks, ledger.rows), ledger)
+    compared = _compared(tasks, ledger.rows)
+    for task in compared:
+        row = ledger.rows.get(task.job.name, {})
+        theirs = row.get("input", task.job.path)
+        if task.why != SKIP and row.get("outputs") and theirs not in sources and os.path.exists(theirs):
+            raise InvalidParameterError(
+                f"{task.job.path}: its results, {task.job.name}, would replace those of {theirs}: give another folder "
+                "for them"
+            )
+    return Plan(out, recipe, parameters, compared, ledger)
 
 
 def _why(job: Job, row: Row, parameters: str) -> str:
@@ -177,7 +191,7 @@ def _why(job: Job, row: Row, parameters: str) -> str:
     if not row:
         return NEW
     if row["status"] != DONE:
-        return FAILED_BEFORE
+        return INTERRUPTED if row["status"] == STALE else FAILED_BEFORE
     if row.get("parameters") != parameters:
         return OTHER_PARAMETERS
     there = set(job.outputs) <= set(row.get("outputs", ())) and all(

@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..errors import BatchError, InvalidParameterError
 from ..interop.files import write_json
-from .ledger import COLUMNS, DONE, FAILED, Row, locked
-from .plan import Plan, Task, plan_batch
-from .work import told, work
+from .ledger import COLUMNS, DONE, FAILED, STALE, Row, locked
+from .plan import SKIP, Plan, Task, plan_batch
+from .work import clear, told, work
 from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, cores, died
 
 if TYPE_CHECKING:
@@ -168,10 +168,14 @@ def _hired(plan: Plan, workers, scheduler, executor) -> Workers:
 
 
 def _make_room(plan: Plan) -> None:
-    """Drop what is no longer true from the ledger, and make the folders: a worker's own would be where nobody looks."""
-    for task in plan.todo:
-        if plan.ledger.rows.get(task.job.name, {}).get("status") == DONE:
-            del plan.ledger.rows[task.job.name]
+    """Mark what is no longer true in the ledger, and make the folders: a worker's own would be where nobody looks."""
+    rows = plan.ledger.rows
+    for task in plan.tasks:
+        name, path = task.job.name, task.job.path
+        if task.why == SKIP and rows[name]["input"] != path:  # the same bytes somewhere else
+            rows[name] = rows.pop(name) | {"input": path}
+        elif task.why != SKIP and rows.get(name, {}).get("status") == DONE:
+            rows[name]["status"] = STALE
     plan.ledger.rewrite()
     write_json(plan.out_dir / "recipe.json", plan.recipe)
     for folder in {(plan.out_dir / task.job.name).parent for task in plan.todo}:
@@ -235,6 +239,8 @@ def _row(task: Task, future: Future, error: BaseException | None) -> Row:
         if missing and Path(task.job.path).exists():
             row["error"] += f" (on {row['worker']}; there is one here: workers need the same files by the same paths)"
         return row
+    with suppress(OSError):
+        clear(task.job)
     return {
         "status": FAILED,
         "error": WORKER_DIED if died(error) else told(error),

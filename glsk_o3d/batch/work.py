@@ -9,6 +9,7 @@ import socket
 import threading
 import time
 import traceback
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
@@ -66,11 +67,12 @@ def work(job: Job) -> Row:
     row["worker"] = f"{socket.gethostname()}, process {os.getpid()}"
     with _Heard() as heard:
         try:
-            for path in job.stale:
-                Path(job.out_dir, path).unlink(missing_ok=True)
             with suppress(OSError):  # what it is shows when it is read
                 row["input_hash"] = file_hash(job.path)
-            _skeletonize(job, row, heard.messages)
+            try:
+                _skeletonize(job, row, heard.messages)
+            finally:
+                clear(job, row["outputs"])
             row["status"] = DONE
         except Exception as error:  # whatever it is, the other clouds are to be done
             row |= {"status": FAILED, "error": told(error).removeprefix(f"{job.path}: ")}
@@ -78,6 +80,21 @@ def work(job: Job) -> Row:
     row |= {"seconds": round(time.perf_counter() - start, 4), "warnings": len(messages), "messages": messages}
     finished = datetime.now(timezone.utc).isoformat(timespec="seconds")
     return {**row, "finished": finished}
+
+
+def clear(job: Job, written: Iterable[str] = ()) -> None:
+    """Remove what is there of earlier batches.
+
+    Only afterwards, since a cluster may do a job once more, and end while it does.
+
+    Parameters
+    ----------
+    job : Job
+    written : iterable of str
+        Outputs to keep.
+    """
+    for path in {*job.stale, *job.outputs}.difference(written):
+        Path(job.out_dir, path).unlink(missing_ok=True)
 
 
 def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:

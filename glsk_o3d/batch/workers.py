@@ -232,7 +232,7 @@ class DaskWorkers:
     """
 
     def __init__(self, scheduler: Any):
-        distributed = require("distributed", "glsk-o3d[cluster]")
+        distributed = require("distributed")
         self._own = not isinstance(scheduler, distributed.Client)
         self.name = str(getattr(getattr(scheduler, "scheduler", scheduler), "address", scheduler))
         if self._own:

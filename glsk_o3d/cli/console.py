@@ -25,7 +25,10 @@ FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
 
 # The library speaks Python; these are the same cures on the command line.
 _SAID_HERE = {
-    "let RingBuilder(drop_invalid=True) drop them": "drop them with --drop-invalid",
+    "drop them with RingBuilder(drop_invalid=True), or remove them first": "drop them with --drop-invalid",
+    "raise max_points": "raise --max-points",
+    "max_points = ": "--max-points ",
+    "must be None or a whole number": "must be 0 (no limit) or a whole number",
     "make one with glsk_o3d.skeletonize": "run 'glsk skeletonize' first",
     "pass cut_loops=True to drop": "add --cut-loops to drop",
     "taken with recursive": "taken with --recursive",
@@ -122,7 +125,7 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
         finally:
             if not quiet:
                 for line in lines:
-                    say("warning", line)
+                    say("warning", said_here(line))
     if problem is not None:
         if verbose:
             traceback.print_exception(problem)

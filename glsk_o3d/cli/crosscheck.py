@@ -50,12 +50,14 @@ def crosscheck(
     """Check a scan against a mesh made from it.
 
     Both skeletons are computed, that of the mesh with libigl's Laplacian, and compared. The verdict is one of
-    'agrees', 'agrees in part' and 'do not trust'; whatever it is, the exit code is 0.
+    'agrees', 'agrees in part' and 'do not trust'; then the exit code is 0. 'cannot tell', with exit code 1, says that
+    the skeletons differ but the mesh is at fault.
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
         from ..analysis import cross_check, save_crosscheck_picture
-        from ..analysis.crosscheck import SURFACES
+        from ..analysis.crosscheck import SURFACES, UNTOLD
         from ..catalogue import nearest
+        from ..errors import InvalidCloudError
         from ..interop.files import read_cloud, write_json
         from ..interop.meshes import read_mesh
         from ..interop.preview import printable
@@ -91,6 +93,11 @@ def crosscheck(
             print_rows(_rows(told), title=f"{scan}: {check.verdict}")
             for path in files:
                 typer.echo(f"wrote {path}")
+        if check.verdict == UNTOLD:
+            raise InvalidCloudError(
+                f"the check says nothing about the skeleton: {check.reasons[0]}; give "
+                + ("another mesh" if mesh else "a mesh of its surface with --mesh, or another --method")
+            )
 
 
 def _rows(told: dict[str, Any]) -> dict[str, Any]:

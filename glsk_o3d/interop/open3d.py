@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 import os
 import re
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, requires
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,14 +38,14 @@ _DEBIAN = {  # shared library -> Debian package, where the one does not follow f
 
 
 def require(package: str, install: str | None = None) -> Any:
-    """Import an optional package, or say what to install.
+    """Import an optional package, or say what to install: it by itself, in the version that this package asks for.
 
     Parameters
     ----------
     package : str
         Name of the module.
     install : str, optional
-        What to give to pip, if it is not the module's name.
+        What pip calls it, if it is not the module's name.
 
     Returns
     -------
@@ -54,6 +56,7 @@ def require(package: str, install: str | None = None) -> Any:
     MissingPackageError
         The package is not there, or it needs a shared library which is not; the message names the Debian package.
     """
+    asked = install or package
     try:
         return importlib.import_module(package)
     except (ImportError, OSError) as error:
@@ -62,11 +65,19 @@ def require(package: str, install: str | None = None) -> Any:
             debian = _DEBIAN.get(library[1])
             cure = f"apt-get install {debian}" if debian else f"install the system library {library[1]}"
         elif isinstance(error, ModuleNotFoundError) and error.name == package.partition(".")[0]:
-            cure = f'pip install "{install or package}"'
+            cure = f'pip install "{_versioned(asked)}"'
         else:
-            cure = f'its installation is damaged ({error}): pip install --force-reinstall "{install or package}"'
+            cure = f'its installation is damaged ({error}): pip install --force-reinstall "{_versioned(asked)}"'
         need = f"needs {library[0].partition(':')[0]}, which this machine lacks" if library else "cannot be imported"
         raise MissingPackageError(f"{package} {need}: {cure}", name=package) from error
+
+
+def _versioned(package: str) -> str:
+    with suppress(PackageNotFoundError):  # run from a folder, not installed
+        for line in requires("glsk-o3d") or ():
+            if re.split(r"[^\w.-]", line)[0] == package:
+                return line.partition(";")[0].strip()
+    return package
 
 
 def import_open3d() -> Any:

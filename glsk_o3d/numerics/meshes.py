@@ -51,6 +51,21 @@ def umbrellas(n, faces):
     return ~odd & (np.bincount(vertex_of_fan, minlength=n) == 1)
 
 
+def border_lengths(n, faces):
+    """How many edges the border has that each vertex is on, (n,) int array: 0 inside, 3 at a hole of one triangle.
+
+    Parameters
+    ----------
+    n : int
+    faces : (f, 3) int array
+        As from `clean_faces`.
+    """
+    edges = np.sort(np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]), axis=1)
+    edges, count = np.unique(edges, axis=0, return_counts=True)
+    label = component_labels(n, edges[count == 1])
+    return np.bincount(label[edges[count == 1, 0]], minlength=n)[label]
+
+
 def mesh_rings(n, faces):
     """The neighbours of every vertex of a mesh as Rings; ascending, not in rotational order, since there may be none.
 

@@ -10,11 +10,20 @@ from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Connector, Contractor, LPRReducer, Refiner, RingBuilder, read_cloud, samples, skeletonize
 from glsk_o3d.analysis import cross_check, save_crosscheck_picture
-from glsk_o3d.analysis.agreement import RowAgreement, SkeletonAgreement, compare_rows, compare_skeletons
+from glsk_o3d.analysis.agreement import (
+    MeshFit,
+    RowAgreement,
+    SkeletonAgreement,
+    compare_rows,
+    compare_skeletons,
+    mesh_fit,
+)
 from glsk_o3d.analysis.crosscheck import judge
 from glsk_o3d.analysis.crosscheck_picture import _draw
+from glsk_o3d.analysis.reconstruction import spacing
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
 from glsk_o3d.interop.meshes import mesh_arrays, read_mesh
+from glsk_o3d.numerics.meshes import border_lengths
 from glsk_o3d.report import REFUSED, Report
 
 matplotlib = pytest.importorskip("matplotlib")
@@ -76,10 +85,16 @@ def test_it_tells_where_the_cloud_is_noisy(shape):
 
 @SPIKY
 @pytest.mark.parametrize(
-    ("shape", "n", "noise"), [("two_rings", 256, 0), ("helix", 256, 0), ("sheet", 1024, 0), ("torus", 1024, 0.08)]
+    ("verdict", "shape", "n", "noise"),
+    [
+        ("do not trust", "sheet", 1024, 0),
+        ("cannot tell", "two_rings", 256, 0),
+        ("cannot tell", "helix", 256, 0),
+        ("cannot tell", "torus", 1024, 0.08),
+    ],
 )
-def test_too_sparse_too_noisy_or_without_a_curve(shape, n, noise):
-    assert cross_check(samples.SAMPLES[shape](n, noise=noise).points).verdict == "do not trust"
+def test_too_sparse_too_noisy_or_without_a_curve(verdict, shape, n, noise):
+    assert cross_check(samples.SAMPLES[shape](n, noise=noise).points).verdict == verdict
 
 
 def test_even_points_agree_to_rounding(even_ball):
@@ -112,7 +127,7 @@ def apart(**changed):
         ("agrees", {}, {"leaves": (3, 4)}, None),
         ("agrees in part", {"angle": {"median": 1.0, "p75": 31.0}}, {}, "turned by more than 31 degrees"),
         ("agrees in part", {"covered": 0.69}, {}, "closes around 69%"),
-        ("do not trust", {"compared": 0, "covered": 0.0, "angle": {}}, {}, "no Laplacian coordinates"),
+        ("cannot tell", {"compared": 0, "covered": 0.0, "angle": {}}, {}, "no Laplacian coordinates"),
         ("agrees", {"angle": {"median": 1.0, "p75": 29.0}, "covered": 0.71}, {}, None),
         ("agrees", {}, {"distance_in_radii": 0.19, "hausdorff95_in_radii": 0.95}, None),
         ("agrees in part", {}, {"distance_in_radii": 0.21}, "0.21 local radii apart"),
@@ -151,8 +166,52 @@ def test_a_mesh_that_fails_is_named():
     warned = ("the mesh's run warns: spiky", "the mesh's run warns: flat")
     assert judge(rows(), apart(), (), FAILED) == ("agrees in part", (message, *warned))
     verdict, reasons = judge(rows(), apart(components=(1, 9)), ("flat",), FAILED)
-    assert (verdict, reasons[0], len(reasons)) == ("do not trust", message, 4)
+    assert (verdict, reasons[0], len(reasons)) == ("cannot tell", message, 4)
     assert judge(rows(), apart(), (), Report(stop_reason="settled")) == ("agrees", ())
+
+
+FIT = MeshFit(far=0.0, open=0.0, pieces=1, parts=1)
+
+
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        ({"far": 0.06}, "6% of the points lie more than a point spacing off it"),
+        ({"open": 0.07}, "7% of it are at holes that the cloud has not"),
+        ({"pieces": 3, "parts": 2}, "3 pieces of it, 2 of the cloud"),
+    ],
+)
+def test_a_mesh_that_does_not_describe_the_cloud_says_nothing_against_it(changed, reason):
+    fit, differ = replace(FIT, **changed), apart(loops=(2, 1))
+    assert judge(rows(), differ, fit=FIT)[0] == "do not trust"
+    verdict, (first, second) = judge(rows(), differ, fit=fit)
+    assert (verdict, first) == ("cannot tell", f"the mesh does not describe the cloud: {reason}")
+    assert second.startswith("loops: 2")
+    assert judge(rows(), apart(), fit=fit) == ("agrees", ())
+    assert judge(rows(covered=0.6), differ)[0] == "cannot tell"
+
+
+def test_the_fit_of_meshes_that_are_known(ring, check):
+    state = RingBuilder()(ring.points)
+    vertices = state.frame.into(check.vertices)
+    whole = mesh_fit(state, vertices, check.faces)
+    assert (whole.far, whole.pieces, whole.parts) == (0, 1, 1)
+    assert whole.open < 0.02
+    cut = np.abs(vertices[check.faces].mean(axis=1)[:, 0]) > 0.1  # a slab of the ring is missing, and so two pieces
+    fit = mesh_fit(state, vertices, check.faces[cut])
+    off = np.abs(vertices[:, 0]) < 0.1 - spacing(vertices)
+    assert (fit.pieces, fit.parts) == (2, 1)
+    assert off.mean() / 2 < fit.far < off.mean() * 2
+    assert fit.open > whole.open + 0.05
+    apart = np.abs(ring.points[:, 0]) > 0.1
+    assert mesh_fit(RingBuilder()(ring.points[apart]), vertices, check.faces[cut]).parts == 2
+
+
+def test_open_ends_that_the_cloud_has_too_are_not_held_against_a_mesh():
+    tube = samples.tube(2000, capped=False)
+    found = cross_check(tube.points, "ball_pivoting")
+    assert border_lengths(len(found.vertices), found.faces).max() > 12
+    assert found.fit.open < 0.05
 
 
 @SPIKY
@@ -298,7 +357,7 @@ def test_holes_extra_triangles_and_bare_vertices(ring, check):
     assert np.isnan(found.angle[missing]).all()
     assert np.isnan(found.angle).sum() < np.isnan(check.angle).sum() + 1.5 * missing.sum() + 20
     assert found.skeletons.loops[0] == 1
-    assert found.verdict == "do not trust"  # the mesh's ring is broken
+    assert found.verdict == "cannot tell"  # the mesh's ring is broken
 
 
 def test_poisson_and_a_single_method(ring):
@@ -404,7 +463,7 @@ def test_clouds_without_a_surface():
         cross_check(line, "ball_pivoting")
     found = cross_check(np.column_stack([np.linspace(0, 1, 500), np.zeros((500, 2))]))  # Poisson invents one
     assert found.rows.compared == 0
-    assert found.verdict == "do not trust"
+    assert found.verdict == "cannot tell"
     assert "no Laplacian coordinates could be compared" in found.reasons
     for wrong in (np.eye(3), np.empty((0, 3))):
         with pytest.raises(InvalidCloudError):

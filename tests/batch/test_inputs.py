@@ -1,6 +1,7 @@
 """Which files a batch takes, and what it calls their results."""
 
 import os
+from itertools import chain
 
 import pytest
 
@@ -52,21 +53,53 @@ def test_a_pattern_is_named_from_its_fixed_part(touch):
 def test_a_list(touch, here):
     touch("in/a.ply", "in/sub/b.ply")
     (here / "list.txt").write_bytes(b"\xef\xbb\xbf# mine\r\nin/a.ply\r\n\r\n  in/sub/b.ply\nin/gone.ply")
-    assert names("list.txt") == ["a", "gone", "sub/b"]
+    assert names("list.txt") == ["in/a", "in/gone", "in/sub/b"]
     (here / "list.txt").write_text("# nothing\n")
-    with pytest.raises(FileNotFoundError, match=r"list\.txt: this list names no file"):
+    with pytest.raises(FileNotFoundError, match=r"list\.txt: read as a list of files.* and it names none; if it is a"):
         names("list.txt")
 
 
-def test_several_share_their_common_folder(touch):
-    touch("x/in/a.ply", "x/more/deep/a.ply")
-    assert names("x/in", "x/more/deep/a.ply") == ["in/a", "more/deep/a"]
+@pytest.mark.parametrize("first", [b"0.25 1 -3", b"x,y,z", b"\0\xff\xfe", b"gone.ply"])
+def test_a_text_that_is_no_list(here, first):
+    (here / "list.txt").write_bytes(first + b"\n1 2 3" * 99)
+    with pytest.raises(
+        FileNotFoundError, match=r"as a list of files, a path per line .* none of 100 lines .* to \.xyz$"
+    ) as e:
+        names("list.txt")
+    assert repr(os.fsdecode(first)) in str(e.value)
+
+
+def test_a_list_of_what_lies_elsewhere(touch, here):
+    touch("in/a.ply", "lists/b.ply")
+    (here / "lists" / "list.txt").write_text("in/a.ply\nlists/b.ply\n")
+    assert names("lists/list.txt") == ["b", (here / "in" / "a").relative_to(here.anchor).as_posix()]
+
+
+def test_other_inputs_rename_none(touch, here):
+    touch("x/in/a.ply", "x/in/sub/a.ply", "more/deep/b.ply", "p/1/c.ply", "l/d.ply")
+    (here / "l" / "list.txt").write_text("l/d.ply\n")
+    given = [["x/in"], ["more/deep/b.ply"], ["p/*/c.ply"], ["l/list.txt"]]
+    alone = [names(*each, recursive=True) for each in given]
+    assert alone == [["a", "sub/a"], ["b"], ["1/c"], ["d"]]
+    assert names(*chain(*given), recursive=True) == sorted(chain(*alone))
+
+
+def test_two_with_one_name(touch):
+    touch("monday/a.ply", "tuesday/a.ply")
+    with pytest.raises(
+        InvalidParameterError, match=r"would both be called a\.ply: give the folder above them, a quoted"
+    ):
+        names("monday", "tuesday")
+    for cure in ("*/a.ply", "*day/*"):
+        assert names(cure) == ["monday/a", "tuesday/a"]
+    assert names(".", recursive=True) == ["monday/a", "tuesday/a"]
 
 
 def test_the_same_file_twice_is_one(touch, here):
     touch("in/a.ply", "in/b.ply")
     (here / "list.txt").write_text(f"{here}/in/a.ply\nin/../in/a.ply\n")
     assert names("in", "in/a.ply", "./in/*.ply", "list.txt") == ["a", "b"]
+    assert names("list.txt", "in") == ["b", "in/a"]
 
 
 def test_names_that_would_be_equal_keep_their_endings(touch):

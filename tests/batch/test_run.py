@@ -13,6 +13,7 @@ import glsk_o3d
 from glsk_o3d import BatchError, Connector, InvalidParameterError, RecipeError, pipelines, read_skeleton, skeletonize
 from glsk_o3d.batch import plan_batch, run_batch
 from glsk_o3d.batch.ledger import COLUMNS, file_hash, locked
+from glsk_o3d.samples import torus
 
 # the work is done in this process, where a skeleton's warnings are errors
 pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
@@ -104,6 +105,77 @@ def test_results_that_are_no_longer_true_are_taken_away(batch, scans, rows, tmp_
     assert rows(out)["a"]["status"] == "failed"
     assert sorted(path.name for path in out.glob("a.*")) == []
     assert sorted(path.name for path in out.glob("b.*")) == ["b.json", "b.ply"]
+
+
+def test_an_interrupted_change_leaves_no_stale_result(batch, scans, rows, write, tmp_path):
+    def stop(row):
+        raise LookupError
+
+    out = tmp_path / "out"
+    batch(formats=["ply", "json"])
+    with pytest.raises(LookupError):
+        batch(pipeline="wen2024", on_result=stop)
+    left = {row["name"]: row["status"] for row in map(json.loads, (out / "ledger.jsonl").read_text().splitlines())}
+    stale = [name for name, status in left.items() if status == "stale"]
+    assert len(left) == 3
+    assert stale
+    (scans / f"{stale[0]}.ply").write_text("no")
+    for pipeline in ("default", "wen2024"):  # what is there is of the first, and no one's any more
+        why = {task.job.name: task.why for task in plan_batch(scans, out, pipeline=pipeline).tasks}
+        assert {why[name] for name in stale} == {"interrupted before"}
+    batch(pipeline="wen2024")
+    assert len({row["parameters"] for row in rows(out).values()}) == 1
+    assert list(out.glob(f"{stale[0]}.*")) == list(out.glob("?.json")) == []
+
+
+def test_what_a_lost_row_left_is_taken_away(batch, scans, rows, tmp_path):
+    batch()
+    (tmp_path / "out" / "ledger.jsonl").write_text("")
+    (scans / "a.ply").write_text("no")
+    assert batch() == dict.fromkeys("abc", "new")
+    assert rows(tmp_path / "out")["a"]["outputs"] == []
+
+
+def test_an_input_from_elsewhere_renames_none(batch, scans, rows, write, tmp_path):
+    batch()
+    write(tmp_path / "more" / "deep" / "d.ply", seed=7)
+    assert batch([scans, tmp_path / "more" / "deep" / "d.ply"]) == {"d": "new"}
+    assert list(rows(tmp_path / "out")) == list("abcd")
+
+
+def test_another_name_leaves_no_orphans(batch, scans, rows, write, tmp_path):
+    batch(formats=["ply", "json"])
+    write(scans / "a.xyz", seed=7)  # now both need their endings
+    assert batch() == {"a.ply": "new", "a.xyz": "new"}
+    assert list(rows(tmp_path / "out")) == ["a.ply", "a.xyz", "b", "c"]
+    assert batch([tmp_path], recursive=True).keys() == {"in/a.ply", "in/a.xyz", "in/b", "in/c"}
+    assert len(rows(tmp_path / "out")) == 4
+
+
+def test_results_of_other_scans_are_not_replaced(batch, scans, rows, write, tmp_path):
+    batch()
+    write(tmp_path / "tuesday" / "a.ply", seed=7)
+    with pytest.raises(InvalidParameterError, match=r"its results, a, would replace those of .*give another folder"):
+        batch([tmp_path / "tuesday"])
+    (scans / "a.ply").unlink()
+    assert batch([tmp_path / "tuesday"]) == {"a": "input changed"}
+    assert rows(tmp_path / "out")["a"]["input"] == str(tmp_path / "tuesday" / "a.ply")
+
+
+def test_scans_that_have_moved_are_done(batch, scans, rows, tmp_path):
+    batch()
+    scans.rename(tmp_path / "moved")
+    assert batch([tmp_path / "moved"]) == {}
+    assert {Path(row["input"]).parent for row in rows(tmp_path / "out").values()} == {tmp_path / "moved"}
+
+
+def test_outliers_are_counted(batch, scans, rows, tmp_path):
+    (scans / "a.ply").unlink()
+    points = "\n".join(" ".join(map(str, point)) for point in [*torus(1024).points, [3, 0, 0], [0, 3, 0]])
+    (scans / "a.xyz").write_text(points)
+    batch([scans / "a.xyz"])
+    row = rows(tmp_path / "out")["a"]
+    assert (row["points"], row["sampled"], row["outliers"]) == (1026, 1026, 2)
 
 
 def test_a_ledger_from_elsewhere_removes_nothing(batch, scans, tmp_path):

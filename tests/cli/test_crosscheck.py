@@ -83,10 +83,23 @@ def test_a_mesh_of_the_users(invoke, scans, meshes, check, mesh):
 def test_reasons_and_warnings(invoke, scans):
     result = invoke("crosscheck", scans / "ball.ply", "--method", "poisson", "--max-points", "500")
     assert result.exit_code == 0
-    assert "glsk: warning: 500 of 1000 points are checked" in result.stderr
+    assert "glsk: warning: 500 of 1000 points are checked: raise --max-points to use more" in result.stderr
     assert "because" in result.stdout
     assert "mesh poisson, " in " ".join(result.stdout.split())
     assert "same rings" not in result.stdout
+
+
+def test_a_mesh_at_fault_is_not_held_against_the_cloud(invoke, write_scan, tmp_path):
+    write_scan(tmp_path / "ring.ply", torus(1024, noise=0.08).points)
+    result = invoke("crosscheck", "ring.ply", "-o", "r.json", "--json")
+    assert json.loads(result.stdout)["verdict"] == "cannot tell"
+    assert result.exit_code == 1
+    assert result.stderr.startswith(
+        "glsk: error: ring.ply: the check says nothing about the skeleton: the mesh does not"
+    )
+    assert result.stderr.endswith("give a mesh of its surface with --mesh, or another --method\n")
+    told = json.loads((tmp_path / "r.json").read_text())
+    assert told["mesh"]["far"] > told["thresholds"]["far_or_open"]
 
 
 def test_points_that_are_not_finite(invoke, refused, scans):
@@ -107,7 +120,11 @@ def test_points_that_are_not_finite(invoke, refused, scans):
         (2, ["ring.ply", "--mesh", "ring.off", "--method", "poisson"], "--mesh gives a mesh"),
         (2, ["ring.ply", "--method", "alpha"], "no method is called 'alpha': there are auto, ball_pivoting, poisson"),
         (2, ["ring.ply", "--method", "poison"], "did you mean 'poisson'?"),
-        (2, ["ring.ply", "--max-points", "5"], "max_points = 5"),
+        (
+            2,
+            ["ring.ply", "--max-points", "5"],
+            "--max-points 5: must be 0 (no limit) or a whole number of at least",
+        ),
         (2, ["ring.ply", "--pipeline", "no"], "no pipeline is called 'no'"),
         (2, ["ring.ply", "-o", "r.txt"], "r.txt: the report is JSON"),
         (2, ["ring.ply", "--picture", "p.jpg"], "p.jpg: the picture is a PNG"),
@@ -142,3 +159,13 @@ def test_the_scan_may_be_a_mesh_too(invoke, meshes):
     )  # its own triangles
     assert told["rows"]["one_to_one"]
     assert np.isclose(told["rows"]["angle"]["median"], 0, atol=1)
+
+
+def test_a_users_mesh_at_fault(invoke, scans, check, tmp_path):
+    faces = o3d.utility.Vector3iVector(check.faces[np.abs(check.vertices[check.faces[:, 0], 0]) > 0.2])
+    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(check.vertices), faces)
+    o3d.io.write_triangle_mesh(str(tmp_path / "half.ply"), mesh)
+    result = invoke("crosscheck", scans / "ring.ply", "--mesh", "half.ply")
+    assert result.exit_code == 1
+    assert "ring.ply: cannot tell" in result.stdout
+    assert result.stderr.rstrip().endswith("; give another mesh")

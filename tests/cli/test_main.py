@@ -82,8 +82,7 @@ def test_failure_and_wrong_usage_differ(glsk, scans, tmp_path):
 def test_points_that_are_not_finite(glsk, scans, tmp_path):
     line = failed(glsk("skeletonize", scans / "nan.ply", "-o", "s.npz"), 1)
     assert f"{scans / 'nan.ply'}: 2 of 1000 points" in line
-    assert "--drop-invalid" in line
-    assert "RingBuilder(" not in line
+    assert line.rstrip().endswith("the first at index 3: drop them with --drop-invalid")
     run = glsk("skeletonize", scans / "nan.ply", "-o", "s.npz", "--drop-invalid", "--json")
     assert run.returncode == 0, run.stderr
     facts = json.loads(run.stdout)

@@ -233,3 +233,18 @@ def test_a_mesh_can_be_written_as_points(invoke, tmp_path):
     for ending in ("pcd", "xyz"):
         assert invoke("run", "scan_cleanup", "m.ply", "-o", f"c.{ending}").exit_code == 0
         assert n_vertices / 2 < len(read_cloud(tmp_path / f"c.{ending}").points) <= n_vertices
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter"),
+    [
+        ("Generate Curve Skeleton (GLSkeleton)", "ringbuilder_drop_invalid"),
+        ("Generate One Rings (GLSkeleton)", "drop_invalid"),
+    ],
+)
+def test_points_that_are_not_finite(invoke, refused, scans, script, monkeypatch, name, parameter):
+    monkeypatch.setitem(sys.modules, "pymeshlab", None)
+    line = refused(1, "run", script(name), scans / "nan.ply", "-o", "s.ply")
+    assert f"the first at index 3: drop them with its parameter {parameter}, or remove them first" in line
+    cured = script(name, f'<Param type="RichBool" name="{parameter}" value="true"/>')
+    assert "NaN" not in invoke("run", cured, scans / "nan.ply", "-o", "s.ply").stderr

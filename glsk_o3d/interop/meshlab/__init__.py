@@ -31,7 +31,7 @@ def to_pymeshlab(skeleton: Skeleton) -> Any:
     Raises
     ------
     MissingPackageError
-        pymeshlab (GPL-3, hence an extra: ``glsk-o3d[meshlab]``) or a library that it needs is not installed.
+        pymeshlab (GPL-3, hence the extra ``meshlab``) or a library that it needs is not installed.
     """
     from .layers import Layer
 

@@ -14,8 +14,6 @@ from ...catalogue import nearest
 from ..open3d import require
 from .script import BOOL, FLOAT, INT, LENGTH, MATRIX, POINT, TEXT, Param
 
-EXTRA = "pymeshlab>=2023.12"
-
 
 @cache
 def names() -> dict[str, str]:
@@ -34,7 +32,7 @@ def names() -> dict[str, str]:
 @cache
 def trial() -> Any:
     """A MeshSet to ask what filters take: they raise, or crash the process, where there is nothing to apply them to."""
-    pymeshlab = require("pymeshlab", EXTRA)
+    pymeshlab = require("pymeshlab")
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32)
     ones, white = np.ones(4), np.ones((4, 4))
@@ -84,7 +82,7 @@ def arguments(name: str, params: tuple[Param, ...]) -> dict[str, Any]:
         With the line of the parameter as its second argument, or None.
     MissingPackageError
     """
-    if name not in require("pymeshlab", EXTRA).filter_list():
+    if name not in require("pymeshlab").filter_list():
         raise ValueError("the pymeshlab that is installed has no such filter", None)
     known, found = defaults(name), {}
     for param in params:
@@ -102,7 +100,7 @@ def arguments(name: str, params: tuple[Param, ...]) -> dict[str, Any]:
 
 def _argument(name, key, param, default):
     param.check_type(_fitting(default))
-    pymeshlab = require("pymeshlab", EXTRA)
+    pymeshlab = require("pymeshlab")
     value = param.value()
     if param.type in LENGTH:
         try:

@@ -15,7 +15,6 @@ from ...state import Contraction
 from .. import files
 from ..files import graph_skeleton, read_skeleton, save_skeleton, skeleton_ending, write_atomically
 from ..open3d import cloud_points, import_open3d, require
-from .builtin import EXTRA
 
 ENDINGS = {"points": (".ply", ".pcd", ".xyz"), "mesh": (".ply", ".obj", ".off", ".stl")}
 """What layers without edges are written as."""
@@ -135,7 +134,7 @@ class Layer:
         ------
         MissingPackageError
         """
-        pymeshlab = require("pymeshlab", EXTRA)
+        pymeshlab = require("pymeshlab")
         given = dict(
             vertex_matrix=(self.vertices, float),
             face_matrix=(self.faces, np.int32),

@@ -22,7 +22,7 @@ from .plan import Step, exact_digits, read_steps, step
 from .script import Param, read_script, write_script
 from .verbs import Verb, facts, verbs
 
-pymeshlab = require("pymeshlab", builtin.EXTRA)
+pymeshlab = require("pymeshlab")
 
 
 class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]

@@ -56,7 +56,10 @@ class Step:
             raise
         except GlskError as error:
             place = f"{self.place}: " if self.place else ""
-            raise ScriptError(f"{place}filter {self.call.name!r}: {error}") from error
+            slots = self.verb.slots if self.verb is not None else ()
+            cure = next((f"its parameter {name}" for name in slots if name.endswith("drop_invalid")), "")
+            said = str(error).replace("RingBuilder(drop_invalid=True)", cure or "the RingBuilder's drop_invalid")
+            raise ScriptError(f"{place}filter {self.call.name!r}: {said}") from error
 
 
 def step(verb: Verb, values: Mapping[str, Any]) -> Step:
