@@ -107,6 +107,7 @@ LEAST, MOST = 2.0, 50  # seconds that runs in turns go on for, however few were 
 MIDDLE = (4096, 65536)  # sizes of the second growth exponent
 GROWTH = f"growth {MIDDLE[0]} to {MIDDLE[1]}"
 BASES: dict[str, Callable[[], Pipeline]] = {"wen2024": wen2024, "default": default}
+WHOLE = ("cao2010", "wen2024", "default")
 BASELINE = ("wen2024", False, "rings")  # the contraction of cao2010
 RULES: dict[str, list[str]] = {
     "own": [],
@@ -434,20 +435,25 @@ def contractors(solves: int) -> dict[tuple[str, bool, str], tuple[Pipeline, Cont
 
 
 def contraction(cloud: Case | Scan, solves: int, repeat: int) -> dict:
-    """What all the contractions of a cloud cost, and leave of it."""
+    """What all the contractions of a cloud cost, and leave of it; and the whole of the pipelines, in kNN."""
     points, _ = cloud.load()
     tasks, states = {}, {}
     for key, (rings, contractor) in contractors(solves).items():
         if key[0] not in states:
             states[key[0]] = rings(points)
         tasks[key] = partial(contractor, states[key[0]])
+    tasks |= {name: partial(pipeline, points) for name, pipeline in named(",".join(WHOLE)).items()}
+    tasks["1 kNN"] = partial(yardstick, points)
+    found = in_turns(tasks, repeat)
+    _, knn = found.pop("1 kNN")
+    whole = {name: found.pop(name)[1]["cpu"] / knn["cpu"] for name in WHOLE}
     runs = []
-    for key, (state, facts) in in_turns(tasks, repeat).items():
+    for key, (state, facts) in found.items():
         report = state.report
         counts = dict(left=len(state), contracted=report.n_contracted, solves=len(report.iterations))
         refused = REFUSED in report.stop_reason
         runs.append(dict(key=list(key), cpu=facts["cpu"], wall=facts["wall"], refused=refused) | counts)
-    return dict(runs=runs)
+    return dict(runs=runs, whole=whole)
 
 
 def measure_figures(found: list[tuple[int, Case | Scan]], solves: int, repeat: int, jobs: int) -> list[dict]:
@@ -510,6 +516,12 @@ def figure_tables(rows: list[dict]) -> Tables:
             lines.append([name, str(n), *cells])
     header = ["", "points", "share left", "CPU ms", "solves", "refused"]
     tables.append(("the contraction, median (quartiles)", header, lines))
+    lines = []
+    for n, here in at.items():
+        for name in WHOLE:
+            values = np.array([row["whole"][name] for row in here])
+            lines.append([name, str(n), quartiles(values, 1), f"{values.mean():.1f}", f"{values.max():.1f}"])
+    tables.append(("end to end, in kNN", ["", "points", "median (quartiles)", "mean", "most"], lines))
     if failed := [row for row in rows if "failure" in row]:
         words = [[str(row["n"]), row["shape"], row["failure"]] for row in failed]
         tables.append(("failures", ["points", "cloud", "note"], words))

@@ -184,7 +184,8 @@ def contracted(tool, shape="tube", n=1024, **changed):
         name = "_".join([key[0], "lpr" if key[1] else "all", key[2]])
         run = dict(key=list(key), cpu=8.0, wall=8.0, left=n // 2, contracted=n, solves=4, refused=False)
         runs.append(run | changed.get(name, {}))
-    return dict(measure="figures", n=n, shape=shape, fixed=4, runs=runs)
+    whole = {name: 10.0 + i for i, name in enumerate(tool.WHOLE)}
+    return dict(measure="figures", n=n, shape=shape, fixed=4, runs=runs, whole=whole)
 
 
 class TestArithmetic:
@@ -248,6 +249,14 @@ class TestArithmetic:
         assert cells["LPR, own rule"] == "0.50 (0.50 to 0.50)"
         assert cells["own rule, no LPR"] == "0.75 (0.75 to 0.75)"
         assert (cells["clouds"], cells["paper"], cells["of these"]) == ("1", "about 1", "1")
+
+    def test_whole_pipelines_in_knn(self, tool):
+        rows = [contracted(tool, shape) for shape in ("tube", "mug")]
+        rows[1]["whole"] = dict(rows[0]["whole"], default=16.0)
+        title, header, lines = tool.figure_tables(rows)[-1]
+        assert (title, header[-2:]) == ("end to end, in kNN", ["mean", "most"])
+        assert lines[0] == ["cao2010", "1024", "10.0 (10.0 to 10.0)", "10.0", "10.0"]
+        assert lines[2] == ["default", "1024", "14.0 (13.0 to 15.0)", "14.0", "16.0"]
 
     def test_failures_are_lines(self, tool):
         failed = dict(measure="figures", n=512, shape="mug", fixed=4, failure="ValueError: no")
@@ -327,6 +336,7 @@ class TestCommands:
             left = {name: tool.take(row, key)["left"] for name, key in tool.shown().items()}
             assert left["cao2010"] == row["n"] > left["wen2024"]
             assert all(run["solves"] == 4 for run in row["runs"] if run["key"][2] == "fixed" and not run["refused"])
+            assert all(row["whole"][name] > 1 for name in tool.WHOLE)
         assert printed.count("| 300 | 2 | ") == 2
         assert {path.name for path in (tmp_path / "new").iterdir()} == {"contraction_256.png", "contraction_300.png"}
 
