@@ -330,6 +330,40 @@ def nothing(points):
 """
 
 
+class TestOptions:
+    @pytest.fixture
+    def tool(self, root, monkeypatch):
+        monkeypatch.syspath_prepend(str(root / "benchmarks"))
+        yield importlib.import_module("options")
+        del sys.modules["options"]
+
+    def test_tables(self, tool):
+        def row(cloud, settings, seed):
+            values = dict(error=0.1 * seed, radius_error=0.05, ends=0.5, leaves=seed - 1, vertices=60 + seed)
+            return dict(cloud=cloud, settings=settings) | values
+
+        found = tool.tables([row(*which, seed) for which in tool.wanted() for seed in range(3)])
+        ((_, _, twigs),), ((_, header, radii),), ((_, _, spacing),) = (found[part] for part in tool.PARTS)
+        assert [line[0] for line in twigs] == list(tool.TWIGS)
+        assert {cell for line in twigs for cell in line[1:]} == {"-1 0 +1"}
+        assert dict(zip(header, radii[0], strict=True))["ends, `k=24`"] == "0.50"
+        assert spacing[0] == ["`torus`", *["61, 0.100"] * 3]
+
+    def test_one_draw(self, tool, tmp_path, monkeypatch):
+        monkeypatch.setattr(tool, "wanted", lambda: [("`torus`", "Refiner.spacing=1")])
+        monkeypatch.setattr(
+            tool, "tables", lambda rows: {part: [(part, ["cloud"], [[rows[0]["cloud"]]])] for part in tool.PARTS}
+        )
+        page, out = tmp_path / "page.md", tmp_path / "out.json"
+        page.write_text("".join(f"<!-- {part} -->\n<!-- end -->\n" for part in tool.PARTS))
+        tool.options(page, draws=1, jobs=0, output=out)
+        (row,) = json.loads(out.read_text())["rows"]
+        assert row["topology"]
+        assert row["leaves"] == 0
+        assert 20 < row["vertices"] < 50
+        assert page.read_text().count("| `torus` |") == 3
+
+
 class TestPeers:
     @pytest.fixture
     def tool(self, root, monkeypatch):
