@@ -123,7 +123,7 @@ def test_noise_is_not_smooth(surface):
 
 @pytest.mark.parametrize("n", [100, 700, 2500])
 def test_a_grid_keeps_about_so_many_each_the_nearest_to_the_middle_of_its_cell(surface, n):
-    kept, into = thin_to_grid(surface, n)
+    kept, into, _ = thin_to_grid(surface, n)
     assert 0.6 * n < len(kept) < 1.7 * n
     np.testing.assert_array_equal(into[kept], np.arange(len(kept)))
     for cell in range(len(kept)):
@@ -137,8 +137,8 @@ def test_a_grid_keeps_about_so_many_each_the_nearest_to_the_middle_of_its_cell(s
 
 def test_a_grid_does_not_depend_on_the_order_or_scale(surface):
     order = np.random.default_rng(0).permutation(len(surface))
-    kept, into = thin_to_grid(surface, 500)
-    again, into_again = thin_to_grid(64 * surface[order], 500)
+    kept, into, _ = thin_to_grid(surface, 500)
+    again, into_again, _ = thin_to_grid(64 * surface[order], 500)
     assert set(order[again].tolist()) == set(kept.tolist())
     np.testing.assert_array_equal(order[again[into_again]], kept[into[order]])
 
@@ -146,7 +146,7 @@ def test_a_grid_does_not_depend_on_the_order_or_scale(surface):
 @pytest.mark.parametrize("far", [1e3, 1e7, 1e12])
 def test_points_far_off_do_not_widen_the_cells(surface, far):
     points = np.concatenate([surface, [[far, 0, 0], [0, -far, 0]]])
-    kept, into = thin_to_grid(points, 500)
+    kept, into, _ = thin_to_grid(points, 500)
     assert 300 < len(kept) < 850
     np.testing.assert_array_equal(into[kept], np.arange(len(kept)))
 
@@ -155,7 +155,8 @@ def test_a_grid_that_is_too_coarse_keeps_all():
     """Half of the points so far off that the others would be in a few of the finest cells."""
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(size=(500, 3)), 1e9 + np.zeros((500, 3))])
-    kept, into = thin_to_grid(points, 100)
+    kept, into, counts = thin_to_grid(points, 100)
+    np.testing.assert_array_equal(counts, 1)
     np.testing.assert_array_equal(kept, np.arange(1000))
     np.testing.assert_array_equal(into, np.arange(1000))
 
