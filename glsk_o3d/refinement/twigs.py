@@ -37,9 +37,12 @@ def cut_twigs(skeleton, reach):
         stop = np.cumsum(np.bincount(skeleton.vertex_of_point[owned], minlength=len(degree)))
         start = np.concatenate([[0], stop[:-1]])
         branches, at, worst = skeleton.branches, defaultdict(list), {}
+        ending = np.zeros(len(degree), bool)  # another twig may be far from its points: that does not make it thick
         for branch in branches:
             at[branch[0]].append(branch)
             at[branch[-1]].append(branch)
+            if 1 in degree[branch[[0, -1]]]:
+                ending[branch] = degree[branch] < 3
         for branch in branches:
             a, b = branch[0], branch[-1]
             if sorted((degree[a] == 1, degree[b] == 1)) != [False, True]:
@@ -47,7 +50,8 @@ def cut_twigs(skeleton, reach):
             junction, twig = (a, branch[1:]) if degree[b] == 1 else (b, branch[:-1])
             points = skeleton.points[np.concatenate([owned[start[v] : stop[v]] for v in twig])]
             others = [other for other in at[junction] if other is not branch]
-            far = np.quantile(beyond(points, skeleton.vertices, thickness, others), FAR) if len(points) else 0.0
+            thick = np.where(ending, np.minimum(thickness, thickness[junction]), thickness)
+            far = np.quantile(beyond(points, skeleton.vertices, thick, others), FAR) if len(points) else 0.0
             if far < worst.get(junction, (reach,))[0]:
                 worst[junction] = (far, twig)
         if not worst:
