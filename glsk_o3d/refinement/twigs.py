@@ -92,4 +92,5 @@ def beyond(points, vertices, thickness, paths):
     foot = np.clip(along, 0, length)
     distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
     share = foot / np.maximum(length, tiny)
-    return (distance / np.maximum(thickness[a] + share * (thickness[b] - thickness[a]), tiny)).min(axis=1)
+    least = max(np.finfo(float).eps * distance.max(), tiny)  # of a line, which has no thickness but roundings
+    return (distance / np.maximum(thickness[a] + share * (thickness[b] - thickness[a]), least)).min(axis=1)

@@ -124,6 +124,12 @@ def test_ends_of_the_trunk_stay():
     assert cut_twigs(raw, 0.8) is raw
 
 
+def test_lines_have_no_thickness():
+    """Whatever is off a line leaves it."""
+    raw = tree((10, 0.5), radius=0.0)
+    assert cut_twigs(raw, 1.3) is raw
+
+
 def test_zero_keeps_all():
     raw = tree((5, 0.07))
     assert cut_twigs(raw, 0) is raw
