@@ -126,7 +126,7 @@ def test_ends_of_the_trunk_stay():
 
 def test_lines_have_no_thickness():
     """Whatever is off a line leaves it."""
-    raw = tree((10, 0.5), radius=0.0)
+    raw = tree((10, 50.0), radius=0.0)
     assert cut_twigs(raw, 1.3) is raw
 
 
