@@ -53,6 +53,25 @@ def published_k(n: int) -> int:
     return int(np.clip(np.floor(0.012 * n + 0.5), 8, 30))
 
 
+@dataclass(frozen=True)
+class _Surface:
+    """Points in the working frame that say where the surface is, and what their neighbourhoods are like."""
+
+    points: np.ndarray
+    neighbours: np.ndarray
+    weight: np.ndarray  # points of the cloud that each stands for
+    merged: np.ndarray  # distinct points that each is the mean of
+    noise: np.ndarray
+    normals: np.ndarray
+    spread: np.ndarray
+    across: np.ndarray  # normals of the planes that the rings lie in
+
+    @classmethod
+    def of(cls, points, neighbours, weight, merged):
+        spread, normals = principal(points, neighbours)
+        return cls(points, neighbours, weight, merged, noise_share(spread, neighbours), normals, spread, normals)
+
+
 @documented
 @dataclass(frozen=True, kw_only=True)
 class RingBuilder(Filter):
@@ -173,44 +192,14 @@ class RingBuilder(Filter):
         good = points if finite.all() else points[finite]
         most = self._number(len(good))
         # a radius is in terms of the spacing that the cloud came with
-        sample, stands_for = _sample(good, 2 * most if self.radius is None else len(good))
-        good = good[sample]
-        frame, distinct, row, distance, neighbours = self._distinct(good)
-        stray, counts, weight = np.zeros(len(good), bool), np.bincount(stands_for), np.empty(len(distinct))
-        weight[row] = counts  # copies count once, but in a sample
-        if self.outlier_factor:
-            left = without_outliers(distinct, weight, distance, neighbours, self.outlier_factor, MIN_POINTS)
-            if len(left) < len(distinct):
-                kept = np.zeros(len(distinct), bool)
-                kept[left] = True
-                stray = ~kept[row]
-                frame, distinct, row[~stray], _, neighbours = self._distinct(good[~stray])
-                weight = np.empty(len(distinct))
-                weight[row[~stray]] = counts[~stray]
-        if stray.any():
-            row[stray] = cKDTree(distinct).query(frame.into(good[stray]))[1]
-
-        spread, normals = principal(distinct, neighbours)
-        noise = noise_share(spread, neighbours)
-        stands = np.ones(len(distinct))  # for so many distinct points
-        while self.denoise and self._may_merge and np.count_nonzero(noise) >= 2 * PLENTY:
-            into, mean, weight_of_mean = average_noisy(distinct, neighbours, noise, weight, PLENTY)
-            if len(mean) > STEADY * len(distinct):
-                break
-            distinct, weight, stands = mean, weight_of_mean, np.bincount(into, stands)
-            row, neighbours = into[row], nearest_neighbours(distinct, self._neighbours(len(distinct)))[1]
-            spread, normals = principal(distinct, neighbours)
-            noise = noise_share(spread, neighbours)
-        across = normals  # of the planes that the rings lie in
-        if self.denoise and noise.any():
-            distinct, neighbours, left, nearest = self._denoised(distinct, neighbours.shape[1], noise, weight)
-            # a ridge has no normals: those of the cloud as it came
-            normals, noise, stands = normals[left], noise[left], stands[left]
-            stray |= (left[nearest] != np.arange(len(nearest)))[row]
-            row = nearest[row]
-            spread, across = principal(distinct, neighbours)
-        survivors, owner, neighbours = self._thinned(distinct, neighbours, spread, most)
-        n, positions, axes = len(survivors), distinct[survivors], plane_axes(across[survivors])
+        sample, stands_for, counts = _sample(good, 2 * most if self.radius is None else len(good))
+        frame, surface, row, stray = self._without_outliers(good[sample], counts)
+        surface, into = self._averaged(surface)
+        row = into[row]
+        surface, into, alone = self._denoised(surface)
+        row, stray = into[row], stray | alone[row]
+        survivors, owner, neighbours = self._thinned(surface, most)
+        n, positions, axes = len(survivors), surface.points[survivors], plane_axes(surface.across[survivors])
         rings = star_rings(positions, np.arange(n), self._within(positions, neighbours[:, 1:], frame), axes)
         row_of_point, outlier, witness = (
             np.full(len(points), -1),
@@ -225,44 +214,74 @@ class RingBuilder(Filter):
             outlier=outlier,
             witness=witness,
             frame=frame,
-            cloud=distinct,
-            noise=noise,
-            normals=normals,
+            cloud=surface.points,
+            noise=surface.noise,
+            normals=surface.normals,
             survivors=survivors,
             owner=owner,
-            mass=np.bincount(owner, stands) * (n / stands.sum()),
+            mass=np.bincount(owner, surface.merged) * (n / surface.merged.sum()),
             **at_rest(positions, rings),
             report=Report(
                 n_input=len(points),
                 n_dropped=int((~finite).sum()),
                 n_outliers=int(outlier.sum()),
-                n_sampled=len(good),
-                n_distinct=int(stands.sum()),
+                n_sampled=len(sample),
+                n_distinct=int(surface.merged.sum()),
                 n_contracted=n,
             ),
         )
 
-    def _denoised(self, cloud, k, noise, weight):
-        """The denoised cloud and its neighbours, without points that now stand alone; who is left; nearest of these."""
-        calm = to_ridges(cloud, noise, self.denoise, weight)
-        distance, neighbours = nearest_neighbours(calm, k)
-        alone = (
-            (noise > FAIRLY_NOISY)
-            & (isolation(distance[:, 1:].mean(axis=1), neighbours) > ALONE)
-            & (self.outlier_factor > 0)
-        )
-        if not 0 < alone.sum() <= len(calm) - max(k, MIN_POINTS):
-            return calm, neighbours, np.arange(len(calm)), np.arange(len(calm))
-        left = np.flatnonzero(~alone)
-        nearest = np.cumsum(~alone) - 1
-        nearest[alone] = cKDTree(calm[left]).query(calm[alone])[1]
-        changed = np.flatnonzero(alone[neighbours[left]].any(axis=1))
-        calm, neighbours = calm[left], nearest[neighbours[left]]
-        neighbours[changed] = nearest_neighbours(calm, k, of=calm[changed])[1]
-        return calm, neighbours, left, nearest
+    def _without_outliers(self, points, counts):
+        """Frame and surface of the distinct points but outliers, the row of or nearest to each point, the outliers."""
+        frame, cloud, row, weight, distance, neighbours = self._distinct(points, counts)
+        stray = np.zeros(len(points), bool)
+        if self.outlier_factor:
+            found = np.ones(len(cloud), bool)
+            found[without_outliers(cloud, weight, distance, neighbours, self.outlier_factor, MIN_POINTS)] = False
+            stray = found[row]
+        if stray.any():
+            frame, cloud, row[~stray], weight, _, neighbours = self._distinct(points[~stray], counts[~stray])
+            row[stray] = cKDTree(cloud).query(frame.into(points[stray]))[1]
+        return frame, _Surface.of(cloud, neighbours, weight, np.ones(len(cloud))), row, stray
 
-    def _thinned(self, cloud, neighbours, spread, most):
+    def _averaged(self, surface):
+        """The surface with means in the place of noisy points while there are plenty, and the row each went into."""
+        row = np.arange(len(surface.points))
+        while self.denoise and self._may_merge and np.count_nonzero(surface.noise) >= 2 * PLENTY:
+            noisy = surface.points, surface.neighbours, surface.noise, surface.weight
+            into, mean, weight = average_noisy(*noisy, PLENTY)
+            if len(mean) > STEADY * len(into):
+                break
+            neighbours = nearest_neighbours(mean, self._neighbours(len(mean)))[1]
+            surface, row = _Surface.of(mean, neighbours, weight, np.bincount(into, surface.merged)), into[row]
+        return surface, row
+
+    def _denoised(self, surface):
+        """The surface drawn to its ridges, without points that now stand alone; the row nearest to each; the alone."""
+        everybody, alone = np.arange(len(surface.points)), np.zeros(len(surface.points), bool)
+        if not (self.denoise and surface.noise.any()):
+            return surface, everybody, alone
+        calm, k = to_ridges(surface.points, surface.noise, self.denoise, surface.weight), surface.neighbours.shape[1]
+        distance, neighbours = nearest_neighbours(calm, k)
+        found = isolation(distance[:, 1:].mean(axis=1), neighbours) > ALONE
+        found &= (surface.noise > FAIRLY_NOISY) & (self.outlier_factor > 0)
+        if 0 < found.sum() <= len(calm) - max(k, MIN_POINTS):
+            alone = found
+        left, nearest = np.flatnonzero(~alone), np.cumsum(~alone) - 1
+        if len(left) < len(calm):
+            nearest[alone] = cKDTree(calm[left]).query(calm[alone])[1]
+            changed = np.flatnonzero(alone[neighbours[left]].any(axis=1))
+            calm, neighbours = calm[left], nearest[neighbours[left]]
+            neighbours[changed] = nearest_neighbours(calm, k, of=calm[changed])[1]
+        spread, across = principal(calm, neighbours)
+        # a ridge has no normals: those of the surface as it came
+        noise, normals = surface.noise[left], surface.normals[left]
+        ridge = _Surface(calm, neighbours, surface.weight[left], surface.merged[left], noise, normals, spread, across)
+        return ridge, nearest, alone
+
+    def _thinned(self, surface, most):
         """Rows of the points to contract, the one of these that stands for each point, and their neighbours."""
+        cloud, neighbours, spread = surface.points, surface.neighbours, surface.spread
         left, owner = np.arange(len(cloud)), np.arange(len(cloud))
 
         def merge(into, kept):
@@ -318,8 +337,8 @@ class RingBuilder(Filter):
             )
         return finite
 
-    def _distinct(self, points):
-        """Frame, distinct points in Morton order, the row of each point, and distances and rows of their neighbours."""
+    def _distinct(self, points, counts):
+        """Frame, distinct points in Morton order, row of each point, counts, distances and rows of their neighbours."""
         if len(points) < MIN_POINTS:
             raise InvalidCloudError(
                 f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones"
@@ -353,11 +372,14 @@ class RingBuilder(Filter):
             position[order] = np.arange(len(cloud))
             cloud, row = cloud[order], position[inverse.reshape(-1)[row]]
             distance, neighbours = nearest_neighbours(cloud, self._neighbours(len(cloud)))
-        return frame, cloud, row, distance, neighbours
+        weight = np.empty(len(cloud))
+        weight[row] = counts
+        return frame, cloud, row, weight, distance, neighbours
 
 
 def _sample(points, n):
-    """About n points that stand for a cloud of more than twice as many, and which of them stands for each."""
+    """About n points that stand for a cloud of more than twice as many, which of them does for each, for how many."""
     if len(points) > 2 * n:
         return thin_to_grid(points, n)
-    return np.arange(len(points)), np.arange(len(points))
+    everybody = np.arange(len(points))
+    return everybody, everybody, np.ones(len(points))

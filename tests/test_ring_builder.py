@@ -21,6 +21,7 @@ from glsk_o3d import (
 from glsk_o3d.analysis import compare
 from glsk_o3d.numerics.neighbourhoods import isolation, nearest_neighbours, principal
 from glsk_o3d.numerics.ridges import noise_share, to_ridges
+from glsk_o3d.numerics.thinning import MOST
 from glsk_o3d.pipelines import default
 from glsk_o3d.ring_builder import ALONE, FAIRLY_NOISY, MIN_POINTS, published_k, usual_k, usual_number
 
@@ -351,6 +352,16 @@ def test_clean_parts_are_not_averaged():
     np.testing.assert_allclose(state.mass, many / many.mean(), rtol=1e-12)
 
 
+def test_noisy_points_stay_where_averaging_them_would_hardly_make_fewer(monkeypatch):
+    """A noisy part of a cloud, next to a clean one with three and with six times as many points."""
+    monkeypatch.setattr("glsk_o3d.ring_builder.PLENTY", 400)
+    noisy = samples.torus(1000, noise=0.05).points + [0, 0, 1]
+    for clean, stays in ((3000, False), (6000, True)):
+        state = RingBuilder(outlier_factor=0)(np.concatenate([samples.torus(clean).points, noisy]))
+        assert (len(state.cloud) == clean + 1000) == stays
+        assert len(state.cloud) > clean + 400
+
+
 # ---- points that stand alone after denoising
 
 
@@ -619,6 +630,52 @@ def test_a_sampled_cloud_has_the_skeleton_of_the_whole():
         assert found.topology
         assert found.error < 0.1
         assert found.inside == 1
+
+
+def test_what_floats_around_a_sampled_surface_is_told_by_how_many_points_stand_behind_it():
+    """The sample alone is hardly denser on the surface than beside it."""
+    surface, rng = samples.torus(20000).points, np.random.default_rng(0)
+    gas = rng.uniform(-0.6, 0.6, (3000, 3))
+    gas = gas[cKDTree(surface).query(gas)[0] > 0.05][:800]
+    state = RingBuilder(thin_to=2000)(np.concatenate([surface, gas]))
+    assert state.report.n_sampled < 8000
+    assert not state.outlier[:20000].any()
+    assert state.outlier[20000:].mean() > 0.9
+
+
+@pytest.fixture
+def sampled():
+    """A noisy cloud with points far off, and a RingBuilder that takes a sample of it."""
+    points = np.concatenate([samples.torus(16000, noise=0.03).points, [[0, 0, z] for z in (1, 2, 4)]])
+    return points, RingBuilder(thin_to=1500, k=16)
+
+
+def test_a_sample_is_denoised_by_how_many_points_it_stands_for(sampled):
+    points, filter = sampled
+    plain, calm = (replace(filter, denoise=passes)(points) for passes in (0, 4))
+    near = nearest_neighbours(plain.cloud, 16)[1]
+    noise = noise_share(principal(plain.cloud, near)[0], near)
+    weight = np.bincount(plain.row_of_point[~plain.outlier])
+    assert plain.report.n_outliers >= 3
+    assert weight.max() > 10
+    ridge = to_ridges(plain.cloud, noise, 4, weight)
+    np.testing.assert_array_equal(calm.cloud, ridge[np.isin(ridge, calm.cloud).all(axis=1)])
+    assert len(calm.cloud) > 0.9 * len(ridge)
+
+
+def test_a_sample_is_averaged_by_how_many_points_it_stands_for(sampled, monkeypatch):
+    """Round by round: a mean of means is that of all points."""
+    points, filter = sampled
+    plain = replace(filter, denoise=0)(points)
+    monkeypatch.setattr("glsk_o3d.ring_builder.PLENTY", 200)
+    monkeypatch.setattr("glsk_o3d.ring_builder.to_ridges", lambda cloud, noise, passes, weight: cloud)
+    monkeypatch.setattr("glsk_o3d.ring_builder.ALONE", np.inf)
+    state = filter(points)
+    assert MOST * len(state.cloud) < len(plain.cloud)
+    counted = ~plain.outlier
+    row, place = state.row_of_point[counted], plain.cloud[plain.row_of_point[counted]]
+    mean = np.column_stack([np.bincount(row, axis) for axis in place.T]) / np.bincount(row)[:, None]
+    np.testing.assert_allclose(state.cloud, mean, atol=1e-13)
 
 
 def test_one_point_far_off_does_not_spoil_the_sample():

@@ -69,6 +69,8 @@ def thin_to_grid(points, n):
         Points left, about n. Points far off share the cells at the border.
     into : (m,) int array
         Position in `kept` of the point that stands for each.
+    counts : (c,) float array
+        Points that each stands for; copies count once.
     """
     # A few points far off must not decide how wide the cells are.
     low, high = np.quantile(points[:: 1 + len(points) // 100000], [TAIL, 1 - TAIL], axis=0)
@@ -79,7 +81,7 @@ def thin_to_grid(points, n):
     counts = [1]
     while counts[-1] < n:  # cells half as wide
         if len(counts) > BITS:
-            return np.arange(len(points)), np.arange(len(points))
+            return np.arange(len(points)), np.arange(len(points)), np.ones(len(points))
         counts.append(1 + np.count_nonzero(np.diff(ordered >> np.uint64(3 * (BITS - len(counts))))))
     wider = np.log(counts[-1] / n) / np.log(counts[-1] / counts[-2])
     code = morton_codes(inner, 2 ** (len(counts) - 1 - wider))[order]
@@ -87,16 +89,20 @@ def thin_to_grid(points, n):
     order, code = order[again], code[again]
     begin = np.flatnonzero(np.append(True, code[1:] != code[:-1]))
     size = np.diff(np.append(begin, len(code)))
+    cell = np.repeat(np.arange(len(begin)), size)
     ordered = points[order]
-    away = ordered - np.repeat(np.add.reduceat(ordered, begin) / size[:, None], size, axis=0)
+    x, y, z = (ordered[1:] != ordered[:-1]).T
+    fresh = np.append(True, x | y | z)  # no copy of the one before
+    counts = np.bincount(cell, fresh)
+    mean = np.add.reduceat(ordered * fresh[:, None], begin) / counts[:, None]
+    away = ordered - np.repeat(mean, size, axis=0)
     squared = np.einsum("ni,ni->n", away, away)
     nearest = np.flatnonzero(squared == np.repeat(np.minimum.reduceat(squared, begin), size))
-    cell = np.repeat(np.arange(len(begin)), size)
     kept = np.empty(len(begin), int)
     kept[cell[nearest[::-1]]] = order[nearest[::-1]]
     into = np.empty(len(points), int)
     into[order] = cell
-    return kept, into
+    return kept, into, counts
 
 
 def thin_smooth(points, neighbours, spread, around):

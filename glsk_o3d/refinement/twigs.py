@@ -1,5 +1,6 @@
 """Cut twigs that hardly leave the part they grow from."""
 
+from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
@@ -11,17 +12,18 @@ FAR = 0.9  # share of a twig's points that its reach covers
 
 
 def cut_twigs(skeleton, reach):
-    """Cut branches that end in a leaf and whose points reach no farther than the surface around their junction.
+    """Cut branches that end in a leaf and whose points reach no farther than the surface around what they grow from.
 
     What counts is the points, not the curve: the contraction shortens stubs as thick as they are long, and lets thin
-    ones grow.
+    ones grow. And it is how far they leave the branches that meet them, not how far they are from the junction: along
+    a part they may be anywhere.
 
     Parameters
     ----------
     skeleton : Skeleton
     reach : float
-        Least distance of a branch's points from its junction (all but a tenth), over the distance from the junction to
-        the surface. Of every junction the least first, until there is none.
+        Least distance of a branch's points (all but a tenth) from the other branches at its junction, over the distance
+        from these to the surface there. Of every junction the least first, until there is none.
 
     Returns
     -------
@@ -34,16 +36,23 @@ def cut_twigs(skeleton, reach):
         owned = owned[np.argsort(skeleton.vertex_of_point[owned], kind="stable")]
         stop = np.cumsum(np.bincount(skeleton.vertex_of_point[owned], minlength=len(degree)))
         start = np.concatenate([[0], stop[:-1]])
-        worst = {}
-        for branch in skeleton.branches:
+        branches, at, worst = skeleton.branches, defaultdict(list), {}
+        ending = np.zeros(len(degree), bool)  # another twig may be far from its points: that does not make it thick
+        for branch in branches:
+            at[branch[0]].append(branch)
+            at[branch[-1]].append(branch)
+            if 1 in degree[branch[[0, -1]]]:
+                ending[branch] = degree[branch] < 3
+        for branch in branches:
             a, b = branch[0], branch[-1]
             if sorted((degree[a] == 1, degree[b] == 1)) != [False, True]:
                 continue
             junction, twig = (a, branch[1:]) if degree[b] == 1 else (b, branch[:-1])
             points = skeleton.points[np.concatenate([owned[start[v] : stop[v]] for v in twig])]
-            distance = np.linalg.norm(points - skeleton.vertices[junction], axis=1)
-            far = np.quantile(distance, FAR) if len(distance) else 0.0
-            if far < worst.get(junction, (reach * thickness[junction],))[0]:
+            others = [other for other in at[junction] if other is not branch]
+            thick = np.where(ending, np.minimum(thickness, thickness[junction]), thickness)
+            far = np.quantile(beyond(points, skeleton.vertices, thick, others), FAR) if len(points) else 0.0
+            if far < worst.get(junction, (reach,))[0]:
                 worst[junction] = (far, twig)
         if not worst:
             return skeleton
@@ -55,3 +64,33 @@ def cut_twigs(skeleton, reach):
         skeleton = merge_vertices(skeleton, group)
         # a junction stays where it was
         skeleton = replace(skeleton, vertices=places)
+
+
+def beyond(points, vertices, thickness, paths):
+    """Distance from the edge of some paths from which it is least over the thickness, which is linear along an edge.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    vertices : (M, 3) float array
+    thickness : (M,) float array
+    paths : list of (p,) int array
+
+    Returns
+    -------
+    (n,) float array
+        Over the thickness at the nearest place of that edge.
+    """
+    a, b = (np.concatenate([path[part] for path in paths]) for part in (slice(-1), slice(1, None)))
+    start, step = vertices[a], vertices[b] - vertices[a]
+    length, tiny = np.linalg.norm(step, axis=1), np.finfo(float).tiny
+    direction = step / np.maximum(length, tiny)[:, None]
+    # relative to one of them: products of coordinates far from the origin would cancel
+    points, start = points - start[0], start - start[0]
+    along = points @ direction.T - np.einsum("ej,ej->e", start, direction)
+    squared = (points**2).sum(axis=1)[:, None] - 2 * points @ start.T + (start**2).sum(axis=1)
+    foot = np.clip(along, 0, length)
+    distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
+    share = foot / np.maximum(length, tiny)
+    least = max(np.finfo(float).eps * distance.max(), tiny)  # of a line, which has no thickness but roundings
+    return (distance / np.maximum(thickness[a] + share * (thickness[b] - thickness[a]), least)).min(axis=1)

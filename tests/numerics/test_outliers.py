@@ -77,6 +77,23 @@ def test_more_neighbours_than_points_are_left():
         np.testing.assert_array_equal(kept, np.arange(200))
 
 
+def test_what_floats_around_a_part_with_a_tenth_of_the_points():
+    """The other part is so coarse that nothing is far from its neighbours by the measure of most points."""
+    part, other = samples.torus(2000).points, 20 * samples.torus(20000, seed=1).points + [80, 0, 0]
+    points = np.concatenate([part, other, floating(300)])
+    found = np.ones(len(points), bool)
+    found[left(points)] = False
+    assert not found[:22000].any()
+    assert found[22000:].mean() > 0.85
+
+
+def test_a_few_points_close_together_make_no_outliers_of_those_around():
+    """A clump of a fortieth of the points in a noisy cloud, whose neighbourhoods fill space."""
+    clump = [0.4, 0, 0.1] + 0.01 * np.random.default_rng(0).normal(size=(300, 3))
+    points = np.concatenate([samples.torus(N, noise=0.02).points, clump])
+    assert len(points) - len(left(points)) < 20
+
+
 @pytest.mark.parametrize("noise", [0, 0.003])
 def test_uneven_clouds_stay(noise):
     """Ten times as dense at one end as at the other."""
@@ -89,10 +106,10 @@ def test_where_each_point_stands_for_many():
     """A sample evens out the density that tells a surface from what floats around it; the weight knows it."""
     dense = samples.torus(60000, ring_radius=0.4, radius=0.1).points
     gas = floating(2500)
-    kept, into = thin_to_grid(np.concatenate([dense, gas]), 12000)
+    kept, _, counts = thin_to_grid(np.concatenate([dense, gas]), 12000)
     points, true = np.concatenate([dense, gas])[kept], kept < len(dense)
     found = np.ones(len(kept), bool)
-    found[left(points, np.bincount(into).astype(float))] = False
+    found[left(points, counts)] = False
     assert not found[true].any()
     assert found[~true].mean() > 0.99
 

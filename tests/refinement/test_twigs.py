@@ -1,10 +1,13 @@
-"""Twigs are cut by the reach of their points over the thickness where they begin."""
+"""Twigs are cut by how far their points leave the other branches, over the thickness of these."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
-from glsk_o3d.refinement.twigs import FAR, cut_twigs
+from glsk_o3d.refinement.twigs import FAR, beyond, cut_twigs
 
 N = 21  # vertices of the trunk
 PER = 60  # points of each: many, so that a cut twig does not change the thickness of its junction
@@ -15,11 +18,12 @@ def directions(n, seed=0):
     return towards / np.linalg.norm(towards, axis=1, keepdims=True)
 
 
-def tree(*twigs, radius=0.1, length=None, share=1.0, per=10):
+def tree(*twigs, radius=0.1, length=None, share=1.0, per=10, along=0.0):
     """A trunk along x from -1 to 1, every point of it at the distance `radius` from its vertex.
 
     Twigs (vertex, reach) grow from it in two edges each, along z, as long as they reach or `length` long. All their
-    points are as far from the junction as they reach; where `share` is below 1, the others are ten times as far.
+    points are as far from the trunk as they reach, `along` behind the junction; where `share` is below 1, the others
+    are ten times as far.
     """
     x = np.linspace(-1, 1, N)
     trunk = np.column_stack([x, 0 * x, 0 * x])
@@ -30,7 +34,9 @@ def tree(*twigs, radius=0.1, length=None, share=1.0, per=10):
         edges += [(at, first), (first, first + 1)]
         vertices += [trunk[at] + [0, 0, (length or reach) * part] for part in (0.4, 1)]
         distance = np.where(np.arange(2 * per) < round(share * 2 * per), reach, 10 * reach)
-        points.append(trunk[at] + distance[:, None] * directions(2 * per, seed=first))
+        across = directions(2 * per, seed=first) * [0, 1, 1]
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        points.append(trunk[at] + [along, 0, 0] + distance[:, None] * across)
         owner.append(first + np.arange(2 * per) % 2)
     points, owner = np.concatenate(points), np.concatenate(owner)
     return Skeleton(vertices, sorted(edges), np.full(len(vertices), 0.1), owner, points, directions(len(points)))
@@ -53,10 +59,36 @@ def test_short_is_cut_long_stays():
 @pytest.mark.parametrize("reach", [0.4, 1.3, 2.0])
 @pytest.mark.parametrize(("share", "cut"), [(1 - 1e-6, True), (1 + 1e-6, False)])
 def test_threshold_is_exact(reach, share, cut):
-    radius = np.full(N, 0.3)
+    radius = np.full(N, 0.03)
     radius[10] = 0.1  # at the junction, and nowhere else
     skeleton = cut_twigs(tree((10, reach * 0.1 * share), radius=radius), reach)
     assert (len(skeleton.vertices) == N) == cut
+
+
+@pytest.mark.parametrize("along", [0.025, 0.05, 0.9])
+@pytest.mark.parametrize(("share", "cut"), [(1 - 1e-6, True), (1 + 1e-6, False)])
+def test_what_counts_is_how_far_points_are_from_the_part_and_how_thick_it_is_there(along, share, cut):
+    """Between two vertices of the trunk, and far from the junction where it is thin."""
+    radius = np.where(np.linspace(-1, 1, N) < 0.4, 0.3, 0.1)
+    there = 0.1 if along > 0.4 else 0.3
+    skeleton = cut_twigs(tree((10, 1.3 * there * share), radius=radius, along=along), 1.3)
+    assert (len(skeleton.vertices) == N) == cut
+
+
+@pytest.mark.parametrize("far", [0, 1e4])
+def test_distance_from_paths_over_their_thickness(far):
+    """The nearest place of edges that are cut into very short ones."""
+    rng = np.random.default_rng(0)
+    vertices, thickness, points = rng.normal(size=(12, 3)), rng.uniform(0.1, 1, 12), rng.normal(size=(200, 3))
+    paths, expected = [np.array(path) for path in ([0, 1, 2, 3], [0, 4], [5, 0, 5])], np.inf
+    for path in paths:
+        for a, b in pairwise(path):
+            share = np.linspace(0, 1, 3001)[:, None]
+            places, thick = (values[a] + share * (values[b] - values[a]) for values in (vertices, thickness[:, None]))
+            distance, nearest = cKDTree(places).query(points)
+            expected = np.minimum(expected, distance / thick[nearest, 0])
+    found = beyond(points + far, vertices + far, thickness, paths)
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
 
 
 @pytest.mark.parametrize(("reach", "length", "cut"), [(0.07, 0.9, True), (0.3, 0.02, False)])
@@ -90,6 +122,12 @@ def test_ends_of_the_trunk_stay():
     """Only what leaves a junction is a twig: a path shorter than it is thick is all there is."""
     raw = tree(radius=50.0)
     assert cut_twigs(raw, 0.8) is raw
+
+
+def test_lines_have_no_thickness():
+    """Whatever is off a line leaves it."""
+    raw = tree((10, 50.0), radius=0.0)
+    assert cut_twigs(raw, 1.3) is raw
 
 
 def test_zero_keeps_all():
