@@ -24,13 +24,14 @@ class Refiner(Filter):
 
     1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
        the shortest, until there is no triangle.
-    2. Loops that open less than their tube is thick are zipped up, and branches shorter than the part they grow from is
-       thick are cut.
+    2. Loops that open less than their tube is thick are zipped up, and branches whose points hardly leave the part that
+       they grow from are cut.
     3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
        corners.
     4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
        side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
-    5. Loops that hang by a thread, and narrow loops where the points hardly say where the axis is, are cut.
+    5. Loops that hang by a thread, and narrow loops where the points hardly say where the axis is, are cut, and twigs
+       that this leaves.
     6. Ends of different parts that point at each other across a gap of the scan are joined.
 
     The first step is published; with `opening`, `twig`, `spacing`, `recentre`, `weak`, `sure` and `bridge` all 0 it
@@ -72,7 +73,8 @@ class Refiner(Filter):
     )
     twig: float = parameter(
         1.3,
-        "Least reach of a branch's points from its junction over the thickness there; others are cut. 0 keeps all.",
+        "Least reach of a branch's points from the branches it leaves over the thickness there; others are cut. 0 keeps "
+        "all.",
         type="float",
         low=0,
     )
@@ -116,10 +118,12 @@ class Refiner(Filter):
         if self.spacing:
             skeleton = resample(skeleton, self.spacing)
         vertices, confidence, radii = fit_axis(skeleton, self.recentre)
-        skeleton = replace(skeleton, vertices=vertices, confidence=confidence)
+        skeleton = replace(skeleton, vertices=vertices, confidence=confidence, radii=radii)
         if self.weak or self.sure:
+            loops = skeleton.n_loops
             skeleton = cut_threads(skeleton, self.weak, self.sure)
-        skeleton = replace(skeleton, radii=radii)
+            if self.twig and skeleton.n_loops < loops:
+                skeleton = cut_twigs(skeleton, self.twig)
         report = skeleton.report
         if self.bridge:
             skeleton, bridges = bridge_gaps(skeleton, self.bridge)

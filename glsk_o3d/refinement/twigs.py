@@ -60,10 +60,9 @@ def cut_twigs(skeleton, reach):
         for junction, (_, twig) in worst.items():
             group[twig] = junction
         stay = np.flatnonzero(group == np.arange(m))
-        places = skeleton.vertices[stay]
-        skeleton = merge_vertices(skeleton, group)
-        # a junction stays where it was
-        skeleton = replace(skeleton, vertices=places)
+        # a junction stays what it was
+        kept = {name: getattr(skeleton, name)[stay] for name in ("vertices", "radii", "confidence")}
+        skeleton = replace(merge_vertices(skeleton, group), **kept)
 
 
 def beyond(points, vertices, thickness, paths):
