@@ -109,6 +109,15 @@ def test_random_graphs(assert_sound, m, edges, seed):
         assert all(len(after) == 1 for after in parts.values())
 
 
+@pytest.mark.parametrize("seed", [6, 8])
+def test_a_loop_that_is_cut_leaves_no_twigs(seed):
+    """Two legs of a scan touch; the ends of the cut loop are no ends of the animal."""
+    skeleton = glsk.skeletonize(samples.sample_object(seed=seed).points)
+    assert (skeleton.n_loops, len(skeleton.leaves)) == (1, 6)
+    assert np.isfinite(skeleton.confidence).all()
+    assert (skeleton.radii > 0).all()
+
+
 def test_graphs_without_triangles_are_left_alone():
     raw = around_torus()
     skeleton = refined(raw, PUBLISHED)

@@ -1,5 +1,6 @@
 """Twigs are cut by how far their points leave the other branches, over the thickness of these."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -116,6 +117,17 @@ def test_points_without_a_say_do_not_count():
     distance = np.linalg.norm(raw.points - raw.vertices[10], axis=1)
     raw.normals[(raw.vertex_of_point >= N) & (distance > 0.1)] = np.nan
     assert len(cut_twigs(raw, 1.0).vertices) == N
+
+
+def test_a_junction_stays_what_it_was():
+    raw = tree((10, 0.05))
+    m = len(raw.vertices)
+    raw = replace(raw, radii=np.arange(m) + 1.0, confidence=np.linspace(0.5, 1, m))
+    skeleton = cut_twigs(raw, 0.8)
+    assert len(skeleton.vertices) == N < m
+    np.testing.assert_array_equal(skeleton.vertices, raw.vertices[:N])
+    np.testing.assert_array_equal(skeleton.radii, raw.radii[:N])
+    np.testing.assert_array_equal(skeleton.confidence, raw.confidence[:N])
 
 
 def test_ends_of_the_trunk_stay():
