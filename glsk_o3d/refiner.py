@@ -73,8 +73,8 @@ class Refiner(Filter):
     )
     twig: float = parameter(
         1.3,
-        "Least reach of a branch's points from the branches it leaves over the thickness there; others are cut. 0 keeps "
-        "all.",
+        "Least reach of a branch's points from the branches it leaves over the thickness there; others are cut. 0 "
+        "keeps all.",
         type="float",
         low=0,
     )
