@@ -177,7 +177,7 @@ def linearity(points, rings):
     Returns
     -------
     (n,) float array
-        1 on a line.
+        1 on a line, 0 where everything is in one place.
     """
     moments = np.stack([*points.T, *(points[:, i] * points[:, j] for i, j in PAIRS)], axis=1)
     own = (SELF / (SELF + rings.sizes))[:, None]
@@ -186,7 +186,8 @@ def linearity(points, rings):
     mean, square = moments[:, :3].T, moments[:, 3:].T
     spread = square - [mean[i] * mean[j] for i, j in PAIRS]
     total = spread[0] + spread[3] + spread[5]
-    return largest_eigenvalue(spread) / np.maximum(total, np.finfo(float).tiny)
+    rounding = 1e-12 * (square[0] + square[3] + square[5])  # of the differences: what is less has no direction
+    return np.where(total > rounding, largest_eigenvalue(spread) / np.maximum(total, np.finfo(float).tiny), 0)
 
 
 def explained_score(points) -> float:

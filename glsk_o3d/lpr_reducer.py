@@ -245,7 +245,8 @@ def match(n, keepers, swallowed):
     -------
     (m,) int array
     """
-    # Rounds of the pairs that come before all others at both their points. Of nearest neighbours two or three do.
+    # Rounds of the pairs that come before all others at both their points. Of nearest neighbours two or three do; only
+    # a chain of pairs in its own order takes a round for every second one.
     pairs = np.stack([keepers, swallowed], axis=1)
     free, first, left, chosen = np.ones(n, bool), np.empty(n, int), np.arange(len(pairs)), [np.empty(0, int)]
     while len(left):

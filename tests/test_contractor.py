@@ -473,6 +473,12 @@ def test_linearity_of_one_neighbourhood(rim, expected, scale):
     np.testing.assert_allclose(found[0], expected, rtol=3e-8)
 
 
+def test_roundings_are_no_line():
+    points = np.array([3.0, 1, 2]) + 1e-9 * np.random.default_rng(0).normal(size=(300, 3))
+    share = linearity(points, rings_of(nearest_neighbours(points, 9)[1][:, 1:]))
+    assert (share < LINE).all()
+
+
 def test_linearity_is_that_of_the_place():
     """A long line and a disc in one cloud."""
     line = np.outer(np.arange(200.0), [0, 0, 1])

@@ -3,8 +3,10 @@
 import numpy as np
 
 from .groups import group_median, group_sum
+from .neighbourhoods import PAIRS
 
-ROWS, COLUMNS, TIMES = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2], [1, 1, 1, 2, 2, 2]  # a symmetric matrix's entries
+ROWS, COLUMNS = np.array(PAIRS).T
+TIMES = np.where(ROWS == COLUMNS, 1, 2)  # that an entry stands in a symmetric matrix
 
 
 def witnesses(vertex_of_point, normals):
@@ -46,10 +48,11 @@ def robust_radii(planes, distance, doubt, normals, owner):
     normals, and the plane of a tilted normal passes nearer than its point: radii come out small, most where parts are
     thin and where they meet. The distance of the points knows no normals. Its weight is
 
-    .. math:: \sqrt d (1 - f)
+    .. math:: \sqrt d (1 - \varphi)
 
-    with the doubt d of `fit_axis` and f, from 0 to 1, how much the normals have one direction in common: 0 around a
-    tube, or half of one, and 1 on a sheet, where the distance of the points would measure its width.
+    with the doubt d of `fit_axis` and :math:`\varphi = |a - b|`, the difference of the shares a + b = 1 that the two
+    directions across the axis have of the squared normals: 0 around a tube, or half of one, and 1 on a sheet, where the
+    distance of the points would measure its width.
 
     Parameters
     ----------
@@ -71,7 +74,7 @@ def robust_radii(planes, distance, doubt, normals, owner):
     m = len(planes)
     count = np.bincount(owner, minlength=m)
     shares = group_sum(normals[:, ROWS] * normals[:, COLUMNS], owner, m) / np.maximum(count, 1)[:, None]
-    # across the axis the two directions have the shares a + b = 1 of the normals: (a - b)^2 = 2 (a^2 + b^2) - 1
+    # (a - b)^2 = 2 (a^2 + b^2) - 1
     flat = np.sqrt(np.clip(2 * shares**2 @ TIMES - 1, 0, 1))
     weight = np.where(count > 0, np.sqrt(doubt) * (1 - flat), 0)
     return (1 - weight) * planes + weight * group_median(distance, owner, m)

@@ -66,11 +66,11 @@ def thin_to_grid(points, n):
     Returns
     -------
     kept : (c,) int array
-        Points left, about n. Points far off share the cells at the border.
+        Points left, about n, one per cell. Points far off share the cells at the border.
     into : (m,) int array
         Position in `kept` of the point that stands for each.
     counts : (c,) float array
-        Points that each stands for; copies count once.
+        Points in the cell of each of `kept`; copies in a row of the grid's finest cells count once.
     """
     # A few points far off must not decide how wide the cells are.
     low, high = np.quantile(points[:: 1 + len(points) // 100000], [TAIL, 1 - TAIL], axis=0)

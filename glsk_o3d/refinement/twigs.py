@@ -9,6 +9,7 @@ from .loops import surface_distance
 from .merging import merge_vertices
 
 FAR = 0.9  # share of a twig's points that its reach covers
+_CHUNK = 2**20  # pairs of a point and an edge at a time: memory stays flat
 
 
 def cut_twigs(skeleton, reach):
@@ -16,7 +17,8 @@ def cut_twigs(skeleton, reach):
 
     What counts is the points, not the curve: the contraction shortens stubs as thick as they are long, and lets thin
     ones grow. And it is how far they leave the branches that meet them, not how far they are from the junction: along
-    a part they may be anywhere.
+    a part they may be anywhere. Another branch with an end may be a twig, too, far from its points: it counts as no
+    thicker than the junction. A branch whose points have no say goes.
 
     Parameters
     ----------
@@ -32,12 +34,13 @@ def cut_twigs(skeleton, reach):
     """
     while True:
         thickness, degree = surface_distance(skeleton), skeleton.degree
+        thickness = np.where(thickness > 0, thickness, skeleton.radii)  # of vertices without points
         owned = skeleton.witnesses
         owned = owned[np.argsort(skeleton.vertex_of_point[owned], kind="stable")]
         stop = np.cumsum(np.bincount(skeleton.vertex_of_point[owned], minlength=len(degree)))
         start = np.concatenate([[0], stop[:-1]])
         branches, at, worst = skeleton.branches, defaultdict(list), {}
-        ending = np.zeros(len(degree), bool)  # another twig may be far from its points: that does not make it thick
+        ending = np.zeros(len(degree), bool)
         for branch in branches:
             at[branch[0]].append(branch)
             at[branch[-1]].append(branch)
@@ -86,10 +89,15 @@ def beyond(points, vertices, thickness, paths):
     direction = step / np.maximum(length, tiny)[:, None]
     # relative to one of them: products of coordinates far from the origin would cancel
     points, start = points - start[0], start - start[0]
-    along = points @ direction.T - np.einsum("ej,ej->e", start, direction)
-    squared = (points**2).sum(axis=1)[:, None] - 2 * points @ start.T + (start**2).sum(axis=1)
-    foot = np.clip(along, 0, length)
-    distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
-    share = foot / np.maximum(length, tiny)
-    least = max(np.finfo(float).eps * distance.max(), tiny)  # of a line, which has no thickness but roundings
-    return (distance / np.maximum(thickness[a] + share * (thickness[b] - thickness[a]), least)).min(axis=1)
+    least = max(np.finfo(float).eps * np.abs(points).max(), tiny)  # of a line, which has no thickness but roundings
+    found = np.empty(len(points))
+    rows = max(_CHUNK // len(a), 1)
+    for first in range(0, len(points), rows):
+        p = points[first : first + rows]
+        along = p @ direction.T - np.einsum("ej,ej->e", start, direction)
+        squared = (p**2).sum(axis=1)[:, None] - 2 * p @ start.T + (start**2).sum(axis=1)
+        foot = np.clip(along, 0, length)
+        distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
+        thick = thickness[a] + foot / np.maximum(length, tiny) * (thickness[b] - thickness[a])
+        found[first : first + rows] = (distance / np.maximum(thick, least)).min(axis=1)
+    return found

@@ -136,6 +136,22 @@ def test_ends_of_the_trunk_stay():
     assert cut_twigs(raw, 0.8) is raw
 
 
+def test_a_vertex_without_points_is_as_thick_as_its_radius_says():
+    """Not without thickness: all points would be far from the edges beside it."""
+    raw = tree((10, 0.05))
+    raw.vertex_of_point[raw.vertex_of_point == 10] = 9
+    assert not (raw.vertex_of_point == 10).any()
+    assert len(cut_twigs(raw, 0.8).vertices) == N
+
+
+def test_far_points_in_chunks(monkeypatch):
+    rng = np.random.default_rng(0)
+    points, vertices = rng.normal(size=(50, 3)), rng.normal(size=(8, 3))
+    found = beyond(points, vertices, np.arange(8) + 1.0, [np.arange(8)])
+    monkeypatch.setattr("glsk_o3d.refinement.twigs._CHUNK", 21)
+    np.testing.assert_array_equal(beyond(points, vertices, np.arange(8) + 1.0, [np.arange(8)]), found)
+
+
 def test_lines_have_no_thickness():
     """Whatever is off a line leaves it."""
     raw = tree((10, 50.0), radius=0.0)
