@@ -17,7 +17,7 @@ print(skeleton)
 
 # %%
 # It is a graph in space: vertices, edges, the local radius at each vertex, and for every point the vertex it belongs
-# to. The loop is the handle. Leaves are nose, tail and feet; a leg whose inner side no camera saw may have a twig more.
+# to. The loop is the handle. Leaves are nose, tail and feet.
 
 glsk.plot_skeleton(skeleton, color="radius")
 plt.show()
