@@ -301,8 +301,8 @@ def judge(
     verdict : {"agrees", "agrees in part", "do not trust", "cannot tell"}
         "do not trust" where the skeletons differ in components or loops, or lie more than half a radius apart on
         average; "cannot tell" instead where the mesh does not describe the cloud (a twentieth of it lies off, a
-        twentieth of the mesh has borders that the cloud has not, a twentieth is torn off, or it closes around less than
-        70 % of the points whose rings close), where its contraction failed, and where no Laplacian
+        twentieth of the mesh has borders that the cloud has not, a twentieth is torn off, smaller pieces of it are all
+        that differs, or it closes around less than 70 % of the points whose rings close), where its contraction failed, and where no Laplacian
         coordinates could be compared. "agrees" where they lie within a fifth of a radius on
         average and a radius in 95 % of their length, the mesh closes around 70 % of the points whose rings close, three
         quarters of the Laplacian coordinates lie within 30 degrees, neither run warned of anything, and the contraction
@@ -341,6 +341,9 @@ def judge(
         slight += [f"the mesh's run warns: {message}" for message in mesh_report.warnings if message not in warned]
     if grave and fit is not None:
         failed += _faults(fit)
+        ours, theirs = skeletons.components
+        if len(grave) == 1 and 0 < theirs - ours <= fit.pieces - fit.parts:  # crumbs explain this, and nothing else
+            failed.append(f"the mesh does not describe the cloud: {fit.pieces} pieces of it, {fit.parts} of the cloud")
     if failed and (grave or not rows.compared):
         return UNTOLD, (*failed, *grave, *slight)
     return (DISTRUST if grave else IN_PART if failed or slight else AGREES), (*failed, *grave, *slight)

@@ -220,6 +220,9 @@ def test_a_crumb_is_no_excuse(ring, check):
     assert (fit.pieces, fit.parts) == (2, 1)
     assert fit.torn == pytest.approx(3 / (len(np.unique(check.faces)) + 3))
     assert judge(rows(), apart(loops=(2, 1)), fit=fit)[0] == "do not trust"
+    assert judge(rows(), apart(components=(1, 2), distance_in_radii=0.6), fit=fit)[0] == "do not trust"
+    for components, verdict in (((1, 2), "cannot tell"), ((1, 3), "do not trust"), ((2, 1), "do not trust")):
+        assert judge(rows(), apart(components=components), fit=fit)[0] == verdict  # a crumb has a skeleton of its own
     shattered = np.arange(3 * len(check.faces)).reshape(-1, 3)
     assert mesh_fit(state, vertices[check.faces.ravel()], shattered).torn > 0.99
 
