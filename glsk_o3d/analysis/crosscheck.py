@@ -302,8 +302,8 @@ def judge(
         "do not trust" where the skeletons differ in components or loops, or lie more than half a radius apart on
         average; "cannot tell" instead where the mesh does not describe the cloud (a twentieth of it lies off, a
         twentieth of the mesh has borders that the cloud has not, a twentieth is torn off, smaller pieces of it are all
-        that differs, or it closes around less than 70 % of the points whose rings close), where its contraction failed, and where no Laplacian
-        coordinates could be compared. "agrees" where they lie within a fifth of a radius on
+        that differs, or it closes around less than 70 % of the points whose rings close), where its contraction failed,
+        and where no Laplacian coordinates could be compared. "agrees" where they lie within a fifth of a radius on
         average and a radius in 95 % of their length, the mesh closes around 70 % of the points whose rings close, three
         quarters of the Laplacian coordinates lie within 30 degrees, neither run warned of anything, and the contraction
         of the mesh did not fail.
