@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.spatial import cKDTree
 
 from ..interop.open3d import require
 from ..numerics.components import component_labels
@@ -72,12 +74,16 @@ class MeshFit:
         not close: above 0 the mesh has holes where the cloud has none.
     pieces, parts : int
         Into how many pieces the mesh falls, and the cloud, where no ring has an edge longer than three spacings.
+    torn : float
+        Share of the mesh's vertices that are not in the largest piece of the mesh on their part of the cloud: crumbs
+        count for little, and parts of the cloud that are apart for nothing.
     """
 
     far: float
     open: float
     pieces: int
     parts: int
+    torn: float
 
 
 @dataclass(frozen=True)
@@ -187,14 +193,18 @@ def mesh_fit(state, vertices, faces):
     squared = require("igl", "libigl").point_mesh_squared_distance(points, vertices, faces)[0]
     used = np.unique(faces)
     border = border_lengths(len(vertices), faces)[used] > TEAR
-    pieces = component_labels(len(vertices), np.concatenate([faces[:, :2], faces[:, 1:]]))[used]
+    piece = component_labels(len(vertices), np.concatenate([faces[:, :2], faces[:, 1:]]))[used]
     edges = np.column_stack([rings.owners, rings.indices])
     near = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1) < REACH * step
+    part = component_labels(len(points), edges[near])
+    on = part[cKDTree(points).query(vertices[used])[1]]
+    shared = coo_array((np.ones(len(used), int), (on, piece))).tocsr()  # vertices of each piece on each part
     return MeshFit(
         far=float((squared > step**2).mean()),
         open=float(border.mean() - (~rings.closed).mean()),
-        pieces=len(np.unique(pieces)),
-        parts=int(component_labels(len(points), edges[near]).max()) + 1,
+        pieces=len(np.unique(piece)),
+        parts=int(part.max()) + 1,
+        torn=float(1 - shared.max(axis=1).sum() / len(used)),
     )
 
 

@@ -246,11 +246,9 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         tortuosity = length / np.linalg.norm(last - first, axis=1)
     curvature, torsion = curvature_torsion(skeleton)
     label = branch_of_point(skeleton, skeleton.points, skeleton.vertex_of_point)
-    angle, mean_radius = (
-        np.array([_angle(skeleton, outward, i, parent[i]) for i in range(len(paths))]),
-        mean(skeleton.radii),
-    )
-    axis, order = _axes(parent, level, start, angle, np.where(np.isnan(mean_radius), 1, mean_radius))
+    angle = np.array([_angle(skeleton, outward, i, parent[i]) for i in range(len(paths))])
+    mean_radius = mean(skeleton.radii)
+    axis, order = _axes(parent, level, start, angle, mean_radius)
     return BranchTable(
         kind=_kinds(skeleton, paths),
         component=skeleton.component_of_vertex[start],
@@ -338,7 +336,11 @@ def _grow(skeleton, paths, length, section, chosen):
 
 def _axes(parent, level, start, angle, radius):
     """First row of every row's axis, and the axes before it: of those that begin in one place, one goes straight on."""
-    onward = np.nan_to_num(radius * np.cos(np.radians(angle)))
+    straight = np.cos(np.radians(angle))
+    _, fork = np.unique([parent, start], axis=1, return_inverse=True)
+    fork = fork.ravel()  # NumPy 2.0 gives it two axes
+    unknown = np.isin(fork, fork[(straight > 0) & np.isnan(radius)])  # there the angle alone decides
+    onward = np.nan_to_num(straight * np.where(unknown, 1, radius))
     straightest: dict[tuple[int, int], int] = {}
     for row in np.lexsort((-np.arange(len(onward)), onward)).tolist():  # the last one stays
         if onward[row] > 0:

@@ -34,7 +34,7 @@ SAME = 1e-6  # of the diagonal: nearer vertices are points of the cloud, whichev
 TURNED = 30.0  # degrees
 NEAR, FAR = 0.2, 0.5  # local radii
 ASTRAY = 1.0  # local radii
-UNLIKE = 0.05  # share of the cloud far from the mesh, or of the mesh on borders that the cloud has not
+UNLIKE = 0.05  # share of the cloud far from the mesh, or of the mesh torn off or on borders that the cloud has not
 WHOLE = 0.99  # share of rings that close where the cloud has no gaps
 
 
@@ -121,6 +121,7 @@ class CrossCheck:
                 "hausdorff95_in_radii": ASTRAY,
                 "covered": COVERED,
                 "far_or_open": UNLIKE,
+                "torn": UNLIKE,
             },
             "convention": "L = 2 igl.cotmatrix: rows sum to 0, off-diagonals are positive, L P points inward",
         }
@@ -300,9 +301,9 @@ def judge(
     verdict : {"agrees", "agrees in part", "do not trust", "cannot tell"}
         "do not trust" where the skeletons differ in components or loops, or lie more than half a radius apart on
         average; "cannot tell" instead where the mesh does not describe the cloud (a twentieth of it lies off, a
-        twentieth of the mesh has borders that the cloud has not, it falls into more pieces than the cloud, or it closes
-        around less than 70 % of the points whose rings close), where its contraction failed, and where no Laplacian
-        coordinates could be compared. "agrees" where they lie within a fifth of a radius on
+        twentieth of the mesh has borders that the cloud has not, a twentieth is torn off, smaller pieces of it are all
+        that differs, or it closes around less than 70 % of the points whose rings close), where its contraction failed,
+        and where no Laplacian coordinates could be compared. "agrees" where they lie within a fifth of a radius on
         average and a radius in 95 % of their length, the mesh closes around 70 % of the points whose rings close, three
         quarters of the Laplacian coordinates lie within 30 degrees, neither run warned of anything, and the contraction
         of the mesh did not fail.
@@ -340,6 +341,9 @@ def judge(
         slight += [f"the mesh's run warns: {message}" for message in mesh_report.warnings if message not in warned]
     if grave and fit is not None:
         failed += _faults(fit)
+        ours, theirs = skeletons.components
+        if len(grave) == 1 and 0 < theirs - ours <= fit.pieces - fit.parts:  # crumbs explain this, and nothing else
+            failed.append(f"the mesh does not describe the cloud: {fit.pieces} pieces of it, {fit.parts} of the cloud")
     if failed and (grave or not rows.compared):
         return UNTOLD, (*failed, *grave, *slight)
     return (DISTRUST if grave else IN_PART if failed or slight else AGREES), (*failed, *grave, *slight)
@@ -351,5 +355,5 @@ def _faults(fit):
         yield f"the mesh does not describe the cloud: {fit.far:.0%} of the points lie more than a point spacing off it"
     if fit.open > UNLIKE:
         yield f"the mesh does not describe the cloud: {fit.open:.0%} of it are at holes that the cloud has not"
-    if fit.pieces > fit.parts:
-        yield f"the mesh does not describe the cloud: {fit.pieces} pieces of it, {fit.parts} of the cloud"
+    if fit.torn > UNLIKE:
+        yield f"the mesh does not describe the cloud: {fit.torn:.0%} of it are torn off where the cloud holds together"

@@ -20,6 +20,7 @@ from .ledger import DONE, STALE, Ledger, Row, file_hash
 from .work import Job
 
 SKIP = "done"
+RECIPE = "recipe.json"
 NEW, AGAIN, FAILED_BEFORE, INTERRUPTED = "new", "asked for", "failed before", "interrupted before"
 OTHER_PARAMETERS, OUTPUTS_GONE, INPUT_CHANGED = "other parameters", "outputs are gone", "input changed"
 
@@ -134,8 +135,8 @@ def plan_batch(
     FileNotFoundError
         A file is not there, or a folder or pattern has no cloud.
     InvalidParameterError
-        The pipeline or a format is wrong, there is nothing to write, or a result would replace an input, or the result
-        of another input that is still there.
+        The pipeline or a format is wrong, there is nothing to write, or a result would replace an input, the result of
+        another input that is still there, or, in a folder without a ledger, a file that no batch has made.
     RecipeError
         No recipe can hold the pipeline: then it cannot be told whether two runs are the same.
 
@@ -163,6 +164,7 @@ def plan_batch(
     ledger, tasks = Ledger(out), []
     results = {name + ending for name in found for ending in endings}
     names = {row["input"]: name for name, row in ledger.rows.items()}
+    listed = {output for row in ledger.rows.values() for output in row.get("outputs", ())}
     for name, path in found.items():
         outputs = tuple(name + ending for ending in endings)
         for output in outputs:
@@ -172,8 +174,17 @@ def plan_batch(
         before = names.get(str(path), name)  # otherwise its old results would be nobody's
         stale = {each for each in row.get("outputs", ()) if _is_of(name, each)}
         stale |= {each for each in ledger.rows.get(before, {}).get("outputs", ()) if _is_of(before, each)} - results
-        job = Job(name, str(path), str(out), outputs, recipe, cut_loops, tuple(sorted(stale)))
+        foreign = tuple(each for each in outputs if each not in listed and os.path.lexists(out / each))
+        job = Job(name, str(path), str(out), outputs, recipe, cut_loops, tuple(sorted(stale)), foreign)
         tasks.append(Task(job, AGAIN if force else _why(job, row, parameters)))
+    if not ledger.path.exists():
+        strange = [each for task in tasks for each in task.job.foreign]
+        strange += [each for each in (ledger.table.name, RECIPE) if os.path.lexists(out / each)]
+        if strange:
+            raise InvalidParameterError(
+                f"{out / strange[0]}: is not the result of a batch, since there is no ledger here: give the results "
+                "another folder, or remove it"
+            )
     compared = _compared(tasks, ledger.rows)
     for task in compared:
         row = ledger.rows.get(task.job.name, {})

@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ from .. import __version__
 from ..errors import BatchError, InvalidParameterError
 from ..interop.files import write_json
 from .ledger import COLUMNS, DONE, FAILED, STALE, Row, locked
-from .plan import SKIP, Plan, Task, plan_batch
+from .plan import RECIPE, SKIP, Plan, Task, plan_batch
 from .work import clear, told, work
 from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, cores, died
 
@@ -177,7 +177,7 @@ def _make_room(plan: Plan) -> None:
         elif task.why != SKIP and rows.get(name, {}).get("status") == DONE:
             rows[name]["status"] = STALE
     plan.ledger.rewrite()
-    write_json(plan.out_dir / "recipe.json", plan.recipe)
+    write_json(plan.out_dir / RECIPE, plan.recipe)
     for folder in {(plan.out_dir / task.job.name).parent for task in plan.todo}:
         folder.mkdir(parents=True, exist_ok=True)
 
@@ -191,7 +191,7 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
         running[workers.submit(work, task.job)] = task
 
     def enter(task, row):
-        row |= {"name": task.job.name, "input": task.job.path, "parameters": plan.parameters}
+        row = {"parameters": plan.parameters} | row | {"name": task.job.name, "input": task.job.path}
         row = {name: row[name] for name in COLUMNS if name in row}
         plan.ledger.add(row)
         if on_result is not None:
@@ -214,7 +214,7 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
                 elif died(error) and not alone:
                     again.append(task)
                 else:
-                    enter(task, _row(task, future, error))
+                    enter(task, _row(task, future, error, plan.ledger.rows.get(task.job.name, {})))
             if lost is not None:
                 raise lost
             if len(interrupts) > 1:
@@ -232,15 +232,16 @@ def _gone() -> BatchError:
     return BatchError("the work was cancelled, or its scheduler has gone: run the same batch to go on")
 
 
-def _row(task: Task, future: Future, error: BaseException | None) -> Row:
+def _row(task: Task, future: Future, error: BaseException | None, before: Row) -> Row:
     if error is None:
         row = future.result()
         missing = row["error"].startswith("no such file") or ": no such folder" in row["error"]
         if missing and Path(task.job.path).exists():
             row["error"] += f" (on {row['worker']}; there is one here: workers need the same files by the same paths)"
+        if row.get("kept") and row["outputs"]:  # what the line told of them stays, too
+            return (before or row) | {name: row[name] for name in ("status", "error", "outputs")}
         return row
-    with suppress(OSError):
-        clear(task.job)
+    clear(task.job)
     return {
         "status": FAILED,
         "error": WORKER_DIED if died(error) else told(error),

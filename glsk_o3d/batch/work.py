@@ -21,6 +21,8 @@ from .. import __version__
 from ..errors import GlskError
 from .ledger import DONE, FAILED, Row, file_hash
 
+_log = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True)
 class Job:
@@ -39,6 +41,8 @@ class Job:
     cut_loops : bool
     stale : tuple of str
         Outputs of an earlier batch, from `out_dir`, which are no longer true.
+    foreign : tuple of str
+        Outputs that were there before, and of which no ledger knows whose they are: replaced perhaps, never removed.
     """
 
     name: str
@@ -48,6 +52,7 @@ class Job:
     recipe: dict[str, Any]
     cut_loops: bool = False
     stale: tuple[str, ...] = ()
+    foreign: tuple[str, ...] = ()
 
 
 def work(job: Job) -> Row:
@@ -60,7 +65,8 @@ def work(job: Job) -> Row:
     Returns
     -------
     dict
-        What the ledger is to say. Whatever goes wrong is in it: nothing is raised.
+        What the ledger is to say. Whatever goes wrong is in it: nothing is raised. ``kept`` is in it where the cloud
+        is not there: then earlier results, if any, are its outputs.
     """
     start = time.perf_counter()
     row: Row = {"error": "", "outputs": [], "version": __version__}
@@ -69,13 +75,13 @@ def work(job: Job) -> Row:
         try:
             with suppress(OSError):  # what it is shows when it is read
                 row["input_hash"] = file_hash(job.path)
-            try:
-                _skeletonize(job, row, heard.messages)
-            finally:
-                clear(job, row["outputs"])
+            _skeletonize(job, row, heard.messages)
             row["status"] = DONE
         except Exception as error:  # whatever it is, the other clouds are to be done
             row |= {"status": FAILED, "error": told(error).removeprefix(f"{job.path}: ")}
+            if "points" not in row and not os.path.exists(job.path):  # a disk that is not mounted, say
+                row |= {"kept": True, "outputs": [each for each in job.stale if Path(job.out_dir, each).is_file()]}
+        clear(job, row["outputs"])
     messages = list(dict.fromkeys(heard.messages))
     row |= {"seconds": round(time.perf_counter() - start, 4), "warnings": len(messages), "messages": messages}
     finished = datetime.now(timezone.utc).isoformat(timespec="seconds")
@@ -83,7 +89,7 @@ def work(job: Job) -> Row:
 
 
 def clear(job: Job, written: Iterable[str] = ()) -> None:
-    """Remove what is there of earlier batches.
+    """Remove what is there of earlier batches and of a job that broke off; what cannot be removed is logged.
 
     Only afterwards, since a cluster may do a job once more, and end while it does.
 
@@ -93,8 +99,11 @@ def clear(job: Job, written: Iterable[str] = ()) -> None:
     written : iterable of str
         Outputs to keep.
     """
-    for path in {*job.stale, *job.outputs}.difference(written):
-        Path(job.out_dir, path).unlink(missing_ok=True)
+    for path in sorted({*job.stale, *job.outputs}.difference(job.foreign, written)):
+        try:
+            Path(job.out_dir, path).unlink(missing_ok=True)
+        except OSError as error:
+            _log.warning("an old result could not be removed: %s", told(error))
 
 
 def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:

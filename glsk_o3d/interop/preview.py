@@ -30,7 +30,8 @@ def save_preview(
 
     The three views look along the coordinate axes, all at one scale: x across and y up, x across and z up, y across and
     z up. The cloud is grey, lighter where it is farther; edges are red, junctions dark dots, leaves open ones. Below
-    are the counts and what the run warned of: the first two warnings, long ones shortened.
+    are the counts and what the run warned of: the first two warnings, long ones shortened, fewer and shorter in a low
+    picture, and how many more there are.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] 
     cloud = cloud[:: max(1, -(-len(cloud) // MOST_POINTS))]
     centre, extent = room(np.concatenate([cloud, skeleton.vertices]))
     cloud, vertices = cloud - centre, skeleton.vertices - centre
-    warned = _warned(warnings, width)[: int(height / 3 / _LINE)]
+    warned = _warned(warnings, width, int(height / 3 / _LINE))
     below = _LINE * len(warned)
     views = three_views(figure, extent, head=0.55 if title else 0.25, foot=0.6 + below, names=0.36 + below)
     for a, b, axes in views:
@@ -211,13 +212,22 @@ def _dot(n: int) -> float:
     return float(np.clip(4500 / max(n, 1), 0.8, 3))
 
 
-def _warned(warnings: Sequence[str], width: float) -> list[str]:
-    """The lines that tell the warnings in a figure so many inches wide."""
+def _warned(warnings: Sequence[str], width: float, room: int) -> list[str]:
+    """At most so many lines that tell the warnings in a figure so many inches wide; the last counts what is left."""
     letters = max(int((width - 2 * _PAD) / _LETTER), 20)
-    wrapper = textwrap.TextWrapper(letters, max_lines=_MOST_LINES, placeholder=" ...")
-    lines = [line for warning in warnings[:_MOST_WARNINGS] for line in wrapper.wrap(f"warning: {warning}")]
-    more = len(warnings) - _MOST_WARNINGS
-    return [*lines, f"and {more} more warning{'s' * (more > 1)}"] if more > 0 else lines
+    lines: list[str] = []
+    more = len(warnings)
+    for warning in warnings[:_MOST_WARNINGS]:
+        free = room - len(lines) - (more > 1)
+        if free < 1:
+            break
+        wrapper = textwrap.TextWrapper(letters, max_lines=min(_MOST_LINES, free), placeholder=" ...")
+        lines += wrapper.wrap(f"warning: {warning}")
+        more -= 1
+    if more and room > len(lines):
+        told = f"and {more} more" if lines else f"{more}"
+        lines.append(f"{told} warning{'s' * (more > 1)}")
+    return lines
 
 
 def _caption(skeleton: Skeleton) -> str:

@@ -213,6 +213,17 @@ def test_without_radii_the_direction_alone_decides():
     np.testing.assert_array_equal(bare.branch_table(0).order, leafy.branch_table(0).order)
 
 
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_where_one_radius_is_unknown_the_unit_does_not_matter(scale):
+    """A branch at 20 degrees without a radius, and one at 50 with one; then both with radii, the latter thicker."""
+    a, b = np.deg2rad([20, -50])
+    nodes = np.array([[0, 0, 0], [0, 0, 1], [np.sin(a), 0, 1 + np.cos(a)], [np.sin(b), 0, 1 + np.cos(b)]])
+    for radii, straight in (([0.1, np.nan, np.nan, 0.1], 2), ([0.1, 0.1, 0.1, 0.3], 3)):
+        fork = Skeleton(nodes * scale, [(0, 1), (1, 2), (1, 3)], np.multiply(radii, scale), (), (), ())
+        table = fork.branch_table(0)
+        assert table.end[table.order == 0].tolist() in ([1, straight], [straight, 1])
+
+
 def test_nothing_continues_what_turns_back_or_is_closed():
     hook = Skeleton([[0, 0, 0], [1, 0, 0], [0, 0.5, 0], [0, -0.5, 0]], [(0, 1), (1, 2), (1, 3)], [0.1] * 4, (), (), ())
     assert hook.branch_table(0).order.tolist() == [0, 1, 1]

@@ -128,12 +128,85 @@ def test_an_interrupted_change_leaves_no_stale_result(batch, scans, rows, write,
     assert list(out.glob(f"{stale[0]}.*")) == list(out.glob("?.json")) == []
 
 
-def test_what_a_lost_row_left_is_taken_away(batch, scans, rows, tmp_path):
+def test_what_a_lost_row_left_is_replaced_and_never_removed(batch, scans, rows, write, tmp_path):
     batch()
-    (tmp_path / "out" / "ledger.jsonl").write_text("")
+    out = tmp_path / "out"
+    old = (out / "a.ply").read_bytes()
+    (out / "ledger.jsonl").write_text("")
     (scans / "a.ply").write_text("no")
+    write(scans / "b.ply", seed=9)
     assert batch() == dict.fromkeys("abc", "new")
-    assert rows(tmp_path / "out")["a"]["outputs"] == []
+    found = rows(out, strict=False)  # what it says of b and c is true of the files
+    assert [row["outputs"] for row in found.values()] == [[], ["b.ply"], ["c.ply"]]
+    assert (out / "a.ply").read_bytes() == old  # nobody knows whose it is
+    write(scans / "a.ply", seed=8)
+    assert batch() == {"a": "failed before"}
+    assert rows(out)["a"]["outputs"] == ["a.ply"]
+
+
+@pytest.mark.parametrize("name", ["a.ply", "a.png", "recipe.json", "ledger.csv"])
+def test_files_of_others_are_not_touched(batch, scans, write, tmp_path, name):
+    (tmp_path / "out").mkdir()
+    mine = tmp_path / "out" / name
+    mine.write_text("mine")
+    (scans / "b.ply").write_text("no")
+    for options in ({}, {"force": True}):
+        with pytest.raises(InvalidParameterError, match=rf"{name}: is not the result of a batch.*another folder"):
+            batch(preview=True, **options)
+    with pytest.raises(InvalidParameterError, match="is not the result of a batch"):
+        plan_batch(scans, tmp_path / "out", preview=True)
+    assert mine.read_text() == "mine"
+    assert {path.name for path in (tmp_path / "out").iterdir()} <= {name, ".ledger.lock"}
+
+
+def test_a_folder_of_scans_and_more(batch, rows, tmp_path):
+    """A bad scan, given by name, whose folder is that of the results, and files that bear the names of results."""
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "a.xyz").write_text("no")
+    for name in ("a.ply", "a.png"):
+        (out / name).write_text("mine")
+    with pytest.raises(InvalidParameterError, match=r"a\.ply: is not the result of a batch"):
+        batch([out / "a.xyz"], preview=True)
+    (out / "z.xyz").write_text("no")
+    batch([out / "z.xyz"])  # now there is a ledger
+    batch([out / "a.xyz"], preview=True)
+    assert {row["status"] for row in rows(out, strict=False).values()} == {"failed"}
+    assert [(out / name).read_text() for name in ("a.ply", "a.png")] == ["mine", "mine"]
+
+
+def test_a_scan_that_is_not_there_costs_no_results(batch, scans, rows, tmp_path):
+    out = tmp_path / "out"
+    batch(formats=["ply", "json"])
+    good = rows(out)
+    given = scans / "list.txt"
+    given.write_text("\n".join(str(scans / f"{name}.ply") for name in "abc"))
+    (scans / "a.ply").rename(tmp_path / "away.ply")
+    for why in ("input changed", "failed before"):
+        assert batch([given], formats=["ply", "json"]) == {"a": why}
+        found = rows(out)
+        assert sorted(found["a"]["outputs"]) == ["a.json", "a.ply"]
+        same = {"outputs": found["a"]["outputs"]}
+        assert found["a"] == good["a"] | {"status": "failed", "error": "no such file"} | same
+        assert batch.result.failed == 1
+    (tmp_path / "away.ply").rename(scans / "a.ply")
+    assert batch([given], formats=["ply", "json"]) == {"a": "failed before"}
+    assert rows(out)["a"]["status"] == "done"
+
+
+def test_what_cannot_be_removed_hides_nothing(batch, scans, rows, tmp_path):
+    out = tmp_path / "out"
+    batch([scans / "a.ply", scans / "b.ply"], formats=["ply", "json"])
+    (scans / "a.ply").write_text("no")
+    for name in ("a.json", "b.json"):  # in their places folders, which no unlink removes
+        (out / name).unlink()
+        (out / name / "x").mkdir(parents=True)
+    batch([scans / "a.ply", scans / "b.ply"], force=True)
+    found = rows(out)
+    assert found["a"]["error"].startswith("not a valid .ply file")
+    assert found["b"]["status"] == "done"
+    for name, row in found.items():
+        assert any(f"{name}.json" in message and "could not be removed" in message for message in row["messages"])
 
 
 def test_an_input_from_elsewhere_renames_none(batch, scans, rows, write, tmp_path):

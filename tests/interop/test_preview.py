@@ -107,14 +107,25 @@ def test_without_matplotlib(tree, tmp_path, monkeypatch):
 LONG = "weakly supported: around 31% of the points " + "they do not agree on an axis, " * 20
 
 
-@pytest.mark.parametrize("size", [(1800, 760), (900, 400)])
+WIDE = [
+    (("sheet-like: costs $5 and $6",), r"warning: sheet-like: costs \$5 and \$6"),
+    ((LONG, "second"), r"warning: weakly .* \.\.\. warning: second"),
+    (("one", "two", "three", "four"), "warning: one warning: two and 2 more warnings"),
+    ((), ""),
+]
+LOW = [  # two lines
+    ((LONG,), r"warning: weakly .* \.\.\."),
+    ((LONG, "second"), r"warning: weakly .* \.\.\. warning: second"),
+    (("one", LONG), r"warning: one warning: weakly .* \.\.\."),
+    ((LONG, LONG, LONG), r"warning: weakly .* \.\.\. and 2 more warnings"),
+]
+
+
 @pytest.mark.parametrize(
-    ("warnings", "told"),
+    ("size", "warnings", "told"),
     [
-        (("sheet-like: costs $5 and $6",), r"warning: sheet-like: costs \$5 and \$6"),
-        ((LONG, "second"), r"warning: weakly .* \.\.\. warning: second"),
-        (("one", "two", "three", "four"), "warning: one warning: two and 2 more warnings"),
-        ((), ""),
+        *((size, *each) for size in ((1800, 760), (900, 400)) for each in WIDE),
+        *(((900, 200), *each) for each in LOW),
     ],
 )
 def test_warnings_are_told_below_and_nothing_overlaps(tree, tmp_path, size, warnings, told):
@@ -131,3 +142,9 @@ def test_warnings_are_told_below_and_nothing_overlaps(tree, tmp_path, size, warn
     save_preview(warned, tmp_path / "p.png", size=size)
     image = imread(tmp_path / "p.png")[-preview.DPI // 4 :]
     assert (image[..., 0] - image[..., 2] > 0.4).any() == bool(warnings)
+
+
+def test_a_line_for_the_count_comes_first():
+    assert preview._warned([LONG, "two"], 6, 1) == ["2 warnings"]
+    assert preview._warned(["one"], 6, 1) == ["warning: one"]
+    assert preview._warned(["one"], 6, 0) == []
