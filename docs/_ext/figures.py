@@ -87,7 +87,7 @@ def skeletonised(points, pipeline=None):
         return (pipeline or pipelines.default())(points)
 
 
-def animal(n=6000):
+def animal(n=5000):
     return samples.sample_object(n).points
 
 
@@ -362,7 +362,7 @@ def centring():
 
 
 def loop_test():
-    points = animal()
+    points = animal(6000)
     raw = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(points)
     skeleton = glsk.Refiner()(raw)
     figure, axes = panels(
