@@ -139,7 +139,8 @@ def _print_measures(assessment: Assessment | None, comparison: Comparison | None
         _add_numbers(table, assessment)
         parts = f"{assessment.components}", f"{assessment.clusters}"
         table.add_row("parts", *parts, "components; the cloud has as many as best")
-        table.add_row("loops", f"{len(assessment.loops)}", "", f"{assessment.wide_loops} open wider than their tube; missing ones show with --truth")
+        told = f"{assessment.wide_loops} open wider than their tube; missing ones show with --truth"
+        table.add_row("loops", f"{len(assessment.loops)}", "", told)
         for i, loop in enumerate(assessment.loops, 1):
             ratio = f"{loop.opening / loop.thickness:.2f}" if loop.thickness > 0 else "inf"
             table.add_row(f"  loop {i}", ratio, "> 1", f"opening {loop.opening:.4g}, thickness {loop.thickness:.4g}")
