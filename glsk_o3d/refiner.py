@@ -120,9 +120,8 @@ class Refiner(Filter):
         vertices, confidence, radii = fit_axis(skeleton, self.recentre)
         skeleton = replace(skeleton, vertices=vertices, confidence=confidence, radii=radii)
         if self.weak or self.sure:
-            loops = skeleton.n_loops
-            skeleton = cut_threads(skeleton, self.weak, self.sure)
-            if self.twig and skeleton.n_loops < loops:
+            whole, skeleton = skeleton, cut_threads(skeleton, self.weak, self.sure)
+            if self.twig and skeleton is not whole:
                 skeleton = cut_twigs(skeleton, self.twig)
         report = skeleton.report
         if self.bridge:

@@ -6,6 +6,7 @@ import math
 import re
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from itertools import chain
 from types import SimpleNamespace
 
@@ -272,12 +273,20 @@ class TestCommands:
         assert "Invalid value" in call(*wrong, code=2)
 
 
+@contextmanager
+def benchmark(root, monkeypatch, name, *parts):
+    """A benchmark as a module, which nobody finds afterwards, nor the parts of its own that it imports."""
+    monkeypatch.syspath_prepend(str(root / "benchmarks"))
+    yield importlib.import_module(name)
+    for each in (name, *parts):
+        del sys.modules[each]
+
+
 class TestCrosscheck:
     @pytest.fixture
     def tool(self, root, monkeypatch):
-        monkeypatch.syspath_prepend(str(root / "benchmarks"))
-        yield importlib.import_module("crosscheck")
-        del sys.modules["crosscheck"]
+        with benchmark(root, monkeypatch, "crosscheck") as module:
+            yield module
 
     def test_verdicts(self, call, tmp_path):
         words = ("--builtin", "--shapes", "tube,torus", "--variant", "clean_1500,noise5_300", "--jobs", 0)
@@ -333,9 +342,8 @@ def nothing(points):
 class TestOptions:
     @pytest.fixture
     def tool(self, root, monkeypatch):
-        monkeypatch.syspath_prepend(str(root / "benchmarks"))
-        yield importlib.import_module("options")
-        del sys.modules["options"]
+        with benchmark(root, monkeypatch, "options") as module:
+            yield module
 
     def test_tables(self, tool):
         def row(cloud, settings, seed):
@@ -367,10 +375,8 @@ class TestOptions:
 class TestPeers:
     @pytest.fixture
     def tool(self, root, monkeypatch):
-        monkeypatch.syspath_prepend(str(root / "benchmarks"))
-        yield importlib.import_module("peers")
-        for name in ("peers", "_peers"):
-            del sys.modules[name]
+        with benchmark(root, monkeypatch, "peers", "_peers") as module:
+            yield module
 
     def test_one_that_crashes_or_hangs_is_a_failure_and_ends_nothing(self, tool, call, tmp_path, monkeypatch):
         (tmp_path / "bad_tools.py").write_text(BAD)
