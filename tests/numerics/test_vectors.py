@@ -1,0 +1,24 @@
+"""Rows of vectors."""
+
+import numpy as np
+import pytest
+
+from glsk_o3d.numerics.vectors import dot, norm
+
+RNG = np.random.default_rng(0)
+
+
+@pytest.mark.parametrize("n", [0, 1, 7, 1000])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_against_numpy(n, order):
+    a, b = (np.asarray(RNG.normal(size=(n, 3)), order=order) for _ in range(2))
+    np.testing.assert_allclose(dot(a, b), (a * b).sum(axis=1), rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(norm(a), np.linalg.norm(a, axis=1), rtol=1e-14)
+
+
+def test_rows_do_not_depend_on_each_other():
+    """Bit for bit, so that skeletons do not depend on the order of the points."""
+    a, b = RNG.normal(size=(2, 1001, 3))
+    turn = RNG.permutation(len(a))
+    np.testing.assert_array_equal(dot(a[turn], b[turn]), dot(a, b)[turn])
+    np.testing.assert_array_equal(norm(a[turn]), norm(a)[turn])
