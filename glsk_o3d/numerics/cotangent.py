@@ -31,10 +31,15 @@ def cotangent_laplacian(points, rings, cap=WEIGHT_CAP):
     """
     x = np.ascontiguousarray(points.T)
     entry, after = rings.fans
-    i, j, k = x[:, rings.owners[entry]], x[:, rings.indices[entry]], x[:, rings.indices[after]]
+    here = x.take(rings.owners[entry], axis=1)
+    one, other = (x.take(rings.indices[at], axis=1) - here for at in (entry, after))
+    opposite = other - one
+    (a, b, c), (u, v, w) = one, other
+    area = np.sqrt((b * w - c * v) ** 2 + (c * u - a * w) ** 2 + (a * v - b * u) ** 2)
+    inverse = np.where(area > 0, 1 / np.maximum(area, np.finfo(float).tiny), 0)
     weight = np.zeros(len(rings.indices))
-    weight[entry] = _cotangent(k, i, j)
-    weight[after] += _cotangent(j, i, k)
+    weight[entry] = (other * opposite).sum(axis=0) * inverse
+    weight[after] -= (one * opposite).sum(axis=0) * inverse
     n, owners = len(points), rings.owners
     total = np.bincount(owners, weight, n)
     scale = cap / np.maximum(np.abs(total), cap)
@@ -44,11 +49,3 @@ def cotangent_laplacian(points, rings, cap=WEIGHT_CAP):
     data[ring], indices[ring] = weight * scale[owners], rings.indices
     data[indptr[:-1]], indices[indptr[:-1]] = -total * scale, every
     return csr_matrix((data, indices, indptr.astype(np.int32)), shape=(n, n))
-
-
-def _cotangent(apex, a, b):
-    """Cotangent of the angle at `apex` between `a` and `b`, each (3, t)."""
-    (x, y, z), (u, v, w) = a - apex, b - apex
-    dot = x * u + y * v + z * w
-    area = np.sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2)
-    return np.divide(dot, area, out=np.zeros_like(dot), where=area > 0)

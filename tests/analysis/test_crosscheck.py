@@ -90,8 +90,8 @@ def test_it_tells_where_the_cloud_is_noisy(shape):
     ("verdict", "shape", "n", "noise"),
     [
         ("do not trust", "sheet", 1024, 0),
-        ("do not trust", "two_rings", 256, 0),
-        ("do not trust", "helix", 256, 0),
+        ("do not trust", "sauropod", 128, 0),
+        ("cannot tell", "torus", 128, 0),
         ("cannot tell", "torus", 1024, 0.08),
     ],
 )

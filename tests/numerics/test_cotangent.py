@@ -146,6 +146,16 @@ def test_rows_are_capped_by_scaling():
     np.testing.assert_allclose(cotangent_laplacian(points, rings, cap=0.5).toarray()[3], free[3] / abs(free[3, 3]) / 2)
 
 
+@pytest.mark.parametrize("height", [1, 1e-3, 1e-6, 1e-9, 1e-12])
+def test_both_cotangents_of_a_needle_have_the_same_area(height):
+    """However flat the triangle: else the point is drawn along it, and lines contract to points."""
+    points = np.array([[0, 0, 0], [1, 0.3, 0.1], [2, 0.6 + height, 0.2]])
+    needle = cotangent_laplacian(points, rings_of([[1, 2], [], []], [False] * 3), cap=1e30)
+    one, other = points[1:]
+    along = other - one
+    assert needle[0, 1] / needle[0, 2] == pytest.approx(-(other @ along) / (one @ along), rel=1e-13)
+
+
 def test_triangles_without_area_add_nothing():
     points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0]])
     degenerate = rings_of([[1, 2], [0, 3], [1, 3], [], [], [0, 1]], [False] * 6)
