@@ -4,6 +4,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from .vectors import dot
+
 
 def minimum_cycle_basis(n, edges, lengths):
     """Shortest set of cycles that generates all others (Horton 1987).
@@ -149,33 +151,54 @@ def inscribed_circle(points):
     radius : float
         Distance from the centre to the curve. Found on a grid that is refined twice: good to about 1 %.
     """
+    *_, widest = _circles(points)
+    return widest
+
+
+def opens_wider(points, radius):
+    """Whether the largest circle inside a closed curve has at least this radius.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        A closed polygon.
+    radius : float
+
+    Returns
+    -------
+    bool
+        As `inscribed_circle` finds it, but without going on once a circle is wide enough.
+    """
+    return any(found >= radius for _, found in _circles(points))
+
+
+def _circles(points):
+    """Ever wider circles inside a closed curve, on ever finer grids: a few places, its box, and around the best."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]
     polygon = (points - middle) @ axes.T
     low, high = polygon[:, :2].min(axis=0), polygon[:, :2].max(axis=0)
     centre, best = np.zeros(3), 0.0
-    span = high - low
-    at = (low + high) / 2
-    for n in (21, 11, 11):
-        x, y = (np.linspace(-0.5, 0.5, n)[:, None] * span + at).T
+    for n, share in ((5, 1), (21, 1), (11, 1 / 5), (11, 1 / 25)):
+        at = (low + high) / 2 if share == 1 else centre[:2]
+        x, y = (np.linspace(-0.5, 0.5, n)[:, None] * share * (high - low) + at).T
         grid = np.stack([*np.meshgrid(x, y), np.zeros((n, n))], axis=-1).reshape(-1, 3)
         grid = grid[_inside(grid, polygon)]
         if len(grid):
             distance = _distance(grid, polygon)
             if distance.max() > best:
                 best, centre = float(distance.max()), grid[np.argmax(distance)]
-        at, span = centre[:2], span / 5
-    return centre @ axes + middle, best
+        yield centre @ axes + middle, best
 
 
 def _distance(points, polygon):
     """Distance from each point to the closed polygon, (n,) float array."""
     edge = np.roll(polygon, -1, axis=0) - polygon
-    squared = np.maximum(np.einsum("ei,ei->e", edge, edge), np.finfo(float).tiny)
+    squared = np.maximum(dot(edge, edge), np.finfo(float).tiny)
     # products of matrices instead of differences of all pairs; the polygon is centred, so that they lose nothing
-    along = points @ edge.T - np.einsum("ei,ei->e", polygon, edge)
-    apart = np.einsum("ni,ni->n", points, points)[:, None] - 2 * points @ polygon.T
-    apart += np.einsum("ei,ei->e", polygon, polygon)
+    along = points @ edge.T - dot(polygon, edge)
+    apart = dot(points, points)[:, None] - 2 * points @ polygon.T
+    apart += dot(polygon, polygon)
     share = np.clip(along / squared, 0, 1)
     apart += share * (share * squared - 2 * along)
     return np.sqrt(np.maximum(apart.min(axis=1), 0))

@@ -3,8 +3,9 @@
 import numpy as np
 
 from ..numerics.components import component_labels
-from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
+from ..numerics.cycles import minimum_cycle_basis, opens_wider
 from ..numerics.groups import group_median
+from ..numerics.vectors import norm
 from .merging import merge_vertices
 from .triangles import collapse_triangles
 
@@ -13,7 +14,7 @@ def surface_distance(skeleton):
     """Median distance from each vertex to the input points it owns, (M,) float array."""
     owned = skeleton.witnesses
     owner = skeleton.vertex_of_point[owned]
-    distance = np.linalg.norm(skeleton.points[owned] - skeleton.vertices[owner], axis=1)
+    distance = norm(skeleton.points[owned] - skeleton.vertices[owner])
     return group_median(distance, owner, len(skeleton.vertices))
 
 
@@ -43,7 +44,7 @@ def close_loops(skeleton, opening):
         false = [
             cycle
             for cycle in cycles
-            if inscribed_circle(skeleton.vertices[cycle])[1] < opening * np.median(thickness[cycle])
+            if not opens_wider(skeleton.vertices[cycle], opening * np.median(thickness[cycle]))
         ]
         if not false:
             return skeleton
@@ -76,7 +77,7 @@ def zip_pairs(points, labels):
     ]
     along = []
     for side in sides:
-        travelled = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points[side], axis=0), axis=1))])
+        travelled = np.concatenate([[0], np.cumsum(norm(np.diff(points[side], axis=0)))])
         along.append(travelled / travelled[-1])
     nearest = np.abs(along[0][:, None] - along[1][None])
     pairs = [(i, int(np.argmin(nearest[i]))) for i in range(1, len(sides[0]) - 1)]

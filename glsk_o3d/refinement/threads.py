@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
+from ..numerics.cycles import minimum_cycle_basis, opens_wider
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
+from ..numerics.vectors import dot
 from .loops import surface_distance
 
 NEAR = 8  # points, itself included, that are near to a point
@@ -44,7 +45,7 @@ def bonds(skeleton, among=None):
     p, q = np.repeat(p, near.shape[1]), near.ravel()
     foreign = (owner[p] != owner[q]) & chosen[q]
     p, q = p[foreign], q[foreign]
-    agree = np.einsum("ni,ni->n", normals[p], normals[q]) ** 2
+    agree = dot(normals[p], normals[q]) ** 2
     weight = agree * uprightness(points, normals, p, q)
     m = len(skeleton.vertices)
     keys, which = np.unique(np.sort(np.column_stack([owner[p], owner[q]]), axis=1) @ [m, 1], return_inverse=True)
@@ -111,8 +112,9 @@ def cut_threads(skeleton, weak, sure):
         cut, used = [], np.zeros(len(keys), bool)
         for cycle in cycles:
             across = crossings(cycle, m, pairs, weight)
-            opening, tube = inscribed_circle(skeleton.vertices[cycle])[1], np.median(thickness[cycle])
-            if across.min() < weak * np.median(across) or opening * skeleton.confidence[cycle].mean() < sure * tube:
+            tube, confidence = np.median(thickness[cycle]), skeleton.confidence[cycle].mean()
+            wide = opens_wider(skeleton.vertices[cycle], sure * tube / max(confidence, np.finfo(float).tiny))
+            if across.min() < weak * np.median(across) or not wide:
                 edges = np.searchsorted(keys, np.sort(np.column_stack([cycle, np.roll(cycle, -1)]), axis=1) @ [m, 1])
                 if not used[edges].any():  # two cuts in what two loops share would tear a piece out of it
                     cut.append(edges[np.lexsort((edges, across))[0]])

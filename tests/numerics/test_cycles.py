@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glsk_o3d.numerics.cycles import inscribed_circle, minimum_cycle_basis
+from glsk_o3d.numerics import cycles as module
+from glsk_o3d.numerics.cycles import inscribed_circle, minimum_cycle_basis, opens_wider
 
 
 def basis_of(graph):
@@ -139,6 +140,26 @@ def test_inscribed_circle(name, size, tilted):
     centre, found = inscribed_circle(points)
     assert found == pytest.approx(radius * size, rel=0.015)
     assert np.linalg.norm(centre - middle) < (0.15 if name == "ellipse" else 0.03) * radius * size
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_opens_wider_as_the_inscribed_circle_says(name):
+    flat = SHAPES[name][0]
+    points = np.column_stack([flat, 0 * flat[:, 0]]) @ TURN
+    radius = inscribed_circle(points)[1]
+    for share in (0, 0.5, 0.9, 0.999, 1):
+        assert opens_wider(points, share * radius)
+    for share in (1.001, 2):
+        assert not opens_wider(points, share * radius)
+
+
+@pytest.mark.parametrize(("share", "grids"), [(0.9, 1), (1.5, 4)])
+def test_wide_loops_are_seen_at_a_glance(share, grids, monkeypatch):
+    points, calls = np.column_stack([np.cos(ANGLE), np.sin(ANGLE), 0 * ANGLE]), []
+    distance = module._distance
+    monkeypatch.setattr(module, "_distance", lambda *given: calls.append(1) or distance(*given))
+    assert opens_wider(points, share) is (share < 1)
+    assert len(calls) == grids
 
 
 @pytest.mark.parametrize("share", [0.003, 0.02, 0.1, 0.3, 0.5, 1])
