@@ -17,9 +17,11 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import Annotated, Any
+from unittest.mock import patch
 
 import numpy as np
 import typer
@@ -57,6 +59,7 @@ from glsk_o3d import Contractor, Pipeline, Skeleton, read_cloud, read_skeleton
 from glsk_o3d.analysis.curves import distances
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.interop.open3d import cloud_points, import_open3d
+from glsk_o3d.numerics.cores import cores
 from glsk_o3d.pipelines import default, wen2024
 from glsk_o3d.report import REFUSED
 
@@ -584,13 +587,14 @@ def cold(path: Path, pipeline: str, repeat: int) -> dict[str, float]:
     return {name: median(each[name] for each in found) for name in found[0]}
 
 
-def first_and_next(path: Path, pipeline: str, repeat: int) -> dict:
+def first_and_next(path: Path, pipeline: str, repeat: int, threads: int) -> dict:
     """Cold and warm, one after the other."""
-    return cold(path, pipeline, repeat) | timed(path, named(pipeline), repeat)[pipeline]
+    with patch.dict(os.environ, OMP_NUM_THREADS=str(threads)):  # the package asks at every call
+        return cold(path, pipeline, repeat) | timed(path, named(pipeline), repeat)[pipeline]
 
 
 def measure_rate(sizes: list[int], pipelines: list[str], shape: str, repeat: int, jobs: int) -> list[dict]:
-    """A row for each size and pipeline."""
+    """A row for each size and pipeline, in one thread and in one for each core."""
     named(",".join(pipelines))
     with tempfile.TemporaryDirectory() as folder:
         work = []
@@ -598,22 +602,24 @@ def measure_rate(sizes: list[int], pipelines: list[str], shape: str, repeat: int
             path = Path(folder, f"{n}.npy")
             np.save(path, builtin(shape, f"clean_{n}")[0])
             facts = dict(measure="rate", n=n, shape=shape)
-            work += [(facts | dict(pipeline=name), (path, name, repeat)) for name in pipelines]
+            for name, threads in product(pipelines, sorted({1, cores()})):
+                work.append((facts | dict(pipeline=name, threads=threads), (path, name, repeat, threads)))
         return run(first_and_next, work, min(jobs, 1))
 
 
 def rate_tables(rows: list[dict]) -> Tables:
     """Cold and warm."""
-    header = ["", "points", "1 kNN ms", "import ms", "first call ms", "process ms"]
+    header = ["", "points", "threads", "1 kNN ms", "import ms", "first call ms", "process ms"]
     header += ["next call ms", "CPU ms", "per second", "first process per second", "note"]
     lines = []
     for row in rows:
         if "failure" in row:
-            lines.append([row["pipeline"], str(row["n"]), *"-" * 8, row["failure"]])
+            lines.append([row["pipeline"], str(row["n"]), str(row["threads"]), *"-" * 8, row["failure"]])
             continue
         keys = ("knn_wall", "import_wall", "first_wall", "process_wall", "wall", "cpu")
         rates = [number(1 / row[key], 1) for key in ("wall", "process_wall")]
-        lines.append([row["pipeline"], str(row["n"]), *(short(1000 * row[key]) for key in keys), *rates, ""])
+        times = (short(1000 * row[key]) for key in keys)
+        lines.append([row["pipeline"], str(row["n"]), str(row["threads"]), *times, *rates, ""])
     return [("skeletons per second, wall time", header, lines)]
 
 

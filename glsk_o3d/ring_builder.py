@@ -12,7 +12,7 @@ from .errors import InvalidCloudError, InvalidParameterError
 from .filter import Filter, documented, parameter, resolve_length
 from .interop.open3d import cloud_points, search_parameters
 from .numerics.frame import Frame
-from .numerics.neighbourhoods import isolation, nearest_neighbours, plane_axes, principal
+from .numerics.neighbourhoods import isolation, nearest_left, nearest_neighbours, plane_axes, principal
 from .numerics.ordering import morton_order
 from .numerics.outliers import without_outliers
 from .numerics.ridges import noise_share, to_ridges
@@ -270,9 +270,7 @@ class RingBuilder(Filter):
         left, nearest = np.flatnonzero(~alone), np.cumsum(~alone) - 1
         if len(left) < len(calm):
             nearest[alone] = cKDTree(calm[left]).query(calm[alone])[1]
-            changed = np.flatnonzero(alone[neighbours[left]].any(axis=1))
-            calm, neighbours = calm[left], nearest[neighbours[left]]
-            neighbours[changed] = nearest_neighbours(calm, k, of=calm[changed])[1]
+            calm, neighbours = calm[left], nearest_left(calm, neighbours, ~alone, k)
         spread, across = principal(calm, neighbours)
         # a ridge has no normals: those of the surface as it came
         noise, normals = surface.noise[left], surface.normals[left]
@@ -286,7 +284,7 @@ class RingBuilder(Filter):
 
         def merge(into, kept):
             rows, rank = left[kept], np.cumsum(kept) - 1
-            return rows, rank[into][owner], nearest_neighbours(cloud[rows], self._neighbours(len(rows)))[1]
+            return rows, rank[into][owner], nearest_left(cloud[left], neighbours, kept, self._neighbours(len(rows)))
 
         while self.around and self._may_merge and len(left) >= FEW:
             into = thin_smooth(cloud[left], neighbours, spread, self.around)

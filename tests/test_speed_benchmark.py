@@ -14,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from glsk_o3d import LPRReducer, contractor, numerics, pipelines
+from glsk_o3d.numerics.cores import cores
 from glsk_o3d.samples import sauropod
 
 MODULES = ("speed", "_stopwatch", "_common", "_plots")
@@ -369,11 +370,15 @@ class TestCommands:
         assert all(len(cloud.load()[0]) == n for n, cloud in found)
 
     def test_rate(self, call, tmp_path):
+        before = os.environ.get("OMP_NUM_THREADS")
         out = tmp_path / "out.json"
         call("rate", "--sizes", 256, "--repeat", 1, "--jobs", 0, "-o", out)
-        (row,) = json.loads(out.read_text())["rows"]
-        assert 0 < row["import_wall"] + row["first_wall"] < row["process_wall"]
-        assert row["wall"] > 0
+        rows = json.loads(out.read_text())["rows"]
+        assert [row["threads"] for row in rows] == sorted({1, cores()})
+        for row in rows:
+            assert 0 < row["import_wall"] + row["first_wall"] < row["process_wall"]
+            assert row["wall"] > 0
+        assert os.environ.get("OMP_NUM_THREADS") == before
 
     def test_all_fill_a_page(self, call, tmp_path, root):
         page = tmp_path / "speed.md"
@@ -383,7 +388,7 @@ class TestCommands:
         printed = call("all", page, "--builtin", *words, "--repeat", 1, "--jobs", 0, "--markdown")
         text = page.read_text()
         assert text.count("| default | 512 |") == 1
-        assert text.count("| 256 | 1 | ") == 2
+        assert text.count("| 256 | 1 | ") == 3
         assert text.count("\nMeasured on ") == 1
         assert text.count("<!-- end -->") == 4
         assert "| 16384 |" not in text  # what was there before

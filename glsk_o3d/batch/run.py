@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..errors import BatchError, InvalidParameterError
 from ..interop.files import write_json
+from ..numerics.cores import cores
 from .ledger import COLUMNS, DONE, FAILED, STALE, Row, locked
 from .plan import RECIPE, SKIP, Plan, Task, plan_batch
 from .work import clear, told, work
-from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, cores, died
+from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, died
 
 if TYPE_CHECKING:
     import distributed

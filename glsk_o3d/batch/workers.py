@@ -20,6 +20,7 @@ from typing import Any, Protocol
 
 from ..errors import BatchError, PluginWarning, SkeletonWarning
 from ..interop.open3d import import_open3d, require
+from ..numerics.cores import cores
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 _PATIENCE = 10  # seconds until a scheduler must answer
@@ -38,16 +39,6 @@ class Workers(Protocol):
 
     def close(self, *, at_once: bool) -> None:
         """Let the workers go; at once: without waiting for what they do."""
-
-
-def cores() -> int:
-    """The cores that this process may use.
-
-    Returns
-    -------
-    int
-    """
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def died(error: BaseException | None) -> bool:

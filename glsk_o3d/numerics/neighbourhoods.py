@@ -1,11 +1,16 @@
 """Nearest neighbours and how they are spread."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .cores import threads
 from .eigen import principal_parts
+from .vectors import dot, norm
 
 PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # the entries of a symmetric matrix
+_LEAST = 4096  # points whose neighbours are worth a thread
 _CHUNK = 4096  # rows at a time: the (3, rows, k) work array then stays in the cache
 
 
@@ -24,10 +29,50 @@ def nearest_neighbours(points, k, of=None):
     distance : (n, k) float array
     neighbour : (n, k) int array
         Nearest first.
+
+    Notes
+    -----
+    On all cores, unless ``OMP_NUM_THREADS`` says otherwise.
     """
-    # One worker: SciPy's threads outlive their arrays when they are interrupted, and crash the process.
     # Split at middles, not at medians: a twelfth faster to build and ask together.
-    return cKDTree(points, leafsize=24, balanced_tree=False).query(points if of is None else of, k)
+    tree, asked = cKDTree(points, leafsize=24, balanced_tree=False), points if of is None else of
+    parts = min(threads(), len(asked) // _LEAST)
+    if parts < 2:
+        return tree.query(asked, k)
+    # Not SciPy's own threads, which outlive their arrays when they are interrupted, and crash the process.
+    with ThreadPoolExecutor(parts) as pool:
+        found = list(pool.map(lambda part: tree.query(part, k), np.array_split(asked, parts)))
+    return tuple(map(np.concatenate, zip(*found, strict=True)))
+
+
+def nearest_left(points, neighbours, left, k):
+    """The k nearest points of every point left among those left; asked anew only where too few are known.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    neighbours : (n, c) int array
+        The nearest of every point among all, as from `nearest_neighbours`.
+    left : (n,) bool array
+        At least k.
+    k : int
+        At most c.
+
+    Returns
+    -------
+    (m, k) int array
+        For each of the m points left positions among these, nearest first.
+    """
+    rows, index = np.flatnonzero(left), np.cumsum(left) - 1
+    known = neighbours[rows]
+    there = left.take(known)
+    rank = np.cumsum(there, axis=1, dtype=np.int16)
+    enough = rank[:, -1] >= k
+    found = np.empty((len(rows), k), int)
+    found[enough] = index[known[enough][(there & (rank <= k))[enough]]].reshape(-1, k)
+    if not enough.all():
+        found[~enough] = nearest_neighbours(points[rows], k, of=points[rows[~enough]])[1]
+    return found
 
 
 def isolation(mean, neighbours):
@@ -46,7 +91,7 @@ def isolation(mean, neighbours):
     -------
     (n,) float array
     """
-    return mean / row_medians(mean[neighbours[:, 1:]])
+    return mean / row_medians(mean.take(neighbours[:, 1:]))
 
 
 def row_medians(values):
@@ -73,7 +118,7 @@ def scatter(points, neighbours):
     share = np.full(neighbours.shape[1], 1 / neighbours.shape[1])
     for start in range(0, len(neighbours), _CHUNK):
         part = slice(start, start + _CHUNK)
-        patch = coordinates[:, neighbours[part]]
+        patch = coordinates.take(neighbours[part], axis=1)
         patch -= (patch @ share)[:, :, None]
         for entry, (i, j) in zip(entries, PAIRS, strict=True):
             np.einsum("nk,nk->n", patch[i], patch[j], out=entry[part])
@@ -114,7 +159,7 @@ def fullness(spread, neighbours):
         0 on a plane or a line, 1 in a ball.
     """
     ratio = spread[:, 0] / np.maximum(spread[:, 2], np.finfo(float).tiny)
-    return row_medians(ratio[neighbours])
+    return row_medians(ratio.take(neighbours))
 
 
 def uprightness(points, normals, p, q):
@@ -132,8 +177,8 @@ def uprightness(points, normals, p, q):
         1 where a surface goes on from one point to the other, 0 where two surfaces face each other.
     """
     line = points[q] - points[p]
-    line /= np.maximum(np.linalg.norm(line, axis=1, keepdims=True), np.finfo(float).tiny)
-    at_p, at_q = (np.maximum(1 - np.einsum("ni,ni->n", normals[end], line) ** 2, 0) for end in (p, q))
+    line /= np.maximum(norm(line)[:, None], np.finfo(float).tiny)
+    at_p, at_q = (np.maximum(1 - dot(normals[end], line) ** 2, 0) for end in (p, q))
     return at_p * at_q
 
 

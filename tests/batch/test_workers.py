@@ -13,15 +13,8 @@ import pytest
 from glsk_o3d import BatchError, load_recipe
 from glsk_o3d.batch import run_batch
 from glsk_o3d.batch.run import WORKER_DIED
-from glsk_o3d.batch.workers import GivenWorkers, LocalWorkers, cores
+from glsk_o3d.batch.workers import GivenWorkers, LocalWorkers
 from glsk_o3d.cli.overrides import override
-
-
-def test_cores_are_those_that_may_be_used():
-    assert cores() == len(os.sched_getaffinity(0))
-    one = "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})"
-    code = f"{one}; from glsk_o3d.batch.workers import cores; print(cores())"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "1\n"
 
 
 def test_workers_compute_in_one_thread_and_ignore_ctrl_c(monkeypatch):

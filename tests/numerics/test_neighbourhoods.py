@@ -1,5 +1,11 @@
 """Nearest neighbours, tangent planes and axes."""
 
+import os
+import signal
+import subprocess
+import sys
+import time
+
 import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
@@ -7,6 +13,7 @@ from scipy.spatial.distance import cdist
 from glsk_o3d.numerics import neighbourhoods as module
 from glsk_o3d.numerics.neighbourhoods import (
     PAIRS,
+    nearest_left,
     nearest_neighbours,
     plane_axes,
     principal,
@@ -26,6 +33,73 @@ def test_nearest_neighbours_against_all_distances(k):
     np.testing.assert_allclose(distance, np.sort(brute, axis=1)[:, :k], rtol=1e-12)
     np.testing.assert_array_equal(neighbours, np.argsort(brute, axis=1)[:, :k])
     np.testing.assert_array_equal(neighbours[:, 0], np.arange(300))
+
+
+@pytest.mark.parametrize("k", [1, 9])
+@pytest.mark.parametrize("count", ["2", "3", "64"])
+def test_threads_find_the_same(count, k, monkeypatch):
+    points = np.random.default_rng(1).normal(size=(13000, 3))
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    alone = nearest_neighbours(points, k)
+    monkeypatch.setenv("OMP_NUM_THREADS", count)
+    for one, other in zip(alone, nearest_neighbours(points, k), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_few_points_start_no_threads(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "8")
+    monkeypatch.setattr(module, "ThreadPoolExecutor", None)
+    assert nearest_neighbours(CLOUD, 4)[1].shape == (300, 4)
+    with pytest.raises(TypeError):
+        nearest_neighbours(np.random.default_rng(0).normal(size=(8192, 3)), 4)
+
+
+ASK_ON_AND_ON = """
+import numpy as np
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
+try:
+    print("begun", flush=True)
+    while True:
+        nearest_neighbours(np.random.default_rng(0).random((30000, 3)), 16)
+except KeyboardInterrupt:
+    print("stopped")
+"""
+
+
+@pytest.mark.parametrize("delay", [0.05, 0.12, 0.19, 0.23])
+def test_threads_may_be_interrupted(delay):
+    environment = os.environ | {"OMP_NUM_THREADS": "4"}
+    asking = subprocess.Popen([sys.executable, "-c", ASK_ON_AND_ON], env=environment, stdout=subprocess.PIPE, text=True)
+    assert asking.stdout.readline() == "begun\n"
+    time.sleep(delay)
+    asking.send_signal(signal.SIGINT)
+    assert asking.communicate(timeout=60)[0] == "stopped\n"
+    assert asking.returncode == 0
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 0.99, 1.0])
+@pytest.mark.parametrize("k", [1, 5, 12])
+def test_nearest_among_those_left_as_if_asked_anew(share, k):
+    left = RNG.random(300) < share
+    left[:k] = True
+    expected = nearest_neighbours(CLOUD[left], k)[1].reshape(-1, k)
+    np.testing.assert_array_equal(nearest_left(CLOUD, nearest_neighbours(CLOUD, 12)[1], left, k), expected)
+
+
+def test_those_with_enough_known_neighbours_are_not_asked_anew(monkeypatch):
+    known, left = nearest_neighbours(CLOUD, 12)[1], np.ones(300, bool)
+    left[known[0, 1:4]] = False  # nine of the first point's twelve are left
+    asked = []
+
+    def ask(points, k, of):
+        asked.append(len(of))
+        return nearest_neighbours(points, k, of)
+
+    monkeypatch.setattr(module, "nearest_neighbours", ask)
+    nearest_left(CLOUD, known, left, 9)
+    assert asked == []
+    nearest_left(CLOUD, known, left, 10)
+    assert 0 < sum(asked) < 40
 
 
 @pytest.mark.parametrize("seed", range(4))
