@@ -14,6 +14,7 @@ from .numerics.groups import group_median, group_sum
 from .numerics.neighbourhoods import nearest_neighbours, row_medians, uprightness
 from .numerics.sampling import farthest_point_sampling
 from .numerics.thickness import plane_distance_radii
+from .numerics.vectors import norm
 from .skeleton import Skeleton
 
 NOISY = 0.3  # share of noise from which on a vertex may be stray
@@ -118,7 +119,9 @@ class Connector(Filter):
         if self.links == "nearest":
             length = np.where(link, rings.edge_lengths(state.positions), np.inf)
             link &= length == np.repeat(np.minimum.reduceat(length, rings.indptr[:-1]), rings.sizes)
-        return np.unique(np.sort(np.column_stack([a[link], b[link]]), axis=1), axis=0)
+        a, b = a[link], b[link]
+        m = owner.max() + 1
+        return np.column_stack(np.divmod(np.unique(np.minimum(a, b) * m + np.maximum(a, b)), m))
 
 
 def across_gaps(state):
@@ -198,7 +201,7 @@ def local_thickness(state):
     (n,) float array
         In the working frame.
     """
-    distance = np.linalg.norm(state.cloud - state.positions[state.owner], axis=1)
+    distance = norm(state.cloud - state.positions[state.owner])
     thickness = group_median(distance, state.owner, len(state))
     _, neighbours = nearest_neighbours(state.positions, min(16, len(state)))
-    return row_medians(thickness[neighbours])
+    return row_medians(thickness.take(neighbours))

@@ -11,6 +11,7 @@ from .errors import StageError
 from .filter import Filter, documented, parameter
 from .numerics.neighbourhoods import plane_axes
 from .numerics.rings import Rings, star_rings
+from .numerics.vectors import dot, norm
 
 _IN_PLANE = 1e-3  # sine of the angle below which a direction counts as lying in the tangent plane
 _MIN_SIZE = 1e-4  # floor of s - psi' s(0) in the working frame, as in the published code
@@ -140,10 +141,10 @@ def merge_energy(state):
     s0, s, delta = state.ring_size0, state.ring_size, state.laplacian_coordinates
     psi = 1.2 * state.ring_ratio_drop
     eta = np.maximum(s - psi * s0, _MIN_SIZE) / s0
-    moved = np.linalg.norm(state.positions - state.previous, axis=1)
+    moved = norm(state.positions - state.previous)
     with np.errstate(divide="ignore", invalid="ignore"):
         attraction = np.nan_to_num(psi * s0 * moved / (eta * (s0 - s)), nan=0.0, posinf=np.inf, neginf=-np.inf) ** 2
-    contraction = (9 * state.contraction_weight * eta) ** 2 * np.einsum("ij,ij->i", delta, delta)
+    contraction = (9 * state.contraction_weight * eta) ** 2 * dot(delta, delta)
     curvature = ((delta - state.rings.mean_over(delta)) ** 2).sum(axis=1)
     return contraction - attraction + 3 * curvature
 
@@ -169,8 +170,8 @@ def combine_rings(state, keepers, swallowed):
     union = -np.sort(-union, axis=1)[:, : (union >= 0).sum(axis=1).max(initial=0)]
     normals = state.normals[state.survivors[keepers]]
     delta = state.laplacian_coordinates[keepers]
-    length = np.linalg.norm(delta, axis=1, keepdims=True)
-    along = np.abs(np.einsum("ij,ij->i", delta, normals))[:, None] > _IN_PLANE * length
+    length = norm(delta)[:, None]
+    along = np.abs(dot(delta, normals))[:, None] > _IN_PLANE * length
     direction = np.where(along, np.divide(delta, length, out=np.zeros_like(delta), where=along), normals)
     return star_rings(state.cloud[state.survivors], keepers, union, plane_axes(direction))
 

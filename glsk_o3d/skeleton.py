@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .numerics.thickness import witnesses
+from .numerics.vectors import norm
 from .report import Report
 
 if TYPE_CHECKING:
@@ -141,7 +142,7 @@ class Skeleton:
     def edge_lengths(self) -> np.ndarray:
         """Length of every edge, (E,) float array."""
         ends = self.vertices[self.edges]
-        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return norm(ends[:, 1] - ends[:, 0])
 
     @cached_property
     def branches(self) -> tuple[np.ndarray, ...]:

@@ -50,8 +50,8 @@ def delaunay_star(offsets, valid=None):
     q = np.zeros((n, k + 1), complex)
     np.multiply(x, inverse, out=q.real[:, :k])
     np.multiply(y, inverse, out=q.imag[:, :k])
+    q[:, :k][~usable] = np.nan  # on no line
     shut = np.zeros((n, k + 1))
-    shut[:, :k][~usable] = -np.inf
 
     walk = np.full((n, k + 2), -1)
     start = np.argmax(inverse, axis=1)
@@ -63,29 +63,30 @@ def delaunay_star(offsets, valid=None):
     # The farthest image is a hull corner; everything lies to the left of its tangent.
     ahead = 1j * q[line, here]
     widest = 2 * np.abs(ahead)
-    for step in range(1, k + 2):
-        way = q - q[line, here][:, None]
-        shut[line, first] = 0
-        shut[line, here] = -np.inf
-        # The cotangent of the turn: falls on ]0, pi[, and is exact for small turns. 0 / 0 is where we are.
-        turn = way * ahead.conj()[:, None]
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for step in range(1, k + 2):
+            way = q - q[line, here][:, None]
+            shut[line, first] = 0
+            shut[line, here] = -np.inf
+            # The cotangent of the turn: falls on ]0, pi[, and is exact for small turns. 0 / 0 is where we are.
+            turn = way * ahead.conj()[:, None]
             cotangent = turn.real / np.maximum(turn.imag, 0) + shut
-        best = np.argmax(np.fmax(cotangent, -np.inf), axis=1)
-        best = np.where(cotangent[line, best] > -np.inf, best, first)  # straight back, along a line
-        ahead = way[line, best]
-        aside = np.abs((way * ahead.conj()[:, None]).imag)
-        several = (aside <= (_COLLINEAR * widest * np.abs(ahead))[:, None]).sum(axis=1) > 2
-        if several.any():
-            best[several] = _farthest(way[several], shut[several] == 0, best[several])
+            best = np.argmax(np.fmax(cotangent, -np.inf), axis=1)
+            best = np.where(cotangent[line, best] > -np.inf, best, first)  # straight back, along a line
             ahead = way[line, best]
-        going = best != first
-        if not going.any():
-            break
-        if not going.all():
-            rows, first, best, ahead, widest = (a[going] for a in (rows, first, best, ahead, widest))
-            q, shut, line = q[going], shut[going], line[: len(rows)]
-        walk[rows, step] = here = best
+            aside = np.abs((way * ahead.conj()[:, None]).imag)
+            beside = aside <= (_COLLINEAR * widest * np.abs(ahead))[:, None]
+            if np.count_nonzero(beside) > 2 * len(line):  # more than where we are and where we go
+                several = np.flatnonzero(beside.sum(axis=1) > 2)
+                best[several] = _farthest(way[several], shut[several] == 0, best[several])
+                ahead = way[line, best]
+            going = best != first
+            if not going.any():
+                break
+            if not going.all():
+                rows, first, best, ahead, widest = (a[going] for a in (rows, first, best, ahead, widest))
+                q, shut, line = q[going], shut[going], line[: len(rows)]
+            walk[rows, step] = here = best
 
     # Cut the walk at the origin, where it meets it.
     size = (walk >= 0).sum(axis=1)

@@ -8,6 +8,8 @@ the memory.
 
 import numpy as np
 
+from .vectors import norm
+
 _TINY = np.finfo(float).tiny
 _APART = 1e-3  # distance of two eigenvalues over their spread, below which the closed form is not exact enough
 _SQUARE = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
@@ -91,7 +93,7 @@ def _direction(shape, value, which):
     longest = np.argmax(diagonal, axis=0)
     line = np.arange(len(longest))
     vectors = adjugate.T[line[:, None], np.array(_SQUARE)[longest]]
-    vectors /= np.maximum(np.linalg.norm(vectors, axis=1), _TINY)[:, None]
+    vectors /= np.maximum(norm(vectors), _TINY)[:, None]
     # its trace is the product of the distances to the two other eigenvalues
     dim = np.flatnonzero(diagonal.sum(axis=0) < 3 * _APART)
     if len(dim):

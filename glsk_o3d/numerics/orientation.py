@@ -4,6 +4,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 
+from .vectors import dot
+
 _LEAST = 1e-6  # cost of an edge between equal normals; a sparse graph would take 0 for no edge
 
 
@@ -25,12 +27,12 @@ def orient_normals(points, normals, edges):
     """
     n = len(points)
     a, b = np.unique(np.sort(edges, axis=1), axis=0).T
-    cost = 1 - np.abs(np.einsum("ij,ij->i", normals[a], normals[b])) + _LEAST
+    cost = 1 - np.abs(dot(normals[a], normals[b])) + _LEAST
     tree = minimum_spanning_tree(coo_matrix((cost, (a, b)), shape=(n, n)).tocsr())
     part = connected_components(tree, directed=False)[1]
     outward = points - points.mean(axis=0)
     roots = np.empty(part.max() + 1, int)
-    order = np.argsort(np.einsum("ij,ij->i", outward, outward), kind="stable")
+    order = np.argsort(dot(outward, outward), kind="stable")
     roots[part[order]] = order  # the last one written, the farthest, stays
     before = dijkstra(tree, directed=False, indices=roots, min_only=True, return_predecessors=True, unweighted=True)[1]
     before[roots] = roots
@@ -41,4 +43,4 @@ def orient_normals(points, normals, edges):
 
 
 def _sign(a, b):
-    return np.where(np.einsum("ij,ij->i", a, b) < 0, -1.0, 1.0)
+    return np.where(dot(a, b) < 0, -1.0, 1.0)

@@ -39,7 +39,7 @@ def without_outliers(points, weight, distance, neighbours, factor, least):
     left = np.arange(len(points))
     for _ in range(ROUNDS):
         # as near as the neighbours would be if all were there
-        mean = distance[:, 1:].mean(axis=1) / np.sqrt(weight[left][neighbours].mean(axis=1))
+        mean = distance[:, 1:].mean(axis=1) / np.sqrt(weight[left].take(neighbours).mean(axis=1))
         found = isolation(mean, neighbours) > factor
         if (mean > ADRIFT * np.quantile(mean, 0.05)).any():
             found |= adrift(points[left], weight[left], mean, neighbours)
@@ -73,9 +73,9 @@ def adrift(points, weight, mean, neighbours):
     -------
     (n,) bool array
     """
-    densest = row_medians(mean[neighbours])
+    densest = row_medians(mean.take(neighbours))
     for _ in range(HOPS):
-        densest = densest[neighbours].min(axis=1)
+        densest = densest.take(neighbours).min(axis=1)
     island, alone = np.zeros(len(points), bool), mean > ADRIFT * np.median(mean)
     if alone.any():
         near = neighbours[:, 1:5]

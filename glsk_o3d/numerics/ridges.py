@@ -4,6 +4,7 @@ import numpy as np
 
 from .eigen import main_direction
 from .neighbourhoods import PAIRS, fullness, nearest_neighbours
+from .vectors import dot
 
 NEIGHBOURS = 32  # among which a ridge is sought: more than for rings, a noisy shell is thick
 CLEAN, NOISY = 0.2, 0.35  # scatter of clean neighbourhoods at most, and of nothing but noise
@@ -58,7 +59,7 @@ def to_ridges(points, noise, passes, weight=None):
     around = nearest_neighbours(points, min(NEIGHBOURS, len(points)), of=points[noisy])[1]
     for start in range(0, len(noisy), _CHUNK):
         part = slice(start, start + _CHUNK)
-        patch, mass = points[around[part]], weight[around[part]]
+        patch, mass = points.take(around[part], axis=0), weight.take(around[part])
         step, x = noise[noisy[part], None], points[noisy[part]]
         for _ in range(passes):
             apart = patch - x[:, None]
@@ -70,7 +71,7 @@ def to_ridges(points, noise, passes, weight=None):
             spread = np.matmul((kernel[:, :, None] * offset).transpose(0, 2, 1), offset)
             along = main_direction(np.stack([spread[:, i, j] for i, j in PAIRS]))
             shift = mean - x
-            shift -= np.einsum("ni,ni->n", shift, along)[:, None] * along
+            shift -= dot(shift, along)[:, None] * along
             x = x + step * shift
         moved[noisy[part]] = x
     return moved

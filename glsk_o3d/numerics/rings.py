@@ -67,8 +67,11 @@ class Rings:
 
     def edge_lengths(self, points):
         """Distance from every point to each of its ring neighbours, (m,) float array."""
-        edge = points[self.indices] - points[self.owners]
-        return np.sqrt(np.einsum("mi,mi->m", edge, edge))
+        squared = np.zeros(len(self.indices))
+        for x in points.T:
+            edge = x.take(self.indices) - x.repeat(self.sizes)
+            squared += edge * edge
+        return np.sqrt(squared)
 
     def mean_lengths(self, points):
         """Mean ring edge of every point with a ring, (n,) float array."""
@@ -92,8 +95,11 @@ class Rings:
 
     def mean_over(self, values):
         """Mean of the neighbours' values, (n, d) float array from `values` (n, d); 0 for an empty ring."""
-        ring = csr_array((np.ones(len(self.indices)), self.indices, self.indptr), shape=(len(self),) * 2)
-        return ring @ values / np.maximum(self.sizes, 1)[:, None]
+        return self._adjacency @ values / np.maximum(self.sizes, 1)[:, None]
+
+    @cached_property
+    def _adjacency(self):
+        return csr_array((np.ones(len(self.indices)), self.indices, self.indptr), shape=(len(self),) * 2)
 
     def take(self, points):
         """The rings of some points, in the order given; the indices stay as they are."""
@@ -173,7 +179,7 @@ def star_rings(points, centres, neighbours, axes):
     for start in range(0, len(centres), _CHUNK):
         part = slice(start, start + _CHUNK)
         candidates = neighbours[part]
-        offsets = np.matmul(points[candidates] - points[centres[part], None], axes[part])
+        offsets = np.matmul(points.take(candidates, axis=0) - points[centres[part], None], axes[part])
         position, closed = delaunay_star(offsets, candidates >= 0)
         ring = np.take_along_axis(candidates, np.maximum(position, 0), axis=1)
         chunks.append(Rings.from_padded(np.where(position >= 0, ring, -1), closed))

@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .vectors import norm
+
 
 def farthest_point_sampling(points, radius, start=None):
     """Sample points until every one lies in the ball of a sample: each is the point farthest from those before.
@@ -37,7 +39,7 @@ def farthest_point_sampling(points, radius, start=None):
             np.arange(len(points)) if np.isinf(reach) else tree.query_ball_point(points[sample], reach * radius[sample])
         )
         ball = np.asarray(ball)
-        distance = np.linalg.norm(points[ball] - points[sample], axis=1) / radius[sample]
+        distance = norm(points.take(ball, axis=0) - points[sample]) / radius[sample]
         closer = distance < nearest[ball]
         nearest[ball[closer]] = distance[closer]
         owner[ball[closer]] = len(samples)

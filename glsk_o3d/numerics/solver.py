@@ -89,7 +89,7 @@ def solve_contraction(laplacian, row_weight, position_weight, points):
         raise SolveError(f"the contraction system is too ill-conditioned: corrections stay at {error:.1e} of the size")
     # The sum of all equations. The rows of a Laplacian sum to zero, so only W_H keeps the cloud in its place: where
     # it drowns beside L^T L in rounding, the corrections vanish but the points drift.
-    pull = system.sum(axis=1) @ (wanted - system @ x)
+    pull = (system @ np.ones(len(points))) @ (wanted - system @ x)
     drift = np.abs(pull).max() / ((position_weight**2).sum() * size)
     if not drift < ACCEPTABLE:
         raise SolveError(f"the contraction system is too ill-conditioned: the cloud drifts by {drift:.1e} of its size")

@@ -4,6 +4,7 @@ import numpy as np
 
 from .groups import group_median, group_sum
 from .neighbourhoods import PAIRS
+from .vectors import dot
 
 ROWS, COLUMNS = np.array(PAIRS).T
 TIMES = np.where(ROWS == COLUMNS, 1, 2)  # that an entry stands in a symmetric matrix
@@ -36,7 +37,7 @@ def plane_distance_radii(vertices, vertex_of_point, points, normals, otherwise=0
     owned = witnesses(vertex_of_point, normals)
     owner = vertex_of_point[owned]
     offset = points[owned] - vertices[owner]
-    distance = np.abs(np.einsum("ij,ij->i", offset, normals[owned]))
+    distance = np.abs(dot(offset, normals[owned]))
     radii = group_median(distance, owner, len(vertices))
     return np.where(np.bincount(owner, minlength=len(vertices)) > 0, radii, otherwise)
 

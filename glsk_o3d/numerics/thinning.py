@@ -5,6 +5,7 @@ import numpy as np
 from .groups import group_sum
 from .neighbourhoods import fullness, nearest_neighbours
 from .ordering import BITS, morton_codes
+from .vectors import dot
 
 TAIL = 0.001  # share of the points that may be far off, at either end of each axis
 MOST = 4  # points that one may stand for after a pass, where there are more than enough
@@ -96,7 +97,7 @@ def thin_to_grid(points, n):
     counts = np.bincount(cell, fresh)
     mean = np.add.reduceat(ordered * fresh[:, None], begin) / counts[:, None]
     away = ordered - np.repeat(mean, size, axis=0)
-    squared = np.einsum("ni,ni->n", away, away)
+    squared = dot(away, away)
     nearest = np.flatnonzero(squared == np.repeat(np.minimum.reduceat(squared, begin), size))
     kept = np.empty(len(begin), int)
     kept[cell[nearest[::-1]]] = order[nearest[::-1]]
@@ -206,7 +207,7 @@ def _mutual(points, neighbours, left):
     """Pairs of points left that are each other's nearest; of each pair the one with more room around it is kept."""
     rows = np.flatnonzero(left)
     candidates = neighbours[rows, 1:]
-    there = left[candidates]
+    there = left.take(candidates)
     first = np.argmax(there, axis=1)
     found = there[np.arange(len(rows)), first]
     nearest = np.full(len(points), -1)

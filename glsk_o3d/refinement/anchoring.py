@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..numerics.groups import group_sum
+from ..numerics.vectors import norm
 
 REACH = 0.7  # farthest a vertex may be from the mean of its points, over their own root mean square distance from it
 FEW = 4  # points, below which they do not say where their vertex is
@@ -30,6 +31,6 @@ def anchor(skeleton):
     mean = group_sum(skeleton.points[owned] - skeleton.vertices[owner], owner, m) / np.maximum(count, 1)[:, None]
     spread = group_sum((skeleton.points[owned] - (skeleton.vertices + mean)[owner]) ** 2, owner, m).sum(axis=1)
     reach = REACH * np.sqrt(spread / np.maximum(count, 1))
-    away = np.linalg.norm(mean, axis=1)
+    away = norm(mean)
     back = np.where((count >= FEW) & (away > reach), 1 - reach / np.maximum(away, np.finfo(float).tiny), 0)
     return replace(skeleton, vertices=skeleton.vertices + back[:, None] * mean)

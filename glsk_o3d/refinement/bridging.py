@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..numerics.vectors import dot, norm
+
 STRAIGHT = 0.7  # least cosine between the bridge and either end
 ALIKE = 2.0  # most that one end may be thicker than the other
 BACK = 3.0  # radii to look back along a branch for its direction
@@ -30,14 +32,14 @@ def bridge_gaps(skeleton, gap):
     place, component = skeleton.vertices[leaf], skeleton.component_of_vertex[leaf]
     i, j = np.triu_indices(len(leaf), 1)
     way = place[j] - place[i]
-    length = np.linalg.norm(way, axis=1)
+    length = norm(way)
     way = way / np.maximum(length, np.finfo(float).tiny)[:, None]
     relative = length / ((radius[i] + radius[j]) / 2)
     fits = (
         (component[i] != component[j])
         & (relative < gap)
-        & (np.einsum("ni,ni->n", way, direction[i]) > STRAIGHT)
-        & (np.einsum("ni,ni->n", way, direction[j]) < -STRAIGHT)
+        & (dot(way, direction[i]) > STRAIGHT)
+        & (dot(way, direction[j]) < -STRAIGHT)
         & (np.maximum(radius[i], radius[j]) < ALIKE * np.minimum(radius[i], radius[j]))
     )
     pairs = np.flatnonzero(fits)
@@ -70,6 +72,6 @@ def _ends(skeleton):
 
 def _outward(path, back):
     """Unit vector from the place so far back along a path to its start."""
-    travelled = np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))
+    travelled = np.cumsum(norm(np.diff(path, axis=0)))
     way = path[0] - path[min(int(np.searchsorted(travelled, back)), len(travelled) - 1) + 1]
     return way / max(np.linalg.norm(way), np.finfo(float).tiny)

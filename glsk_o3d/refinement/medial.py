@@ -3,11 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import bsr_array, csc_array
 
 from ..numerics.groups import group_median, group_sum
 from ..numerics.solver import factorised
 from ..numerics.thickness import plane_distance_radii, robust_radii
+from ..numerics.vectors import dot, norm
 
 BENDING = 2.0  # weight of a vertex's distance from the chord of its neighbours, per point
 BLUR = 0.3  # how much more of that where there is doubt, over the squared ratio of noise to spacing
@@ -61,27 +62,28 @@ def fit_axis(skeleton, passes):
     if len(owned) == 0:
         return skeleton.vertices, np.zeros(m), _plane_radii(skeleton, skeleton.vertices)
     centre = skeleton.vertices.mean(axis=0)
-    x, p, n = skeleton.vertices - centre, skeleton.points[owned] - centre, skeleton.normals[owned]
+    x, p, n = skeleton.vertices - centre, skeleton.points[owned] - centre, skeleton.normals.take(owned, axis=0)
     edges_at = incident_edges(ends, m)
     around = edges_at[skeleton.vertex_of_point[owned]]
     inner = np.flatnonzero(skeleton.degree == 2)
     beside = ends[edges_at[inner, :2]].sum(axis=2) - inner[:, None]  # the other end of either edge
-    far = np.sqrt(np.einsum("ni,ni->n", p, p).max())
+    pattern = _Pattern(m, ends, inner, beside)
+    far = np.sqrt(dot(p, p).max())
     for step in range(passes):
         near = _nearest(x, ends, around, p, n)
         weight, pull = np.ones(len(p)), np.zeros(len(p))
         if step:
-            radius = group_median(np.linalg.norm(near.offset, axis=1), near.edge, len(ends))[near.edge]
+            radius = group_median(norm(near.offset), near.edge, len(ends))[near.edge]
             weight = 1 / (1 + near.miss / np.maximum((OUTLYING * radius) ** 2, TINY))
             pull = CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1)
-        x = _solve(x, ends, near, p, weight, pull, inner, beside, BLUR if step else 0)
-        size = np.linalg.norm(x, axis=1)
+        x = _solve(x, ends, near, p, weight, pull, inner, beside, pattern, BLUR if step else 0)
+        size = norm(x)
         run = np.where((size > far) & (skeleton.degree > 0), far / np.maximum(size, TINY), 1)
         x = run[:, None] * x  # normals that mean nothing may meet anywhere
     near = _nearest(x, ends, around, p, n)
     radii = _plane_radii(skeleton, x + centre)
     if passes:  # the distance from a curve that nobody has centred is no radius
-        distance = np.linalg.norm(near.offset, axis=1)
+        distance = norm(near.offset)
         radii = robust_radii(radii, distance, near.doubt, n, skeleton.vertex_of_point[owned])
     return x + centre, (1 - near.doubt) * near.support / (near.support + SUPPORT), radii
 
@@ -119,15 +121,15 @@ def nearest_on_edges(x, edges, candidates, p):
         From 0 at the first end of the edge to 1 at the second.
     """
     starts, ways = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
-    lengths = np.maximum(np.einsum("ei,ei->e", ways, ways), TINY)  # squared
+    lengths = np.maximum(dot(ways, ways), TINY)  # squared
     edge, t, best = np.zeros(len(p), int), np.zeros(len(p)), np.full(len(p), np.inf)
     for column in candidates.T:
         some = np.flatnonzero(column >= 0)
         column = column[some]
-        along, offset = ways[column], p[some] - starts[column]
-        part = np.clip(np.einsum("ni,ni->n", along, offset) / lengths[column], 0, 1)
+        along, offset = ways.take(column, axis=0), p.take(some, axis=0) - starts.take(column, axis=0)
+        part = np.clip(dot(along, offset) / lengths.take(column), 0, 1)
         offset -= part[:, None] * along
-        squared = np.einsum("ni,ni->n", offset, offset)
+        squared = dot(offset, offset)
         nearer = squared < (1 - TIE) * best[some]  # a vertex belongs to all its edges: rounding must not choose
         some = some[nearer]
         edge[some], t[some], best[some] = column[nearer], part[nearer], squared[nearer]
@@ -151,12 +153,13 @@ class _Nearest(NamedTuple):
 def _nearest(x, ends, around, p, n):
     edge, t = nearest_on_edges(x, ends, around, p)
     share = np.column_stack([1 - t, t])
-    tangent = x[ends[:, 1]] - x[ends[:, 0]]
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), TINY)
-    across = np.cross(n, tangent[edge])
-    offset = np.einsum("ns,nsi->ni", share, x[ends[edge]]) - p
-    miss = np.einsum("ni,ni->n", across, offset) ** 2
-    apart = np.einsum("ni,ni->n", offset, offset) - np.einsum("ni,ni->n", offset, tangent[edge]) ** 2
+    start, way = x[ends[:, 0]], x[ends[:, 1]] - x[ends[:, 0]]
+    tangent = way / np.maximum(norm(way)[:, None], TINY)
+    along = tangent.take(edge, axis=0)
+    across = np.cross(n, along)
+    offset = start.take(edge, axis=0) + t[:, None] * way.take(edge, axis=0) - p
+    miss = dot(across, offset) ** 2
+    apart = dot(offset, offset) - dot(offset, along) ** 2
     a, b = ends.T
     at = group_sum(np.column_stack([miss, apart, np.full(len(p), 0.5)]), edge, len(ends))
     at = group_sum(np.concatenate([at, at]), np.concatenate([a, b]), len(x))
@@ -166,7 +169,7 @@ def _nearest(x, ends, around, p, n):
     return _Nearest(edge, share, tangent, across, offset, miss, doubt, apart_at / np.maximum(support, TINY), support)
 
 
-def _solve(x, ends, near, p, weight, pull, inner, beside, blur):
+def _solve(x, ends, near, p, weight, pull, inner, beside, pattern, blur):
     """The minimum of the energy in `fit_axis`: one sparse, symmetric, positive definite system."""
     m, e = len(x), len(ends)
     along = near.tangent[:, :, None] * near.tangent[:, None]
@@ -175,7 +178,7 @@ def _solve(x, ends, near, p, weight, pull, inner, beside, blur):
     # what they say of its place, and that it is there, once for each end.
     weighted = weight[:, None] * near.across
     matrix = np.column_stack([weighted[:, ROWS] * near.across[:, COLUMNS], pull])
-    target = np.einsum("ni,ni->n", near.across, p)[:, None] * weighted
+    target = dot(near.across, p)[:, None] * weighted
     target = np.column_stack([target, pull[:, None] * p, np.ones(len(p))])
     share, pairs = near.share, near.share[:, [0, 0, 1]] * near.share[:, [0, 1, 1]]
     at_pairs = group_sum(matrix, near.edge[:, None] + e * np.arange(3), 3 * e, pairs)
@@ -189,23 +192,31 @@ def _solve(x, ends, near, p, weight, pull, inner, beside, blur):
     stay = (STAY * count + 1e-3 * max(count.mean(), 1))[:, None, None] * np.eye(3) + count[:, None, None] * along
     right = right + np.einsum("nij,nj->ni", stay, x)
 
-    (a, b), every = ends.T, np.arange(m)
-    rows, columns = np.concatenate([a, a, b, b, every]), np.concatenate([a, b, a, b, every])
-    blocks = np.concatenate([at_edges[0], at_edges[1], at_edges[1], at_edges[2], stay])
     reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
     stencil = np.column_stack([np.ones(len(inner)), -chord])
     width = np.minimum((near.doubt * near.apart)[inner] / np.maximum(reach.prod(axis=1), TINY), WIDEST)
     bend = BENDING * (1 + blur * width**2) * np.maximum(count[inner], 1)
     bend = bend[:, None, None] * stencil[:, :, None] * stencil[:, None]  # the same for all three coordinates
-    corners = np.broadcast_to(np.column_stack([inner, beside])[:, :, None], bend.shape)
+    blocks = np.concatenate(
+        [at_edges[0], at_edges[1], at_edges[1], at_edges[2], stay, bend.reshape(-1, 1, 1) * np.eye(3)]
+    )
+    return factorised(pattern.matrix(blocks)).solve(right.ravel()).reshape(m, 3)
 
-    axis = np.arange(3)
-    row = [(3 * rows[:, None, None] + axis[:, None] + 0 * axis).ravel(), (3 * corners[..., None] + axis).ravel()]
-    column = [
-        (3 * columns[:, None, None] + 0 * axis[:, None] + axis).ravel(),
-        (3 * corners.swapaxes(1, 2)[..., None] + axis).ravel(),
-    ]
-    value = np.concatenate([blocks.ravel(), np.repeat(bend.ravel(), 3)])
-    system = coo_matrix((value, (np.concatenate(row), np.concatenate(column))), shape=(3 * m, 3 * m)).tocsc()
-    return factorised(system).solve(right.ravel()).reshape(m, 3)
+
+class _Pattern:
+    """Where the blocks of `_solve` stand in its system: for both ends of edges, vertices, and these with two beside."""
+
+    def __init__(self, m, ends, inner, beside):
+        (a, b), every, stencil = ends.T, np.arange(m), np.column_stack([inner, beside])
+        rows = np.concatenate([a, a, b, b, every, np.repeat(stencil, 3, axis=1).ravel()])
+        columns = np.concatenate([a, b, a, b, every, np.tile(stencil, 3).ravel()])
+        places, self._place = np.unique(rows * m + columns, return_inverse=True)
+        self._columns = places % m
+        self._starts = np.searchsorted(places, m * np.arange(m + 1))
+
+    def matrix(self, blocks):
+        """The symmetric matrix that has the sum of the blocks, (b, 3, 3), in every place."""
+        summed = group_sum(blocks, self._place, len(self._columns))
+        rows = bsr_array((summed, self._columns, self._starts)).tocsr()
+        return csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..numerics.vectors import dot, norm
 from .medial import incident_edges
 from .merging import support
 
@@ -50,19 +51,18 @@ def resample(skeleton, spacing):
     for begin in range(0, len(owned), _CHUNK):
         part = owned[begin : begin + _CHUNK]
         owner, points = vertex_of_point[part], skeleton.points[part]
-        choice, best = owner.copy(), ((points - skeleton.vertices[owner]) ** 2).sum(axis=1)
+        choice, best = owner.copy(), norm(points - skeleton.vertices.take(owner, axis=0))
         for column in around[owner].T:
             some = np.flatnonzero(column >= 0)
             some = some[inner[column[some]] > 0]
             e = column[some]
-            a, along = skeleton.vertices[ends[e, 0]], skeleton.vertices[ends[e, 1]] - skeleton.vertices[ends[e, 0]]
-            place = (
-                pieces[e] * np.einsum("ni,ni->n", points[some] - a, along) / np.maximum((along**2).sum(axis=1), TINY)
-            )
+            p, a = points.take(some, axis=0), skeleton.vertices.take(ends[e, 0], axis=0)
+            along = skeleton.vertices.take(ends[e, 1], axis=0) - a
+            place = pieces[e] * dot(p - a, along) / np.maximum(dot(along, along), TINY)
             sample = first[e] + np.clip(np.rint(place), 1, inner[e]).astype(int) - 1
-            squared = ((points[some] - vertices[sample]) ** 2).sum(axis=1)
-            nearer = squared < best[some]
-            choice[some[nearer]], best[some[nearer]] = sample[nearer], squared[nearer]
+            distance = norm(p - vertices.take(sample, axis=0))
+            nearer = distance < best[some]
+            choice[some[nearer]], best[some[nearer]] = sample[nearer], distance[nearer]
         vertex_of_point[part] = choice
     radii = np.concatenate(
         [skeleton.radii, ((1 - t[:, 0]) * skeleton.radii[ends[edge, 0]] + t[:, 0] * skeleton.radii[ends[edge, 1]])]

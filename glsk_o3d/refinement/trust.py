@@ -4,6 +4,7 @@ import numpy as np
 
 from ..numerics.components import component_labels
 from ..numerics.groups import group_median, group_sum
+from ..numerics.vectors import dot, norm
 
 SHEET = 0.9  # share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
 BALL = 0.5  # spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
@@ -48,11 +49,11 @@ def trust_warnings(skeleton):
     size = np.bincount(component, minlength=n)[:, None]
     # of every normal line I - n n^T, which takes away what is along it
     weight = (size[:, :, None] + 1e-9 * np.maximum(size, 1)[:, :, None]) * np.eye(3) - group_sum(along, component, n)
-    height = np.einsum("ni,ni->n", normals, points)[:, None]
+    height = dot(normals, points)[:, None]
     meet = np.linalg.solve(weight, group_sum(points - height * normals, component, n)[:, :, None])[:, :, 0]
     offset = points - meet[component]
-    distance = np.einsum("ni,ni->n", offset, offset)
-    miss = distance - np.einsum("ni,ni->n", normals, offset) ** 2
+    distance = dot(offset, offset)
+    miss = distance - dot(normals, offset) ** 2
     spread = group_sum(np.column_stack([miss, distance]), component, n)
     ball = spread[:, 0] < BALL**2 * spread[:, 1]
     share = size[ball].sum() / len(owner)
@@ -64,7 +65,7 @@ def trust_warnings(skeleton):
     spread = group_sum(np.einsum("ni,nj->nij", points, points), component, n) / np.maximum(size, 1)[:, :, None]
     mean = group_sum(points, component, n) / np.maximum(size, 1)
     length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread - mean[:, :, None] * mean[:, None])[:, 2], 0))
-    reach = np.linalg.norm(skeleton.points[owned] - skeleton.vertices[owner], axis=1)
+    reach = norm(skeleton.points[owned] - skeleton.vertices[owner])
     share = size[length < STUB * group_median(reach, component, n)].sum() / len(owner)
     if share > 0.5:
         return [
@@ -86,7 +87,7 @@ def _weak_region(skeleton, count):
     most = np.argmax(np.bincount(label[weak], count[weak], minlength=len(weak)))
     region = skeleton.vertices[weak & (label == most)]
     middle = region.mean(axis=0)
-    reach = np.linalg.norm(region - middle, axis=1).max()
+    reach = norm(region - middle).max()
     place = ", ".join(f"{c:.4g}" for c in middle)
     return [
         f"weakly supported: around {share:.0%} of the points, above all within {reach:.3g} of ({place}), the points do "

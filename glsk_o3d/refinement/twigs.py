@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..numerics.vectors import norm
 from .loops import surface_distance
 from .merging import merge_vertices
 
@@ -85,7 +86,7 @@ def beyond(points, vertices, thickness, paths):
     """
     a, b = (np.concatenate([path[part] for path in paths]) for part in (slice(-1), slice(1, None)))
     start, step = vertices[a], vertices[b] - vertices[a]
-    length, tiny = np.linalg.norm(step, axis=1), np.finfo(float).tiny
+    length, tiny = norm(step), np.finfo(float).tiny
     direction = step / np.maximum(length, tiny)[:, None]
     # relative to one of them: products of coordinates far from the origin would cancel
     points, start = points - start[0], start - start[0]
