@@ -65,7 +65,7 @@ from glsk_o3d.report import REFUSED
 
 STAGES = {
     "order": Stage(("numerics.ordering:morton_order",)),
-    "kNN": Stage(("numerics.neighbourhoods:nearest_neighbours",)),
+    "kNN": Stage(("numerics.neighbourhoods:nearest_neighbours", "numerics.neighbourhoods:nearest_left")),
     "outliers, noise": Stage(
         (
             "numerics.outliers:without_outliers",

@@ -108,9 +108,11 @@ class Refiner(Filter):
     )
 
     def _run(self, skeleton, watch):
-        skeleton = collapse_triangles(skeleton)
+        skeleton, closed, cut = collapse_triangles(skeleton), 0, 0
         if self.opening:
-            skeleton = close_loops(skeleton, self.opening)
+            raw, skeleton = skeleton, close_loops(skeleton, self.opening)
+            # their cycle rank is edges less vertices plus components, and these stay
+            closed = len(raw.edges) - len(raw.vertices) - len(skeleton.edges) + len(skeleton.vertices)
         if self.twig:
             skeleton = cut_twigs(skeleton, self.twig)
         if self.recentre:
@@ -121,9 +123,10 @@ class Refiner(Filter):
         skeleton = replace(skeleton, vertices=vertices, confidence=confidence, radii=radii)
         if self.weak or self.sure:
             whole, skeleton = skeleton, cut_threads(skeleton, self.weak, self.sure)
-            if self.twig and skeleton is not whole:
+            cut = len(whole.edges) - len(skeleton.edges)
+            if self.twig and cut:
                 skeleton = cut_twigs(skeleton, self.twig)
-        report = skeleton.report
+        report = replace(skeleton.report, n_loops_closed=closed, n_loops_cut=cut)
         if self.bridge:
             skeleton, bridges = bridge_gaps(skeleton, self.bridge)
             report = replace(report, n_bridges=bridges)

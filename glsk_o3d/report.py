@@ -98,6 +98,9 @@ class Report:
     n_input, n_dropped, n_sampled, n_outliers, n_distinct, n_contracted : int
         Input points, those dropped as not finite, those that a large cloud was sampled to (all of a smaller one), those
         set aside as outliers, the distinct ones of the sample, and those of them that were contracted.
+    n_loops_closed, n_loops_cut : int
+        Loops that were zipped up because they open less than their tube is thick, and loops that were cut because they
+        hang by a thread or because the points are not sure enough of them. In noise a true loop may be among these.
     n_bridges : int
         Gaps between parts that were bridged.
     stages : tuple of str
@@ -131,6 +134,8 @@ class Report:
     n_outliers: int = 0
     n_distinct: int = 0
     n_contracted: int = 0
+    n_loops_closed: int = 0
+    n_loops_cut: int = 0
     n_bridges: int = 0
     stages: tuple[str, ...] = ()
     recipe: dict[str, Any] = field(default_factory=dict)

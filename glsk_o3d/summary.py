@@ -29,6 +29,8 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
         "distinct": report.n_distinct,
         "contracted": report.n_contracted,
         **structure(skeleton),
+        "loops_closed": report.n_loops_closed,
+        "loops_cut": report.n_loops_cut,
         "iterations": len(report.iterations),
         "converged": report.converged,
         "stop_reason": report.stop_reason,

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 import glsk_o3d as glsk
 from glsk_o3d import Refiner, Report, Skeleton, SkeletonWarning, pipelines, samples
+from glsk_o3d.refinement.triangles import collapse_triangles
 
 PUBLISHED = pipelines.cao2010().stages[3]
 VARIANTS = {"published": PUBLISHED, "recommended": Refiner()}
@@ -102,6 +103,8 @@ def test_random_graphs(assert_sound, m, edges, seed):
         assert skeleton.vertex_of_point[-1] == -1
         assert skeleton.n_components == nx.number_connected_components(graph) - skeleton.report.n_bridges
         assert skeleton.n_loops <= len(nx.cycle_basis(graph))
+        gone = skeleton.report.n_loops_closed + skeleton.report.n_loops_cut
+        assert skeleton.n_loops + gone == collapse_triangles(raw).n_loops
         # points of one component stay in one component
         parts = {part: set() for part in range(raw.n_components)}
         for before, after in zip(owner[:-1], skeleton.vertex_of_point[:-1], strict=True):

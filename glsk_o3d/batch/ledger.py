@@ -27,6 +27,7 @@ DONE, FAILED, STALE = "done", "failed", "stale"  # the last: what is there is of
 COLUMNS = (
     *("name", "input", "status", "error", "seconds", "points", "dropped", "sampled", "outliers"),
     *("distinct", "contracted", "vertices", "edges", "components", "loops", "leaves", "junctions", "length"),
+    *("loops_closed", "loops_cut"),
     *("iterations", "converged", "stop_reason", "warnings", "messages", "parameters", "input_hash"),
     *("outputs", "worker", "version", "finished"),
 )

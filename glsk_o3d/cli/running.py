@@ -291,8 +291,8 @@ def print_results(
         hidden = {"dropped": facts["dropped"] or None, "converged": None, "seconds": f"{seconds:.2f}"}
         if facts["sampled"] in (0, facts["points"] - facts["dropped"]):
             hidden["sampled"] = None
-        if not facts["outliers"]:
-            hidden["outliers"] = None
+        hidden["loops_closed"] = None  # most clouds have some, true ones are hardly ever among them
+        hidden |= {name: None for name in ("outliers", "loops_cut") if not facts[name]}
         if facts["contracted"] == facts["distinct"]:
             hidden["contracted"] = None
         words = {name: "yes" if value else "no" for name, value in facts.items() if isinstance(value, bool)}

@@ -149,7 +149,7 @@ def inscribed_circle(points):
     -------
     centre : (3,) float array
     radius : float
-        Distance from the centre to the curve. Found on a grid that is refined twice: good to about 1 %.
+        Distance from the centre to the curve. Found on a grid that is refined twice, good to about 1 %.
     """
     *_, widest = _circles(points)
     return widest
@@ -173,7 +173,7 @@ def opens_wider(points, radius):
 
 
 def _circles(points):
-    """Ever wider circles inside a closed curve, on ever finer grids: a few places, its box, and around the best."""
+    """Ever wider circles inside a closed curve: on a coarse and a fine grid of its box, and on two around the best."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]
     polygon = (points - middle) @ axes.T

@@ -1,6 +1,7 @@
 """Nearest neighbours and how they are spread."""
 
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -36,13 +37,23 @@ def nearest_neighbours(points, k, of=None):
     """
     # Split at middles, not at medians: a twelfth faster to build and ask together.
     tree, asked = cKDTree(points, leafsize=24, balanced_tree=False), points if of is None else of
-    parts = min(threads(), len(asked) // _LEAST)
-    if parts < 2:
-        return tree.query(asked, k)
-    # Not SciPy's own threads, which outlive their arrays when they are interrupted, and crash the process.
-    with ThreadPoolExecutor(parts) as pool:
-        found = list(pool.map(lambda part: tree.query(part, k), np.array_split(asked, parts)))
-    return tuple(map(np.concatenate, zip(*found, strict=True)))
+    distance, neighbour = np.empty((len(asked), k)), np.empty((len(asked), k), int)
+
+    def ask(start, stop):
+        found = tree.query(asked[start:stop], k)
+        distance[start:stop], neighbour[start:stop] = (np.reshape(each, (stop - start, k)) for each in found)
+
+    parts = max(min(threads(), len(asked) // _LEAST), 1)
+    bounds = np.linspace(0, len(asked), parts + 1).astype(int).tolist()
+    if parts > 1:
+        # Not SciPy's own threads, which outlive their arrays when they are interrupted, and crash the process.
+        with suppress(RuntimeError), ThreadPoolExecutor(parts - 1) as pool:  # an interpreter that ends starts none
+            others = pool.map(ask, bounds[1:-1], bounds[2:])
+            ask(*bounds[:2])
+            list(others)
+            return distance, neighbour
+    ask(0, len(asked))
+    return distance, neighbour
 
 
 def nearest_left(points, neighbours, left, k):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .groups import group_sum
-from .neighbourhoods import fullness, nearest_neighbours
+from .neighbourhoods import fullness, nearest_left
 from .ordering import BITS, morton_codes
 from .vectors import dot
 
@@ -50,7 +50,7 @@ def thin(points, neighbours, n):
     into = _ends(into)
     rows = np.flatnonzero(left)
     if n < len(rows) < len(points):
-        around = nearest_neighbours(points[rows], min(neighbours.shape[1], len(rows)))[1]
+        around = nearest_left(points, neighbours, left, min(neighbours.shape[1], len(rows)))
         into = rows[thin(points[rows], around, n)][(np.cumsum(left) - 1)[into]]
     return into
 

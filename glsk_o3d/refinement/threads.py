@@ -112,9 +112,8 @@ def cut_threads(skeleton, weak, sure):
         cut, used = [], np.zeros(len(keys), bool)
         for cycle in cycles:
             across = crossings(cycle, m, pairs, weight)
-            tube, confidence = np.median(thickness[cycle]), skeleton.confidence[cycle].mean()
-            wide = opens_wider(skeleton.vertices[cycle], sure * tube / max(confidence, np.finfo(float).tiny))
-            if across.min() < weak * np.median(across) or not wide:
+            tube, loop = np.median(thickness[cycle]), skeleton.confidence[cycle].mean() * skeleton.vertices[cycle]
+            if across.min() < weak * np.median(across) or not opens_wider(loop, sure * tube):
                 edges = np.searchsorted(keys, np.sort(np.column_stack([cycle, np.roll(cycle, -1)]), axis=1) @ [m, 1])
                 if not used[edges].any():  # two cuts in what two loops share would tear a piece out of it
                     cut.append(edges[np.lexsort((edges, across))[0]])

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..numerics.vectors import norm
+from ..numerics.vectors import dot, norm
 from .loops import surface_distance
 from .merging import merge_vertices
 
@@ -95,7 +95,7 @@ def beyond(points, vertices, thickness, paths):
     rows = max(_CHUNK // len(a), 1)
     for first in range(0, len(points), rows):
         p = points[first : first + rows]
-        along = p @ direction.T - np.einsum("ej,ej->e", start, direction)
+        along = p @ direction.T - dot(start, direction)
         squared = (p**2).sum(axis=1)[:, None] - 2 * p @ start.T + (start**2).sum(axis=1)
         foot = np.clip(along, 0, length)
         distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))

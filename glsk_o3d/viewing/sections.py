@@ -154,6 +154,8 @@ def origin(report: Report) -> str:
         "set aside as outliers": report.n_outliers,
         "distinct points": report.n_distinct,
         "contracted points": report.n_contracted,
+        "loops closed": report.n_loops_closed,
+        "loops cut": report.n_loops_cut,
         "gaps bridged": report.n_bridges,
     }
     numbers = {name: f"{n:,}" for name, n in counts.items()} if report.n_input else {}

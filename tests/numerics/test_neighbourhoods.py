@@ -28,7 +28,6 @@ CLOUD = RNG.normal(size=(300, 3))
 @pytest.mark.parametrize("k", [1, 2, 9, 300])
 def test_nearest_neighbours_against_all_distances(k):
     distance, neighbours = nearest_neighbours(CLOUD, k)
-    distance, neighbours = np.reshape(distance, (300, k)), np.reshape(neighbours, (300, k))
     brute = cdist(CLOUD, CLOUD)
     np.testing.assert_allclose(distance, np.sort(brute, axis=1)[:, :k], rtol=1e-12)
     np.testing.assert_array_equal(neighbours, np.argsort(brute, axis=1)[:, :k])
@@ -55,8 +54,10 @@ def test_few_points_start_no_threads(monkeypatch):
 
 
 ASK_ON_AND_ON = """
+import signal
 import numpy as np
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
+signal.signal(signal.SIGINT, signal.default_int_handler)  # who starts the tests may ignore it
 try:
     print("begun", flush=True)
     while True:
@@ -70,11 +71,29 @@ except KeyboardInterrupt:
 def test_threads_may_be_interrupted(delay):
     environment = os.environ | {"OMP_NUM_THREADS": "4"}
     asking = subprocess.Popen([sys.executable, "-c", ASK_ON_AND_ON], env=environment, stdout=subprocess.PIPE, text=True)
-    assert asking.stdout.readline() == "begun\n"
-    time.sleep(delay)
-    asking.send_signal(signal.SIGINT)
-    assert asking.communicate(timeout=60)[0] == "stopped\n"
-    assert asking.returncode == 0
+    try:
+        assert asking.stdout.readline() == "begun\n"
+        time.sleep(delay)
+        asking.send_signal(signal.SIGINT)
+        assert asking.communicate(timeout=60)[0] == "stopped\n"
+        assert asking.returncode == 0
+    finally:
+        asking.kill()
+        asking.wait()
+
+
+AT_THE_END = """
+import atexit
+import numpy as np
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
+atexit.register(lambda: print(nearest_neighbours(np.random.default_rng(0).random((30000, 3)), 16)[1].shape))
+"""
+
+
+def test_an_interpreter_that_ends_still_finds_them():
+    environment = os.environ | {"OMP_NUM_THREADS": "4"}
+    done = subprocess.run([sys.executable, "-c", AT_THE_END], env=environment, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("(30000, 16)\n", "")
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 0.99, 1.0])
@@ -82,7 +101,7 @@ def test_threads_may_be_interrupted(delay):
 def test_nearest_among_those_left_as_if_asked_anew(share, k):
     left = RNG.random(300) < share
     left[:k] = True
-    expected = nearest_neighbours(CLOUD[left], k)[1].reshape(-1, k)
+    expected = nearest_neighbours(CLOUD[left], k)[1]
     np.testing.assert_array_equal(nearest_left(CLOUD, nearest_neighbours(CLOUD, 12)[1], left, k), expected)
 
 

@@ -399,9 +399,10 @@ def test_never_tears_a_component_and_leaves_no_false_loop(random_skeleton, seed,
 
 
 @settings(max_examples=10, deadline=None)
-@given(st.integers(0, 10**6), st.integers(4, 9), st.floats(0.3, 1.0))
-def test_what_nothing_supports_becomes_a_forest(random_skeleton, seed, m, reach):
+@given(st.integers(0, 10**6), st.integers(4, 9), st.floats(0.3, 1.0), st.sampled_from([1, 1e4]))
+def test_what_nothing_supports_becomes_a_forest(random_skeleton, seed, m, reach, size):
     raw = random_skeleton(seed, m, reach, n=4 * m)
+    raw = replace(raw, vertices=size * raw.vertices, points=size * raw.points)
     owner = np.arange(4 * m) % m  # each vertex has points at some distance
     skeleton = cut_threads(replace(raw, vertex_of_point=owner, confidence=np.zeros(m)), 0, 1)
     assert skeleton.n_loops == 0
