@@ -179,9 +179,9 @@ def _circles(points):
     polygon = (points - middle) @ axes.T
     low, high = polygon[:, :2].min(axis=0), polygon[:, :2].max(axis=0)
     centre, best = np.zeros(3), 0.0
-    for n, share in ((5, 1), (21, 1), (11, 1 / 5), (11, 1 / 25)):
-        at = (low + high) / 2 if share == 1 else centre[:2]
-        x, y = (np.linspace(-0.5, 0.5, n)[:, None] * share * (high - low) + at).T
+    at, span = (low + high) / 2, high - low
+    for n, finer in ((5, 1), (21, 5), (11, 5), (11, 1)):
+        x, y = (np.linspace(-0.5, 0.5, n)[:, None] * span + at).T
         grid = np.stack([*np.meshgrid(x, y), np.zeros((n, n))], axis=-1).reshape(-1, 3)
         grid = grid[_inside(grid, polygon)]
         if len(grid):
@@ -189,6 +189,8 @@ def _circles(points):
             if distance.max() > best:
                 best, centre = float(distance.max()), grid[np.argmax(distance)]
         yield centre @ axes + middle, best
+        if finer > 1:
+            at, span = centre[:2], span / finer
 
 
 def _distance(points, polygon):
