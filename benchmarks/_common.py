@@ -30,11 +30,11 @@ from rich.progress import track
 from rich.table import Table
 from scipy.spatial import cKDTree
 
-from glsk_o3d import Contractor, Pipeline, pipelines, samples
-from glsk_o3d.analysis import Truth, read_truth
+from glsk_o3d import Contractor, Pipeline, pipelines, read_truth, samples
+from glsk_o3d.analysis import Truth
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.errors import InvalidParameterError
-from glsk_o3d.interop.files import write_atomically
+from glsk_o3d.interop.writing import write_atomically
 from glsk_o3d.report import Report
 
 ROOT = Path(__file__).resolve().parents[1]

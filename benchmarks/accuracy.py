@@ -50,7 +50,7 @@ from glsk_o3d import Pipeline, read_cloud
 from glsk_o3d.analysis import compare
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.errors import InvalidParameterError
-from glsk_o3d.interop.files import write_atomically
+from glsk_o3d.interop.writing import write_atomically
 from glsk_o3d.pipelines import default
 
 EVERY = "clean_1024,clean_4096,density_4096,holes_4096,scan2_4096,noise1_4096,noise2_4096,outliers_4096"

@@ -58,7 +58,8 @@ from scipy.spatial import cKDTree
 from glsk_o3d import Contractor, Pipeline, Skeleton, read_cloud, read_skeleton
 from glsk_o3d.analysis.curves import distances
 from glsk_o3d.cli.overrides import override
-from glsk_o3d.interop.open3d import cloud_points, import_open3d
+from glsk_o3d.interop.clouds import cloud_points
+from glsk_o3d.interop.packages import import_open3d
 from glsk_o3d.numerics.cores import cores
 from glsk_o3d.pipelines import default, wen2024
 from glsk_o3d.report import REFUSED

@@ -1,9 +1,11 @@
 # The public names and where they live; the package imports each when it is first asked for.
 from . import analysis as analysis
 from . import batch as batch
+from . import crosscheck as crosscheck
 from . import pipelines as pipelines
 from .connector import Connector
 from .contractor import Contractor
+from .driver import remove_redundant_points, skeletonize
 from .errors import (
     BatchError,
     DisplayError,
@@ -18,28 +20,30 @@ from .errors import (
     SkeletonWarning,
     StageError,
 )
-from .filter import Filter
-from .interop.files import read_cloud, read_skeleton, save_skeleton
-from .interop.meshlab.meshset import MeshSet
-from .interop.preview import save_preview
+from .interop.clouds import Cloud
+from .io.files import read_cloud, read_skeleton, save_skeleton
+from .io.truth import read_truth
 from .lpr_reducer import LPRReducer
-from .pipeline import Pipeline, skeletonize
-from .recipes import load_recipe, rerun, save_recipe
-from .reduction import remove_redundant_points
+from .meshlab.meshset import MeshSet
+from .pipeline import Filter, Pipeline
+from .recipes import from_recipe, load_recipe, rerun, save_recipe, to_recipe
 from .refiner import Refiner
 from .report import IterationRecord, Report
 from .ring_builder import RingBuilder
 from .skeleton import Skeleton
 from .state import Contraction
 from .stopping import ExplainedScore, RingSizeRatio
+from .viewing.assessment import save_assessment
 from .viewing.page import save_report
 from .viewing.plot import plot_skeleton
+from .viewing.preview import save_preview
 from .viewing.recorder import ContractionRecorder
 
 __version__: str
 
 __all__ = [
     "BatchError",
+    "Cloud",
     "Connector",
     "Contraction",
     "ContractionRecorder",
@@ -68,16 +72,21 @@ __all__ = [
     "StageError",
     "analysis",
     "batch",
+    "crosscheck",
+    "from_recipe",
     "load_recipe",
     "pipelines",
     "plot_skeleton",
     "read_cloud",
     "read_skeleton",
+    "read_truth",
     "remove_redundant_points",
     "rerun",
+    "save_assessment",
     "save_preview",
     "save_recipe",
     "save_report",
     "save_skeleton",
     "skeletonize",
+    "to_recipe",
 ]

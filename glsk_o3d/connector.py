@@ -8,14 +8,16 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .filter import Filter, documented, parameter, resolve_length
 from .numerics.components import component_labels
+from .numerics.farthest_point import farthest_point_sampling
 from .numerics.groups import group_median, group_sum
 from .numerics.neighbourhoods import nearest_neighbours, row_medians, uprightness
-from .numerics.sampling import farthest_point_sampling
-from .numerics.thickness import plane_distance_radii
+from .numerics.radii import plane_distance_radii
 from .numerics.vectors import norm
+from .parameters import documented, parameter, resolve_length
+from .pipeline import Filter
 from .skeleton import Skeleton
+from .state import Contraction
 
 NOISY = 0.3  # share of noise from which on a vertex may be stray
 FACING = 0.1  # uprightness of two normals below which their surfaces face each other
@@ -24,7 +26,7 @@ CALM = 0.2  # share of noise below which that counts
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Connector(Filter):
+class Connector(Filter[Skeleton]):
     """Sample the contracted points and join samples whose points are ring neighbours.
 
     Farthest-point sampling leaves a ball around every vertex, as wide as `radius` or a share of the local thickness.
@@ -51,8 +53,8 @@ class Connector(Filter):
     (1, True)
     """
 
-    consumes: ClassVar[str] = "Contraction"
-    produces: ClassVar[str] = "Skeleton"
+    consumes: ClassVar[type] = Contraction
+    produces: ClassVar[type] = Skeleton
 
     radius: float | str = parameter(
         "1%",

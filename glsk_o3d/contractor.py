@@ -9,11 +9,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from .filter import Filter, documented, parameter
 from .numerics.cotangent import cotangent_laplacian
 from .numerics.eigen import largest_eigenvalue
 from .numerics.neighbourhoods import PAIRS
 from .numerics.solver import SolveError, solve_contraction
+from .parameters import documented, parameter
+from .pipeline import Filter
 from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord
 from .state import Contraction
 from .stopping import ExplainedScore, StopRule
@@ -24,7 +25,7 @@ SELF = 4  # neighbours that a point counts as in its own surroundings
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Contractor(Filter):
+class Contractor(Filter[Contraction]):
     r"""Contract a cloud onto its curve skeleton, reducing it on the way.
 
     Each iteration solves :math:`(w_L^2 L^T M^{-1} L + M W_H^2) P' = M W_H^2 P` with the cotangent Laplacian L of the
@@ -51,7 +52,7 @@ class Contractor(Filter):
     'reached max_iterations = 2'
     """
 
-    consumes: ClassVar[str] = "Contraction"
+    consumes: ClassVar[type] = Contraction
 
     reducer: Callable[[Contraction], Contraction] | None = parameter(
         None, "Merges redundant points after each solve; None keeps them all.", type="reducer?"

@@ -1,5 +1,8 @@
 """What can go wrong, by name. Every message says what was wrong, where, and what to do."""
 
+import difflib
+from collections.abc import Iterable
+
 
 class GlskError(Exception):
     """Base of all errors this package raises on purpose."""
@@ -47,3 +50,29 @@ class SkeletonWarning(UserWarning):
 
 class PluginWarning(UserWarning):
     """A plugin of another distribution is broken and was left out."""
+
+
+def did_you_mean(word: str, known: Iterable[str], what: str) -> str:
+    """The message for an unknown word: what was meant, or what there is.
+
+    Parameters
+    ----------
+    word : str
+    known : iterable of str
+    what : str
+        What `word` should have been, such as ``"filter"``.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> did_you_mean("radios", ["radius", "links"], "parameter of Connector")
+    "no parameter of Connector is called 'radios': did you mean 'radius'?"
+    """
+    names = {name.lower(): name for name in known}
+    # a long list helps nobody: then the nearest name is said however far it is
+    close = difflib.get_close_matches(word.lower(), names, n=1, cutoff=0.6 if len(names) <= 20 else 0.0)
+    hint = f"did you mean {names[close[0]]!r}?" if close else f"there are {', '.join(names.values()) or 'none'}"
+    return f"no {what} is called {word!r}: {hint}"

@@ -8,10 +8,12 @@ from typing import ClassVar
 import numpy as np
 
 from .errors import StageError
-from .filter import Filter, documented, parameter
 from .numerics.neighbourhoods import plane_axes
 from .numerics.rings import Rings, star_rings
 from .numerics.vectors import dot, norm
+from .parameters import documented, parameter
+from .pipeline import Filter
+from .state import Contraction
 
 _IN_PLANE = 1e-3  # sine of the angle below which a direction counts as lying in the tangent plane
 _MIN_SIZE = 1e-4  # floor of s - psi' s(0) in the working frame, as in the published code
@@ -19,7 +21,7 @@ _MIN_SIZE = 1e-4  # floor of s - psi' s(0) in the working frame, as in the publi
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class LPRReducer(Filter):
+class LPRReducer(Filter[Contraction]):
     r"""Merge each point with its nearest ring neighbour where that costs little: one pass.
 
     A point i may swallow its nearest ring neighbour m where :math:`F = V_1 - V_2 + 3 U < \varphi s_i^2`. Its new ring
@@ -55,7 +57,7 @@ class LPRReducer(Filter):
     True
     """
 
-    consumes: ClassVar[str] = "Contraction"
+    consumes: ClassVar[type] = Contraction
 
     phi: float = parameter(
         1e5, "Merge where F is below phi times the squared ring size.", type="float", low=0, open_low=True

@@ -1,23 +1,121 @@
-"""Pipeline: filters joined with `|`, and the one easy door."""
+"""Filters, and pipelines of filters joined with `|`."""
 
 from __future__ import annotations
 
 import dataclasses
-import os
+import logging
 import time
-from collections.abc import Callable
-from itertools import pairwise
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import chain, pairwise
+from typing import Any, ClassVar, Generic, TypeVar
 
-from .errors import InvalidParameterError
-from .filter import Filter
-from .pipelines import named_pipeline
-from .report import Report
+from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageError, did_you_mean
+from .interop.clouds import Cloud, cloud_points
+from .interop.verbosity import following_open3d
+from .parameters import UNWRITTEN, Parameters
+from .report import STOPPED_BY_CALLER, IterationRecord, Report
 from .skeleton import Skeleton
+from .state import Contraction
+
+OnIteration = Callable[[IterationRecord], "bool | None"]
+OnState = Callable[[Contraction], object]
+Watch = Callable[[Contraction], "bool | None"]
+Produced = TypeVar("Produced", covariant=True)
+Next = TypeVar("Next")
+
+FLOWS = (Cloud, Contraction, Skeleton)
+"""What runs between filters."""
+ORDER = "the order is RingBuilder | Contractor | Connector | Refiner"
+RECIPE_VERSION = 1
+
+_log = logging.getLogger(__name__)
 
 
-class Pipeline:
+class Filter(Parameters, Generic[Produced]):
+    """A stage of a pipeline: a frozen, keyword-only dataclass that maps what it `consumes` to something new.
+
+    Filters keep no state between calls and never change their input. They are joined with ``|``.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Connector, RingBuilder
+    >>> [flow.__name__ for flow in (RingBuilder.consumes, RingBuilder.produces, Connector.produces)]
+    ['Cloud', 'Contraction', 'Skeleton']
+    """
+
+    kind: ClassVar[str] = "filter"
+    consumes: ClassVar[type] = Cloud
+    """What the filter takes: `Cloud`, `Contraction` or `Skeleton`."""
+    produces: ClassVar[type] = Contraction
+    """What it gives. A cloud, which only a filter of clouds gives, carries no report: pipelines tell of its stage."""
+
+    def __call__(
+        self, data: Any, *, on_iteration: OnIteration | None = None, on_state: OnState | None = None
+    ) -> Produced:
+        """Run the filter.
+
+        Parameters
+        ----------
+        data : cloud, Contraction or Skeleton
+            See `consumes`. A cloud is anything `glsk_o3d.skeletonize` takes.
+        on_iteration : callable, optional
+            Called with each IterationRecord of a contraction; return False to stop there and keep what is done.
+        on_state : callable, optional
+            Called before it with the Contraction itself, as it is after each solve and the merges that follow.
+
+        Returns
+        -------
+        cloud, Contraction or Skeleton
+            See `produces`.
+
+        Raises
+        ------
+        InvalidParameterError
+            A parameter is wrong.
+        StageError
+            `data` is not what the filter takes, or what it gives is not what it promises.
+        """
+        self.check()
+        if not _is_of(data, self.consumes):
+            raise StageError(f"{type(self).__name__} takes a {_named(self.consumes)}, not a {_called(data)}: {ORDER}")
+        start = time.perf_counter()
+        with following_open3d():
+            result = self._ran(data, _watch(on_iteration, on_state))
+            seconds = time.perf_counter() - start
+            _log.debug("%s took %.3f s: %r", type(self).__name__, seconds, result)
+        if result is None or not _is_of(result, self.produces):
+            raise StageError(
+                f"{type(self).__name__} should give a {_named(self.produces)} and gave a {_called(result)}"
+            )
+        if self.produces is Cloud:
+            try:
+                cloud_points(result)
+            except InvalidCloudError as error:
+                raise InvalidCloudError(f"{type(self).__name__} gave no usable cloud: {error}") from error
+            return result
+        return dataclasses.replace(result, report=with_stage(result.report, self, seconds))
+
+    def __or__(self, other: Filter[Next] | Pipeline[Next]) -> Pipeline[Next]:
+        return Pipeline(self) | other
+
+    def _run(self, data: Any, watch: Watch | None) -> Any:
+        """The work itself; `watch` is None or wants the Contraction after each solve, and says False to stop."""
+        raise NotImplementedError
+
+    def _ran(self, data: Any, watch: Watch | None) -> Any:
+        """What `_run` gives; where it fails and is not of this package, the error says whose it is."""
+        try:
+            return self._run(data, watch)
+        except (GlskError, MemoryError, Warning):
+            raise
+        except Exception as error:
+            cls = type(self)
+            if cls.__module__.startswith(f"{__package__}."):
+                raise
+            raise StageError(f"{cls.__name__} of {cls.__module__} failed: {type(error).__name__}: {error}") from error
+
+
+class Pipeline(Generic[Produced]):
     """Filters in a row; called on a cloud, each takes what the one before made.
 
     Parameters
@@ -41,12 +139,19 @@ class Pipeline:
         for before, after in pairwise(stages):
             if before.produces != after.consumes:
                 raise InvalidParameterError(
-                    f"{type(after).__name__} takes a {after.consumes} but {type(before).__name__} gives a "
-                    f"{before.produces}: the order is RingBuilder | Contractor | Connector | Refiner"
+                    f"{type(after).__name__} takes a {_named(after.consumes)} but {type(before).__name__} gives a "
+                    f"{_named(before.produces)}: {ORDER}"
                 )
         self.stages = stages
 
-    def __call__(self, cloud, *, on_iteration=None, on_state=None, on_stage: Callable[[Filter], object] | None = None):
+    def __call__(
+        self,
+        cloud: Any,
+        *,
+        on_iteration: OnIteration | None = None,
+        on_state: OnState | None = None,
+        on_stage: Callable[[Filter], object] | None = None,
+    ) -> Produced:
         """Run all filters on a cloud.
 
         Parameters
@@ -71,10 +176,10 @@ class Pipeline:
                 on_stage(stage)
             start = time.perf_counter()
             cloud = stage(cloud, on_iteration=on_iteration, on_state=on_state)
-            if stage.produces == "cloud":
-                ahead = ahead.with_stage(stage, time.perf_counter() - start)
-            elif ahead.stages and stage.consumes == "cloud":
-                cloud = dataclasses.replace(cloud, report=cloud.report.after(ahead))
+            if stage.produces is Cloud:
+                ahead = with_stage(ahead, stage, time.perf_counter() - start)
+            elif ahead.stages and stage.consumes is Cloud:
+                cloud = dataclasses.replace(cloud, report=after(cloud.report, ahead))
         return cloud
 
     def check(self) -> None:
@@ -84,29 +189,82 @@ class Pipeline:
 
     def check_complete(self) -> None:
         """Raise InvalidParameterError unless the pipeline leads from a cloud to a skeleton."""
-        if self.stages[0].consumes != "cloud" or self.stages[-1].produces != "Skeleton":
+        if self.stages[0].consumes is not Cloud or self.stages[-1].produces is not Skeleton:
             raise InvalidParameterError(f"{self!r} does not lead from a cloud to a skeleton")
 
-    def to_recipe(self) -> dict[str, Any]:
-        """The pipeline as a plain dict; see `glsk_o3d.recipes.to_recipe`."""
-        from .recipes import to_recipe
+    def with_options(self, options: Mapping[str, Any] | None = None, /, **named: Any) -> Pipeline[Produced]:
+        """This pipeline with other values of some parameters.
 
-        return to_recipe(self)
+        Parameters
+        ----------
+        options : mapping of str to object, optional
+            A value by ``"RingBuilder.k"`` or, where only one part of the pipeline has a parameter of that name, by
+            ``"k"``; it is replaced wherever its filter occurs, also inside another filter. Reducers and stopping rules
+            are put in first, so that the order does not matter.
+        **named
+            More of them.
 
-    @classmethod
-    def from_recipe(cls, recipe: dict[str, Any]) -> Pipeline:
-        """The pipeline that a plain dict describes; see `glsk_o3d.recipes.from_recipe`."""
-        from .recipes import from_recipe
+        Returns
+        -------
+        Pipeline
+            Checked.
 
-        return from_recipe(recipe)
+        Raises
+        ------
+        InvalidParameterError
+            A name is unknown, not in the pipeline or that of several parameters, or a value is wrong.
 
-    def save_recipe(self, path: str | os.PathLike) -> None:
-        """Write the pipeline to a JSON or TOML file, which `glsk_o3d.load_recipe` reads."""
-        from .recipes import save_recipe
+        Examples
+        --------
+        >>> from glsk_o3d import pipelines
+        >>> thin = pipelines.default().with_options({"Connector.radius": "2%"}, k=12, reducer=None)
+        >>> thin.stages[0].k, thin.stages[1].reducer, thin.stages[2].radius
+        (12, None, '2%')
+        """
+        pipeline: Any = self
+        given = {**(options or {}), **named}
+        # reducers and rules first: what is put in has parameters that others may change
+        for name, value in sorted(given.items(), key=lambda item: not isinstance(item[1], Parameters | None)):
+            pipeline = _changed(pipeline, pipeline.owner_of(name), name.rpartition(".")[2], value)
+        pipeline.check()
+        return pipeline
 
-        save_recipe(self, path)
+    def owner_of(self, name: str) -> type[Parameters]:
+        """The class that a name of an option means.
 
-    def __or__(self, other: Filter | Pipeline) -> Pipeline:
+        Parameters
+        ----------
+        name : str
+            ``"RingBuilder.k"``, or ``"k"``.
+
+        Returns
+        -------
+        class
+            Of a filter, reducer or stopping rule in the pipeline.
+
+        Raises
+        ------
+        InvalidParameterError
+            There is none, or more than one.
+        """
+        present = {type(part).__name__: type(part) for part in parts(self)}
+        owner, dot, field = name.rpartition(".")
+        if dot and owner not in present:
+            raise InvalidParameterError(f"{name}: {owner} is not in the pipeline, which has {', '.join(present)}")
+        fields = {
+            cls: [known.name for known in dataclasses.fields(cls)]  # type: ignore[arg-type]
+            for cls in ([present[owner]] if dot else present.values())
+        }
+        owners = [cls for cls, names in fields.items() if field in names]
+        if not owners:
+            known = dict.fromkeys(chain.from_iterable(fields.values()))
+            raise InvalidParameterError(did_you_mean(field, known, f"parameter of {owner or 'the pipeline'}"))
+        if len(owners) > 1:
+            choice = " or ".join(f"'{cls.__name__}.{field}'" for cls in owners)
+            raise InvalidParameterError(f"{name}: more than one part of the pipeline has it: write {choice}")
+        return owners[0]
+
+    def __or__(self, other: Filter[Next] | Pipeline[Next]) -> Pipeline[Next]:
         return Pipeline(*self.stages, *(other.stages if isinstance(other, Pipeline) else (other,)))
 
     def __repr__(self):
@@ -119,74 +277,127 @@ class Pipeline:
         return hash(self.stages)
 
 
-def skeletonize(
-    cloud, pipeline: Pipeline | str | os.PathLike = "default", *, on_iteration=None, on_state=None
-) -> Skeleton:
-    """Curve skeleton of a point cloud.
+def parts(item: Pipeline | Parameters) -> Iterator[Parameters]:
+    """Everything with parameters in a pipeline: its filters, and after each the reducer and the rule inside.
 
     Parameters
     ----------
-    cloud : open3d.geometry.PointCloud, open3d.t.geometry.PointCloud, TriangleMesh of either kind, or (N, 3) array
-        Points without order, normals or orientation; of a mesh the vertices. It is not modified.
-    pipeline : Pipeline, {"default", "wen2024", "cao2010"}, name of a plugin's pipeline, or path of a recipe
-        A name that ends in ``.json`` or ``.toml`` is a path.
-    on_iteration : callable, optional
-        Called with the IterationRecord of each solve; return False to stop the contraction there.
-    on_state : callable, optional
-        Called before it with the Contraction after each solve, such as a `ContractionRecorder`.
+    item : Pipeline or Parameters
 
-    Returns
-    -------
-    Skeleton
-
-    Raises
+    Yields
     ------
-    InvalidCloudError
-        If the points cannot be skeletonised.
-    InvalidParameterError
-        If the pipeline is unknown, lacks a stage, or has a wrong parameter.
-    RecipeError
-        If the recipe is wrong.
-
-    Examples
-    --------
-    >>> from glsk_o3d.samples import torus
-    >>> ring = skeletonize(torus(1000).points)
-    >>> ring.n_loops, ring.vertices.shape[1]
-    (1, 3)
+    Parameters
     """
-    return as_pipeline(pipeline)(cloud, on_iteration=on_iteration, on_state=on_state)
+    if isinstance(item, Pipeline):
+        inner: Iterable[Any] = item.stages
+    else:
+        yield item
+        inner = (getattr(item, field.name) for field in dataclasses.fields(item))  # type: ignore[arg-type]
+    for part in inner:
+        if isinstance(part, Parameters):
+            yield from parts(part)
 
 
-def as_pipeline(pipeline: Pipeline | Filter | str | os.PathLike) -> Pipeline:
-    """The pipeline that is meant, from a cloud to a skeleton.
+def _changed(item: Any, cls: type[Parameters], name: str, value: Any) -> Any:
+    """A pipeline, or a part of one, with a parameter replaced wherever its filter occurs, also inside another."""
+    if isinstance(item, Pipeline):
+        return Pipeline(*(_changed(stage, cls, name, value) for stage in item.stages))
+    changes = {name: value} if type(item) is cls else {}
+    for field in dataclasses.fields(item):
+        inner = getattr(item, field.name)
+        if isinstance(inner, Parameters) and field.name not in changes:
+            changes[field.name] = _changed(inner, cls, name, value)
+    return dataclasses.replace(item, **changes)
+
+
+def recipe_of(*tables: dict[str, Any]) -> dict[str, Any]:
+    """The recipe of stages, each as `Parameters.table` makes it.
 
     Parameters
     ----------
-    pipeline : Pipeline, Filter, name, or path of a recipe
+    *tables : dict
 
     Returns
     -------
-    Pipeline
-
-    Raises
-    ------
-    InvalidParameterError, RecipeError
-        As in `skeletonize`.
+    dict
     """
-    if isinstance(pipeline, os.PathLike) or (
-        isinstance(pipeline, str) and Path(pipeline).suffix.lower() in (".json", ".toml")
-    ):
-        from .recipes import load_recipe
+    return {"glsk_o3d": {"version": RECIPE_VERSION}, "pipeline": list(tables)}
 
-        pipeline = load_recipe(pipeline)
-    elif isinstance(pipeline, str):
-        pipeline = named_pipeline(pipeline)
-    elif isinstance(pipeline, Filter):
-        pipeline = Pipeline(pipeline)
-    elif not isinstance(pipeline, Pipeline):
-        raise InvalidParameterError(
-            f"pipeline = {pipeline!r}: must be a Pipeline, the name of one, or the path of a recipe"
+
+def with_stage(report: Report, stage: Filter, seconds: float) -> Report:
+    """A report with one more filter in it.
+
+    Parameters
+    ----------
+    report : Report
+    stage : Filter
+    seconds : float
+
+    Returns
+    -------
+    Report
+    """
+    table = stage.table()
+    if report.stop_reason == STOPPED_BY_CALLER:
+        table[UNWRITTEN] = f"the contraction was stopped by the caller after solve {len(report.iterations)}"
+    name = type(stage).__name__
+    return dataclasses.replace(
+        report,
+        stages=(*report.stages, repr(stage)),
+        recipe=recipe_of(*report.recipe.get("pipeline", ()), table),
+        seconds={**report.seconds, name: report.seconds.get(name, 0.0) + seconds},
+    )
+
+
+def after(report: Report, ahead: Report) -> Report:
+    """A report with the filters of another ahead of its own: clouds carry no report of what made them.
+
+    Parameters
+    ----------
+    report, ahead : Report
+
+    Returns
+    -------
+    Report
+    """
+    return dataclasses.replace(
+        report,
+        stages=(*ahead.stages, *report.stages),
+        recipe=recipe_of(*ahead.recipe["pipeline"], *report.recipe["pipeline"]),
+        seconds={
+            name: ahead.seconds.get(name, 0.0) + report.seconds.get(name, 0.0)
+            for name in (*ahead.seconds, *report.seconds)
+        },
+    )
+
+
+def _is_of(data: Any, flow: type) -> bool:
+    """Whether something is what a filter takes or gives; a cloud is anything else than what comes of one."""
+    return not isinstance(data, FLOWS[1:]) if flow is Cloud else isinstance(data, flow)
+
+
+def _named(flow: type) -> str:
+    return "cloud" if flow is Cloud else flow.__name__
+
+
+def _called(data: Any) -> str:
+    return type(data).__name__
+
+
+def _watch(on_iteration: OnIteration | None, on_state: OnState | None) -> Watch | None:
+    """One callback for both, and for the log; None where nobody listens."""
+    if on_iteration is None and on_state is None and not _log.isEnabledFor(logging.DEBUG):
+        return None
+
+    def watch(state):
+        record = state.report.iterations[-1]
+        _log.debug(
+            "solve %d: %d points, %d merged, e %.4f, De %.4f, ring ratio %.4f, %.3f s",
+            *(record.iteration, record.n_points, record.n_merged, record.explained, record.explained_change),
+            *(record.ring_ratio, record.seconds),
         )
-    pipeline.check_complete()
-    return pipeline
+        if on_state is not None:
+            on_state(state)
+        return None if on_iteration is None else on_iteration(record)
+
+    return watch

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from .connector import Connector
 from .contractor import Contractor
-from .errors import InvalidParameterError
 from .lpr_reducer import LPRReducer
+from .parameters import Parameters
+from .pipeline import Pipeline
 from .refiner import Refiner
 from .ring_builder import RingBuilder
+from .skeleton import Skeleton
 from .stopping import ExplainedScore, RingSizeRatio
 
-if TYPE_CHECKING:
-    from .pipeline import Pipeline
 
-
-def cao2010() -> Pipeline:
+def cao2010() -> Pipeline[Skeleton]:
     """The baseline: contraction without reduction, stopped by the ring sizes (Cao et al. 2010).
 
     Examples
@@ -33,7 +31,7 @@ def cao2010() -> Pipeline:
     )
 
 
-def wen2024() -> Pipeline:
+def wen2024() -> Pipeline[Skeleton]:
     """GLSkeleton as published (Wen et al. 2024), with the choices of the authors' code where it differs from the paper.
 
     Merges visit the points in the order of the input and drop the mass of what they merge; the stopping rule waits for
@@ -60,7 +58,7 @@ def wen2024() -> Pipeline:
     )
 
 
-def default() -> Pipeline:
+def default() -> Pipeline[Skeleton]:
     """What we recommend: GLSkeleton with the mass of merged points kept and the vertices centred in the surface.
 
     Examples
@@ -72,41 +70,10 @@ def default() -> Pipeline:
     return RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore()) | Connector() | Refiner()
 
 
-PIPELINES: dict[str, Callable[[], Pipeline]] = {"default": default, "wen2024": wen2024, "cao2010": cao2010}
+PIPELINES: dict[str, Callable[[], Pipeline[Skeleton]]] = {"default": default, "wen2024": wen2024, "cao2010": cao2010}
 
-
-def known_pipelines() -> dict[str, Callable[[], Pipeline]]:
-    """All pipelines by name, those of plugins after the built-in ones.
-
-    Returns
-    -------
-    dict of str to callable
-        Each makes a Pipeline.
-    """
-    from .plugins import plugin_pipelines
-
-    return {**PIPELINES, **plugin_pipelines()}
-
-
-def named_pipeline(name: str) -> Pipeline:
-    """The pipeline of that name, built in or of a plugin.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    Pipeline
-
-    Raises
-    ------
-    InvalidParameterError
-        If there is none; the message says which was meant, or lists the names.
-    """
-    from .catalogue import nearest
-
-    make = PIPELINES.get(name) or known_pipelines().get(name)
-    if make is None:
-        raise InvalidParameterError(nearest(name, known_pipelines(), "pipeline"))
-    return make()
+BUILTIN: dict[str, type[Parameters]] = {
+    cls.__name__: cls
+    for cls in (RingBuilder, Contractor, LPRReducer, Connector, Refiner, ExplainedScore, RingSizeRatio)
+}
+"""The filters and stopping rules of this package, in the order in which they run."""

@@ -5,21 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from .filter import Filter, documented, parameter
-from .refinement.anchoring import anchor
+from .parameters import documented, parameter
+from .pipeline import Filter
+from .refinement.axis_fit import fit_axis
 from .refinement.bridging import bridge_gaps
+from .refinement.clamp import anchor
+from .refinement.diagnostics import trust_warnings
 from .refinement.loops import close_loops
-from .refinement.medial import fit_axis
-from .refinement.resampling import resample
-from .refinement.threads import cut_threads
+from .refinement.spurs import cut_twigs
+from .refinement.subdivision import resample
 from .refinement.triangles import collapse_triangles
-from .refinement.trust import trust_warnings
-from .refinement.twigs import cut_twigs
+from .refinement.weak_loops import cut_threads
+from .skeleton import Skeleton
 
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Refiner(Filter):
+class Refiner(Filter[Skeleton]):
     """Make the graph one-dimensional, close false loops, cut twigs, and centre it in the surface around it.
 
     1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
@@ -62,8 +64,8 @@ class Refiner(Filter):
     (1, 0)
     """
 
-    consumes: ClassVar[str] = "Skeleton"
-    produces: ClassVar[str] = "Skeleton"
+    consumes: ClassVar[type] = Skeleton
+    produces: ClassVar[type] = Skeleton
 
     opening: float = parameter(
         1.0,

@@ -106,7 +106,7 @@ class Report:
     stages : tuple of str
         The filters that ran, as the expressions that rebuild them.
     recipe : dict
-        The same as a recipe, from which `Pipeline.from_recipe` makes the pipeline that repeats the run. Empty if it is
+        The same as a recipe, from which `glsk_o3d.from_recipe` makes the pipeline that repeats the run. Empty if it is
         not known. What a recipe cannot hold is an entry ``"unwritten"`` that says what was there.
     seconds : dict of str to float
         Wall time per filter.
@@ -145,35 +145,6 @@ class Report:
     stop_reason: str = "not contracted"
     warnings: tuple[str, ...] = ()
     versions: dict[str, str] = field(default_factory=_versions)
-
-    def with_stage(self, stage, seconds: float) -> Report:
-        """This report with one more filter in it."""
-        from .recipes import UNWRITTEN, joined, written
-
-        entry = written(stage)
-        if self.stop_reason == STOPPED_BY_CALLER:
-            entry[UNWRITTEN] = f"the contraction was stopped by the caller after solve {len(self.iterations)}"
-        name = type(stage).__name__
-        return dataclasses.replace(
-            self,
-            stages=(*self.stages, repr(stage)),
-            recipe=joined(self.recipe, entry),
-            seconds={**self.seconds, name: self.seconds.get(name, 0.0) + seconds},
-        )
-
-    def after(self, ahead: Report) -> Report:
-        """This report with the filters of another ahead of its own: clouds carry no report of what made them."""
-        from .recipes import joined
-
-        return dataclasses.replace(
-            self,
-            stages=(*ahead.stages, *self.stages),
-            recipe=joined(ahead.recipe, *self.recipe["pipeline"]),
-            seconds={
-                name: ahead.seconds.get(name, 0.0) + self.seconds.get(name, 0.0)
-                for name in (*ahead.seconds, *self.seconds)
-            },
-        )
 
     def with_warning(self, message: str) -> Report:
         """This report with a warning in it; also issued as a SkeletonWarning, unless Open3D's verbosity is Error."""

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from .errors import InvalidCloudError, InvalidParameterError
-from .filter import Filter, documented, parameter, resolve_length
-from .interop.open3d import cloud_points, search_parameters
-from .numerics.frame import Frame
+from .interop.clouds import cloud_points, search_parameters
+from .numerics.morton import morton_order
 from .numerics.neighbourhoods import isolation, nearest_left, nearest_neighbours, plane_axes, principal
-from .numerics.ordering import morton_order
-from .numerics.outliers import without_outliers
-from .numerics.ridges import noise_share, to_ridges
 from .numerics.rings import star_rings
-from .numerics.thinning import average_noisy, thin, thin_smooth, thin_to_grid
+from .parameters import documented, parameter, resolve_length
+from .pipeline import Filter
+from .preparation.denoising import noise_share, to_ridges
+from .preparation.frame import Frame
+from .preparation.outliers import without_outliers
+from .preparation.sampling import _sample, usual_number
+from .preparation.thinning import average_noisy, thin, thin_smooth
 from .report import Report
 from .state import Contraction, at_rest
 
@@ -37,15 +39,6 @@ def usual_k(n: int) -> int:
     In a sparse cloud 16 neighbours would reach across thin parts.
     """
     return int(np.clip(np.floor(16 * np.cbrt(n / 4096) + 0.5), 8, 16))
-
-
-def usual_number(n: int) -> int:
-    """Points to contract: at most 25000, but 64 times the square root of their number from 152588 points on.
-
-    More points make the axis hardly more exact, since neither noise nor the thickness of parts shrinks with their
-    spacing; they only cost time.
-    """
-    return min(n, max(25000, round(64 * np.sqrt(n))))
 
 
 def published_k(n: int) -> int:
@@ -74,7 +67,7 @@ class _Surface:
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class RingBuilder(Filter):
+class RingBuilder(Filter[Contraction]):
     """Surround every point of a cloud with its one-ring.
 
     The ring of a point is its Delaunay star among its k nearest neighbours, projected on their principal plane. The
@@ -103,8 +96,6 @@ class RingBuilder(Filter):
     >>> len(state), bool(state.rings.closed.mean() > 0.9)
     (500, True)
     """
-
-    consumes: ClassVar[str] = "cloud"
 
     k: int | str | Any = parameter(
         "auto",
@@ -373,11 +364,3 @@ class RingBuilder(Filter):
         weight = np.empty(len(cloud))
         weight[row] = counts
         return frame, cloud, row, weight, distance, neighbours
-
-
-def _sample(points, n):
-    """About n points that stand for a cloud of more than twice as many, which of them does for each, for how many."""
-    if len(points) > 2 * n:
-        return thin_to_grid(points, n)
-    everybody = np.arange(len(points))
-    return everybody, everybody, np.ones(len(points))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .numerics.thickness import witnesses
+from .numerics.radii import witnesses
 from .numerics.vectors import norm
 from .report import Report
 
@@ -187,9 +187,9 @@ class Skeleton:
     def annotate(self, cloud=None, *, color: str | None = None):
         """A copy of a cloud with the attributes ``skeleton_vertex``, ``branch`` and ``radius``.
 
-        See `glsk_o3d.interop.annotation.annotate`.
+        See `glsk_o3d.io.annotation.annotate`.
         """
-        from .interop.annotation import annotate
+        from .io.annotation import annotate
 
         return annotate(self, cloud, color=color)
 
@@ -231,7 +231,7 @@ class Skeleton:
         color : {"branch", "radius", "confidence"} or three floats in [0, 1]
             What the colours of the edges show, or the one colour of all.
         """
-        from .interop.open3d import to_line_set
+        from .io.line_sets import to_line_set
 
         return to_line_set(self, color)
 
@@ -243,27 +243,27 @@ class Skeleton:
         color : {"branch", "radius", "confidence"} or three floats in [0, 1], optional
             What the colours of the edges show, or the one colour of all; by default there are none.
         """
-        from .interop.open3d import to_tensor_line_set
+        from .io.line_sets import to_tensor_line_set
 
         return to_tensor_line_set(self, color)
 
     def to_tubes(self, color="branch", *, radius: float | None = None, sides: int = 16):
         """The skeleton as tubes as thick as the object, an ``open3d.geometry.TriangleMesh``.
 
-        See `glsk_o3d.interop.tubes.to_tubes`.
+        See `glsk_o3d.io.tubes.to_tubes`.
         """
-        from .interop.tubes import to_tubes
+        from .io.tubes import to_tubes
 
         return to_tubes(self, color, radius=radius, sides=sides)
 
     def to_pymeshlab(self):
         """The skeleton as a ``pymeshlab.Mesh`` of vertices and edges (extra ``meshlab``)."""
-        from .interop.meshlab import to_pymeshlab
+        from .meshlab import to_pymeshlab
 
         return to_pymeshlab(self)
 
     def save(self, path: str | PathLike, **options) -> None:
         """Write the skeleton to a file; the ending chooses the format. See `glsk_o3d.save_skeleton`."""
-        from .interop.files import save_skeleton
+        from .io.files import save_skeleton
 
         save_skeleton(self, path, **options)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .numerics.frame import Frame
 from .numerics.rings import Rings
+from .preparation.frame import Frame
 from .report import Report
 
 
@@ -147,15 +147,15 @@ class Contraction:
 
     def to_point_cloud(self):
         """The contracted points as an ``open3d.geometry.PointCloud``."""
-        from .interop.open3d import to_point_cloud
+        from .interop.clouds import to_point_cloud
 
         return to_point_cloud(self.contracted)
 
     def annotate(self, cloud=None):
         """A copy of a cloud with the attribute ``contracted``.
 
-        See `glsk_o3d.interop.annotation.annotate_contraction`.
+        See `glsk_o3d.io.annotation.annotate_contraction`.
         """
-        from .interop.annotation import annotate_contraction
+        from .io.annotation import annotate_contraction
 
         return annotate_contraction(self, cloud)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from .filter import Parameters, documented, parameter
+from .parameters import Parameters, documented, parameter
 from .report import IterationRecord
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import tomlkit
 
-from glsk_o3d.plugins import forget_plugins
+from glsk_o3d.recipes.plugins import forget_plugins
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.ring_builder import RingBuilder
 from glsk_o3d.skeleton import Skeleton

@@ -21,9 +21,9 @@ from typer.testing import CliRunner
 
 import glsk_o3d as glsk
 from glsk_o3d import samples
-from glsk_o3d.catalogue import BUILTIN
 from glsk_o3d.cli.overrides import override
-from glsk_o3d.filter import TYPES
+from glsk_o3d.parameters import TYPES
+from glsk_o3d.recipes.catalogue import BUILTIN
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "_ext"))

@@ -8,8 +8,8 @@ import pytest
 
 import glsk_o3d
 from glsk_o3d import samples
-from glsk_o3d.interop.meshlab.plan import read_steps, scripts
-from glsk_o3d.interop.meshlab.script import comment
+from glsk_o3d.meshlab.script import comment
+from glsk_o3d.meshlab.steps import read_steps, scripts
 
 pymeshlab = pytest.importorskip("pymeshlab")
 
@@ -76,6 +76,6 @@ def test_the_page_says_what_is_so(root, tmp_path, monkeypatch, capsys):
     (tmp_path / "page.mlx").write_text(script)
     assert read_steps("page.mlx")[1].values == {"connector_radius": "2%"}
     table = re.findall(r"^\| `(generate_\w+)` \| `([\w ]+)` \|", page, re.MULTILINE)
-    from glsk_o3d.interop.meshlab.verbs import verbs
+    from glsk_o3d.meshlab.verbs import verbs
 
     assert {name: f"{title} (GLSkeleton)" for name, title in table} == {v.name: v.title for v in verbs().values()}

@@ -20,10 +20,11 @@ from glsk_o3d import (
 )
 from glsk_o3d.analysis import compare
 from glsk_o3d.numerics.neighbourhoods import isolation, nearest_neighbours, principal
-from glsk_o3d.numerics.ridges import noise_share, to_ridges
-from glsk_o3d.numerics.thinning import MOST
 from glsk_o3d.pipelines import default
-from glsk_o3d.ring_builder import ALONE, FAIRLY_NOISY, MIN_POINTS, published_k, usual_k, usual_number
+from glsk_o3d.preparation.denoising import noise_share, to_ridges
+from glsk_o3d.preparation.sampling import usual_number
+from glsk_o3d.preparation.thinning import MOST
+from glsk_o3d.ring_builder import ALONE, FAIRLY_NOISY, MIN_POINTS, published_k, usual_k
 
 TORUS = samples.torus(n=600).points
 SHEET = samples.sheet(n=500, bend=0).points

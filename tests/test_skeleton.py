@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import Skeleton
-from glsk_o3d.numerics.thickness import plane_distance_radii
+from glsk_o3d.numerics.radii import plane_distance_radii
 
 
 def skeleton_of(m, edges):

@@ -12,16 +12,16 @@ PACKAGES = {
 """Packages that list their names."""
 MODULES = {
     "glsk_o3d.pipelines": "Named pipelines",
-    "glsk_o3d.filter": "Making filters",
-    "glsk_o3d.catalogue": "What there is by name",
+    "glsk_o3d.parameters": "Making filters",
+    "glsk_o3d.recipes.catalogue": "What there is by name",
     "glsk_o3d.recipes": "Recipes",
-    "glsk_o3d.plugins": "Plugins",
+    "glsk_o3d.recipes.plugins": "Plugins",
     "glsk_o3d.samples": "Sample clouds",
-    "glsk_o3d.interop.annotation": "Attributes on clouds",
-    "glsk_o3d.interop.tubes": "Tubes",
-    "glsk_o3d.interop.colors": "Colours",
-    "glsk_o3d.interop.open3d": "What counts as a cloud",
-    "glsk_o3d.interop.meshlab.plan": "Filter scripts",
+    "glsk_o3d.io.annotation": "Attributes on clouds",
+    "glsk_o3d.io.tubes": "Tubes",
+    "glsk_o3d.io.colors": "Colours",
+    "glsk_o3d.interop.clouds": "What counts as a cloud",
+    "glsk_o3d.meshlab.steps": "Filter scripts",
 }
 """Modules whose functions and classes are all public but for those with an underscore."""
 

@@ -22,7 +22,7 @@ from scipy.spatial import Delaunay, cKDTree
 import glsk_o3d as glsk
 from glsk_o3d import pipelines, samples
 from glsk_o3d.analysis.segmentation import branch_of_edge
-from glsk_o3d.interop.colors import shades
+from glsk_o3d.io.colors import shades
 from glsk_o3d.numerics.cycles import inscribed_circle, minimum_cycle_basis
 from glsk_o3d.numerics.neighbourhoods import plane_axes
 from glsk_o3d.refinement.triangles import collapse_triangles

@@ -6,8 +6,9 @@ from docutils import nodes
 from docutils.parsers.rst import Directive
 
 from glsk_o3d import pipelines
-from glsk_o3d.catalogue import BUILTIN, parts
 from glsk_o3d.cli.filters import limits
+from glsk_o3d.pipeline import parts
+from glsk_o3d.recipes.catalogue import BUILTIN
 
 
 def plain(value):

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 import numpy as np
 
-from glsk_o3d.analysis import cross_check, save_crosscheck_picture
+from glsk_o3d.crosscheck import cross_check, save_crosscheck_picture
 from glsk_o3d.samples import y_junction
 
 

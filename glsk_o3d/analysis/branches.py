@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InvalidParameterError
-from ..interop.files import write_atomically
+from ..interop.writing import write_atomically
 from .curvature import curvature_torsion
 from .segmentation import branch_of_point
 

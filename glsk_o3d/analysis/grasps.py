@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InvalidParameterError, SkeletonWarning
-from ..interop.files import write_atomically, write_json
+from ..interop.writing import write_atomically, write_json
 from ..report import outside
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ class GraspCandidates:
         """
         from matplotlib import colormaps
 
-        from ..interop.open3d import import_open3d
+        from ..interop.packages import import_open3d
 
         o3d = import_open3d()
         side, back = self.opening[:, None] / 2 * self.closing, -self.opening[:, None] * self.approach

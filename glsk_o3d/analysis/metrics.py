@@ -10,13 +10,13 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from ..errors import InvalidCloudError, InvalidParameterError
-from ..interop.open3d import cloud_points
+from ..interop.clouds import cloud_points
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..skeleton import Skeleton
+from .cross_sections import cross_sections
 from .curves import along, pieces
 from .graph import check_graph, count_components, simple_edges
-from .sections import cross_sections
 from .truth import Truth
 
 FINENESS = 0.1  # spacing of the places where curves are compared, in median true radii

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidCloudError, InvalidParameterError
-from ..interop.open3d import cloud_points
-from ..refinement.medial import nearest_on_edges
+from ..interop.clouds import cloud_points
+from ..refinement.axis_fit import nearest_on_edges
 from .curves import along, pieces
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import BatchError
-from ..interop.files import write_atomically
+from ..interop.writing import write_atomically
 
 try:
     import fcntl

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..driver import as_pipeline
 from ..errors import FileFormatError, InvalidParameterError
-from ..filter import Filter
-from ..interop.files import skeleton_ending
-from ..pipeline import Pipeline, as_pipeline
+from ..io.files import skeleton_ending
+from ..pipeline import Filter, Pipeline
+from ..recipes import to_recipe
 from .inputs import find_inputs
 from .ledger import DONE, STALE, Ledger, Row, file_hash
 from .work import Job
@@ -149,7 +150,7 @@ def plan_batch(
     >>> [task.why for task in plan.tasks], plan.skipped
     (['new'], 0)
     """
-    recipe = as_pipeline(pipeline).to_recipe()
+    recipe = to_recipe(as_pipeline(pipeline))
     try:
         endings = list(dict.fromkeys(skeleton_ending(Path(), ending) for ending in formats)) + [".png"] * preview
     except FileFormatError as error:

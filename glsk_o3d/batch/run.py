@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..errors import BatchError, InvalidParameterError
-from ..interop.files import write_json
+from ..interop.writing import write_json
 from ..numerics.cores import cores
 from .ledger import COLUMNS, DONE, FAILED, STALE, Row, locked
 from .plan import RECIPE, SKIP, Plan, Task, plan_batch

@@ -107,10 +107,10 @@ def clear(job: Job, written: Iterable[str] = ()) -> None:
 
 
 def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
-    from ..interop.files import read_cloud
-    from ..interop.preview import save_preview
+    from ..analysis.summary import summary
+    from ..io.files import read_cloud
     from ..recipes import from_recipe
-    from ..summary import summary
+    from ..viewing.preview import save_preview
 
     skeleton = from_recipe(job.recipe)(read_cloud(job.path))
     messages += skeleton.report.warnings

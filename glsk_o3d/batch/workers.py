@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ..errors import BatchError, PluginWarning, SkeletonWarning
-from ..interop.open3d import import_open3d, require
+from ..interop.packages import import_open3d, require
 from ..numerics.cores import cores
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")

@@ -54,21 +54,21 @@ def crosscheck(
     the skeletons differ but the mesh is at fault.
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
-        from ..analysis import cross_check, save_crosscheck_picture
-        from ..analysis.crosscheck import SURFACES, UNTOLD
-        from ..catalogue import nearest
-        from ..errors import InvalidCloudError
-        from ..interop.files import read_cloud, write_json
-        from ..interop.meshes import read_mesh
-        from ..interop.preview import printable
-        from ..pipelines import named_pipeline
+        from ..crosscheck import cross_check, save_crosscheck_picture
+        from ..crosscheck.verdict import SURFACES, UNTOLD
+        from ..errors import InvalidCloudError, did_you_mean
+        from ..interop.writing import write_json
+        from ..io.files import read_cloud
+        from ..io.meshes import read_mesh
+        from ..recipes.catalogue import named_pipeline
+        from ..viewing.preview import printable
         from .overrides import override
         from .running import check_findings
 
         if mesh is not None and method != "auto":
             raise WrongUsage("--mesh gives a mesh: there is none to make with --method")
         if method not in ("auto", *SURFACES):
-            raise WrongUsage(nearest(method, ("auto", *SURFACES), "method"))
+            raise WrongUsage(did_you_mean(method, ("auto", *SURFACES), "method"))
         files = [path for path in (output, picture) if path is not None]
         check_findings(output, picture, scan, mesh)
         settings = ["RingBuilder.drop_invalid=true"] if drop_invalid else []

@@ -29,8 +29,8 @@ def demo(
     skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
     """
     with reporting(quiet=quiet, verbose=verbose):
-        from ..interop.files import write_atomically
-        from ..pipelines import named_pipeline
+        from ..interop.writing import write_atomically
+        from ..recipes.catalogue import named_pipeline
         from ..samples import sample_object
         from .running import check_writable, print_results, run, write
 
@@ -55,7 +55,8 @@ def demo(
 
 
 def _write_cloud(path: Path, points) -> None:
-    from ..interop.open3d import import_open3d, to_point_cloud
+    from ..interop.clouds import to_point_cloud
+    from ..interop.packages import import_open3d
 
     if not import_open3d().io.write_point_cloud(os.fspath(path), to_point_cloud(points)):
         raise OSError(f"{path.parent}: Open3D cannot write a cloud there")

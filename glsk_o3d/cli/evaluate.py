@@ -62,10 +62,13 @@ def evaluate(
     how far is it from the true axis.
     """
     with reporting(cloud, quiet=quiet, verbose=verbose):
-        from ..analysis import assess, compare, read_truth, save_picture
+        from ..analysis import assess, compare
         from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
-        from ..interop.files import read_cloud, read_skeleton, write_json
-        from ..interop.open3d import cloud_points
+        from ..interop.clouds import cloud_points
+        from ..interop.writing import write_json
+        from ..io.files import read_cloud, read_skeleton
+        from ..io.truth import read_truth
+        from ..viewing.assessment import save_assessment
         from .running import check_findings
 
         files = [path for path in (output, preview) if path is not None]
@@ -105,7 +108,7 @@ def evaluate(
                     values, label, best = comparison.edge_error, "error in true radii", 0
                 elif assessment is not None:
                     values, label, best = assessment.edge_centredness, "centredness", 1
-                save_picture(
+                save_assessment(
                     curve, points, values, preview, label=label, best=best, unknown=_BLACK, title=skeleton.name
                 )
         if as_json:

@@ -13,7 +13,7 @@ from .console import WrongUsage, console, print_json, print_table, reporting
 from .options import Json
 
 if TYPE_CHECKING:
-    from ..filter import Parameters
+    from ..parameters import Parameters
 
 
 def filters(
@@ -27,12 +27,12 @@ def filters(
     Everything is taken from the code: the filters, the stopping rules and the named pipelines, those of plugins too.
     """
     with reporting():
-        from ..catalogue import catalogue, nearest
-        from ..pipelines import known_pipelines
+        from ..errors import did_you_mean
+        from ..recipes.catalogue import catalogue, known_pipelines
 
         known, pipelines = catalogue(), known_pipelines()
         if name is not None and name not in known and name not in pipelines:
-            raise WrongUsage(nearest(name, [*known, *pipelines], "filter or pipeline"))
+            raise WrongUsage(did_you_mean(name, [*known, *pipelines], "filter or pipeline"))
         classes = [cls for key, cls in known.items() if name in (None, key)]
         names = [key for key in pipelines if name in (None, key)]
         if as_json:
@@ -60,7 +60,7 @@ def facts(cls: type[Parameters]) -> dict[str, Any]:
         (None for a rule), ``doc`` and ``parameters``: a list of dicts of the field's metadata, with ``name``,
         ``default`` and ``limits`` in words.
     """
-    from ..filter import Filter
+    from ..pipeline import Filter
 
     flow = (cls.consumes, cls.produces) if issubclass(cls, Filter) else (None, None)
     return {
@@ -88,7 +88,7 @@ def limits(metadata) -> str:
     Parameters
     ----------
     metadata : mapping
-        As `glsk_o3d.filter.parameter` makes it.
+        As `glsk_o3d.parameters.parameter` makes it.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def _print_filter(cls, full: bool) -> None:
 
 
 def _pipeline_facts(name: str) -> dict[str, Any]:
-    from ..pipelines import known_pipelines
+    from ..recipes.catalogue import known_pipelines
 
     make = known_pipelines()[name]
     made = make()

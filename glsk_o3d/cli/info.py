@@ -25,7 +25,7 @@ def info(
 ) -> None:
     """Say what is in a cloud or skeleton file."""
     with reporting(quiet=quiet, verbose=verbose):
-        from ..interop.files import holds_skeleton, read_scan, read_skeleton
+        from ..io.files import holds_skeleton, read_scan, read_skeleton
 
         if holds_skeleton(file):
             skeleton = read_skeleton(file)
@@ -99,7 +99,7 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
     """
     import numpy as np
 
-    from ..summary import structure
+    from ..analysis.summary import structure
 
     report = skeleton.report
     radii = skeleton.radii[np.isfinite(skeleton.radii)]

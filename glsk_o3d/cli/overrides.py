@@ -8,12 +8,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..catalogue import catalogue, changed_by, find, nearest, serves
-from ..errors import InvalidParameterError
-from ..filter import Parameters
-from ..pipeline import Pipeline
-from ..pipelines import named_pipeline
+from ..errors import InvalidParameterError, did_you_mean
+from ..parameters import Parameters
+from ..pipeline import Pipeline, parts
 from ..recipes import load_recipe
+from ..recipes.catalogue import catalogue, find, named_pipeline, serves
 from .console import WrongUsage
 
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
@@ -82,37 +81,43 @@ def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pip
     >>> override(pipelines.default(), ["RingBuilder.k=20", "Connector.links=nearest"]).stages[2]
     Connector(radius='1%', thickness=0.6, links='nearest', stray=0.1)
     """
-    place = f"the pipeline {name!r}" if name else "the pipeline"
+    options = {setting: _parse(setting, pipeline) for setting in settings}
+    put_in = {f"{cls.__name__}.{name}": value for cls, name, value in options.values() if isinstance(value, Parameters)}
+    present = {type(part).__name__ for part in parts(pipeline.with_options(put_in))}
+    for setting, (cls, _, _) in options.items():
+        if cls.__name__ not in present:
+            place = f"the pipeline {name!r}" if name else "the pipeline"
+            raise InvalidParameterError(
+                f"--set {setting}: {cls.__name__} is not in {place}, which has {', '.join(present)}{_how_to_add(cls)}"
+            )
+    return pipeline.with_options({f"{cls.__name__}.{name}": value for cls, name, value in options.values()})
 
-    def absent(setting, owner, there):
-        hint = _how_to_add(catalogue()[owner])
-        return InvalidParameterError(f"--set {setting}: {owner} is not in {place}, which has {there}{hint}")
 
-    pipeline = changed_by(pipeline, [(*_parse(setting), setting) for setting in settings], absent)
-    pipeline.check()
-    return pipeline
-
-
-def _parse(setting: str) -> tuple[type[Parameters], str, Any]:
+def _parse(setting: str, pipeline: Pipeline) -> tuple[type[Parameters], str, Any]:
     key, equals, text = (word.strip() for word in setting.partition("="))
-    owner, _, name = (word.strip() for word in key.partition("."))
-    if not (equals and owner and name and text):
+    owner, dot, name = (word.strip() for word in key.rpartition("."))
+    if not (equals and (owner or not dot) and name and text):
         raise InvalidParameterError(
             f"--set {setting}: write it as Filter.parameter=value, for example Connector.radius=2%"
         )
+    if not owner:
+        try:
+            owner = pipeline.owner_of(name).__name__
+        except InvalidParameterError as error:
+            raise InvalidParameterError(f"--set {setting}: {error}") from None
     cls = find(owner)
     if cls is None:
-        raise InvalidParameterError(f"--set {setting}: {nearest(owner, catalogue(), 'filter')}")
+        raise InvalidParameterError(f"--set {setting}: {did_you_mean(owner, catalogue(), 'filter')}")
     kinds = {field.name: field.metadata["type"] for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
     if name not in kinds:
-        raise InvalidParameterError(f"--set {setting}: {nearest(name, kinds, f'parameter of {owner}')}")
+        raise InvalidParameterError(f"--set {setting}: {did_you_mean(name, kinds, f'parameter of {owner}')}")
     kind = kinds[name]
     if kind.rstrip("?") not in ("reducer", "stop") or (kind.endswith("?") and text.lower() == "none"):
         return cls, name, _value(text, kind)
     known = catalogue()
     fitting = [other for other, its in known.items() if its is not cls and serves(its, kind.rstrip("?"))]
     if text not in fitting:
-        raise InvalidParameterError(f"--set {setting}: {nearest(text, fitting, kind.rstrip('?'))}")
+        raise InvalidParameterError(f"--set {setting}: {did_you_mean(text, fitting, kind.rstrip('?'))}")
     return cls, name, known[text]()
 
 

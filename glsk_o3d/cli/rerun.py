@@ -36,7 +36,7 @@ def rerun(
     """
     with reporting(scan or result, quiet=quiet, verbose=verbose):
         from ..errors import RecipeError
-        from ..interop.files import read_cloud, read_skeleton
+        from ..io.files import read_cloud, read_skeleton
         from ..recipes import identical
         from ..recipes import rerun as run_again
         from ..viewing.recorder import ContractionRecorder

@@ -13,7 +13,7 @@ from .console import WrongUsage, holding_interrupts, print_json, print_table, pr
 from .options import CutLoops, Json, Quiet, Verbose
 
 if TYPE_CHECKING:
-    from ..interop.meshlab.plan import Step
+    from ..meshlab.steps import Step
     from ..report import IterationRecord
 
 
@@ -44,8 +44,8 @@ def run(
     The whole script is checked before anything is run. Filters of MeshLab's own need pymeshlab.
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
-        from ..interop.meshlab.layers import Layer, check_ending
-        from ..interop.meshlab.plan import PlainLayers, find_script, read_steps
+        from ..meshlab.layers import Layer, check_ending
+        from ..meshlab.steps import PlainLayers, find_script, read_steps
         from .running import check_outputs, write_each
 
         if listed:
@@ -64,7 +64,7 @@ def run(
                 if all(step.verb for step in steps):
                     layers: Any = PlainLayers(Layer.read(scan))
                 else:
-                    from ..interop.meshlab.meshset import MeshSet
+                    from ..meshlab.meshset import MeshSet
 
                     layers = MeshSet()
                     layers.load_scan(scan)
@@ -120,8 +120,8 @@ def _said(value: Any) -> str:
 def _list(as_json: bool) -> None:
     from rich.table import Table
 
-    from ..interop.meshlab.plan import scripts
-    from ..interop.meshlab.script import comment
+    from ..meshlab.script import comment
+    from ..meshlab.steps import scripts
 
     told = {name: comment(path) for name, path in scripts().items()}
     if as_json:

@@ -13,12 +13,12 @@ from typing import Any
 
 import typer
 
+from ..analysis.summary import summary
 from ..errors import FileFormatError, GlskError
-from ..interop.files import skeleton_ending
-from ..interop.preview import save_preview
+from ..io.files import skeleton_ending
 from ..skeleton import Skeleton
-from ..summary import summary
 from ..viewing.page import save_report
+from ..viewing.preview import save_preview
 from ..viewing.recorder import ContractionRecorder
 from .console import WrongUsage, print_iterations, print_json, print_rows
 

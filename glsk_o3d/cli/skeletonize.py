@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -51,8 +52,10 @@ def skeletonize(
     Everything that can be checked is checked before the computation starts. Files appear complete or not at all.
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
-        from ..interop.files import read_cloud
-        from ..recipes import recipe_ending
+        from ..io.files import read_cloud
+        from ..recipes import save_recipe as write_recipe
+        from ..recipes import to_recipe
+        from ..recipes.writing import recipe_ending
         from ..viewing.recorder import ContractionRecorder
         from .overrides import choose
         from .running import check_outputs, print_results, run, write
@@ -62,8 +65,8 @@ def skeletonize(
         others = {}
         if save_recipe is not None:
             recipe_ending(save_recipe)
-            chosen.to_recipe()
-            others[save_recipe] = chosen.save_recipe
+            to_recipe(chosen)
+            others[save_recipe] = partial(write_recipe, chosen)
         check_outputs(outputs, preview, scan, report, others, recipe=recipe)
         recorder = ContractionRecorder() if report is not None else None
         with progress(not quiet and not verbose) as update:

@@ -32,7 +32,7 @@ def view(
     with reporting(quiet=quiet, verbose=verbose):
         import numpy as np
 
-        from ..interop.files import holds_skeleton, read_cloud, read_skeleton
+        from ..io.files import holds_skeleton, read_cloud, read_skeleton
         from ..skeleton import Skeleton
         from ..viewing.window import show
         from .running import check_outputs, write

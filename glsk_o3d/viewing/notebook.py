@@ -30,7 +30,7 @@ def picture(skeleton: Skeleton) -> str:
     """
     from PIL import Image  # matplotlib needs it, too
 
-    from ..interop.preview import DPI, draw
+    from .preview import DPI, draw
 
     figure, stream = draw(skeleton, SIZE, None, caption=False), io.BytesIO()
     figure.set_dpi(DPI)

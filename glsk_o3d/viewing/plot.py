@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InvalidParameterError
-from ..interop.open3d import cloud_points, require
+from ..interop.clouds import cloud_points
+from ..interop.packages import require
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -80,7 +81,7 @@ def plot_skeleton(
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
     from ..analysis.segmentation import branch_of_edge
-    from ..interop.colors import shades
+    from ..io.colors import shades
 
     if axes is None:
         axes = plt.figure(figsize=(6, 4), layout="constrained").add_subplot(projection="3d")

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import DisplayError
-from ..interop.open3d import import_open3d, to_point_cloud
+from ..interop.clouds import to_point_cloud
+from ..interop.packages import import_open3d
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton

@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from glsk_o3d.analysis import Truth, assess, compare, read_truth
-from glsk_o3d.analysis.sections import cross_sections
+from glsk_o3d import read_truth
+from glsk_o3d.analysis import Truth, assess, compare
+from glsk_o3d.analysis.cross_sections import cross_sections
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.samples import helix, sample_object, sphere, torus, tube, two_rings, y_junction
 from glsk_o3d.skeleton import Skeleton

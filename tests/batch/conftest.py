@@ -26,8 +26,8 @@ from typing import ClassVar
 import numpy as np
 
 from glsk_o3d import Filter
-from glsk_o3d.filter import documented, parameter
-from glsk_o3d.interop.open3d import cloud_points
+from glsk_o3d.parameters import documented, parameter
+from glsk_o3d.interop.clouds import cloud_points
 
 
 @documented

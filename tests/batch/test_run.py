@@ -13,6 +13,7 @@ import glsk_o3d
 from glsk_o3d import BatchError, Connector, InvalidParameterError, RecipeError, pipelines, read_skeleton, skeletonize
 from glsk_o3d.batch import plan_batch, run_batch
 from glsk_o3d.batch.ledger import COLUMNS, file_hash, locked
+from glsk_o3d.recipes import to_recipe
 from glsk_o3d.samples import torus
 
 # the work is done in this process, where a skeleton's warnings are errors
@@ -57,7 +58,7 @@ def test_every_scan_is_done_once(batch, scans, rows, tmp_path):
         assert row["leaves"] == len(skeleton.leaves)
         same = read_skeleton(tmp_path / "out" / f"{name}.ply")
         assert (same.vertices == skeleton.vertices).all()
-    assert json.loads((tmp_path / "out" / "recipe.json").read_text()) == pipelines.default().to_recipe()
+    assert json.loads((tmp_path / "out" / "recipe.json").read_text()) == to_recipe(pipelines.default())
 
 
 def test_a_second_run_skips(batch, scans, rows, tmp_path):

@@ -9,7 +9,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d.analysis import cross_check
+from glsk_o3d.crosscheck import cross_check
 from glsk_o3d.samples import torus
 
 matplotlib = pytest.importorskip("matplotlib")

@@ -7,9 +7,10 @@ import sys
 import numpy as np
 import pytest
 
-from glsk_o3d.analysis import assess, compare, save_picture
+from glsk_o3d import save_assessment
+from glsk_o3d.analysis import assess, compare
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
-from glsk_o3d.interop.files import save_skeleton
+from glsk_o3d.io.files import save_skeleton
 from glsk_o3d.samples import torus
 from glsk_o3d.skeleton import Skeleton
 
@@ -141,7 +142,9 @@ def test_the_picture_tells_good_from_bad(ring, moved, tmp_path):
     flags = np.zeros(len(moved.edges))
     counts = {}
     for value, best in ((0, 0), (1, 0), (7, 0), (0, 1), (1, 1), (np.nan, 1)):
-        save_picture(moved, ring.points, flags + value, tmp_path / "p.png", label="measure", best=best, title="a title")
+        save_assessment(
+            moved, ring.points, flags + value, tmp_path / "p.png", label="measure", best=best, title="a title"
+        )
         blue, orange = colours(tmp_path / "p.png")
         counts[value, best] = (blue > 500, orange > 500)
     good, bad = (True, False), (False, True)
@@ -151,14 +154,14 @@ def test_the_picture_tells_good_from_bad(ring, moved, tmp_path):
 def test_the_legend_tells_what_black_is(ring, moved, tmp_path):
     legends = []
     for value in (0.5, np.nan):
-        save_picture(moved, ring.points, np.full(len(moved.edges), value), tmp_path / "p.png", label="measure")
+        save_assessment(moved, ring.points, np.full(len(moved.edges), value), tmp_path / "p.png", label="measure")
         legends.append((imread(tmp_path / "p.png")[85:110, 1400:, :3] < 0.5).sum())
     assert legends[0] == 0 < legends[1]
 
 
 def test_the_picture_needs_a_value_per_edge(ring, moved, tmp_path):
     with pytest.raises(InvalidParameterError, match="128 edges need as many values"):
-        save_picture(moved, ring.points, np.zeros(3), tmp_path / "p.png", label="measure")
+        save_assessment(moved, ring.points, np.zeros(3), tmp_path / "p.png", label="measure")
     with pytest.raises(FileFormatError, match=r"p\.jpg: the picture is a PNG"):
-        save_picture(moved, ring.points, np.zeros(128), tmp_path / "p.jpg", label="measure")
+        save_assessment(moved, ring.points, np.zeros(128), tmp_path / "p.jpg", label="measure")
     assert list(tmp_path.iterdir()) == []

@@ -5,9 +5,9 @@ import json
 
 import pytest
 
-from glsk_o3d.catalogue import catalogue
-from glsk_o3d.filter import Filter
+from glsk_o3d.pipeline import Filter
 from glsk_o3d.pipelines import PIPELINES
+from glsk_o3d.recipes.catalogue import catalogue
 
 
 @pytest.fixture

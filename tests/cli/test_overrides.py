@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 import glsk_o3d
 from glsk_o3d import Contractor, InvalidParameterError, LPRReducer, Pipeline, RingBuilder, RingSizeRatio
-from glsk_o3d.catalogue import catalogue, parts
 from glsk_o3d.cli.overrides import override
+from glsk_o3d.pipeline import parts
 from glsk_o3d.pipelines import PIPELINES, cao2010, default
+from glsk_o3d.recipes.catalogue import catalogue
 
 RULES = {"stop": ["ExplainedScore", "RingSizeRatio"], "reducer": ["LPRReducer"]}
 

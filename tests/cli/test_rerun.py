@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import load_recipe, pipelines, read_skeleton
+from glsk_o3d.recipes import to_recipe
 
 
 @pytest.fixture
@@ -65,7 +66,7 @@ def test_another_scan_and_its_recipe_from_a_file(invoke, scans, tmp_path, made):
     assert json.loads(result.stdout)["files"] == ["b.json", "b.toml"]
     a, b = read_skeleton(tmp_path / "a.json"), read_skeleton(tmp_path / "b.json")
     np.testing.assert_array_equal(a.vertices, b.vertices)
-    assert a.report.recipe == b.report.recipe == load_recipe(tmp_path / "b.toml").to_recipe()
+    assert a.report.recipe == b.report.recipe == to_recipe(load_recipe(tmp_path / "b.toml"))
     assert (tmp_path / "r.toml").read_text() == (tmp_path / "b.toml").read_text()
 
 

@@ -8,8 +8,8 @@ import pytest
 
 import glsk_o3d
 from glsk_o3d import read_cloud, read_skeleton
-from glsk_o3d.interop.meshlab.layers import Layer
-from glsk_o3d.interop.meshlab.plan import scripts
+from glsk_o3d.meshlab.layers import Layer
+from glsk_o3d.meshlab.steps import scripts
 
 OURS = '<FilterScript>\n<filter name="{}">\n{}\n</filter>\n</FilterScript>\n'
 

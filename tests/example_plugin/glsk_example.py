@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from glsk_o3d import Connector, Contractor, Filter, LPRReducer, Pipeline, Refiner, RingBuilder
-from glsk_o3d.filter import Parameters, documented, parameter, resolve_length
-from glsk_o3d.interop.open3d import cloud_points
+from glsk_o3d.interop.clouds import cloud_points
+from glsk_o3d.parameters import Parameters, documented, parameter, resolve_length
 
 
 @documented

@@ -13,7 +13,7 @@ import glsk_o3d as glsk
 from glsk_o3d import ContractionRecorder, Contractor, FileFormatError, InvalidParameterError, RingBuilder, save_report
 from glsk_o3d.report import IterationRecord
 from glsk_o3d.samples import torus
-from glsk_o3d.viewing import sections
+from glsk_o3d.viewing import html as sections
 from glsk_o3d.viewing.recorder import thinned
 
 

@@ -1,0 +1,120 @@
+"""Digests of skeletons, to show that a change of the code did not change a bit of a result.
+
+Each cloud is skeletonised by three pipelines; a SHA-256 stands for the vertices, edges, radii and vertex_of_point of
+each result, or for the error that came instead. `digest.py make BEFORE.json` writes them, and after the change
+`digest.py compare BEFORE.json` makes them anew and prints the table; exit code 1 if anything differs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+import warnings
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Annotated, Any
+
+os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")  # before NumPy: sums in the same order on any machine
+
+import numpy as np
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+import glsk_o3d as glsk
+from glsk_o3d import samples
+
+PIPELINES = ("default", "wen2024", "cao2010")
+ARRAYS = ("vertices", "edges", "radii", "vertex_of_point")
+SAMPLES = ("tube", "y_junction", "torus", "two_rings", "helix", "sauropod")
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+app = typer.Typer(add_completion=False, help=__doc__, pretty_exceptions_enable=False)
+Shared = Annotated[Path, typer.Option(help="Folder with data/*.ply and truth/*.npz; left out where there is none.")]
+Size = Annotated[int, typer.Option(help="Points of the truth clouds and samples.")]
+
+
+def clouds(shared: Path, size: int) -> Iterator[tuple[str, str, Any]]:
+    """Group, name and source of every cloud: a path, a path with the name of an array in it, or a sample's name."""
+    for path in sorted(shared.glob("data/*.ply")):
+        yield "data", path.stem, path
+    for path in sorted(shared.glob("truth/*.npz")):
+        with np.load(path) as archive:
+            for variant in sorted(name for name in archive if name.endswith(f"_{size}")):
+                yield f"truth {variant}", f"{path.stem} {variant}", (path, variant)
+    for name in SAMPLES:
+        yield "samples", f"{name} {size}", (name, size)
+
+
+def load(source: Any) -> Any:
+    """The points that `clouds` names."""
+    if isinstance(source, Path):
+        return np.asarray(glsk.read_cloud(source).points)
+    place, which = source
+    if isinstance(place, Path):
+        with np.load(place) as archive:
+            return archive[which].astype(float)
+    return getattr(samples, place)(which).points
+
+
+def digest(cloud: np.ndarray, pipeline: str) -> str:
+    """What stands for a skeleton: the first 16 digits of a SHA-256 of its arrays, or the error."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            skeleton = glsk.skeletonize(cloud, pipeline)
+        except glsk.GlskError as error:
+            return type(error).__name__
+    told = hashlib.sha256()
+    for name in ARRAYS:
+        told.update(np.ascontiguousarray(getattr(skeleton, name)).tobytes())
+    return told.hexdigest()[:16]
+
+
+def _digests(case: tuple[str, str, Any]) -> tuple[str, str, dict[str, str]]:
+    group, name, source = case
+    cloud = load(source)
+    return group, name, {pipeline: digest(cloud, pipeline) for pipeline in PIPELINES}
+
+
+def digests(shared: Path, size: int, jobs: int) -> dict[str, dict[str, dict[str, str]]]:
+    """Digest by group, cloud and pipeline."""
+    every = list(clouds(shared, size))
+    found: dict[str, dict[str, dict[str, str]]] = {}
+    with ProcessPoolExecutor(jobs) as pool:
+        for group, name, told in track(pool.map(_digests, every), "clouds", len(every), console=Console(stderr=True)):
+            found.setdefault(group, {})[name] = told
+    return found
+
+
+@app.command()
+def make(out: Path, shared: Shared = SHARED, size: Size = 4096, jobs: int = 2) -> None:
+    """Write the digests of all clouds."""
+    out.write_text(json.dumps(digests(shared, size, jobs), indent=1, sort_keys=True) + "\n")
+
+
+@app.command()
+def compare(before: Path, shared: Shared = SHARED, size: Size = 4096, jobs: int = 2) -> None:
+    """Make the digests anew, and say where they differ from a file of earlier ones."""
+    old, new = json.loads(before.read_text()), digests(shared, size, jobs)
+    table = Table("clouds", "number", *PIPELINES, box=SIMPLE_HEAD, title="identical skeletons, to the last bit")
+    changed = []
+    for group in sorted({*old, *new}):
+        here, there = new.get(group, {}), old.get(group, {})
+        names = sorted({*here, *there})
+        same = {p: [n for n in names if here.get(n, {}).get(p) == there.get(n, {}).get(p)] for p in PIPELINES}
+        changed += [f"{name}: {p}" for p in PIPELINES for name in names if name not in same[p]]
+        table.add_row(group, str(len(names)), *(str(len(same[p])) for p in PIPELINES))
+    Console().print(table)
+    for line in changed:
+        print(f"differs: {line}")
+    sys.exit(bool(changed))
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,129 @@
+"""A picture of a cross-check: the cloud coloured by how far it and a mesh disagree, with both skeletons."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..interop.packages import require
+from ..interop.writing import check_ending
+from ..viewing.preview import DPI, INK, MOST_POINTS, colour_bar, printable, room, save_figure, three_views
+
+if TYPE_CHECKING:
+    from .verdict import CrossCheck
+
+_OURS, _THEIRS, _UNKNOWN = "#111111", "#0a6fc2", "#c9c9c9"
+_MOST_REASONS = 3
+_MOST = 60.0  # degrees at which the colours end
+_HEAD, _FOOT = 0.95, 0.85  # inches
+
+
+def save_crosscheck_picture(
+    check: CrossCheck, path: str | os.PathLike, *, size: tuple[int, int] = (1800, 860), title: str | None = None
+) -> None:
+    """Draw a cross-check from three sides into a PNG file.
+
+    Points go from pale yellow, where the Laplacian coordinates of cloud and mesh have one direction, to dark red at 60
+    degrees and more; grey ones could not be compared. The worst lie on top. The cloud's skeleton is black, that of the
+    mesh blue.
+
+    Parameters
+    ----------
+    check : CrossCheck
+    path : path-like
+        PNG; it appears complete or not at all.
+    size : (width, height)
+        In pixels.
+    title : str, optional
+        Ahead of the verdict.
+
+    Raises
+    ------
+    FileFormatError
+        The ending is not ``.png``.
+    MissingPackageError
+        matplotlib is not installed.
+    OSError
+        The folder does not exist, or the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d.crosscheck import cross_check
+    >>> from glsk_o3d.samples import torus
+    >>> with TemporaryDirectory() as folder:
+    ...     save_crosscheck_picture(cross_check(torus(2000).points), f"{folder}/where.png")
+    ...     Path(folder, "where.png").stat().st_size > 10_000
+    True
+    """
+    check_ending(path, "picture is a PNG", ".png")
+    save_figure(_draw(check, np.asarray(size) / DPI, title), path)
+
+
+def _draw(check, size, title):
+    require("matplotlib")
+    from matplotlib import colormaps
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+
+    width, height = size
+    figure = Figure((width, height), facecolor="white")
+    FigureCanvasAgg(figure)
+    scale = ScalarMappable(Normalize(0, _MOST, clip=True), colormaps["YlOrRd"])
+    points, angle = _shown(check)
+    shown = np.concatenate([points, check.skeleton.vertices, check.mesh_skeleton.vertices])  # they may differ widely
+    centre, extent = room(shown)
+    points = points - centre
+    colours = np.where(np.isnan(angle)[:, None], _rgba(_UNKNOWN), scale.to_rgba(np.nan_to_num(angle)))
+    for a, b, axes in three_views(figure, extent, head=_HEAD, foot=_FOOT, names=0.62):
+        dot = float(np.clip(16000 / max(len(points), 1), 2, 6))
+        axes.scatter(points[:, a], points[:, b], s=dot, c=colours, linewidths=0, clip_on=False)
+        for skeleton, colour, line in ((check.mesh_skeleton, _THEIRS, 2.6), (check.skeleton, _OURS, 1.2)):
+            places = (skeleton.vertices - centre)[:, [a, b]]
+            for paint, wider in (("white", 1.4), (colour, 0)):  # a white edge lifts it off the cloud
+                style = dict(colors=paint, linewidths=line + wider, capstyle="round", clip_on=False)
+                axes.add_collection(LineCollection(places[skeleton.edges], **style))
+            alone = skeleton.degree == 0
+            axes.scatter(*places[alone].T, s=16, c=colour, linewidths=0, zorder=3, clip_on=False)
+    _write(figure, check, title, height)
+    box = [0.42, 0.3 / height, 0.16, 0.09 / height]
+    colour_bar(figure, scale, box, [0, 30, 60], ["0", "30", "60\N{DEGREE SIGN} and more"])
+    return figure
+
+
+def _shown(check):
+    """Finite points and their angles, those that cannot be compared first and the worst last."""
+    finite = np.flatnonzero(np.isfinite(check.points).all(axis=1))
+    finite = finite[:: max(1, -(-len(finite) // MOST_POINTS))]
+    order = finite[np.argsort(np.nan_to_num(check.angle[finite], nan=-1), kind="stable")]
+    return check.points[order], check.angle[order]
+
+
+def _write(figure, check, title, height):
+    head = f"{printable(title)}: {check.verdict}" if title else check.verdict
+    style = dict(ha="center", color=INK, parse_math=False)
+    figure.text(0.5, 1 - 0.33 / height, head, fontsize=12, **style)
+    reasons = [*check.reasons[:_MOST_REASONS]]
+    if len(check.reasons) > _MOST_REASONS:
+        reasons[-1] += f"; and {len(check.reasons) - _MOST_REASONS} more"
+    for row, reason in enumerate(reasons):
+        figure.text(0.5, 1 - (0.55 + 0.16 * row) / height, reason, fontsize=7.5, **style)
+    beside = dict(va="center_baseline", fontsize=8)
+    level = 0.34 / height
+    figure.text(0.41, level, "angle between the Laplacian coordinates", ha="right", color=INK, **beside)
+    grey = "not compared" if np.isnan(check.angle).any() else ""
+    figure.text(0.625, level, grey, color="#999999", **beside)
+    figure.text(0.70, level, "skeleton of the cloud", color=_OURS, **beside)
+    figure.text(0.81, level, "of the mesh", color=_THEIRS, **beside)
+
+
+def _rgba(colour):
+    from matplotlib.colors import to_rgba
+
+    return to_rgba(colour)

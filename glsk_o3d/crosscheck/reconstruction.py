@@ -1,0 +1,88 @@
+"""Meshes of clouds, by Open3D."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..interop.clouds import to_point_cloud
+from ..interop.packages import import_open3d
+from ..numerics.mesh_rings import clean_faces
+from ..numerics.neighbourhoods import nearest_neighbours
+from ..numerics.orientation import orient_normals
+
+BALLS = (1.0, 2.0, 4.0)  # radii of the rolling balls, in spacings
+DEPTHS = (5, 9)  # of Poisson's octree; below 5 Open3D makes the same mesh, and complains
+REACH = 3.0  # spacings from the cloud beyond which Poisson's surface is an invention
+
+
+def spacing(points):
+    """Mean distance of the points to their six nearest neighbours, as many as a regular triangulation gives each."""
+    return float(nearest_neighbours(points, min(7, len(points)))[0][:, 1:].mean())
+
+
+def ball_pivoting(points, normals, rings):
+    """Triangulate a cloud by rolling balls over it (Bernardini et al. 1999): its points are the vertices.
+
+    Parameters
+    ----------
+    points, normals : (n, 3) float array
+        The normals up to their sign.
+    rings : Rings
+        Which points are neighbours.
+
+    Returns
+    -------
+    vertices : (n, 3) float array
+        `points`.
+    faces : (f, 3) int array
+        Not always manifold, nor of all vertices; none where no ball finds three points.
+    """
+    o3d = import_open3d()
+    radii = o3d.utility.DoubleVector(spacing(points) * np.array(BALLS))
+    cloud = _with_normals(points, normals, rings)
+    mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, radii)
+    return points, clean_faces(points, np.asarray(mesh.triangles))
+
+
+def poisson(points, normals, rings):
+    """Screened Poisson reconstruction (Kazhdan and Hoppe 2013), cut where there is no cloud.
+
+    Parameters
+    ----------
+    points, normals : (n, 3) float array
+        The normals up to their sign.
+    rings : Rings
+        Which points are neighbours.
+
+    Returns
+    -------
+    vertices : (m, 3) float array
+        About as many as points, but not these.
+    faces : (f, 3) int array
+        Of all vertices.
+    """
+    o3d = import_open3d()
+    step = spacing(points)
+    depth = int(np.clip(np.log2(1.1 * np.ptp(points, axis=0).max() / step), *DEPTHS))
+    cloud = _with_normals(points, normals, rings)
+    # with several threads the last digits change from run to run
+    mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=depth, n_threads=1)
+    vertices = np.array(mesh.vertices)
+    near = cKDTree(points).query(vertices, distance_upper_bound=REACH * step)[0] < np.inf
+    faces = np.asarray(mesh.triangles)
+    return without_bare(vertices, clean_faces(vertices, faces[near[faces].all(axis=1)]))
+
+
+def without_bare(vertices, faces):
+    """The mesh without vertices that have no triangle, and the faces renumbered."""
+    used, renumbered = np.unique(faces, return_inverse=True)
+    return vertices[used], renumbered.reshape(-1, 3)
+
+
+def _with_normals(points, normals, rings):
+    o3d = import_open3d()
+    cloud = to_point_cloud(points)
+    edges = np.column_stack([rings.owners, rings.indices])
+    cloud.normals = o3d.utility.Vector3dVector(orient_normals(points, normals, edges))
+    return cloud

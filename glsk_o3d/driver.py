@@ -1,0 +1,167 @@
+"""The driver: from a cloud to its skeleton in one call, and to the points that say most about it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .contractor import Contractor
+from .errors import InvalidCloudError, InvalidParameterError
+from .interop.clouds import open3d_class
+from .interop.packages import import_open3d
+from .lpr_reducer import LPRReducer
+from .pipeline import Filter, OnIteration, OnState, Pipeline
+from .recipes import ENDINGS, load_recipe
+from .recipes.catalogue import named_pipeline
+from .ring_builder import RingBuilder
+from .skeleton import Skeleton
+
+
+def skeletonize(
+    cloud: Any,
+    pipeline: Pipeline[Skeleton] | str | os.PathLike[str] | Mapping[str, Any] = "default",
+    *,
+    on_iteration: OnIteration | None = None,
+    on_state: OnState | None = None,
+    **options: Any,
+) -> Skeleton:
+    """Curve skeleton of a point cloud.
+
+    Parameters
+    ----------
+    cloud : open3d.geometry.PointCloud, open3d.t.geometry.PointCloud, TriangleMesh of either kind, or (N, 3) array
+        Points without order, normals or orientation; of a mesh the vertices. It is not modified.
+    pipeline : Pipeline, {"default", "wen2024", "cao2010"}, name of a plugin's pipeline, or path of a recipe
+        A name that ends in ``.json`` or ``.toml`` is a path. A mapping is options for ``"default"``.
+    on_iteration : callable, optional
+        Called with the IterationRecord of each solve; return False to stop the contraction there.
+    on_state : callable, optional
+        Called before it with the Contraction after each solve, such as a `ContractionRecorder`.
+    **options
+        Parameters of the filters that are to differ, by name; where more than one filter has the name, as
+        ``**{"Connector.radius": "2%"}``. See `Pipeline.with_options`.
+
+    Returns
+    -------
+    Skeleton
+
+    Raises
+    ------
+    InvalidCloudError
+        If the points cannot be skeletonised.
+    InvalidParameterError
+        If the pipeline is unknown, lacks a stage, or an option is unknown or wrong.
+    RecipeError
+        If the recipe is wrong.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(1000).points)
+    >>> ring.n_loops, ring.vertices.shape[1]
+    (1, 3)
+    >>> skeletonize(torus(1000).points, k=12, drop_invalid=True).n_loops
+    1
+    """
+    if isinstance(pipeline, Mapping):
+        return skeletonize(cloud, on_iteration=on_iteration, on_state=on_state, **{**pipeline, **options})
+    return as_pipeline(pipeline).with_options(options)(cloud, on_iteration=on_iteration, on_state=on_state)
+
+
+def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathLike[str]) -> Pipeline[Skeleton]:
+    """The pipeline that is meant, from a cloud to a skeleton.
+
+    Parameters
+    ----------
+    pipeline : Pipeline, Filter, name, or path of a recipe
+
+    Returns
+    -------
+    Pipeline
+
+    Raises
+    ------
+    InvalidParameterError, RecipeError
+        As in `skeletonize`.
+    """
+    if isinstance(pipeline, os.PathLike) or (isinstance(pipeline, str) and Path(pipeline).suffix.lower() in ENDINGS):
+        pipeline = load_recipe(pipeline)
+    elif isinstance(pipeline, str):
+        pipeline = named_pipeline(pipeline)
+    elif isinstance(pipeline, Filter):
+        pipeline = Pipeline(pipeline)
+    elif not isinstance(pipeline, Pipeline):
+        raise InvalidParameterError(
+            f"pipeline = {pipeline!r}: must be a Pipeline, the name of one, or the path of a recipe"
+        )
+    pipeline.check_complete()
+    return pipeline
+
+
+def remove_redundant_points(
+    cloud: Any, *, passes: int = 1, rings: RingBuilder | None = None, reducer: LPRReducer | None = None
+) -> tuple[Any, Any]:
+    """Remove points that say little more about the skeleton than their neighbours, by local point reduction.
+
+    The points are contracted, those that have become redundant are merged into their neighbours, and so on; what is
+    left of them is returned where it was. One pass takes about two fifths of the points, near and alike ones first, so
+    that the gaps are smaller than in a random sample. Used like ``remove_statistical_outlier``.
+
+    Parameters
+    ----------
+    cloud : open3d.geometry.PointCloud, open3d.t.geometry.PointCloud or (N, 3) array_like
+        Not modified.
+    passes : int
+        Solves, each with a merging pass after it. They cost as much as the contraction of a skeleton.
+    rings : RingBuilder, optional
+        How the neighbourhoods are made. By default points are neither set aside nor denoised: outliers are for
+        ``remove_statistical_outlier``.
+    reducer : LPRReducer, optional
+
+    Returns
+    -------
+    reduced : like cloud
+        With colours, normals and all other attributes of the points that are left.
+    kept : list of int, open3d.core.Tensor or (n,) int array
+        Their indices in `cloud`, ascending: a list for a legacy cloud, an int64 tensor on its device for a tensor
+        cloud. ``cloud.select_by_index(kept)`` is `reduced`, and with ``invert=True`` the points that were removed.
+
+    Raises
+    ------
+    InvalidCloudError
+        The cloud is a mesh, or the points cannot be skeletonised.
+    InvalidParameterError
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> points = torus(1000).points
+    >>> reduced, kept = remove_redundant_points(points)
+    >>> bool((reduced == points[kept]).all()), 500 < len(kept) < 700
+    (True, True)
+    """
+    if isinstance(passes, bool) or not isinstance(passes, (int, np.integer)) or passes < 1:
+        raise InvalidParameterError(f"passes = {passes!r}: must be an int of at least 1")
+    name, tensor = open3d_class(cloud)
+    if name == "TriangleMesh":
+        raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
+    rings = RingBuilder(thin_to="all", outlier_factor=0, denoise=0) if rings is None else rings
+    contractor = Contractor(
+        reducer=LPRReducer() if reducer is None else reducer,
+        reduce_above=0,
+        max_iterations=int(passes),
+        stop=lambda iterations: None,
+    )
+    state = (rings | contractor)(cloud)
+    kept = np.sort(state.point_of_survivor)
+    if name == "PointCloud" and not tensor:
+        return cloud.select_by_index(kept), kept.tolist()
+    if tensor:
+        o3d = import_open3d()
+        kept = o3d.core.Tensor(kept.astype(np.int64), device=cloud.device)
+        return (cloud.select_by_index(kept) if name == "PointCloud" else cloud[kept]), kept
+    return np.asarray(cloud)[kept], kept

@@ -1,0 +1,142 @@
+"""The points of anything that carries points; Open3D is imported when it is first needed, never for an array."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from ..errors import InvalidCloudError
+from .packages import import_open3d
+
+ACCEPTED = "an Open3D point cloud or triangle mesh (legacy or tensor) or an (N, 3) array of real numbers"
+MOST_NEIGHBOURS = 30  # within a radius without a limit of its own: as many as Open3D's KDTreeSearchParamKNN has
+
+
+class Cloud:
+    """Anything that carries points: a name for what filters of clouds take and give, which has no instances.
+
+    See `cloud_points` for what counts as one.
+    """
+
+
+def cloud_points(cloud: Any) -> np.ndarray:
+    """The points of anything that carries points.
+
+    Parameters
+    ----------
+    cloud : open3d.geometry.PointCloud, TriangleMesh, open3d.t.geometry.PointCloud, TriangleMesh or (N, 3) array_like
+        Of a mesh the vertices are taken. Tensors may have any real dtype and live on any device.
+
+    Returns
+    -------
+    (N, 3) float64 array
+        C-contiguous and in the units of `cloud`: always a copy. NaN and infinity pass through.
+
+    Raises
+    ------
+    InvalidCloudError
+        `cloud` is something else, has no points, or is no (N, 3) array of real numbers.
+
+    Examples
+    --------
+    >>> cloud_points([[0, 0, 1], [2, 3, 4]])
+    array([[0., 0., 1.],
+           [2., 3., 4.]])
+    """
+    if isinstance(cloud, (str, bytes, os.PathLike)):
+        raise InvalidCloudError(f"a cloud is not a file name ({cloud!r}): read it first with glsk_o3d.read_cloud")
+    if isinstance(cloud, np.ma.MaskedArray):
+        raise InvalidCloudError("a cloud cannot be a masked array: drop the masked points, or fill them with NaN")
+    try:
+        array = np.asarray(_held(cloud))
+    except InvalidCloudError:
+        raise
+    except Exception as error:  # ragged lists, and whatever a foreign __array__ raises
+        raise InvalidCloudError(f"a {type(cloud).__name__} is no cloud ({error}): give {ACCEPTED}") from error
+    if array.size == 0 and array.dtype.kind in "iuf":
+        raise InvalidCloudError(f"the cloud ({type(cloud).__name__}) is empty")
+    if array.dtype.kind not in "iuf" or array.ndim != 2 or array.shape[1] != 3:
+        raise InvalidCloudError(
+            f"a {type(cloud).__name__} of shape {array.shape} and dtype {array.dtype} is no cloud: give {ACCEPTED}"
+        )
+    return np.array(array, np.float64, order="C")
+
+
+def _held(cloud):
+    """The array-like in an Open3D object, or `cloud` itself; knows Open3D's classes by name, so as not to import it."""
+    name, tensor = open3d_class(cloud)
+    if name == "Tensor":
+        return cloud.cpu().numpy()
+    if name in ("PointCloud", "TriangleMesh"):
+        field = "point" if name == "PointCloud" else "vertex"
+        if not tensor:
+            return cloud.points if field == "point" else cloud.vertices
+        attributes = getattr(cloud, field)
+        return attributes.positions.cpu().numpy() if "positions" in attributes else np.empty((0, 3))
+    if name == "" or name.endswith("Vector"):
+        return cloud
+    raise InvalidCloudError(f"an Open3D {name} is no cloud: give {ACCEPTED}")
+
+
+def open3d_class(thing: Any) -> tuple[str, bool]:
+    """The name of the Open3D class that something is of, and whether it is one of the tensor API.
+
+    Parameters
+    ----------
+    thing : object
+
+    Returns
+    -------
+    name : str
+        Empty if it is not Open3D's.
+    tensor : bool
+    """
+    for cls in type(thing).__mro__:
+        package, *_ = parts = cls.__module__.split(".")
+        if package == "open3d":
+            return cls.__name__, "t" in parts or "core" in parts
+    return "", False
+
+
+def search_parameters(given: Any) -> dict[str, Any]:
+    """The number of neighbours and the radius in Open3D's ``KDTreeSearchParam*``.
+
+    Parameters
+    ----------
+    given : object
+
+    Returns
+    -------
+    dict
+        With ``k``, and with ``radius`` (float) if there is one; for a radius alone, `k` is `MOST_NEIGHBOURS`. Empty for
+        anything else.
+    """
+    name, _ = open3d_class(given)
+    if name == "KDTreeSearchParamKNN":
+        return {"k": int(given.knn)}
+    if name == "KDTreeSearchParamHybrid":
+        return {"k": int(given.max_nn), "radius": float(given.radius)}
+    if name == "KDTreeSearchParamRadius":
+        return {"k": MOST_NEIGHBOURS, "radius": float(given.radius)}
+    return {}
+
+
+def to_point_cloud(points: np.ndarray) -> Any:
+    """Points as an ``open3d.geometry.PointCloud``.
+
+    Parameters
+    ----------
+    points : (N, 3) array_like
+
+    Returns
+    -------
+    open3d.geometry.PointCloud
+
+    Raises
+    ------
+    MissingPackageError
+    """
+    o3d = import_open3d()
+    return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.ascontiguousarray(points, float).reshape(-1, 3)))

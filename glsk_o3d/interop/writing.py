@@ -1,0 +1,82 @@
+"""Files that appear complete or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ..errors import FileFormatError
+
+
+def write_json(path: str | os.PathLike, data: Any) -> None:
+    """Write what JSON can hold, indented; it appears complete or not at all.
+
+    Parameters
+    ----------
+    path : path-like
+    data : object
+
+    Raises
+    ------
+    OSError
+        As for `write_atomically`.
+    """
+    text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -> None:
+    """Write a file so that it appears complete or not at all.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to make or to replace. Of a symbolic link the target is replaced.
+    write : callable
+        Given the path of a temporary file in the same folder, with the same ending, that it is to make. If it raises,
+        the temporary file is removed and `path` stays as it was.
+
+    Raises
+    ------
+    FileNotFoundError
+        The folder does not exist.
+    OSError
+        `path` is a folder or a device, or cannot be written; the message names it, not the temporary file.
+    """
+    given, path = path, Path(os.path.realpath(path))
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"{path.parent}: no such folder: make it before writing {path.name}")
+    if path.exists() and not path.is_file():
+        raise OSError(f"{path} is a folder or a device, not a file to write to")
+    temporary = path.with_name(f".{uuid.uuid4().hex}{path.suffix}")
+    try:
+        write(temporary)
+        if path.exists():
+            shutil.copymode(path, temporary)
+        os.replace(temporary, path)
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, f"cannot be written: {os.strerror(error.errno)}", os.fspath(given)) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def check_ending(path: str | os.PathLike, what: str, *endings: str) -> None:
+    """Raise FileFormatError unless the name of a file to be written has the ending of what is written.
+
+    Parameters
+    ----------
+    path : path-like
+    what : str
+        For the message, such as ``"preview is a picture"``.
+    *endings : str
+        With their dots; the message names the first.
+    """
+    if Path(path).suffix.lower() not in endings:
+        raise FileFormatError(f"{os.fspath(path)}: the {what} and its name ends in {endings[0]}")

@@ -1,0 +1,122 @@
+"""Results as attributes of Open3D's tensor clouds, which keep them through selections, sampling and files."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..interop.clouds import cloud_points, open3d_class
+from ..interop.packages import import_open3d
+from .colors import shades
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
+    from ..state import Contraction
+
+
+def annotate(skeleton: Skeleton, cloud: Any = None, *, color: str | None = None) -> Any:
+    """A copy of a cloud that says of every point where it belongs.
+
+    The copy has all attributes of the original, and
+
+    - ``skeleton_vertex`` (N, 1) int32: the vertex it belongs to, as in `Skeleton.vertex_of_point`;
+    - ``branch`` (N, 1) int32: the row of `Skeleton.branch_table`, as from `Skeleton.segment`;
+    - ``radius`` (N, 1), of the type of the positions: the radius of the vertex.
+
+    Points that are not finite have -1, -1 and NaN. Attributes of these names are replaced.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    cloud : cloud, optional
+        By default the one the skeleton was made from. Points of another one go with the nearest point of that, or with
+        the nearest place on the curve if the skeleton's file held no cloud.
+    color : {"branch", "radius", "confidence"}, optional
+        What the colours of the points are to show; see `glsk_o3d.io.colors.shades`.
+
+    Returns
+    -------
+    open3d.t.geometry.PointCloud or TriangleMesh
+        On the device of `cloud` and of its type. Legacy clouds cannot hold attributes: they and arrays become tensor
+        clouds (float32 if the array was, else float64), with normals and colours; ``.to_legacy()`` leads back.
+
+    Raises
+    ------
+    InvalidCloudError
+    InvalidParameterError
+        The skeleton is empty, or the colour is unknown.
+    MissingPackageError
+
+    Notes
+    -----
+    Integers are int32 because Open3D writes no int64 to PLY. ``voxel_down_sample`` takes the mean of every attribute:
+    that of labels means nothing where branches meet. Annotate its result once more.
+    """
+    from ..analysis.segmentation import branch_of_point, vertex_of_cloud
+
+    points, vertex = vertex_of_cloud(skeleton, cloud)
+    branch = branch_of_point(skeleton, points, vertex)
+    geometry, put = _copy(points if cloud is None else cloud)
+    put("skeleton_vertex", vertex[:, None], "int32")
+    put("branch", branch[:, None], "int32")
+    put("radius", np.where(vertex >= 0, skeleton.radii[vertex], np.nan)[:, None])
+    if color is not None:
+        put("colors", np.round(255 * shades(skeleton, color, branch, vertex)), "uint8")
+    return geometry
+
+
+def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
+    """A copy of a cloud with the attribute ``contracted`` (N, 3): where the contraction has brought every point.
+
+    Parameters
+    ----------
+    state : Contraction
+    cloud : cloud, optional
+        As for `annotate`.
+
+    Returns
+    -------
+    open3d.t.geometry.PointCloud or TriangleMesh
+        As from `annotate`. Points that were merged away have the position of the one they were merged into; NaN for
+        points that are not finite.
+
+    Raises
+    ------
+    InvalidCloudError
+    MissingPackageError
+
+    Notes
+    -----
+    Open3D writes the attribute to npz as it is, to PLY as three columns ``contracted_0`` to ``contracted_2``, and not
+    to PCD.
+    """
+    from ..analysis.segmentation import label_of_nearest
+
+    points = state.points if cloud is None else cloud_points(cloud)
+    survivor = label_of_nearest(state.points, state.survivor_of_point, points)
+    geometry, put = _copy(points if cloud is None else cloud)
+    put("contracted", np.where((survivor >= 0)[:, None], state.contracted[survivor], np.nan))
+    return geometry
+
+
+def _copy(cloud):
+    """A tensor geometry with its own copy of all data, and a function that sets one of its attributes."""
+    o3d = import_open3d()
+    name, tensor = open3d_class(cloud)
+    if name in ("PointCloud", "TriangleMesh"):
+        kind = getattr(o3d.t.geometry, name)
+        geometry = cloud.clone() if tensor else kind.from_legacy(cloud, o3d.core.float64)
+    else:
+        array = cloud.cpu().numpy() if name == "Tensor" else np.asarray(cloud)
+        array = np.array(array, np.float32 if array.dtype == np.float32 else np.float64, order="C")
+        geometry = o3d.t.geometry.PointCloud(o3d.core.Tensor(array))
+    attributes = geometry.vertex if name == "TriangleMesh" else geometry.point
+    positions = attributes.positions
+    own = positions.dtype if positions.dtype in (o3d.core.float32, o3d.core.float64) else o3d.core.float64
+
+    def put(key, values, dtype=None):
+        values = np.ascontiguousarray(values, None if dtype is None else dtype)
+        attributes[key] = o3d.core.Tensor(values, own if dtype is None else None, positions.device)
+
+    return geometry, put

@@ -1,0 +1,85 @@
+"""Skeletons as Open3D's line sets."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..analysis.segmentation import branch_of_edge
+from ..interop.packages import import_open3d
+from .colors import shades
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
+
+
+def to_line_set(skeleton: Skeleton, color: Any = (0.85, 0.1, 0.1)) -> Any:
+    """A skeleton as a legacy line set, ready for ``draw_geometries``.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    color : {"branch", "radius", "confidence"} or three floats in [0, 1]
+        What the colours of the edges show, or the one colour of all; see `glsk_o3d.io.colors.shades`.
+
+    Returns
+    -------
+    open3d.geometry.LineSet
+        Points and lines in the order of `skeleton.vertices` and `skeleton.edges`.
+
+    Raises
+    ------
+    InvalidParameterError
+        The colour is unknown.
+    MissingPackageError
+    """
+    o3d = import_open3d()
+    lines = o3d.geometry.LineSet()
+    lines.points = o3d.utility.Vector3dVector(_rows(skeleton.vertices, float, 3))
+    lines.lines = o3d.utility.Vector2iVector(_rows(skeleton.edges, np.int32, 2))
+    lines.colors = o3d.utility.Vector3dVector(_edge_colors(skeleton, color))
+    return lines
+
+
+def to_tensor_line_set(skeleton: Skeleton, color: Any = None) -> Any:
+    """A skeleton as a tensor line set.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    color : {"branch", "radius", "confidence"} or three floats in [0, 1], optional
+        As for `to_line_set`; by default there are no colours.
+
+    Returns
+    -------
+    open3d.t.geometry.LineSet
+        On the CPU: ``point.positions`` (M, 3), ``point.radius`` and ``point.confidence`` (M, 1) float64, and
+        ``line.indices`` (E, 2) int64 and ``line.branch`` (E, 1) int32; with a color, ``line.colors`` (E, 3) float64.
+
+    Raises
+    ------
+    InvalidParameterError
+        The colour is unknown.
+    MissingPackageError
+    """
+
+    o3d = import_open3d()
+    lines = o3d.t.geometry.LineSet()
+    lines.point.positions = o3d.core.Tensor(_rows(skeleton.vertices, float, 3))
+    lines.point.radius = o3d.core.Tensor(_rows(skeleton.radii, float, 1))
+    lines.point.confidence = o3d.core.Tensor(_rows(skeleton.confidence, float, 1))
+    lines.line.indices = o3d.core.Tensor(_rows(skeleton.edges, np.int64, 2))
+    lines.line.branch = o3d.core.Tensor(_rows(branch_of_edge(skeleton), np.int32, 1))
+    if color is not None:
+        lines.line.colors = o3d.core.Tensor(_rows(_edge_colors(skeleton, color), float, 3))
+    return lines
+
+
+def _edge_colors(skeleton, color):
+
+    return shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
+
+
+def _rows(array, dtype, columns):
+    return np.ascontiguousarray(array, dtype).reshape(-1, columns)

@@ -1,0 +1,136 @@
+"""A skeleton as tubes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InvalidParameterError
+from ..interop.packages import import_open3d
+from ..numerics.neighbourhoods import plane_axes
+from .colors import shades
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
+
+TINY = np.finfo(float).tiny
+
+
+def to_tubes(skeleton: Skeleton, color: Any = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
+    """A skeleton as a mesh of tubes, one for every branch, closed by half balls.
+
+    The tubes have the radius of the vertices, linear between them. They overlap at the junctions, where the half balls
+    of all branches make one ball. Their cross-sections do not twist along the curve.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        A vertex without edges becomes a ball.
+    color : {"branch", "radius", "confidence"} or three floats in [0, 1]
+        See `glsk_o3d.io.colors.shades`.
+    radius : float, optional
+        One radius for all, in the cloud's units, instead of those of the vertices.
+    sides : int
+        Corners of a cross-section, at least 3.
+
+    Returns
+    -------
+    open3d.geometry.TriangleMesh
+        With vertex colours and normals; triangles face outwards. ``open3d.t.geometry.TriangleMesh.from_legacy`` makes a
+        tensor mesh of it.
+
+    Raises
+    ------
+    InvalidParameterError
+        A radius is unknown or not positive, `sides` is below 3, or the colour is unknown.
+    MissingPackageError
+    """
+    if isinstance(sides, bool) or not isinstance(sides, (int, np.integer)) or sides < 3:
+        raise InvalidParameterError(f"sides = {sides!r}: must be an int of at least 3")
+    if radius is not None and not (np.isfinite(radius) and radius > 0):
+        raise InvalidParameterError(f"radius = {radius!r}: must be a length above 0, in the cloud's units")
+    radii = skeleton.radii if radius is None else np.full(len(skeleton.vertices), float(radius))
+    unknown = ~(np.isfinite(radii) & (radii >= 0))
+    if unknown.any():
+        raise InvalidParameterError(f"{unknown.sum()} of {len(radii)} vertices have no radius: give one, radius=...")
+    paths = [*skeleton.branches, *np.flatnonzero(skeleton.degree == 0)[:, None]]
+    vertices, triangles, row = sweep(skeleton.vertices, radii, paths, sides)
+    flat, branch = np.concatenate([*paths, np.empty(0, int)]), np.repeat(np.arange(len(paths)), list(map(len, paths)))
+    o3d = import_open3d()
+    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(triangles))
+    mesh.vertex_colors = o3d.utility.Vector3dVector(shades(skeleton, color, branch, flat)[row])
+    mesh.compute_vertex_normals()
+    return mesh
+
+
+def sweep(vertices, radii, paths, sides):
+    """Closed surfaces around curves: circles swept along them, and half balls at the ends.
+
+    Parameters
+    ----------
+    vertices : (M, 3) float array
+    radii : (M,) float array
+    paths : sequence of int arrays
+        Vertices in order.
+    sides : int
+
+    Returns
+    -------
+    points : (P, 3) float array
+    triangles : (T, 3) int array
+    row : (P,) int array
+        The row, in the paths one after the other, that each point belongs to.
+    """
+    if len(paths) == 0:
+        return np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int)
+    flat, size = np.concatenate(paths), np.array(list(map(len, paths)))
+    path = np.repeat(np.arange(len(paths)), size)
+    stop = np.cumsum(size)
+    first, last = np.zeros(len(flat), bool), np.zeros(len(flat), bool)
+    first[stop - size], last[stop - 1] = True, True
+    centre, radius = vertices[flat], radii[flat]
+    tangent, turn = _frames(centre, first)
+    axes = plane_axes(tangent)
+
+    caps = max(2, sides // 4)  # circles from a half ball's equator to its pole
+    before, after = (caps - 1) * first, (caps - 1) * last
+    count = before + 1 + after
+    row = np.repeat(np.arange(len(flat)), count)
+    step = np.arange(len(row)) - np.repeat(np.cumsum(count) - count + before, count)
+    latitude = step * np.pi / 2 / caps
+    angle = turn[row, None] + np.arange(sides) * 2 * np.pi / sides
+    across = np.einsum("rij,jrs->rsi", axes[row], np.stack([np.cos(angle), np.sin(angle)]))
+    middle = centre[row] + (radius[row] * np.sin(latitude))[:, None] * tangent[row]
+    circles = middle[:, None] + (radius[row] * np.cos(latitude))[:, None, None] * across
+    poles = [centre[end] + sign * radius[end, None] * tangent[end] for end, sign in ((first, -1), (last, 1))]
+    points = np.concatenate([circles.reshape(-1, 3), *poles])
+
+    corner = np.arange(len(row) * sides).reshape(-1, sides)
+    onward = np.roll(corner, -1, axis=1)
+    joined = np.flatnonzero(path[row[:-1]] == path[row[1:]])
+    a, b, c, d = corner[joined], onward[joined], corner[joined + 1], onward[joined + 1]
+    opened = np.flatnonzero(np.r_[True, path[row[1:]] != path[row[:-1]]])
+    closed = np.r_[opened[1:], len(row)] - 1
+    south, north = len(row) * sides + np.arange(2 * len(paths)).reshape(2, -1, 1)
+    faces = [(a, b, d), (a, d, c), (onward[opened], corner[opened], south), (corner[closed], onward[closed], north)]
+    triangles = np.concatenate([np.stack(np.broadcast_arrays(*face), axis=-1).reshape(-1, 3) for face in faces])
+    return points, triangles, np.concatenate([np.repeat(row, sides), np.flatnonzero(first), np.flatnonzero(last)])
+
+
+def _frames(centre, first):
+    """Unit tangents of polylines one after the other, and the angles by which `plane_axes` of them do not twist."""
+    edge = np.diff(centre, axis=0, prepend=centre[:1])  # the one that leads to each point
+    edge[first] = 0
+    edge /= np.maximum(np.linalg.norm(edge, axis=1, keepdims=True), TINY)
+    tangent = edge + np.concatenate([edge[1:], np.zeros((1, 3))])  # what follows a path's last point is another's first
+    length = np.linalg.norm(tangent, axis=1, keepdims=True)
+    tangent = np.where(length > 1e-9, tangent / np.maximum(length, TINY), [0.0, 0.0, 1.0])
+    axes = plane_axes(tangent)
+    # the smallest rotation from one tangent to the next takes the one's first axis along
+    here, there, carried = tangent[:-1], tangent[1:], axes[:-1, :, 0]
+    dot = np.maximum(1 + (here * there).sum(axis=1), 1e-9)
+    carried = carried - ((carried * there).sum(axis=1) / dot)[:, None] * (here + there)
+    u, v = np.einsum("ni,nij->jn", carried, axes[1:])
+    turn = np.r_[0, np.where(first[1:], 0, np.arctan2(v, u))].cumsum()
+    return tangent, turn

@@ -1,0 +1,253 @@
+"""Layers, as MeshLab calls the meshes it holds: what goes into a filter and what comes out."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileFormatError
+from ..interop.clouds import cloud_points
+from ..interop.packages import import_open3d, require
+from ..interop.writing import write_atomically
+from ..io import files
+from ..io.files import graph_skeleton, read_skeleton, save_skeleton, skeleton_ending
+from ..skeleton import Skeleton
+from ..state import Contraction
+
+ENDINGS = {"points": (".ply", ".pcd", ".xyz"), "mesh": (".ply", ".obj", ".off", ".stl")}
+"""What layers without edges are written as."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Vertices with what hangs on them.
+
+    Attributes
+    ----------
+    vertices : (N, 3) float64 array
+    faces : (F, 3) int array or None
+    edges : (E, 2) int array or None
+    normals : (N, 3) float array or None
+    scalars : (N,) float array or None
+        One number per vertex, which MeshLab calls quality: radii of a skeleton, multiplicities of a contracted cloud,
+        branches of a segmented one.
+    colors : (N, 4) float array or None
+        Red, green, blue and alpha from 0 to 1.
+    label : str
+    flow : Contraction or Skeleton or None
+        What our filters pass on, of which the vertices are the visible part.
+    source : Layer or None
+        The layer from which the flow was made.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray | None = None
+    edges: np.ndarray | None = None
+    normals: np.ndarray | None = None
+    scalars: np.ndarray | None = None
+    colors: np.ndarray | None = None
+    label: str = "cloud"
+    flow: Contraction | Skeleton | None = None
+    source: Layer | None = None
+
+    @classmethod
+    def of(cls, data: Any, label: str = "cloud", source: Layer | None = None) -> Layer:
+        """The layer that shows a skeleton, a contraction or a cloud.
+
+        Parameters
+        ----------
+        data : Skeleton, Contraction or cloud
+        label : str
+        source : Layer, optional
+
+        Returns
+        -------
+        Layer
+        """
+        common: dict[str, Any] = dict(label=label, source=source)
+        if isinstance(data, Skeleton):
+            return cls(data.vertices, edges=data.edges, scalars=data.radii, flow=data, **common)
+        if isinstance(data, Contraction):
+            return cls(data.contracted, scalars=data.mass, flow=data, **common)
+        return cls(cloud_points(data), **common)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike) -> Layer:
+        """A scan from a file, with whatever hangs on its vertices.
+
+        Parameters
+        ----------
+        path : path-like
+            As in `glsk_o3d.read_cloud`. Of a mesh the faces are kept, of a PLY or OBJ file of lines the edges, and of a
+            PLY file the property ``quality``. What STL repeats for every triangle around it becomes one vertex.
+
+        Returns
+        -------
+        Layer
+            Its label is the name of the file.
+
+        Raises
+        ------
+        FileNotFoundError, FileFormatError, MissingPackageError
+        """
+        path, scalars = files.check_scan(path), None
+        ending, o3d = path.suffix.lower(), import_open3d()
+        held = _elements(path, ending)
+        if "edge" in held and "face" not in held:
+            drawing = read_skeleton(path)
+            return cls(
+                drawing.vertices,
+                edges=drawing.edges if len(drawing.edges) else None,
+                scalars=None if np.isnan(drawing.radii).all() else drawing.radii,
+                label=path.name,
+            )
+        cloud, faces = files.read_scan(path)  # knows best what may be wrong with the file
+        points, normals, colors = cloud.points, cloud.normals, cloud.colors
+        if ending == ".stl":
+            mesh = o3d.geometry.TriangleMesh(points, o3d.utility.Vector3iVector(faces))
+            mesh.vertex_normals = normals
+            mesh.remove_duplicated_vertices()
+            points, normals, faces = mesh.vertices, mesh.vertex_normals, np.array(mesh.triangles)
+        if "quality" in held.get("vertex", ()):
+            scalars = o3d.t.io.read_point_cloud(str(path)).point["quality"].numpy().ravel().astype(float)
+        return cls(
+            cloud_points(points),
+            faces=faces if len(faces) else None,
+            normals=np.array(normals) if len(normals) else None,
+            scalars=scalars,
+            colors=np.column_stack([colors, np.ones(len(colors))]) if len(colors) else None,
+            label=path.name,
+        )
+
+    def shows(self, other: Layer) -> bool:
+        """Whether both have the same vertices and edges, so that the one's flow is still the other's."""
+        none = np.empty((0, 2), int)
+        mine, its = (none if layer.edges is None else layer.edges for layer in (self, other))
+        return np.array_equal(self.vertices, other.vertices) and np.array_equal(mine, its)
+
+    def to_pymeshlab(self) -> Any:
+        """The layer as a ``pymeshlab.Mesh``.
+
+        Raises
+        ------
+        MissingPackageError
+        """
+        pymeshlab = require("pymeshlab")
+        given = dict(
+            vertex_matrix=(self.vertices, float),
+            face_matrix=(self.faces, np.int32),
+            edge_matrix=(self.edges, np.int32),
+            v_normals_matrix=(self.normals, float),
+            v_scalar_array=(self.scalars, float),
+            v_color_matrix=(self.colors, float),
+        )
+        arrays = {key: np.ascontiguousarray(array, kind) for key, (array, kind) in given.items() if array is not None}
+        return pymeshlab.Mesh(**{key: array for key, array in arrays.items() if len(array)})
+
+    def to_skeleton(self) -> Skeleton:
+        """The skeleton that the layer shows: that of our filters, or else its vertices and edges with what is known."""
+        if isinstance(self.flow, Skeleton):
+            return self.flow
+        return graph_skeleton(self.vertices, np.empty((0, 2)) if self.edges is None else self.edges, self.scalars)
+
+    def save(self, path: str | os.PathLike, **options: Any) -> None:
+        """Write the layer: one with edges as `save_skeleton` does, others with their faces, scalars and colours.
+
+        Parameters
+        ----------
+        path : path-like
+            The ending of a skeleton's format; for points ``.ply`` (with the scalars as the property ``quality``, as
+            MeshLab has it), ``.pcd`` (float32, with normals and colours) or ``.xyz``; for a mesh also ``.obj``,
+            ``.off`` or ``.stl``.
+        **options
+            As in `save_skeleton`.
+
+        Raises
+        ------
+        FileFormatError
+            The ending is that of no format, or of none for such a layer.
+        OSError
+            The file cannot be written.
+        """
+        path = Path(path)
+        if self.edges is not None and self.faces is None:
+            save_skeleton(self.to_skeleton(), path, **options)
+            return
+        check_ending(path, "points" if self.faces is None else "points or mesh")
+        writers = {".ply": self._write_ply, ".xyz": self._write_xyz}
+        write_atomically(path, writers.get(path.suffix.lower(), self._write_open3d))
+
+    def _write_ply(self, path: Path) -> None:
+        columns = [(self.vertices, "f8", "x y z"), (self.normals, "f8", "nx ny nz")]
+        if self.colors is not None:
+            columns.append((np.round(255 * self.colors[:, :3]), "u1", "red green blue"))
+        columns = [(array, kind, names.split()) for array, kind, names in columns if array is not None]
+        if self.scalars is not None:
+            columns.append((self.scalars[:, None], "f8", ["quality"]))
+        fields = [(name, f"<{kind}") for _, kind, names in columns for name in names]
+        vertices = np.empty(len(self.vertices), fields)
+        for array, _, names in columns:
+            for name, column in zip(names, array.T, strict=True):
+                vertices[name] = column
+        said = {"f8": "double", "u1": "uchar"}
+        header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
+        header += [f"property {said[kind[1:]]} {name}" for name, kind in fields]
+        faces = np.empty(0 if self.faces is None else len(self.faces), [("n", "u1"), ("corners", "<i4", 3)])
+        if len(faces):
+            faces["n"], faces["corners"] = 3, self.faces
+            header += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+        path.write_bytes("\n".join([*header, "end_header\n"]).encode() + vertices.tobytes() + faces.tobytes())
+
+    def _write_open3d(self, path: Path) -> None:
+        o3d = import_open3d()
+        vector = o3d.utility.Vector3dVector
+        points, normals, colors = (
+            vector(np.empty((0, 3)) if array is None else np.ascontiguousarray(array[:, :3], float))
+            for array in (self.vertices, self.normals, self.colors)
+        )
+        if path.suffix.lower() in ENDINGS["points"]:
+            cloud = o3d.geometry.PointCloud(points)
+            cloud.normals, cloud.colors = normals, colors
+            done = o3d.io.write_point_cloud(str(path), cloud)
+        else:
+            mesh = o3d.geometry.TriangleMesh(
+                points, o3d.utility.Vector3iVector(np.ascontiguousarray(self.faces, np.int32))
+            )
+            mesh.vertex_normals, mesh.vertex_colors = normals, colors
+            if path.suffix.lower() == ".stl":
+                mesh.compute_triangle_normals()
+            done = o3d.io.write_triangle_mesh(str(path), mesh)
+        if not done:
+            raise FileFormatError(f"{path}: Open3D cannot write it")
+
+    def _write_xyz(self, path: Path) -> None:
+        np.savetxt(path, self.vertices, fmt="%.17g")
+
+
+def _elements(path, ending) -> dict[str, list[str]]:
+    if ending == ".obj":  # without faces Open3D finds nothing in it
+        with path.open("rb") as stream:
+            return {"face" if any(line.split()[:1] == [b"f"] for line in stream) else "edge": []}
+    return files.ply_elements(path) if ending == ".ply" else {}
+
+
+def check_ending(path: Path, what: str) -> None:
+    """Raise FileFormatError unless the ending is that of a format for such a layer.
+
+    Parameters
+    ----------
+    path : Path
+    what : {"skeleton", "points", "points or mesh", "skeleton, points or mesh"}
+        What the layer may be.
+    """
+    known = [ending for kind, endings in ENDINGS.items() if kind in what for ending in endings]
+    if path.suffix.lower() in known:
+        return
+    if "skeleton" in what:
+        skeleton_ending(path)
+    else:
+        raise FileFormatError(f"{path}: unknown ending for {what}; known are {', '.join(dict.fromkeys(known))}")

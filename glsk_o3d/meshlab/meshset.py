@@ -1,0 +1,438 @@
+"""MeshSet: MeshLab's, with our filters among its own."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileFormatError, GlskError, InvalidCloudError, InvalidParameterError, did_you_mean
+from ..interop.packages import require
+from ..interop.writing import write_atomically
+from ..io.files import CLOUD_ENDINGS, MESH_ENDINGS, check_scan, save_skeleton, skeleton_ending
+from ..skeleton import Skeleton
+from . import builtin
+from .layers import Layer
+from .script import Param, read_script, write_script
+from .steps import Step, exact_digits, read_steps, step
+from .verbs import Verb, facts, verbs
+
+pymeshlab = require("pymeshlab")
+
+
+class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
+    """``pymeshlab.MeshSet`` with the filters of this package among MeshLab's own.
+
+    Ours are applied as MeshLab's are, by name or as methods, and can be mixed with them in filter scripts. Each makes a
+    new layer from the current one, which becomes the current layer: a skeleton has vertices, edges, and the radii as
+    vertex scalars. Where a layer came from one of our filters and its vertices and edges are as they were, the next one
+    goes on from there; on any other layer the vertices are the cloud, and whatever must run first is run with its
+    defaults.
+
+    Lengths are ``pymeshlab.PercentageValue`` (of the diagonal of the box that has the spread of the points, unless the
+    parameter ``frame`` is ``"box"``) or ``pymeshlab.PureValue`` (in the units of the cloud); a float and a string such
+    as ``"2%"`` are understood too.
+
+    Raises
+    ------
+    MissingPackageError
+        When the class is imported and pymeshlab is not installed.
+
+    Examples
+    --------
+    >>> import glsk_o3d as glsk
+    >>> from glsk_o3d.samples import torus
+    >>> meshes = glsk.MeshSet()
+    >>> meshes.add_points(torus(1000).points)
+    >>> result = meshes.generate_curve_skeleton_glsk(connector_radius="2%")
+    >>> result["loops"], meshes.current_mesh().edge_number() == result["edges"]
+    (1, True)
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any):
+        super().__init__(*args, **kwargs)
+        self._flows: dict[int, Layer] = {}
+        self._steps: list[Step] = []
+
+    # ----------------------------------------------------------------------------------------------------- layers
+
+    def add_points(self, points: Any, name: str = "cloud") -> None:
+        """Add a cloud as a new layer, which becomes the current one.
+
+        Parameters
+        ----------
+        points : cloud
+            Anything that `glsk_o3d.skeletonize` takes.
+        name : str
+        """
+        self.add_mesh(Layer.of(points).to_pymeshlab(), name)
+
+    def layer(self, number: int = -1) -> Layer:
+        """A layer as our filters see it, with what they passed on if its vertices and edges are unchanged since.
+
+        Parameters
+        ----------
+        number : int
+            Its id; -1 is the current layer.
+
+        Returns
+        -------
+        Layer
+
+        Raises
+        ------
+        InvalidCloudError
+            There is no layer at all.
+        InvalidParameterError
+            There is none of that id.
+        """
+        if not self.mesh_number():
+            raise InvalidCloudError("there is no layer: load a scan first")
+        number = self.current_mesh_id() if number == -1 else number
+        if not self.mesh_id_exists(number):
+            raise InvalidParameterError(f"layer = {number}: there is no such layer")
+        mesh = self.mesh(number)
+        scalars = mesh.vertex_scalar_array()
+        layer = Layer(
+            mesh.transformed_vertex_matrix(),
+            faces=mesh.face_matrix() if mesh.face_number() else None,
+            edges=mesh.edge_matrix().reshape(-1, 2) if mesh.edge_number() else None,
+            normals=_unless(_turned(mesh.vertex_normal_matrix(), mesh.transform_matrix()), 0),
+            scalars=_unless(scalars, 0),
+            colors=_unless(mesh.vertex_color_matrix(), 1),
+            label=mesh.label(),
+        )
+        known = self._flows.get(number)
+        if known is None or not known.shows(layer):
+            return layer
+        flow = known.flow
+        if isinstance(flow, Skeleton) and not np.array_equal(scalars, flow.radii, equal_nan=True):
+            flow = replace(flow, radii=scalars)
+        return replace(layer, edges=known.edges, flow=flow, source=known.source)
+
+    def current_skeleton(self) -> Skeleton:
+        """The skeleton in the current layer; its radii are the layer's scalars.
+
+        It has its report and its points if nothing changed its vertices and edges since they were made.
+
+        Raises
+        ------
+        InvalidCloudError
+            The layer has no edges.
+        """
+        layer = self.layer()
+        if layer.edges is None:
+            raise InvalidCloudError(f"the current layer ({layer.label}) has no edges: it is no skeleton")
+        return layer.to_skeleton()
+
+    def save_current_mesh(self, file_name: str | os.PathLike, *args: Any, **kwargs: Any) -> None:
+        """Write the current layer. Without options, edges and their radii survive in PLY, which MeshLab would drop.
+
+        Parameters
+        ----------
+        file_name : path-like
+            MeshLab's endings; for a layer of vertices and edges also those of `glsk_o3d.save_skeleton`.
+        *args, **kwargs
+            As pymeshlab has them; with any of them the layer is written by MeshLab.
+        """
+        if not args and not kwargs and self.current_mesh().edge_number() and not self.current_mesh().face_number():
+            try:
+                skeleton_ending(Path(file_name))
+            except FileFormatError:
+                pass
+            else:
+                save_skeleton(self.current_skeleton(), file_name)
+                return
+        super().save_current_mesh(os.fspath(file_name), *args, **kwargs)
+
+    def save(self, path: str | os.PathLike, **options: Any) -> None:
+        """Write the current layer, complete or not at all: by MeshLab if it has faces, else as `Layer.save`.
+
+        Parameters
+        ----------
+        path : path-like
+        **options
+            As in `glsk_o3d.save_skeleton`.
+
+        Raises
+        ------
+        FileFormatError, OSError
+        """
+        layer = self.layer()
+        if layer.faces is None or Path(path).suffix.lower() in (".pcd", ".xyz"):  # which hold no faces
+            layer.save(path, **options)
+            return
+        try:
+            write_atomically(path, lambda temporary: super(MeshSet, self).save_current_mesh(str(temporary)))
+        except pymeshlab.PyMeshLabException as error:
+            raise FileFormatError(f"{path}: MeshLab cannot write it: {' '.join(str(error).split())}") from error
+
+    def load_scan(self, path: str | os.PathLike) -> None:
+        """Add a scan as a new layer: what `Layer.read` reads as it does, all else by MeshLab.
+
+        Parameters
+        ----------
+        path : path-like
+            Of formats that both read, `load_new_mesh` also has colours of faces and textures.
+
+        Raises
+        ------
+        FileNotFoundError, FileFormatError
+        """
+        path = check_scan(path)
+        try:
+            if path.suffix.lower() in CLOUD_ENDINGS + MESH_ENDINGS:
+                self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)
+                return
+            self.load_new_mesh(str(path))
+        except pymeshlab.PyMeshLabException as error:
+            raise FileFormatError(f"{path}: MeshLab cannot read it: {' '.join(str(error).split())}") from error
+        if not self.current_mesh().vertex_number():
+            raise FileFormatError(f"{path}: no points could be read")
+
+    def clear(self) -> None:
+        """Remove all layers."""
+        super().clear()
+        self._flows = {}
+
+    # ---------------------------------------------------------------------------------------------------- filters
+
+    def apply_filter(self, filter_name: str, **params: Any) -> dict[str, Any]:
+        """Apply a filter of MeshLab's or ours to the current layer.
+
+        Parameters
+        ----------
+        filter_name : str
+            One of `filter_list`.
+        **params
+            See `print_filter_parameter_list`.
+
+        Returns
+        -------
+        dict of str to object
+            What the filter says about its result.
+
+        Raises
+        ------
+        InvalidParameterError
+            There is no such filter; or one of ours was given an unknown parameter or a wrong value.
+        InvalidCloudError
+            The layer cannot be skeletonised.
+        pymeshlab.PyMeshLabException
+            A filter of MeshLab's failed.
+        """
+        if filter_name in verbs():
+            done = step(verbs()[filter_name], _plain_lengths(params))
+            result = self._run_ours(done)
+        elif filter_name in pymeshlab.filter_list():
+            done, result = self._run_theirs(filter_name, params)
+        else:
+            raise InvalidParameterError(did_you_mean(str(filter_name), self.filter_list(), "filter"))
+        self._steps.append(done)
+        return result
+
+    def apply_step(self, step: Step, on_iteration: Callable[..., Any] | None = None) -> dict[str, Any]:
+        """Run a filter of a script without adding it to the current script.
+
+        Parameters
+        ----------
+        step : Step
+        on_iteration : callable, optional
+            As in `glsk_o3d.skeletonize`.
+
+        Returns
+        -------
+        dict of str to object
+
+        Raises
+        ------
+        ScriptError
+            The filter failed; the message names file and line.
+        """
+        with step.named_in_errors():
+            if step.verb is not None:
+                return self._run_ours(step, on_iteration)
+            try:
+                return self._run_theirs(step.name, step.values)[1]
+            except Exception as error:  # pymeshlab's have no base of their own
+                raise GlskError(" ".join(str(error).split())) from error
+
+    def _run_ours(self, step: Step, on_iteration=None) -> dict[str, Any]:
+        verb = step.verb
+        assert verb is not None
+        layer = verb.run(self.layer(step.values.get("layer", -1)), step.values, on_iteration)
+        self.add_mesh(layer.to_pymeshlab(), layer.label)
+        self._flows = {number: known for number, known in self._flows.items() if self.mesh_id_exists(number)}
+        self._flows[self.current_mesh_id()] = layer
+        return {"layer": self.current_mesh_id(), **facts(layer)}
+
+    def _run_theirs(self, name: str, params: dict[str, Any]) -> tuple[Step, dict[str, Any]]:
+        asked: Any = super() if self.mesh_number() else builtin.trial()  # without a mesh it crashes
+        exact = asked.filter_parameter_values(name, **params)
+        for key, value in exact.items():
+            if self.mesh_number() and builtin.is_layer(key, value) and not self.mesh_id_exists(value):
+                raise InvalidParameterError(f"{key} = {value}: there is no such layer")
+        super().clear_filter_script()
+        result = super().apply_filter(name, **params)
+        with tempfile.TemporaryDirectory() as folder:  # MeshLab alone knows how they are written
+            file = os.path.join(folder, "last.mlx")
+            super().save_filter_script(file)
+            (call,) = read_script(file)
+        return exact_digits(Step(name, dict(params), call), exact), result
+
+    def filter_parameter_values(self, filter_name: str, **params: Any) -> dict[str, Any]:
+        """The parameters that `apply_filter` would use: those given, and the defaults of the others.
+
+        Parameters
+        ----------
+        filter_name : str
+        **params
+
+        Returns
+        -------
+        dict of str to object
+        """
+        if filter_name in verbs():
+            return verbs()[filter_name].values(_plain_lengths(params))
+        return super().filter_parameter_values(filter_name, **params)
+
+    @staticmethod
+    def filter_list() -> list[str]:
+        """The names of all filters, MeshLab's and ours."""
+        return [*pymeshlab.filter_list(), *verbs()]
+
+    @staticmethod
+    def print_filter_list() -> None:
+        """Print the names of all filters, MeshLab's and ours."""
+        print("\n".join(MeshSet.filter_list()))
+
+    @staticmethod
+    def print_filter_parameter_list(filter_name: str) -> None:
+        """Print the parameters of a filter: name, type and default; of ours also limits and meaning.
+
+        Parameters
+        ----------
+        filter_name : str
+        """
+        verb = verbs().get(filter_name)
+        if verb is None:
+            if filter_name not in pymeshlab.filter_list():
+                raise InvalidParameterError(did_you_mean(filter_name, MeshSet.filter_list(), "filter"))
+            pymeshlab.print_filter_parameter_list(filter_name)
+            return
+        print(f"{filter_name} filter - list of parameter names:")
+        print("\n".join(_described(verb)) or "\tNone.")
+
+    @staticmethod
+    def search(word: str) -> None:
+        """Print the filters, MeshLab's and ours, whose names or descriptions have a word.
+
+        Parameters
+        ----------
+        word : str
+        """
+        for verb in verbs().values():
+            if all(part in f"{verb.name} {verb.title} {verb.doc}".lower() for part in word.lower().split()):
+                print(f"{verb.name} : {verb.doc}")
+        pymeshlab.search(word)
+
+    # ---------------------------------------------------------------------------------------------------- scripts
+
+    def load_filter_script(self, filter_script_name: str | os.PathLike) -> None:
+        """Make a script file the current script. Nothing is run; everything is checked.
+
+        Parameters
+        ----------
+        filter_script_name : path-like
+
+        Raises
+        ------
+        FileNotFoundError, FileFormatError, ScriptError
+            See `glsk_o3d.meshlab.steps.read_steps`.
+        """
+        self._steps = read_steps(filter_script_name)
+
+    def apply_filter_script(self) -> None:
+        """Run the filters of the current script, in order, from the current layer on."""
+        for each in list(self._steps):
+            self.apply_step(each)
+
+    def save_filter_script(self, filter_script_name: str | os.PathLike) -> None:
+        """Write the current script: what was loaded, and what was applied since. Our lengths in percent stay so.
+
+        Parameters
+        ----------
+        filter_script_name : path-like
+        """
+        write_script(filter_script_name, [each.call for each in self._steps])
+
+    def clear_filter_script(self) -> None:
+        """Make the current script empty."""
+        self._steps = []
+
+    def print_filter_script(self) -> None:
+        """Print the filters of the current script with their parameters."""
+        print(f"Filter Script Size : {len(self._steps)}\n")
+        for i, each in enumerate(self._steps):
+            print(f"{i}: {each.name}")
+            for param in each.call.params:
+                print(f"\t{param.name} : {param.type} = {_shown(param)}")
+
+
+def _unless(array: np.ndarray, blank: float) -> np.ndarray | None:
+    """What every layer has, or nothing if it was never set."""
+    return None if (array == blank).all() else array
+
+
+def _turned(normals: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Normals as a layer's matrix shows them: they keep their lengths and stay normal where it is no rotation."""
+    turned = normals @ np.linalg.pinv(matrix[:3, :3])
+    before, after = (np.linalg.norm(vectors, axis=1, keepdims=True) for vectors in (normals, turned))
+    return turned * np.divide(before, after, out=np.ones_like(after), where=after > 0)
+
+
+def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
+    """MeshLab's classes for lengths, which hold float32, as what our filters take."""
+
+    def plain(value):
+        if isinstance(value, pymeshlab.PercentageValue):
+            return f"{np.float32(value.value())}%"
+        return float(str(np.float32(value.value()))) if isinstance(value, pymeshlab.PureValue) else value
+
+    return {name: plain(value) for name, value in params.items()}
+
+
+def _described(verb: Verb) -> Iterator[str]:
+    values = verb.values({})
+    for slot in verb.slots.values():
+        limits = {"above" if slot.facts["open_low"] else "min": slot.facts["low"], "max": slot.facts["high"]}
+        limits = {key: limit for key, limit in limits.items() if limit is not None}
+        said = f" [{'; '.join(f'{key}: {limit:g}' for key, limit in limits.items())}]" if limits else ""
+        said += f" ({', '.join(slot.words)})" if slot.words else ""
+        default = values.get(slot.name, "as the pipeline has it")
+        yield f"\t{slot.name} : {slot.python_type()} = {default}{said}\n\t\t{slot.facts['doc']}"
+
+
+def _shown(param: Param) -> str:
+    told = ("name", "type", "tooltip", "description")
+    values = {key: value for key, value in param.attributes.items() if key not in told}
+    return values.get("value", ", ".join(values.values()))
+
+
+def _method(name: str, verb: Verb):
+    def apply(self, **params):
+        return self.apply_filter(name, **params)
+
+    apply.__name__ = name
+    apply.__qualname__ = f"MeshSet.{name}"
+    apply.__doc__ = f"{verb.doc}\n\nParameters: see ``MeshSet.print_filter_parameter_list({name!r})``.\n"
+    return apply
+
+
+for _name, _verb in verbs().items():
+    setattr(MeshSet, _name, _method(_name, _verb))

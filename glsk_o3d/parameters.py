@@ -1,0 +1,214 @@
+"""Parameters that describe and check themselves: what filters and stopping rules have."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import re
+from numbers import Integral, Real
+from typing import Any, ClassVar, TypeVar
+
+from .errors import InvalidParameterError
+
+_Class = TypeVar("_Class", bound=type)
+
+TYPES = ("int", "float", "bool", "length", "choice", "reducer", "stop")
+"""What a parameter may be; with a trailing ``?`` also None."""
+
+
+def parameter(
+    default: Any,
+    doc: str,
+    *,
+    type: str,
+    unit: str = "-",
+    low: float | None = None,
+    high: float | None = None,
+    open_low: bool = False,
+    choices: tuple[str, ...] = (),
+) -> Any:
+    """A dataclass field that carries its own documentation and limits.
+
+    Parameters
+    ----------
+    default : object
+    doc : str
+        One sentence; it appears in the class's docstring and in ``glsk filters``.
+    type : {"int", "float", "bool", "length", "choice", "reducer", "stop"}
+        A length is a float in the cloud's units or a string such as ``"2%"`` of the diagonal of the box that
+        `RingBuilder.frame` names. A trailing ``?`` allows None.
+    unit : str
+    low, high : float, optional
+        Inclusive limits (`low` is exclusive with `open_low`); for a length in percent they limit nothing.
+    open_low : bool
+    choices : tuple of str
+        What the type ``"choice"`` may be; any other type may also be one of these words.
+    """
+    facts = dict(doc=doc, type=type, unit=unit, low=low, high=high, open_low=open_low, choices=choices)
+    return dataclasses.field(default=default, metadata=facts)
+
+
+def documented(cls: _Class) -> _Class:
+    """Class decorator: append the numpydoc "Parameters" section made from the fields' own facts.
+
+    Parameters
+    ----------
+    cls : dataclass
+        All of whose fields are made by `parameter`.
+
+    Returns
+    -------
+    class
+        The same.
+    """
+    lines = []
+    for field in dataclasses.fields(cls):
+        facts = field.metadata
+        words = [repr(choice) for choice in facts["choices"]]
+        kind = " or ".join(words + [facts["type"].replace("?", " or None")] * (facts["type"] != "choice"))
+        unit = "" if facts["unit"] == "-" else f" [{facts['unit']}]"
+        lines += [f"{field.name} : {kind}{unit}, default {field.default!r}", f"    {facts['doc']}"]
+    if lines:
+        text = inspect.cleandoc(cls.__doc__ or "")
+        cls.__doc__ = f"{text}\n\nParameters\n----------\n" + "\n".join(lines) + "\n"
+    return cls
+
+
+NONE, UNWRITTEN, FROM = "none", "unwritten", "from"
+RESERVED = ("filter", "rule", UNWRITTEN, FROM)
+"""Names that no parameter has, since recipes use them."""
+
+
+class Parameters:
+    """Mixin of frozen dataclasses whose fields are made by `parameter`: checked when used, not when made."""
+
+    kind: ClassVar[str] = "rule"
+    """What a recipe calls it."""
+
+    def check(self) -> None:
+        """Raise InvalidParameterError if a parameter has the wrong type or is out of range."""
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            problem = problem_with(value, field.metadata)
+            if problem:
+                raise InvalidParameterError(f"{type(self).__name__}.{field.name} = {value!r}: {problem}")
+            if isinstance(value, Parameters):
+                value.check()
+
+    def table(self) -> dict[str, Any]:
+        """Name and parameters as the plain table that stands for it in a recipe.
+
+        Returns
+        -------
+        dict
+            Of dicts, strings, numbers and bools, with the class under ``"filter"`` or ``"rule"`` and, unless it is of
+            this package, its module under ``"from"``. In the place of what a file cannot hold stands a table with the
+            key ``"unwritten"``, which says what it was.
+        """
+        cls = type(self)
+        origin = {} if cls.__module__.startswith(f"{__package__}.") else {FROM: cls.__module__}
+        fields = dataclasses.fields(self)  # type: ignore[arg-type]
+        return {
+            self.kind: cls.__name__,
+            **origin,
+            **{field.name: _plain(getattr(self, field.name)) for field in fields},
+        }
+
+
+def _plain(value: Any) -> Any:
+    if value is None:
+        return NONE
+    if isinstance(value, Parameters):
+        return value.table()
+    if isinstance(value, str):
+        return str.__str__(value)
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, Integral):
+        return int(value)
+    if isinstance(value, Real):
+        return float(value)
+    return {UNWRITTEN: f"{_name(value)} is no number, word, filter or rule"}
+
+
+def _name(value: Any) -> str:
+    named = value if hasattr(value, "__qualname__") else type(value)
+    return f"{'' if named is value else 'a '}{named.__module__}.{named.__qualname__}"
+
+
+def problem_with(value: Any, facts: Any) -> str | None:
+    """What is wrong with the value of a parameter.
+
+    Parameters
+    ----------
+    value : object
+    facts : mapping
+        As `parameter` makes it.
+
+    Returns
+    -------
+    str or None
+        None where nothing is.
+    """
+    kind, low, high = facts["type"], facts["low"], facts["high"]
+    if isinstance(value, str) and value in facts["choices"]:
+        return None
+    if kind.endswith("?"):
+        if value is None:
+            return None
+        kind = kind[:-1]
+    if kind == "bool":
+        return None if isinstance(value, bool) else "must be True or False"
+    if kind == "choice":
+        return f"must be one of {', '.join(map(repr, facts['choices']))}"
+    if kind in ("reducer", "stop"):
+        usable = callable(value) and not isinstance(value, type)
+        return None if usable else f"must be a {kind}: an instance, not a class or a name"
+    if kind == "length" and isinstance(value, str):
+        percent = _percent(value)
+        if percent is None:
+            return "must be a number in the cloud's units or a percentage of its diagonal such as '2%'"
+        return None if 0 < percent <= 100 else "a percentage of the diagonal lies above 0% and up to 100%"
+    if isinstance(value, bool) or not isinstance(value, Integral if kind == "int" else Real):
+        words = "".join(f", or {choice!r}" for choice in facts["choices"])
+        return f"must be {'an int' if kind == 'int' else 'a number'}{words}"
+    if not isinstance(value, Integral) and not math.isfinite(value):
+        return "must be finite"
+    if low is not None and (value < low or (facts["open_low"] and value == low)):
+        return f"must be {'above' if facts['open_low'] else 'at least'} {low}"
+    if high is not None and value > high:
+        return f"must be at most {high}"
+    return None
+
+
+def _percent(text: str) -> float | None:
+    match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*%\s*", text)
+    return float(match[1]) if match else None
+
+
+def resolve_length(length: float | str, diagonal: float) -> float:
+    """A length in the cloud's units: a number as it is, ``"2%"`` as a share of the diagonal.
+
+    Parameters
+    ----------
+    length : float or str
+    diagonal : float
+        In the cloud's units: of the bounding box or of the box with the spread of the points, as `RingBuilder.frame`
+        says.
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> resolve_length("2%", 50.0), resolve_length(0.3, 50.0)
+    (1.0, 0.3)
+    """
+    if isinstance(length, str):
+        percent = _percent(length)
+        if percent is None:
+            raise InvalidParameterError(f"length {length!r}: must be a number or a percentage such as '2%'")
+        return percent / 100 * diagonal
+    return float(length)

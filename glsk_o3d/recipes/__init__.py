@@ -1,0 +1,13 @@
+"""Recipes: pipelines as plain dicts, and as JSON and TOML files.
+
+A recipe is ``{"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "RingBuilder", "k": 20}, ...]}``: a table per stage,
+with its parameters; a reducer inside is a table with ``"filter"`` and a stopping rule one with ``"rule"``. Parameters
+that are left out have their defaults. ``"none"`` stands for None, which TOML lacks. Instead of ``"pipeline"`` there can
+be ``"extends"``, the name of a pipeline, and ``"set"``, changes to it by filter and parameter.
+"""
+
+from .reading import from_recipe, load_recipe
+from .rerun import identical, rerun
+from .writing import ENDINGS, gaps, save_recipe, to_recipe
+
+__all__ = ["ENDINGS", "from_recipe", "gaps", "identical", "load_recipe", "rerun", "save_recipe", "to_recipe"]

@@ -1,0 +1,163 @@
+"""Filters, stopping rules and pipelines of other distributions, found through their entry points."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from importlib import metadata
+from typing import Any
+
+from ..errors import PluginWarning
+from ..interop.clouds import Cloud
+from ..parameters import RESERVED, TYPES, Parameters
+from ..pipeline import FLOWS, Filter, Pipeline
+from ..pipelines import BUILTIN, PIPELINES
+from ..report import outside
+
+FILTER_GROUP, PIPELINE_GROUP = "glsk_o3d.filters", "glsk_o3d.pipelines"
+
+
+class _Unfit(Exception):
+    """A plugin is not what it should be."""
+
+
+_found: dict[str, dict[str, Any]] = {}
+_lock = threading.RLock()
+
+
+def plugin_filters() -> dict[str, type[Parameters]]:
+    """Filters and stopping rules of the entry-point group ``glsk_o3d.filters``, by name.
+
+    Returns
+    -------
+    dict of str to class
+
+    Warns
+    -----
+    PluginWarning
+        Once for each that is broken, with its distribution and what is wrong; it is left out, and the others are not.
+    """
+    return _plugins(FILTER_GROUP, BUILTIN, _check_filter)
+
+
+def plugin_pipelines() -> dict[str, Callable[[], Pipeline]]:
+    """Pipelines of the entry-point group ``glsk_o3d.pipelines``, by name.
+
+    Returns
+    -------
+    dict of str to callable
+        Each makes a Pipeline.
+
+    Warns
+    -----
+    PluginWarning
+        As `plugin_filters`.
+    """
+    return _plugins(PIPELINE_GROUP, PIPELINES, _check_pipeline)
+
+
+def forget_plugins() -> None:
+    """Look for plugins anew when they are next asked for, after one was installed into a running process."""
+    with _lock:
+        _found.clear()
+
+
+def _plugins(group, builtin, check):
+    with _lock:
+        if group not in _found:
+            found = _found[group] = {}  # already there for plugins that themselves ask for plugins
+            try:
+                problems = _load(group, builtin, check, found)
+            except BaseException:  # interrupted: next time from the start
+                del _found[group]
+                raise
+            for problem in problems:
+                warnings.warn(problem, PluginWarning, stacklevel=outside())
+        return _found[group]
+
+
+def _load(group, builtin, check, found):
+    """Fill `found` with plugins; gives what is wrong with the others."""
+    problems: list[str] = []
+    for distribution, entry in _entries(group, problems):
+        try:
+            if entry.name in builtin or entry.name in found:
+                owner = "the built-in one" if entry.name in builtin else "one of another plugin"
+                raise _Unfit(f"the name is that of {owner}")
+            plugin = entry.load()
+            check(entry.name, plugin)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # whatever code of others raises; some is no Exception
+            cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
+            problems.append(f"plugin {entry.name!r} ({entry.value}) of {distribution} left out: {cause}")
+        else:
+            found[entry.name] = plugin
+    return problems
+
+
+def _entries(group: str, problems: list[str]) -> Iterator[tuple[str, metadata.EntryPoint]]:
+    """Every entry point of a group with its distribution; of a distribution found twice those of the first.
+
+    One by one, since a single malformed file spoils `importlib.metadata.entry_points` for all.
+    """
+    seen = set()
+    for distribution in metadata.distributions():
+        text = distribution.read_text("entry_points.txt") or ""
+        if group not in text:
+            continue
+        name = str(distribution.metadata["Name"])
+        if name in seen:
+            continue
+        seen.add(name)
+        heads = [line for line in map(str.strip, text.splitlines()) if line.strip("[] ") == group]
+        try:
+            if any(head != f"[{group}]" for head in heads):  # importlib.metadata passes over it
+                raise _Unfit(f"a line should be '[{group}]'")
+            entries = list(distribution.entry_points.select(group=group))
+        except Exception as error:
+            problems.append(f"the plugins of {name} left out: its entry_points.txt is malformed: {error}")
+            continue
+        for entry in entries:
+            yield f"{name} {distribution.version}", entry
+
+
+def _check_filter(name: str, cls: Any) -> None:
+    if not (isinstance(cls, type) and issubclass(cls, Parameters) and _is_frozen(cls)):
+        raise _Unfit("it is no frozen dataclass derived from glsk_o3d.Filter")
+    if cls.__name__ != name:
+        raise _Unfit(f"the entry point must have the name of the class, {cls.__name__!r}")
+    for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+        if "type" not in field.metadata:
+            raise _Unfit(f"its field {field.name!r} is not made by glsk_o3d.parameters.parameter")
+        if field.name in RESERVED:
+            raise _Unfit(f"recipes have another meaning for a parameter {field.name!r}")
+        if str(field.metadata["type"]).removesuffix("?") not in TYPES:
+            raise _Unfit(f"its parameter {field.name!r} has a type that is none of {', '.join(TYPES)}")
+        if field.metadata["type"].endswith("?") and "none" in field.metadata["choices"]:
+            raise _Unfit(f"the choice 'none' of its parameter {field.name!r} cannot be told from None")
+    if not issubclass(cls, Filter):
+        if not callable(cls()):
+            raise _Unfit("a stopping rule must be callable")
+    elif cls.consumes not in FLOWS or cls.produces not in FLOWS or (cls.produces is Cloud is not cls.consumes):
+        raise _Unfit(f"there is no filter from {_flow(cls.consumes)} to {_flow(cls.produces)}")
+    elif cls._run is Filter._run:
+        raise _Unfit("it has no method _run")
+    cls().check()
+
+
+def _flow(flow: Any) -> str:
+    return getattr(flow, "__name__", repr(flow))
+
+
+def _is_frozen(cls) -> bool:
+    return getattr(getattr(cls, "__dataclass_params__", None), "frozen", False)
+
+
+def _check_pipeline(name: str, make: Any) -> None:
+    made = make() if callable(make) else make
+    if not callable(make) or not isinstance(made, Pipeline):
+        raise _Unfit(f"it must be a callable that returns a Pipeline, and gives a {type(made).__name__}")
+    made.check()

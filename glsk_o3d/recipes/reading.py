@@ -1,0 +1,209 @@
+"""Pipelines from recipes, and these from JSON and TOML files."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ..errors import InvalidParameterError, RecipeError, did_you_mean
+from ..parameters import FROM, NONE, Parameters, problem_with
+from ..pipeline import RECIPE_VERSION, Pipeline
+from .catalogue import catalogue, find, named_pipeline, serves
+from .writing import recipe_ending, refuse_gaps
+
+
+def load_recipe(path: str | os.PathLike) -> Pipeline:
+    """Read a pipeline from a recipe.
+
+    Parameters
+    ----------
+    path : path-like
+        JSON or TOML, by the ending.
+
+    Returns
+    -------
+    Pipeline
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    RecipeError
+        It is no recipe, or a wrong one; the message names the file and the place in it.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder, "mine.json")
+    ...     _ = path.write_text('{"glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {"k": 12}}}')
+    ...     load_recipe(path).stages[0].k
+    12
+    """
+    ending = recipe_ending(path)
+    data = Path(path).read_bytes()
+    try:
+        recipe = _READERS[ending](data.decode("utf-8-sig"))
+    except Exception as error:  # whatever a parser raises on a hostile file
+        raise RecipeError(f"{os.fspath(path)}: not valid {ending[1:].upper()}: {error}") from error
+    try:
+        return from_recipe(recipe)
+    except (RecipeError, RecursionError) as error:
+        raise RecipeError(f"{os.fspath(path)}: {error}") from None
+
+
+def _read_json(text: str) -> Any:
+    def table(pairs):
+        keys = [key for key, _ in pairs]
+        twice = [key for key in keys if keys.count(key) > 1]
+        if twice:
+            raise ValueError(f"the key {twice[0]!r} stands twice in one table")
+        return dict(pairs)
+
+    return json.loads(text, object_pairs_hook=table)
+
+
+def _read_toml(text: str) -> Any:
+    import tomlkit
+
+    return tomlkit.parse(text).unwrap()
+
+
+_READERS: dict[str, Callable[[str], Any]] = {".json": _read_json, ".toml": _read_toml}
+
+
+def from_recipe(recipe: dict[str, Any]) -> Pipeline:
+    """The pipeline that a recipe describes.
+
+    Parameters
+    ----------
+    recipe : dict
+        As `to_recipe` makes it, as `Report.recipe` has it, or as a file holds it.
+
+    Returns
+    -------
+    Pipeline
+        Checked.
+
+    Raises
+    ------
+    RecipeError
+        The recipe is of a newer version, malformed, or not complete; the message names the place in it.
+
+    Examples
+    --------
+    >>> from_recipe({"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "Connector", "radius": "2%"}]})
+    Connector(radius='2%', thickness=0.6, links='all', stray=0.1)
+    >>> from_recipe({"glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {"k": 20}}}).stages[0].k
+    20
+    """
+    _check_head(recipe)
+    refuse_gaps(recipe)
+    if "extends" in recipe:
+        return _extended(recipe["extends"], recipe.get("set", {}))
+    stages = recipe["pipeline"]
+    if not isinstance(stages, list) or not stages:
+        raise RecipeError(f"pipeline: must be a list of at least one stage, not {_short(stages)}")
+    read: list[Any] = [_part(stage, f"pipeline[{i}]", "filter") for i, stage in enumerate(stages)]
+    return _valid(lambda: Pipeline(*read), "pipeline")
+
+
+def _check_head(recipe: Any) -> None:
+    example = f'{{"glsk_o3d": {{"version": {RECIPE_VERSION}}}, "pipeline": [...]}}'
+    if not isinstance(recipe, dict):
+        raise RecipeError(f"a recipe is a table such as {example}, not {_short(recipe)}")
+    head = recipe.get("glsk_o3d")
+    if not isinstance(head, dict) or "version" not in head:
+        raise RecipeError(f"glsk_o3d.version: is missing; a recipe is a table such as {example}")
+    version = head["version"]
+    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
+        raise RecipeError(f"glsk_o3d.version: must be {RECIPE_VERSION}, not {_short(version)}")
+    if version > RECIPE_VERSION:
+        raise RecipeError(f"glsk_o3d.version: is {version} and this release reads {RECIPE_VERSION}: update glsk-o3d")
+    for key in head:
+        if key != "version":
+            raise RecipeError(f"glsk_o3d.{key}: there is only 'version' in this table")
+    for key in recipe:
+        if key not in ("glsk_o3d", "pipeline", "extends", "set"):
+            raise RecipeError(f"{key}: {did_you_mean(str(key), ('pipeline', 'extends', 'set'), 'key of a recipe')}")
+    if ("pipeline" in recipe) == ("extends" in recipe):
+        both = "has both" if "pipeline" in recipe else "lacks both"
+        raise RecipeError(f"a recipe has either 'pipeline' or 'extends', and this one {both}")
+    if "set" in recipe and "extends" not in recipe:
+        raise RecipeError("set: changes the pipeline that 'extends' names, and there is no 'extends'")
+
+
+def _extended(name: Any, changes: Any) -> Pipeline:
+    try:
+        pipeline = named_pipeline(str(name))
+    except InvalidParameterError as error:
+        raise RecipeError(f"extends: {error}") from None
+    if not isinstance(changes, dict):
+        raise RecipeError(f"set: must be a table of filters, not {_short(changes)}")
+    read: dict[str, Any] = {}
+    for owner, values in changes.items():
+        cls = find(owner)
+        if cls is None:
+            raise RecipeError(f"set.{owner}: {did_you_mean(str(owner), catalogue(), 'filter or rule')}")
+        read |= {f"{owner}.{field}": value for field, value in _values(cls, values, f"set.{owner}").items()}
+    return _valid(lambda: pipeline.with_options(read), "set")
+
+
+def _part(table: Any, path: str, role: str) -> Parameters:
+    """A filter, reducer or rule from its table."""
+    kind = "rule" if role == "stop" else "filter"
+    if not isinstance(table, dict) or kind not in table:
+        raise RecipeError(f'{path}: must be a table such as {{"{kind}": NAME, ...}}, not {_short(table)}')
+    name = table[kind]
+    cls = find(name) if isinstance(name, str) else None
+    if cls is None or not serves(cls, role):
+        fitting = [other for other, its in catalogue().items() if serves(its, role)]
+        message = did_you_mean(str(name), fitting, role.replace("stop", "stopping rule"))
+        plugin = " (or install the plugin that it is from)" * (cls is None)
+        raise RecipeError(f"{path}.{kind}: {message}{plugin}")
+    origin = table.get(FROM, cls.__module__)
+    if origin != cls.__module__:
+        raise RecipeError(f"{path}.{FROM}: {name!r} of {origin} is not among the filters and rules of 'glsk filters'")
+    values = _values(cls, {key: value for key, value in table.items() if key not in (kind, FROM)}, path)
+    return _valid(lambda: cls(**values), path)
+
+
+def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
+    """Parameters of a class, each checked."""
+    if not isinstance(table, dict):
+        raise RecipeError(f"{path}: must be a table of parameters, not {_short(table)}")
+    fields = {field.name: field.metadata for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    values = {}
+    for name, value in table.items():
+        if name not in fields:
+            raise RecipeError(f"{path}.{name}: {did_you_mean(str(name), fields, f'parameter of {cls.__name__}')}")
+        facts = fields[name]
+        kind = facts["type"]
+        if kind.endswith("?") and value == NONE and NONE not in facts["choices"]:
+            value = None
+        if kind.rstrip("?") in ("reducer", "stop") and value is not None:
+            value = _part(value, f"{path}.{name}", kind.rstrip("?"))
+        problem = problem_with(value, facts)
+        if problem:
+            raise RecipeError(f"{path}.{name}: {problem}, not {_short(value)}")
+        values[name] = value
+    return values
+
+
+def _valid(make: Callable[[], Any], path: str) -> Any:
+    """What is made, checked as a whole: stages that do not fit, and whatever else a filter demands."""
+    try:
+        made = make()
+        made.check()
+    except (ValueError, TypeError) as error:  # InvalidParameterError, or what a plugin raises
+        raise RecipeError(f"{path}: {error}") from None
+    return made
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

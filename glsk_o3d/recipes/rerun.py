@@ -1,0 +1,101 @@
+"""Runs repeated from the recipe in their report."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..errors import InvalidParameterError, RecipeError, SkeletonWarning
+from ..interop.clouds import Cloud
+from ..pipeline import Pipeline, after, with_stage
+from ..report import Report, outside
+from ..skeleton import Skeleton
+from .reading import from_recipe
+
+
+def identical(skeleton: Skeleton, other: Skeleton) -> bool:
+    """Whether two skeletons have the same vertices, edges and radii, to the last bit.
+
+    Parameters
+    ----------
+    skeleton, other : Skeleton
+
+    Returns
+    -------
+    bool
+    """
+    return all(
+        np.array_equal(getattr(skeleton, name), getattr(other, name), equal_nan=name == "radii")
+        for name in ("vertices", "edges", "radii")
+    )
+
+
+def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -> Skeleton:
+    """Make a skeleton again with the recipe in its report.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        With its points, as it was computed or as a JSON or npz file holds it.
+    cloud : cloud, optional
+        Another cloud to run the recipe on; by default the skeleton's own points. They are what the first filter after
+        those of clouds took, so that these do not run again.
+    **callbacks : callable, optional
+        Those that a Pipeline takes when it is called.
+
+    Returns
+    -------
+    Skeleton
+
+    Raises
+    ------
+    RecipeError
+        There is no recipe, or not a complete one; the message says what is missing.
+
+    Warns
+    -----
+    SkeletonWarning
+        The result on the skeleton's own points differs from it: other releases computed it.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> skeleton = skeletonize(torus(1000).points)
+    >>> bool((rerun(skeleton).vertices == skeleton.vertices).all())
+    True
+    """
+    recipe = skeleton.report.recipe
+    if not recipe:
+        raise RecipeError(
+            "it holds no recipe: .json and .npz results of glsk-o3d have one, but not those of old releases"
+        )
+    pipeline = from_recipe(recipe)
+    try:
+        pipeline.check_complete()
+    except InvalidParameterError as error:
+        raise RecipeError(f"pipeline: {error}") from None
+    if cloud is not None:
+        return pipeline(cloud, **callbacks)
+    if not len(skeleton.points):
+        raise RecipeError("it holds no points: give the scan")
+    first = max((i for i, stage in enumerate(pipeline.stages) if stage.produces is Cloud), default=-1) + 1
+    again = Pipeline(*pipeline.stages[first:])(skeleton.points, **callbacks)
+    if first:
+        ahead = Report()
+        for stage in pipeline.stages[:first]:
+            ahead = with_stage(ahead, stage, 0.0)
+        again = dataclasses.replace(again, report=after(again.report, ahead))
+    if not identical(again, skeleton):
+        then, now = skeleton.report.versions, again.report.versions
+        others = [f"{name} {then.get(name)} instead of {now[name]}" for name in now if then.get(name) != now[name]]
+        warnings.warn(
+            f"the rerun differs from the result: that was made with {', '.join(others) or 'the same releases'}",
+            SkeletonWarning,
+            stacklevel=outside(),
+        )
+    return again

@@ -1,0 +1,222 @@
+"""Fit the skeleton to the axis of the surface around it."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import bsr_array, csc_array
+
+from ..numerics.groups import group_median, group_sum
+from ..numerics.radii import plane_distance_radii, robust_radii
+from ..numerics.solver import factorised
+from ..numerics.vectors import dot, norm
+
+BENDING = 2.0  # weight of a vertex's distance from the chord of its neighbours, per point
+BLUR = 0.3  # how much more of that where there is doubt, over the squared ratio of noise to spacing
+WIDEST = 100.0  # that ratio at most: vertices in one place have none
+STAY = 0.1  # weight of staying where it was, per point
+OUTLYING = 0.5  # distance from the axis, in radii, at which a point's normal counts half
+CENTROID = 0.5  # weight of the points themselves where their normals say nothing
+SUPPORT = 8  # points that support a vertex half
+TIE = 1e-9
+TINY = np.finfo(float).tiny
+ROWS, COLUMNS = np.triu_indices(3)
+ENTRIES = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # the upper triangle of a symmetric matrix, spread out
+
+
+def fit_axis(skeleton, passes):
+    r"""Vertices moved to the axis of the surface, how well the points around say where that is, and how far it is.
+
+    The plane through a point p of a tube, spanned by its normal n and the tangent t of the axis, contains the axis:
+    b (x(p) - p) = 0 with b = n x t and x(p) the place of the curve nearest to p. Each pass minimises, over all vertices
+    at once,
+
+    .. math:: \sum_p w (b \cdot (x(p) - p))^2 + \mu d |(x(p) - p)_\perp|^2
+        + \sum_v c (\lambda |x_v - chord|^2 + \epsilon |x_v - old|^2 + ((x_v - old) \cdot t)^2)
+
+    with c the number of points at a vertex. w = 1 / (1 + (r / OUTLYING)^2), where r is the distance of the curve from
+    that plane in local radii, is small for points of something else. The doubt d, from 0 to 1, is the share of the
+    distance from the curve that the normals do not explain; where it is large, noise is as wide as the part and the
+    points say more than their normals, and the curve may not bend within less than the points' spread s around it:
+    :math:`\lambda = 2 (1 + 0.3 (d s^2 / h^2)^2)` with the spacing h of the vertices, so that the length over which the
+    curve is smoothed grows with s and not with h. A half tube, scanned from one side, has an axis, but the centroid of
+    its points is off it. So the first pass takes the normals alone, w = 1 and d = 0: it finds the axis from wherever
+    the contraction left the curve.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    passes : int
+
+    Returns
+    -------
+    vertices : (M, 3) float array
+    confidence : (M,) float array
+        (1 - d) c / (c + SUPPORT) with c over the vertex and its neighbours: near 1 on the axis of a tube, near 0 where
+        the normals have no axis in common or points are few.
+    radii : (M,) float array
+        See `robust_radii`; without passes, `plane_distance_radii`.
+    """
+    m, ends = len(skeleton.vertices), skeleton.edges
+    owned = skeleton.witnesses
+    owned = owned[skeleton.degree[skeleton.vertex_of_point[owned]] > 0]
+    if len(owned) == 0:
+        return skeleton.vertices, np.zeros(m), _plane_radii(skeleton, skeleton.vertices)
+    centre = skeleton.vertices.mean(axis=0)
+    x, p, n = skeleton.vertices - centre, skeleton.points[owned] - centre, skeleton.normals.take(owned, axis=0)
+    edges_at = incident_edges(ends, m)
+    around = edges_at[skeleton.vertex_of_point[owned]]
+    inner = np.flatnonzero(skeleton.degree == 2)
+    beside = ends[edges_at[inner, :2]].sum(axis=2) - inner[:, None]  # the other end of either edge
+    pattern = _Pattern(m, ends, inner, beside)
+    far = np.sqrt(dot(p, p).max())
+    for step in range(passes):
+        near = _nearest(x, ends, around, p, n)
+        weight, pull = np.ones(len(p)), np.zeros(len(p))
+        if step:
+            radius = group_median(norm(near.offset), near.edge, len(ends))[near.edge]
+            weight = 1 / (1 + near.miss / np.maximum((OUTLYING * radius) ** 2, TINY))
+            pull = CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1)
+        x = _solve(x, ends, near, p, weight, pull, inner, beside, pattern, BLUR if step else 0)
+        size = norm(x)
+        run = np.where((size > far) & (skeleton.degree > 0), far / np.maximum(size, TINY), 1)
+        x = run[:, None] * x  # normals that mean nothing may meet anywhere
+    near = _nearest(x, ends, around, p, n)
+    radii = _plane_radii(skeleton, x + centre)
+    if passes:  # the distance from a curve that nobody has centred is no radius
+        distance = norm(near.offset)
+        radii = robust_radii(radii, distance, near.doubt, n, skeleton.vertex_of_point[owned])
+    return x + centre, (1 - near.doubt) * near.support / (near.support + SUPPORT), radii
+
+
+def _plane_radii(skeleton, vertices):
+    return plane_distance_radii(vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals, skeleton.radii)
+
+
+def incident_edges(edges, m):
+    """Edges at every vertex, (m, most) int array, filled up with -1."""
+    vertex, edge = edges.ravel(), np.repeat(np.arange(len(edges)), 2)
+    order = np.argsort(vertex, kind="stable")
+    vertex, edge = vertex[order], edge[order]
+    degree = np.bincount(vertex, minlength=m)
+    table = np.full((m, max(degree.max(initial=0), 2)), -1)
+    table[vertex, np.arange(len(vertex)) - np.repeat(np.cumsum(degree) - degree, degree)] = edge
+    return table
+
+
+def nearest_on_edges(x, edges, candidates, p):
+    """The place nearest to each point among some edges.
+
+    Parameters
+    ----------
+    x : (m, 3) float array
+    edges : (e, 2) int array
+    candidates : (n, c) int array
+        Edges to look at for each point, -1 for none; at least one.
+    p : (n, 3) float array
+
+    Returns
+    -------
+    edge : (n,) int array
+    t : (n,) float array
+        From 0 at the first end of the edge to 1 at the second.
+    """
+    starts, ways = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
+    lengths = np.maximum(dot(ways, ways), TINY)  # squared
+    edge, t, best = np.zeros(len(p), int), np.zeros(len(p)), np.full(len(p), np.inf)
+    for column in candidates.T:
+        some = np.flatnonzero(column >= 0)
+        column = column[some]
+        along, offset = ways.take(column, axis=0), p.take(some, axis=0) - starts.take(column, axis=0)
+        part = np.clip(dot(along, offset) / lengths.take(column), 0, 1)
+        offset -= part[:, None] * along
+        squared = dot(offset, offset)
+        nearer = squared < (1 - TIE) * best[some]  # a vertex belongs to all its edges: rounding must not choose
+        some = some[nearer]
+        edge[some], t[some], best[some] = column[nearer], part[nearer], squared[nearer]
+    return edge, t
+
+
+class _Nearest(NamedTuple):
+    """What the points are to the place of the curve nearest to them."""
+
+    edge: np.ndarray
+    share: np.ndarray  # of the edge's two ends in that place
+    tangent: np.ndarray  # of every edge
+    across: np.ndarray  # b
+    offset: np.ndarray  # x(p) - p
+    miss: np.ndarray  # (b (x(p) - p))^2
+    doubt: np.ndarray  # d, of every vertex
+    apart: np.ndarray  # mean squared distance of the points around every vertex
+    support: np.ndarray  # points at every vertex and its neighbours
+
+
+def _nearest(x, ends, around, p, n):
+    edge, t = nearest_on_edges(x, ends, around, p)
+    share = np.column_stack([1 - t, t])
+    start, way = x[ends[:, 0]], x[ends[:, 1]] - x[ends[:, 0]]
+    tangent = way / np.maximum(norm(way)[:, None], TINY)
+    along = tangent.take(edge, axis=0)
+    across = np.cross(n, along)
+    offset = start.take(edge, axis=0) + t[:, None] * way.take(edge, axis=0) - p
+    miss = dot(across, offset) ** 2
+    apart = dot(offset, offset) - dot(offset, along) ** 2
+    a, b = ends.T
+    at = group_sum(np.column_stack([miss, apart, np.full(len(p), 0.5)]), edge, len(ends))
+    at = group_sum(np.concatenate([at, at]), np.concatenate([a, b]), len(x))
+    miss_at, apart_at, support = (at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))).T
+    # normals that point anywhere explain half of the distance; without points there is nothing but doubt
+    doubt = np.where(apart_at > 0, np.clip(2 * miss_at / np.maximum(apart_at, TINY), 0, 1), 1)
+    return _Nearest(edge, share, tangent, across, offset, miss, doubt, apart_at / np.maximum(support, TINY), support)
+
+
+def _solve(x, ends, near, p, weight, pull, inner, beside, pattern, blur):
+    """The minimum of the energy in `fit_axis`: one sparse, symmetric, positive definite system."""
+    m, e = len(x), len(ends)
+    along = near.tangent[:, :, None] * near.tangent[:, None]
+    upright = np.eye(3) - along
+    # Of every point w b b^T by its six different entries, and the pull, once for each pair of ends of its edge; and
+    # what they say of its place, and that it is there, once for each end.
+    weighted = weight[:, None] * near.across
+    matrix = np.column_stack([weighted[:, ROWS] * near.across[:, COLUMNS], pull])
+    target = dot(near.across, p)[:, None] * weighted
+    target = np.column_stack([target, pull[:, None] * p, np.ones(len(p))])
+    share, pairs = near.share, near.share[:, [0, 0, 1]] * near.share[:, [0, 1, 1]]
+    at_pairs = group_sum(matrix, near.edge[:, None] + e * np.arange(3), 3 * e, pairs)
+    at_ends = group_sum(target, near.edge[:, None] + e * np.arange(2), 2 * e, share)
+    at_edges = at_pairs[:, ENTRIES].reshape(3, e, 3, 3) + at_pairs[:, 6].reshape(3, e, 1, 1) * upright
+    wanted = at_ends[:, :3] + np.einsum("eij,ej->ei", np.tile(upright, (2, 1, 1)), at_ends[:, 3:6])
+    facts = np.column_stack([wanted, at_ends[:, 6], np.tile(along.reshape(e, 9), (2, 1))])
+    facts = group_sum(facts, ends.T.ravel(), m)
+    right, count = facts[:, :3], facts[:, 3]
+    along = facts[:, 4:].reshape(m, 3, 3) / np.maximum(np.bincount(ends.ravel(), minlength=m), 1)[:, None, None]
+    stay = (STAY * count + 1e-3 * max(count.mean(), 1))[:, None, None] * np.eye(3) + count[:, None, None] * along
+    right = right + np.einsum("nij,nj->ni", stay, x)
+
+    reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
+    chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
+    stencil = np.column_stack([np.ones(len(inner)), -chord])
+    width = np.minimum((near.doubt * near.apart)[inner] / np.maximum(reach.prod(axis=1), TINY), WIDEST)
+    bend = BENDING * (1 + blur * width**2) * np.maximum(count[inner], 1)
+    bend = bend[:, None, None] * stencil[:, :, None] * stencil[:, None]  # the same for all three coordinates
+    blocks = np.concatenate(
+        [at_edges[0], at_edges[1], at_edges[1], at_edges[2], stay, bend.reshape(-1, 1, 1) * np.eye(3)]
+    )
+    return factorised(pattern.matrix(blocks)).solve(right.ravel()).reshape(m, 3)
+
+
+class _Pattern:
+    """Where the blocks of `_solve` stand in its system: for both ends of edges, vertices, and these with two beside."""
+
+    def __init__(self, m, ends, inner, beside):
+        (a, b), every, stencil = ends.T, np.arange(m), np.column_stack([inner, beside])
+        rows = np.concatenate([a, a, b, b, every, np.repeat(stencil, 3, axis=1).ravel()])
+        columns = np.concatenate([a, b, a, b, every, np.tile(stencil, 3).ravel()])
+        places, self._place = np.unique(rows * m + columns, return_inverse=True)
+        self._columns = places % m
+        self._starts = np.searchsorted(places, m * np.arange(m + 1))
+
+    def matrix(self, blocks):
+        """The symmetric matrix that has the sum of the blocks, (b, 3, 3), in every place."""
+        summed = group_sum(blocks, self._place, len(self._columns))
+        rows = bsr_array((summed, self._columns, self._starts)).tocsr()
+        return csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)

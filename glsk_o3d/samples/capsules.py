@@ -1,0 +1,118 @@
+"""Unions of tapered capsules, the convex hulls of two balls: distances to them, points on them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InvalidParameterError
+from .sample import Sample, check, collect, directions, noisy, perpendicular
+
+
+def signed_distance(points: np.ndarray, nodes: np.ndarray, edges: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Signed distance to a union of tapered capsules: exact outside and on the surface, a bound inside.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    nodes : (M, 3) array
+    edges : (E, 2) int array
+        A node without an edge is a ball.
+    radii : (M,) array
+
+    Returns
+    -------
+    (n,) float64 array
+        Negative inside.
+    """
+    points = np.asarray(points, float)
+    best = np.full(len(points), np.inf)
+    for node in np.setdiff1d(np.arange(len(nodes)), edges):
+        best = np.minimum(best, np.linalg.norm(points - nodes[node], axis=1) - radii[node])
+    for i, j in edges:
+        a, span, length = nodes[i], nodes[j] - nodes[i], np.linalg.norm(nodes[j] - nodes[i])
+        slope = (radii[i] - radii[j]) / length
+        if abs(slope) >= 1:  # one ball holds the other
+            big = i if slope > 0 else j
+            best = np.minimum(best, np.linalg.norm(points - nodes[big], axis=1) - radii[big])
+            continue
+        offset = points - a
+        along = offset @ span / length
+        across = np.sqrt(np.maximum((offset**2).sum(axis=1) - along**2, 0))
+        # the sphere that touches the surface nearest to the point has its centre `foot` along the axis
+        foot = np.clip(along - across * slope / np.sqrt(1 - slope**2), 0, length)
+        distance = np.hypot(along - foot, across) - (radii[i] - slope * foot)
+        best = np.minimum(best, distance)
+    return best
+
+
+def union_sample(name, nodes, edges, radii, n, noise, seed, cameras=None) -> Sample:
+    """n points, uniform by area, on the outer surface of the union, as far as one of the cameras sees it."""
+    check(n, noise)
+    rng = np.random.default_rng(seed)
+    a, b = nodes[edges[:, 0]], nodes[edges[:, 1]]
+    ra, rb = radii[edges[:, 0]], radii[edges[:, 1]]
+    length = np.linalg.norm(b - a, axis=1)
+    slope = (ra - rb) / length
+    if (np.abs(slope) >= 1).any():
+        raise InvalidParameterError(f"{name}: a part is wider than it is long, so that one end swallows the other")
+    if cameras is not None:
+        cameras = np.asarray(cameras, float).reshape(-1, 3)
+        if len(cameras) == 0 or not (signed_distance(cameras, nodes, edges, radii) > 0).all():
+            raise InvalidParameterError(f"{name}: there must be a camera, and none inside the object")
+    axis = (b - a) / length[:, None]
+    lean = np.sqrt(1 - slope**2)  # the cone touches its end balls where the normal has `slope` along the axis
+    areas = np.concatenate([4 * np.pi * radii**2, np.pi * lean**2 * (ra + rb) * length])
+
+    def draw(m):
+        piece = rng.choice(len(areas), m, p=areas / areas.sum())
+        points = np.empty((m, 3))
+        on_ball = piece < len(nodes)
+        ball = piece[on_ball]
+        points[on_ball] = nodes[ball] + radii[ball, None] * directions(len(ball), rng)
+        cone = piece[~on_ball] - len(nodes)
+        big, small = np.maximum(ra, rb)[cone], np.minimum(ra, rb)[cone]
+        u = rng.random(len(cone))
+        radius = np.sqrt(big**2 + u * (small**2 - big**2))  # by area: density proportional to the radius
+        flat = np.abs(big - small) < 1e-12 * big
+        share = np.where(flat, u, (ra[cone] - radius) / np.where(flat, 1, (ra - rb)[cone]))
+        out = perpendicular(axis[cone], rng) * lean[cone, None] + axis[cone] * slope[cone, None]
+        points[~on_ball] = a[cone] + (b - a)[cone] * share[:, None] + radius[:, None] * out
+        points = points[signed_distance(points, nodes, edges, radii) > -1e-9]
+        if cameras is not None:
+            seen = [_visible(points, camera, nodes, edges, radii) for camera in cameras]
+            points = points[np.any(seen, axis=0)]
+        return points
+
+    return Sample(noisy(collect(draw, n), noise, rng), nodes, edges, radii, name)
+
+
+def _visible(points, camera, nodes, edges, radii) -> np.ndarray:
+    """Which points on the surface the camera, which is outside, sees: its ray meets nothing before them.
+
+    Each tapered capsule is two balls and a cone between them; a ray meets all three in closed form.
+    """
+    ray = points - camera
+    reach = np.linalg.norm(ray, axis=1)
+    ray /= reach[:, None]
+    to_node = camera - nodes
+    first = np.full(len(points), np.inf)
+    for offset, radius in zip(to_node, radii, strict=True):
+        near = ray @ offset
+        root = near**2 - offset @ offset + radius**2
+        first = np.where(root >= 0, np.minimum(first, -near - np.sqrt(np.maximum(root, 0))), first)
+    for i, j in edges:
+        # |o + t d - foot| = radius(foot), foot as in signed_distance: a quadratic k2 t^2 + 2 k1 t + k0 = 0
+        span, drop = nodes[j] - nodes[i], radii[i] - radii[j]
+        size = span @ span
+        along_o, along_d, near = to_node[i] @ span, ray @ span, ray @ to_node[i]
+        k2 = size - drop**2 - along_d**2
+        k1 = (size - drop**2) * near - along_o * along_d + along_d * drop * radii[i]
+        k0 = (size - drop**2) * (to_node[i] @ to_node[i]) - along_o**2 + 2 * along_o * drop * radii[i]
+        k0 -= size * radii[i] ** 2
+        root = np.sqrt(np.maximum(k1**2 - k0 * k2, 0))
+        safe = np.where(np.abs(k2) < 1e-12, 1, k2)
+        for t in ((-k1 - root) / safe, (-k1 + root) / safe):
+            y = along_o + t * along_d - drop * radii[i]
+            hit = (k1**2 >= k0 * k2) & (safe == k2) & (y > 0) & (y < size - drop**2) & (t > 0)
+            first = np.where(hit, np.minimum(first, t), first)
+    return first > reach - 1e-6

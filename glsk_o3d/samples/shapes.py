@@ -1,0 +1,353 @@
+"""Samples of simple shapes, and samples by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import InvalidParameterError
+from .capsules import union_sample
+from .sample import Sample, chain, check, collect, directions, noisy
+from .sauropod import sauropod
+
+
+def sample_object(n: int = 8192, noise: float = 0.002, seed: int = 0, name: str = "sauropod") -> Sample:
+    """The object of ``glsk demo``, or any other sample by its name.
+
+    Parameters
+    ----------
+    n : int
+        Number of points.
+    noise : float
+        Standard deviation of the Gaussian noise on every coordinate, as a share of the bounding-box diagonal.
+    seed : int
+    name : str
+        One of `SAMPLES`.
+
+    Returns
+    -------
+    Sample
+
+    Examples
+    --------
+    >>> sample_object(500)
+    Sample('sauropod', 500 points, 54 nodes, 54 edges)
+    """
+    if name not in SAMPLES:
+        raise InvalidParameterError(f"no sample is called {name!r}; there are {', '.join(SAMPLES)}")
+    return SAMPLES[name](n=n, noise=noise, seed=seed)
+
+
+def tube(
+    n: int = 4096, *, length: float = 1.0, radius: float = 0.1, capped: bool = True, noise: float = 0.0, seed: int = 0
+) -> Sample:
+    """A straight tube along x, centred on the origin.
+
+    Parameters
+    ----------
+    n : int
+        Number of points.
+    length : float
+        Length of the axis; half balls at the ends come on top.
+    radius : float
+    capped : bool
+        Whether the ends are closed by half balls.
+    noise : float
+        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
+    seed : int
+
+    Returns
+    -------
+    Sample
+
+    Examples
+    --------
+    >>> tube(500)
+    Sample('tube', 500 points, 2 nodes, 1 edges)
+    """
+    check(n, noise, length=length, radius=radius)
+    nodes, edges, radii = chain(np.array([[-length / 2, 0, 0], [length / 2, 0, 0]]), radius)
+    if capped:
+        return union_sample("tube", nodes, edges, radii, n, noise, seed)
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(0, 2 * np.pi, n)
+    points = np.stack([rng.uniform(-length / 2, length / 2, n), radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    return Sample(noisy(points, noise, rng), nodes, edges, radii, "tube")
+
+
+def torus(n: int = 4096, *, ring_radius: float = 0.4, radius: float = 0.1, noise: float = 0.0, seed: int = 0) -> Sample:
+    """A torus around z.
+
+    Parameters
+    ----------
+    n : int
+        Number of points.
+    ring_radius : float
+        Radius of the axis, a circle.
+    radius : float
+        Radius of the tube, smaller than `ring_radius`.
+    noise : float
+        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
+    seed : int
+
+    Returns
+    -------
+    Sample
+
+    Examples
+    --------
+    >>> torus(500)
+    Sample('torus', 500 points, 128 nodes, 128 edges)
+    """
+    check(n, noise, ring_radius=ring_radius, radius=radius)
+    if radius >= ring_radius:
+        raise InvalidParameterError(f"radius = {radius}: must be below ring_radius = {ring_radius}")
+    rng = np.random.default_rng(seed)
+    points = _torus_points(n, ring_radius, radius, rng)
+    nodes, edges, radii = _circle(ring_radius, radius)
+    return Sample(noisy(points, noise, rng), nodes, edges, radii, "torus")
+
+
+def helix(
+    n: int = 4096,
+    *,
+    coil_radius: float = 0.3,
+    radius: float = 0.06,
+    pitch: float = 0.35,
+    turns: float = 2.0,
+    noise: float = 0.0,
+    seed: int = 0,
+) -> Sample:
+    """A coil spring around z, its ends closed by half balls.
+
+    Parameters
+    ----------
+    n : int
+        Number of points.
+    coil_radius : float
+        Radius of the axis, a helix.
+    radius : float
+        Radius of the wire; the turns must not touch and the wire must not fold.
+    pitch : float
+        Rise per turn.
+    turns : float
+    noise : float
+        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
+    seed : int
+
+    Returns
+    -------
+    Sample
+
+    Examples
+    --------
+    >>> helix(500)
+    Sample('helix', 500 points, 193 nodes, 192 edges)
+    """
+    check(n, noise, coil_radius=coil_radius, radius=radius, pitch=pitch, turns=turns)
+    climb = pitch / (2 * np.pi)
+    speed = np.hypot(coil_radius, climb)
+    curvature = coil_radius / speed**2
+    if radius * curvature >= 1 or 2 * radius * speed >= pitch * coil_radius:
+        raise InvalidParameterError(f"radius = {radius}: the turns of the helix touch, or its wire folds")
+    rng = np.random.default_rng(seed)
+    end = 2 * np.pi * turns
+    wire, cap = speed * end * 2 * np.pi * radius, 2 * np.pi * radius**2
+
+    def frame(t):
+        centre = np.stack([coil_radius * np.cos(t), coil_radius * np.sin(t), climb * (t - end / 2)], axis=-1)
+        inward = np.stack([-np.cos(t), -np.sin(t), np.zeros_like(t)], axis=-1)
+        tangent = np.stack([-coil_radius * np.sin(t), coil_radius * np.cos(t), np.full_like(t, climb)], axis=-1) / speed
+        return centre, inward, tangent, np.cross(tangent, inward)
+
+    def draw(m):
+        which = rng.choice(3, m, p=np.array([wire, cap, cap]) / (wire + 2 * cap))
+        t, angle = rng.uniform(0, end, m), rng.uniform(0, 2 * np.pi, m)
+        centre, inward, _, across = frame(t)
+        points = centre + radius * (np.cos(angle)[:, None] * inward + np.sin(angle)[:, None] * across)
+        for piece, (at, sign) in enumerate(((0.0, -1), (end, 1)), start=1):
+            rows = np.flatnonzero(which == piece)
+            centre, _, tangent, _ = frame(np.array(at))
+            out = directions(len(rows), rng)
+            out *= np.where(sign * (out @ tangent) < 0, -1, 1)[:, None]
+            points[rows] = centre + radius * out
+        density = np.where(which == 0, 1 - radius * curvature * np.cos(angle), 1)  # area element of a bent tube
+        return points[rng.uniform(0, 1 + radius * curvature, m) < density]
+
+    points = collect(draw, n)
+    nodes, edges, radii = chain(frame(np.linspace(0, end, max(2, int(96 * turns) + 1)))[0], radius)
+    return Sample(noisy(points, noise, rng), nodes, edges, radii, "helix")
+
+
+def y_junction(
+    n: int = 4096,
+    *,
+    length: float = 0.5,
+    radii: tuple[float, float, float] = (0.09, 0.07, 0.07),
+    angle: float = 80.0,
+    noise: float = 0.0,
+    seed: int = 0,
+) -> Sample:
+    """Three straight tubes that meet in the origin: a stem downwards and two arms.
+
+    Parameters
+    ----------
+    n : int
+        Number of points.
+    length : float
+        Length of each axis.
+    radii : tuple of three floats
+        At the ends of the stem and of the two arms; all have the stem's radius in the middle.
+    angle : float
+        Between the arms, in degrees.
+    noise : float
+        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
+    seed : int
+
+    Returns
+    -------
+    Sample
+
+    Examples
+    --------
+    >>> y_junction(500)
+    Sample('y_junction', 500 points, 4 nodes, 3 edges)
+    """
+    half = np.deg2rad(angle) / 2
+    check(n, noise, length=length, angle=angle, stem=radii[0], left=radii[1], right=radii[2])
+    ends = length * np.array([[0, 0, -1], [-np.sin(half), 0, np.cos(half)], [np.sin(half), 0, np.cos(half)]])
+    nodes = np.concatenate([np.zeros((1, 3)), ends])
+    edges = np.array([[0, 1], [0, 2], [0, 3]])
+    return union_sample("y_junction", nodes, edges, np.array([radii[0], *radii], float), n, noise, seed)
+
+
+def two_rings(
+    n: int = 4096, *, ring_radius: float = 0.3, radius: float = 0.06, noise: float = 0.0, seed: int = 0
+) -> Sample:
+    """Two links of a chain, which do not touch: two components, two loops.
+
+    Parameters
+    ----------
+    n : int
+        Number of points.
+    ring_radius : float
+        Radius of each axis; the second circle goes through the middle of the first.
+    radius : float
+        Radius of the tubes, below half of `ring_radius`.
+    noise : float
+        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
+    seed : int
+
+    Returns
+    -------
+    Sample
+
+    Examples
+    --------
+    >>> two_rings(500)
+    Sample('two_rings', 500 points, 256 nodes, 256 edges)
+    """
+    check(n, noise, ring_radius=ring_radius, radius=radius)
+    if 2 * radius >= ring_radius:
+        raise InvalidParameterError(f"radius = {radius}: must be below half of ring_radius = {ring_radius}")
+    rng = np.random.default_rng(seed)
+    points = _torus_points(n, ring_radius, radius, rng)
+    nodes, edges, radii = _circle(ring_radius, radius)
+
+    def second(x):  # turned about x, and moved by one ring radius
+        return np.stack([x[:, 0] + ring_radius, -x[:, 2], x[:, 1]], axis=1)
+
+    points = np.where(rng.random(n)[:, None] < 0.5, points, second(points))
+    nodes, edges = np.concatenate([nodes, second(nodes)]), np.concatenate([edges, edges + len(nodes)])
+    return Sample(noisy(points, noise, rng), nodes, edges, np.concatenate([radii, radii]), "two_rings")
+
+
+def sphere(n: int = 4096, *, radius: float = 0.5, noise: float = 0.0, seed: int = 0) -> Sample:
+    """A sphere about the origin. Its axis is one node; a curve skeleton of it means nothing.
+
+    Parameters
+    ----------
+    n : int
+        Number of points.
+    radius : float
+    noise : float
+        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
+    seed : int
+
+    Returns
+    -------
+    Sample
+
+    Examples
+    --------
+    >>> sphere(500)
+    Sample('sphere', 500 points, 1 nodes, 0 edges)
+    """
+    check(n, noise, radius=radius)
+    rng = np.random.default_rng(seed)
+    points = radius * directions(n, rng)
+    nodes, edges, radii = np.zeros((1, 3)), np.zeros((0, 2), np.int64), np.array([float(radius)])
+    return Sample(noisy(points, noise, rng), nodes, edges, radii, "sphere")
+
+
+def sheet(
+    n: int = 4096, *, length: float = 1.0, width: float = 0.7, bend: float = 60.0, noise: float = 0.0, seed: int = 0
+) -> Sample:
+    """A sheet of paper, rolled along x. It has no axis; a curve skeleton of it means nothing.
+
+    Parameters
+    ----------
+    n : int
+        Number of points.
+    length, width : float
+    bend : float
+        Angle between the two ends in degrees, below 360; 0 leaves the sheet flat.
+    noise : float
+        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
+    seed : int
+
+    Returns
+    -------
+    Sample
+
+    Examples
+    --------
+    >>> sheet(500)
+    Sample('sheet', 500 points, 0 nodes, 0 edges)
+    """
+    check(n, noise, length=length, width=width)
+    if not 0 <= bend < 360:
+        raise InvalidParameterError(f"bend = {bend}: must be at least 0 and below 360 degrees")
+    rng = np.random.default_rng(seed)
+    along, across = rng.uniform(-length / 2, length / 2, n), rng.uniform(-width / 2, width / 2, n)
+    if bend == 0:
+        points = np.stack([along, across, np.zeros(n)], axis=1)
+    else:
+        curvature = np.deg2rad(bend) / length
+        turn = curvature * along
+        points = np.stack([np.sin(turn) / curvature, across, (np.cos(turn) - 1) / curvature], axis=1)
+    return Sample(noisy(points, noise, rng), np.zeros((0, 3)), np.zeros((0, 2), np.int64), np.zeros(0), "sheet")
+
+
+SAMPLES: dict[str, Callable[..., Sample]] = {
+    shape.__name__: shape for shape in (sauropod, tube, torus, helix, y_junction, two_rings, sphere, sheet)
+}
+"""Every sample by its name; each takes at least ``n``, ``noise`` and ``seed``."""
+
+
+def _circle(ring_radius: float, radius: float, pieces: int = 128) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    angle = np.arange(pieces) * 2 * np.pi / pieces
+    nodes = ring_radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    start = np.arange(pieces)
+    return nodes, np.stack([start, (start + 1) % pieces], axis=1), np.full(pieces, float(radius))
+
+
+def _torus_points(n: int, ring_radius: float, radius: float, rng) -> np.ndarray:
+    def draw(m):
+        around, tube_angle = rng.uniform(0, 2 * np.pi, (2, m))
+        out = ring_radius + radius * np.cos(tube_angle)
+        points = np.stack([out * np.cos(around), out * np.sin(around), radius * np.sin(tube_angle)], axis=1)
+        return points[rng.uniform(0, ring_radius + radius, m) < out]
+
+    return collect(draw, n)

@@ -1,0 +1,232 @@
+"""The parts of the page below the view: numbers, charts and tables, as HTML in which every text is escaped."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..io.colors import shades
+
+if TYPE_CHECKING:
+    from ..report import IterationRecord, Report
+    from ..skeleton import Skeleton
+
+MOST_BRANCHES = 12  # rows of the table
+_COLUMNS = (  # heading, field of the record, format, whether there is no room for it on a narrow screen
+    ("solve", "iteration", "d", False),
+    ("points", "n_points", ",d", False),
+    ("merged", "n_merged", ",d", False),
+    ("held", "n_held", ",d", True),
+    ("e", "explained", ".4f", True),
+    ("De", "explained_change", ".4f", False),
+    ("ring ratio", "ring_ratio", ".4f", False),
+    ("w<sub>L</sub>", "contraction_weight", ".4g", True),
+    ("solver error", "solve_error", ".1e", True),
+    ("seconds", "seconds", ".3f", True),
+)
+_CHARTS = (
+    ("Points solved for, <i>n</i>", "n_points", ",.10g"),
+    ("Change of the explained score, <i>De</i>", "explained_change", ".3g"),
+    ("Ring ratio, <i>a</i>", "ring_ratio", ".3g"),
+)
+_WIDTH, _HEIGHT, _LEFT, _TOP, _BOTTOM = 320, 150, 46, 12, 22  # of a chart and of what surrounds its curve
+
+
+def figures(skeleton: Skeleton) -> str:
+    """The run in a few numbers."""
+    told = {"Points": f"{len(skeleton.points):,}"} if len(skeleton.points) else {}
+    if len(skeleton.vertices):
+        told |= {
+            "Vertices": f"{len(skeleton.vertices):,}",
+            "Branches": f"{len(skeleton.branches):,}",
+            "Components": f"{skeleton.n_components:,}",
+            "Loops": f"{skeleton.n_loops:,}",
+            "Leaves": f"{len(skeleton.leaves):,}",
+            "Length": _number(skeleton.length),
+        }
+    if skeleton.report.seconds:
+        told["Seconds"] = f"{sum(skeleton.report.seconds.values()):.2f}"
+    return "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in told.items())
+
+
+def warnings(messages: Iterable[str]) -> str:
+    """The warnings, each once."""
+    rows = "".join(f"<li>{escape(text)}</li>" for text in dict.fromkeys(messages))
+    return f'<div class="warnings" role="note"><strong>Warnings</strong><ul>{rows}</ul></div>' if rows else ""
+
+
+def contraction(report: Report) -> str:
+    """Why the contraction stopped, and how it went: charts and a table."""
+    records = report.iterations
+    if not report.stages and not records:
+        return ""
+    end = escape(f"{'Converged' if report.converged else 'Not converged'}: {report.stop_reason}.")
+    told = f"<h2>Contraction</h2><p>{end}</p>"
+    if not records:
+        return told
+    heads = "".join(f"<th{_extra(hidden)}>{head}</th>" for head, _, _, hidden in _COLUMNS)
+    rows = ""
+    for record in records:
+        cells = (f"<td{_extra(hidden)}>{getattr(record, name):{form}}</td>" for _, name, form, hidden in _COLUMNS)
+        rows += f'<tr data-solve="{record.iteration:d}">{"".join(cells)}</tr>'
+    marks = {"explained_change": _threshold(report.recipe)}
+    charts = "".join(_chart(caption, records, name, form, marks.get(name)) for caption, name, form in _CHARTS)
+    return f'{told}<div class="charts">{charts}</div><h2>Solve by solve</h2>{_table(heads, rows)}'
+
+
+def _threshold(recipe) -> float | None:
+    """The De below which the contraction stops, if that is its rule."""
+    for stage in recipe.get("pipeline", ()):
+        rule = stage.get("stop") if isinstance(stage, dict) else None
+        if isinstance(rule, dict) and rule.get("rule") == "ExplainedScore":
+            value = rule.get("threshold")
+            return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+    return None
+
+
+def branches(skeleton: Skeleton) -> str:
+    """The longest branches, in the colours that they have in the view; numbered as in `Skeleton.branch_table`."""
+    if len(skeleton.edges) == 0:
+        return ""
+    table = sorted(skeleton.branch_table(), key=lambda row: -row["length"])
+    table = [row for row in table if row["kind"] != "isolated"]
+    colors = branch_colors(skeleton, len(skeleton.branches))
+    columns = (("length", "#.4g", False), ("mean_radius", "#.4g", False))
+    columns = (*columns, ("tortuosity", ".2f", True), ("confidence", ".2f", True))
+    heads = "<th>branch</th><th>kind</th>"
+    heads += "".join(f"<th{_extra(hidden)}>{name.replace('_', ' ')}</th>" for name, _, hidden in columns)
+    rows = ""
+    for row in table[:MOST_BRANCHES]:
+        swatch = f'<span class="swatch" style="background:{colors[row["branch"]]}"></span>'
+        cells = "".join(f"<td{_extra(hidden)}>{_number(row[name], form)}</td>" for name, form, hidden in columns)
+        rows += f"<tr><td>{swatch}{row['branch']}</td><td>{row['kind']}</td>{cells}<td>{row['points']:,}</td></tr>"
+    rest = len(table) - MOST_BRANCHES
+    more = f'<p class="muted small">and {rest:,} shorter ones</p>' if rest > 0 else ""
+    return f"<h2>Longest branches</h2>{_table(heads + '<th>points</th>', rows, 'branches')}{more}"
+
+
+def branch_colors(skeleton: Skeleton, n: int) -> list[str]:
+    """The colours of the first n branches, the same as in Open3D's windows.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    n : int
+
+    Returns
+    -------
+    list of str
+        As ``"#rrggbb"``.
+    """
+    return hexadecimal(shades(skeleton, "branch", np.arange(n), np.arange(n)))
+
+
+def hexadecimal(colors: np.ndarray) -> list[str]:
+    """Colours as ``"#rrggbb"``.
+
+    Parameters
+    ----------
+    colors : (n, 3) or (n, 4) float array
+        From 0 to 1.
+
+    Returns
+    -------
+    list of str
+    """
+    from matplotlib.colors import to_hex
+
+    return [to_hex(color) for color in colors]
+
+
+def origin(report: Report) -> str:
+    """What it takes to repeat the run: the recipe, the counts and times of the run, the versions."""
+    text = json.dumps(report.recipe, indent=2, ensure_ascii=False) if report.recipe else "\n".join(report.stages)
+    told = f"<details><summary>Recipe</summary><pre>{escape(text)}</pre></details>" if text else ""
+    counts = {
+        "input points": report.n_input,
+        "dropped, not finite": report.n_dropped,
+        "sampled from a large cloud": report.n_sampled,
+        "set aside as outliers": report.n_outliers,
+        "distinct points": report.n_distinct,
+        "contracted points": report.n_contracted,
+        "loops closed": report.n_loops_closed,
+        "loops cut": report.n_loops_cut,
+        "gaps bridged": report.n_bridges,
+    }
+    numbers = {name: f"{n:,}" for name, n in counts.items()} if report.n_input else {}
+    numbers |= {f"{name}, seconds": f"{seconds:.3f}" for name, seconds in report.seconds.items()}
+    return f'{told}<div class="pair">{_facts("The run", numbers, "number")}{_facts("Versions", report.versions)}</div>'
+
+
+def _number(value: float, form: str = "#.4g") -> str:
+    return f"{value:{form}}".rstrip(".") if math.isfinite(value) else "–"
+
+
+def _extra(hidden: bool) -> str:
+    return ' class="extra"' if hidden else ""
+
+
+def _table(heads: str, rows: str, kind: str = "") -> str:
+    return f'<div class="wide {kind}"><table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>'
+
+
+def _facts(heading: str, told: dict[str, str], kind: str = "") -> str:
+    rows = "".join(f'<tr><th>{escape(name)}</th><td class="{kind}">{escape(told[name])}</td></tr>' for name in told)
+    return f'<div><h2>{heading}</h2><table class="facts"><tbody>{rows}</tbody></table></div>' if rows else ""
+
+
+def _chart(
+    caption: str, records: Sequence[IterationRecord], name: str, form: str, threshold: float | None = None
+) -> str:
+    """A number per solve, from zero, as SVG; what is not finite is left out."""
+    solves = [record.iteration for record in records]
+    values = [(record.iteration, float(getattr(record, name))) for record in records]
+    values = [(solve, value) for solve, value in values if math.isfinite(value)]
+    levels = [value for _, value in values] + ([] if threshold is None else [threshold])
+    highest = _round_up(max(levels, default=1.0))
+
+    def x(solve):
+        share = (solve - solves[0]) / max(solves[-1] - solves[0], 1)
+        return f"{_LEFT + 12 + share * (_WIDTH - _LEFT - 24):.1f}"
+
+    def y(value, below=0):
+        return f"{_HEIGHT - _BOTTOM - value / highest * (_HEIGHT - _BOTTOM - _TOP) + below:.1f}"
+
+    grid = "".join(
+        f'<line class="grid" x1="{_LEFT}" x2="{_WIDTH}" y1="{y(value)}" y2="{y(value)}"/>'
+        f'<text x="{_LEFT - 7}" y="{y(value, 4)}" text-anchor="end">{value:{form}}</text>'
+        for value in (0, highest / 2, highest)
+    )
+    if threshold is not None:
+        grid += (
+            f'<line class="threshold" x1="{_LEFT}" x2="{_WIDTH}" y1="{y(threshold)}" y2="{y(threshold)}"/>'
+            f'<text x="{_WIDTH}" y="{y(threshold, -4)}" text-anchor="end">stops below {threshold:g}</text>'
+        )
+    ticks = "".join(
+        f'<text x="{x(solve)}" y="{_HEIGHT - 5}" text-anchor="middle">{solve}</text>'
+        for solve in solves[:: -(-len(solves) // 10)]
+    )
+    cursor = f'<line class="cursor" x1="0" x2="0" y1="{_TOP}" y2="{_HEIGHT - _BOTTOM}"/>'
+    curve = " ".join(f"{x(solve)},{y(value)}" for solve, value in values)
+    dots = "".join(
+        f'<circle data-at="{solve}" cx="{x(solve)}" cy="{y(value)}" r="4">'
+        f"<title>solve {solve}: {value:{form}}</title></circle>"
+        for solve, value in values
+    )
+    return (
+        f'<figure><figcaption>{caption}</figcaption><svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img">'
+        f'{grid}{ticks}{cursor}<polyline class="curve" points="{curve}"/>{dots}</svg></figure>'
+    )
+
+
+def _round_up(value: float) -> float:
+    """The next of 1, 2, 3, 4, 5, 6, 8, 10 times a power of ten: its half is a short number, too."""
+    if not value > 0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(step * power for step in (1, 2, 3, 4, 5, 6, 8, 10) if step * power >= value * (1 - 1e-9))

@@ -1,0 +1,230 @@
+"""libigl's Laplacian in our convention, exact curvatures, and the contraction of meshes."""
+
+from dataclasses import replace
+
+import igl
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from glsk_o3d import Connector, Contractor, LPRReducer, Pipeline, Refiner, RingBuilder, pipelines
+from glsk_o3d.crosscheck.mesh_contraction import (
+    MeshContractor,
+    curvature_normals,
+    mesh_areas,
+    mesh_laplacian,
+    mesh_skeleton,
+    mesh_state,
+    ring_areas,
+)
+from glsk_o3d.crosscheck.reconstruction import ball_pivoting
+from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.numerics.cotangent import WEIGHT_CAP, cotangent_laplacian
+from glsk_o3d.numerics.mesh_rings import common_share, umbrellas
+from glsk_o3d.numerics.rings import Rings
+from glsk_o3d.samples import sphere, torus, tube
+
+
+def convex_rings(points, faces):
+    """One-rings of a convex surface around the origin, in rotational order."""
+    around = [set() for _ in points]
+    for a, b, c in faces.tolist():
+        around[a] |= {b, c}
+        around[b] |= {c, a}
+        around[c] |= {a, b}
+    rows = []
+    for i, names in enumerate(around):
+        names = np.array(sorted(names))
+        axes = np.linalg.svd(points[i][None])[2][1:]
+        x, y = axes @ (points[names] - points[i]).T
+        rows.append(names[np.argsort(np.arctan2(y, x))])
+    return Rings(np.cumsum([0, *map(len, rows)]), np.concatenate(rows), np.ones(len(rows), bool))
+
+
+def cloud_and_mesh(points, **parameters):
+    """The state, and a ball-pivoting mesh, both in the user's units; the exact copies of points that rows mean."""
+    state = RingBuilder(thin_to="all", **parameters)(points)
+    vertices, faces = ball_pivoting(state.cloud, state.normals, state.rings)
+    assert vertices is state.cloud
+    return state, state.frame.out_of(state.cloud), faces
+
+
+# ------------------------------------------------------------------------------------------------- sign and factor
+
+
+def test_our_rows_are_twice_libigls_where_the_rings_are_the_same(even_ball):
+    points, faces = even_ball(700)
+    state = RingBuilder(frame="box")(points)
+    row = state.row_of_point
+    faces, cloud = row[faces], state.frame.out_of(state.cloud)
+    same = common_share(state.rings, faces) == 1
+    assert same.mean() > 0.95  # the others lie on squares, which have two diagonals
+    ours, theirs = cotangent_laplacian(cloud, state.rings), igl.cotmatrix(cloud, faces).tocsr()
+    assert abs(ours - 2 * theirs)[same].max() < 1e-10 * abs(theirs).max()
+    assert abs(ours - mesh_laplacian(cloud, faces))[same].max() < 1e-10 * abs(theirs).max()
+
+
+def test_the_sign(even_ball):
+    points, faces = even_ball(300)
+    laplacian = mesh_laplacian(points, faces)
+    dense = laplacian.toarray()
+    assert np.linalg.eigvalsh(dense).max() < 1e-12  # negative semi-definite
+    assert (dense - np.diag(np.diag(dense)) >= -1e-12).all()  # Delaunay: no weight is negative
+    np.testing.assert_allclose(dense.sum(axis=1), 0, atol=1e-12)
+    assert (np.einsum("ij,ij->i", laplacian @ points, points) < 0).all()  # inward
+
+
+@pytest.mark.parametrize("noise", [0, 0.02])
+def test_it_is_the_gradient_of_the_area(noise):
+    # x . L x = -4 area of any mesh, torn or not manifold
+    _, points, faces = cloud_and_mesh(torus(1500, noise=noise).points, denoise=0)
+    area = igl.doublearea(points, faces).sum() / 2
+    found = (points * (mesh_laplacian(points, faces, cap=1e300) @ points)).sum()
+    assert found == pytest.approx(-4 * area, rel=1e-9)
+
+
+def test_rows_are_capped_as_ours_are():
+    points = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-6, 0], [0, 1, 0.0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    free, capped = mesh_laplacian(points, faces, cap=1e300).toarray(), mesh_laplacian(points, faces).toarray()
+    assert abs(free[2, 2]) > 1e5
+    np.testing.assert_allclose(capped[2], free[2] / abs(free[2, 2]) * WEIGHT_CAP)
+    np.testing.assert_allclose(capped[3], free[3])
+
+
+def test_triangles_without_area_and_bare_vertices_add_nothing():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [5, 5, 5]])
+    with_flat = mesh_laplacian(points, np.array([[0, 1, 3], [0, 1, 2]])).toarray()
+    np.testing.assert_array_equal(with_flat, mesh_laplacian(points, np.array([[0, 1, 3]])).toarray())
+    assert not with_flat[[2, 4]].any()
+    assert np.isnan(curvature_normals(with_flat, mesh_areas(points, np.array([[0, 1, 3]])), points)[4]).all()
+
+
+# ------------------------------------------------------------------------------------------------------- curvature
+
+
+def off(found, exact, chosen):
+    """Relative error, and angle in degrees, of the chosen rows."""
+    found, exact = found[chosen], exact[chosen]
+    size, true = np.linalg.norm(found, axis=1), np.linalg.norm(exact, axis=1)
+    cosine = np.einsum("ij,ij->i", found, exact) / (size * true)
+    return np.abs(size / true - 1), np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+
+
+def test_areas_of_rings_are_those_of_the_mesh(even_ball):
+    points, faces = even_ball(500)
+    np.testing.assert_allclose(ring_areas(points, convex_rings(points, faces)), mesh_areas(points, faces), rtol=1e-12)
+    assert mesh_areas(points, faces).sum() == pytest.approx(igl.doublearea(points, faces).sum() / 2)
+
+
+def test_a_sphere_that_is_sampled_evenly_has_two_over_its_radius(even_ball):
+    # both parts of the error fall as the square of the spacing, a quarter for four times as many points
+    errors = []
+    for n in (500, 2000, 8000):
+        points, faces = even_ball(n)
+        state = RingBuilder(thin_to="all")(points)
+        assert state.rings.closed.all()
+        every, cloud = np.ones(n, bool), state.frame.out_of(state.cloud)
+        ours = curvature_normals(cotangent_laplacian(cloud, state.rings), ring_areas(cloud, state.rings), cloud)
+        mesh = curvature_normals(mesh_laplacian(points, faces), mesh_areas(points, faces), points)
+        length, angle = off(ours, -2 * cloud / 0.25, every)
+        length_of_mesh, _ = off(mesh, -2 * points / 0.25, every)
+        errors.append([np.percentile(values, 90) for values in (length, length_of_mesh, np.radians(angle))])
+    errors = np.array(errors)
+    assert (errors[0] < 0.02).all()
+    assert (errors[1:] < 0.45 * errors[:-1]).all()
+
+
+def test_a_cylinder_that_is_sampled_evenly_has_one_over_its_radius():
+    m, n, radius = 60, 41, 0.1
+    u, v = np.meshgrid(np.arange(m), np.arange(n), indexing="ij")
+    turn = 2 * np.pi * (u + v / 2) / m
+    height = radius * 2 * np.pi / m * np.sqrt(3) / 2
+    points = np.stack([radius * np.cos(turn), radius * np.sin(turn), height * v], -1).reshape(-1, 3)
+    state = RingBuilder(thin_to="all", denoise=0, outlier_factor=0)(points)
+    cloud = state.frame.out_of(state.cloud)
+    found = curvature_normals(cotangent_laplacian(cloud, state.rings), ring_areas(cloud, state.rings), cloud)
+    exact = -cloud * [1, 1, 0] / radius**2
+    inside = (cloud[:, 2] > 2 * height) & (cloud[:, 2] < (n - 3) * height)
+    length, angle = off(found, exact, inside)
+    assert length.max() < 1e-3
+    assert angle.max() < 1e-3
+
+
+@pytest.mark.parametrize(("shape", "radius"), [(sphere, 0.5), (tube, 0.1)])
+def test_on_random_samples_directions_converge_and_lengths_do_not(shape, radius):
+    # Both ours and libigl's: the pointwise cotangent Laplacian is consistent in the mean alone.
+    angles, lengths = [], []
+    for n in (1000, 4000, 16000):
+        options = {} if shape is sphere else {"capped": False}
+        state, cloud, faces = cloud_and_mesh(shape(n, **options).points)
+        exact = -2 * cloud / radius**2 if shape is sphere else -cloud * [0, 1, 1] / radius**2
+        ours = curvature_normals(cotangent_laplacian(cloud, state.rings), ring_areas(cloud, state.rings), cloud)
+        areas = mesh_areas(cloud, faces)
+        mesh = curvature_normals(mesh_laplacian(cloud, faces), areas, cloud)
+        whole = umbrellas(len(cloud), faces)
+        found = off(ours, exact, state.rings.closed), off(mesh, exact, whole)
+        lengths.append([np.median(length) for length, _ in found])
+        angles.append([np.median(angle) for _, angle in found])
+        if shape is sphere:  # closed and inscribed: exact in the mean, weighted by area
+            mean = (areas * np.einsum("ij,ij->i", mesh, exact)).sum() / (areas * (exact**2).sum(axis=1)).sum()
+            assert mean == pytest.approx(1, abs=1e-9)
+    angles, lengths = np.array(angles), np.array(lengths)
+    assert (angles[1:] < 0.65 * angles[:-1]).all()  # halved
+    assert (angles[-1] < 0.6).all()
+    assert (lengths[-1] > 0.7 * lengths[-2]).all()
+    assert (lengths[-1] > 0.05).all()
+    assert (lengths[-1] < 0.2).all()
+
+
+# ----------------------------------------------------------------------------------------------------- contraction
+
+
+def test_it_is_the_contractor_where_rings_and_one_rings_are_the_same():
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(400, 3))
+    points *= [[1, 0.6, 2.5]] / np.linalg.norm(points, axis=1, keepdims=True)
+    state = RingBuilder(thin_to="all", denoise=0, outlier_factor=0)(points)
+    faces = ConvexHull(state.cloud).simplices.astype(np.int64)
+    begun, faces = mesh_state(state, state.cloud, faces)
+    centred = state.cloud - state.cloud.mean(axis=0)
+    rings = convex_rings(centred, faces)
+    like = Contractor(max_iterations=3, stop=lambda iterations: None)
+    ours = like(replace(begun, rings=rings))
+    theirs = MeshContractor(faces, replace(like, reducer=LPRReducer()))(begun)
+    assert len(theirs.report.iterations) == len(ours.report.iterations) == 3
+    assert len(theirs) == len(ours) == 400
+    np.testing.assert_allclose(theirs.positions, ours.positions, atol=1e-5)
+    assert "reducer=None" in theirs.report.stages[-1]
+
+
+def test_points_without_a_triangle_go_to_the_nearest_with_one():
+    state, _, faces = cloud_and_mesh(tube(1500).points)
+    gone = np.flatnonzero(state.cloud[:, 0] > 0.3)
+    faces = faces[~np.isin(faces, gone).any(axis=1)]
+    begun, local = mesh_state(state, state.cloud, faces)
+    assert len(begun) == len(np.unique(faces)) < len(state)
+    np.testing.assert_array_equal(begun.survivors[local], faces)
+    np.testing.assert_array_equal(begun.owner[begun.survivors], np.arange(len(begun)))
+    assert (begun.cloud[begun.survivors[begun.owner[gone]], 0] > 0.2).all()
+    skeleton = mesh_skeleton(state, state.cloud, faces, pipelines.default())
+    assert (skeleton.vertex_of_point >= 0).all()
+    assert skeleton.n_components == 1
+
+
+def test_the_skeleton_of_a_torus_is_its_axis():
+    state, _, faces = cloud_and_mesh(torus(2000).points)
+    skeleton = mesh_skeleton(state, state.cloud, faces, pipelines.default())
+    assert (skeleton.n_components, skeleton.n_loops) == (1, 1)
+    ring = torus(10)
+    assert np.abs(np.linalg.norm(skeleton.vertices[:, :2], axis=1) - np.linalg.norm(ring.nodes[0])).max() < 0.01
+    assert np.abs(skeleton.vertices[:, 2]).max() < 0.01
+
+
+def test_a_reduction_of_its_own_is_left_out_and_a_contractor_is_needed():
+    state, _, faces = cloud_and_mesh(torus(800).points)
+    stages = RingBuilder(), Contractor(), LPRReducer(), Connector(), Refiner()
+    skeleton = mesh_skeleton(state, state.cloud, faces, Pipeline(*stages))
+    assert [stage.partition("(")[0] for stage in skeleton.report.stages] == ["MeshContractor", "Connector", "Refiner"]
+    with pytest.raises(InvalidParameterError, match="no Contractor"):
+        mesh_skeleton(state, state.cloud, faces, RingBuilder() | Connector())

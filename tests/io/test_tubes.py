@@ -1,0 +1,92 @@
+"""Tubes: closed, outward, as thick as they should be."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from glsk_o3d import InvalidParameterError, Skeleton, samples
+from glsk_o3d.io.tubes import sweep
+
+
+def axis_of(sample):
+    return Skeleton(sample.nodes, sample.edges, sample.radii, (), (), ())
+
+
+def prism(sides):
+    """Area of a regular polygon over that of its circle."""
+    return sides / 2 / np.pi * np.sin(2 * np.pi / sides)
+
+
+@pytest.mark.parametrize("direction", [[0, 0, 1], [0, 0, -1], [1, 0, 0], [1, -2, 3]])
+def test_a_capsule(direction):
+    axis = np.array(direction) / np.linalg.norm(direction)
+    stick = Skeleton(np.outer([0, 0.4, 1], axis) + 5, [(0, 1), (1, 2)], [0.1] * 3, (), (), ())
+    mesh = stick.to_tubes(sides=64)
+    assert mesh.is_watertight()
+    caps, length = 4 / 3 * np.pi * 0.1**3, np.pi * 0.1**2
+    assert mesh.get_volume() == pytest.approx(prism(64) * (length + caps), rel=1e-3)
+    points = np.asarray(mesh.vertices) - 5
+    along = points @ axis
+    assert (along.min(), along.max()) == pytest.approx((-0.1, 1.1))
+    distance = np.linalg.norm(points - np.outer(np.clip(along, 0, 1), axis), axis=1)
+    np.testing.assert_allclose(distance, 0.1, rtol=1e-9)
+    assert np.asarray(mesh.vertex_normals).shape == points.shape
+
+
+def test_a_cone_and_a_ball():
+    cone = Skeleton([[0, 0, 0], [2, 0, 0]], [(0, 1)], [0.3, 0.1], (), (), ()).to_tubes(sides=96)
+    frustum, caps = np.pi * 2 / 3 * (0.09 + 0.03 + 0.01), 2 / 3 * np.pi * (0.3**3 + 0.1**3)
+    assert cone.get_volume() == pytest.approx(prism(96) * (frustum + caps), rel=1e-3)
+    ball = Skeleton([[1, 1, 1]], [], [0.5], (), (), ()).to_tubes(sides=96)
+    assert ball.is_watertight()
+    assert ball.get_volume() == pytest.approx(np.pi / 6, rel=3e-3)
+
+
+@pytest.mark.parametrize("sample", [samples.sauropod(64), samples.helix(64), samples.two_rings(64)], ids=str)
+def test_every_branch_is_one_closed_outward_surface(sample):
+    skeleton = axis_of(sample)
+    mesh = skeleton.to_tubes(sides=9)
+    assert mesh.is_edge_manifold(allow_boundary_edges=False)
+    assert mesh.is_orientable()
+    assert mesh.euler_poincare_characteristic() == 2 * len(skeleton.branches)
+    points, faces = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+    corners = points[faces]
+    inside = np.einsum("ni,ni->n", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]).sum() / 6
+    assert inside > 0
+    _, counts = np.unique(np.asarray(mesh.vertex_colors), axis=0, return_counts=True)
+    assert sorted(counts) == sorted(
+        9 * (len(path) + 2) + 2 for path in skeleton.branches
+    )  # two more circles, two poles
+
+
+def test_a_helix_of_wire_has_its_volume_and_does_not_twist():
+    spring = axis_of(samples.helix(64))
+    mesh = spring.to_tubes(sides=48)
+    wire, caps = np.pi * 0.06**2 * spring.length, 4 / 3 * np.pi * 0.06**3
+    assert mesh.get_volume() == pytest.approx(wire + caps, rel=0.01)
+    points, _, row = sweep(spring.vertices, spring.radii, spring.branches, 8)
+    ring = points[np.isin(row, np.arange(1, len(spring.vertices) - 1))].reshape(-1, 8, 3)
+    across = (ring - ring.mean(axis=1, keepdims=True))[:, 0] / 0.06
+    step = np.linalg.norm(np.diff(across, axis=0), axis=1)
+    turned = np.linalg.norm(np.diff(spring.vertices[1:-1], axis=0), axis=1) / 0.3
+    assert (step < 1.1 * turned).all()
+
+
+def test_sharp_turns_and_coincident_vertices():
+    zigzag = [[0, 0, 0], [1, 0, 0], [0, 0, 0], [0, 0, 0], [1, 1, 1]]
+    mesh = Skeleton(zigzag, [(0, 1), (1, 2), (2, 3), (3, 4)], [0.1] * 5, (), (), ()).to_tubes()
+    assert np.isfinite(np.asarray(mesh.vertices)).all()
+    assert mesh.is_edge_manifold(allow_boundary_edges=False)
+
+
+def test_radius_and_refusals():
+    bare = dataclasses.replace(axis_of(samples.y_junction(64)), radii=np.full(4, np.nan))
+    with pytest.raises(InvalidParameterError, match="4 of 4 vertices have no radius"):
+        bare.to_tubes()
+    thin = np.asarray(bare.to_tubes(radius=0.01).vertices)
+    assert np.abs(thin[:, 1]).max() == pytest.approx(0.01, rel=0.1)
+    for wrong in (dict(radius=0), dict(radius=np.nan), dict(sides=2), dict(sides=8.0), dict(color="red", radius=1)):
+        with pytest.raises(InvalidParameterError, match=next(iter(wrong))):
+            bare.to_tubes(**wrong)
+    assert len(Skeleton((), (), (), (), (), ()).to_tubes().vertices) == 0

@@ -1,0 +1,101 @@
+"""Farthest-point sampling against brute force."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.distance import cdist
+
+from glsk_o3d.numerics.farthest_point import farthest_point_sampling
+
+
+def brute_force(points, radius, start=None):
+    """The definition, with every distance: O(n m)."""
+    sample = start
+    if sample is None:
+        sample = int(np.argmax(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
+    nearest, owner, samples = np.full(len(points), np.inf), np.zeros(len(points), int), []
+    while nearest[sample] > 1:
+        distance = np.linalg.norm(points - points[sample], axis=1) / radius[sample]
+        owner[distance < nearest] = len(samples)
+        nearest = np.minimum(nearest, distance)
+        samples.append(sample)
+        sample = int(np.argmax(nearest))
+    return samples, owner
+
+
+def clouds():
+    rng = np.random.default_rng(0)
+    yield "ball", rng.normal(size=(700, 3))
+    yield "curve", np.stack([np.cos(t := rng.uniform(0, 9, 500)), np.sin(t), 0.1 * t], axis=1)
+    yield "clusters", (rng.normal(size=(5, 1, 3)) + 0.01 * rng.normal(size=(1, 80, 3))).reshape(-1, 3)
+    yield "grid", np.stack(np.meshgrid(*[np.arange(7.0)] * 3), -1).reshape(-1, 3)
+    yield "doubled", np.repeat(rng.normal(size=(60, 3)), 3, axis=0)
+    yield "line", np.outer(rng.random(300), [1, 2, 3.0])
+
+
+@pytest.mark.parametrize("size", [0.02, 0.1, 0.5])
+@pytest.mark.parametrize(("name", "points"), list(clouds()))
+def test_against_brute_force(name, points, size):
+    reach = size * np.linalg.norm(np.ptp(points, axis=0))
+    rng = np.random.default_rng(1)
+    for radius in (np.full(len(points), reach), reach * rng.uniform(0.3, 3, len(points))):
+        samples, owner = farthest_point_sampling(points, radius)
+        expected, expected_owner = brute_force(points, radius)
+        assert samples.tolist() == expected
+        np.testing.assert_array_equal(owner, expected_owner)
+
+
+@pytest.mark.parametrize(("name", "points"), list(clouds()))
+def test_balls_cover_and_centres_keep_apart(name, points):
+    reach = 0.1 * np.linalg.norm(np.ptp(points, axis=0))
+    samples, owner = farthest_point_sampling(points, np.full(len(points), reach))
+    distance = cdist(points, points[samples])
+    np.testing.assert_array_equal(distance[np.arange(len(points)), owner], distance.min(axis=1))
+    assert distance.min(axis=1).max() <= reach
+    between = cdist(points[samples], points[samples])
+    assert between[~np.eye(len(samples), dtype=bool)].min(initial=np.inf) > reach
+    np.testing.assert_array_equal(owner[samples], np.arange(len(samples)))
+
+
+@settings(max_examples=100, deadline=None)
+@given(arrays(float, st.tuples(st.integers(1, 30), st.just(3)), elements=st.integers(-3, 3)), st.data())
+def test_every_point_lies_in_the_ball_of_its_sample(points, data):
+    radius = data.draw(arrays(float, len(points), elements=st.sampled_from([0.25, 0.5, 1.0, 2.0, 3.0])))
+    start = data.draw(st.none() | st.integers(0, len(points) - 1))
+    samples, owner = farthest_point_sampling(points, radius, start)
+    expected, expected_owner = brute_force(points, radius, start)
+    assert samples.tolist() == expected
+    np.testing.assert_array_equal(owner, expected_owner)
+    distance = cdist(points, points[samples]) / radius[samples]
+    own = distance[np.arange(len(points)), owner]
+    assert (own <= 1).all()
+    np.testing.assert_array_equal(own, distance.min(axis=1))
+    assert start is None or samples[0] == start
+
+
+def test_order_and_rotation_do_not_matter():
+    rng = np.random.default_rng(2)
+    points = rng.normal(size=(500, 3))
+    radius = rng.uniform(0.3, 0.6, 500)
+    samples, owner = farthest_point_sampling(points, radius)
+    order = rng.permutation(500)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    again, owner_again = farthest_point_sampling((points @ turn.T + 3)[order], radius[order])
+    np.testing.assert_array_equal(order[again], samples)
+    np.testing.assert_array_equal(owner_again, owner[order])
+
+
+def test_one_point_and_one_place():
+    for n in (1, 20):
+        samples, owner = farthest_point_sampling(np.ones((n, 3)), np.ones(n))
+        assert len(samples) == 1
+        assert (owner == 0).all()
+
+
+def test_tiny_radius_takes_every_distinct_point():
+    points = np.random.default_rng(3).normal(size=(50, 3))
+    samples, owner = farthest_point_sampling(points, np.full(50, 1e-9))
+    assert sorted(samples.tolist()) == list(range(50))
+    np.testing.assert_array_equal(samples[owner], np.arange(50))

@@ -1,0 +1,136 @@
+"""Outliers, among themselves too."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from glsk_o3d import samples
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
+from glsk_o3d.preparation.outliers import without_outliers
+from glsk_o3d.preparation.sampling import thin_to_grid
+
+K, N = 16, 12000
+SURFACE = samples.torus(N, ring_radius=0.4, radius=0.1).points
+
+
+def left(points, weight=None, factor=2.5, least=8):
+    weight = np.ones(len(points)) if weight is None else weight
+    return without_outliers(points, weight, *nearest_neighbours(points, K), factor, least)
+
+
+def floating(n, seed=0, reach=0.6):
+    """Points anywhere in a box, but for those near to the surface."""
+    points = np.random.default_rng(seed).uniform(-reach, reach, (4 * n, 3))
+    return points[cKDTree(SURFACE).query(points)[0] > 0.05][:n]
+
+
+@pytest.mark.parametrize("n", [1, 10, 200, 600])
+def test_points_that_float_around_a_surface(n):
+    """A few stand out alone; many have each other for neighbours."""
+    points = np.concatenate([SURFACE, floating(n)])
+    np.testing.assert_array_equal(left(points), np.arange(N))
+
+
+@pytest.mark.parametrize("n", [5, 15, 30, 300])
+def test_islands_far_away(n):
+    """Whether their neighbourhoods reach back to the surface, or hold nothing but themselves."""
+    island = [3, 0, 0] + np.random.default_rng(1).uniform(-0.3, 0.3, (n, 3))
+    np.testing.assert_array_equal(left(np.concatenate([SURFACE, island])), np.arange(N))
+
+
+@pytest.mark.parametrize(("n", "shift"), [(300, 3), (800, 0.7)])
+def test_sparse_surfaces_stay(n, shift):
+    """A part of its own with a tenth of the points for its area, and one with a quarter that touches the other."""
+    part = samples.torus(n, ring_radius=0.2, radius=0.05).points + [shift, 0, 0]
+    assert len(left(np.concatenate([SURFACE, part]))) == N + n
+
+
+def limb(n, radius, noise):
+    rng = np.random.default_rng(1)
+    angle, along = rng.uniform(0, 2 * np.pi, n), rng.uniform(0, 0.6, n)
+    points = np.column_stack([along, radius * np.cos(angle), radius * np.sin(angle)])
+    return points + noise * rng.normal(size=(n, 3)) + [0.5, 0, 0]
+
+
+@pytest.mark.parametrize(("n", "radius", "noise"), [(200, 0.02, 0.005), (100, 0.01, 0.003), (400, 0.02, 0.005)])
+def test_sparse_limbs_of_a_dense_part_stay(n, radius, noise):
+    """All around a thin limb its neighbourhoods are as thick as long; a wider one knows better."""
+    points = np.concatenate([SURFACE, limb(n, radius, noise)])
+    found = np.ones(len(points), bool)
+    found[left(points)] = False
+    assert not found[:N].any()
+    assert found.sum() < 0.1 * n
+
+
+@pytest.mark.parametrize("scale", [0.2, 1, 4])
+def test_another_noisy_object_stays(scale):
+    """However much coarser it is: a tenth of the points are no outliers."""
+    other = scale * samples.torus(3000, noise=0.02, seed=1).points + [4, 0, 0]
+    assert len(left(np.concatenate([SURFACE, other]))) > N + 2900
+
+
+def test_more_neighbours_than_points_are_left():
+    points = np.concatenate([samples.torus(200).points, floating(6, reach=3)])
+    for k in (100, 203, 206):
+        kept = without_outliers(points, np.ones(206), *nearest_neighbours(points, k), 2.5, 8)
+        np.testing.assert_array_equal(kept, np.arange(200))
+
+
+def test_what_floats_around_a_part_with_a_tenth_of_the_points():
+    """The other part is so coarse that nothing is far from its neighbours by the measure of most points."""
+    part, other = samples.torus(2000).points, 20 * samples.torus(20000, seed=1).points + [80, 0, 0]
+    points = np.concatenate([part, other, floating(300)])
+    found = np.ones(len(points), bool)
+    found[left(points)] = False
+    assert not found[:22000].any()
+    assert found[22000:].mean() > 0.85
+
+
+def test_a_few_points_close_together_make_no_outliers_of_those_around():
+    """A clump of a fortieth of the points in a noisy cloud, whose neighbourhoods fill space."""
+    clump = [0.4, 0, 0.1] + 0.01 * np.random.default_rng(0).normal(size=(300, 3))
+    points = np.concatenate([samples.torus(N, noise=0.02).points, clump])
+    assert len(points) - len(left(points)) < 20
+
+
+@pytest.mark.parametrize("noise", [0, 0.003])
+def test_uneven_clouds_stay(noise):
+    """Ten times as dense at one end as at the other."""
+    points = samples.tube(30000, noise=noise).points
+    keep = np.random.default_rng(0).random(len(points)) < 10 ** (points[:, 0] / np.ptp(points[:, 0]) - 0.5)
+    assert len(left(points[keep])) > 0.999 * keep.sum()
+
+
+def test_where_each_point_stands_for_many():
+    """A sample evens out the density that tells a surface from what floats around it; the weight knows it."""
+    dense = samples.torus(60000, ring_radius=0.4, radius=0.1).points
+    gas = floating(2500)
+    kept, _, counts = thin_to_grid(np.concatenate([dense, gas]), 12000)
+    points, true = np.concatenate([dense, gas])[kept], kept < len(dense)
+    found = np.ones(len(kept), bool)
+    found[left(points, counts)] = False
+    assert not found[true].any()
+    assert found[~true].mean() > 0.99
+
+
+def test_it_does_not_matter_how_the_cloud_lies():
+    points = np.concatenate([SURFACE, floating(300), [3, 0, 0] + floating(40)])
+    kept = left(points)
+    rng = np.random.default_rng(0)
+    turned = 7 * points @ Rotation.random(random_state=rng).as_matrix().T + [1, 2, 3]
+    np.testing.assert_array_equal(left(turned), kept)
+    order = rng.permutation(len(points))
+    np.testing.assert_array_equal(np.sort(order[left(points[order])]), kept)
+
+
+@pytest.mark.parametrize("least", [N + 190, N + 250])
+def test_so_many_stay_at_least(least):
+    points = np.concatenate([SURFACE, floating(200)])
+    assert len(left(points, least=least)) == len(points)
+
+
+def test_nothing_is_left_to_find():
+    points = np.concatenate([SURFACE, floating(400)])
+    kept = left(points)
+    np.testing.assert_array_equal(left(points[kept]), np.arange(len(kept)))

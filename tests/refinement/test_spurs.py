@@ -1,0 +1,196 @@
+"""Twigs are cut by how far their points leave the other branches, over the thickness of these."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from glsk_o3d import Skeleton
+from glsk_o3d.refinement.spurs import FAR, beyond, cut_twigs
+
+N = 21  # vertices of the trunk
+PER = 60  # points of each: many, so that a cut twig does not change the thickness of its junction
+
+
+def directions(n, seed=0):
+    towards = np.random.default_rng(seed).normal(size=(n, 3))
+    return towards / np.linalg.norm(towards, axis=1, keepdims=True)
+
+
+def tree(*twigs, radius=0.1, length=None, share=1.0, per=10, along=0.0):
+    """A trunk along x from -1 to 1, every point of it at the distance `radius` from its vertex.
+
+    Twigs (vertex, reach) grow from it in two edges each, along z, as long as they reach or `length` long. All their
+    points are as far from the trunk as they reach, `along` behind the junction; where `share` is below 1, the others
+    are ten times as far.
+    """
+    x = np.linspace(-1, 1, N)
+    trunk = np.column_stack([x, 0 * x, 0 * x])
+    vertices, edges, owner = [*trunk], [(i, i + 1) for i in range(N - 1)], [np.repeat(np.arange(N), PER)]
+    points = [np.repeat(trunk, PER, axis=0) + np.repeat(np.broadcast_to(radius, N), PER)[:, None] * directions(N * PER)]
+    for at, reach in twigs:
+        first = len(vertices)
+        edges += [(at, first), (first, first + 1)]
+        vertices += [trunk[at] + [0, 0, (length or reach) * part] for part in (0.4, 1)]
+        distance = np.where(np.arange(2 * per) < round(share * 2 * per), reach, 10 * reach)
+        across = directions(2 * per, seed=first) * [0, 1, 1]
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        points.append(trunk[at] + [along, 0, 0] + distance[:, None] * across)
+        owner.append(first + np.arange(2 * per) % 2)
+    points, owner = np.concatenate(points), np.concatenate(owner)
+    return Skeleton(vertices, sorted(edges), np.full(len(vertices), 0.1), owner, points, directions(len(points)))
+
+
+def test_short_is_cut_long_stays():
+    raw = tree((5, 0.07), (12, 0.5))
+    skeleton = cut_twigs(raw, 0.8)
+    assert len(skeleton.vertices) == N + 2
+    np.testing.assert_array_equal(skeleton.junctions, [12])
+    np.testing.assert_allclose(skeleton.vertices[:N], raw.vertices[:N], atol=1e-15)
+    np.testing.assert_allclose(skeleton.vertices[N:], raw.vertices[N + 2 :], atol=1e-15)
+    # the junction stays in its place and takes the points
+    count = np.bincount(skeleton.vertex_of_point)
+    assert count.tolist() == [PER] * 5 + [PER + 20] + [PER] * (N - 6) + [10, 10]
+    owner = raw.vertex_of_point
+    assert (skeleton.vertex_of_point[(owner == N) | (owner == N + 1)] == 5).all()
+
+
+@pytest.mark.parametrize("reach", [0.4, 1.3, 2.0])
+@pytest.mark.parametrize(("share", "cut"), [(1 - 1e-6, True), (1 + 1e-6, False)])
+def test_threshold_is_exact(reach, share, cut):
+    radius = np.full(N, 0.03)
+    radius[10] = 0.1  # at the junction, and nowhere else
+    skeleton = cut_twigs(tree((10, reach * 0.1 * share), radius=radius), reach)
+    assert (len(skeleton.vertices) == N) == cut
+
+
+@pytest.mark.parametrize("along", [0.025, 0.05, 0.9])
+@pytest.mark.parametrize(("share", "cut"), [(1 - 1e-6, True), (1 + 1e-6, False)])
+def test_what_counts_is_how_far_points_are_from_the_part_and_how_thick_it_is_there(along, share, cut):
+    """Between two vertices of the trunk, and far from the junction where it is thin."""
+    radius = np.where(np.linspace(-1, 1, N) < 0.4, 0.3, 0.1)
+    there = 0.1 if along > 0.4 else 0.3
+    skeleton = cut_twigs(tree((10, 1.3 * there * share), radius=radius, along=along), 1.3)
+    assert (len(skeleton.vertices) == N) == cut
+
+
+@pytest.mark.parametrize("far", [0, 1e4])
+def test_distance_from_paths_over_their_thickness(far):
+    """The nearest place of edges that are cut into very short ones."""
+    rng = np.random.default_rng(0)
+    vertices, thickness, points = rng.normal(size=(12, 3)), rng.uniform(0.1, 1, 12), rng.normal(size=(200, 3))
+    paths, expected = [np.array(path) for path in ([0, 1, 2, 3], [0, 4], [5, 0, 5])], np.inf
+    for path in paths:
+        for a, b in pairwise(path):
+            share = np.linspace(0, 1, 3001)[:, None]
+            places, thick = (values[a] + share * (values[b] - values[a]) for values in (vertices, thickness[:, None]))
+            distance, nearest = cKDTree(places).query(points)
+            expected = np.minimum(expected, distance / thick[nearest, 0])
+    found = beyond(points + far, vertices + far, thickness, paths)
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("reach", "length", "cut"), [(0.07, 0.9, True), (0.3, 0.02, False)])
+def test_points_count_and_not_the_curve(reach, length, cut):
+    skeleton = cut_twigs(tree((10, reach), length=length), 1.0)
+    assert (len(skeleton.vertices) == N) == cut
+
+
+@pytest.mark.parametrize(("share", "cut"), [(1.0, True), (FAR + 0.02, True), (FAR - 0.02, False)])
+def test_a_few_far_points_do_not_save_a_twig(share, cut):
+    skeleton = cut_twigs(tree((10, 0.05), share=share, per=100), 1.0)
+    assert (len(skeleton.vertices) == N) == cut
+
+
+def test_a_twig_without_points_reaches_nowhere():
+    raw = tree((10, 0.5), per=0)
+    skeleton = cut_twigs(raw, 1e-6)
+    assert len(skeleton.vertices) == N
+    np.testing.assert_allclose(skeleton.vertices, raw.vertices[:N], atol=1e-15)
+
+
+def test_points_without_a_say_do_not_count():
+    """Outliers hang on the twig: they have no normal, and do not make it longer."""
+    raw = tree((10, 0.05), share=0.5)
+    distance = np.linalg.norm(raw.points - raw.vertices[10], axis=1)
+    raw.normals[(raw.vertex_of_point >= N) & (distance > 0.1)] = np.nan
+    assert len(cut_twigs(raw, 1.0).vertices) == N
+
+
+def test_a_junction_stays_what_it_was():
+    raw = tree((10, 0.05))
+    m = len(raw.vertices)
+    raw = replace(raw, radii=np.arange(m) + 1.0, confidence=np.linspace(0.5, 1, m))
+    skeleton = cut_twigs(raw, 0.8)
+    assert len(skeleton.vertices) == N < m
+    np.testing.assert_array_equal(skeleton.vertices, raw.vertices[:N])
+    np.testing.assert_array_equal(skeleton.radii, raw.radii[:N])
+    np.testing.assert_array_equal(skeleton.confidence, raw.confidence[:N])
+
+
+def test_ends_of_the_trunk_stay():
+    """Only what leaves a junction is a twig: a path shorter than it is thick is all there is."""
+    raw = tree(radius=50.0)
+    assert cut_twigs(raw, 0.8) is raw
+
+
+def test_a_vertex_without_points_is_as_thick_as_its_radius_says():
+    """Not without thickness: all points would be far from the edges beside it."""
+    raw = tree((10, 0.05))
+    raw.vertex_of_point[raw.vertex_of_point == 10] = 9
+    assert not (raw.vertex_of_point == 10).any()
+    assert len(cut_twigs(raw, 0.8).vertices) == N
+
+
+def test_far_points_in_chunks(monkeypatch):
+    rng = np.random.default_rng(0)
+    points, vertices = rng.normal(size=(50, 3)), rng.normal(size=(8, 3))
+    found = beyond(points, vertices, np.arange(8) + 1.0, [np.arange(8)])
+    monkeypatch.setattr("glsk_o3d.refinement.spurs._CHUNK", 21)
+    np.testing.assert_array_equal(beyond(points, vertices, np.arange(8) + 1.0, [np.arange(8)]), found)
+
+
+def test_lines_have_no_thickness():
+    """Whatever is off a line leaves it."""
+    raw = tree((10, 50.0), radius=0.0)
+    assert cut_twigs(raw, 1.3) is raw
+
+
+def test_zero_keeps_all():
+    raw = tree((5, 0.07))
+    assert cut_twigs(raw, 0) is raw
+
+
+def test_least_first_until_it_is_no_junction(ringed):
+    """Of three short branches the farthest two remain as a path."""
+    tips = np.array([[0.06, 0, 0], [-0.02, 0.05, 0], [-0.02, -0.07, 0]])
+    raw = ringed(np.concatenate([[[0, 0, 0]], tips]), [(0, 1), (0, 2), (0, 3)], radius=[0.1, 1e-6, 1e-6, 1e-6])
+    skeleton = cut_twigs(raw, 0.8)
+    assert skeleton.edges.tolist() == [[0, 1], [0, 2]]
+    np.testing.assert_allclose(skeleton.vertices, [[0, 0, 0], tips[0], tips[2]], atol=1e-15)
+
+
+def test_several_at_one_junction_and_in_any_numbering():
+    raw = tree((5, 0.03), (5, 0.07), (9, 0.05), (12, 0.5))
+    turn = np.random.default_rng(1).permutation(len(raw.vertices))
+    back = np.argsort(turn)
+    edges = sorted(map(tuple, np.sort(back[raw.edges], axis=1).tolist()))
+    renamed = Skeleton(raw.vertices[turn], edges, raw.radii, back[raw.vertex_of_point], raw.points, raw.normals)
+    for case in (raw, renamed):
+        skeleton = cut_twigs(case, 0.8)
+        assert len(skeleton.vertices) == N + 2
+        assert len(skeleton.junctions) == 1
+        expected = raw.vertices[[*range(N), N + 6, N + 7]]
+        gap = np.linalg.norm(skeleton.vertices[:, None] - expected[None], axis=2).min(axis=1)
+        assert gap.max() < 1e-12
+
+
+def test_loops_at_a_junction_and_bridges_are_no_twigs(ringed):
+    """A tiny ring on a stem, and a short link between two junctions: no leaf, no twig."""
+    tiny = [[0, 0, 0.02], [0.01, 0, 0.03], [0, 0, 0.04], [-0.01, 0, 0.03]]
+    line = [[x, 0, 0] for x in (-1, 0, 1)]
+    edges = [(0, 1), (1, 2), (1, 3), (3, 4), (4, 5), (5, 6), (3, 6)]
+    raw = ringed(line + tiny, edges)
+    assert cut_twigs(raw, 0.8) is raw

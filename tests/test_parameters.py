@@ -1,0 +1,223 @@
+"""What all filters share: parameters, documentation, `|`, and the order of the stages."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+import glsk_o3d as glsk
+from glsk_o3d import (
+    Connector,
+    Contractor,
+    ExplainedScore,
+    InvalidParameterError,
+    LPRReducer,
+    Refiner,
+    RingBuilder,
+    RingSizeRatio,
+    StageError,
+    samples,
+)
+from glsk_o3d.parameters import resolve_length
+
+FILTERS = (RingBuilder, Contractor, LPRReducer, Connector, Refiner)
+DESCRIBED = (*FILTERS, ExplainedScore, RingSizeRatio)
+PUBLIC = {name: getattr(glsk, name) for name in glsk.__all__}
+POINTS = samples.torus(n=200).points
+
+
+def fields():
+    return [(cls, field) for cls in DESCRIBED for field in dataclasses.fields(cls)]
+
+
+def wrong_values():
+    """Every parameter with values outside of what its own description allows."""
+    for cls, field in fields():
+        facts = field.metadata
+        kind, optional = facts["type"].rstrip("?"), facts["type"].endswith("?")
+        wrong = [object(), "nonsense", [1], b"2%"]
+        if not optional:
+            wrong.append(None)
+        if kind != "bool":
+            wrong += [True] if kind != "choice" else []
+        if kind in ("int", "float", "length"):
+            wrong += [math.nan, math.inf, -math.inf, -1, 1j]
+            if facts["low"] is not None:
+                wrong.append(facts["low"] - 1)
+                wrong += [facts["low"]] if facts["open_low"] else []
+            if facts["high"] is not None:
+                wrong.append(facts["high"] + 1)
+        if kind == "int":
+            wrong += [7.5, "7"]
+        if kind == "length":
+            wrong += ["0%", "-1%", "101%", "2", "%", "2%%", "nan%", ""]
+        if kind in ("bool", "choice", "reducer", "stop"):
+            wrong += [1, 0, "yes"]
+        for value in wrong:
+            yield pytest.param(cls, field.name, value, id=f"{cls.__name__}.{field.name}-{value!r:.20}")
+
+
+@pytest.mark.parametrize(("cls", "name", "value"), list(wrong_values()))
+def test_wrong_parameters_are_named_when_the_filter_is_called(cls, name, value):
+    made = cls(**{name: value})  # not before
+    with pytest.raises(InvalidParameterError, match=rf"^{cls.__name__}\.{name} = "):
+        made.check()
+    if cls in FILTERS:
+        with pytest.raises(InvalidParameterError, match=rf"^{cls.__name__}\.{name} = "):
+            made(POINTS)
+
+
+@pytest.mark.parametrize("word", ["published ", "Auto", "16", ""])
+def test_a_parameter_of_any_type_takes_its_words_and_no_others(word):
+    with pytest.raises(InvalidParameterError, match="must be an int, or 'auto', or 'published'"):
+        RingBuilder(k=word).check()
+    RingBuilder(k="auto").check()
+    assert "k : 'auto' or 'published' or int [points], default 'auto'" in RingBuilder.__doc__
+    assert "frame : 'spread' or 'box', default 'spread'" in RingBuilder.__doc__  # only words
+
+
+@pytest.mark.parametrize(("cls", "field"), fields(), ids=lambda x: getattr(x, "__name__", None) or x.name)
+def test_right_parameters_pass(cls, field):
+    facts = field.metadata
+    right = [field.default, *facts["choices"]]
+    if facts["high"] is not None:
+        right.append(facts["high"])
+    if facts["low"] is not None and not facts["open_low"]:
+        right.append(facts["low"])
+    if facts["type"] == "length":
+        right += ["2%", " 0.5 %", "100%", "1e-3%", 0.3, 7]
+    if facts["type"] == "float":
+        right.append(max(1, facts["low"] or 0))
+    for value in right:
+        cls(**{field.name: value}).check()
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_unknown_and_positional_parameters(cls):
+    with pytest.raises(TypeError, match="nonsense"):
+        cls(nonsense=3)
+    with pytest.raises(TypeError):
+        cls(5)
+
+
+def test_parameters_of_a_part_are_checked_too():
+    with pytest.raises(InvalidParameterError, match=r"^ExplainedScore\.threshold"):
+        Contractor(stop=ExplainedScore(-1))(POINTS)
+    with pytest.raises(InvalidParameterError, match=r"^LPRReducer\.phi"):
+        (RingBuilder() | Contractor(reducer=LPRReducer(phi=0)))(POINTS)
+
+
+@pytest.mark.parametrize("wrong", [dict(stop=ExplainedScore), dict(reducer=LPRReducer)], ids=str)
+def test_a_class_is_no_instance(wrong):
+    with pytest.raises(InvalidParameterError):
+        Contractor(**wrong).check()
+
+
+@pytest.mark.parametrize("cls", DESCRIBED)
+def test_frozen_hashable_and_comparable(cls):
+    one = cls()
+    for field in dataclasses.fields(cls):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(one, field.name, 1)
+    assert one == cls()
+    assert hash(one) == hash(cls())
+
+
+@pytest.mark.parametrize(
+    "made",
+    [cls() for cls in DESCRIBED]
+    + [
+        RingBuilder(k=17, drop_invalid=True),
+        Contractor(reducer=LPRReducer(phi=1 / 3), stop=RingSizeRatio(0.1), max_iterations=3),
+        Connector(radius="3.5%"),
+        Connector(radius=0.1),
+    ],
+    ids=repr,
+)
+def test_repr_rebuilds_the_filter(made):
+    again = eval(repr(made), PUBLIC)
+    assert type(again) is type(made)
+    assert again == made
+
+
+@pytest.mark.parametrize("cls", DESCRIBED)
+def test_documentation_lists_every_parameter(cls):
+    text = cls.__doc__
+    assert "Parameters\n----------" in text
+    for field in dataclasses.fields(cls):
+        assert f"\n{field.name} : " in text
+        assert field.metadata["doc"] in text
+        assert field.metadata["doc"].endswith(".")
+        assert repr(field.default) in text
+
+
+# ---- the order of the stages
+
+
+@pytest.fixture(scope="module")
+def flow():
+    """What comes out of every stage, by what consumes it."""
+    state = RingBuilder()(POINTS)
+    contracted = Contractor(max_iterations=1)(state)
+    return {"cloud": POINTS, "Contraction": contracted, "Skeleton": Connector()(contracted)}
+
+
+@pytest.mark.parametrize(
+    ("cls", "given"),
+    [(cls, kind) for cls in FILTERS for kind in ("cloud", "Contraction", "Skeleton") if cls.consumes != kind],
+)
+def test_what_belongs_elsewhere_is_refused(cls, given, flow):
+    with pytest.raises(StageError, match=rf"^{cls.__name__} takes a {cls.consumes}, not a .*RingBuilder \| Contractor"):
+        cls()(flow[given])
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_calls_leave_their_input_alone_and_are_repeatable(cls, flow):
+    given = flow[cls.consumes]
+
+    def snapshot():
+        if isinstance(given, np.ndarray):
+            return given.tobytes()
+        values = {**vars(given), **vars(getattr(given, "rings", given))}
+        values = {name: value for name, value in values.items() if not name.startswith("_")}  # what was looked up
+        return {k: v.tobytes() if isinstance(v, np.ndarray) else repr(v) for k, v in values.items()}
+
+    before = snapshot()
+    first, second = cls()(given), cls()(given)
+    assert snapshot() == before
+    for field in dataclasses.fields(first):
+        a, b = getattr(first, field.name), getattr(second, field.name)
+        if isinstance(a, np.ndarray):
+            np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_report_names_the_stage(cls, flow):
+    before = flow[cls.consumes].report.stages if cls.consumes != "cloud" else ()
+    result = cls()(flow[cls.consumes])
+    assert result.report.stages == (*before, repr(cls()))
+    assert result.report.seconds[cls.__name__] > 0
+
+
+@pytest.mark.parametrize(
+    ("length", "expected"),
+    [
+        ("2%", 1.0),
+        ("100%", 50.0),
+        (" 0.5 % ", 0.25),
+        ("1e1%", 5.0),
+        (".5%", 0.25),
+        (0.3, 0.3),
+        (7, 7.0),
+        (1e-300, 1e-300),
+    ],
+)
+def test_lengths(length, expected):
+    assert resolve_length(length, 50.0) == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize("length", ["2", "two%", "", "%", "-2%", "2%2%", "nan%", "inf%"])
+def test_bad_lengths(length):
+    with pytest.raises(InvalidParameterError, match="percentage"):
+        resolve_length(length, 50.0)

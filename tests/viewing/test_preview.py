@@ -1,0 +1,150 @@
+import dataclasses
+import re
+import sys
+
+import numpy as np
+import pytest
+
+from glsk_o3d.errors import FileFormatError, MissingPackageError
+from glsk_o3d.viewing import preview
+from glsk_o3d.viewing.preview import save_preview
+
+matplotlib = pytest.importorskip("matplotlib")
+from matplotlib.image import imread  # noqa: E402
+
+
+def is_red(image):
+    return (image[..., 0] > 0.7) & (image[..., 1] < 0.35) & (image[..., 2] < 0.4)
+
+
+def is_grey(image):
+    grey = (image[..., 0] > 0.6) & (image[..., 0] < 0.95) & (np.ptp(image[..., :3], axis=-1) < 0.02)
+    return grey[: int(0.85 * len(grey))]
+
+
+def columns_and_rows(mask):
+    """Sides of the box around each of the three views, in pixels: views are apart by empty columns."""
+    rows, columns = np.nonzero(mask)
+    gaps = np.sort(np.argsort(np.diff(np.unique(columns)))[-2:])
+    left = np.split(np.unique(columns), gaps + 1)
+    return [(np.ptp(part), np.ptp(rows[np.isin(columns, part)])) for part in left]
+
+
+def test_picture_of_the_size_asked_for(skeleton, tmp_path):
+    save_preview(skeleton, tmp_path / "p.png", size=(901, 402), title="a $title_ with odd^ signs")
+    image = imread(tmp_path / "p.png")
+    assert image.shape[:2] == (402, 901)
+    assert is_red(image).sum() > 30
+    assert [file.name for file in tmp_path.iterdir()] == ["p.png"]
+
+
+@pytest.mark.parametrize("offset", [0, 1e6, -1e9])
+def test_three_views_at_one_scale(make, tmp_path, offset):
+    corners = np.array([[0, 0, 0], [4, 0, 0], [4, 2, 0], [4, 2, 1]]) * 8.0 + offset
+    box = dataclasses.replace(make(corners, [[0, 1], [1, 2], [2, 3]]), points=(), vertex_of_point=(), normals=())
+    save_preview(box, tmp_path / "p.png", size=(2400, 800))
+    measured = columns_and_rows(is_red(imread(tmp_path / "p.png")))
+    expected = np.array([(4, 2), (4, 1), (2, 1)])
+    unit = np.ptp([0, measured[0][0]]) / 4
+    np.testing.assert_allclose(np.array(measured) / unit, expected, atol=0.1)
+
+
+def test_planar_clouds_and_clouds_without_a_skeleton(make, tmp_path):
+    flat = np.random.default_rng(0).random((500, 3)) * [1, 1, 0]
+    whole = make(flat[:3], [[0, 1]])
+    save_preview(dataclasses.replace(whole, points=flat), tmp_path / "flat.png")
+    none = dataclasses.replace(whole, vertices=(), edges=(), radii=())
+    save_preview(dataclasses.replace(none, points=flat), tmp_path / "cloud.png")
+    save_preview(dataclasses.replace(none, points=()), tmp_path / "nothing.png")
+    red = {name: is_red(imread(tmp_path / f"{name}.png")).sum() for name in ("flat", "cloud", "nothing")}
+    assert red["flat"] > 0 == red["cloud"] == red["nothing"]
+    assert is_grey(imread(tmp_path / "cloud.png")).sum() > 100
+
+
+def test_the_same_picture_every_time_also_of_large_clouds(tree, tmp_path):
+    many = dataclasses.replace(tree, points=np.random.default_rng(0).normal(size=(100_001, 3)))
+    for name in "ab":
+        save_preview(many, tmp_path / f"{name}.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_no_global_state(tree, tmp_path):
+    before = dict(matplotlib.rcParams)
+    save_preview(tree, tmp_path / "p.png")
+    assert dict(matplotlib.rcParams) == before
+    assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
+
+
+def test_caption_counts(tree, forest):
+    assert preview._caption(tree).split("   ")[::2] == (
+        ["7 points", "6 vertices", "5 edges", "1 component", "0 loops", "3 leaves", "1 junction"]
+    )
+    assert "3 components" in preview._caption(forest)
+
+
+def test_failure_leaves_nothing(tree, tmp_path, monkeypatch):
+    with pytest.raises(FileNotFoundError, match="no such folder"):
+        save_preview(tree, tmp_path / "missing" / "p.png")
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, path, **_: path.write_bytes(b"half") / 0)
+    with pytest.raises(ZeroDivisionError):
+        save_preview(tree, tmp_path / "p.png")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["p.jpg", "p", "p.png.bak"])
+def test_other_endings_are_refused(tree, tmp_path, name):
+    with pytest.raises(FileFormatError, match=rf"{name}: the preview is a picture and its name ends in \.png"):
+        save_preview(tree, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_matplotlib(tree, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingPackageError, match='pip install "matplotlib>='):
+        save_preview(tree, tmp_path / "p.png")
+
+
+LONG = "weakly supported: around 31% of the points " + "they do not agree on an axis, " * 20
+
+
+WIDE = [
+    (("sheet-like: costs $5 and $6",), r"warning: sheet-like: costs \$5 and \$6"),
+    ((LONG, "second"), r"warning: weakly .* \.\.\. warning: second"),
+    (("one", "two", "three", "four"), "warning: one warning: two and 2 more warnings"),
+    ((), ""),
+]
+LOW = [  # two lines
+    ((LONG,), r"warning: weakly .* \.\.\."),
+    ((LONG, "second"), r"warning: weakly .* \.\.\. warning: second"),
+    (("one", LONG), r"warning: one warning: weakly .* \.\.\."),
+    ((LONG, LONG, LONG), r"warning: weakly .* \.\.\. and 2 more warnings"),
+]
+
+
+@pytest.mark.parametrize(
+    ("size", "warnings", "told"),
+    [
+        *((size, *each) for size in ((1800, 760), (900, 400)) for each in WIDE),
+        *(((900, 200), *each) for each in LOW),
+    ],
+)
+def test_warnings_are_told_below_and_nothing_overlaps(tree, tmp_path, size, warnings, told):
+    warned = dataclasses.replace(tree, report=dataclasses.replace(tree.report, warnings=warnings))
+    figure = preview.draw(warned, size, None, warnings=warnings)
+    figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in figure.texts]
+    assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0 for box in boxes)
+    boxes += [axes.get_window_extent() for axes in figure.axes]
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    lines = [text.get_text() for text in reversed(figure.texts) if text.get_color() == preview._AMBER]
+    assert re.fullmatch(told, " ".join(lines))
+    assert len(lines) <= 5
+    save_preview(warned, tmp_path / "p.png", size=size)
+    image = imread(tmp_path / "p.png")[-preview.DPI // 4 :]
+    assert (image[..., 0] - image[..., 2] > 0.4).any() == bool(warnings)
+
+
+def test_a_line_for_the_count_comes_first():
+    assert preview._warned([LONG, "two"], 6, 1) == ["2 warnings"]
+    assert preview._warned(["one"], 6, 1) == ["warning: one"]
+    assert preview._warned(["one"], 6, 0) == []
