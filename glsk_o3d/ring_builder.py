@@ -3,37 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from .errors import InvalidCloudError, InvalidParameterError
-from .interop.clouds import cloud_points, search_parameters
-from .numerics.morton import morton_order
-from .numerics.neighbourhoods import isolation, nearest_left, nearest_neighbours, plane_axes, principal
-from .numerics.rings import star_rings
+from .errors import InvalidParameterError
+from .interop.clouds import SearchParam, cloud_points, search_parameters
+from .numerics.neighbourhoods import plane_axes
+from .numerics.rings import Rings, star_rings
 from .parameters import documented, parameter, resolve_length
-from .pipeline import Filter
-from .preparation.denoising import noise_share, to_ridges
-from .preparation.frame import Frame
-from .preparation.outliers import without_outliers
-from .preparation.sampling import _sample, usual_number
-from .preparation.thinning import average_noisy, thin, thin_smooth
+from .pipeline import Filter, Watch
+from .preparation.denoising import average_noise, denoise
+from .preparation.frame import finite_points
+from .preparation.outliers import set_aside_outliers
+from .preparation.sampling import Sample, sample_cloud
+from .preparation.surface import Surface
+from .preparation.thinning import Thinned, thin_surface
 from .report import Report
 from .state import Contraction, at_rest
 
-MIN_POINTS = 8
-LEAST_RING = 3
-SMALLEST, LARGEST = 1e-120, 1e120  # extents whose squares and products a float64 holds
-ALONE, FAIRLY_NOISY = 1.8, 0.2  # isolation of a denoised point that is set aside, and its least noise
-FEW, ENOUGH = 1000, 8192  # points from which on, and down to which, more than enough are merged
-STEADY = 0.9  # share of the points left at which that ends
-PLENTY = 4096  # noisy points that are enough: down to about so many they are averaged
-COINCIDENT = 4e-15  # points nearer than this in the working frame, a few roundings, are duplicates
+LEAST_RING = 3  # neighbours that a radius leaves, at least
 
 
-def usual_k(n: int) -> int:
+def default_k(n: int) -> int:
     """Neighbours per point, itself included: 16 from 4096 points on, fewer by the cube root below, at least 8.
 
     In a sparse cloud 16 neighbours would reach across thin parts.
@@ -46,23 +38,13 @@ def published_k(n: int) -> int:
     return int(np.clip(np.floor(0.012 * n + 0.5), 8, 30))
 
 
-@dataclass(frozen=True)
-class _Surface:
-    """Points in the working frame that say where the surface is, and what their neighbourhoods are like."""
+def default_size(n: int) -> int:
+    """Points to contract: at most 25000, but 64 times the square root of their number from 152588 points on.
 
-    points: np.ndarray
-    neighbours: np.ndarray
-    weight: np.ndarray  # points of the cloud that each stands for
-    merged: np.ndarray  # distinct points that each is the mean of
-    noise: np.ndarray
-    normals: np.ndarray
-    spread: np.ndarray
-    across: np.ndarray  # normals of the planes that the rings lie in
-
-    @classmethod
-    def of(cls, points, neighbours, weight, merged):
-        spread, normals = principal(points, neighbours)
-        return cls(points, neighbours, weight, merged, noise_share(spread, neighbours), normals, spread, normals)
+    More points make the axis hardly more exact, since neither noise nor the thickness of parts shrinks with their
+    spacing; they only cost time.
+    """
+    return min(n, max(25000, round(64 * np.sqrt(n))))
 
 
 @documented
@@ -97,7 +79,7 @@ class RingBuilder(Filter[Contraction]):
     (500, True)
     """
 
-    k: int | str | Any = parameter(
+    k: int | Literal["auto", "published"] | SearchParam = parameter(
         "auto",
         "Neighbours per point, itself included; at most all points. More bridge noise and gaps, fewer keep thin parts "
         "apart. 'auto' is 16 from 4096 points on and fewer below, by the cube root, at least 8; 'published' is 1.2 % "
@@ -126,7 +108,7 @@ class RingBuilder(Filter[Contraction]):
         low=0,
         high=1000,
     )
-    thin_to: int | str = parameter(
+    thin_to: int | Literal["auto", "all"] = parameter(
         "auto",
         "Most points to contract; the others are merged into a near one, which takes over their mass. Of more than "
         "four times as many, a sample from a grid says where the surface is, and the others only belong to a vertex. "
@@ -154,7 +136,7 @@ class RingBuilder(Filter[Contraction]):
         unit="passes",
         low=0,
     )
-    frame: str = parameter(
+    frame: Literal["spread", "box"] = parameter(
         "spread",
         "What lengths in percent refer to, and the frame in which the weights are stated: the box with the spread of "
         "the points, which turns with them, or the axis-aligned bounding box, as published.",
@@ -165,7 +147,7 @@ class RingBuilder(Filter[Contraction]):
         False, "Drop points with NaN or infinite coordinates instead of refusing.", type="bool"
     )
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         # as plain numbers they can be compared, printed and written to files
         if not isinstance(self.k, (int, str)):
             given = search_parameters(self.k)
@@ -177,190 +159,82 @@ class RingBuilder(Filter[Contraction]):
             for name, value in given.items():
                 object.__setattr__(self, name, value)
 
-    def _run(self, cloud, watch):
+    def _run(self, cloud: Any, watch: Watch | None) -> Contraction:
         points = cloud_points(cloud)
-        finite = self._finite(points)
-        good = points if finite.all() else points[finite]
-        most = self._number(len(good))
+        finite = finite_points(points, self.drop_invalid)
+        given = points if finite.all() else points[finite]
+        most = self._most(len(given))
         # a radius is in terms of the spacing that the cloud came with
-        sample, stands_for, counts = _sample(good, 2 * most if self.radius is None else len(good))
-        frame, surface, row, stray = self._without_outliers(good[sample], counts)
-        surface, into = self._averaged(surface)
-        row = into[row]
-        surface, into, alone = self._denoised(surface)
-        row, stray = into[row], stray | alone[row]
-        survivors, owner, neighbours = self._thinned(surface, most)
-        n, positions, axes = len(survivors), surface.points[survivors], plane_axes(surface.across[survivors])
-        rings = star_rings(positions, np.arange(n), self._within(positions, neighbours[:, 1:], frame), axes)
-        row_of_point, outlier, witness = (
-            np.full(len(points), -1),
-            np.zeros(len(points), bool),
-            np.zeros(len(points), bool),
-        )
-        row_of_point[finite], outlier[finite] = row[stands_for], stray[stands_for]
-        witness[np.flatnonzero(finite)[sample]] = ~stray
-        return Contraction(
-            points=points,
-            row_of_point=row_of_point,
-            outlier=outlier,
-            witness=witness,
-            frame=frame,
-            cloud=surface.points,
-            noise=surface.noise,
-            normals=surface.normals,
-            survivors=survivors,
-            owner=owner,
-            mass=np.bincount(owner, surface.merged) * (n / surface.merged.sum()),
-            **at_rest(positions, rings),
-            report=Report(
-                n_input=len(points),
-                n_dropped=int((~finite).sum()),
-                n_outliers=int(outlier.sum()),
-                n_sampled=len(sample),
-                n_distinct=int(surface.merged.sum()),
-                n_contracted=n,
-            ),
-        )
+        sample = sample_cloud(given, 2 * most if self.radius is None else len(given))
+        surface = set_aside_outliers(given[sample.kept], sample.counts, self.frame, self._k, self.outlier_factor)
+        if self.denoise and self._may_merge:
+            surface = average_noise(surface, self._k)
+        surface = denoise(surface, self.denoise, self.outlier_factor > 0)
+        thinned = thin_surface(surface, self.around if self._may_merge else 0, most, self._k)
+        return _contraction(points, finite, sample, surface, thinned, self._rings(surface, thinned))
 
-    def _without_outliers(self, points, counts):
-        """Frame and surface of the distinct points but outliers, the row of or nearest to each point, the outliers."""
-        frame, cloud, row, weight, distance, neighbours = self._distinct(points, counts)
-        stray = np.zeros(len(points), bool)
-        if self.outlier_factor:
-            found = np.ones(len(cloud), bool)
-            found[without_outliers(cloud, weight, distance, neighbours, self.outlier_factor, MIN_POINTS)] = False
-            stray = found[row]
-        if stray.any():
-            frame, cloud, row[~stray], weight, _, neighbours = self._distinct(points[~stray], counts[~stray])
-            row[stray] = cKDTree(cloud).query(frame.into(points[stray]))[1]
-        return frame, _Surface.of(cloud, neighbours, weight, np.ones(len(cloud))), row, stray
+    def _rings(self, surface: Surface, thinned: Thinned) -> Rings:
+        """Delaunay stars among the neighbours within the radius, in the planes of the neighbourhoods."""
+        positions, axes = surface.points[thinned.survivors], plane_axes(surface.ring_normals[thinned.survivors])
+        neighbours = thinned.neighbours[:, 1:]
+        if self.radius is not None:
+            frame = surface.frame
+            radius = resolve_length(self.radius, frame.diagonal * frame.scale) / frame.scale
+            neighbours = self._within(radius, positions, neighbours)
+        return star_rings(positions, np.arange(len(positions)), neighbours, axes)
 
-    def _averaged(self, surface):
-        """The surface with means in the place of noisy points while there are plenty, and the row each went into."""
-        row = np.arange(len(surface.points))
-        while self.denoise and self._may_merge and np.count_nonzero(surface.noise) >= 2 * PLENTY:
-            noisy = surface.points, surface.neighbours, surface.noise, surface.weight
-            into, mean, weight = average_noisy(*noisy, PLENTY)
-            if len(mean) > STEADY * len(into):
-                break
-            neighbours = nearest_neighbours(mean, self._neighbours(len(mean)))[1]
-            surface, row = _Surface.of(mean, neighbours, weight, np.bincount(into, surface.merged)), into[row]
-        return surface, row
-
-    def _denoised(self, surface):
-        """The surface drawn to its ridges, without points that now stand alone; the row nearest to each; the alone."""
-        everybody, alone = np.arange(len(surface.points)), np.zeros(len(surface.points), bool)
-        if not (self.denoise and surface.noise.any()):
-            return surface, everybody, alone
-        calm, k = to_ridges(surface.points, surface.noise, self.denoise, surface.weight), surface.neighbours.shape[1]
-        distance, neighbours = nearest_neighbours(calm, k)
-        found = isolation(distance[:, 1:].mean(axis=1), neighbours) > ALONE
-        found &= (surface.noise > FAIRLY_NOISY) & (self.outlier_factor > 0)
-        if 0 < found.sum() <= len(calm) - max(k, MIN_POINTS):
-            alone = found
-        left, nearest = np.flatnonzero(~alone), np.cumsum(~alone) - 1
-        if len(left) < len(calm):
-            nearest[alone] = cKDTree(calm[left]).query(calm[alone])[1]
-            calm, neighbours = calm[left], nearest_left(calm, neighbours, ~alone, k)
-        spread, across = principal(calm, neighbours)
-        # a ridge has no normals: those of the surface as it came
-        noise, normals = surface.noise[left], surface.normals[left]
-        ridge = _Surface(calm, neighbours, surface.weight[left], surface.merged[left], noise, normals, spread, across)
-        return ridge, nearest, alone
-
-    def _thinned(self, surface, most):
-        """Rows of the points to contract, the one of these that stands for each point, and their neighbours."""
-        cloud, neighbours, spread = surface.points, surface.neighbours, surface.spread
-        left, owner = np.arange(len(cloud)), np.arange(len(cloud))
-
-        def merge(into, kept):
-            rows, rank = left[kept], np.cumsum(kept) - 1
-            return rows, rank[into][owner], nearest_left(cloud[left], neighbours, kept, self._neighbours(len(rows)))
-
-        while self.around and self._may_merge and len(left) >= FEW:
-            into = thin_smooth(cloud[left], neighbours, spread, self.around)
-            kept = into == np.arange(len(into))
-            if np.count_nonzero(kept) > STEADY * len(into):
-                break
-            left, owner, neighbours = merge(into, kept)
-            if len(left) < ENOUGH:
-                break
-            spread = principal(cloud[left], neighbours)[0]
-        if most < len(left):
-            into = thin(cloud[left], neighbours, most)
-            left, owner, neighbours = merge(into, into == np.arange(len(into)))
-        return left, owner, neighbours
-
-    def _within(self, cloud, neighbours, frame):
-        """The neighbours without those beyond the radius, which become -1."""
-        if self.radius is None:
-            return neighbours
-        radius = resolve_length(self.radius, frame.diagonal * frame.scale) / frame.scale
-        far = ((cloud[neighbours] - cloud[:, None]) ** 2).sum(axis=2) > radius**2
-        alone = np.count_nonzero(far[:, LEAST_RING - 1])
-        if 2 * alone > len(cloud):
+    def _within(self, radius: float, positions: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+        """The neighbours without those beyond the radius, which become -1; but the nearest three stay."""
+        far = ((positions[neighbours] - positions[:, None]) ** 2).sum(axis=2) > radius**2
+        few = np.count_nonzero(far[:, LEAST_RING - 1])
+        if 2 * few > len(positions):
             raise InvalidParameterError(
-                f"RingBuilder.radius = {self.radius!r}: {alone} of {len(cloud)} points have fewer than {LEAST_RING} "
+                f"RingBuilder.radius = {self.radius!r}: {few} of {len(positions)} points have fewer than {LEAST_RING} "
                 "neighbours so near; is it in the cloud's units?"
             )
         far[:, :LEAST_RING] = False
         return np.where(far, -1, neighbours)
 
     @property
-    def _may_merge(self):
+    def _may_merge(self) -> bool:
         return self.radius is None and self.thin_to != "all"
 
-    def _neighbours(self, n):
-        return min({"auto": usual_k, "published": published_k}[self.k](n) if isinstance(self.k, str) else self.k, n)
+    def _k(self, n: int) -> int:
+        rules: dict[Any, Any] = {"auto": default_k, "published": published_k}
+        return min(rules[self.k](n) if self.k in rules else self.k, n)
 
-    def _number(self, n):
-        return {"auto": usual_number(n), "all": n}[self.thin_to] if isinstance(self.thin_to, str) else self.thin_to
+    def _most(self, n: int) -> int:
+        return {"auto": default_size(n), "all": n}[self.thin_to] if isinstance(self.thin_to, str) else self.thin_to
 
-    def _finite(self, points):
-        finite = np.isfinite(points).all(axis=1)
-        dropped = int(len(points) - finite.sum())
-        if dropped and not self.drop_invalid:
-            raise InvalidCloudError(
-                f"{dropped} of {len(points)} points have NaN or infinite coordinates, the first at index "
-                f"{int(np.argmin(finite))}: drop them with RingBuilder(drop_invalid=True), or remove them first"
-            )
-        return finite
 
-    def _distinct(self, points, counts):
-        """Frame, distinct points in Morton order, row of each point, counts, distances and rows of their neighbours."""
-        if len(points) < MIN_POINTS:
-            raise InvalidCloudError(
-                f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones"
-            )
-        with np.errstate(over="ignore"):
-            extent = np.ptp(points, axis=0).max()
-        if extent == 0:
-            raise InvalidCloudError(f"all {len(points)} points coincide: there is nothing to skeletonise")
-        if not SMALLEST < extent < LARGEST:
-            raise InvalidCloudError(f"the cloud is {extent:g} long, too extreme for its squares: rescale it")
-        frame = Frame.of(points, self.frame)
-        scaled = frame.into(points)
-        order = morton_order(scaled)
-        cloud, row = scaled[order], np.empty(len(points), int)
-        row[order] = np.arange(len(points))
-        k = self._neighbours(len(cloud))
-        distance, neighbours = nearest_neighbours(cloud, k)
-        if distance[:, 1].min() < COINCIDENT:
-            cells = np.round(cloud / COINCIDENT).astype(np.int64)
-            first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)[1:]
-            if len(first) < MIN_POINTS:
-                raise InvalidCloudError(
-                    f"{len(points)} points but only {len(first)} distinct ones: a skeleton needs at least {MIN_POINTS}"
-                )
-            # Anew: the frame is that of the distinct points, however often they came.
-            distinct = points[order[first]]
-            frame = Frame.of(distinct, self.frame)
-            cloud = frame.into(distinct)
-            order = morton_order(cloud)
-            position = np.empty(len(cloud), int)
-            position[order] = np.arange(len(cloud))
-            cloud, row = cloud[order], position[inverse.reshape(-1)[row]]
-            distance, neighbours = nearest_neighbours(cloud, self._neighbours(len(cloud)))
-        weight = np.empty(len(cloud))
-        weight[row] = counts
-        return frame, cloud, row, weight, distance, neighbours
+def _contraction(
+    points: np.ndarray, finite: np.ndarray, sample: Sample, surface: Surface, thinned: Thinned, rings: Rings
+) -> Contraction:
+    """What flows on: nothing has moved yet."""
+    representative, outlier, sampled = np.full(len(points), -1), *np.zeros((2, len(points)), bool)
+    representative[finite] = surface.representative[sample.representative]
+    outlier[finite] = surface.outlier[sample.representative]
+    sampled[np.flatnonzero(finite)[sample.kept]] = ~surface.outlier
+    n = len(rings)
+    return Contraction(
+        points=points,
+        row_of_point=representative,
+        outlier=outlier,
+        witness=sampled,
+        frame=surface.frame,
+        cloud=surface.points,
+        noise=surface.noise,
+        normals=surface.normals,
+        survivors=thinned.survivors,
+        owner=thinned.representative,
+        mass=np.bincount(thinned.representative, surface.merged) * (n / surface.merged.sum()),
+        **at_rest(surface.points[thinned.survivors], rings),
+        report=Report(
+            n_input=len(points),
+            n_dropped=int((~finite).sum()),
+            n_outliers=int(outlier.sum()),
+            n_sampled=len(sample.kept),
+            n_distinct=int(surface.merged.sum()),
+            n_contracted=n,
+        ),
+    )

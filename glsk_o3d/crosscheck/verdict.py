@@ -16,9 +16,10 @@ from ..io.meshes import mesh_arrays
 from ..numerics.mesh_rings import clean_faces, umbrellas
 from ..numerics.morton import morton_order
 from ..pipeline import Pipeline
+from ..preparation.frame import MIN_POINTS
 from ..recipes.catalogue import named_pipeline
 from ..report import REFUSED, Report
-from ..ring_builder import MIN_POINTS, RingBuilder
+from ..ring_builder import RingBuilder
 from ..skeleton import Skeleton
 from .agreement import MeshFit, RowAgreement, SkeletonAgreement, compare_rows, compare_skeletons, mesh_fit
 from .mesh_contraction import mesh_skeleton

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -19,6 +19,13 @@ class Cloud:
 
     See `cloud_points` for what counts as one.
     """
+
+
+class SearchParam(Protocol):
+    """Open3D's ``KDTreeSearchParamKNN``, ``KDTreeSearchParamRadius`` or ``KDTreeSearchParamHybrid``."""
+
+    def get_search_type(self) -> Any:
+        """Which of them it is."""
 
 
 def cloud_points(cloud: Any) -> np.ndarray:

@@ -86,7 +86,7 @@ def nearest_left(points, neighbours, left, k):
     return found
 
 
-def isolation(mean, neighbours):
+def local_outlier_ratio(mean, neighbours):
     """How much farther a point is from its neighbours than these are from theirs (after Breunig et al. 2000, LOF).
 
     Near 1 on a surface, whatever its density; an outlier has more.
@@ -155,7 +155,7 @@ def principal(points, neighbours):
     return np.maximum(values.T, 0), normals
 
 
-def fullness(spread, neighbours):
+def sphericity(spread, neighbours):
     """Least over largest principal spread, smoothed by the median: how far the surroundings fill space.
 
     Parameters

@@ -1,37 +1,138 @@
-"""Draw noisy points to the ridges of their density."""
+"""Denoise a surface: average points where there are plenty, and draw noisy ones to the ridge of their density."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..numerics.eigen import main_direction
-from ..numerics.neighbourhoods import PAIRS, fullness, nearest_neighbours
+from ..numerics.groups import group_sum
+from ..numerics.neighbourhoods import PAIRS, local_outlier_ratio, nearest_left, nearest_neighbours, principal
+from ..numerics.pairing import merge_nearest
 from ..numerics.vectors import dot
+from .frame import MIN_POINTS
+from .surface import Surface
+from .thinning import MOST_IN_ONE, STEADY_SHARE
 
-NEIGHBOURS = 32  # among which a ridge is sought: more than for rings, a noisy shell is thick
-CLEAN, NOISY = 0.2, 0.35  # scatter of clean neighbourhoods at most, and of nothing but noise
-_CHUNK = 16384
+RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
+RIDGE_CHUNK = 16384  # points at a time: memory stays flat
+ENOUGH_NOISY = 4096  # fitted: noisy points that are enough; down to about so many they are averaged
+DENOISED_RATIO, DENOISED_NOISE = 1.8, 0.2  # fitted: local outlier ratio of a denoised outlier, and its least noise
 
 
-def noise_share(spread, neighbours):
-    """How far the neighbourhoods of a cloud are noise, from 0 to 1.
-
-    That is how much they fill space: the least over the largest principal spread, smoothed by the median, is near 0 on
-    a surface and along a curve, however dense, and 1 in a ball of noise (Demantke et al. 2011, "Dimensionality based
-    scale selection in 3D lidar point clouds"); from CLEAN to NOISY it is mapped to 0 to 1.
+def average_noise(surface: Surface, k: Callable[[int], int]) -> Surface:
+    """Put means in the place of noisy points while there are plenty.
 
     Parameters
     ----------
-    spread : (n, 3) float array
-        As from `principal`.
-    neighbours : (n, k) int array
+    surface : Surface
+    k : callable
+        Neighbours to look up for so many points.
 
     Returns
     -------
-    (n,) float array
+    Surface
     """
-    return np.clip((fullness(spread, neighbours) - CLEAN) / (NOISY - CLEAN), 0, 1)
+    while np.count_nonzero(surface.noise) >= 2 * ENOUGH_NOISY:
+        representative, mean, weight = average_noisy(
+            surface.points, surface.neighbours, surface.noise, surface.weight, ENOUGH_NOISY
+        )
+        if len(mean) > STEADY_SHARE * len(representative):
+            break
+        neighbours = nearest_neighbours(mean, k(len(mean)))[1]
+        merged = np.bincount(representative, surface.merged)
+        of_sample = representative[surface.representative]
+        surface = Surface.measured(surface.frame, mean, neighbours, weight, merged, of_sample, surface.outlier)
+    return surface
 
 
-def to_ridges(points, noise, passes, weight=None):
+def denoise(surface: Surface, passes: int, set_aside: bool) -> Surface:
+    """Draw noisy points to the ridges of their density, and set aside those that then are outliers.
+
+    Parameters
+    ----------
+    surface : Surface
+    passes : int
+        See `subspace_mean_shift`.
+    set_aside : bool
+        Whether points may be set aside.
+
+    Returns
+    -------
+    Surface
+        With the normals of the surface as it came, since a ridge has none.
+    """
+    if not (passes and surface.noise.any()):
+        return surface
+    denoised = subspace_mean_shift(surface.points, surface.noise, passes, surface.weight)
+    k, outlier = surface.neighbours.shape[1], np.zeros(len(denoised), bool)
+    distance, neighbours = nearest_neighbours(denoised, k)
+    found = local_outlier_ratio(distance[:, 1:].mean(axis=1), neighbours) > DENOISED_RATIO
+    found &= (surface.noise > DENOISED_NOISE) & set_aside
+    if 0 < found.sum() <= len(denoised) - max(k, MIN_POINTS):
+        outlier = found
+    left, representative = np.flatnonzero(~outlier), np.cumsum(~outlier) - 1
+    if len(left) < len(denoised):
+        representative[outlier] = cKDTree(denoised[left]).query(denoised[outlier])[1]
+        denoised, neighbours = denoised[left], nearest_left(denoised, neighbours, ~outlier, k)
+    spread, ring_normals = principal(denoised, neighbours)
+    return replace(
+        surface,
+        points=denoised,
+        neighbours=neighbours,
+        weight=surface.weight[left],
+        merged=surface.merged[left],
+        noise=surface.noise[left],
+        normals=surface.normals[left],
+        spread=spread,
+        ring_normals=ring_normals,
+        representative=representative[surface.representative],
+        outlier=surface.outlier | outlier[surface.representative],
+    )
+
+
+def average_noisy(
+    points: np.ndarray, neighbours: np.ndarray, noise: np.ndarray, weight: np.ndarray, n: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Put the mean of at most four points in their place where there is noise, but keep about n of them or more.
+
+    A neighbourhood that is narrower than the noise is a ball, wherever the surface is. The mean of m points has less
+    noise, and its neighbourhood is wider.
+
+    Parameters
+    ----------
+    points : (m, 3) float array
+        All different.
+    neighbours : (m, k) int array
+        Their nearest neighbours, the point itself first.
+    noise : (m,) float array
+        Points where it is 0 stay.
+    weight : (m,) float array
+        Of every point in the mean.
+    n : int
+
+    Returns
+    -------
+    representative : (m,) int array
+        The mean that each point is in.
+    mean : (c, 3) float array
+    total : (c,) float array
+        Their weight.
+    """
+    representative = merge_nearest(
+        points, neighbours, np.where(noise > 0, min(MOST_IN_ONE, np.count_nonzero(noise) / n), 1)
+    )
+    representative = (np.cumsum(representative == np.arange(len(representative))) - 1)[representative]
+    total = np.bincount(representative, weight)
+    return representative, group_sum(weight[:, None] * points, representative, len(total)) / total[:, None], total
+
+
+def subspace_mean_shift(
+    points: np.ndarray, noise: np.ndarray, passes: int, weight: np.ndarray | None = None
+) -> np.ndarray:
     """Move points with noisy neighbourhoods to the ridge of the density; clean points stay.
 
     Mean shift across the main direction of the neighbourhood (subspace-constrained mean shift, Ozertem and Erdogmus
@@ -56,9 +157,9 @@ def to_ridges(points, noise, passes, weight=None):
         return points
     weight = np.ones(len(points)) if weight is None else weight
     moved = points.copy()
-    around = nearest_neighbours(points, min(NEIGHBOURS, len(points)), of=points[noisy])[1]
-    for start in range(0, len(noisy), _CHUNK):
-        part = slice(start, start + _CHUNK)
+    around = nearest_neighbours(points, min(RIDGE_NEIGHBOURS, len(points)), of=points[noisy])[1]
+    for start in range(0, len(noisy), RIDGE_CHUNK):
+        part = slice(start, start + RIDGE_CHUNK)
         patch, mass = points.take(around[part], axis=0), weight.take(around[part])
         step, x = noise[noisy[part], None], points[noisy[part]]
         for _ in range(passes):

@@ -1,12 +1,23 @@
-"""The working frame: the cloud centred on its bounding box, about 1.6 long."""
+"""The working frame: distinct points, centred on their bounding box, about 1.6 long, and near ones near in memory."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-SIDE = 1.6
-SLACK = 1.2  # how much larger than the cloud the contracted one may be
-FLAT = 0.01  # least half side of the box for that, over its diagonal
+from ..errors import InvalidCloudError
+from ..numerics.morton import morton_order
+from ..numerics.neighbourhoods import nearest_neighbours
+
+FRAME_SIDE = 1.6  # published: longest side of the box
+CLOUD_SLACK = 1.2  # published: how much larger than the cloud the contracted one may be
+FLAT_BOX = 0.01  # fitted: least half side of the box for that, over its diagonal
+MIN_POINTS = 8  # the least that can have rings of three and a curve
+MIN_EXTENT, MAX_EXTENT = 1e-120, 1e120  # derived: a float64 holds their squares and products
+SAME_POINT = 4e-15  # derived: a few roundings in the working frame; points nearer than this are duplicates
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +48,7 @@ class Frame:
     reach: float = 0.0
 
     @classmethod
-    def of(cls, points, by="box"):
+    def of(cls, points: np.ndarray, by: str = "box") -> Frame:
         """The frame in which the longest side of a box is 1.6.
 
         Parameters
@@ -57,7 +68,7 @@ class Frame:
         half = (high - low) / 2
         centre, longest = low + half, 2 * half.max()
         if by == "box":
-            scale = longest / SIDE
+            scale = longest / FRAME_SIDE
             return cls(centre, float(scale), half / scale, float(2 * np.linalg.norm(half / scale)))
         inner = (points - centre) / longest
         mean = inner.mean(axis=0)
@@ -65,24 +76,121 @@ class Frame:
         variance = np.linalg.eigvalsh(inner.T @ inner / len(inner))  # of a box with sides a, b, c: a^2 / 12, ...
         side, diagonal = np.sqrt(12 * np.array([variance[2], variance.sum()]))
         reach = np.sqrt((inner**2).sum(axis=1).max())
-        unit = side / SIDE
+        unit = side / FRAME_SIDE
         scale = longest * unit
         return cls(centre, float(scale), half / scale, float(diagonal / unit), mean / unit, float(reach / unit))
 
-    def beyond(self, points):
+    def beyond(self, points: np.ndarray) -> np.ndarray:
         """Points of the frame that are far out of the cloud, (n,) bool array.
 
         Out of its bounding box or, where the frame turns with the cloud, of the ball around its mean, 1.2 times as
         large.
         """
         if self.mean is None:
-            return (np.abs(points) > np.maximum(SLACK * self.half_extent, FLAT * self.diagonal)).any(axis=1)
-        return ((points - self.mean) ** 2).sum(axis=1) > (SLACK * self.reach) ** 2
+            return (np.abs(points) > np.maximum(CLOUD_SLACK * self.half_extent, FLAT_BOX * self.diagonal)).any(axis=1)
+        return ((points - self.mean) ** 2).sum(axis=1) > (CLOUD_SLACK * self.reach) ** 2
 
-    def into(self, points):
+    def into(self, points: np.ndarray) -> np.ndarray:
         """User's units to the frame."""
         return (points - self.centre) / self.scale
 
-    def out_of(self, points):
+    def out_of(self, points: np.ndarray) -> np.ndarray:
         """Frame to the user's units."""
         return points * self.scale + self.centre
+
+
+class DistinctPoints(NamedTuple):
+    """A cloud in its working frame, in Morton order and without duplicates."""
+
+    frame: Frame
+    points: np.ndarray  # (m, 3)
+    representative: np.ndarray  # (n,) of every given point its row
+    weight: np.ndarray  # (m,) points that each stands for
+    distance: np.ndarray  # (m, k) to its neighbours
+    neighbours: np.ndarray  # (m, k)
+
+
+def finite_points(points: np.ndarray, drop: bool) -> np.ndarray:
+    """Which points have finite coordinates.
+
+    Parameters
+    ----------
+    points : (N, 3) float array
+    drop : bool
+        Whether some may have none.
+
+    Returns
+    -------
+    (N,) bool array
+
+    Raises
+    ------
+    InvalidCloudError
+        Some have none, and are not to be dropped.
+    """
+    finite = np.isfinite(points).all(axis=1)
+    dropped = int(len(points) - finite.sum())
+    if dropped and not drop:
+        raise InvalidCloudError(
+            f"{dropped} of {len(points)} points have NaN or infinite coordinates, the first at index "
+            f"{int(np.argmin(finite))}: drop them with drop_invalid=True (--drop-invalid), or remove them first"
+        )
+    return finite
+
+
+def to_working_frame(points: np.ndarray, counts: np.ndarray, by: str, k: Callable[[int], int]) -> DistinctPoints:
+    """Bring a cloud into its working frame.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        In the user's units.
+    counts : (n,) float array
+        Points that each stands for.
+    by : {"box", "spread"}
+        See `Frame.of`.
+    k : callable
+        Neighbours to look up for so many points.
+
+    Returns
+    -------
+    DistinctPoints
+
+    Raises
+    ------
+    InvalidCloudError
+        Fewer than 8 distinct points, or so large or small that squares overflow.
+    """
+    if len(points) < MIN_POINTS:
+        raise InvalidCloudError(f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones")
+    with np.errstate(over="ignore"):
+        extent = np.ptp(points, axis=0).max()
+    if extent == 0:
+        raise InvalidCloudError(f"all {len(points)} points coincide: there is nothing to skeletonise")
+    if not MIN_EXTENT < extent < MAX_EXTENT:
+        raise InvalidCloudError(f"the cloud is {extent:g} long, too extreme for its squares: rescale it")
+    frame = Frame.of(points, by)
+    scaled = frame.into(points)
+    order = morton_order(scaled)
+    cloud, representative = scaled[order], np.empty(len(points), int)
+    representative[order] = np.arange(len(points))
+    distance, neighbours = nearest_neighbours(cloud, k(len(cloud)))
+    if distance[:, 1].min() < SAME_POINT:
+        cells = np.round(cloud / SAME_POINT).astype(np.int64)
+        first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)[1:]
+        if len(first) < MIN_POINTS:
+            raise InvalidCloudError(
+                f"{len(points)} points but only {len(first)} distinct ones: a skeleton needs at least {MIN_POINTS}"
+            )
+        # Anew: the frame is that of the distinct points, however often they came.
+        distinct = points[order[first]]
+        frame = Frame.of(distinct, by)
+        cloud = frame.into(distinct)
+        order = morton_order(cloud)
+        position = np.empty(len(cloud), int)
+        position[order] = np.arange(len(cloud))
+        cloud, representative = cloud[order], position[inverse.reshape(-1)[representative]]
+        distance, neighbours = nearest_neighbours(cloud, k(len(cloud)))
+    weight = np.empty(len(cloud))
+    weight[representative] = counts
+    return DistinctPoints(frame, cloud, representative, weight, distance, neighbours)

@@ -1,23 +1,77 @@
-"""Tell outliers from the points of a surface."""
+"""Set outliers aside: single points far from all others, and clusters that float in space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..numerics.components import component_labels
-from ..numerics.neighbourhoods import isolation, nearest_neighbours, principal, row_medians
+from ..numerics.neighbourhoods import local_outlier_ratio, nearest_neighbours, principal, row_medians
+from .frame import MIN_POINTS, to_working_frame
+from .surface import Surface
 
-ROUNDS = 6  # since what is left of a group stands out once the rest is gone
-HOPS = 4  # from neighbour to neighbour, within which the densest place is looked for
-ADRIFT = 5.0  # times as far from its neighbours as points there are: not for a surface that is only uneven
-FEW = 0.1  # share of all points that can float at most; more are a part of the object
-WIDE = 64  # neighbours, among points far from theirs, that a limb of an object is longer than thick with
-ROUND, FULL = 0.35, 0.1  # least second and third over first principal spread of points that fill space
+# All fitted, on clouds with outliers of 1 to 10 %, sparse limbs and crowns.
+OUTLIER_ROUNDS = 6  # since what is left of a cluster stands out once the rest is gone
+DENSEST_HOPS = 4  # from neighbour to neighbour, within which the densest place is looked for
+FLOATING_RATIO = 5.0  # times as far from its neighbours as points there are: not for a surface that is only uneven
+FLOATING_SHARE = 0.1  # of all points that can float at most; more are a part of the object
+LIMB_NEIGHBOURS = 64  # among points far from theirs, that a limb of an object is longer than thick with
+# least second and third over first principal spread of points that fill space
+FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
 
 
-def without_outliers(points, weight, distance, neighbours, factor, least):
+def set_aside_outliers(
+    points: np.ndarray, counts: np.ndarray, by: str, k: Callable[[int], int], factor: float
+) -> Surface:
+    """The surface that a cloud shows without its outliers.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        In the user's units.
+    counts : (n,) float array
+        Points that each stands for.
+    by : {"box", "spread"}
+        See `glsk_o3d.preparation.frame.Frame.of`: the frame is that of the points without outliers.
+    k : callable
+        Neighbours to look up for so many points.
+    factor : float
+        See `inliers`; 0 keeps all.
+
+    Returns
+    -------
+    Surface
+        The representative of an outlier is the point nearest to it.
+
+    Raises
+    ------
+    InvalidCloudError
+        See `to_working_frame`.
+    """
+    frame, cloud, representative, weight, distance, neighbours = to_working_frame(points, counts, by, k)
+    outlier = np.zeros(len(points), bool)
+    if factor:
+        found = np.ones(len(cloud), bool)
+        found[inliers(cloud, weight, distance, neighbours, factor, MIN_POINTS)] = False
+        outlier = found[representative]
+    if outlier.any():
+        inside = ~outlier
+        frame, cloud, representative[inside], weight, _, neighbours = to_working_frame(
+            points[inside], counts[inside], by, k
+        )
+        representative[outlier] = cKDTree(cloud).query(frame.into(points[outlier]))[1]
+    return Surface.measured(frame, cloud, neighbours, weight, np.ones(len(cloud)), representative, outlier)
+
+
+def inliers(
+    points: np.ndarray, weight: np.ndarray, distance: np.ndarray, neighbours: np.ndarray, factor: float, least: int
+) -> np.ndarray:
     """The points left when those far from all others are set aside, round by round.
 
     An outlier is `factor` times farther from its neighbours than these are from theirs. Where there are many, its
-    neighbours are outliers, too; then what floats in space goes, see `adrift`.
+    neighbours are outliers, too; then what floats in space goes, see `in_floating_cluster`.
 
     Parameters
     ----------
@@ -37,12 +91,12 @@ def without_outliers(points, weight, distance, neighbours, factor, least):
         Rows, ascending.
     """
     left = np.arange(len(points))
-    for _ in range(ROUNDS):
+    for _ in range(OUTLIER_ROUNDS):
         # as near as the neighbours would be if all were there
         mean = distance[:, 1:].mean(axis=1) / np.sqrt(weight[left].take(neighbours).mean(axis=1))
-        found = isolation(mean, neighbours) > factor
-        if (mean > ADRIFT * np.quantile(mean, 0.05)).any():
-            found |= adrift(points[left], weight[left], mean, neighbours)
+        found = local_outlier_ratio(mean, neighbours) > factor
+        if (mean > FLOATING_RATIO * np.quantile(mean, 0.05)).any():
+            found |= in_floating_cluster(points[left], weight[left], mean, neighbours)
         keep = np.flatnonzero(~found)
         if len(keep) == len(left) or len(keep) < least:
             break
@@ -55,7 +109,7 @@ def without_outliers(points, weight, distance, neighbours, factor, least):
     return left
 
 
-def adrift(points, weight, mean, neighbours):
+def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Points that float in space, among others that do.
 
     They are far from their neighbours for what is some steps away, or anywhere if they are an island; and together
@@ -74,20 +128,20 @@ def adrift(points, weight, mean, neighbours):
     (n,) bool array
     """
     densest = row_medians(mean.take(neighbours))
-    for _ in range(HOPS):
+    for _ in range(DENSEST_HOPS):
         densest = densest.take(neighbours).min(axis=1)
-    island, alone = np.zeros(len(points), bool), mean > ADRIFT * np.median(mean)
-    if alone.any():
+    island, sparse = np.zeros(len(points), bool), mean > FLOATING_RATIO * np.median(mean)
+    if sparse.any():
         near = neighbours[:, 1:5]
         ends = np.column_stack([np.repeat(np.arange(len(points)), near.shape[1]), near.ravel()])
         part = component_labels(len(points), ends)
-        island = np.bincount(part, weight)[part] < FEW * weight.sum()
-    far = np.flatnonzero((mean > ADRIFT * densest) | (island & alone))
+        island = np.bincount(part, weight)[part] < FLOATING_SHARE * weight.sum()
+    far = np.flatnonzero((mean > FLOATING_RATIO * densest) | (island & sparse))
     found = np.zeros(len(points), bool)
     if len(far) > 3:
-        among = nearest_neighbours(points[far], min(WIDE, len(far)))[1]
+        among = nearest_neighbours(points[far], min(LIMB_NEIGHBOURS, len(far)))[1]
         third, second, first = principal(points[far], among)[0].T
-        found[far] = (second > ROUND * first) & (third > FULL * first)
+        found[far] = (second > FILLED_SECOND * first) & (third > FILLED_THIRD * first)
     if island.any():
-        found |= island & alone & (np.bincount(part)[part] < WIDE)
-    return found & (weight[found].sum() < FEW * weight.sum())
+        found |= island & sparse & (np.bincount(part)[part] < LIMB_NEIGHBOURS)
+    return found & (weight[found].sum() < FLOATING_SHARE * weight.sum())

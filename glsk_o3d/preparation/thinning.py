@@ -1,22 +1,76 @@
-"""Thin a cloud."""
+"""Thin a surface: where there are more points than it takes, and where there are too many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from ..numerics.groups import group_sum
-from ..numerics.neighbourhoods import fullness, nearest_left
+from ..numerics.neighbourhoods import nearest_left, principal, sphericity
+from ..numerics.pairing import final_representatives, merge_nearest, mutual_pairs
+from .surface import Surface
 
-MOST = 4  # points that one may stand for after a pass, where there are more than enough
-WORTH = 0.01  # share of the points that another round must merge
-SPARSE = 0.25  # share of the points left, below which the neighbours are looked up anew
+MOST_IN_ONE = 4  # fitted: points that one may stand for after a pass, where there are more than enough
+ASK_AGAIN = 0.25  # measured: share of the points left, below which the neighbours are looked up anew
+THIN_FROM, THIN_TO = 1000, 8192  # fitted: points from which on, and down to which, more than enough are merged
+STEADY_SHARE = 0.9  # fitted: share of the points left by a pass at which passes end
 
 
-def thin(points, neighbours, n):
+class Thinned(NamedTuple):
+    """The points to contract."""
+
+    survivors: np.ndarray  # (n,) rows of the surface
+    representative: np.ndarray  # (m,) for every point of the surface the position in `survivors` of what it went into
+    neighbours: np.ndarray  # (n, k) among the survivors
+
+
+def thin_surface(surface: Surface, around: float, most: int, k: Callable[[int], int]) -> Thinned:
+    """Merge points where there are more than enough, and then until no more than `most` are left.
+
+    Parameters
+    ----------
+    surface : Surface
+    around : float
+        Points around a part that are enough, see `thin_dense`; 0 merges none for this.
+    most : int
+    k : callable
+        Neighbours to have among so many points.
+
+    Returns
+    -------
+    Thinned
+    """
+    points, spread = surface.points, surface.spread
+    survivors, representative, neighbours = np.arange(len(points)), np.arange(len(points)), surface.neighbours
+
+    def merge(into: np.ndarray, kept: np.ndarray) -> Thinned:
+        rows, rank = survivors[kept], np.cumsum(kept) - 1
+        left = nearest_left(points[survivors], neighbours, kept, k(len(rows)))
+        return Thinned(rows, rank[into][representative], left)
+
+    while around and len(survivors) >= THIN_FROM:
+        into = thin_dense(points[survivors], neighbours, spread, around)
+        kept = into == np.arange(len(into))
+        if np.count_nonzero(kept) > STEADY_SHARE * len(into):
+            break
+        survivors, representative, neighbours = merge(into, kept)
+        if len(survivors) < THIN_TO:
+            break
+        spread = principal(points[survivors], neighbours)[0]
+    if most < len(survivors):
+        into = thin(points[survivors], neighbours, most)
+        survivors, representative, neighbours = merge(into, into == np.arange(len(into)))
+    return Thinned(survivors, representative, neighbours)
+
+
+def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:
     """Merge mutual nearest neighbours, round by round, in the last one the nearest, until n points are left.
 
     Gaps stay smaller than in a random sample, and dense parts stay dense: scanners and meshes have them where there is
-    detail. No point moves. It does not depend on the
-    order of the points, nor on how they are turned, but where distances are equal: on grids a point's nearest neighbour
-    is any of several, and more than n points may be left because no two choose each other.
+    detail. No point moves. It does not depend on the order of the points, nor on how they are turned, but where
+    distances are equal: on grids a point's nearest neighbour is any of several, and more than n points may be left
+    because no two choose each other.
 
     Parameters
     ----------
@@ -33,26 +87,26 @@ def thin(points, neighbours, n):
         The point that each was merged into; itself for those that are left.
     """
     left = np.ones(len(points), bool)
-    into = np.arange(len(points))
-    while SPARSE * len(points) < left.sum() > n:
-        keeper, swallowed = _mutual(points, neighbours, left)
-        if len(keeper) == 0:
+    representative = np.arange(len(points))
+    while ASK_AGAIN * len(points) < left.sum() > n:
+        kept, swallowed = mutual_pairs(points, neighbours, left)
+        if len(kept) == 0:
             break
         most = left.sum() - n
-        if len(keeper) > most:
-            nearest = np.argsort(((points[keeper] - points[swallowed]) ** 2).sum(axis=1), kind="stable")[:most]
-            keeper, swallowed = keeper[nearest], swallowed[nearest]
-        into[swallowed] = keeper
+        if len(kept) > most:
+            nearest = np.argsort(((points[kept] - points[swallowed]) ** 2).sum(axis=1), kind="stable")[:most]
+            kept, swallowed = kept[nearest], swallowed[nearest]
+        representative[swallowed] = kept
         left[swallowed] = False
-    into = _ends(into)
+    representative = final_representatives(representative)
     rows = np.flatnonzero(left)
     if n < len(rows) < len(points):
         around = nearest_left(points, neighbours, left, min(neighbours.shape[1], len(rows)))
-        into = rows[thin(points[rows], around, n)][(np.cumsum(left) - 1)[into]]
-    return into
+        representative = rows[thin(points[rows], around, n)][(np.cumsum(left) - 1)[representative]]
+    return representative
 
 
-def thin_smooth(points, neighbours, spread, around):
+def thin_dense(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray, around: float) -> np.ndarray:
     r"""Merge mutual nearest neighbours, at most four into one, where the surface has more points than it takes.
 
     A disc of k points of a tube with N points around it rises above its plane by :math:`\sigma_1 / \sigma_3 =
@@ -78,89 +132,5 @@ def thin_smooth(points, neighbours, spread, around):
         The point that each was merged into; itself for those that are left.
     """
     needed = np.pi * neighbours.shape[1] / (4 * max(around, 1) ** 2)
-    most = np.minimum(needed / np.maximum(fullness(spread, neighbours), needed / MOST), MOST)
+    most = np.minimum(needed / np.maximum(sphericity(spread, neighbours), needed / MOST_IN_ONE), MOST_IN_ONE)
     return merge_nearest(points, neighbours, most)
-
-
-def average_noisy(points, neighbours, noise, weight, n):
-    """Put the mean of at most four points in their place where there is noise, but keep about n of them or more.
-
-    A neighbourhood that is narrower than the noise is a ball, wherever the surface is. The mean of m points has less
-    noise, and its neighbourhood is wider.
-
-    Parameters
-    ----------
-    points : (m, 3) float array
-        All different.
-    neighbours : (m, k) int array
-        Their nearest neighbours, the point itself first.
-    noise : (m,) float array
-        Points where it is 0 stay.
-    weight : (m,) float array
-        Of every point in the mean.
-    n : int
-
-    Returns
-    -------
-    into : (m,) int array
-        The mean that each point is in.
-    mean : (c, 3) float array
-    total : (c,) float array
-        Their weight.
-    """
-    into = merge_nearest(points, neighbours, np.where(noise > 0, min(MOST, np.count_nonzero(noise) / n), 1))
-    into = (np.cumsum(into == np.arange(len(into))) - 1)[into]
-    total = np.bincount(into, weight)
-    return into, group_sum(weight[:, None] * points, into, len(total)) / total[:, None], total
-
-
-def merge_nearest(points, neighbours, most):
-    """Merge mutual nearest neighbours, round by round, as long as it is worth it.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-        All different.
-    neighbours : (n, k) int array
-        Their nearest neighbours, the point itself first.
-    most : (n,) float array
-        Points that may become one with each, itself included.
-
-    Returns
-    -------
-    (n,) int array
-        The point that each was merged into; itself for those that are left.
-    """
-    left, into, mass = np.ones(len(points), bool), np.arange(len(points)), np.ones(len(points))
-    while True:
-        keeper, swallowed = _mutual(points, neighbours, left & (mass + 1 <= most))
-        both = mass[keeper] + mass[swallowed]
-        fine = both <= np.minimum(most[keeper], most[swallowed])
-        if np.count_nonzero(fine) < WORTH * len(points):
-            return _ends(into)
-        keeper, swallowed = keeper[fine], swallowed[fine]
-        into[swallowed], mass[keeper] = keeper, both[fine]
-        left[swallowed] = False
-
-
-def _ends(into):
-    while (into != into[into]).any():
-        into = into[into]
-    return into
-
-
-def _mutual(points, neighbours, left):
-    """Pairs of points left that are each other's nearest; of each pair the one with more room around it is kept."""
-    rows = np.flatnonzero(left)
-    candidates = neighbours[rows, 1:]
-    there = left.take(candidates)
-    first = np.argmax(there, axis=1)
-    found = there[np.arange(len(rows)), first]
-    nearest = np.full(len(points), -1)
-    nearest[rows[found]] = candidates[found, first[found]]
-    one = rows[found]
-    one = one[(nearest[nearest[one]] == one) & (one < nearest[one])]
-    other = nearest[one]
-    room = [((points[neighbours[p, -1]] - points[p]) ** 2).sum(axis=1) for p in (one, other)]
-    swap = room[1] > room[0]
-    return np.where(swap, other, one), np.where(swap, one, other)
