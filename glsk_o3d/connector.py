@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -15,13 +15,13 @@ from .numerics.neighbourhoods import nearest_neighbours, row_medians, uprightnes
 from .numerics.radii import plane_distance_radii
 from .numerics.vectors import norm
 from .parameters import documented, parameter, resolve_length
-from .pipeline import Filter
+from .pipeline import Filter, Watch
 from .skeleton import Skeleton
 from .state import Contraction
 
-NOISY = 0.3  # share of noise from which on a vertex may be stray
-FACING = 0.1  # uprightness of two normals below which their surfaces face each other
-CALM = 0.2  # share of noise below which that counts
+UNSUPPORTED_NOISE = 0.3  # fitted: share of noise from which on a vertex may be dropped
+FACING_UPRIGHTNESS = 0.1  # fitted: uprightness of two normals below which their surfaces face each other
+FACING_NOISE = 0.2  # fitted: share of noise below which that counts
 
 
 @documented
@@ -70,7 +70,7 @@ class Connector(Filter[Skeleton]):
         type="float",
         low=0,
     )
-    links: str = parameter(
+    links: Literal["all", "nearest"] = parameter(
         "all",
         "Join a point's vertex with those of all its foreign ring neighbours (but where two surfaces face each other), "
         "or of the nearest one only.",
@@ -78,7 +78,7 @@ class Connector(Filter[Skeleton]):
         choices=("all", "nearest"),
     )
 
-    stray: float = parameter(
+    min_support: float = parameter(
         0.1,
         "Where the cloud is noisy, vertices with less than this share of the points of another at most two edges away "
         "are dropped, unless they hold parts together. 0 keeps all.",
@@ -87,34 +87,34 @@ class Connector(Filter[Skeleton]):
         high=1,
     )
 
-    def _run(self, state, watch):
+    def _run(self, state: Contraction, watch: Watch | None) -> Skeleton:
         radius = resolve_length(self.radius, state.frame.diagonal * state.frame.scale) / state.frame.scale
-        radii = np.maximum(radius, self.thickness * local_thickness(state))
-        samples, owner = farthest_point_sampling(state.positions, radii)
-        mass = group_sum(state.mass, owner, len(samples))[:, None]
-        vertices = group_sum(state.mass[:, None] * state.positions, owner, len(samples)) / mass
+        radii = np.maximum(radius, self.thickness * contraction_distance(state))
+        samples, vertex_of_survivor = farthest_point_sampling(state.positions, radii)
+        mass = group_sum(state.mass, vertex_of_survivor, len(samples))[:, None]
+        weighted = state.mass[:, None] * state.positions
+        vertices = state.frame.out_of(group_sum(weighted, vertex_of_survivor, len(samples)) / mass)
         survivor = state.survivor_of_point
-        vertex_of_point = np.where(survivor >= 0, owner[survivor], -1)
+        vertex_of_point = np.where(survivor >= 0, vertex_of_survivor[survivor], -1)
         normals = np.full_like(state.points, np.nan)
         normals[state.witness] = state.normals[state.row_of_point[state.witness]]
-        vertices = state.frame.out_of(vertices)
         skeleton = Skeleton(
             vertices=vertices,
-            edges=self._edges(state, owner),
+            edges=self._edges(state, vertex_of_survivor),
             radii=plane_distance_radii(vertices, vertex_of_point, state.points, normals),
             vertex_of_point=vertex_of_point,
             points=state.points,
             normals=normals,
             report=state.report,
         )
-        vertex_of_row = owner[state.owner]
+        vertex_of_row = vertex_of_survivor[state.owner]
         count = np.bincount(vertex_of_row, minlength=len(samples))
         noise = np.bincount(vertex_of_row, state.noise, len(samples)) / np.maximum(count, 1)
-        return drop_stray(skeleton, count, (noise > NOISY) & (self.stray > 0), self.stray)
+        return drop_unsupported(skeleton, count, (noise > UNSUPPORTED_NOISE) & (self.min_support > 0), self.min_support)
 
-    def _edges(self, state, owner):
+    def _edges(self, state: Contraction, vertex_of_survivor: np.ndarray) -> np.ndarray:
         rings = state.rings
-        a, b = owner[rings.owners], owner[rings.indices]
+        a, b = vertex_of_survivor[rings.centres], vertex_of_survivor[rings.indices]
         link = a != b
         if self.links == "all":
             link &= ~across_gaps(state)
@@ -122,11 +122,11 @@ class Connector(Filter[Skeleton]):
             length = np.where(link, rings.edge_lengths(state.positions), np.inf)
             link &= length == np.repeat(np.minimum.reduceat(length, rings.indptr[:-1]), rings.sizes)
         a, b = a[link], b[link]
-        m = owner.max() + 1
+        m = vertex_of_survivor.max() + 1
         return np.column_stack(np.divmod(np.unique(np.minimum(a, b) * m + np.maximum(a, b)), m))
 
 
-def across_gaps(state):
+def across_gaps(state: Contraction) -> np.ndarray:
     """Ring links between surfaces that face each other: between them is air, or the inside of a part.
 
     Parameters
@@ -138,13 +138,13 @@ def across_gaps(state):
     (r,) bool array
         For every entry of the rings; only where there is no noise, since it spoils the normals.
     """
-    p, q = state.survivors[state.rings.owners], state.survivors[state.rings.indices]
-    facing = uprightness(state.cloud, state.normals, p, q) < FACING
-    return facing & (np.maximum(state.noise[p], state.noise[q]) < CALM)
+    p, q = state.survivors[state.rings.centres], state.survivors[state.rings.indices]
+    facing = uprightness(state.cloud, state.normals, p, q) < FACING_UPRIGHTNESS
+    return facing & (np.maximum(state.noise[p], state.noise[q]) < FACING_NOISE)
 
 
-def drop_stray(skeleton, count, noisy, share):
-    """Drop the vertices of stray points, which noise leaves between parts and contraction leaves there.
+def drop_unsupported(skeleton: Skeleton, count: np.ndarray, noisy: np.ndarray, share: float) -> Skeleton:
+    """Drop the vertices that few points support: what noise leaves between parts, and contraction leaves there.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def drop_stray(skeleton, count, noisy, share):
     noisy : (M,) bool array
         Vertices that may be dropped.
     share : float
-        Points of a stray vertex over those of another at most two edges away, at most. Adjoining stray vertices that
+        Points of such a vertex over those of another at most two edges away, at most. Adjoining ones that
         hold other parts together stay.
 
     Returns
@@ -169,29 +169,29 @@ def drop_stray(skeleton, count, noisy, share):
         around = most.copy()
         np.maximum.at(around, ends, most[others])
         most = around
-    stray = noisy & (count < share * most)
-    if not stray.any():
+    few = noisy & (count < share * most)
+    if not few.any():
         return skeleton
-    parts, groups = (component_labels(m, edges[kept[edges].all(axis=1)]) for kept in (~stray, stray))
-    border = stray[ends] & ~stray[others]
+    parts, groups = (component_labels(m, edges[kept[edges].all(axis=1)]) for kept in (~few, few))
+    border = few[ends] & ~few[others]
     held = np.unique(np.column_stack([groups[ends[border]], parts[others[border]]]), axis=0)[:, 0]
-    dropped = stray & (np.bincount(held, minlength=m)[groups] == 1)
+    dropped = few & (np.bincount(held, minlength=m)[groups] == 1)
     left = np.flatnonzero(~dropped)
-    nearest = np.cumsum(~dropped) - 1
-    nearest[dropped] = cKDTree(skeleton.vertices[left]).query(skeleton.vertices[dropped])[1]
-    owner = skeleton.vertex_of_point
+    representative = np.cumsum(~dropped) - 1
+    representative[dropped] = cKDTree(skeleton.vertices[left]).query(skeleton.vertices[dropped])[1]
+    vertex = skeleton.vertex_of_point
     return replace(
         skeleton,
         vertices=skeleton.vertices[left],
-        edges=nearest[edges[~dropped[edges].any(axis=1)]],
+        edges=representative[edges[~dropped[edges].any(axis=1)]],
         radii=skeleton.radii[left],
         confidence=skeleton.confidence[left],
-        vertex_of_point=np.where(owner >= 0, nearest[owner], -1),
-        normals=np.where(((owner >= 0) & dropped[owner])[:, None], np.nan, skeleton.normals),
+        vertex_of_point=np.where(vertex >= 0, representative[vertex], -1),
+        normals=np.where(((vertex >= 0) & dropped[vertex])[:, None], np.nan, skeleton.normals),
     )
 
 
-def local_thickness(state):
+def contraction_distance(state: Contraction) -> np.ndarray:
     """Median distance of the input points that each survivor speaks for to where it was contracted, smoothed over 16.
 
     Parameters
@@ -203,7 +203,6 @@ def local_thickness(state):
     (n,) float array
         In the working frame.
     """
-    distance = norm(state.cloud - state.positions[state.owner])
-    thickness = group_median(distance, state.owner, len(state))
+    distance = group_median(norm(state.cloud - state.positions[state.owner]), state.owner, len(state))
     _, neighbours = nearest_neighbours(state.positions, min(16, len(state)))
-    return row_medians(thickness.take(neighbours))
+    return row_medians(distance.take(neighbours))

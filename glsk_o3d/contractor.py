@@ -5,22 +5,24 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from .numerics.cotangent import cotangent_laplacian
 from .numerics.eigen import largest_eigenvalue
-from .numerics.neighbourhoods import PAIRS
+from .numerics.rings import Rings
 from .numerics.solver import SolveError, solve_contraction
+from .numerics.vectors import PAIRS, TINY
 from .parameters import documented, parameter
-from .pipeline import Filter
-from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord
+from .pipeline import Filter, Watch
+from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord, Report
 from .state import Contraction
 from .stopping import ExplainedScore, StopRule
 
-LINE = 0.99  # linearity that counts as a line
-SELF = 4  # neighbours that a point counts as in its own surroundings
+LINE_VARIANCE = 0.99  # fitted: explained variance that counts as a line
+OWN_WEIGHT = 4  # fitted: neighbours that a point counts as in its own surroundings
 
 
 @documented
@@ -96,7 +98,7 @@ class Contractor(Filter[Contraction]):
     )
     max_attraction: float = parameter(1e4, "Cap of W_H.", type="float", low=0, open_low=True)
 
-    def _run(self, state, watch):
+    def _run(self, state: Contraction, watch: Watch | None) -> Contraction:
         reducer = self.reducer
         for _ in range(self.max_iterations):
             start = time.perf_counter()
@@ -121,14 +123,17 @@ class Contractor(Filter[Contraction]):
                 return _finished(kept, reason, converged=True)
         return _finished(state, f"reached max_iterations = {self.max_iterations}")
 
-    def _solve(self, state):
+    def _solve(self, state: Contraction) -> tuple[Contraction, dict[str, Any]]:
         """One contraction step: equations 3 to 5."""
         contraction = state.contraction_weight * self.amplification or self.initial_contraction / state.mean_ring_edge
-        contraction = min(contraction, self.max_contraction)
+        contraction = min(contraction, self.max_contraction)  # Wen (4)
         with np.errstate(divide="ignore"):
-            attraction = state.ring_size0 / state.ring_size
+            attraction = state.ring_size0 / state.ring_size  # Wen (5)
         if self.line_hold > 1 and state.report.iterations:
-            attraction = np.where(linearity(state.positions, state.rings) > LINE, self.line_hold, 1) * attraction
+            attraction = (
+                np.where(explained_variance(state.positions, state.rings) > LINE_VARIANCE, self.line_hold, 1)
+                * attraction
+            )
         attraction = np.clip(attraction, self.min_attraction, self.max_attraction)
         laplacian = self._laplacian(state)
         mass = np.sqrt(state.mass)
@@ -138,7 +143,7 @@ class Contractor(Filter[Contraction]):
             state,
             positions=positions,
             previous=state.positions,
-            laplacian_coordinates=laplacian @ state.positions,
+            laplacian_coordinates=laplacian @ state.positions,  # Wen (2)
             ring_size=ring_size,
             contraction_weight=contraction,
         )
@@ -147,11 +152,18 @@ class Contractor(Filter[Contraction]):
         drop = done[-1].ring_ratio - contracted.ring_ratio if done else contracted.ring_ratio
         return replace(contracted, ring_ratio_drop=drop), facts
 
-    def _laplacian(self, state):
+    def _laplacian(self, state: Contraction) -> csr_matrix:
         """That of the current points; what has a surface of its own puts another in its place."""
         return cotangent_laplacian(state.positions, state.rings)
 
-    def _solve_in_box(self, state, laplacian, row_weight, attraction, mass):
+    def _solve_in_box(
+        self,
+        state: Contraction,
+        laplacian: csr_matrix,
+        row_weight: np.ndarray,
+        attraction: np.ndarray,
+        mass: np.ndarray,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """Solve; as long as that throws points out of the box, hold these and solve again."""
         held = np.zeros(len(state), bool)
         for _ in range(self.retries + 1):
@@ -164,7 +176,7 @@ class Contractor(Filter[Contraction]):
         raise SolveError(f"it would throw {outside.sum()} of {len(state)} points far out of the cloud")
 
 
-def linearity(points, rings):
+def explained_variance(points: np.ndarray, rings: Rings) -> np.ndarray:
     """Share of the largest principal component in the spread around every point, over two rings.
 
     The moments of a point are averaged with those of its ring, twice, and count as much as four neighbours. Rings cost
@@ -181,17 +193,17 @@ def linearity(points, rings):
         1 on a line, 0 where everything is in one place.
     """
     moments = np.stack([*points.T, *(points[:, i] * points[:, j] for i, j in PAIRS)], axis=1)
-    own = (SELF / (SELF + rings.sizes))[:, None]
+    own = (OWN_WEIGHT / (OWN_WEIGHT + rings.sizes))[:, None]
     for _ in range(2):
         moments = own * moments + (1 - own) * rings.mean_over(moments)
     mean, square = moments[:, :3].T, moments[:, 3:].T
     spread = square - [mean[i] * mean[j] for i, j in PAIRS]
     total = spread[0] + spread[3] + spread[5]
     rounding = 1e-12 * (square[0] + square[3] + square[5])  # of the differences: what is less has no direction
-    return np.where(total > rounding, largest_eigenvalue(spread) / np.maximum(total, np.finfo(float).tiny), 0)
+    return np.where(total > rounding, largest_eigenvalue(spread) / np.maximum(total, TINY), 0)
 
 
-def explained_score(points) -> float:
+def explained_score(points: np.ndarray) -> float:
     """PCA score e = (2 l1 + l2 + l3) / (2 (l1 + l2 + l3)): 1 for a line, 2/3 for a ball (Wen et al. 2024, equation 14).
 
     Parameters
@@ -204,24 +216,24 @@ def explained_score(points) -> float:
     float
     """
     offset = points - points.mean(axis=0)
-    spread = np.linalg.eigvalsh(offset.T @ offset)
-    return float((spread.sum() + spread[-1]) / (2 * spread.sum()))
+    spread = np.linalg.eigvalsh(offset.T @ offset)  # Wen (13)
+    return float((spread.sum() + spread[-1]) / (2 * spread.sum()))  # Wen (14)
 
 
-def _within(state, report):
+def _within(state: Contraction, report: Report) -> Contraction:
     """The state of a reducer that ran inside the contractor: no stage of its own in the report."""
     kept = replace(state.report, stages=report.stages, recipe=report.recipe, seconds=report.seconds)
     return replace(state, report=kept)
 
 
-def _record(state, **facts):
+def _record(state: Contraction, **facts: Any) -> Contraction:
     iterations = state.report.iterations
     explained = explained_score(state.positions)
     if iterations:
         before, n_before = iterations[-1].explained, iterations[-1].n_points
     else:
         before, n_before = explained_score(state.cloud), len(state)
-    kept = 1 - (n_before - len(state)) / state.report.n_contracted
+    kept = 1 - (n_before - len(state)) / state.report.n_contracted  # Wen (15)
     record = IterationRecord(
         iteration=len(iterations) + 1,
         n_points=len(state),
@@ -235,10 +247,10 @@ def _record(state, **facts):
     return replace(state, report=replace(state.report, iterations=(*iterations, record)))
 
 
-def _amend(state, **facts):
+def _amend(state: Contraction, **facts: Any) -> Contraction:
     *done, last = state.report.iterations
     return replace(state, report=replace(state.report, iterations=(*done, replace(last, **facts))))
 
 
-def _finished(state, reason, converged=False):
+def _finished(state: Contraction, reason: str, converged: bool = False) -> Contraction:
     return replace(state, report=replace(state.report, stop_reason=reason, converged=converged))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -12,11 +12,11 @@ from .numerics.neighbourhoods import plane_axes
 from .numerics.rings import Rings, star_rings
 from .numerics.vectors import dot, norm
 from .parameters import documented, parameter
-from .pipeline import Filter
+from .pipeline import Filter, Watch
 from .state import Contraction
 
-_IN_PLANE = 1e-3  # sine of the angle below which a direction counts as lying in the tangent plane
-_MIN_SIZE = 1e-4  # floor of s - psi' s(0) in the working frame, as in the published code
+IN_PLANE_SINE = 1e-3  # fitted: sine of the angle below which a direction counts as lying in the tangent plane
+MIN_SHRINKAGE = 1e-4  # published: floor of s - psi' s(0) in the working frame, as in the published code
 
 
 @documented
@@ -69,7 +69,7 @@ class LPRReducer(Filter[Contraction]):
         "them, and such points later run away.",
         type="bool",
     )
-    order: str = parameter(
+    order: Literal["cheapest", "index"] = parameter(
         "cheapest",
         "Which pairs are merged first: those with the least F / s^2, whatever the order of the input, or those of the "
         "lowest point index, as in the published code.",
@@ -77,30 +77,32 @@ class LPRReducer(Filter[Contraction]):
         choices=("cheapest", "index"),
     )
 
-    def _run(self, state, watch):
+    def _run(self, state: Contraction, watch: Watch | None) -> Contraction:
         if not state.report.iterations:
             raise StageError("LPRReducer compares ring sizes before and after a contraction: run Contractor first")
         nearest, _ = state.rings.nearest(state.positions)
         energy = merge_energy(state)
-        candidates = np.flatnonzero(energy < self.phi * state.ring_size**2)
+        candidates = np.flatnonzero(energy < self.phi * state.ring_size**2)  # Wen (12)
         if self.order == "index":
             rank = state.point_of_survivor[candidates]
         else:
             with np.errstate(divide="ignore"):
                 rank = energy[candidates] / state.ring_size[candidates] ** 2
         candidates = candidates[np.argsort(rank, kind="stable")]
-        keepers, combined = match_feasible(state, candidates, nearest[candidates])
-        if len(keepers) == 0:
+        representatives, combined = match_feasible(state, candidates, nearest[candidates])
+        if len(representatives) == 0:
             return state
-        return self._merge(state, keepers, nearest[keepers], combined)
+        return self._merge(state, representatives, nearest[representatives], combined)
 
-    def _merge(self, state, keepers, swallowed, combined):
+    def _merge(
+        self, state: Contraction, representatives: np.ndarray, swallowed: np.ndarray, combined: Rings
+    ) -> Contraction:
         n = len(state)
         into = np.arange(n)
-        into[swallowed] = keepers
+        into[swallowed] = representatives
         keep = into == np.arange(n)
         index = np.cumsum(keep) - 1
-        rings = state.rings.replace(keepers, combined).take(np.flatnonzero(keep)).rename(index[into])
+        rings = state.rings.replace(representatives, combined).take(np.flatnonzero(keep)).rename(index[into])
         if self.mend_rings:
             rings = mend_rings(rings, state.cloud[state.survivors[keep]], state.normals[state.survivors[keep]])
         mass, ring_size0, ring_size = state.mass, state.ring_size0, state.ring_size
@@ -124,7 +126,7 @@ class LPRReducer(Filter[Contraction]):
         )
 
 
-def merge_energy(state):
+def merge_energy(state: Contraction) -> np.ndarray:
     r"""F of every point: what merging it with its nearest ring neighbour would cost (equations 6 to 12).
 
     Parameters
@@ -141,23 +143,24 @@ def merge_energy(state):
         :math:`U = |\delta_i - \bar\delta_j|^2` over the ring. Minus infinity where a ring did not change.
     """
     s0, s, delta = state.ring_size0, state.ring_size, state.laplacian_coordinates
-    psi = 1.2 * state.ring_ratio_drop
-    eta = np.maximum(s - psi * s0, _MIN_SIZE) / s0
+    psi = 1.2 * state.ring_ratio_drop  # Wen (10)
+    eta = np.maximum(s - psi * s0, MIN_SHRINKAGE) / s0  # Wen (11)
     moved = norm(state.positions - state.previous)
     with np.errstate(divide="ignore", invalid="ignore"):
-        attraction = np.nan_to_num(psi * s0 * moved / (eta * (s0 - s)), nan=0.0, posinf=np.inf, neginf=-np.inf) ** 2
-    contraction = (9 * state.contraction_weight * eta) ** 2 * dot(delta, delta)
-    curvature = ((delta - state.rings.mean_over(delta)) ** 2).sum(axis=1)
-    return contraction - attraction + 3 * curvature
+        pulled = np.nan_to_num(psi * s0 * moved / (eta * (s0 - s)), nan=0.0, posinf=np.inf, neginf=-np.inf)
+    contraction = (9 * state.contraction_weight * eta) ** 2 * dot(delta, delta)  # Wen (7)
+    attraction = pulled**2  # Wen (8)
+    curvature = ((delta - state.rings.mean_over(delta)) ** 2).sum(axis=1)  # Wen (9)
+    return contraction - attraction + 3 * curvature  # Wen (6)
 
 
-def combine_rings(state, keepers, swallowed):
-    """Rings of the keepers after a merge: the Delaunay star among both rings, on the uncontracted points.
+def combine_rings(state: Contraction, representatives: np.ndarray, swallowed: np.ndarray) -> Rings:
+    """Rings of the representatives after a merge: the Delaunay star among both rings, on the uncontracted points.
 
     Parameters
     ----------
     state : Contraction
-    keepers, swallowed : (c,) int array
+    representatives, swallowed : (c,) int array
         Pairs of survivors.
 
     Returns
@@ -165,21 +168,21 @@ def combine_rings(state, keepers, swallowed):
     Rings
         Of length c.
     """
-    union = np.concatenate([state.rings.padded(keepers), state.rings.padded(swallowed)], axis=1)
-    union[(union == keepers[:, None]) | (union == swallowed[:, None])] = -1
+    union = np.concatenate([state.rings.padded(representatives), state.rings.padded(swallowed)], axis=1)
+    union[(union == representatives[:, None]) | (union == swallowed[:, None])] = -1
     union.sort(axis=1)
     union[:, 1:][union[:, 1:] == union[:, :-1]] = -1  # the two share neighbours
     union = -np.sort(-union, axis=1)[:, : (union >= 0).sum(axis=1).max(initial=0)]
-    normals = state.normals[state.survivors[keepers]]
-    delta = state.laplacian_coordinates[keepers]
+    normals = state.normals[state.survivors[representatives]]
+    delta = state.laplacian_coordinates[representatives]
     length = norm(delta)[:, None]
-    along = np.abs(dot(delta, normals))[:, None] > _IN_PLANE * length
+    along = np.abs(dot(delta, normals))[:, None] > IN_PLANE_SINE * length
     direction = np.where(along, np.divide(delta, length, out=np.zeros_like(delta), where=along), normals)
-    return star_rings(state.cloud[state.survivors], keepers, union, plane_axes(direction))
+    return star_rings(state.cloud[state.survivors], representatives, union, plane_axes(direction))
 
 
-def match_feasible(state, keepers, swallowed):
-    """Greedy matching, in the given order, of the pairs that leave a ring around the keeper.
+def match_feasible(state: Contraction, representatives: np.ndarray, swallowed: np.ndarray) -> tuple[np.ndarray, Rings]:
+    """Greedy matching, in the given order, of the pairs that leave a ring around the representative.
 
     An umbrella of three or a fan of four is the least that still surrounds a point. The rings cost most, so they are
     made only for pairs that the matching takes; it is repeated without those found wanting until there are none, which
@@ -188,31 +191,31 @@ def match_feasible(state, keepers, swallowed):
     Parameters
     ----------
     state : Contraction
-    keepers, swallowed : (c,) int array
-        Pairs of survivors, every keeper at most once.
+    representatives, swallowed : (c,) int array
+        Pairs of survivors, every representative at most once.
 
     Returns
     -------
-    keepers : (p,) int array
+    representatives : (p,) int array
     combined : Rings
         Their rings after the merge.
     """
     rings = Rings.concatenate([])
     ring_of = np.full(len(state), -1)
-    feasible = np.ones(len(keepers), bool)
+    feasible = np.ones(len(representatives), bool)
     while True:
         left = np.flatnonzero(feasible)
-        chosen = left[match(len(state), keepers[left], swallowed[left])]
-        new = chosen[ring_of[keepers[chosen]] < 0]
+        chosen = left[match(len(state), representatives[left], swallowed[left])]
+        new = chosen[ring_of[representatives[chosen]] < 0]
         if len(new) == 0:
-            return keepers[chosen], rings.take(ring_of[keepers[chosen]])
-        combined = combine_rings(state, keepers[new], swallowed[new])
-        ring_of[keepers[new]] = len(rings) + np.arange(len(new))
+            return representatives[chosen], rings.take(ring_of[representatives[chosen]])
+        combined = combine_rings(state, representatives[new], swallowed[new])
+        ring_of[representatives[new]] = len(rings) + np.arange(len(new))
         rings = Rings.concatenate([rings, combined])
         feasible[new] = combined.sizes + combined.closed > 3
 
 
-def mend_rings(rings, points, normals):
+def mend_rings(rings: Rings, points: np.ndarray, normals: np.ndarray) -> Rings:
     """Rings with those of fewer than three neighbours rebuilt, as Delaunay stars among the rings of these neighbours.
 
     Parameters
@@ -235,14 +238,14 @@ def mend_rings(rings, points, normals):
     return rings.replace(broken, star_rings(points, broken, union, plane_axes(normals[broken])))
 
 
-def match(n, keepers, swallowed):
+def match(n: int, representatives: np.ndarray, swallowed: np.ndarray) -> np.ndarray:
     """Greedy matching in the given order: positions of the pairs whose two points are both still free.
 
     Parameters
     ----------
     n : int
         Number of points.
-    keepers, swallowed : (c,) int array
+    representatives, swallowed : (c,) int array
 
     Returns
     -------
@@ -250,7 +253,7 @@ def match(n, keepers, swallowed):
     """
     # Rounds of the pairs that come before all others at both their points. Of nearest neighbours two or three do; only
     # a chain of pairs in its own order takes a round for every second one.
-    pairs = np.stack([keepers, swallowed], axis=1)
+    pairs = np.stack([representatives, swallowed], axis=1)
     free, first, left, chosen = np.ones(n, bool), np.empty(n, int), np.arange(len(pairs)), [np.empty(0, int)]
     while len(left):
         first[pairs[left[::-1]]] = left[::-1, None]  # of several writes the last one stays: that of the least position

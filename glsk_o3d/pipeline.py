@@ -7,7 +7,7 @@ import logging
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import chain, pairwise
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageError, did_you_mean
 from .interop.clouds import Cloud, cloud_points
@@ -17,9 +17,9 @@ from .report import STOPPED_BY_CALLER, IterationRecord, Report
 from .skeleton import Skeleton
 from .state import Contraction
 
-OnIteration = Callable[[IterationRecord], "bool | None"]
-OnState = Callable[[Contraction], object]
-Watch = Callable[[Contraction], "bool | None"]
+OnIteration: TypeAlias = Callable[[IterationRecord], bool | None]
+OnState: TypeAlias = Callable[[Contraction], object]
+Watch: TypeAlias = Callable[[Contraction], bool | None]
 Produced = TypeVar("Produced", covariant=True)
 Next = TypeVar("Next")
 
@@ -130,7 +130,7 @@ class Pipeline(Generic[Produced]):
     RingBuilder(k=12, ...) | Contractor(...) | Connector(radius='3%', ...)
     """
 
-    def __init__(self, *stages: Filter):
+    def __init__(self, *stages: Filter) -> None:
         if not stages:
             raise InvalidParameterError("a pipeline needs at least one filter")
         for stage in stages:
@@ -267,13 +267,13 @@ class Pipeline(Generic[Produced]):
     def __or__(self, other: Filter[Next] | Pipeline[Next]) -> Pipeline[Next]:
         return Pipeline(*self.stages, *(other.stages if isinstance(other, Pipeline) else (other,)))
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return " | ".join(map(repr, self.stages))
 
-    def __eq__(self, other):
+    def __eq__(self, other: object) -> bool:
         return isinstance(other, Pipeline) and self.stages == other.stages
 
-    def __hash__(self):
+    def __hash__(self) -> int:
         return hash(self.stages)
 
 
@@ -389,7 +389,7 @@ def _watch(on_iteration: OnIteration | None, on_state: OnState | None) -> Watch 
     if on_iteration is None and on_state is None and not _log.isEnabledFor(logging.DEBUG):
         return None
 
-    def watch(state):
+    def watch(state: Contraction) -> bool | None:
         record = state.report.iterations[-1]
         _log.debug(
             "solve %d: %d points, %d merged, e %.4f, De %.4f, ring ratio %.4f, %.3f s",

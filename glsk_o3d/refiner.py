@@ -6,38 +6,37 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from .parameters import documented, parameter
-from .pipeline import Filter
+from .pipeline import Filter, Watch
 from .refinement.axis_fit import fit_axis
 from .refinement.bridging import bridge_gaps
-from .refinement.clamp import anchor
-from .refinement.diagnostics import trust_warnings
+from .refinement.clamp import clamp_to_points
+from .refinement.diagnostics import diagnose
 from .refinement.loops import close_loops
-from .refinement.spurs import cut_twigs
-from .refinement.subdivision import resample
+from .refinement.spurs import prune_spurs
+from .refinement.subdivision import subdivide_edges
 from .refinement.triangles import collapse_triangles
-from .refinement.weak_loops import cut_threads
+from .refinement.weak_loops import cut_weak_loops
 from .skeleton import Skeleton
 
 
 @documented
 @dataclass(frozen=True, kw_only=True)
 class Refiner(Filter[Skeleton]):
-    """Make the graph one-dimensional, close false loops, cut twigs, and centre it in the surface around it.
+    """Make the graph one-dimensional, close false loops, prune spurs, and centre it in the surface around it.
 
     1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
        the shortest, until there is no triangle.
-    2. Loops that open less than their tube is thick are zipped up, and branches whose points hardly leave the part that
-       they grow from are cut.
+    2. Loops that open less than their tube is thick are zipped up, and spurs, branches whose points hardly leave the
+       part that they grow from, are pruned.
     3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
        corners.
     4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
        side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
-    5. Loops that hang by a thread, and narrow loops where the points hardly say where the axis is, are cut, and twigs
-       that this leaves.
+    5. Weak loops are cut: those across which the surface hardly goes on somewhere, and narrow ones where the points
+       hardly say where the axis is; and spurs that this leaves.
     6. Ends of different parts that point at each other across a gap of the scan are joined.
 
-    The first step is published; with `opening`, `twig`, `spacing`, `recentre`, `weak`, `sure` and `bridge` all 0 it
-    is the only one.
+    The first step is published; with all options 0 it is the only one.
 
     Warns
     -----
@@ -59,7 +58,7 @@ class Refiner(Filter[Skeleton]):
     >>> from glsk_o3d import Connector, Contractor, RingBuilder
     >>> from glsk_o3d.samples import torus
     >>> raw = (RingBuilder() | Contractor() | Connector())(torus(1000).points)
-    >>> refined = Refiner(twig=2)(raw)
+    >>> refined = Refiner(spur=2)(raw)
     >>> refined.n_loops, len(refined.leaves)
     (1, 0)
     """
@@ -73,7 +72,7 @@ class Refiner(Filter[Skeleton]):
         type="float",
         low=0,
     )
-    twig: float = parameter(
+    spur: float = parameter(
         1.3,
         "Least reach of a branch's points from the branches it leaves over the thickness there; others are cut. 0 "
         "keeps all.",
@@ -89,13 +88,13 @@ class Refiner(Filter[Skeleton]):
     recentre: int = parameter(
         3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", type="int", unit="passes", low=0
     )
-    weak: float = parameter(
+    weak_loop_bonds: float = parameter(
         0.03,
         "A loop is cut where so much less of the surface goes across than its median; 0 keeps all.",
         type="float",
         low=0,
     )
-    sure: float = parameter(
+    weak_loop_opening: float = parameter(
         0.65,
         "Least opening of a loop over the radius of its tube, times the mean confidence; other loops are cut. 0 keeps "
         "all.",
@@ -109,29 +108,30 @@ class Refiner(Filter[Skeleton]):
         low=0,
     )
 
-    def _run(self, skeleton, watch):
-        skeleton, closed, cut = collapse_triangles(skeleton), 0, 0
+    def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
+        skeleton = collapse_triangles(skeleton)
+        n_loops = skeleton.n_loops
         if self.opening:
-            raw, skeleton = skeleton, close_loops(skeleton, self.opening)
-            # their cycle rank is edges less vertices plus components, and these stay
-            closed = len(raw.edges) - len(raw.vertices) - len(skeleton.edges) + len(skeleton.vertices)
-        if self.twig:
-            skeleton = cut_twigs(skeleton, self.twig)
+            skeleton = close_loops(skeleton, self.opening)
+        n_closed = n_loops - skeleton.n_loops
+        if self.spur:
+            skeleton = prune_spurs(skeleton, self.spur)
         if self.recentre:
-            skeleton = anchor(skeleton)
+            skeleton = clamp_to_points(skeleton)
         if self.spacing:
-            skeleton = resample(skeleton, self.spacing)
-        vertices, confidence, radii = fit_axis(skeleton, self.recentre)
-        skeleton = replace(skeleton, vertices=vertices, confidence=confidence, radii=radii)
-        if self.weak or self.sure:
-            whole, skeleton = skeleton, cut_threads(skeleton, self.weak, self.sure)
-            cut = len(whole.edges) - len(skeleton.edges)
-            if self.twig and cut:
-                skeleton = cut_twigs(skeleton, self.twig)
-        report = replace(skeleton.report, n_loops_closed=closed, n_loops_cut=cut)
+            skeleton = subdivide_edges(skeleton, self.spacing)
+        skeleton = fit_axis(skeleton, self.recentre)
+        n_loops = skeleton.n_loops
+        if self.weak_loop_bonds or self.weak_loop_opening:
+            skeleton = cut_weak_loops(skeleton, self.weak_loop_bonds, self.weak_loop_opening)
+        n_cut = n_loops - skeleton.n_loops
+        if self.spur and n_cut:
+            skeleton = prune_spurs(skeleton, self.spur)
+        n_edges = len(skeleton.edges)
         if self.bridge:
-            skeleton, bridges = bridge_gaps(skeleton, self.bridge)
-            report = replace(report, n_bridges=bridges)
-        for message in trust_warnings(skeleton):
+            skeleton = bridge_gaps(skeleton, self.bridge)
+        n_bridges = len(skeleton.edges) - n_edges
+        report = replace(skeleton.report, n_loops_closed=n_closed, n_loops_cut=n_cut, n_bridges=n_bridges)
+        for message in diagnose(skeleton):
             report = report.with_warning(message)
         return replace(skeleton, report=report)

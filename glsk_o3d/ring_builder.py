@@ -201,7 +201,8 @@ class RingBuilder(Filter[Contraction]):
 
     def _k(self, n: int) -> int:
         rules: dict[Any, Any] = {"auto": default_k, "published": published_k}
-        return min(rules[self.k](n) if self.k in rules else self.k, n)
+        chosen: Any = rules[self.k](n) if self.k in rules else self.k
+        return min(chosen, n)
 
     def _most(self, n: int) -> int:
         return {"auto": default_size(n), "all": n}[self.thin_to] if isinstance(self.thin_to, str) else self.thin_to

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .numerics.radii import witnesses
+from .numerics.radii import supporting_points
 from .numerics.vectors import norm
 from .report import Report
 
@@ -102,9 +102,9 @@ class Skeleton:
         return np.bincount(self.edges.ravel(), minlength=len(self.vertices))
 
     @property
-    def witnesses(self) -> np.ndarray:
+    def supporting_points(self) -> np.ndarray:
         """Input points that have a vertex and a normal, int array: those that say where the skeleton is."""
-        return witnesses(self.vertex_of_point, self.normals)
+        return supporting_points(self.vertex_of_point, self.normals)
 
     @property
     def leaves(self) -> np.ndarray:

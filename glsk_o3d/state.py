@@ -116,10 +116,10 @@ class Contraction:
     contraction_weight: float
     report: Report
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"Contraction({len(self)} of {len(self.points)} points left after {len(self.report.iterations)} solves)"
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.survivors)
 
     @property
@@ -145,13 +145,13 @@ class Contraction:
         """a(t): sum of the ring sizes over that of the uncontracted cloud."""
         return float(self.ring_size.sum() / self.ring_size0.sum())
 
-    def to_point_cloud(self):
+    def to_point_cloud(self) -> Any:
         """The contracted points as an ``open3d.geometry.PointCloud``."""
         from .interop.clouds import to_point_cloud
 
         return to_point_cloud(self.contracted)
 
-    def annotate(self, cloud=None):
+    def annotate(self, cloud: Any = None) -> Any:
         """A copy of a cloud with the attribute ``contracted``.
 
         See `glsk_o3d.io.annotation.annotate_contraction`.

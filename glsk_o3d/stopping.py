@@ -40,7 +40,7 @@ class ExplainedScore(Parameters):
 
     def __call__(self, iterations: tuple[IterationRecord, ...]) -> str | None:
         change = iterations[-1].explained_change
-        if len(iterations) >= self.min_iterations and change < self.threshold:
+        if len(iterations) >= self.min_iterations and change < self.threshold:  # Wen (16)
             return f"explained score settled: De = {change:.4f} < {self.threshold:g}"
         return None
 

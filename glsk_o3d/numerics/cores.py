@@ -1,5 +1,7 @@
 """Cores and threads at hand."""
 
+from __future__ import annotations
+
 import os
 
 

@@ -1,13 +1,17 @@
 """Cycles of a graph embedded in space, and how wide they open."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from .vectors import dot
+from .vectors import TINY, dot
 
 
-def minimum_cycle_basis(n, edges, lengths):
+def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[np.ndarray]:
     """Shortest set of cycles that generates all others (Horton 1987).
 
     Chains of vertices with two neighbours count as one edge, and trees that hang on the graph are cut off first, so
@@ -41,7 +45,7 @@ def minimum_cycle_basis(n, edges, lengths):
     return [np.array(vertices) for _, vertices in sorted(cycles, key=lambda cycle: cycle[0])]
 
 
-def _cyclic_chains(n, edges, lengths):
+def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> tuple[list[list[int]], list[float]]:
     """Paths between junctions of the cyclic part: vertex lists and lengths. A ring of its own starts anywhere."""
     around = [{} for _ in range(n)]
     for (a, b), length in zip(edges.tolist(), lengths.tolist(), strict=True):
@@ -74,7 +78,7 @@ def _cyclic_chains(n, edges, lengths):
     return chains, total
 
 
-def _horton(chains):
+def _horton(chains: list[tuple[float, list[int]]]) -> list[tuple[float, list[int]]]:
     """Minimum cycle basis of the multigraph of chains between different junctions: [(length, vertices)]."""
     if not chains:
         return []
@@ -94,7 +98,7 @@ def _horton(chains):
     component = len({int(np.argmax(np.isfinite(row))) for row in distance})
     rank = len(chains) - m + component
 
-    def path(root, v):
+    def path(root: int, v: int) -> int:
         """Chains on the shortest path, as a bit mask."""
         mask = 0
         while v != root:
@@ -124,7 +128,7 @@ def _horton(chains):
     return basis
 
 
-def _walk(chains):
+def _walk(chains: list[list[int]]) -> list[int]:
     """Join chains that form one cycle, end to end."""
     first, *rest = chains
     walk = list(first)
@@ -137,7 +141,7 @@ def _walk(chains):
     return walk[:-1]
 
 
-def inscribed_circle(points):
+def inscribed_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
     """Largest circle in the plane of a closed curve that the curve does not enter.
 
     Parameters
@@ -155,7 +159,7 @@ def inscribed_circle(points):
     return widest
 
 
-def opens_wider(points, radius):
+def opens_wider(points: np.ndarray, radius: float) -> bool:
     """Whether the largest circle inside a closed curve has at least this radius.
 
     Parameters
@@ -172,7 +176,7 @@ def opens_wider(points, radius):
     return any(found >= radius for _, found in _circles(points))
 
 
-def _circles(points):
+def _circles(points: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
     """Ever wider circles inside a closed curve: on a coarse and a fine grid of its box, and on two around the best."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]
@@ -193,10 +197,10 @@ def _circles(points):
             at, span = centre[:2], span / finer
 
 
-def _distance(points, polygon):
+def _distance(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
     """Distance from each point to the closed polygon, (n,) float array."""
     edge = np.roll(polygon, -1, axis=0) - polygon
-    squared = np.maximum(dot(edge, edge), np.finfo(float).tiny)
+    squared = np.maximum(dot(edge, edge), TINY)
     # products of matrices instead of differences of all pairs; the polygon is centred, so that they lose nothing
     along = points @ edge.T - dot(polygon, edge)
     apart = dot(points, points)[:, None] - 2 * points @ polygon.T
@@ -206,7 +210,7 @@ def _distance(points, polygon):
     return np.sqrt(np.maximum(apart.min(axis=1), 0))
 
 
-def _inside(points, polygon):
+def _inside(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
     """Even-odd test in the first two coordinates."""
     a, b = polygon, np.roll(polygon, -1, axis=0)
     x, y = points[:, :1], points[:, 1:2]

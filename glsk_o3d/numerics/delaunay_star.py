@@ -1,12 +1,14 @@
 """The Delaunay star of many points at once, by gift wrapping inverted neighbours."""
 
+from __future__ import annotations
+
 import numpy as np
 
-_COINCIDENT = 1e-300  # squared distance below which a neighbour counts as the origin itself
-_COLLINEAR = 1e-12  # sine below which two directions count as one
+COINCIDENT_SQUARED = 1e-300  # squared distance below which a neighbour counts as the origin itself
+COLLINEAR_SINE = 1e-12  # sine below which two directions count as one
 
 
-def delaunay_star(offsets, valid=None):
+def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Ring of the origin in the 2-D Delaunay triangulation of the origin and its neighbours, for many origins.
 
     Inversion about the origin, ``q = x / |x|^2``, turns circles through it into lines. A neighbour shares a
@@ -42,7 +44,7 @@ def delaunay_star(offsets, valid=None):
     n, k = offsets.shape[:2]
     x, y = offsets[..., 0], offsets[..., 1]
     squared = x * x + y * y
-    usable = squared > _COINCIDENT
+    usable = squared > COINCIDENT_SQUARED
     if valid is not None:
         usable &= valid
     inverse = np.divide(1.0, squared, out=np.zeros_like(squared), where=usable)
@@ -75,7 +77,7 @@ def delaunay_star(offsets, valid=None):
             best = np.where(cotangent[line, best] > -np.inf, best, first)  # straight back, along a line
             ahead = way[line, best]
             aside = np.abs((way * ahead.conj()[:, None]).imag)
-            beside = aside <= (_COLLINEAR * widest * np.abs(ahead))[:, None]
+            beside = aside <= (COLLINEAR_SINE * widest * np.abs(ahead))[:, None]
             if np.count_nonzero(beside) > 2 * len(line):  # more than where we are and where we go
                 several = np.flatnonzero(beside.sum(axis=1) > 2)
                 best[several] = _farthest(way[several], shut[several] == 0, best[several])
@@ -101,12 +103,12 @@ def delaunay_star(offsets, valid=None):
     return ring, closed
 
 
-def _farthest(way, usable, best):
+def _farthest(way: np.ndarray, usable: np.ndarray, best: np.ndarray) -> np.ndarray:
     """Among the images on one hull edge with the best one, the farthest; but never step over the origin."""
     line = np.arange(len(best))
     length = np.abs(way)
     turn = way * way[line, best].conj()[:, None]
-    same = np.abs(turn.imag) <= _COLLINEAR * length[line, best][:, None] * length
+    same = np.abs(turn.imag) <= COLLINEAR_SINE * length[line, best][:, None] * length
     reach = np.where(same & usable & (turn.real > 0), length, -1.0)
     reach[:, -1][reach[:, -1] > 0] = np.inf
     return np.argmax(reach, axis=1)

@@ -6,16 +6,19 @@ The matrices are a (6, n) array of their entries xx, xy, xz, yy, yz, zz: sums ov
 the memory.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
-from .vectors import norm
+from .vectors import TINY, norm
 
-_TINY = np.finfo(float).tiny
-_APART = 1e-3  # distance of two eigenvalues over their spread, below which the closed form is not exact enough
+EIGENVALUES_APART = (
+    1e-3  # distance of two eigenvalues over their spread, below which the closed form is not exact enough
+)
 _SQUARE = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
 
 
-def principal_parts(entries):
+def principal_parts(entries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues of symmetric 3 x 3 matrices, and the direction of the least.
 
     Parameters
@@ -34,7 +37,7 @@ def principal_parts(entries):
     return mean + size * np.stack([least, -least - most, most]), _direction(shape, least, 0)
 
 
-def largest_eigenvalue(entries):
+def largest_eigenvalue(entries: np.ndarray) -> np.ndarray:
     """Largest eigenvalue of symmetric 3 x 3 matrices.
 
     Parameters
@@ -49,7 +52,7 @@ def largest_eigenvalue(entries):
     return mean + size * _outer(shape)[1]
 
 
-def main_direction(entries):
+def main_direction(entries: np.ndarray) -> np.ndarray:
     """Direction of the largest eigenvalue of symmetric 3 x 3 matrices.
 
     Parameters
@@ -65,18 +68,18 @@ def main_direction(entries):
     return _direction(shape, _outer(shape)[1], 2)
 
 
-def _reduced(entries):
+def _reduced(entries: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean of the eigenvalues, and size and shape of what deviates from it; the shape's eigenvalues are -2 to 2."""
     a, b, c, d, e, f = entries
     mean = (a + d + f) / 3
     shape = np.stack([a - mean, b, c, d - mean, e, f - mean])
     a, b, c, d, e, f = shape
     size = np.sqrt((a * a + d * d + f * f + 2 * (b * b + c * c + e * e)) / 6)
-    shape /= np.maximum(size, _TINY)
+    shape /= np.maximum(size, TINY)
     return mean, size, shape
 
 
-def _outer(shape):
+def _outer(shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Least and largest eigenvalue of a shape."""
     a, b, c, d, e, f = shape
     half = (a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)) / 2  # of the determinant
@@ -84,7 +87,7 @@ def _outer(shape):
     return 2 * np.cos(angle + 2 * np.pi / 3), 2 * np.cos(angle)
 
 
-def _direction(shape, value, which):
+def _direction(shape: np.ndarray, value: np.ndarray, which: int) -> np.ndarray:
     """Unit eigenvectors of these eigenvalues; by NumPy where the eigenvalue hardly stands out."""
     a, b, c, d, e, f = shape[0] - value, shape[1], shape[2], shape[3] - value, shape[4], shape[5] - value
     # The adjugate of a matrix of rank two is a multiple of v v^T: take its longest column.
@@ -93,9 +96,9 @@ def _direction(shape, value, which):
     longest = np.argmax(diagonal, axis=0)
     line = np.arange(len(longest))
     vectors = adjugate.T[line[:, None], np.array(_SQUARE)[longest]]
-    vectors /= np.maximum(norm(vectors), _TINY)[:, None]
+    vectors /= np.maximum(norm(vectors), TINY)[:, None]
     # its trace is the product of the distances to the two other eigenvalues
-    dim = np.flatnonzero(diagonal.sum(axis=0) < 3 * _APART)
+    dim = np.flatnonzero(diagonal.sum(axis=0) < 3 * EIGENVALUES_APART)
     if len(dim):
         vectors[dim] = np.linalg.eigh(shape.T[dim][:, _SQUARE])[1][:, :, which]
     return vectors

@@ -1,12 +1,16 @@
 """Farthest-point sampling."""
 
+from __future__ import annotations
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from .vectors import norm
 
 
-def farthest_point_sampling(points, radius, start=None):
+def farthest_point_sampling(
+    points: np.ndarray, radius: np.ndarray, start: int | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Sample points until every one lies in the ball of a sample: each is the point farthest from those before.
 
     Distances from a sample count in units of its own radius, so that samples are dense where the radii are small.
@@ -24,12 +28,12 @@ def farthest_point_sampling(points, radius, start=None):
     -------
     samples : (m,) int array
         In the order taken.
-    owner : (n,) int array
+    representative : (n,) int array
         For every point the position in `samples` of the sample nearest to it.
     """
     tree = cKDTree(points)
     nearest = np.full(len(points), np.inf)
-    owner = np.zeros(len(points), int)
+    representative = np.zeros(len(points), int)
     sample = int(np.argmax(((points - points.mean(axis=0)) ** 2).sum(axis=1))) if start is None else start
     samples = []
     while nearest[sample] > 1:
@@ -42,7 +46,7 @@ def farthest_point_sampling(points, radius, start=None):
         distance = norm(points.take(ball, axis=0) - points[sample]) / radius[sample]
         closer = distance < nearest[ball]
         nearest[ball[closer]] = distance[closer]
-        owner[ball[closer]] = len(samples)
+        representative[ball[closer]] = len(samples)
         samples.append(sample)
         sample = int(np.argmax(nearest))
-    return np.array(samples), owner
+    return np.array(samples), representative

@@ -1,12 +1,14 @@
 """Statistics of groups of values."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np
 from scipy.sparse import csc_array
 
 
-def group_median(values, group, n):
+def group_median(values: np.ndarray, group: np.ndarray, n: int) -> np.ndarray:
     """Median of the values of each group.
 
     Parameters
@@ -33,7 +35,7 @@ def group_median(values, group, n):
     return median
 
 
-def group_sum(values, group, n, weight=None):
+def group_sum(values: np.ndarray, group: np.ndarray, n: int, weight: np.ndarray | None = None) -> np.ndarray:
     """Sum of the rows of each group.
 
     Parameters

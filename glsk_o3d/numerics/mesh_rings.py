@@ -1,12 +1,14 @@
 """One-rings of triangle meshes, manifold or not."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from .components import component_labels
 from .rings import Rings
 
 
-def clean_faces(points, faces):
+def clean_faces(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Triangles with an area, each once; vertices without a triangle stay, so that rows keep their meaning.
 
     Parameters
@@ -25,14 +27,14 @@ def clean_faces(points, faces):
     return faces[first[np.cross(b - a, c - a).any(axis=1)]]
 
 
-def corners(faces):
+def corners(faces: np.ndarray) -> np.ndarray:
     """Every triangle from each of its corners, (3 f, 3) int array: a vertex and the two others, the smaller first."""
     corner = np.concatenate([faces, faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]])
     corner[:, 1:] = np.sort(corner[:, 1:], axis=1)
     return corner
 
 
-def umbrellas(n, faces):
+def umbrellas(n: int, faces: np.ndarray) -> np.ndarray:
     """Vertices whose triangles make one closed umbrella, (n,) bool array: neither border nor fan of fans nor bare.
 
     Parameters
@@ -51,7 +53,7 @@ def umbrellas(n, faces):
     return ~odd & (np.bincount(vertex_of_fan, minlength=n) == 1)
 
 
-def border_lengths(n, faces):
+def border_lengths(n: int, faces: np.ndarray) -> np.ndarray:
     """How many edges the border has that each vertex is on, (n,) int array: 0 inside, 3 at a hole of one triangle.
 
     Parameters
@@ -66,7 +68,7 @@ def border_lengths(n, faces):
     return np.bincount(label[edges[count == 1, 0]], minlength=n)[label]
 
 
-def mesh_rings(n, faces):
+def mesh_rings(n: int, faces: np.ndarray) -> Rings:
     """The neighbours of every vertex of a mesh as Rings; ascending, not in rotational order, since there may be none.
 
     Parameters
@@ -85,7 +87,7 @@ def mesh_rings(n, faces):
     return Rings(np.searchsorted(owner, np.arange(n + 1)), neighbour, umbrellas(n, faces))
 
 
-def common_share(rings, faces):
+def common_share(rings: Rings, faces: np.ndarray) -> np.ndarray:
     """How much of each ring is in the mesh: triangles in both over triangles in either, (n,) float array.
 
     Parameters
@@ -115,9 +117,9 @@ def common_share(rings, faces):
 # A corner as one number: three indices below 2 million fit into 63 bits.
 
 
-def _triangle_keys(corner, n):
+def _triangle_keys(corner: np.ndarray, n: int) -> np.ndarray:
     return np.unique(corner @ np.array([n * n, n, 1], np.int64))
 
 
-def _vertex_of_key(keys, n):
+def _vertex_of_key(keys: np.ndarray, n: int) -> np.ndarray:
     return keys // (n * n)

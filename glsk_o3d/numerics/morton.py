@@ -1,11 +1,15 @@
 """Morton order: points that are near in space become near in memory."""
 
+from __future__ import annotations
+
 import numpy as np
+
+from .vectors import TINY
 
 BITS = 21  # per axis: 63 bits in all
 
 
-def morton_order(points):
+def morton_order(points: np.ndarray) -> np.ndarray:
     """Permutation that sorts points along the Morton curve of their bounding box.
 
     Parameters
@@ -20,7 +24,7 @@ def morton_order(points):
     return np.argsort(morton_codes(points, 2**BITS - 1), kind="stable")
 
 
-def morton_codes(points, cells):
+def morton_codes(points: np.ndarray, cells: float) -> np.ndarray:
     """Morton code of the cell of every point, in a cubic grid with its corner in that of the bounding box.
 
     Parameters
@@ -33,7 +37,7 @@ def morton_codes(points, cells):
     -------
     (n,) uint64 array
     """
-    extent = max(np.ptp(points, axis=0).max(), np.finfo(float).tiny)
+    extent = max(np.ptp(points, axis=0).max(), TINY)
     code = np.zeros(len(points), np.uint64)
     for axis, column in enumerate(points.T):
         cell = ((column - column.min()) / extent * cells).astype(np.uint64)
@@ -41,7 +45,7 @@ def morton_codes(points, cells):
     return code
 
 
-def _spread(x):
+def _spread(x: np.ndarray) -> np.ndarray:
     """Put two zero bits between the bits of 21-bit integers."""
     for shift, mask in (
         (32, 0x1F00000000FFFF),

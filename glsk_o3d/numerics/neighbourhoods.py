@@ -1,5 +1,7 @@
 """Nearest neighbours and how they are spread."""
 
+from __future__ import annotations
+
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
@@ -8,14 +10,13 @@ from scipy.spatial import cKDTree
 
 from .cores import threads
 from .eigen import principal_parts
-from .vectors import dot, norm
+from .vectors import PAIRS, TINY, dot, norm
 
-PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # the entries of a symmetric matrix
-_LEAST = 4096  # points whose neighbours are worth a thread
-_CHUNK = 4096  # rows at a time: the (3, rows, k) work array then stays in the cache
+THREAD_POINTS = 4096  # measured: points whose neighbours are worth a thread
+SCATTER_CHUNK = 4096  # measured: rows at a time: the (3, rows, k) work array then stays in the cache
 
 
-def nearest_neighbours(points, k, of=None):
+def nearest_neighbours(points: np.ndarray, k: int, of: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """The k nearest points of every point, itself among them.
 
     Parameters
@@ -39,11 +40,11 @@ def nearest_neighbours(points, k, of=None):
     tree, asked = cKDTree(points, leafsize=24, balanced_tree=False), points if of is None else of
     distance, neighbour = np.empty((len(asked), k)), np.empty((len(asked), k), int)
 
-    def ask(start, stop):
+    def ask(start: int, stop: int) -> None:
         found = tree.query(asked[start:stop], k)
         distance[start:stop], neighbour[start:stop] = (np.reshape(each, (stop - start, k)) for each in found)
 
-    parts = max(min(threads(), len(asked) // _LEAST), 1)
+    parts = max(min(threads(), len(asked) // THREAD_POINTS), 1)
     bounds = np.linspace(0, len(asked), parts + 1).astype(int).tolist()
     if parts > 1:
         # Not SciPy's own threads, which outlive their arrays when they are interrupted, and crash the process.
@@ -56,7 +57,7 @@ def nearest_neighbours(points, k, of=None):
     return distance, neighbour
 
 
-def nearest_left(points, neighbours, left, k):
+def nearest_left(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, k: int) -> np.ndarray:
     """The k nearest points of every point left among those left; asked anew only where too few are known.
 
     Parameters
@@ -86,7 +87,7 @@ def nearest_left(points, neighbours, left, k):
     return found
 
 
-def local_outlier_ratio(mean, neighbours):
+def local_outlier_ratio(mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """How much farther a point is from its neighbours than these are from theirs (after Breunig et al. 2000, LOF).
 
     Near 1 on a surface, whatever its density; an outlier has more.
@@ -105,14 +106,14 @@ def local_outlier_ratio(mean, neighbours):
     return mean / row_medians(mean.take(neighbours[:, 1:]))
 
 
-def row_medians(values):
+def row_medians(values: np.ndarray) -> np.ndarray:
     """Median of every row, (n,) float array from `values` (n, k): several times faster than NumPy's on short rows."""
     k = values.shape[1]
     ordered = np.sort(values, axis=1)
     return (ordered[:, (k - 1) // 2] + ordered[:, k // 2]) / 2
 
 
-def scatter(points, neighbours):
+def scatter(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Scatter matrix of every neighbourhood: the sums of products of what its points deviate from their mean.
 
     Parameters
@@ -127,8 +128,8 @@ def scatter(points, neighbours):
     """
     coordinates, entries = np.ascontiguousarray(points.T), np.empty((6, len(neighbours)))
     share = np.full(neighbours.shape[1], 1 / neighbours.shape[1])
-    for start in range(0, len(neighbours), _CHUNK):
-        part = slice(start, start + _CHUNK)
+    for start in range(0, len(neighbours), SCATTER_CHUNK):
+        part = slice(start, start + SCATTER_CHUNK)
         patch = coordinates.take(neighbours[part], axis=1)
         patch -= (patch @ share)[:, :, None]
         for entry, (i, j) in zip(entries, PAIRS, strict=True):
@@ -136,7 +137,7 @@ def scatter(points, neighbours):
     return entries
 
 
-def principal(points, neighbours):
+def principal(points: np.ndarray, neighbours: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Principal components of every neighbourhood.
 
     Parameters
@@ -155,7 +156,7 @@ def principal(points, neighbours):
     return np.maximum(values.T, 0), normals
 
 
-def sphericity(spread, neighbours):
+def sphericity(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Least over largest principal spread, smoothed by the median: how far the surroundings fill space.
 
     Parameters
@@ -169,11 +170,11 @@ def sphericity(spread, neighbours):
     (n,) float array
         0 on a plane or a line, 1 in a ball.
     """
-    ratio = spread[:, 0] / np.maximum(spread[:, 2], np.finfo(float).tiny)
+    ratio = spread[:, 0] / np.maximum(spread[:, 2], TINY)
     return row_medians(ratio.take(neighbours))
 
 
-def uprightness(points, normals, p, q):
+def uprightness(points: np.ndarray, normals: np.ndarray, p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """How upright two normals stand on the line between their points: sin^2 times sin^2 of their angles with it.
 
     Parameters
@@ -188,12 +189,12 @@ def uprightness(points, normals, p, q):
         1 where a surface goes on from one point to the other, 0 where two surfaces face each other.
     """
     line = points[q] - points[p]
-    line /= np.maximum(norm(line)[:, None], np.finfo(float).tiny)
+    line /= np.maximum(norm(line)[:, None], TINY)
     at_p, at_q = (np.maximum(1 - dot(normals[end], line) ** 2, 0) for end in (p, q))
     return at_p * at_q
 
 
-def plane_axes(normals):
+def plane_axes(normals: np.ndarray) -> np.ndarray:
     """Two orthonormal axes perpendicular to each normal (Duff et al. 2017, "Building an orthonormal basis, revisited").
 
     Parameters

@@ -1,15 +1,17 @@
 """Normals that agree on which side is out."""
 
+from __future__ import annotations
+
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 
 from .vectors import dot
 
-_LEAST = 1e-6  # cost of an edge between equal normals; a sparse graph would take 0 for no edge
+EQUAL_NORMALS_COST = 1e-6  # cost of an edge between equal normals; a sparse graph would take 0 for no edge
 
 
-def orient_normals(points, normals, edges):
+def orient_normals(points: np.ndarray, normals: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Turn normals so that neighbours agree (Hoppe et al. 1992): along the tree over which they turn least.
 
     In every connected part the point farthest from the centroid of all points says which side is out. Open3D's function
@@ -27,7 +29,7 @@ def orient_normals(points, normals, edges):
     """
     n = len(points)
     a, b = np.unique(np.sort(edges, axis=1), axis=0).T
-    cost = 1 - np.abs(dot(normals[a], normals[b])) + _LEAST
+    cost = 1 - np.abs(dot(normals[a], normals[b])) + EQUAL_NORMALS_COST
     tree = minimum_spanning_tree(coo_matrix((cost, (a, b)), shape=(n, n)).tocsr())
     part = connected_components(tree, directed=False)[1]
     outward = points - points.mean(axis=0)
@@ -42,5 +44,5 @@ def orient_normals(points, normals, edges):
     return normals * (sign * _sign(normals, outward)[before])[:, None]
 
 
-def _sign(a, b):
+def _sign(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.where(dot(a, b) < 0, -1.0, 1.0)

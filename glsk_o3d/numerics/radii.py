@@ -1,21 +1,27 @@
 """Local thickness: how far the surface is from a vertex, also where noise has tilted the normals."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from .groups import group_median, group_sum
-from .neighbourhoods import PAIRS
-from .vectors import dot
+from .vectors import COLUMNS, ROWS, dot
 
-ROWS, COLUMNS = np.array(PAIRS).T
 TIMES = np.where(ROWS == COLUMNS, 1, 2)  # that an entry stands in a symmetric matrix
 
 
-def witnesses(vertex_of_point, normals):
+def supporting_points(vertex_of_point: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Points that have a vertex and a normal, int array."""
     return np.flatnonzero((vertex_of_point >= 0) & np.isfinite(np.einsum("ni->n", normals)))
 
 
-def plane_distance_radii(vertices, vertex_of_point, points, normals, otherwise=0.0):
+def plane_distance_radii(
+    vertices: np.ndarray,
+    vertex_of_point: np.ndarray,
+    points: np.ndarray,
+    normals: np.ndarray,
+    otherwise: np.ndarray | float = 0.0,
+) -> np.ndarray:
     """Local thickness: median distance from each vertex to the tangent planes of the points it owns.
 
     On the axis of a tube this is the tube's radius, however far along the axis a point lies from its vertex.
@@ -34,15 +40,17 @@ def plane_distance_radii(vertices, vertex_of_point, points, normals, otherwise=0
     -------
     (M,) float array
     """
-    owned = witnesses(vertex_of_point, normals)
-    owner = vertex_of_point[owned]
-    offset = points[owned] - vertices[owner]
-    distance = np.abs(dot(offset, normals[owned]))
-    radii = group_median(distance, owner, len(vertices))
-    return np.where(np.bincount(owner, minlength=len(vertices)) > 0, radii, otherwise)
+    supporting = supporting_points(vertex_of_point, normals)
+    vertex = vertex_of_point[supporting]
+    offset = points[supporting] - vertices[vertex]
+    distance = np.abs(dot(offset, normals[supporting]))
+    radii = group_median(distance, vertex, len(vertices))
+    return np.where(np.bincount(vertex, minlength=len(vertices)) > 0, radii, otherwise)
 
 
-def robust_radii(planes, distance, doubt, normals, owner):
+def robust_radii(
+    planes: np.ndarray, distance: np.ndarray, doubt: np.ndarray, normals: np.ndarray, vertex: np.ndarray
+) -> np.ndarray:
     r"""Radii between the distances to the tangent planes of a vertex's points and those to the points themselves.
 
     The distance to the planes is exact on tubes and cones, and on a flat part it is half its thickness. But noise tilts
@@ -64,7 +72,7 @@ def robust_radii(planes, distance, doubt, normals, owner):
     doubt : (M,) float array
         Share of the squared distances that the normals do not explain, 0 to 1.
     normals : (n, 3) float array
-    owner : (n,) int array
+    vertex : (n,) int array
         The vertex of each point.
 
     Returns
@@ -73,9 +81,9 @@ def robust_radii(planes, distance, doubt, normals, owner):
         `planes` at vertices without points.
     """
     m = len(planes)
-    count = np.bincount(owner, minlength=m)
-    shares = group_sum(normals[:, ROWS] * normals[:, COLUMNS], owner, m) / np.maximum(count, 1)[:, None]
+    count = np.bincount(vertex, minlength=m)
+    shares = group_sum(normals[:, ROWS] * normals[:, COLUMNS], vertex, m) / np.maximum(count, 1)[:, None]
     # (a - b)^2 = 2 (a^2 + b^2) - 1
     flat = np.sqrt(np.clip(2 * shares**2 @ TIMES - 1, 0, 1))
     weight = np.where(count > 0, np.sqrt(doubt) * (1 - flat), 0)
-    return (1 - weight) * planes + weight * group_median(distance, owner, m)
+    return (1 - weight) * planes + weight * group_median(distance, vertex, m)

@@ -1,5 +1,8 @@
 """One-rings of a point cloud: which neighbours surround each point, in rotational order."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,7 +11,7 @@ from scipy.sparse import csr_array
 
 from .delaunay_star import delaunay_star
 
-_CHUNK = 512  # rows at a time: the (rows, k) work arrays then stay in the cache
+STAR_CHUNK = 512  # measured: rows at a time: the (rows, k) work arrays then stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,24 +36,24 @@ class Rings:
     indices: np.ndarray
     closed: np.ndarray
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.closed)
 
-    def __getitem__(self, point):
+    def __getitem__(self, point: int) -> np.ndarray:
         return self.indices[self.indptr[point] : self.indptr[point + 1]]
 
     @cached_property
-    def sizes(self):
+    def sizes(self) -> np.ndarray:
         """Neighbours per ring, (n,) int array."""
         return np.diff(self.indptr)
 
     @cached_property
-    def owners(self):
+    def centres(self) -> np.ndarray:
         """The point that each entry of `indices` belongs to, (m,) int array."""
         return np.repeat(np.arange(len(self)), self.sizes)
 
     @cached_property
-    def fans(self):
+    def fans(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions in `indices` of two neighbours that share a triangle with their point: two (t,) int arrays."""
         following = np.arange(1, len(self.indices) + 1)
         some = self.sizes > 0
@@ -60,12 +63,12 @@ class Rings:
         return entry, following[entry]
 
     @property
-    def triangles(self):
+    def triangles(self) -> np.ndarray:
         """Fan triangles (i, j, k): a point and two consecutive neighbours, (t, 3) int array."""
         entry, after = self.fans
-        return np.column_stack([self.owners[entry], self.indices[entry], self.indices[after]])
+        return np.column_stack([self.centres[entry], self.indices[entry], self.indices[after]])
 
-    def edge_lengths(self, points):
+    def edge_lengths(self, points: np.ndarray) -> np.ndarray:
         """Distance from every point to each of its ring neighbours, (m,) float array."""
         squared = np.zeros(len(self.indices))
         for x in points.T:
@@ -73,11 +76,11 @@ class Rings:
             squared += edge * edge
         return np.sqrt(squared)
 
-    def mean_lengths(self, points):
+    def mean_lengths(self, points: np.ndarray) -> np.ndarray:
         """Mean ring edge of every point with a ring, (n,) float array."""
         return np.add.reduceat(self.edge_lengths(points), self.indptr[:-1]) / self.sizes
 
-    def nearest(self, points):
+    def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Nearest ring neighbour of every point and its distance: ((n,) int array, (n,) float array).
 
         Of equally near neighbours the first in the ring.
@@ -87,49 +90,49 @@ class Rings:
             length = self.edge_lengths(points)
             distance = np.minimum.reduceat(length, self.indptr[:-1])
             hits = np.flatnonzero(length == np.repeat(distance, self.sizes))
-            owner = self.owners[hits]
+            owner = self.centres[hits]
             first = np.append(True, owner[1:] != owner[:-1])
             found = self.indices[hits[first]], distance
             self.__dict__["_nearest"] = points, found
         return found
 
-    def mean_over(self, values):
+    def mean_over(self, values: np.ndarray) -> np.ndarray:
         """Mean of the neighbours' values, (n, d) float array from `values` (n, d); 0 for an empty ring."""
         return self._adjacency @ values / np.maximum(self.sizes, 1)[:, None]
 
     @cached_property
-    def _adjacency(self):
+    def _adjacency(self) -> csr_array:
         return csr_array((np.ones(len(self.indices)), self.indices, self.indptr), shape=(len(self),) * 2)
 
-    def take(self, points):
+    def take(self, points: np.ndarray) -> Rings:
         """The rings of some points, in the order given; the indices stay as they are."""
         sizes = self.sizes[points]
         indptr = np.concatenate([[0], np.cumsum(sizes)])
         source = np.repeat(self.indptr[points] - indptr[:-1], sizes) + np.arange(indptr[-1])
         return Rings(indptr, self.indices[source], self.closed[points])
 
-    def replace(self, points, rings):
+    def replace(self, points: np.ndarray, rings: Rings) -> Rings:
         """These rings with those of `points` replaced by `rings`."""
         both = Rings.concatenate([self, rings])
         source = np.arange(len(self))
         source[points] = len(self) + np.arange(len(rings))
         return both.take(source)
 
-    def rename(self, index):
+    def rename(self, index: np.ndarray) -> Rings:
         """These rings with neighbour j called index[j]; neighbours that fall together in a row become one."""
-        indices, owners = index[self.indices], self.owners
+        indices, centres = index[self.indices], self.centres
         repeats = np.zeros(len(indices), bool)
-        repeats[1:] = (indices[1:] == indices[:-1]) & (owners[1:] == owners[:-1])
+        repeats[1:] = (indices[1:] == indices[:-1]) & (centres[1:] == centres[:-1])
         kept = np.flatnonzero(~repeats)
-        sizes = np.bincount(owners[kept], minlength=len(self))
+        sizes = np.bincount(centres[kept], minlength=len(self))
         several = self.closed & (sizes > 1)
         last = np.cumsum(sizes)[several] - 1
         first = last + 1 - sizes[several]
         kept = np.delete(kept, last[indices[kept[first]] == indices[kept[last]]])
-        sizes = np.bincount(owners[kept], minlength=len(self))
+        sizes = np.bincount(centres[kept], minlength=len(self))
         return Rings(np.concatenate([[0], np.cumsum(sizes)]), indices[kept], self.closed)
 
-    def padded(self, points):
+    def padded(self, points: np.ndarray) -> np.ndarray:
         """The rings of some points as rows padded with -1, (c, r) int array."""
         rings = self.take(points)
         column = np.arange(rings.sizes.max(initial=0))
@@ -139,14 +142,14 @@ class Rings:
         return rows
 
     @classmethod
-    def from_padded(cls, ring, closed):
+    def from_padded(cls, ring: np.ndarray, closed: np.ndarray) -> Rings:
         """Rings from an (n, r) int array padded with -1 and an (n,) bool array."""
         present = ring >= 0
         indptr = np.concatenate([[0], np.cumsum(present.sum(axis=1))])
         return cls(indptr, ring[present], closed)
 
     @classmethod
-    def concatenate(cls, parts):
+    def concatenate(cls, parts: Sequence[Rings]) -> Rings:
         """One Rings from several, in order."""
         sizes = np.concatenate([np.zeros(1, int), *(part.sizes for part in parts)])
         none = [np.empty(0, int)]
@@ -157,7 +160,7 @@ class Rings:
         )
 
 
-def star_rings(points, centres, neighbours, axes):
+def star_rings(points: np.ndarray, centres: np.ndarray, neighbours: np.ndarray, axes: np.ndarray) -> Rings:
     """Ring of each centre among its neighbours: its Delaunay star in the plane it is projected on.
 
     Parameters
@@ -176,8 +179,8 @@ def star_rings(points, centres, neighbours, axes):
         Of length n; the neighbours are rows of `points`.
     """
     chunks = []
-    for start in range(0, len(centres), _CHUNK):
-        part = slice(start, start + _CHUNK)
+    for start in range(0, len(centres), STAR_CHUNK):
+        part = slice(start, start + STAR_CHUNK)
         candidates = neighbours[part]
         offsets = np.matmul(points.take(candidates, axis=0) - points[centres[part], None], axes[part])
         position, closed = delaunay_star(offsets, candidates >= 0)

@@ -1,11 +1,16 @@
 """The linear solve of the contraction."""
 
-import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.linalg import splu
+from __future__ import annotations
 
-TOLERANCE = 1e-7  # of the cloud's size; refinement ends here
-ACCEPTABLE = 1e-4  # of the cloud's size; a solve that stalls above this is refused
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array, csr_array, csr_matrix
+from scipy.sparse.linalg import SuperLU, splu
+
+# measured
+SOLVE_TOLERANCE = 1e-7  # of the cloud's size; refinement ends here
+SOLVE_ACCEPTABLE = 1e-4  # of the cloud's size; a solve that stalls above this is refused
 MAX_REFINEMENTS = 6
 
 
@@ -13,7 +18,7 @@ class SolveError(ArithmeticError):
     """The contraction system is singular or too ill-conditioned to be solved."""
 
 
-def factorised(matrix, **options):
+def factorised(matrix: csc_array, **options: Any) -> SuperLU:
     """LU factors of a sparse, symmetric, positive definite matrix: SuperLU in symmetric mode.
 
     Parameters
@@ -41,7 +46,9 @@ def factorised(matrix, **options):
     )
 
 
-def solve_contraction(laplacian, row_weight, position_weight, points):
+def solve_contraction(
+    laplacian: csr_matrix, row_weight: np.ndarray, position_weight: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, float]:
     r"""Minimise :math:`\|W_L L X\|^2 + \|W_H (X - P)\|^2` (Wen et al. 2024, equation 3; Cao et al. 2010).
 
     The normal equations :math:`(L^T W_L^2 L + W_H^2) X = W_H^2 P` are factorised once for the three coordinates, by
@@ -69,6 +76,7 @@ def solve_contraction(laplacian, row_weight, position_weight, points):
     """
     system = _stacked(laplacian.tocsr(), row_weight, position_weight)
     transposed = system.T.tocsr()
+    # Wen (3): W_L L X = 0 and W_H X = W_H P in the sense of least squares
     wanted = np.concatenate([np.zeros_like(points), position_weight[:, None] * points])
     try:
         factor = factorised((transposed @ system).tocsc(), Equil=False)  # this also sorts it
@@ -83,20 +91,20 @@ def solve_contraction(laplacian, row_weight, position_weight, points):
         if not change < error:  # also when it is NaN
             break
         x, error = x + correction, change
-        if error < TOLERANCE:
+        if error < SOLVE_TOLERANCE:
             break
-    if not error < ACCEPTABLE:
+    if not error < SOLVE_ACCEPTABLE:
         raise SolveError(f"the contraction system is too ill-conditioned: corrections stay at {error:.1e} of the size")
     # The sum of all equations. The rows of a Laplacian sum to zero, so only W_H keeps the cloud in its place: where
     # it drowns beside L^T L in rounding, the corrections vanish but the points drift.
     pull = (system @ np.ones(len(points))) @ (wanted - system @ x)
     drift = np.abs(pull).max() / ((position_weight**2).sum() * size)
-    if not drift < ACCEPTABLE:
+    if not drift < SOLVE_ACCEPTABLE:
         raise SolveError(f"the contraction system is too ill-conditioned: the cloud drifts by {drift:.1e} of its size")
     return x, float(error)
 
 
-def _stacked(laplacian, row_weight, position_weight):
+def _stacked(laplacian: csr_matrix, row_weight: np.ndarray, position_weight: np.ndarray) -> csr_array:
     """The rows of W_L L, and below them W_H."""
     n = len(position_weight)
     data = np.concatenate([np.repeat(row_weight, np.diff(laplacian.indptr)) * laplacian.data, position_weight])

@@ -1,9 +1,15 @@
 """Dot products and lengths of rows of vectors: several times faster than NumPy's own."""
 
+from __future__ import annotations
+
 import numpy as np
 
+TINY = np.finfo(float).tiny
+PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # the entries of a symmetric 3 x 3 matrix
+ROWS, COLUMNS = np.array(PAIRS).T
 
-def dot(a, b):
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Dot product of each two rows.
 
     Parameters
@@ -18,7 +24,7 @@ def dot(a, b):
     return x * u + y * v + z * w
 
 
-def norm(a):
+def norm(a: np.ndarray) -> np.ndarray:
     """Length of each row.
 
     Parameters

@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 
 from ..numerics.eigen import main_direction
 from ..numerics.groups import group_sum
-from ..numerics.neighbourhoods import PAIRS, local_outlier_ratio, nearest_left, nearest_neighbours, principal
+from ..numerics.neighbourhoods import local_outlier_ratio, nearest_left, nearest_neighbours, principal
 from ..numerics.pairing import merge_nearest
-from ..numerics.vectors import dot
+from ..numerics.vectors import PAIRS, dot
 from .frame import MIN_POINTS
 from .surface import Surface
 from .thinning import MOST_IN_ONE, STEADY_SHARE

@@ -1,5 +1,8 @@
 """Fit the skeleton to the axis of the surface around it."""
 
+from __future__ import annotations
+
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -8,23 +11,23 @@ from scipy.sparse import bsr_array, csc_array
 from ..numerics.groups import group_median, group_sum
 from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
-from ..numerics.vectors import dot, norm
+from ..numerics.vectors import COLUMNS, ROWS, TINY, dot, norm
+from ..skeleton import Skeleton
 
-BENDING = 2.0  # weight of a vertex's distance from the chord of its neighbours, per point
-BLUR = 0.3  # how much more of that where there is doubt, over the squared ratio of noise to spacing
-WIDEST = 100.0  # that ratio at most: vertices in one place have none
-STAY = 0.1  # weight of staying where it was, per point
-OUTLYING = 0.5  # distance from the axis, in radii, at which a point's normal counts half
-CENTROID = 0.5  # weight of the points themselves where their normals say nothing
-SUPPORT = 8  # points that support a vertex half
-TIE = 1e-9
-TINY = np.finfo(float).tiny
-ROWS, COLUMNS = np.triu_indices(3)
+# All fitted, on the shapes with known axes.
+FIT_BENDING = 2.0  # weight of a vertex's distance from the chord of its neighbours, per point
+FIT_SMOOTHING = 0.3  # how much more of that where there is doubt, over the squared ratio of noise to spacing
+FIT_WIDEST = 100.0  # that ratio at most: vertices in one place have none
+FIT_STAY = 0.1  # weight of staying where it was, per point
+FIT_OUTLYING = 0.5  # distance from the axis, in radii, at which a point's normal counts half
+FIT_CENTROID = 0.5  # weight of the points themselves where their normals say nothing
+HALF_SUPPORT = 8  # points that support a vertex half
+NEAREST_TIE = 1e-9  # derived: of roundings, which must not choose between the edges of a vertex
 ENTRIES = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # the upper triangle of a symmetric matrix, spread out
 
 
-def fit_axis(skeleton, passes):
-    r"""Vertices moved to the axis of the surface, how well the points around say where that is, and how far it is.
+def fit_axis(skeleton: Skeleton, passes: int) -> Skeleton:
+    r"""Move the vertices to the axis of the surface, and measure how well the points say where it is, and how far it is.
 
     The plane through a point p of a tube, spanned by its normal n and the tangent t of the axis, contains the axis:
     b (x(p) - p) = 0 with b = n x t and x(p) the place of the curve nearest to p. Each pass minimises, over all vertices
@@ -33,10 +36,10 @@ def fit_axis(skeleton, passes):
     .. math:: \sum_p w (b \cdot (x(p) - p))^2 + \mu d |(x(p) - p)_\perp|^2
         + \sum_v c (\lambda |x_v - chord|^2 + \epsilon |x_v - old|^2 + ((x_v - old) \cdot t)^2)
 
-    with c the number of points at a vertex. w = 1 / (1 + (r / OUTLYING)^2), where r is the distance of the curve from
-    that plane in local radii, is small for points of something else. The doubt d, from 0 to 1, is the share of the
-    distance from the curve that the normals do not explain; where it is large, noise is as wide as the part and the
-    points say more than their normals, and the curve may not bend within less than the points' spread s around it:
+    with c the number of points at a vertex. w = 1 / (1 + (2 r)^2), where r is the distance of the curve from that plane
+    in local radii, is small for points of something else. The doubt d, from 0 to 1, is the share of the distance from
+    the curve that the normals do not explain; where it is large, noise is as wide as the part and the points say more
+    than their normals, and the curve may not bend within less than the points' spread s around it:
     :math:`\lambda = 2 (1 + 0.3 (d s^2 / h^2)^2)` with the spacing h of the vertices, so that the length over which the
     curve is smoothed grows with s and not with h. A half tube, scanned from one side, has an axis, but the centroid of
     its points is off it. So the first pass takes the normals alone, w = 1 and d = 0: it finds the axis from wherever
@@ -46,53 +49,50 @@ def fit_axis(skeleton, passes):
     ----------
     skeleton : Skeleton
     passes : int
+        0 leaves the vertices where they are.
 
     Returns
     -------
-    vertices : (M, 3) float array
-    confidence : (M,) float array
-        (1 - d) c / (c + SUPPORT) with c over the vertex and its neighbours: near 1 on the axis of a tube, near 0 where
-        the normals have no axis in common or points are few.
-    radii : (M,) float array
-        See `robust_radii`; without passes, `plane_distance_radii`.
+    Skeleton
+        With the confidence (1 - d) c / (c + 8), where c counts over the vertex and its neighbours: near 1 on the axis of
+        a tube, near 0 where the normals have no axis in common or points are few; and with radii, see `robust_radii`, or
+        without passes `plane_distance_radii`.
     """
     m, ends = len(skeleton.vertices), skeleton.edges
-    owned = skeleton.witnesses
-    owned = owned[skeleton.degree[skeleton.vertex_of_point[owned]] > 0]
-    if len(owned) == 0:
-        return skeleton.vertices, np.zeros(m), _plane_radii(skeleton, skeleton.vertices)
+    points = skeleton.supporting_points
+    points = points[skeleton.degree[skeleton.vertex_of_point[points]] > 0]
+    if len(points) == 0:
+        return replace(skeleton, confidence=np.zeros(m), radii=_plane_radii(skeleton, skeleton.vertices))
     centre = skeleton.vertices.mean(axis=0)
-    x, p, n = skeleton.vertices - centre, skeleton.points[owned] - centre, skeleton.normals.take(owned, axis=0)
-    edges_at = incident_edges(ends, m)
-    around = edges_at[skeleton.vertex_of_point[owned]]
-    inner = np.flatnonzero(skeleton.degree == 2)
-    beside = ends[edges_at[inner, :2]].sum(axis=2) - inner[:, None]  # the other end of either edge
-    pattern = _Pattern(m, ends, inner, beside)
+    x, p, n = skeleton.vertices - centre, skeleton.points[points] - centre, skeleton.normals.take(points, axis=0)
+    around = incident_edges(ends, m)[skeleton.vertex_of_point[points]]
+    pattern = _Pattern.of(skeleton)
     far = np.sqrt(dot(p, p).max())
     for step in range(passes):
         near = _nearest(x, ends, around, p, n)
         weight, pull = np.ones(len(p)), np.zeros(len(p))
         if step:
             radius = group_median(norm(near.offset), near.edge, len(ends))[near.edge]
-            weight = 1 / (1 + near.miss / np.maximum((OUTLYING * radius) ** 2, TINY))
-            pull = CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1)
-        x = _solve(x, ends, near, p, weight, pull, inner, beside, pattern, BLUR if step else 0)
+            weight = 1 / (1 + near.miss / np.maximum((FIT_OUTLYING * radius) ** 2, TINY))
+            pull = FIT_CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1)
+        x = _solve(x, near, p, weight, pull, pattern, FIT_SMOOTHING if step else 0)
         size = norm(x)
         run = np.where((size > far) & (skeleton.degree > 0), far / np.maximum(size, TINY), 1)
         x = run[:, None] * x  # normals that mean nothing may meet anywhere
     near = _nearest(x, ends, around, p, n)
     radii = _plane_radii(skeleton, x + centre)
     if passes:  # the distance from a curve that nobody has centred is no radius
-        distance = norm(near.offset)
-        radii = robust_radii(radii, distance, near.doubt, n, skeleton.vertex_of_point[owned])
-    return x + centre, (1 - near.doubt) * near.support / (near.support + SUPPORT), radii
+        vertex = skeleton.vertex_of_point[points]
+        radii = robust_radii(radii, norm(near.offset), near.doubt, n, vertex)
+    confidence = (1 - near.doubt) * near.support / (near.support + HALF_SUPPORT)
+    return replace(skeleton, vertices=x + centre, confidence=confidence, radii=radii)
 
 
-def _plane_radii(skeleton, vertices):
+def _plane_radii(skeleton: Skeleton, vertices: np.ndarray) -> np.ndarray:
     return plane_distance_radii(vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals, skeleton.radii)
 
 
-def incident_edges(edges, m):
+def incident_edges(edges: np.ndarray, m: int) -> np.ndarray:
     """Edges at every vertex, (m, most) int array, filled up with -1."""
     vertex, edge = edges.ravel(), np.repeat(np.arange(len(edges)), 2)
     order = np.argsort(vertex, kind="stable")
@@ -103,7 +103,9 @@ def incident_edges(edges, m):
     return table
 
 
-def nearest_on_edges(x, edges, candidates, p):
+def nearest_on_edges(
+    x: np.ndarray, edges: np.ndarray, candidates: np.ndarray, p: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The place nearest to each point among some edges.
 
     Parameters
@@ -130,7 +132,7 @@ def nearest_on_edges(x, edges, candidates, p):
         part = np.clip(dot(along, offset) / lengths.take(column), 0, 1)
         offset -= part[:, None] * along
         squared = dot(offset, offset)
-        nearer = squared < (1 - TIE) * best[some]  # a vertex belongs to all its edges: rounding must not choose
+        nearer = squared < (1 - NEAREST_TIE) * best[some]  # a vertex belongs to all its edges: rounding must not choose
         some = some[nearer]
         edge[some], t[some], best[some] = column[nearer], part[nearer], squared[nearer]
     return edge, t
@@ -150,7 +152,7 @@ class _Nearest(NamedTuple):
     support: np.ndarray  # points at every vertex and its neighbours
 
 
-def _nearest(x, ends, around, p, n):
+def _nearest(x: np.ndarray, ends: np.ndarray, around: np.ndarray, p: np.ndarray, n: int) -> _Nearest:
     edge, t = nearest_on_edges(x, ends, around, p)
     share = np.column_stack([1 - t, t])
     start, way = x[ends[:, 0]], x[ends[:, 1]] - x[ends[:, 0]]
@@ -169,8 +171,17 @@ def _nearest(x, ends, around, p, n):
     return _Nearest(edge, share, tangent, across, offset, miss, doubt, apart_at / np.maximum(support, TINY), support)
 
 
-def _solve(x, ends, near, p, weight, pull, inner, beside, pattern, blur):
+def _solve(
+    x: np.ndarray,
+    near: _Nearest,
+    p: np.ndarray,
+    weight: np.ndarray,
+    pull: np.ndarray,
+    pattern: _Pattern,
+    smoothing: float,
+) -> np.ndarray:
     """The minimum of the energy in `fit_axis`: one sparse, symmetric, positive definite system."""
+    ends, inner, beside = pattern.ends, pattern.inner, pattern.beside
     m, e = len(x), len(ends)
     along = near.tangent[:, :, None] * near.tangent[:, None]
     upright = np.eye(3) - along
@@ -189,14 +200,14 @@ def _solve(x, ends, near, p, weight, pull, inner, beside, pattern, blur):
     facts = group_sum(facts, ends.T.ravel(), m)
     right, count = facts[:, :3], facts[:, 3]
     along = facts[:, 4:].reshape(m, 3, 3) / np.maximum(np.bincount(ends.ravel(), minlength=m), 1)[:, None, None]
-    stay = (STAY * count + 1e-3 * max(count.mean(), 1))[:, None, None] * np.eye(3) + count[:, None, None] * along
+    stay = (FIT_STAY * count + 1e-3 * max(count.mean(), 1))[:, None, None] * np.eye(3) + count[:, None, None] * along
     right = right + np.einsum("nij,nj->ni", stay, x)
 
     reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
     stencil = np.column_stack([np.ones(len(inner)), -chord])
-    width = np.minimum((near.doubt * near.apart)[inner] / np.maximum(reach.prod(axis=1), TINY), WIDEST)
-    bend = BENDING * (1 + blur * width**2) * np.maximum(count[inner], 1)
+    width = np.minimum((near.doubt * near.apart)[inner] / np.maximum(reach.prod(axis=1), TINY), FIT_WIDEST)
+    bend = FIT_BENDING * (1 + smoothing * width**2) * np.maximum(count[inner], 1)
     bend = bend[:, None, None] * stencil[:, :, None] * stencil[:, None]  # the same for all three coordinates
     blocks = np.concatenate(
         [at_edges[0], at_edges[1], at_edges[1], at_edges[2], stay, bend.reshape(-1, 1, 1) * np.eye(3)]
@@ -207,7 +218,8 @@ def _solve(x, ends, near, p, weight, pull, inner, beside, pattern, blur):
 class _Pattern:
     """Where the blocks of `_solve` stand in its system: for both ends of edges, vertices, and these with two beside."""
 
-    def __init__(self, m, ends, inner, beside):
+    def __init__(self, m: int, ends: np.ndarray, inner: np.ndarray, beside: np.ndarray) -> None:
+        self.ends, self.inner, self.beside = ends, inner, beside
         (a, b), every, stencil = ends.T, np.arange(m), np.column_stack([inner, beside])
         rows = np.concatenate([a, a, b, b, every, np.repeat(stencil, 3, axis=1).ravel()])
         columns = np.concatenate([a, b, a, b, every, np.tile(stencil, 3).ravel()])
@@ -215,7 +227,14 @@ class _Pattern:
         self._columns = places % m
         self._starts = np.searchsorted(places, m * np.arange(m + 1))
 
-    def matrix(self, blocks):
+    @classmethod
+    def of(cls, skeleton: Skeleton) -> _Pattern:
+        """That of the edges of a skeleton."""
+        m, ends, inner = len(skeleton.vertices), skeleton.edges, np.flatnonzero(skeleton.degree == 2)
+        beside = ends[incident_edges(ends, m)[inner, :2]].sum(axis=2) - inner[:, None]  # the other end of either edge
+        return cls(m, ends, inner, beside)
+
+    def matrix(self, blocks: np.ndarray) -> csc_array:
         """The symmetric matrix that has the sum of the blocks, (b, 3, 3), in every place."""
         summed = group_sum(blocks, self._place, len(self._columns))
         rows = bsr_array((summed, self._columns, self._starts)).tocsr()

@@ -1,20 +1,26 @@
 """Tell where no curve skeleton is meaningful, on sheets and balls, and where the points do not say where it is."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from ..numerics.components import component_labels
 from ..numerics.groups import group_median, group_sum
 from ..numerics.vectors import dot, norm
+from ..skeleton import Skeleton
 
-SHEET = 0.9  # share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
-BALL = 0.5  # spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
+# All fitted; what tubes and balls have is derived.
+SHEET_SHARE = 0.9  # of one direction among the normals around a vertex; a tube has 0.5, half a tube too
+# spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
+BALL_SPREAD = 0.5
+STUB_LENGTH = (
+    3.3  # of the evenly filled box with a part's spread over the median distance to the surface; balls: 2 to 3
+)
+LOW_CONFIDENCE = 0.1  # below which a vertex is not to be trusted
+LOW_CONFIDENCE_SHARE = 0.25  # of the points around such vertices that is worth a warning
 
-STUB = 3.3  # length of the evenly filled box with a part's spread over the median thickness; balls have 2 to 3
-WEAK = 0.1  # confidence below which a vertex is not to be trusted
-MUCH = 0.25  # share of the points around such vertices that is worth a warning
 
-
-def trust_warnings(skeleton):
+def diagnose(skeleton: Skeleton) -> list[str]:
     """Reasons not to trust a skeleton: the cloud is sheet-like, sphere-like, or does not say where much of the axis is.
 
     Sheet-like: the normals around a vertex have one direction. Sphere-like: the normal lines of a whole component meet
@@ -29,23 +35,23 @@ def trust_warnings(skeleton):
     -------
     list of str
     """
-    owned = skeleton.witnesses
-    if len(owned) == 0:
+    supporting = skeleton.supporting_points
+    if len(supporting) == 0:
         return []
-    owner, normals = skeleton.vertex_of_point[owned], skeleton.normals[owned]
+    vertex, normals = skeleton.vertex_of_point[supporting], skeleton.normals[supporting]
     along = np.einsum("ni,nj->nij", normals, normals)
 
-    count = np.bincount(owner, minlength=len(skeleton.vertices))
-    one_way = np.linalg.eigvalsh(group_sum(along, owner, len(count)))[:, 2] > SHEET * np.maximum(count, 1)
-    sheet = count[one_way].sum() / len(owner)
+    count = np.bincount(vertex, minlength=len(skeleton.vertices))
+    one_way = np.linalg.eigvalsh(group_sum(along, vertex, len(count)))[:, 2] > SHEET_SHARE * np.maximum(count, 1)
+    sheet = count[one_way].sum() / len(vertex)
     if sheet > 0.5:
         return [
             f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
             "so that a curve skeleton says little about it"
         ]
 
-    component, n = skeleton.component_of_vertex[owner], skeleton.n_components
-    points = skeleton.points[owned] - skeleton.vertices[0]
+    component, n = skeleton.component_of_vertex[vertex], skeleton.n_components
+    points = skeleton.points[supporting] - skeleton.vertices[0]
     size = np.bincount(component, minlength=n)[:, None]
     # of every normal line I - n n^T, which takes away what is along it
     weight = (size[:, :, None] + 1e-9 * np.maximum(size, 1)[:, :, None]) * np.eye(3) - group_sum(along, component, n)
@@ -55,8 +61,8 @@ def trust_warnings(skeleton):
     distance = dot(offset, offset)
     miss = distance - dot(normals, offset) ** 2
     spread = group_sum(np.column_stack([miss, distance]), component, n)
-    ball = spread[:, 0] < BALL**2 * spread[:, 1]
-    share = size[ball].sum() / len(owner)
+    ball = spread[:, 0] < BALL_SPREAD**2 * spread[:, 1]
+    share = size[ball].sum() / len(vertex)
     if share > 0.5:
         return [
             f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
@@ -65,8 +71,8 @@ def trust_warnings(skeleton):
     spread = group_sum(np.einsum("ni,nj->nij", points, points), component, n) / np.maximum(size, 1)[:, :, None]
     mean = group_sum(points, component, n) / np.maximum(size, 1)
     length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread - mean[:, :, None] * mean[:, None])[:, 2], 0))
-    reach = norm(skeleton.points[owned] - skeleton.vertices[owner])
-    share = size[length < STUB * group_median(reach, component, n)].sum() / len(owner)
+    reach = norm(skeleton.points[supporting] - skeleton.vertices[vertex])
+    share = size[length < STUB_LENGTH * group_median(reach, component, n)].sum() / len(vertex)
     if share > 0.5:
         return [
             f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
@@ -77,10 +83,10 @@ def trust_warnings(skeleton):
     return _weak_region(skeleton, count)
 
 
-def _weak_region(skeleton, count):
-    weak = skeleton.confidence < WEAK
+def _weak_region(skeleton: Skeleton, count: np.ndarray) -> list[str]:
+    weak = skeleton.confidence < LOW_CONFIDENCE
     share = count[weak].sum() / count.sum()
-    if share <= MUCH:
+    if share <= LOW_CONFIDENCE_SHARE:
         return []
     inner = skeleton.edges[weak[skeleton.edges].all(axis=1)]
     label = component_labels(len(weak), inner)

@@ -1,24 +1,27 @@
 """Close loops that nothing passes through."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from ..numerics.components import component_labels
 from ..numerics.cycles import minimum_cycle_basis, opens_wider
 from ..numerics.groups import group_median
 from ..numerics.vectors import norm
+from ..skeleton import Skeleton
 from .merging import merge_vertices
 from .triangles import collapse_triangles
 
 
-def surface_distance(skeleton):
+def surface_distance(skeleton: Skeleton) -> np.ndarray:
     """Median distance from each vertex to the input points it owns, (M,) float array."""
-    owned = skeleton.witnesses
-    owner = skeleton.vertex_of_point[owned]
-    distance = norm(skeleton.points[owned] - skeleton.vertices[owner])
-    return group_median(distance, owner, len(skeleton.vertices))
+    supporting = skeleton.supporting_points
+    vertex = skeleton.vertex_of_point[supporting]
+    distance = norm(skeleton.points[supporting] - skeleton.vertices[vertex])
+    return group_median(distance, vertex, len(skeleton.vertices))
 
 
-def close_loops(skeleton, opening):
+def close_loops(skeleton: Skeleton, opening: float) -> Skeleton:
     """Zip up the loops whose opening is not wider than the tube that makes them.
 
     The opening of a loop is the radius of the largest circle inside it; the tube's is the median over the loop of the
@@ -53,7 +56,7 @@ def close_loops(skeleton, opening):
         skeleton = collapse_triangles(merge_vertices(skeleton, group))
 
 
-def zip_pairs(points, labels):
+def zip_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
     """Pairs of vertices that meet when a loop is zipped up between its two ends, those farthest apart.
 
     Parameters

@@ -1,19 +1,22 @@
 """Merge vertices of a skeleton."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np
 
 from ..numerics.groups import group_sum
+from ..skeleton import Skeleton
 
 
-def support(skeleton):
+def support(skeleton: Skeleton) -> np.ndarray:
     """Input points that each vertex owns, at least 1, (M,) float array."""
-    owner = skeleton.vertex_of_point[skeleton.witnesses]
-    return np.maximum(np.bincount(owner, minlength=len(skeleton.vertices)), 1).astype(float)
+    vertex = skeleton.vertex_of_point[skeleton.supporting_points]
+    return np.maximum(np.bincount(vertex, minlength=len(skeleton.vertices)), 1).astype(float)
 
 
-def merge_vertices(skeleton, group):
+def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
     """Make one vertex of each group, at the mean of its members weighted by the points they own.
 
     Parameters
@@ -31,11 +34,11 @@ def merge_vertices(skeleton, group):
     n, weight = len(label), support(skeleton)[:, None]
     total = group_sum(weight, group, n)
     edges = np.sort(group[skeleton.edges], axis=1)
-    owner = skeleton.vertex_of_point
+    vertex = skeleton.vertex_of_point
     return replace(
         skeleton,
         vertices=group_sum(weight * skeleton.vertices, group, n) / total,
         edges=np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0),
         radii=(group_sum(weight * skeleton.radii[:, None], group, n) / total)[:, 0],
-        vertex_of_point=np.where(owner >= 0, group[owner], -1),
+        vertex_of_point=np.where(vertex >= 0, group[vertex], -1),
     )

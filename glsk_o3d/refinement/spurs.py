@@ -1,24 +1,27 @@
-"""Cut twigs that hardly leave the part they grow from."""
+"""Cut spurs that hardly leave the part they grow from."""
+
+from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
 
-from ..numerics.vectors import dot, norm
+from ..numerics.vectors import TINY, dot, norm
+from ..skeleton import Skeleton
 from .loops import surface_distance
 from .merging import merge_vertices
 
-FAR = 0.9  # share of a twig's points that its reach covers
-_CHUNK = 2**20  # pairs of a point and an edge at a time: memory stays flat
+SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
+SPUR_CHUNK = 2**20  # pairs of a point and an edge at a time: memory stays flat
 
 
-def cut_twigs(skeleton, reach):
+def prune_spurs(skeleton: Skeleton, reach: float) -> Skeleton:
     """Cut branches that end in a leaf and whose points reach no farther than the surface around what they grow from.
 
     What counts is the points, not the curve: the contraction shortens stubs as thick as they are long, and lets thin
     ones grow. And it is how far they leave the branches that meet them, not how far they are from the junction: along
-    a part they may be anywhere. Another branch with an end may be a twig, too, far from its points: it counts as no
+    a part they may be anywhere. Another branch with an end may be a spur, too, far from its points: it counts as no
     thicker than the junction. A branch whose points have no say goes.
 
     Parameters
@@ -31,14 +34,14 @@ def cut_twigs(skeleton, reach):
     Returns
     -------
     Skeleton
-        Points of a cut twig belong to its junction.
+        Points of a cut spur belong to its junction.
     """
     while True:
         thickness, degree = surface_distance(skeleton), skeleton.degree
         thickness = np.where(thickness > 0, thickness, skeleton.radii)  # of vertices without points
-        owned = skeleton.witnesses
-        owned = owned[np.argsort(skeleton.vertex_of_point[owned], kind="stable")]
-        stop = np.cumsum(np.bincount(skeleton.vertex_of_point[owned], minlength=len(degree)))
+        supporting = skeleton.supporting_points
+        supporting = supporting[np.argsort(skeleton.vertex_of_point[supporting], kind="stable")]
+        stop = np.cumsum(np.bincount(skeleton.vertex_of_point[supporting], minlength=len(degree)))
         start = np.concatenate([[0], stop[:-1]])
         branches, at, worst = skeleton.branches, defaultdict(list), {}
         ending = np.zeros(len(degree), bool)
@@ -51,25 +54,31 @@ def cut_twigs(skeleton, reach):
             a, b = branch[0], branch[-1]
             if sorted((degree[a] == 1, degree[b] == 1)) != [False, True]:
                 continue
-            junction, twig = (a, branch[1:]) if degree[b] == 1 else (b, branch[:-1])
-            points = skeleton.points[np.concatenate([owned[start[v] : stop[v]] for v in twig])]
+            junction, spur = (a, branch[1:]) if degree[b] == 1 else (b, branch[:-1])
+            points = skeleton.points[np.concatenate([supporting[start[v] : stop[v]] for v in spur])]
             others = [other for other in at[junction] if other is not branch]
             thick = np.where(ending, np.minimum(thickness, thickness[junction]), thickness)
-            far = np.quantile(beyond(points, skeleton.vertices, thick, others), FAR) if len(points) else 0.0
+            far = (
+                np.quantile(distance_over_thickness(points, skeleton.vertices, thick, others), SPUR_QUANTILE)
+                if len(points)
+                else 0.0
+            )
             if far < worst.get(junction, (reach,))[0]:
-                worst[junction] = (far, twig)
+                worst[junction] = (far, spur)
         if not worst:
             return skeleton
         group, m = np.arange(len(skeleton.vertices)), len(skeleton.vertices)
-        for junction, (_, twig) in worst.items():
-            group[twig] = junction
+        for junction, (_, spur) in worst.items():
+            group[spur] = junction
         stay = np.flatnonzero(group == np.arange(m))
         # a junction stays what it was
         kept = {name: getattr(skeleton, name)[stay] for name in ("vertices", "radii", "confidence")}
         skeleton = replace(merge_vertices(skeleton, group), **kept)
 
 
-def beyond(points, vertices, thickness, paths):
+def distance_over_thickness(
+    points: np.ndarray, vertices: np.ndarray, thickness: np.ndarray, paths: list[np.ndarray]
+) -> np.ndarray:
     """Distance from the edge of some paths from which it is least over the thickness, which is linear along an edge.
 
     Parameters
@@ -86,13 +95,13 @@ def beyond(points, vertices, thickness, paths):
     """
     a, b = (np.concatenate([path[part] for path in paths]) for part in (slice(-1), slice(1, None)))
     start, step = vertices[a], vertices[b] - vertices[a]
-    length, tiny = norm(step), np.finfo(float).tiny
+    length, tiny = norm(step), TINY
     direction = step / np.maximum(length, tiny)[:, None]
     # relative to one of them: products of coordinates far from the origin would cancel
     points, start = points - start[0], start - start[0]
     least = max(np.finfo(float).eps * np.abs(points).max(), tiny)  # of a line, which has no thickness but roundings
     found = np.empty(len(points))
-    rows = max(_CHUNK // len(a), 1)
+    rows = max(SPUR_CHUNK // len(a), 1)
     for first in range(0, len(points), rows):
         p = points[first : first + rows]
         along = p @ direction.T - dot(start, direction)

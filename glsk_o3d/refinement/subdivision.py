@@ -1,19 +1,21 @@
 """Subdivide edges, so that chords do not cut corners."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np
 
-from ..numerics.vectors import dot, norm
+from ..numerics.vectors import TINY, dot, norm
+from ..skeleton import Skeleton
 from .axis_fit import incident_edges
 from .merging import support
 
-SUPPORT = 8  # an edge is cut into at most one piece for every so many input points, begun ones counted
-TINY = np.finfo(float).tiny
-_CHUNK = 65536  # points at a time: memory stays flat
+POINTS_PER_PIECE = 8  # fitted: an edge is cut into at most one piece for every so many input points, begun ones counted
+SUBDIVISION_CHUNK = 65536  # points at a time: memory stays flat
 
 
-def resample(skeleton, spacing):
+def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
     """Subdivide the edges to a share of the local thickness; points go to the nearest sample around their vertex.
 
     Parameters
@@ -30,7 +32,7 @@ def resample(skeleton, spacing):
     m = len(skeleton.vertices)
     length = np.maximum(spacing * skeleton.radii[ends].mean(axis=1), 1e-3 * skeleton.edge_lengths)
     points = (support(skeleton) / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
-    pieces = np.ceil(np.minimum(skeleton.edge_lengths / length, np.maximum(points / SUPPORT, 1))).astype(int)
+    pieces = np.ceil(np.minimum(skeleton.edge_lengths / length, np.maximum(points / POINTS_PER_PIECE, 1))).astype(int)
     inner = pieces - 1
     edge = np.repeat(np.arange(len(ends)), inner)
     step = np.arange(len(edge)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
@@ -48,11 +50,11 @@ def resample(skeleton, spacing):
 
     around, vertex_of_point = incident_edges(ends, m), skeleton.vertex_of_point.copy()
     owned = np.flatnonzero(vertex_of_point >= 0)
-    for begin in range(0, len(owned), _CHUNK):
-        part = owned[begin : begin + _CHUNK]
-        owner, points = vertex_of_point[part], skeleton.points[part]
-        choice, best = owner.copy(), norm(points - skeleton.vertices.take(owner, axis=0))
-        for column in around[owner].T:
+    for begin in range(0, len(owned), SUBDIVISION_CHUNK):
+        part = owned[begin : begin + SUBDIVISION_CHUNK]
+        vertex, points = vertex_of_point[part], skeleton.points[part]
+        choice, best = vertex.copy(), norm(points - skeleton.vertices.take(vertex, axis=0))
+        for column in around[vertex].T:
             some = np.flatnonzero(column >= 0)
             some = some[inner[column[some]] > 0]
             e = column[some]

@@ -1,14 +1,17 @@
 """Collapse triangles, so that the graph is one-dimensional."""
 
+from __future__ import annotations
+
 import heapq
 import math
 
 import numpy as np
 
+from ..skeleton import Skeleton
 from .merging import merge_vertices, support
 
 
-def collapse_triangles(skeleton):
+def collapse_triangles(skeleton: Skeleton) -> Skeleton:
     """Merge the two ends of edges that lie on a triangle, cheapest first, until there is no triangle.
 
     Parameters
@@ -26,7 +29,7 @@ def collapse_triangles(skeleton):
         around[a].add(b)
         around[b].add(a)
 
-    def cost(a, b):
+    def cost(a: int, b: int) -> tuple[float, float]:
         return (len(around[a]) + len(around[b])) / 2, math.dist(position[a], position[b])
 
     queue = [(*cost(a, b), a, b) for a, b in skeleton.edges.tolist() if around[a] & around[b]]

@@ -1,4 +1,6 @@
-"""Cut loops that hang by a thread, and loops that are hardly supported."""
+"""Cut weak loops: those across which the surface hardly goes on, and those that few points are sure of."""
+
+from __future__ import annotations
 
 from dataclasses import replace
 
@@ -7,12 +9,13 @@ import numpy as np
 from ..numerics.cycles import minimum_cycle_basis, opens_wider
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
 from ..numerics.vectors import dot
+from ..skeleton import Skeleton
 from .loops import surface_distance
 
-NEAR = 8  # points, itself included, that are near to a point
+BOND_NEIGHBOURS = 8  # fitted: points, itself included, that are near to a point
 
 
-def bonds(skeleton, among=None):
+def bonds(skeleton: Skeleton, among: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """How far the surface goes on from vertex to vertex.
 
     Every two near points of different vertices count by how far their normals agree and stand upright on the line
@@ -30,29 +33,33 @@ def bonds(skeleton, among=None):
         Vertices, i < j.
     weight : (B,) float array
     """
-    owned = skeleton.witnesses
-    places = skeleton.points[owned]
-    if len(np.unique(places[:, 0])) < len(owned):  # perhaps copies, which are near to nothing else
+    supporting = skeleton.supporting_points
+    places = skeleton.points[supporting]
+    if len(np.unique(places[:, 0])) < len(supporting):  # perhaps copies, which are near to nothing else
         order = np.lexsort(places.T)
         step = np.diff(places[order], axis=0, prepend=np.nan)
-        owned = np.sort(owned[order[(step != 0).any(axis=1)]])
-    if len(owned) < 2:
+        supporting = np.sort(supporting[order[(step != 0).any(axis=1)]])
+    if len(supporting) < 2:
         return np.empty((0, 2), int), np.empty(0)
-    points, normals, owner = skeleton.points[owned], skeleton.normals[owned], skeleton.vertex_of_point[owned]
-    chosen = np.ones(len(owner), bool) if among is None else np.isin(owner, among)
+    points, normals, vertex = (
+        skeleton.points[supporting],
+        skeleton.normals[supporting],
+        skeleton.vertex_of_point[supporting],
+    )
+    chosen = np.ones(len(vertex), bool) if among is None else np.isin(vertex, among)
     p = np.flatnonzero(chosen)
-    near = nearest_neighbours(points, min(NEAR, len(owned)), of=points[p])[1][:, 1:]
+    near = nearest_neighbours(points, min(BOND_NEIGHBOURS, len(supporting)), of=points[p])[1][:, 1:]
     p, q = np.repeat(p, near.shape[1]), near.ravel()
-    foreign = (owner[p] != owner[q]) & chosen[q]
+    foreign = (vertex[p] != vertex[q]) & chosen[q]
     p, q = p[foreign], q[foreign]
     agree = dot(normals[p], normals[q]) ** 2
     weight = agree * uprightness(points, normals, p, q)
     m = len(skeleton.vertices)
-    keys, which = np.unique(np.sort(np.column_stack([owner[p], owner[q]]), axis=1) @ [m, 1], return_inverse=True)
+    keys, which = np.unique(np.sort(np.column_stack([vertex[p], vertex[q]]), axis=1) @ [m, 1], return_inverse=True)
     return np.column_stack(np.divmod(keys, m)), np.bincount(which, weight, len(keys))
 
 
-def crossings(cycle, m, pairs, weight):
+def crossings(cycle: np.ndarray, m: int, pairs: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Bonds across every edge of a cycle, from its vertices on the one side to those on the other, the shorter way.
 
     Parameters
@@ -80,22 +87,22 @@ def crossings(cycle, m, pairs, weight):
     return np.maximum(np.cumsum(steps) + weight[around].sum(), 0)  # rounding leaves less than nothing
 
 
-def cut_threads(skeleton, weak, sure):
-    """Cut the loops that hang by a thread or are hardly supported, each where the fewest bonds cross.
+def cut_weak_loops(skeleton: Skeleton, weak_bonds: float, weak_opening: float) -> Skeleton:
+    """Cut the weak loops, each where the fewest bonds cross.
 
-    A loop hangs by a thread where hardly any bond crosses it: two parts touch there, or a stray point lies between
-    them. It is hardly supported if its opening over the thickness of its tube is small for the confidence in it: noise
-    and sparse points leave narrow loops, not wide ones. All such loops of a minimum cycle basis are cut, until there
+    A loop is weak where hardly any bond crosses it: two parts touch there, or a lone point lies between them. And it is
+    weak if its opening over the distance to the surface is small for the confidence in it: noise and sparse points
+    leave narrow loops, not wide ones. All such loops of a minimum cycle basis are cut, until there
     are none; a component is never torn.
 
     Parameters
     ----------
     skeleton : Skeleton
         With its confidence.
-    weak : float
+    weak_bonds : float
         Least bonds across an edge over the median along its loop.
-    sure : float
-        Least opening over thickness, times the mean confidence.
+    weak_opening : float
+        Least opening over the distance to the surface, times the mean confidence.
 
     Returns
     -------
@@ -113,7 +120,7 @@ def cut_threads(skeleton, weak, sure):
         for cycle in cycles:
             across = crossings(cycle, m, pairs, weight)
             tube, loop = np.median(thickness[cycle]), skeleton.confidence[cycle].mean() * skeleton.vertices[cycle]
-            if across.min() < weak * np.median(across) or not opens_wider(loop, sure * tube):
+            if across.min() < weak_bonds * np.median(across) or not opens_wider(loop, weak_opening * tube):
                 edges = np.searchsorted(keys, np.sort(np.column_stack([cycle, np.roll(cycle, -1)]), axis=1) @ [m, 1])
                 if not used[edges].any():  # two cuts in what two loops share would tear a piece out of it
                     cut.append(edges[np.lexsort((edges, across))[0]])
