@@ -77,12 +77,12 @@ def assert_sound():
         assert (owner == -1).sum() == n_dropped
         assert owner.min() >= -1
         assert skeleton.points.shape == skeleton.normals.shape == (n_points, 3)
-        lengths = np.linalg.norm(skeleton.normals[skeleton.witnesses], axis=1)
+        lengths = np.linalg.norm(skeleton.normals[skeleton.supporting_points], axis=1)
         np.testing.assert_allclose(lengths, 1, atol=1e-12)
         silent = np.isnan(skeleton.normals).any(axis=1)
         said = n_dropped + skeleton.report.n_outliers
         if any(
-            "stray=" in stage and "stray=0)" not in stage for stage in skeleton.report.stages
+            "min_support=" in stage and "min_support=0)" not in stage for stage in skeleton.report.stages
         ):  # points of dropped vertices have no say
             assert said <= silent.sum() < n_points
         else:

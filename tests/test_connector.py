@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from glsk_o3d import Connector, Contractor, InvalidParameterError, LPRReducer, RingBuilder, Skeleton, pipelines, samples
-from glsk_o3d.connector import NOISY, drop_stray, local_thickness
+from glsk_o3d.connector import UNSUPPORTED_NOISE, contraction_distance, drop_unsupported
 
 VARIANTS = {name: make().stages[2] for name, make in pipelines.PIPELINES.items()}
 ONE_RADIUS = VARIANTS["cao2010"]
@@ -57,7 +57,7 @@ def test_edges_join_what_rings_join(state):
     skeleton = Connector()(state)
     owner = np.full(len(state), -1)
     owner[state.survivor_of_point] = skeleton.vertex_of_point
-    a, b = np.sort([owner[state.rings.owners], owner[state.rings.indices]], axis=0)
+    a, b = np.sort([owner[state.rings.centres], owner[state.rings.indices]], axis=0)
     possible = {(i, j) for i, j in zip(a.tolist(), b.tolist(), strict=True) if i != j}
     nearest = {tuple(edge) for edge in ONE_RADIUS(state).edges.tolist()}
     assert {tuple(edge) for edge in skeleton.edges.tolist()} <= possible
@@ -143,21 +143,21 @@ def slow_thickness(state, k=16):
 
 def test_local_thickness_is_a_median_over_sixteen(state):
     """Of the medians of what each survivor speaks for; itself is one of the 16."""
-    np.testing.assert_allclose(local_thickness(state), slow_thickness(state), atol=1e-12)
+    np.testing.assert_allclose(contraction_distance(state), slow_thickness(state), atol=1e-12)
     assert np.abs(slow_thickness(state, 15) - slow_thickness(state)).max() > 1e-4
 
 
 def test_local_thickness_of_a_tube_is_its_radius():
     state = Contractor()(RingBuilder()(samples.tube(n=2000, radius=0.1).points))
     middle = np.abs(state.contracted[:, 0]) < 0.4
-    np.testing.assert_allclose(local_thickness(state)[middle] * state.frame.scale, 0.1, rtol=0.1)
+    np.testing.assert_allclose(contraction_distance(state)[middle] * state.frame.scale, 0.1, rtol=0.1)
 
 
 def test_local_thickness_ignores_a_few_points_gone_astray(state):
     cloud = state.cloud.copy()
     cloud[state.survivors[::40]] += 100
     astray = replace(state, cloud=cloud)
-    assert local_thickness(astray).max() < 1
+    assert contraction_distance(astray).max() < 1
 
 
 def test_local_thickness_of_fewer_points_than_neighbours():
@@ -165,7 +165,7 @@ def test_local_thickness_of_fewer_points_than_neighbours():
     state = RingBuilder(outlier_factor=0)(points)
     moved = replace(state, positions=0.5 * state.positions)
     expected = np.median(np.linalg.norm(state.cloud, axis=1)) / 2
-    np.testing.assert_allclose(local_thickness(moved), expected)
+    np.testing.assert_allclose(contraction_distance(moved), expected)
 
 
 # ---- stray vertices
@@ -203,7 +203,7 @@ BETWEEN = {
 def test_stray_vertices_are_dropped_unless_they_hold_parts_together(case):
     more, dropped = BETWEEN[case]
     raw, count = counted(THICK + more, [100] * 6 + [5] * 3)
-    skeleton = drop_stray(raw, count, np.ones(9, bool), 0.1)
+    skeleton = drop_unsupported(raw, count, np.ones(9, bool), 0.1)
     left = np.setdiff1d(np.arange(9), dropped)
     np.testing.assert_array_equal(skeleton.vertices, raw.vertices[left])
     kept = [edge for edge in raw.edges.tolist() if not set(edge) & set(dropped)]
@@ -222,7 +222,7 @@ def test_share_of_the_points_of_another_at_most_two_edges_away(count, share, dro
     path = [100, *[60] * (away - 1), count]
     raw, count = counted([(i, i + 1) for i in range(away)], path)
     noisy = np.arange(away + 1) == away
-    skeleton = drop_stray(raw, count, noisy, share)
+    skeleton = drop_unsupported(raw, count, noisy, share)
     near = count[away] < share * 60 if away == 3 else dropped
     assert len(skeleton.vertices) == len(path) - near
     if not near:
@@ -231,9 +231,9 @@ def test_share_of_the_points_of_another_at_most_two_edges_away(count, share, dro
 
 def test_only_noisy_vertices_are_dropped():
     raw, count = counted([*THICK, (2, 6), (3, 7)], [100] * 6 + [1, 1])
-    assert drop_stray(raw, count, np.zeros(8, bool), 0.1) is raw
-    assert drop_stray(raw, count, np.arange(8) < 6, 1.0) is raw
-    np.testing.assert_array_equal(drop_stray(raw, count, np.arange(8) == 7, 0.1).vertices, raw.vertices[:7])
+    assert drop_unsupported(raw, count, np.zeros(8, bool), 0.1) is raw
+    assert drop_unsupported(raw, count, np.arange(8) < 6, 1.0) is raw
+    np.testing.assert_array_equal(drop_unsupported(raw, count, np.arange(8) == 7, 0.1).vertices, raw.vertices[:7])
 
 
 def slow_stray(edges, count, noisy, share):
@@ -264,7 +264,7 @@ def graphs(draw):
 def test_drop_stray_by_its_definition(graph, share, seed):
     edges, count, noisy = graph
     raw, count = counted(edges, count, seed)
-    skeleton = drop_stray(raw, count, noisy, share)
+    skeleton = drop_unsupported(raw, count, noisy, share)
     dropped = slow_stray(edges, count.tolist(), noisy, share)
     left = np.setdiff1d(np.arange(len(count)), dropped)
     np.testing.assert_array_equal(skeleton.vertices, raw.vertices[left])
@@ -296,7 +296,7 @@ def test_drop_stray_does_not_mind_numbers(graph, seed):
         raw, vertices=raw.vertices[back], edges=sorted(map(tuple, np.sort(name[raw.edges], axis=1).tolist())),
         radii=raw.radii[back], confidence=raw.confidence[back], vertex_of_point=owner,
     )  # fmt: skip
-    one, other = drop_stray(raw, count, noisy, 0.1), drop_stray(renamed, count[back], noisy[back], 0.1)
+    one, other = drop_unsupported(raw, count, noisy, 0.1), drop_unsupported(renamed, count[back], noisy[back], 0.1)
     places = [
         {frozenset(map(tuple, s.vertices[edge].tolist())) for edge in s.edges} | set(map(tuple, s.vertices.tolist()))
         for s in (one, other)
@@ -310,18 +310,18 @@ def test_drop_stray_does_not_mind_numbers(graph, seed):
 @pytest.mark.parametrize("shape", ["tube", "torus", "y_junction", "two_rings", "sheet"])
 def test_clean_clouds_have_no_stray_vertices(shape):
     state = contracted(samples.SAMPLES[shape](n=700).points, LPRReducer())
-    assert state.noise.max() <= NOISY
-    all_of_them, skeleton = Connector(stray=0)(state), Connector(stray=1.0)(state)
+    assert state.noise.max() <= UNSUPPORTED_NOISE
+    all_of_them, skeleton = Connector(min_support=0)(state), Connector(min_support=1.0)(state)
     np.testing.assert_array_equal(skeleton.vertices, all_of_them.vertices)
     np.testing.assert_array_equal(skeleton.vertex_of_point, all_of_them.vertex_of_point)
     np.testing.assert_array_equal(skeleton.normals, all_of_them.normals)
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.99 * NOISY, 1.01 * NOISY, 1.0])
+@pytest.mark.parametrize("noise", [0.0, 0.99 * UNSUPPORTED_NOISE, 1.01 * UNSUPPORTED_NOISE, 1.0])
 def test_vertices_are_stray_only_where_noise_is(state, noise, assert_sound):
-    all_of_them = Connector(stray=0)(state)
+    all_of_them = Connector(min_support=0)(state)
     share = np.full(len(state.cloud), noise)
-    skeleton = Connector(stray=1.0)(replace(state, noise=share))
-    assert (len(skeleton.vertices) < len(all_of_them.vertices)) == (noise > NOISY)
+    skeleton = Connector(min_support=1.0)(replace(state, noise=share))
+    assert (len(skeleton.vertices) < len(all_of_them.vertices)) == (noise > UNSUPPORTED_NOISE)
     assert_sound(skeleton, 800, triangles=True)
     assert skeleton.n_components == all_of_them.n_components

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import Contractor, ExplainedScore, LPRReducer, RingBuilder, RingSizeRatio, pipelines, samples
 from glsk_o3d import contractor as module
-from glsk_o3d.contractor import LINE, explained_score, linearity
+from glsk_o3d.contractor import LINE_VARIANCE, explained_score, explained_variance
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.rings import Rings
@@ -469,14 +469,14 @@ def test_linearity_of_one_neighbourhood(rim, expected, scale):
     neighbours = np.full((len(rim) + 1, len(rim)), -1)
     neighbours[0], neighbours[1:, 0] = np.arange(1, len(rim) + 1), 0
     # the closed form is good to the root of rounding where two spreads are equal
-    found = linearity(scale * np.concatenate([hub, rim]) @ turn, rings_of(neighbours))
+    found = explained_variance(scale * np.concatenate([hub, rim]) @ turn, rings_of(neighbours))
     np.testing.assert_allclose(found[0], expected, rtol=3e-8)
 
 
 def test_roundings_are_no_line():
     points = np.array([3.0, 1, 2]) + 1e-9 * np.random.default_rng(0).normal(size=(300, 3))
-    share = linearity(points, rings_of(nearest_neighbours(points, 9)[1][:, 1:]))
-    assert (share < LINE).all()
+    share = explained_variance(points, rings_of(nearest_neighbours(points, 9)[1][:, 1:]))
+    assert (share < LINE_VARIANCE).all()
 
 
 def test_linearity_is_that_of_the_place():
@@ -484,7 +484,7 @@ def test_linearity_is_that_of_the_place():
     line = np.outer(np.arange(200.0), [0, 0, 1])
     disc = np.stack(np.meshgrid(np.arange(15.0), np.arange(15.0), [-50.0]), -1).reshape(-1, 3)
     points = np.concatenate([line, disc])
-    found = linearity(points, rings_of(nearest_neighbours(points, 9)[1][:, 1:]))
+    found = explained_variance(points, rings_of(nearest_neighbours(points, 9)[1][:, 1:]))
     np.testing.assert_allclose(found[:200], 1, atol=1e-9)
     inside = ((disc[:, :2] > 3) & (disc[:, :2] < 11)).all(axis=1)
     assert ((found[200:][inside] > 0.49) & (found[200:][inside] < 0.6)).all()
@@ -494,7 +494,7 @@ def test_linearity_is_that_of_the_place():
 def test_no_line_hold_is_as_before(built, monkeypatch):
     """No neighbourhood is asked, and W_H is the ratio of the ring sizes alone."""
     plain = Contractor(stop=never, max_iterations=4, line_hold=1)
-    monkeypatch.setattr(module, "linearity", Mock(side_effect=AssertionError))
+    monkeypatch.setattr(module, "explained_variance", Mock(side_effect=AssertionError))
     capture = Capture(monkeypatch)
     state = built
     for done in range(4):
@@ -508,15 +508,15 @@ def test_no_line_hold_is_as_before(built, monkeypatch):
 @pytest.mark.parametrize("hold", [1.5, 30])
 def test_lines_are_held_from_the_second_solve_on(built, monkeypatch, hold, floor, cap):
     filter = Contractor(stop=never, max_iterations=1, line_hold=hold, min_attraction=floor, max_attraction=cap)
-    share = np.linspace(LINE - 0.3, 1, len(built))
-    monkeypatch.setattr(module, "linearity", lambda points, rings: share[: len(points)])
+    share = np.linspace(LINE_VARIANCE - 0.3, 1, len(built))
+    monkeypatch.setattr(module, "explained_variance", lambda points, rings: share[: len(points)])
     capture = Capture(monkeypatch)
     one = filter(built)
     filter(one)
     (_, first), (_, second) = capture.calls
     np.testing.assert_array_equal(first, np.clip(np.ones(len(built)), floor, cap))
     ratio = one.ring_size0 / one.ring_size
-    held = share > LINE
+    held = share > LINE_VARIANCE
     assert 0 < held.sum() < len(built)
     np.testing.assert_allclose(second, np.clip(np.where(held, hold * ratio, ratio), floor, cap), rtol=1e-12)
 

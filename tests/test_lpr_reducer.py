@@ -262,7 +262,7 @@ class TestBookkeeping:
     def test_rings(self, state, reducer):
         rings = reducer(state).rings
         assert len(rings) == rings.indices.max() + 1
-        assert (rings.indices != rings.owners).all()  # nobody surrounds itself
+        assert (rings.indices != rings.centres).all()  # nobody surrounds itself
         assert (rings.indices >= 0).all()
         assert rings.sizes.min() >= 1
         following = rings.triangles[:, 1:]

@@ -19,12 +19,13 @@ from glsk_o3d import (
     samples,
 )
 from glsk_o3d.analysis import compare
-from glsk_o3d.numerics.neighbourhoods import isolation, nearest_neighbours, principal
+from glsk_o3d.numerics.neighbourhoods import local_outlier_ratio, nearest_neighbours, principal
 from glsk_o3d.pipelines import default
-from glsk_o3d.preparation.denoising import noise_share, to_ridges
-from glsk_o3d.preparation.sampling import usual_number
-from glsk_o3d.preparation.thinning import MOST
-from glsk_o3d.ring_builder import ALONE, FAIRLY_NOISY, MIN_POINTS, published_k, usual_k
+from glsk_o3d.preparation.denoising import DENOISED_NOISE, DENOISED_RATIO, subspace_mean_shift
+from glsk_o3d.preparation.frame import MIN_POINTS
+from glsk_o3d.preparation.surface import noise_share
+from glsk_o3d.preparation.thinning import MOST_IN_ONE
+from glsk_o3d.ring_builder import default_k, default_size, published_k
 
 TORUS = samples.torus(n=600).points
 SHEET = samples.sheet(n=500, bend=0).points
@@ -54,10 +55,10 @@ def test_published_number_of_neighbours(n, k):
     ("n", "k"), [(8, 8), (614, 8), (615, 9), (2048, 13), (3723, 15), (3724, 16), (4096, 16), (10**8, 16)]
 )
 def test_usual_number_of_neighbours(n, k):
-    assert usual_k(n) == k
+    assert default_k(n) == k
 
 
-@pytest.mark.parametrize(("word", "number"), [("auto", usual_k), ("published", published_k)])
+@pytest.mark.parametrize(("word", "number"), [("auto", default_k), ("published", published_k)])
 @pytest.mark.parametrize("n", [20, 900, 2000])
 def test_words_for_numbers_of_neighbours(word, number, n):
     points = samples.torus(n=n).points
@@ -94,7 +95,7 @@ def test_state_says_what_it_is():
     np.testing.assert_allclose(state.contracted[state.survivor_of_point], TORUS, atol=1e-15)
     np.testing.assert_array_equal(state.mass, 1)
     assert state.ring_ratio == 1
-    distance = np.linalg.norm(state.cloud[state.rings.indices] - state.cloud[state.rings.owners], axis=1)
+    distance = np.linalg.norm(state.cloud[state.rings.indices] - state.cloud[state.rings.centres], axis=1)
     np.testing.assert_allclose(state.ring_size, [d.min() for d in np.split(distance, state.rings.indptr[1:-1])])
     edges = np.mean([d.mean() for d in np.split(distance, state.rings.indptr[1:-1])])
     assert state.mean_ring_edge == pytest.approx(edges, rel=1e-12)
@@ -161,7 +162,7 @@ def test_invalid_points_are_counted_and_dropped_only_when_asked():
     points[[5, 70, 599]] = [[np.nan, 0, 0], [0, np.inf, 0], [0, 0, -np.inf]]
     with pytest.raises(
         InvalidCloudError,
-        match=r"^3 of 600 points .*at index 5: drop them with RingBuilder.drop_invalid=True., or remove them first$",
+        match=r"^3 of 600 points .*at index 5: drop_invalid=True",
     ):
         RingBuilder()(points)
     state = RingBuilder(drop_invalid=True)(points)
@@ -186,7 +187,7 @@ def group(n, wide, seed=4):
 
 def stands_out(points):
     distance, neighbours = nearest_neighbours(points, STRICT.k)
-    return isolation(distance[:, 1:].mean(axis=1), neighbours) > STRICT.outlier_factor
+    return local_outlier_ratio(distance[:, 1:].mean(axis=1), neighbours) > STRICT.outlier_factor
 
 
 @pytest.mark.parametrize("seed", [2, 4, 9, 13])
@@ -273,7 +274,7 @@ def test_denoising_moves_the_cloud_to_its_ridges_before_the_rings(passes):
     plain, calm = RAW(points), replace(BY_16, denoise=passes, outlier_factor=0)(points)
     spread, normals = principal(plain.cloud, nearest_neighbours(plain.cloud, 16)[1])
     noise = noise_share(spread, nearest_neighbours(plain.cloud, 16)[1])
-    np.testing.assert_array_equal(calm.cloud, to_ridges(plain.cloud, noise, passes))
+    np.testing.assert_array_equal(calm.cloud, subspace_mean_shift(plain.cloud, noise, passes))
     np.testing.assert_array_equal(calm.positions, calm.cloud)
     assert calm.positions is calm.previous
     np.testing.assert_array_equal(calm.row_of_point, plain.row_of_point)
@@ -355,7 +356,7 @@ def test_clean_parts_are_not_averaged():
 
 def test_noisy_points_stay_where_averaging_them_would_hardly_make_fewer(monkeypatch):
     """A noisy part of a cloud, next to a clean one with three and with six times as many points."""
-    monkeypatch.setattr("glsk_o3d.ring_builder.PLENTY", 400)
+    monkeypatch.setattr("glsk_o3d.preparation.denoising.ENOUGH_NOISY", 400)
     noisy = samples.torus(1000, noise=0.05).points + [0, 0, 1]
     for clean, stays in ((3000, False), (6000, True)):
         state = RingBuilder(outlier_factor=0)(np.concatenate([samples.torus(clean).points, noisy]))
@@ -370,10 +371,10 @@ def lonely(plain, passes):
     """The denoised cloud and which of its points stand alone, by definition."""
     near = nearest_neighbours(plain.cloud, 16)[1]
     noise = noise_share(principal(plain.cloud, near)[0], near)
-    calm = to_ridges(plain.cloud, noise, passes)
+    calm = subspace_mean_shift(plain.cloud, noise, passes)
     distance, near = nearest_neighbours(calm, 16)
-    alone = isolation(distance[:, 1:].mean(axis=1), near) > ALONE
-    return calm, alone & (noise > FAIRLY_NOISY), noise
+    alone = local_outlier_ratio(distance[:, 1:].mean(axis=1), near) > DENOISED_RATIO
+    return calm, alone & (noise > DENOISED_NOISE), noise
 
 
 @pytest.mark.parametrize("passes", [1, 4])
@@ -427,10 +428,10 @@ def test_no_factor_no_lonely_points():
 def test_lonely_points_are_left_in_where_hardly_anything_would_be_left(monkeypatch, left, stays):
     points = samples.tube(n=24, radius=0.1, noise=0.1).points
     filter, noise = RingBuilder(k=8, outlier_factor=100.0), np.ones(24)
-    monkeypatch.setattr("glsk_o3d.ring_builder.noise_share", lambda spread, neighbours: noise)
-    monkeypatch.setattr("glsk_o3d.ring_builder.to_ridges", lambda cloud, noise, passes, weight: cloud)
-    found = np.where(np.arange(24) < left, 1.0, 2 * ALONE)
-    monkeypatch.setattr("glsk_o3d.ring_builder.isolation", lambda mean, neighbours: found)
+    monkeypatch.setattr("glsk_o3d.preparation.surface.noise_share", lambda spread, neighbours: noise)
+    monkeypatch.setattr("glsk_o3d.preparation.denoising.subspace_mean_shift", lambda cloud, noise, passes, weight: cloud)
+    found = np.where(np.arange(24) < left, 1.0, 2 * DENOISED_RATIO)
+    monkeypatch.setattr("glsk_o3d.preparation.denoising.local_outlier_ratio", lambda mean, neighbours: found)
     assert len(filter(points)) == (24 if stays else left)
 
 
@@ -514,7 +515,7 @@ def test_radius_limits_the_rings():
     scale = near.frame.scale
     third = cKDTree(near.cloud).query(near.cloud, 4)[0][:, 3] * scale
     length = near.rings.edge_lengths(near.cloud) * scale
-    assert (length <= np.maximum(radius, third[near.rings.owners]) * (1 + 1e-9)).all()
+    assert (length <= np.maximum(radius, third[near.rings.centres]) * (1 + 1e-9)).all()
     percent = RingBuilder(k=16, radius="5%")(TORUS)
     absolute = RingBuilder(k=16, radius=0.05 * near.frame.diagonal * scale)(TORUS)
     np.testing.assert_array_equal(percent.rings.indices, absolute.rings.indices)
@@ -532,7 +533,7 @@ def test_a_radius_in_the_wrong_units_is_refused():
     ("n", "expected"), [(8, 8), (25000, 25000), (25001, 25000), (152588, 25000), (160000, 25600), (10**6, 64000)]
 )
 def test_usual_number(n, expected):
-    assert usual_number(n) == expected
+    assert default_size(n) == expected
 
 
 @pytest.mark.parametrize("thin_to", [500, 1000, 2500])
@@ -615,7 +616,7 @@ def test_a_large_cloud_is_sampled_and_every_point_has_its_place():
     skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
     assert skeleton.n_loops == 1
     assert (skeleton.vertex_of_point >= 0).sum() == 7999
-    assert len(skeleton.witnesses) == state.witness.sum()
+    assert len(skeleton.supporting_points) == state.witness.sum()
     # who says where the surface is has a normal, nobody else
     np.testing.assert_array_equal(np.isfinite(skeleton.normals[:, 0]), state.witness)
 
@@ -659,7 +660,7 @@ def test_a_sample_is_denoised_by_how_many_points_it_stands_for(sampled):
     weight = np.bincount(plain.row_of_point[~plain.outlier])
     assert plain.report.n_outliers >= 3
     assert weight.max() > 10
-    ridge = to_ridges(plain.cloud, noise, 4, weight)
+    ridge = subspace_mean_shift(plain.cloud, noise, 4, weight)
     np.testing.assert_array_equal(calm.cloud, ridge[np.isin(ridge, calm.cloud).all(axis=1)])
     assert len(calm.cloud) > 0.9 * len(ridge)
 
@@ -668,11 +669,11 @@ def test_a_sample_is_averaged_by_how_many_points_it_stands_for(sampled, monkeypa
     """Round by round: a mean of means is that of all points."""
     points, filter = sampled
     plain = replace(filter, denoise=0)(points)
-    monkeypatch.setattr("glsk_o3d.ring_builder.PLENTY", 200)
-    monkeypatch.setattr("glsk_o3d.ring_builder.to_ridges", lambda cloud, noise, passes, weight: cloud)
-    monkeypatch.setattr("glsk_o3d.ring_builder.ALONE", np.inf)
+    monkeypatch.setattr("glsk_o3d.preparation.denoising.ENOUGH_NOISY", 200)
+    monkeypatch.setattr("glsk_o3d.preparation.denoising.subspace_mean_shift", lambda cloud, noise, passes, weight: cloud)
+    monkeypatch.setattr("glsk_o3d.preparation.denoising.DENOISED_RATIO", np.inf)
     state = filter(points)
-    assert MOST * len(state.cloud) < len(plain.cloud)
+    assert MOST_IN_ONE * len(state.cloud) < len(plain.cloud)
     counted = ~plain.outlier
     row, place = state.row_of_point[counted], plain.cloud[plain.row_of_point[counted]]
     mean = np.column_stack([np.bincount(row, axis) for axis in place.T]) / np.bincount(row)[:, None]

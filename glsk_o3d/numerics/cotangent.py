@@ -8,7 +8,7 @@ from scipy.sparse import csr_matrix
 from .rings import Rings
 from .vectors import TINY
 
-WEIGHT_CAP = 1e4
+WEIGHT_CAP = 1e4  # published, in both codes
 
 
 def cotangent_laplacian(points: np.ndarray, rings: Rings, cap: float = WEIGHT_CAP) -> csr_matrix:

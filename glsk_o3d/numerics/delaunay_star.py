@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-COINCIDENT_SQUARED = 1e-300  # squared distance below which a neighbour counts as the origin itself
-COLLINEAR_SINE = 1e-12  # sine below which two directions count as one
+COINCIDENT_SQUARED = 1e-300  # derived: squared distance below which a neighbour counts as the origin itself
+COLLINEAR_SINE = 1e-12  # derived: sine below which two directions count as one
 
 
 def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,8 @@ from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spannin
 
 from .vectors import dot
 
-EQUAL_NORMALS_COST = 1e-6  # cost of an edge between equal normals; a sparse graph would take 0 for no edge
+# derived: cost of an edge between equal normals; a sparse graph would take 0 for no edge
+EQUAL_NORMALS_COST = 1e-6
 
 
 def orient_normals(points: np.ndarray, normals: np.ndarray, edges: np.ndarray) -> np.ndarray:

@@ -27,7 +27,7 @@ ENTRIES = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # the upper triangle of a symmetric matri
 
 
 def fit_axis(skeleton: Skeleton, passes: int) -> Skeleton:
-    r"""Move the vertices to the axis of the surface, and measure how well the points say where it is, and how far it is.
+    r"""Move the vertices to the axis of the surface; measure how well the points say where it is, and how far it is.
 
     The plane through a point p of a tube, spanned by its normal n and the tangent t of the axis, contains the axis:
     b (x(p) - p) = 0 with b = n x t and x(p) the place of the curve nearest to p. Each pass minimises, over all vertices
@@ -54,9 +54,9 @@ def fit_axis(skeleton: Skeleton, passes: int) -> Skeleton:
     Returns
     -------
     Skeleton
-        With the confidence (1 - d) c / (c + 8), where c counts over the vertex and its neighbours: near 1 on the axis of
-        a tube, near 0 where the normals have no axis in common or points are few; and with radii, see `robust_radii`, or
-        without passes `plane_distance_radii`.
+        With the confidence (1 - d) c / (c + 8), where c counts over the vertex and its neighbours: near 1 on the axis
+        of a tube, near 0 where the normals have no axis in common or points are few; and with radii, see
+        `robust_radii`, or without passes `plane_distance_radii`.
     """
     m, ends = len(skeleton.vertices), skeleton.edges
     points = skeleton.supporting_points

@@ -10,10 +10,9 @@ from ..numerics.groups import group_sum
 from ..numerics.vectors import TINY, norm
 from ..skeleton import Skeleton
 
-CLAMP_REACH = (
-    0.7  # farthest a vertex may be from the mean of its points, over their own root mean square distance from it
-)
-CLAMP_MIN_POINTS = 4  # points, below which they do not say where their vertex is
+# fitted: farthest a vertex may be from the mean of its points, over their root mean square distance from that
+CLAMP_REACH = 0.7
+CLAMP_MIN_POINTS = 4  # fitted: points, below which they do not say where their vertex is
 
 
 def clamp_to_points(skeleton: Skeleton) -> Skeleton:

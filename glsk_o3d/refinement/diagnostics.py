@@ -13,9 +13,8 @@ from ..skeleton import Skeleton
 SHEET_SHARE = 0.9  # of one direction among the normals around a vertex; a tube has 0.5, half a tube too
 # spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
 BALL_SPREAD = 0.5
-STUB_LENGTH = (
-    3.3  # of the evenly filled box with a part's spread over the median distance to the surface; balls: 2 to 3
-)
+# length of the evenly filled box with a part's spread, over the median distance to the surface; balls have 2 to 3
+STUB_LENGTH = 3.3
 LOW_CONFIDENCE = 0.1  # below which a vertex is not to be trusted
 LOW_CONFIDENCE_SHARE = 0.25  # of the points around such vertices that is worth a warning
 

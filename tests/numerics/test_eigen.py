@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.numerics.eigen import largest_eigenvalue, main_direction, principal_parts
-from glsk_o3d.numerics.neighbourhoods import PAIRS
+from glsk_o3d.numerics.vectors import PAIRS
 
 SPREADS = [(1, 2, 5), (0, 0, 1), (0, 1e-9, 1), (-3, 1, 2), (-3, -2, -1), (1, 1, 1.1), (0, 1, 1), (0, 1, 1 + 1e-9)]
 

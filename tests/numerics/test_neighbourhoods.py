@@ -12,7 +12,6 @@ from scipy.spatial.distance import cdist
 
 from glsk_o3d.numerics import neighbourhoods as module
 from glsk_o3d.numerics.neighbourhoods import (
-    PAIRS,
     nearest_left,
     nearest_neighbours,
     plane_axes,
@@ -20,6 +19,7 @@ from glsk_o3d.numerics.neighbourhoods import (
     row_medians,
     scatter,
 )
+from glsk_o3d.numerics.vectors import PAIRS
 
 RNG = np.random.default_rng(0)
 CLOUD = RNG.normal(size=(300, 3))
@@ -151,7 +151,7 @@ def test_normals_of_a_sphere():
 def test_chunks_do_not_show(monkeypatch):
     neighbours = nearest_neighbours(CLOUD, 8)[1]
     whole = principal(CLOUD, neighbours)[1]
-    monkeypatch.setattr(module, "_CHUNK", 64)
+    monkeypatch.setattr(module, "SCATTER_CHUNK", 64)
     np.testing.assert_array_equal(principal(CLOUD, neighbours)[1], whole)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from glsk_o3d.numerics.radii import plane_distance_radii, robust_radii, witnesses
+from glsk_o3d.numerics.radii import plane_distance_radii, robust_radii, supporting_points
 
 
 def fan(opening, n=4000):
@@ -32,6 +32,6 @@ def test_planes_of_a_tube_wherever_along_it():
     points = 0.1 * normals + np.linspace(-1, 1, 12)[:, None] * [1, 0, 0]
     owner = np.array([0] * 6 + [1] * 5 + [-1])
     normals[0] = np.nan
-    assert witnesses(owner, normals).tolist() == list(range(1, 11))
+    assert supporting_points(owner, normals).tolist() == list(range(1, 11))
     radii = plane_distance_radii(np.zeros((3, 3)), owner, points, normals, otherwise=np.array([9.0, 9.0, 0.5]))
     np.testing.assert_allclose(radii, [0.1, 0.1, 0.5])

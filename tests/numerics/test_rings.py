@@ -53,7 +53,7 @@ def test_sizes_owners_and_rows(case):
     assert lists_of(rings) == lists
     assert len(rings) == len(lists)
     assert rings.sizes.tolist() == [len(row) for row in lists]
-    assert rings.owners.tolist() == [i for i, row in enumerate(lists) for _ in row]
+    assert rings.centres.tolist() == [i for i, row in enumerate(lists) for _ in row]
     assert rings.closed.tolist() == closed
 
 
@@ -194,7 +194,7 @@ def test_star_rings_of_a_tilted_plane_are_those_of_the_flat_one(monkeypatch):
     rings = star_rings(flat, np.arange(300), neighbours[:, 1:], plane_axes(up))
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.linalg.det(turn)
-    monkeypatch.setattr(module, "_CHUNK", 64)
+    monkeypatch.setattr(module, "STAR_CHUNK", 64)
     tilted = star_rings(flat @ turn.T + 5, np.arange(300), neighbours[:, 1:], plane_axes(up @ turn.T))
     for a, b in zip(lists_of(rings), lists_of(tilted), strict=True):
         assert set(a) == set(b)

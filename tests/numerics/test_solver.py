@@ -6,7 +6,7 @@ from scipy.sparse import csr_matrix, eye_array
 
 from glsk_o3d import samples
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
-from glsk_o3d.numerics.solver import ACCEPTABLE, SolveError, solve_contraction
+from glsk_o3d.numerics.solver import SOLVE_ACCEPTABLE, SolveError, solve_contraction
 from glsk_o3d.ring_builder import RingBuilder
 
 
@@ -129,7 +129,7 @@ def test_error_estimates_the_error():
         pytest.fail("this system can still be solved")
     off = np.abs(x - least_squares(laplacian, rows, attraction, points)).max() / np.ptp(points, axis=0).max()
     assert off <= max(10 * error, 1e-9)
-    assert error < ACCEPTABLE
+    assert error < SOLVE_ACCEPTABLE
 
 
 @pytest.mark.parametrize(
@@ -159,7 +159,7 @@ def test_numerically_singular_systems_are_refused_or_solved(shape, contraction):
     except SolveError:
         return
     # the sum of the equations: L has no say in it
-    np.testing.assert_allclose(x.mean(axis=0), points.mean(axis=0), atol=ACCEPTABLE)
+    np.testing.assert_allclose(x.mean(axis=0), points.mean(axis=0), atol=SOLVE_ACCEPTABLE)
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
 from glsk_o3d.preparation import denoising as module
-from glsk_o3d.preparation.denoising import CLEAN, NEIGHBOURS, NOISY, noise_share, to_ridges
+from glsk_o3d.preparation.denoising import RIDGE_NEIGHBOURS, subspace_mean_shift
+from glsk_o3d.preparation.surface import CLEAN_SPHERICITY, NOISE_SPHERICITY, noise_share
 
 TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
 
@@ -47,7 +48,7 @@ def test_noise_share_by_its_definition(seed, n, k):
     spread[:: n // 2 + 1] = 0  # points in one place
     ratio = [s[0] / s[2] if s[2] else 0.0 for s in spread]
     middle = np.array([np.median([ratio[j] for j in row]) for row in neighbours])
-    expected = np.interp(middle, [CLEAN, NOISY], [0, 1])
+    expected = np.interp(middle, [CLEAN_SPHERICITY, NOISE_SPHERICITY], [0, 1])
     np.testing.assert_allclose(noise_share(spread, neighbours), expected, atol=1e-12)
 
 
@@ -69,7 +70,10 @@ def test_a_ball_is_noise_and_a_surface_is_none():
     assert (np.diff(grown) > 0).all()
 
 
-@pytest.mark.parametrize(("least", "share"), [(0, 0), (CLEAN, 0), ((CLEAN + NOISY) / 2, 0.5), (NOISY, 1), (1, 1)])
+@pytest.mark.parametrize(
+    ("least", "share"),
+    [(0, 0), (CLEAN_SPHERICITY, 0), ((CLEAN_SPHERICITY + NOISE_SPHERICITY) / 2, 0.5), (NOISE_SPHERICITY, 1), (1, 1)],
+)
 @pytest.mark.parametrize("size", [1e-150, 1, 1e150])
 def test_noise_share_between_its_limits(least, share, size):
     spread, neighbours = size * np.tile([least, 1, 1], (5, 1)), np.arange(5)[:, None]
@@ -86,7 +90,7 @@ def test_noise_share_of_the_same_spread_in_all_directions_is_one():
 
 def test_points_of_a_noisy_cylinder_come_nearer_to_it():
     points = cylinder(0.2)
-    moved = to_ridges(points, noise_of(points), 4)
+    moved = subspace_mean_shift(points, noise_of(points), 4)
     assert from_surface(moved) < 0.6 * from_surface(points)
     # on it, not in it
     radius = np.hypot(moved[:, 1], moved[:, 2])[np.abs(moved[:, 0]) < 1.5]
@@ -95,7 +99,7 @@ def test_points_of_a_noisy_cylinder_come_nearer_to_it():
 
 def test_points_of_a_noisy_line_come_nearer_to_it_but_do_not_clump():
     points = thread()
-    moved = to_ridges(points, np.ones(400), 4)
+    moved = subspace_mean_shift(points, np.ones(400), 4)
     inner = np.abs(points[:, 0]) < 4
     assert np.hypot(*moved[inner, 1:].T).mean() < np.hypot(*points[inner, 1:].T).mean() / 2
     assert np.abs(moved - points)[inner, 0].mean() < 0.05
@@ -107,18 +111,18 @@ def test_points_of_a_noisy_line_come_nearer_to_it_but_do_not_clump():
 @pytest.mark.parametrize("noise", [0, 0.01])
 def test_clean_cylinder_does_not_move(noise):
     points = cylinder(noise)
-    assert to_ridges(points, noise_of(points), 4) is points
+    assert subspace_mean_shift(points, noise_of(points), 4) is points
 
 
 def test_no_passes_move_nothing():
     points = thread()
-    assert to_ridges(points, np.ones(400), 0) is points
+    assert subspace_mean_shift(points, np.ones(400), 0) is points
 
 
 def test_clean_points_stay_among_noisy_ones():
     points = thread()
     noise = np.arange(400) % 2.0
-    moved = to_ridges(points, noise, 3)
+    moved = subspace_mean_shift(points, noise, 3)
     np.testing.assert_array_equal(moved[::2], points[::2])
     assert (moved[1::2] != points[1::2]).any(axis=1).all()
     assert not np.shares_memory(moved, points)
@@ -127,18 +131,18 @@ def test_clean_points_stay_among_noisy_ones():
 @pytest.mark.parametrize("share", [0, 0.25, 0.5])
 def test_noise_says_how_much_of_the_way(share):
     points = thread()
-    step, whole = (to_ridges(points, np.full(400, value), 1) - points for value in (share, 1.0))
+    step, whole = (subspace_mean_shift(points, np.full(400, value), 1) - points for value in (share, 1.0))
     np.testing.assert_allclose(step, share * whole, atol=1e-12)
 
 
 def test_one_pass_by_its_definition():
     """The mean of the neighbours in a Gaussian as wide as they are, but for the way along their main direction."""
     points = thread(n=60)
-    moved = to_ridges(points, np.ones(60), 1)
+    moved = subspace_mean_shift(points, np.ones(60), 1)
     for x, after in zip(points, moved, strict=True):
         distance = np.linalg.norm(points - x, axis=1)
-        near = points[np.argsort(distance)[:NEIGHBOURS]]
-        squared = np.sort(distance)[:NEIGHBOURS] ** 2
+        near = points[np.argsort(distance)[:RIDGE_NEIGHBOURS]]
+        squared = np.sort(distance)[:RIDGE_NEIGHBOURS] ** 2
         weight = np.exp(-squared / (2 * squared.mean()))
         mean = np.average(near, axis=0, weights=weight)
         along = np.linalg.eigh(np.cov(near, rowvar=False, aweights=weight))[1][:, 2]
@@ -148,9 +152,9 @@ def test_one_pass_by_its_definition():
 def test_passes_look_at_the_cloud_as_it_came():
     """Neighbours do not move: each point goes its way, whatever the others do."""
     points = thread()
-    all_of_them = to_ridges(points, np.ones(400), 5)
+    all_of_them = subspace_mean_shift(points, np.ones(400), 5)
     for some in (np.arange(400) < 7, np.arange(400) % 3 == 0):
-        moved = to_ridges(points, some.astype(float), 5)
+        moved = subspace_mean_shift(points, some.astype(float), 5)
         np.testing.assert_allclose(moved, np.where(some[:, None], all_of_them, points), atol=1e-12)
 
 
@@ -160,30 +164,30 @@ def test_goes_with_the_cloud(turn, scale, shift):
     noise = noise_of(points)
     there = scale * points @ turn + shift
     np.testing.assert_allclose(noise_of(there), noise, atol=1e-9)
-    moved = (to_ridges(there, noise, 3) - shift) / scale
-    np.testing.assert_allclose(moved, to_ridges(points, noise, 3) @ turn, atol=1e-8)
+    moved = (subspace_mean_shift(there, noise, 3) - shift) / scale
+    np.testing.assert_allclose(moved, subspace_mean_shift(points, noise, 3) @ turn, atol=1e-8)
 
 
 def test_order_does_not_matter():
     points = cylinder(0.2)
     noise, order = noise_of(points), np.random.default_rng(3).permutation(1200)
     np.testing.assert_allclose(
-        to_ridges(points[order], noise[order], 3), to_ridges(points, noise, 3)[order], atol=1e-10
+        subspace_mean_shift(points[order], noise[order], 3), subspace_mean_shift(points, noise, 3)[order], atol=1e-10
     )
 
 
 def test_chunks_do_not_show(monkeypatch):
     points = cylinder(0.2)
     noise = noise_of(points)
-    whole = to_ridges(points, noise, 2)
-    monkeypatch.setattr(module, "_CHUNK", 64)
-    np.testing.assert_array_equal(to_ridges(points, noise, 2), whole)
+    whole = subspace_mean_shift(points, noise, 2)
+    monkeypatch.setattr(module, "RIDGE_CHUNK", 64)
+    np.testing.assert_array_equal(subspace_mean_shift(points, noise, 2), whole)
 
 
-@pytest.mark.parametrize("n", [8, NEIGHBOURS - 1, NEIGHBOURS, NEIGHBOURS + 1])
+@pytest.mark.parametrize("n", [8, RIDGE_NEIGHBOURS - 1, RIDGE_NEIGHBOURS, RIDGE_NEIGHBOURS + 1])
 def test_few_points_are_each_others_neighbours(n):
     points = np.random.default_rng(n).normal(size=(n, 3))
-    moved = to_ridges(points, np.ones(n), 4)
+    moved = subspace_mean_shift(points, np.ones(n), 4)
     assert np.isfinite(moved).all()
     diameter = np.linalg.norm(points[:, None] - points, axis=2).max()
     assert 0 < np.linalg.norm(moved - points, axis=1).max() < diameter
@@ -192,7 +196,7 @@ def test_few_points_are_each_others_neighbours(n):
 def test_the_line_itself_stays():
     """On the ridge there is nowhere to go, at the ends neither."""
     line = np.outer(np.linspace(-1, 1, 50), [1, 2, 2])
-    np.testing.assert_allclose(to_ridges(line, np.ones(50), 4), line, atol=1e-12)
+    np.testing.assert_allclose(subspace_mean_shift(line, np.ones(50), 4), line, atol=1e-12)
 
 
 def test_a_point_that_stands_for_several():
@@ -201,10 +205,12 @@ def test_a_point_that_stands_for_several():
     points = rng.normal(size=(31, 3)) * [3, 1, 1]
     times = rng.integers(1, 4, 31)
     ones = np.ones(31)
-    weighted = to_ridges(points, ones, 1, times.astype(float))
-    assert np.abs(weighted - to_ridges(points, ones, 1)).max() > 0.01
-    np.testing.assert_allclose(to_ridges(points, ones, 3, 5 * ones), to_ridges(points, ones, 3), atol=1e-12)
+    weighted = subspace_mean_shift(points, ones, 1, times.astype(float))
+    assert np.abs(weighted - subspace_mean_shift(points, ones, 1)).max() > 0.01
+    np.testing.assert_allclose(
+        subspace_mean_shift(points, ones, 3, 5 * ones), subspace_mean_shift(points, ones, 3), atol=1e-12
+    )
     heavy = np.where(np.arange(31) == 4, 1e9, 1.0)
-    towards = to_ridges(points, ones, 1, heavy)
+    towards = subspace_mean_shift(points, ones, 1, heavy)
     before, after = (np.linalg.norm(cloud - points[4], axis=1)[np.arange(31) != 4] for cloud in (points, towards))
     assert (after < before).all()

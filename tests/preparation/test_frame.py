@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.numerics.morton import morton_order
-from glsk_o3d.preparation.frame import SIDE, Frame
+from glsk_o3d.preparation.frame import FRAME_SIDE, Frame
 
 CLOUD = np.random.default_rng(0).normal(size=(500, 3)) * [1, 3, 0.2]
 
@@ -18,7 +18,7 @@ def test_frame_is_centred_and_1_6_wide(scale, offset):
     digits = 4e-16 * max(1, abs(offset))
     np.testing.assert_allclose(inside.max(axis=0), frame.half_extent, atol=digits)
     np.testing.assert_allclose(inside.min(axis=0), -frame.half_extent, atol=digits)
-    assert 2 * frame.half_extent.max() == pytest.approx(SIDE, rel=1e-15)
+    assert 2 * frame.half_extent.max() == pytest.approx(FRAME_SIDE, rel=1e-15)
     assert frame.diagonal == pytest.approx(np.linalg.norm(np.ptp(inside, axis=0)), rel=1e-9)
     np.testing.assert_allclose(frame.out_of(inside), points, atol=digits * scale * 10, rtol=0)
 
@@ -47,7 +47,7 @@ def test_frame_of_a_flat_cloud():
 def test_frame_does_not_overflow_half_way():
     points = np.array([[1.5e308, 0, 0], [1.6e308, 1e306, 0]])
     frame = Frame.of(points)
-    np.testing.assert_allclose(np.abs(frame.into(points)[:, 0]), SIDE / 2)
+    np.testing.assert_allclose(np.abs(frame.into(points)[:, 0]), FRAME_SIDE / 2)
 
 
 # ---- the box with the spread of the points
@@ -61,7 +61,7 @@ def lattice(sides, n):
 
 def size(frame):
     """Longest side and diagonal in the user's units."""
-    return np.array([SIDE, frame.diagonal]) * frame.scale
+    return np.array([FRAME_SIDE, frame.diagonal]) * frame.scale
 
 
 @pytest.mark.parametrize("n", [2, 5, 16])

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from glsk_o3d import samples
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
-from glsk_o3d.preparation.outliers import without_outliers
-from glsk_o3d.preparation.sampling import thin_to_grid
+from glsk_o3d.preparation.outliers import inliers
+from glsk_o3d.preparation.sampling import sample_grid
 
 K, N = 16, 12000
 SURFACE = samples.torus(N, ring_radius=0.4, radius=0.1).points
@@ -16,7 +16,7 @@ SURFACE = samples.torus(N, ring_radius=0.4, radius=0.1).points
 
 def left(points, weight=None, factor=2.5, least=8):
     weight = np.ones(len(points)) if weight is None else weight
-    return without_outliers(points, weight, *nearest_neighbours(points, K), factor, least)
+    return inliers(points, weight, *nearest_neighbours(points, K), factor, least)
 
 
 def floating(n, seed=0, reach=0.6):
@@ -73,7 +73,7 @@ def test_another_noisy_object_stays(scale):
 def test_more_neighbours_than_points_are_left():
     points = np.concatenate([samples.torus(200).points, floating(6, reach=3)])
     for k in (100, 203, 206):
-        kept = without_outliers(points, np.ones(206), *nearest_neighbours(points, k), 2.5, 8)
+        kept = inliers(points, np.ones(206), *nearest_neighbours(points, k), 2.5, 8)
         np.testing.assert_array_equal(kept, np.arange(200))
 
 
@@ -106,7 +106,7 @@ def test_where_each_point_stands_for_many():
     """A sample evens out the density that tells a surface from what floats around it; the weight knows it."""
     dense = samples.torus(60000, ring_radius=0.4, radius=0.1).points
     gas = floating(2500)
-    kept, _, counts = thin_to_grid(np.concatenate([dense, gas]), 12000)
+    kept, _, counts = sample_grid(np.concatenate([dense, gas]), 12000)
     points, true = np.concatenate([dense, gas])[kept], kept < len(dense)
     found = np.ones(len(kept), bool)
     found[left(points, counts)] = False

@@ -6,8 +6,9 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import samples
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
-from glsk_o3d.preparation.sampling import thin_to_grid
-from glsk_o3d.preparation.thinning import MOST, average_noisy, thin, thin_smooth
+from glsk_o3d.preparation.denoising import average_noisy
+from glsk_o3d.preparation.sampling import sample_grid
+from glsk_o3d.preparation.thinning import MOST_IN_ONE, thin, thin_dense
 
 
 def thinned(points, n, k=16):
@@ -80,7 +81,7 @@ def test_grids_end_somewhere():
 
 def smoothed(points, around, k=16):
     neighbours = nearest_neighbours(points, k)[1]
-    return thin_smooth(points, neighbours, principal(points, neighbours)[0], around)
+    return thin_dense(points, neighbours, principal(points, neighbours)[0], around)
 
 
 @pytest.mark.parametrize("around", [20, 40])
@@ -95,7 +96,7 @@ def test_dense_tubes_are_merged_as_far_as_allowed_and_sparse_ones_stay(around):
         into = smoothed(points, around)
         np.testing.assert_array_equal(into[into], into)
         mass = np.bincount(into)[left(into)]
-        assert mass.max() <= MOST
+        assert mass.max() <= MOST_IN_ONE
         if many == 100:
             assert len(left(into)) < 0.6 * n
         else:
@@ -124,7 +125,7 @@ def test_noise_is_not_smooth(surface):
 
 @pytest.mark.parametrize("n", [100, 700, 2500])
 def test_a_grid_keeps_about_so_many_each_the_nearest_to_the_middle_of_its_cell(surface, n):
-    kept, into, counts = thin_to_grid(surface, n)
+    kept, into, counts = sample_grid(surface, n)
     np.testing.assert_array_equal(counts, np.bincount(into))
     assert 0.6 * n < len(kept) < 1.7 * n
     np.testing.assert_array_equal(into[kept], np.arange(len(kept)))
@@ -139,15 +140,15 @@ def test_a_grid_keeps_about_so_many_each_the_nearest_to_the_middle_of_its_cell(s
 
 def test_a_grid_does_not_depend_on_the_order_or_scale(surface):
     order = np.random.default_rng(0).permutation(len(surface))
-    kept, into, _ = thin_to_grid(surface, 500)
-    again, into_again, _ = thin_to_grid(64 * surface[order], 500)
+    kept, into, _ = sample_grid(surface, 500)
+    again, into_again, _ = sample_grid(64 * surface[order], 500)
     assert set(order[again].tolist()) == set(kept.tolist())
     np.testing.assert_array_equal(order[again[into_again]], kept[into[order]])
 
 
 def test_copies_on_a_grid_neither_count_nor_pull(surface):
     order = np.random.default_rng(0).permutation(np.append(np.arange(3000), np.repeat(np.arange(0, 3000, 50), 9)))
-    kept, into, counts = thin_to_grid(surface[order], 500)
+    kept, into, counts = sample_grid(surface[order], 500)
     for cell in range(len(kept)):
         members = np.unique(order[into == cell])
         away = np.linalg.norm(surface[members] - surface[members].mean(axis=0), axis=1)
@@ -158,7 +159,7 @@ def test_copies_on_a_grid_neither_count_nor_pull(surface):
 @pytest.mark.parametrize("far", [1e3, 1e7, 1e12])
 def test_points_far_off_do_not_widen_the_cells(surface, far):
     points = np.concatenate([surface, [[far, 0, 0], [0, -far, 0]]])
-    kept, into, _ = thin_to_grid(points, 500)
+    kept, into, _ = sample_grid(points, 500)
     assert 300 < len(kept) < 850
     np.testing.assert_array_equal(into[kept], np.arange(len(kept)))
 
@@ -167,7 +168,7 @@ def test_a_grid_that_is_too_coarse_keeps_all():
     """Half of the points so far off that the others would be in a few of the finest cells."""
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(size=(500, 3)), 1e9 + np.zeros((500, 3))])
-    kept, into, counts = thin_to_grid(points, 100)
+    kept, into, counts = sample_grid(points, 100)
     np.testing.assert_array_equal(counts, 1)
     np.testing.assert_array_equal(kept, np.arange(1000))
     np.testing.assert_array_equal(into, np.arange(1000))
@@ -184,7 +185,7 @@ def test_means_of_noisy_points(surface, n):
     weight = rng.uniform(1, 9, 3000)
     into, mean, total = average_noisy(surface, near, noise, weight, n)
     size = np.bincount(into)
-    assert size.max() == np.floor(min(MOST, np.count_nonzero(noise) / n))
+    assert size.max() == np.floor(min(MOST_IN_ONE, np.count_nonzero(noise) / n))
     assert n <= len(np.unique(into[noise > 0])) < np.count_nonzero(noise) / 1.5
     np.testing.assert_allclose(total, np.bincount(into, weight), rtol=1e-12)
     for group in (0, len(mean) // 2, int(np.argmax(size))):

@@ -10,11 +10,17 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, samples, skeletonize
 from glsk_o3d.numerics.radii import plane_distance_radii
-from glsk_o3d.refinement import axis_fit as medial
-from glsk_o3d.refinement.axis_fit import STAY, SUPPORT, fit_axis, incident_edges, nearest_on_edges
+from glsk_o3d.refinement import axis_fit
+from glsk_o3d.refinement.axis_fit import FIT_STAY, HALF_SUPPORT, incident_edges, nearest_on_edges
 
 R = 0.15  # of the tubes
 TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+
+
+def fit_axis(skeleton, passes):
+    """Vertices, confidence and radii after a fit."""
+    fitted = axis_fit.fit_axis(skeleton, passes)
+    return fitted.vertices, fitted.confidence, fitted.radii
 
 
 def tube(off=(0, 0), arc=2 * np.pi, m=20, around=24, along=200):
@@ -72,10 +78,10 @@ def off_axis(vertices):
 
 @pytest.mark.parametrize("off", [(0, 0.12), (0.05, 0.1), (-0.1, 0)])
 def test_first_pass_moves_a_curve_by_the_share_of_the_normals(off):
-    """Per point, the normals of a whole tube weigh 1/2, and staying STAY."""
+    """Per point, the normals of a whole tube weigh 1/2, and staying FIT_STAY."""
     skeleton = tube(off)
     moved = fit_axis(skeleton, 1)[0]
-    np.testing.assert_allclose(moved[:, 1:], np.tile(off, (20, 1)) * STAY / (0.5 + STAY), rtol=0.03, atol=1e-9)
+    np.testing.assert_allclose(moved[:, 1:], np.tile(off, (20, 1)) * FIT_STAY / (0.5 + FIT_STAY), rtol=0.03, atol=1e-9)
     np.testing.assert_allclose(moved[:, 0], skeleton.vertices[:, 0], atol=2e-3)
 
 
@@ -172,8 +178,8 @@ def noisy(noise, seed=0, m=60, known=False):
 
 def with_and_without(raw, monkeypatch, passes=3):
     found = []
-    for blur in (medial.BLUR, 0):
-        monkeypatch.setattr(medial, "BLUR", blur)
+    for blur in (axis_fit.FIT_SMOOTHING, 0):
+        monkeypatch.setattr(axis_fit, "FIT_SMOOTHING", blur)
         found.append(fit_axis(raw, passes)[0])
     return found
 
@@ -244,7 +250,7 @@ def test_confidence_of_a_curve_off_the_axis(height):
     skeleton = tube((0, height))
     near = points_around(skeleton)
     inner = slice(2, -2)  # beyond the ends the way to the curve has a part along it
-    expected = R**2 / (R**2 + height**2) * near / (near + SUPPORT)
+    expected = R**2 / (R**2 + height**2) * near / (near + HALF_SUPPORT)
     np.testing.assert_allclose(fit_axis(skeleton, 0)[1][inner], expected[inner], rtol=0.02)
 
 
@@ -252,7 +258,7 @@ def test_confidence_of_a_curve_off_the_axis(height):
 def test_confidence_is_near_one_on_the_axis_of_a_tube_with_many_points(around):
     skeleton = tube(around=around)
     near = points_around(skeleton)
-    np.testing.assert_allclose(fit_axis(skeleton, 3)[1], near / (near + SUPPORT), rtol=1e-3)
+    np.testing.assert_allclose(fit_axis(skeleton, 3)[1], near / (near + HALF_SUPPORT), rtol=1e-3)
 
 
 @pytest.mark.parametrize(("across", "explained"), [(True, 0), (False, 1 / 3)])
@@ -269,7 +275,7 @@ def test_confidence_of_few_points_is_small():
     counts = [2, 5, 50]
     confidence = [fit_axis(tube(m=2, around=8, along=n), 2)[1] for n in counts]
     for n, both in zip(counts, confidence, strict=True):
-        np.testing.assert_allclose(both, 8 * n / (8 * n + SUPPORT), rtol=0.01)
+        np.testing.assert_allclose(both, 8 * n / (8 * n + HALF_SUPPORT), rtol=0.01)
 
 
 # ---- what does not matter, and what is not there

@@ -9,9 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import Refiner, Report, Skeleton, SkeletonWarning
-from glsk_o3d.refinement.bridging import ALIKE, BACK, STRAIGHT, bridge_gaps
+from glsk_o3d.refinement.bridging import BRIDGE_COSINE, BRIDGE_LOOK_BACK, BRIDGE_RADIUS_RATIO, bridge_gaps
 
 GAP = 8.0
+
+
+def bridged(raw, gap):
+    """The skeleton and how many bridges it got."""
+    skeleton = bridge_gaps(raw, gap)
+    return skeleton, len(skeleton.edges) - len(raw.edges)
 
 
 def graph(*paths, radii=0.1):
@@ -42,7 +48,7 @@ def new_edges(raw, skeleton):
 @pytest.mark.parametrize("gap", [1e-6, 0.1, 0.5, 0.79])
 def test_collinear_tubes_are_joined_at_the_ends_that_face(gap):
     raw = facing(gap)
-    skeleton, bridges = bridge_gaps(raw, GAP)
+    skeleton, bridges = bridged(raw, GAP)
     assert bridges == 1
     assert new_edges(raw, skeleton) == [(0, 7)]
     assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 0, 2)
@@ -56,22 +62,22 @@ def test_collinear_tubes_are_joined_at_the_ends_that_face(gap):
 @pytest.mark.parametrize(("share", "bridges"), [(1 - 1e-9, 1), (1 + 1e-9, 0)])
 def test_width_is_over_the_mean_radius(gap, radii, share, bridges):
     raw = facing(gap * np.mean(radii) * share, radii=radii)
-    assert bridge_gaps(raw, gap)[1] == bridges
+    assert bridged(raw, gap)[1] == bridges
 
 
 @pytest.mark.parametrize("order", [1, -1])
 @pytest.mark.parametrize(("share", "bridges"), [(1 - 1e-9, 1), (1 + 1e-9, 0)])
 def test_thicknesses_are_alike(share, bridges, order):
-    assert bridge_gaps(facing(0.1, radii=(0.1, 0.1 * ALIKE * share)[::order]), GAP)[1] == bridges
+    assert bridged(facing(0.1, radii=(0.1, 0.1 * BRIDGE_RADIUS_RATIO * share)[::order]), GAP)[1] == bridges
 
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(("share", "bridges"), [(1 - 1e-6, 1), (1 + 1e-6, 0)])
 def test_ends_point_at_each_other(share, bridges, sign):
-    limit = np.arccos(STRAIGHT) * share * sign
-    assert bridge_gaps(facing(0.3, turn=limit), GAP)[1] == bridges
+    limit = np.arccos(BRIDGE_COSINE) * share * sign
+    assert bridged(facing(0.3, turn=limit), GAP)[1] == bridges
     # parallel, but side by side
-    assert bridge_gaps(facing(0.3, aside=0.3 * np.tan(limit)), GAP)[1] == bridges
+    assert bridged(facing(0.3, aside=0.3 * np.tan(limit)), GAP)[1] == bridges
 
 
 @pytest.mark.parametrize(
@@ -84,7 +90,7 @@ def test_ends_point_at_each_other(share, bridges, sign):
 )
 def test_others_stay_apart(second):
     raw = graph(bar([0, 0, 0], [-1, 0, 0]), second)
-    assert bridge_gaps(raw, GAP) == (raw, 0)
+    assert bridged(raw, GAP) == (raw, 0)
 
 
 def test_ends_of_one_component_stay_apart():
@@ -93,13 +99,13 @@ def test_ends_of_one_component_stay_apart():
     raw = graph(np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]), bar([9, 9, 9], [1, 0, 0]))
     assert np.linalg.norm(raw.vertices[0] - raw.vertices[39]) < GAP * 0.1
     for skeleton in (raw, replace(raw, vertices=raw.vertices[:40], edges=raw.edges[:39], radii=raw.radii[:40])):
-        assert bridge_gaps(skeleton, GAP) == (skeleton, 0)
+        assert bridged(skeleton, GAP) == (skeleton, 0)
 
 
 def test_two_halves_of_a_ring_are_joined_once_across_the_narrower_gap():
     angles = np.linspace(0.2, np.pi - 0.1, 30), np.linspace(np.pi + 0.1, 2 * np.pi - 0.2, 30)
     raw = graph(*(np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) for angle in angles))
-    skeleton, bridges = bridge_gaps(raw, GAP)
+    skeleton, bridges = bridged(raw, GAP)
     assert bridges == 1
     assert new_edges(raw, skeleton) == [(29, 30)]
     assert skeleton.n_loops == 0
@@ -108,7 +114,7 @@ def test_two_halves_of_a_ring_are_joined_once_across_the_narrower_gap():
 @pytest.mark.parametrize("n", [2, 3, 7])
 def test_many_in_a_row_with_equal_gaps(n):
     raw = graph(*(bar([1.25 * k, 0, 0], [1, 0, 0]) for k in range(n)))
-    skeleton, bridges = bridge_gaps(raw, GAP)
+    skeleton, bridges = bridged(raw, GAP)
     assert bridges == n - 1
     assert new_edges(raw, skeleton) == [(7 * k + 6, 7 * k + 7) for k in range(n - 1)]
     assert (skeleton.n_components, skeleton.n_loops) == (1, 0)
@@ -118,7 +124,7 @@ def test_an_end_is_joined_once_to_the_nearest():
     up, down = bar([0.4, 0.15, 0], [1, 0.3, 0]), bar([0.35, -0.15, 0], [1, -0.3, 0])
     for second, third in ((up, down), (down, up)):
         raw = graph(bar([0, 0, 0], [-1, 0, 0]), second, third)
-        skeleton, bridges = bridge_gaps(raw, GAP)
+        skeleton, bridges = bridged(raw, GAP)
         assert bridges == 1
         ((a, b),) = new_edges(raw, skeleton)
         assert a == 0
@@ -127,7 +133,7 @@ def test_an_end_is_joined_once_to_the_nearest():
 
 def test_of_two_as_near_one_is_taken():
     raw = graph(bar([0, 0, 0], [-1, 0, 0]), bar([0.5, 0.25, 0], [1, 0.5, 0]), bar([0.5, -0.25, 0], [1, -0.5, 0]))
-    skeleton, bridges = bridge_gaps(raw, GAP)
+    skeleton, bridges = bridged(raw, GAP)
     assert bridges == 1
     assert new_edges(raw, skeleton) in ([(0, 7)], [(0, 14)])
 
@@ -136,37 +142,37 @@ def test_nearness_counts_in_radii():
     """Wide bars are nearer over a wider gap."""
     thick, thin = bar([0.5, 0.1, 0], [1, 0, 0]), bar([0.4, -0.1, 0], [1, 0, 0])
     raw = graph(bar([0, 0, 0], [-1, 0, 0]), thick, thin, radii=(0.1, 0.19, 0.06))
-    skeleton, bridges = bridge_gaps(raw, GAP)
+    skeleton, bridges = bridged(raw, GAP)
     assert bridges == 1
     assert new_edges(raw, skeleton) == [(0, 7)]
 
 
-@pytest.mark.parametrize(("hook", "bridges"), [(0.1 * BACK, 1), (3 * BACK, 0)])
+@pytest.mark.parametrize(("hook", "bridges"), [(0.1 * BRIDGE_LOOK_BACK, 1), (3 * BRIDGE_LOOK_BACK, 0)])
 def test_direction_looks_back_a_few_radii(hook, bridges):
     """A last edge at a right angle is nothing where it is short; a long one is the direction."""
     tip = np.array([[0, -hook * 0.1, 0]])
     first = np.concatenate([tip, bar([0, 0, 0], [-1, 0, 0], length=2.0, pieces=20)])
     raw = graph(first, bar([0.5, tip[0, 1], 0], [1, 0, 0]))
-    assert bridge_gaps(raw, GAP)[1] == bridges
+    assert bridged(raw, GAP)[1] == bridges
 
 
 def test_branches_of_one_edge_and_rings_and_specks():
     """Shorter than the look back; without a leaf; without an edge."""
     pairs = graph([[-0.1, 0, 0], [0, 0, 0]], [[0.2, 0, 0], [0.3, 0, 0]])
-    skeleton, bridges = bridge_gaps(pairs, GAP)
+    skeleton, bridges = bridged(pairs, GAP)
     assert bridges == 1
     assert new_edges(pairs, skeleton) == [(1, 2)]
     ring = Skeleton(np.eye(3), [(0, 1), (0, 2), (1, 2)], np.full(3, 0.1), [], [], [])
     specks = Skeleton(np.eye(3), [], np.full(3, 0.1), [], [], [])
     nothing = Skeleton([], [], [], [], [], [])
     for raw in (ring, specks, nothing, graph(bar([0, 0, 0], [1, 0, 0]))):
-        assert bridge_gaps(raw, GAP) == (raw, 0)
+        assert bridged(raw, GAP) == (raw, 0)
 
 
 @pytest.mark.parametrize("radii", [0, (0, 0.1)])
 def test_no_thickness_no_bridge(radii):
     raw = facing(0.05, radii=radii)
-    assert bridge_gaps(raw, GAP) == (raw, 0)
+    assert bridged(raw, GAP) == (raw, 0)
 
 
 def scattered(seed, n=14):
@@ -176,19 +182,19 @@ def scattered(seed, n=14):
 
 
 def test_scattered_bars_have_bridges():
-    assert np.mean([bridge_gaps(scattered(seed), GAP)[1] for seed in range(10)]) > 1
+    assert np.mean([bridged(scattered(seed), GAP)[1] for seed in range(10)]) > 1
 
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10**6), st.integers(0, 99))
 def test_numbers_do_not_matter(seed, other):
     raw = scattered(seed)
-    skeleton, bridges = bridge_gaps(raw, GAP)
+    skeleton, bridges = bridged(raw, GAP)
     name = np.random.default_rng(other).permutation(len(raw.vertices))
     back = np.argsort(name)
     edges = np.sort(name[raw.edges], axis=1)
     renamed = replace(raw, vertices=raw.vertices[back], radii=raw.radii[back], edges=edges[np.lexsort(edges.T[::-1])])
-    again, as_many = bridge_gaps(renamed, GAP)
+    again, as_many = bridged(renamed, GAP)
     assert as_many == bridges
     named = {tuple(sorted(name[list(edge)].tolist())) for edge in new_edges(raw, skeleton)}
     assert set(new_edges(renamed, again)) == named
@@ -200,12 +206,12 @@ def test_goes_with_the_skeleton_and_keeps_a_forest(seed, scale):
     raw = scattered(seed)
     turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
     moved = replace(raw, vertices=scale * (raw.vertices @ turn + 3), radii=scale * raw.radii)
-    skeleton, bridges = bridge_gaps(raw, GAP)
-    np.testing.assert_array_equal(bridge_gaps(moved, GAP)[0].edges, skeleton.edges)
+    skeleton, bridges = bridged(raw, GAP)
+    np.testing.assert_array_equal(bridged(moved, GAP)[0].edges, skeleton.edges)
     assert skeleton.n_components == raw.n_components - bridges
     assert skeleton.n_loops == 0
     assert skeleton.degree.max() == 2  # each end once
-    assert bridge_gaps(raw, 0)[1] == 0
+    assert bridged(raw, 0)[1] == 0
 
 
 # ---- in the refiner

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import Skeleton
-from glsk_o3d.refinement.clamp import FEW, REACH, anchor
+from glsk_o3d.refinement.clamp import CLAMP_MIN_POINTS, CLAMP_REACH, clamp_to_points
 
 
 def cross(at, n=8):
@@ -18,23 +18,25 @@ def cross(at, n=8):
     return Skeleton([at], [], [1], np.zeros(n, int), points, points)
 
 
-@pytest.mark.parametrize("away", [0, 0.5 * REACH, REACH * (1 - 1e-9)])
+@pytest.mark.parametrize("away", [0, 0.5 * CLAMP_REACH, CLAMP_REACH * (1 - 1e-9)])
 def test_vertices_within_reach_stay_exactly(away):
     raw = cross([0, 0.6 * away, 0.8 * away])
-    np.testing.assert_array_equal(anchor(raw).vertices, raw.vertices)
+    np.testing.assert_array_equal(clamp_to_points(raw).vertices, raw.vertices)
 
 
 @pytest.mark.parametrize("size", [1e-6, 1, 1e6])
-@pytest.mark.parametrize("away", [REACH * 1.01, 2, 1000])
+@pytest.mark.parametrize("away", [CLAMP_REACH * 1.01, 2, 1000])
 def test_farther_ones_come_straight_back_to_the_end_of_it(away, size):
     raw = cross(np.array([0.48, 0.6, 0.64]) * away)
     raw = replace(raw, vertices=size * raw.vertices, points=size * raw.points)
-    np.testing.assert_allclose(anchor(raw).vertices[0], np.array([0.48, 0.6, 0.64]) * REACH * size, rtol=1e-9)
+    np.testing.assert_allclose(
+        clamp_to_points(raw).vertices[0], np.array([0.48, 0.6, 0.64]) * CLAMP_REACH * size, rtol=1e-9
+    )
 
 
-@pytest.mark.parametrize(("n", "back"), [(1, False), (FEW - 1, False), (FEW, True)])
+@pytest.mark.parametrize(("n", "back"), [(1, False), (CLAMP_MIN_POINTS - 1, False), (CLAMP_MIN_POINTS, True)])
 def test_few_points_do_not_say_where_their_vertex_is(n, back):
-    moved = anchor(cross([9, 9, 9], n)).vertices[0]
+    moved = clamp_to_points(cross([9, 9, 9], n)).vertices[0]
     assert (moved != 9).any() == back
 
 
@@ -42,10 +44,10 @@ def test_axis_of_half_a_tube_is_out_of_reach_but_not_far():
     """By the mean 2 / pi of the half circle and its spread around that: less than a tenth of the radius is lost."""
     angle = (np.arange(1000) + 0.5) / 1000 * np.pi
     points = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
-    moved = anchor(Skeleton([[0, 0, 0]], [], [1], np.zeros(1000, int), points, points)).vertices[0]
+    moved = clamp_to_points(Skeleton([[0, 0, 0]], [], [1], np.zeros(1000, int), points, points)).vertices[0]
     mean, spread = 2 / np.pi, np.sqrt(1 - (2 / np.pi) ** 2)
     assert mean / spread == pytest.approx(0.83, abs=0.006)
-    np.testing.assert_allclose(moved, [0, 0, max(mean - REACH * spread, 0)], atol=1e-5)
+    np.testing.assert_allclose(moved, [0, 0, max(mean - CLAMP_REACH * spread, 0)], atol=1e-5)
 
 
 @settings(max_examples=60, deadline=None)
@@ -55,17 +57,17 @@ def test_by_its_definition(random_skeleton, seed, m, every):
     normals = raw.normals.copy()
     normals[::7] = np.nan
     raw = replace(raw, vertices=3 * raw.vertices, normals=normals)
-    skeleton = anchor(raw)
+    skeleton = clamp_to_points(raw)
     for v, (before, after) in enumerate(zip(raw.vertices, skeleton.vertices, strict=True)):
-        own = raw.points[[p for p in raw.witnesses if raw.vertex_of_point[p] == v]]
-        if len(own) < FEW:
+        own = raw.points[[p for p in raw.supporting_points if raw.vertex_of_point[p] == v]]
+        if len(own) < CLAMP_MIN_POINTS:
             np.testing.assert_array_equal(after, before)
             continue
         mean = own.mean(axis=0)
-        reach = REACH * np.sqrt(((own - mean) ** 2).sum(axis=1).mean())
+        reach = CLAMP_REACH * np.sqrt(((own - mean) ** 2).sum(axis=1).mean())
         away = np.linalg.norm(before - mean)
         np.testing.assert_allclose(after, mean + (before - mean) * min(1, reach / away), atol=1e-12)
-    np.testing.assert_allclose(anchor(skeleton).vertices, skeleton.vertices, atol=1e-12)  # once is enough
+    np.testing.assert_allclose(clamp_to_points(skeleton).vertices, skeleton.vertices, atol=1e-12)  # once is enough
     for name in ("edges", "radii", "vertex_of_point", "points", "normals"):
         np.testing.assert_array_equal(getattr(skeleton, name), getattr(raw, name))
 
@@ -74,12 +76,12 @@ def test_goes_with_the_cloud(random_skeleton):
     raw = random_skeleton(5)
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     moved = replace(raw, vertices=raw.vertices @ turn + 1e4, points=raw.points @ turn + 1e4, normals=raw.normals @ turn)
-    np.testing.assert_allclose(anchor(moved).vertices - 1e4, anchor(raw).vertices @ turn, atol=1e-9)
+    np.testing.assert_allclose(clamp_to_points(moved).vertices - 1e4, clamp_to_points(raw).vertices @ turn, atol=1e-9)
 
 
 def test_points_in_one_place_hold_their_vertex_there():
     raw = cross([0.1, 0.2, 0.3])
-    skeleton = anchor(replace(raw, points=np.ones((8, 3))))
+    skeleton = clamp_to_points(replace(raw, points=np.ones((8, 3))))
     np.testing.assert_allclose(skeleton.vertices, [[1, 1, 1]], atol=1e-15)
-    on_them = anchor(replace(raw, points=np.ones((8, 3)), vertices=[[1, 1, 1]]))
+    on_them = clamp_to_points(replace(raw, points=np.ones((8, 3)), vertices=[[1, 1, 1]]))
     np.testing.assert_array_equal(on_them.vertices, [[1, 1, 1]])

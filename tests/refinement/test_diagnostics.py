@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Skeleton
-from glsk_o3d.refinement.diagnostics import MUCH, WEAK, trust_warnings
+from glsk_o3d.refinement.diagnostics import LOW_CONFIDENCE, LOW_CONFIDENCE_SHARE, diagnose
 
 
 def unit(n, seed=0):
@@ -72,7 +72,7 @@ def skeleton_of(*shapes, joined=True):
 def test_shapes(shapes, start, size):
     skeleton = skeleton_of(*shapes)
     scaled = replace(skeleton, vertices=size * skeleton.vertices, points=size * skeleton.points)
-    messages = trust_warnings(scaled)
+    messages = diagnose(scaled)
     assert len(messages) == (start is not None)
     assert not start or messages[0].startswith(start)
 
@@ -81,20 +81,20 @@ def test_asks_the_cloud_and_not_the_skeleton():
     """Wherever the vertices are."""
     skeleton = skeleton_of(ball())
     astray = replace(skeleton, vertices=skeleton.vertices + [3, 1, 2])
-    assert trust_warnings(astray)[0].startswith("sphere-like")
+    assert diagnose(astray)[0].startswith("sphere-like")
 
 
 def test_no_edges():
-    messages = trust_warnings(skeleton_of(tube(), tube()))
+    messages = diagnose(skeleton_of(tube(), tube()))
     assert [message.startswith("no edges: every part became one vertex") for message in messages] == [True]
     # one reason is enough
-    assert trust_warnings(skeleton_of(sheet(), joined=False))[0].startswith("sheet-like")
+    assert diagnose(skeleton_of(sheet(), joined=False))[0].startswith("sheet-like")
 
 
 # ---- weakly supported
 
 
-def unsure(shape, vertices, confidence=0.9 * WEAK):
+def unsure(shape, vertices, confidence=0.9 * LOW_CONFIDENCE):
     """A shape, some of whose vertices have little confidence."""
     skeleton = skeleton_of(*shape)
     values = np.ones(len(skeleton.vertices))
@@ -112,7 +112,7 @@ def weak_place(message):
 def test_names_the_region_that_is_weakly_supported(size):
     skeleton = unsure([torus(), torus()], [*range(12, 24)])
     scaled = replace(skeleton, vertices=size * skeleton.vertices, points=size * skeleton.points)
-    (message,) = trust_warnings(scaled)
+    (message,) = diagnose(scaled)
     assert message.startswith("weakly supported: around 50% of the points")
     reach, place = weak_place(message)
     assert reach == pytest.approx(size, rel=1e-2)
@@ -125,8 +125,8 @@ def test_the_region_with_most_points_is_named():
     owner, normals = skeleton.vertex_of_point, skeleton.normals.copy()
     normals[(owner < 4) & (np.arange(len(owner)) % 10 > 0)] = np.nan
     skeleton = replace(skeleton, normals=normals)
-    share = np.isin(owner[skeleton.witnesses], [0, 1, 2, 3, 6, 7, 8]).mean()
-    (message,) = trust_warnings(skeleton)
+    share = np.isin(owner[skeleton.supporting_points], [0, 1, 2, 3, 6, 7, 8]).mean()
+    (message,) = diagnose(skeleton)
     assert message.startswith(f"weakly supported: around {share:.0%} of the points")
     reach, place = weak_place(message)
     region = skeleton.vertices[6:9]
@@ -138,21 +138,21 @@ def test_thresholds_of_support():
     count = np.bincount(skeleton_of(torus()).vertex_of_point, minlength=12)
     share = np.cumsum(count) / count.sum()
     for few in range(1, 13):
-        weak = trust_warnings(unsure([torus()], [*range(few)]))
-        assert len(weak) == (share[few - 1] > MUCH)
-    assert trust_warnings(unsure([torus()], [*range(12)], WEAK)) == []
-    assert len(trust_warnings(unsure([torus()], [*range(12)], np.nextafter(WEAK, 0)))) == 1
+        weak = diagnose(unsure([torus()], [*range(few)]))
+        assert len(weak) == (share[few - 1] > LOW_CONFIDENCE_SHARE)
+    assert diagnose(unsure([torus()], [*range(12)], LOW_CONFIDENCE)) == []
+    assert len(diagnose(unsure([torus()], [*range(12)], np.nextafter(LOW_CONFIDENCE, 0)))) == 1
 
 
 def test_confidence_that_nobody_measured_is_no_reason():
     assert np.isnan(skeleton_of(torus()).confidence).all()
-    assert trust_warnings(skeleton_of(torus())) == []
+    assert diagnose(skeleton_of(torus())) == []
 
 
 @pytest.mark.parametrize(("shape", "start"), [(sheet, "sheet-like"), (ball, "sphere-like"), (tube, "no edges")])
 def test_other_reasons_say_more(shape, start):
     skeleton = skeleton_of(shape())
-    messages = trust_warnings(replace(skeleton, confidence=np.zeros(len(skeleton.vertices))))
+    messages = diagnose(replace(skeleton, confidence=np.zeros(len(skeleton.vertices))))
     assert [message.startswith(start) for message in messages] == [True]
 
 
@@ -160,5 +160,5 @@ def test_points_without_a_say_do_not_count():
     skeleton = skeleton_of(sheet(600), torus(400))
     normals = skeleton.normals.copy()
     normals[:400] = np.nan
-    assert trust_warnings(replace(skeleton, normals=normals)) == []
-    assert trust_warnings(replace(skeleton, normals=np.full_like(normals, np.nan))) == []
+    assert diagnose(replace(skeleton, normals=normals)) == []
+    assert diagnose(replace(skeleton, normals=np.full_like(normals, np.nan))) == []

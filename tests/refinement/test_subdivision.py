@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import Skeleton
-from glsk_o3d.refinement.subdivision import SUPPORT, resample
+from glsk_o3d.refinement.subdivision import POINTS_PER_PIECE, subdivide_edges
 
 
 def bar(per, radii=(0.1, 0.2), length=1.0):
@@ -18,7 +18,7 @@ def bar(per, radii=(0.1, 0.2), length=1.0):
 
 @pytest.mark.parametrize(("spacing", "pieces"), [(0.5, 14), (1.0, 7), (2.0, 4), (6.6, 2), (6.7, 1), (50.0, 1)])
 def test_edges_are_as_long_as_the_share_of_the_mean_radius(spacing, pieces):
-    skeleton = resample(bar(400), spacing)
+    skeleton = subdivide_edges(bar(400), spacing)
     assert len(skeleton.edges) == pieces
     np.testing.assert_allclose(skeleton.edge_lengths, 1 / pieces)
     assert skeleton.edge_lengths.max() <= spacing * 0.15 or pieces == 1
@@ -28,27 +28,27 @@ def test_edges_are_as_long_as_the_share_of_the_mean_radius(spacing, pieces):
 
 @pytest.mark.parametrize(("per", "pieces"), [(2, 1), (4, 1), (8, 2), (20, 5), (400, 14)])
 def test_every_piece_has_its_eight_points(per, pieces):
-    assert len(resample(bar(per), 0.5).edges) == pieces
-    assert SUPPORT == 8
+    assert len(subdivide_edges(bar(per), 0.5).edges) == pieces
+    assert POINTS_PER_PIECE == 8
 
 
 def test_points_of_a_vertex_are_shared_by_its_edges(ringed):
     """A star of four edges: a quarter of the centre's points each."""
     tips = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]
-    skeleton = resample(ringed([[0, 0, 0], *tips], [(0, i) for i in range(1, 5)], per=16), 0.01)
+    skeleton = subdivide_edges(ringed([[0, 0, 0], *tips], [(0, i) for i in range(1, 5)], per=16), 0.01)
     # 16 / 4 + 16 = 20 points, 2.5 pieces
     assert len(skeleton.edges) == 4 * 3
 
 
 def test_tiny_radii_make_no_endless_subdivision():
-    assert len(resample(bar(5000, radii=(0, 0)), 0.5).edges) <= 1000
+    assert len(subdivide_edges(bar(5000, radii=(0, 0)), 0.5).edges) <= 1000
 
 
 @settings(max_examples=100, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 9), st.floats(0.2, 1.2), st.floats(0.3, 5))
 def test_topology_and_length_stay(random_skeleton, seed, m, reach, spacing):
     raw = random_skeleton(seed, m, reach, n=200)
-    skeleton = resample(raw, spacing)
+    skeleton = subdivide_edges(raw, spacing)
     np.testing.assert_array_equal(skeleton.vertices[:m], raw.vertices)
     np.testing.assert_array_equal(skeleton.radii[:m], raw.radii)
     np.testing.assert_array_equal(skeleton.degree[:m], raw.degree)
@@ -64,7 +64,7 @@ def test_topology_and_length_stay(random_skeleton, seed, m, reach, spacing):
 def test_points_go_to_the_nearest_sample_of_their_own_vertex(random_skeleton, seed, m):
     """Brute force: the vertex itself and the inner samples of its edges."""
     raw = random_skeleton(seed, m, 0.6, n=60)
-    skeleton = resample(raw, 1.0)
+    skeleton = subdivide_edges(raw, 1.0)
     samples = {v: [v] for v in range(m)}
     for edge in raw.edges.tolist():
         (a, b), ends = edge, raw.vertices[edge]
@@ -92,7 +92,7 @@ def test_points_never_cross_to_a_strand_that_only_passes_by():
     side = np.repeat([0, 1], 400)
     points, normals = np.column_stack([x, 0 * x + 0.05, 0 * x]), np.tile([0.0, 1, 0], (800, 1))
     owner = 2 * side + (x > 0)
-    skeleton = resample(Skeleton(vertices, [(0, 1), (2, 3)], np.full(4, 0.1), owner, points, normals), 1.0)
+    skeleton = subdivide_edges(Skeleton(vertices, [(0, 1), (2, 3)], np.full(4, 0.1), owner, points, normals), 1.0)
     assert len(skeleton.vertices) > 30
     np.testing.assert_array_equal(skeleton.vertices[skeleton.vertex_of_point, 1] > 0.05, side == 1)
     assert np.abs(skeleton.vertices[skeleton.vertex_of_point, 0] - points[:, 0]).max() < 0.051

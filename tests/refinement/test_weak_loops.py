@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from glsk_o3d import Skeleton
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
-from glsk_o3d.refinement.weak_loops import NEAR, bonds, crossings, cut_threads
+from glsk_o3d.refinement.weak_loops import BOND_NEIGHBOURS, bonds, crossings, cut_weak_loops
 
 TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
 WEAK, SURE = 0.1, 0.65
@@ -69,12 +69,12 @@ def torn(around):
 
 def slow_bonds(skeleton):
     """Summed over every point and each of its nearest, by pair of vertices."""
-    owned = skeleton.witnesses
+    owned = skeleton.supporting_points
     points, normals, owner = skeleton.points[owned], skeleton.normals[owned], skeleton.vertex_of_point[owned]
     found = {}
     for p in range(len(owned)):
         order = np.argsort(np.linalg.norm(points - points[p], axis=1), kind="stable")
-        for q in [q for q in order if q != p][: NEAR - 1]:
+        for q in [q for q in order if q != p][: BOND_NEIGHBOURS - 1]:
             if owner[p] == owner[q]:
                 continue
             line = (points[q] - points[p]) / np.linalg.norm(points[q] - points[p])
@@ -109,7 +109,9 @@ def foreign(skeleton):
     """Near points of different vertices, counted from every point."""
     points, owner = skeleton.points, skeleton.vertex_of_point
     distance = np.linalg.norm(points[:, None] - points, axis=2)
-    return sum((owner[np.argsort(row)[:NEAR]] != own).sum() for row, own in zip(distance, owner, strict=True))
+    return sum(
+        (owner[np.argsort(row)[:BOND_NEIGHBOURS]] != own).sum() for row, own in zip(distance, owner, strict=True)
+    )
 
 
 @pytest.mark.parametrize("turn", [np.eye(3), TURN])
@@ -146,7 +148,7 @@ def test_bond_of_two_points_by_the_angles_of_their_normals(angle):
     np.testing.assert_allclose(weight, 2 * np.cos(2 * t) ** 2 * np.cos(t) ** 4, atol=1e-12)
 
 
-@pytest.mark.parametrize("copies", [2, NEAR, 20])
+@pytest.mark.parametrize("copies", [2, BOND_NEIGHBOURS, 20])
 def test_copies_of_a_point_are_one_point(torn, copies):
     """Wherever they are: a cloud that came together from two has some."""
     raw = torn(None)
@@ -155,7 +157,7 @@ def test_copies_of_a_point_are_one_point(torn, copies):
         raw, points=raw.points[twice], normals=raw.normals[twice], vertex_of_point=raw.vertex_of_point[twice]
     )
     assert len(twice) > len(raw.points)
-    assert cut_threads(many, WEAK, SURE).n_loops == 1
+    assert cut_weak_loops(many, WEAK, SURE).n_loops == 1
     (pairs, weight), (expected, sound) = bonds(many), bonds(raw)
     np.testing.assert_array_equal(pairs, expected)
     np.testing.assert_allclose(weight, sound)
@@ -242,11 +244,11 @@ def test_crossings_turn_with_the_cycle():
 @pytest.mark.parametrize("bridged", [False, True])
 def test_a_tube_that_touches_itself_by_a_thread_is_cut_there(torn, missing, bridged):
     raw = torn(missing, bridged)
-    skeleton = cut_threads(raw, WEAK, SURE)
+    skeleton = cut_weak_loops(raw, WEAK, SURE)
     np.testing.assert_array_equal(skeleton.edges, np.delete(raw.edges, missing, axis=0))
     for name in ("vertices", "vertex_of_point", "radii", "confidence", "normals"):
         np.testing.assert_array_equal(getattr(skeleton, name), getattr(raw, name))
-    assert cut_threads(raw, 0, SURE) is raw
+    assert cut_weak_loops(raw, 0, SURE) is raw
     # where is what matters, not the numbers
     assert (skeleton.n_loops, skeleton.n_components) == (0, 1)
 
@@ -254,7 +256,7 @@ def test_a_tube_that_touches_itself_by_a_thread_is_cut_there(torn, missing, brid
 @pytest.mark.parametrize("weak", [WEAK, 0.5])
 def test_a_ring_of_even_tube_is_not_cut(torn, weak):
     raw = torn(None)
-    assert cut_threads(raw, weak, SURE) is raw
+    assert cut_weak_loops(raw, weak, SURE) is raw
 
 
 @pytest.mark.parametrize("big", [0.4, 0.6, 1.0])
@@ -267,7 +269,7 @@ def test_a_torus_with_points_anywhere_on_it_is_not_cut(around, big, n):
     signs = rng.choice([-1, 1], (n, 1))
     raw = sure(around(circle(24, big), sorted_edges(ring_edges(24)), big * out + 0.1 * normals, signs * normals))
     assert raw.n_loops == 1
-    assert cut_threads(raw, WEAK, SURE) is raw
+    assert cut_weak_loops(raw, WEAK, SURE) is raw
 
 
 def arms(gap):
@@ -283,7 +285,7 @@ def test_where_tips_touch_by_one_point_the_loop_is_cut(around):
     points, normals = np.concatenate([points, [[0, 1.51, 0]]]), np.concatenate([normals, [[0, 0, 1]]])
     raw = sure(around(vertices, sorted([*stem, *sides, (6, 10)]), points, normals))
     assert raw.n_loops == 1
-    skeleton = cut_threads(raw, WEAK, SURE)
+    skeleton = cut_weak_loops(raw, WEAK, SURE)
     assert skeleton.edges.tolist() == [list(edge) for edge in sorted(stem + sides)]
 
 
@@ -298,7 +300,7 @@ def test_where_flanks_touch_the_loop_is_cut(around, gap):
     points, normals = pipe([vertices[list(edge)] for edge in tubes])
     raw = sure(around(vertices, sorted([*tubes, (8, 18)]), points, normals))
     assert raw.n_loops == 1
-    skeleton = cut_threads(raw, WEAK, 0)
+    skeleton = cut_weak_loops(raw, WEAK, 0)
     assert skeleton.edges.tolist() == [list(edge) for edge in sorted(tubes)]
 
 
@@ -314,7 +316,7 @@ def test_opening_over_thickness_times_confidence(ringed, least, confidence, shar
     tube[:20] *= 10  # the median over the loop does not mind
     mixed = confidence * np.where(np.arange(n) % 2, 0.5, 1.5)  # whose mean is meant
     raw = replace(ringed(circle(n), ring_edges(n), radius=tube), confidence=mixed)
-    skeleton = cut_threads(raw, 0, least)
+    skeleton = cut_weak_loops(raw, 0, least)
     assert skeleton.n_loops == loops
     assert skeleton.n_components == 1
     assert len(skeleton.edges) == n - 1 + loops
@@ -323,36 +325,36 @@ def test_opening_over_thickness_times_confidence(ringed, least, confidence, shar
 def test_a_narrow_loop_without_confidence_is_cut_where_the_fewest_bonds_cross(torn):
     raw = torn(7, bridged=True)
     doubtful = sure(raw, 0.01)
-    np.testing.assert_array_equal(cut_threads(doubtful, 0, SURE).edges, np.delete(raw.edges, 7, axis=0))
-    assert cut_threads(raw, 0, SURE) is raw
+    np.testing.assert_array_equal(cut_weak_loops(doubtful, 0, SURE).edges, np.delete(raw.edges, 7, axis=0))
+    assert cut_weak_loops(raw, 0, SURE) is raw
 
 
 def test_wide_loops_stay_where_narrow_ones_go(ringed):
     """With the same tubes and confidence."""
     rings = np.concatenate([circle(24), circle(24, 0.2, (3, 0, 0))])
     raw = ringed(rings, ring_edges(24) + ring_edges(24, 24), radius=0.1)
-    skeleton = cut_threads(sure(raw, 0.25), 0, 1)
+    skeleton = cut_weak_loops(sure(raw, 0.25), 0, 1)
     assert (skeleton.n_loops, skeleton.n_components) == (1, 2)
     assert (skeleton.edges < 24).all(axis=1).sum() == 24
 
 
 def test_loops_of_no_thickness_are_sure(ringed):
     raw = sure(ringed(circle(12), ring_edges(12), radius=0.0))
-    assert cut_threads(raw, 0, 1e9) is raw
-    assert cut_threads(sure(raw, 0.0), 0, 1e9).n_loops == 1  # nothing is less than nothing
+    assert cut_weak_loops(raw, 0, 1e9) is raw
+    assert cut_weak_loops(sure(raw, 0.0), 0, 1e9).n_loops == 1  # nothing is less than nothing
 
 
 def test_zero_keeps_all(torn, ringed):
     for raw in (torn(3), sure(torn(3), 0.0), sure(ringed(circle(9), ring_edges(9), radius=9.0), 0.0)):
-        assert cut_threads(raw, 0, 0) is raw
+        assert cut_weak_loops(raw, 0, 0) is raw
 
 
 def test_trees_and_skeletons_without_witnesses_are_left(ringed):
     tree = sure(ringed(circle(9), ring_edges(9)[:-1]), 0)
-    assert cut_threads(tree, 9, 9) is tree
+    assert cut_weak_loops(tree, 9, 9) is tree
     ring = sure(ringed(circle(9), ring_edges(9)))
     silent = replace(ring, normals=np.full_like(ring.normals, np.nan))
-    assert cut_threads(silent, 9, 9) is silent  # no bond is weaker than the others, no tube is thick
+    assert cut_weak_loops(silent, 9, 9) is silent  # no bond is weaker than the others, no tube is thick
 
 
 # ---- several loops
@@ -370,7 +372,7 @@ def test_cutting_what_two_loops_share_takes_one_edge(around, seed):
     points, normals = pipe([vertices[list(edge)] for edge in edges if edge not in empty])
     name = np.random.default_rng(seed).permutation(len(vertices))
     raw = sure(around(vertices[np.argsort(name)], sorted_edges(name[edges].tolist()), points, normals))
-    skeleton = cut_threads(raw, WEAK, 0)
+    skeleton = cut_weak_loops(raw, WEAK, 0)
     assert (skeleton.n_components, skeleton.n_loops) == (1, 1)
     (cut,) = {tuple(edge) for edge in raw.edges.tolist()} - {tuple(edge) for edge in skeleton.edges.tolist()}
     assert cut in sorted_edges(name[empty].tolist())
@@ -384,13 +386,13 @@ def test_cutting_what_two_loops_share_takes_one_edge(around, seed):
 def test_never_tears_a_component_and_leaves_no_false_loop(random_skeleton, seed, m, reach, every, weak, least):
     raw = random_skeleton(seed, m, reach, n=4 * m, every=every)
     raw = replace(raw, confidence=np.random.default_rng(seed).random(m))
-    skeleton = cut_threads(raw, weak, least)
+    skeleton = cut_weak_loops(raw, weak, least)
     np.testing.assert_array_equal(skeleton.component_of_vertex, raw.component_of_vertex)
     np.testing.assert_array_equal(skeleton.vertices, raw.vertices)
     assert {tuple(e) for e in skeleton.edges.tolist()} <= {tuple(e) for e in raw.edges.tolist()}
     assert skeleton.edges.tolist() == sorted(skeleton.edges.tolist())
     # what is left would not be cut again
-    assert cut_threads(skeleton, weak, least) is skeleton
+    assert cut_weak_loops(skeleton, weak, least) is skeleton
     if weak == least == 0:
         assert skeleton is raw
     # and each edge that went was on a loop
@@ -404,7 +406,7 @@ def test_what_nothing_supports_becomes_a_forest(random_skeleton, seed, m, reach,
     raw = random_skeleton(seed, m, reach, n=4 * m)
     raw = replace(raw, vertices=size * raw.vertices, points=size * raw.points)
     owner = np.arange(4 * m) % m  # each vertex has points at some distance
-    skeleton = cut_threads(replace(raw, vertex_of_point=owner, confidence=np.zeros(m)), 0, 1)
+    skeleton = cut_weak_loops(replace(raw, vertex_of_point=owner, confidence=np.zeros(m)), 0, 1)
     assert skeleton.n_loops == 0
     assert skeleton.n_components == raw.n_components
 
@@ -417,7 +419,7 @@ def test_goes_with_the_cloud_and_does_not_mind_the_order_of_points(torn, seed):
         raw, vertices=7 * raw.vertices @ turn - 3, points=(7 * raw.points @ turn - 3)[order],
         normals=(raw.normals @ turn)[order], vertex_of_point=raw.vertex_of_point[order],
     )  # fmt: skip
-    np.testing.assert_array_equal(cut_threads(moved, WEAK, SURE).edges, np.delete(raw.edges, 5, axis=0))
+    np.testing.assert_array_equal(cut_weak_loops(moved, WEAK, SURE).edges, np.delete(raw.edges, 5, axis=0))
 
 
 def test_a_loop_with_the_median_of_its_crossings_as_limit(torn):
@@ -427,6 +429,6 @@ def test_a_loop_with_the_median_of_its_crossings_as_limit(torn):
     across = crossings(cycle, 24, *bonds(raw))
     share = across.min() / np.median(across)
     assert 0 < share < 1
-    assert cut_threads(raw, 0.99 * share, 0) is raw
-    skeleton = cut_threads(raw, 1.01 * share, 0)
+    assert cut_weak_loops(raw, 0.99 * share, 0) is raw
+    skeleton = cut_weak_loops(raw, 1.01 * share, 0)
     assert skeleton.n_loops == 0
