@@ -64,7 +64,7 @@ def cloud_points(cloud: Any) -> np.ndarray:
     return np.array(array, np.float64, order="C")
 
 
-def _held(cloud):
+def _held(cloud: Any) -> Any:
     """The array-like in an Open3D object, or `cloud` itself; knows Open3D's classes by name, so as not to import it."""
     name, tensor = open3d_class(cloud)
     if name == "Tensor":
