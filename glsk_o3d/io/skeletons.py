@@ -1,6 +1,6 @@
 """Skeletons to files and back: the table of formats.
 
-A format is a module with ``write(skeleton) -> bytes`` and ``read(data: bytes) -> Skeleton``; it has a line in `FORMATS`.
+A format is a module with ``write(skeleton) -> bytes``, ``read(data: bytes) -> Skeleton`` and a line in `FORMATS`.
 """
 
 from __future__ import annotations
