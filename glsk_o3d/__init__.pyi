@@ -21,7 +21,8 @@ from .errors import (
     StageError,
 )
 from .interop.clouds import Cloud
-from .io.files import read_cloud, read_skeleton, save_skeleton
+from .io.clouds import read_cloud
+from .io.skeletons import read_skeleton, save_skeleton
 from .io.truth import read_truth
 from .lpr_reducer import LPRReducer
 from .meshlab.meshset import MeshSet

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import networkx
 
     from .analysis.branches import BranchTable
+    from .io.colors import ColorChoice
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +185,7 @@ class Skeleton:
 
         return branch_table(self, root)
 
-    def annotate(self, cloud=None, *, color: str | None = None):
+    def annotate(self, cloud=None, *, color: ColorChoice | None = None):
         """A copy of a cloud with the attributes ``skeleton_vertex``, ``branch`` and ``radius``.
 
         See `glsk_o3d.io.annotation.annotate`.
@@ -264,6 +265,6 @@ class Skeleton:
 
     def save(self, path: str | PathLike, **options) -> None:
         """Write the skeleton to a file; the ending chooses the format. See `glsk_o3d.save_skeleton`."""
-        from .io.files import save_skeleton
+        from .io.skeletons import save_skeleton
 
         save_skeleton(self, path, **options)

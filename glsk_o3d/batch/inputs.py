@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from ..errors import InvalidParameterError
-from ..io.files import CLOUD_ENDINGS, MESH_ENDINGS
+from ..io.paths import CLOUD_ENDINGS, MESH_ENDINGS
 
 ENDINGS = CLOUD_ENDINGS + MESH_ENDINGS
 RESERVED = ("ledger", "recipe")

@@ -13,7 +13,7 @@ from typing import Any
 
 from ..driver import as_pipeline
 from ..errors import FileFormatError, InvalidParameterError
-from ..io.files import skeleton_ending
+from ..io.skeletons import skeleton_ending
 from ..pipeline import Filter, Pipeline
 from ..recipes import to_recipe
 from .inputs import find_inputs

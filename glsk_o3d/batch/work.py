@@ -108,7 +108,7 @@ def clear(job: Job, written: Iterable[str] = ()) -> None:
 
 def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
     from ..analysis.summary import summary
-    from ..io.files import read_cloud
+    from ..io.clouds import read_cloud
     from ..recipes import from_recipe
     from ..viewing.preview import save_preview
 

@@ -44,7 +44,7 @@ def branches(
     """
     with reporting(quiet=quiet, verbose=verbose):
         from ..errors import FileFormatError
-        from ..io.files import read_skeleton
+        from ..io.skeletons import read_skeleton
         from .running import check_writable
 
         if output is not None:

@@ -58,7 +58,7 @@ def crosscheck(
         from ..crosscheck.verdict import SURFACES, UNTOLD
         from ..errors import InvalidCloudError, did_you_mean
         from ..interop.writing import write_json
-        from ..io.files import read_cloud
+        from ..io.clouds import read_cloud
         from ..io.meshes import read_mesh
         from ..recipes.catalogue import named_pipeline
         from ..viewing.preview import printable

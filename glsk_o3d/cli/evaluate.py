@@ -66,7 +66,8 @@ def evaluate(
         from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
         from ..interop.clouds import cloud_points
         from ..interop.writing import write_json
-        from ..io.files import read_cloud, read_skeleton
+        from ..io.clouds import read_cloud
+        from ..io.skeletons import read_skeleton
         from ..io.truth import read_truth
         from ..viewing.assessment import save_assessment
         from .running import check_findings

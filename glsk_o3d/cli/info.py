@@ -25,7 +25,8 @@ def info(
 ) -> None:
     """Say what is in a cloud or skeleton file."""
     with reporting(quiet=quiet, verbose=verbose):
-        from ..io.files import holds_skeleton, read_scan, read_skeleton
+        from ..io.clouds import read_scan
+        from ..io.skeletons import holds_skeleton, read_skeleton
 
         if holds_skeleton(file):
             skeleton = read_skeleton(file)

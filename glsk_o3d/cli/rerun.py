@@ -36,7 +36,8 @@ def rerun(
     """
     with reporting(scan or result, quiet=quiet, verbose=verbose):
         from ..errors import RecipeError
-        from ..io.files import read_cloud, read_skeleton
+        from ..io.clouds import read_cloud
+        from ..io.skeletons import read_skeleton
         from ..recipes import identical
         from ..recipes import rerun as run_again
         from ..viewing.recorder import ContractionRecorder

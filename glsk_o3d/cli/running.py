@@ -15,7 +15,7 @@ import typer
 
 from ..analysis.summary import summary
 from ..errors import FileFormatError, GlskError
-from ..io.files import skeleton_ending
+from ..io.skeletons import skeleton_ending
 from ..skeleton import Skeleton
 from ..viewing.page import save_report
 from ..viewing.preview import save_preview

@@ -32,7 +32,8 @@ def view(
     with reporting(quiet=quiet, verbose=verbose):
         import numpy as np
 
-        from ..io.files import holds_skeleton, read_cloud, read_skeleton
+        from ..io.clouds import read_cloud
+        from ..io.skeletons import holds_skeleton, read_skeleton
         from ..skeleton import Skeleton
         from ..viewing.window import show
         from .running import check_outputs, write

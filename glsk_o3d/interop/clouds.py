@@ -15,9 +15,9 @@ MOST_NEIGHBOURS = 30  # within a radius without a limit of its own: as many as O
 
 
 class Cloud:
-    """Anything that carries points: a name for what filters of clouds take and give, which has no instances.
+    """Anything that carries points: what a filter of clouds `consumes` or `produces`.
 
-    See `cloud_points` for what counts as one.
+    A name alone, without instances and without subclasses; `cloud_points` says what counts as a cloud.
     """
 
 
@@ -34,7 +34,8 @@ def cloud_points(cloud: Any) -> np.ndarray:
     Parameters
     ----------
     cloud : open3d.geometry.PointCloud, TriangleMesh, open3d.t.geometry.PointCloud, TriangleMesh or (N, 3) array_like
-        Of a mesh the vertices are taken. Tensors may have any real dtype and live on any device.
+        Of a mesh the vertices are taken. Tensors may have any real dtype and live on any device; by themselves, they
+        and Open3D's vectors count as arrays.
 
     Returns
     -------
@@ -71,7 +72,7 @@ def cloud_points(cloud: Any) -> np.ndarray:
     return np.array(array, np.float64, order="C")
 
 
-def _held(cloud):
+def _held(cloud: Any) -> Any:
     """The array-like in an Open3D object, or `cloud` itself; knows Open3D's classes by name, so as not to import it."""
     name, tensor = open3d_class(cloud)
     if name == "Tensor":

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analysis.segmentation import branch_of_point, label_of_nearest, vertex_of_cloud
 from ..interop.clouds import cloud_points, open3d_class
 from ..interop.packages import import_open3d
-from .colors import shades
+from .colors import ColorChoice, shades
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
     from ..state import Contraction
 
 
-def annotate(skeleton: Skeleton, cloud: Any = None, *, color: str | None = None) -> Any:
+def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None = None) -> Any:
     """A copy of a cloud that says of every point where it belongs.
 
     The copy has all attributes of the original, and
@@ -32,8 +34,8 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: str | None = None)
     cloud : cloud, optional
         By default the one the skeleton was made from. Points of another one go with the nearest point of that, or with
         the nearest place on the curve if the skeleton's file held no cloud.
-    color : {"branch", "radius", "confidence"}, optional
-        What the colours of the points are to show; see `glsk_o3d.io.colors.shades`.
+    color : {"branch", "radius", "confidence"} or three floats in [0, 1], optional
+        What the colours of the points are to show, or the one colour of all; see `glsk_o3d.io.colors.shades`.
 
     Returns
     -------
@@ -53,8 +55,6 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: str | None = None)
     Integers are int32 because Open3D writes no int64 to PLY. ``voxel_down_sample`` takes the mean of every attribute:
     that of labels means nothing where branches meet. Annotate its result once more.
     """
-    from ..analysis.segmentation import branch_of_point, vertex_of_cloud
-
     points, vertex = vertex_of_cloud(skeleton, cloud)
     branch = branch_of_point(skeleton, points, vertex)
     geometry, put = _copy(points if cloud is None else cloud)
@@ -91,8 +91,6 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
     Open3D writes the attribute to npz as it is, to PLY as three columns ``contracted_0`` to ``contracted_2``, and not
     to PCD.
     """
-    from ..analysis.segmentation import label_of_nearest
-
     points = state.points if cloud is None else cloud_points(cloud)
     survivor = label_of_nearest(state.points, state.survivor_of_point, points)
     geometry, put = _copy(points if cloud is None else cloud)
@@ -100,7 +98,7 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
     return geometry
 
 
-def _copy(cloud):
+def _copy(cloud: Any) -> tuple[Any, Callable[..., None]]:
     """A tensor geometry with its own copy of all data, and a function that sets one of its attributes."""
     o3d = import_open3d()
     name, tensor = open3d_class(cloud)
@@ -115,7 +113,7 @@ def _copy(cloud):
     positions = attributes.positions
     own = positions.dtype if positions.dtype in (o3d.core.float32, o3d.core.float64) else o3d.core.float64
 
-    def put(key, values, dtype=None):
+    def put(key: str, values: np.ndarray, dtype: str | None = None) -> None:
         values = np.ascontiguousarray(values, None if dtype is None else dtype)
         attributes[key] = o3d.core.Tensor(values, own if dtype is None else None, positions.device)
 

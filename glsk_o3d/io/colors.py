@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
@@ -11,11 +12,14 @@ from ..errors import InvalidParameterError
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
+ColorChoice: TypeAlias = Literal["branch", "radius", "confidence"] | Sequence[float]
+"""What colours show, or one colour for all: red, green and blue from 0 to 1."""
+
 GREY = (0.6, 0.6, 0.6)
 NAMES = ("branch", "radius", "confidence")
 
 
-def shades(skeleton: Skeleton, color, branch: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """Colours of things that belong to branches and vertices.
 
     Parameters

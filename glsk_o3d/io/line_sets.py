@@ -8,13 +8,13 @@ import numpy as np
 
 from ..analysis.segmentation import branch_of_edge
 from ..interop.packages import import_open3d
-from .colors import shades
+from .colors import ColorChoice, shades
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 
-def to_line_set(skeleton: Skeleton, color: Any = (0.85, 0.1, 0.1)) -> Any:
+def to_line_set(skeleton: Skeleton, color: ColorChoice = (0.85, 0.1, 0.1)) -> Any:
     """A skeleton as a legacy line set, ready for ``draw_geometries``.
 
     Parameters
@@ -42,7 +42,7 @@ def to_line_set(skeleton: Skeleton, color: Any = (0.85, 0.1, 0.1)) -> Any:
     return lines
 
 
-def to_tensor_line_set(skeleton: Skeleton, color: Any = None) -> Any:
+def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> Any:
     """A skeleton as a tensor line set.
 
     Parameters
@@ -63,7 +63,6 @@ def to_tensor_line_set(skeleton: Skeleton, color: Any = None) -> Any:
         The colour is unknown.
     MissingPackageError
     """
-
     o3d = import_open3d()
     lines = o3d.t.geometry.LineSet()
     lines.point.positions = o3d.core.Tensor(_rows(skeleton.vertices, float, 3))
@@ -76,10 +75,9 @@ def to_tensor_line_set(skeleton: Skeleton, color: Any = None) -> Any:
     return lines
 
 
-def _edge_colors(skeleton, color):
-
+def _edge_colors(skeleton: Skeleton, color: ColorChoice) -> np.ndarray:
     return shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
 
 
-def _rows(array, dtype, columns):
+def _rows(array: np.ndarray, dtype: type, columns: int) -> np.ndarray:
     return np.ascontiguousarray(array, dtype).reshape(-1, columns)

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..errors import FileFormatError, InvalidParameterError
 from ..interop.packages import import_open3d
-from .files import MESH_ENDINGS, check_scan
+from .clouds import check_scan
+from .paths import MESH_ENDINGS
 
 
 def read_mesh(path: str | os.PathLike) -> Any:

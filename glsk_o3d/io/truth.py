@@ -10,7 +10,7 @@ import numpy as np
 
 from ..analysis.truth import Truth
 from ..errors import FileFormatError, InvalidParameterError
-from .files import read_skeleton
+from .skeletons import read_skeleton
 
 
 def read_truth(path: str | os.PathLike) -> Truth:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ..errors import InvalidParameterError
 from ..interop.packages import import_open3d
 from ..numerics.neighbourhoods import plane_axes
-from .colors import shades
+from .colors import ColorChoice, shades
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 TINY = np.finfo(float).tiny
 
 
-def to_tubes(skeleton: Skeleton, color: Any = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
+def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
     """A skeleton as a mesh of tubes, one for every branch, closed by half balls.
 
     The tubes have the radius of the vertices, linear between them. They overlap at the junctions, where the half balls
@@ -64,7 +65,9 @@ def to_tubes(skeleton: Skeleton, color: Any = "branch", *, radius: float | None 
     return mesh
 
 
-def sweep(vertices, radii, paths, sides):
+def sweep(
+    vertices: np.ndarray, radii: np.ndarray, paths: Sequence[np.ndarray], sides: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Closed surfaces around curves: circles swept along them, and half balls at the ends.
 
     Parameters
@@ -118,7 +121,7 @@ def sweep(vertices, radii, paths, sides):
     return points, triangles, np.concatenate([np.repeat(row, sides), np.flatnonzero(first), np.flatnonzero(last)])
 
 
-def _frames(centre, first):
+def _frames(centre: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit tangents of polylines one after the other, and the angles by which `plane_axes` of them do not twist."""
     edge = np.diff(centre, axis=0, prepend=centre[:1])  # the one that leads to each point
     edge[first] = 0

@@ -13,8 +13,10 @@ from ..errors import FileFormatError
 from ..interop.clouds import cloud_points
 from ..interop.packages import import_open3d, require
 from ..interop.writing import write_atomically
-from ..io import files
-from ..io.files import graph_skeleton, read_skeleton, save_skeleton, skeleton_ending
+from ..io.clouds import check_scan, read_scan
+from ..io.graph import graph_skeleton
+from ..io.ply import ply_elements
+from ..io.skeletons import read_skeleton, save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
 from ..state import Contraction
 
@@ -94,7 +96,7 @@ class Layer:
         ------
         FileNotFoundError, FileFormatError, MissingPackageError
         """
-        path, scalars = files.check_scan(path), None
+        path, scalars = check_scan(path), None
         ending, o3d = path.suffix.lower(), import_open3d()
         held = _elements(path, ending)
         if "edge" in held and "face" not in held:
@@ -105,7 +107,7 @@ class Layer:
                 scalars=None if np.isnan(drawing.radii).all() else drawing.radii,
                 label=path.name,
             )
-        cloud, faces = files.read_scan(path)  # knows best what may be wrong with the file
+        cloud, faces = read_scan(path)  # knows best what may be wrong with the file
         points, normals, colors = cloud.points, cloud.normals, cloud.colors
         if ending == ".stl":
             mesh = o3d.geometry.TriangleMesh(points, o3d.utility.Vector3iVector(faces))
@@ -232,7 +234,7 @@ def _elements(path, ending) -> dict[str, list[str]]:
     if ending == ".obj":  # without faces Open3D finds nothing in it
         with path.open("rb") as stream:
             return {"face" if any(line.split()[:1] == [b"f"] for line in stream) else "edge": []}
-    return files.ply_elements(path) if ending == ".ply" else {}
+    return ply_elements(path) if ending == ".ply" else {}
 
 
 def check_ending(path: Path, what: str) -> None:

@@ -14,7 +14,9 @@ import numpy as np
 from ..errors import FileFormatError, GlskError, InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.packages import require
 from ..interop.writing import write_atomically
-from ..io.files import CLOUD_ENDINGS, MESH_ENDINGS, check_scan, save_skeleton, skeleton_ending
+from ..io.clouds import check_scan
+from ..io.paths import CLOUD_ENDINGS, MESH_ENDINGS
+from ..io.skeletons import save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
 from . import builtin
 from .layers import Layer

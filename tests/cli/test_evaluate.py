@@ -10,7 +10,7 @@ import pytest
 from glsk_o3d import save_assessment
 from glsk_o3d.analysis import assess, compare
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
-from glsk_o3d.io.files import save_skeleton
+from glsk_o3d.io.skeletons import save_skeleton
 from glsk_o3d.samples import torus
 from glsk_o3d.skeleton import Skeleton
 

@@ -143,14 +143,14 @@ def test_ctrl_c(refused, scans, monkeypatch):
 
 
 def test_ctrl_c_while_open3d_loads(refused, scans, monkeypatch):
-    import glsk_o3d.io.files as files
+    import glsk_o3d.io.clouds as clouds
 
     def slow(path):
         signal.raise_signal(signal.SIGINT)
         held.append(Path(path).name)  # not before this is done
 
     held = []
-    monkeypatch.setattr(files, "read_cloud", slow)
+    monkeypatch.setattr(clouds, "read_cloud", slow)
     before = signal.getsignal(signal.SIGINT)
     assert "interrupted" in refused(130, "skeletonize", scans / "sample.ply", "-o", "s.ply")
     assert held == ["sample.ply"]

@@ -160,38 +160,3 @@ def test_colours(cloud, skeleton):
     for wrong in ("thickness", (1, 0), (0, 0, 2), ("a", 0, 0), np.nan):
         with pytest.raises(InvalidParameterError, match="color"):
             skeleton.annotate(cloud, color=wrong)
-
-
-def test_colours_without_radii_or_confidence(skeleton):
-    bare = glsk.Skeleton(skeleton.vertices, skeleton.edges, np.full(len(skeleton.radii), np.nan), (), (), ())
-    for color in ("radius", "confidence"):
-        assert (np.asarray(bare.to_line_set(color).colors) == 0.6).all()
-    even = glsk.Skeleton([[0, 0, 0], [1, 0, 0]], [(0, 1)], [1, 1], (), (), ())
-    assert np.ptp(np.asarray(even.to_line_set("radius").colors)) > 0
-
-
-@pytest.mark.parametrize("count", [0, 1])
-@pytest.mark.parametrize("color", ["branch", "radius", "confidence", (0.1, 0.2, 0.3)])
-def test_line_sets_in_colour_without_edges(count, color):
-    lone = glsk.Skeleton(np.zeros((count, 3)), (), np.ones(count), (), (), (), confidence=np.ones(count))
-    legacy, tensor = lone.to_line_set(color), lone.to_tensor_line_set(color)
-    assert (len(legacy.points), len(legacy.lines), len(legacy.colors)) == (count, 0, 0)
-    assert tuple(tensor.point.positions.shape) == (count, 3)
-    assert tuple(tensor.line.indices.shape) == (0, 2)
-    assert tuple(tensor.line.colors.shape) == (0, 3)
-    assert len(lone.to_tubes(color).vertex_colors) == len(lone.to_tubes(color).vertices)
-
-
-def test_line_sets_in_colour(skeleton):
-    for color, distinct in (("branch", 3), ((0.1, 0.2, 0.3), 1), ("radius", None), ("confidence", None)):
-        legacy = np.asarray(skeleton.to_line_set(color).colors)
-        tensor = skeleton.to_tensor_line_set(color)
-        np.testing.assert_array_equal(tensor.line.colors.numpy(), legacy)
-        assert legacy.shape == (len(skeleton.edges), 3)
-        count = len(np.unique(legacy, axis=0))
-        assert count == distinct if distinct else count > 5
-    plain = skeleton.to_tensor_line_set()
-    assert "colors" not in plain.line
-    for path, branch in zip(skeleton.branches, range(3), strict=True):
-        rows = np.isin(skeleton.edges, path).all(axis=1)
-        assert (plain.line.branch.numpy()[rows] == branch).all()

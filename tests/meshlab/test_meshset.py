@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import glsk_o3d as glsk
 from glsk_o3d.cli.main import app
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, MissingPackageError, ScriptError
-from glsk_o3d.io.files import read_skeleton
+from glsk_o3d.io.skeletons import read_skeleton
 from glsk_o3d.meshlab.layers import Layer
 from glsk_o3d.meshlab.steps import PlainLayers, read_steps
 from glsk_o3d.meshlab.verbs import verbs

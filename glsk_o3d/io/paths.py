@@ -1,0 +1,57 @@
+"""Names of files that are to be read: their endings, and whether they are there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from ..errors import FileFormatError
+
+CLOUD_ENDINGS = (".ply", ".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts")
+"""Files that `read_cloud` reads as clouds."""
+MESH_ENDINGS = (".off", ".obj", ".stl", ".gltf", ".glb")
+"""Files that `read_cloud` reads as meshes, to take their vertices."""
+
+
+def existing_file(path: str | os.PathLike) -> Path:
+    """The path of a file that is there and not empty.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    FileNotFoundError
+    FileFormatError
+        A folder, or an empty file.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise FileFormatError(f"{path}: is a folder, not a file")
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: no such file")
+    if path.is_file() and path.stat().st_size == 0:
+        raise FileFormatError(f"{path}: the file is empty")
+    return path
+
+
+def unknown_ending(what: object, known: Iterable[str]) -> FileFormatError:
+    """The error for a file whose ending is that of no format; it lists those that are known.
+
+    Parameters
+    ----------
+    what : object
+        The file, for the message.
+    known : iterable of str
+
+    Returns
+    -------
+    FileFormatError
+    """
+    return FileFormatError(f"{what}: unknown ending; known are {', '.join(known)}")

@@ -1,0 +1,189 @@
+"""Skeletons to files and back: the table of formats.
+
+A format is a module with ``write(skeleton) -> bytes``, ``read(data: bytes) -> Skeleton`` and a line in `FORMATS`.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Protocol
+
+from ..errors import FileFormatError, MissingPackageError
+from ..interop.writing import write_atomically
+from ..skeleton import Skeleton
+from . import graphml, json, npz, obj, ply, polylines, swc
+from .graph import NoEdges
+from .paths import CLOUD_ENDINGS, MESH_ENDINGS, existing_file, unknown_ending
+
+
+class Format(Protocol):
+    """What `FORMATS` holds: a module that writes skeletons as bytes and reads them."""
+
+    def write(self, skeleton: Skeleton) -> bytes:
+        """The content of a file."""
+
+    def read(self, data: bytes) -> Skeleton:
+        """The skeleton in the content of a file; any error means that it is damaged."""
+
+
+FORMATS: dict[str, Format] = {
+    ".ply": ply,
+    ".obj": obj,
+    ".json": json,
+    ".npz": npz,
+    ".swc": swc,
+    ".graphml": graphml,
+    ".cgal": polylines,
+    ".polylines.txt": polylines,
+}
+"""The formats of skeletons by the ending of the file."""
+
+
+def save_skeleton(
+    skeleton: Skeleton, path: str | os.PathLike, *, cut_loops: bool = False, format: str | None = None
+) -> None:
+    """Write a skeleton to a file; the ending chooses the format.
+
+    ===================== =============================================== =======================================
+    ending                holds                                           opens in
+    ===================== =============================================== =======================================
+    .json, .npz           everything, to the last bit                     `read_skeleton`
+    .ply                  vertices, edges, the property ``radius``        Open3D (``read_line_set``), MeshLab
+    .obj                  vertices, edges as ``l`` lines; no radii        MeshLab, Blender, CloudCompare
+    .swc                  trees only, with radii; vertices renumbered     neuron and plant tools
+    .graphml              x, y, z, radius of nodes, length of edges       networkx, Gephi, Cytoscape
+    .cgal, .polylines.txt a line per branch: count, x y z, ...; no radii  CGAL
+    ===================== =============================================== =======================================
+
+    Numbers keep their full precision. The file appears complete or not at all; on an error an existing file stays as
+    it was. Open3D's ``read_line_set`` gives an empty line set for a PLY file without edges.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    path : path-like
+    cut_loops : bool
+        For SWC: drop one edge per loop, keeping the spanning forest of least length, instead of refusing.
+    format : str, optional
+        The ending of another format than that of `path`, with or without its dot.
+
+    Raises
+    ------
+    FileFormatError
+        The ending is unknown, or the skeleton has loops and the format is SWC.
+    FileNotFoundError
+        The folder does not exist.
+    OSError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> skeleton = skeletonize(torus(1000).points)
+    >>> with TemporaryDirectory() as folder:
+    ...     save_skeleton(skeleton, f"{folder}/ring.swc", cut_loops=True)
+    ...     read_skeleton(f"{folder}/ring.swc").n_loops
+    0
+    """
+    path = Path(path)
+    chosen = FORMATS[skeleton_ending(path, format)]
+    data = swc.write(skeleton, cut_loops) if chosen is swc else chosen.write(skeleton)
+    write_atomically(path, lambda temporary: temporary.write_bytes(data))
+
+
+def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skeleton:
+    """Read a skeleton from a file that `save_skeleton` or another program wrote.
+
+    Parameters
+    ----------
+    path : path-like
+    format : str, optional
+        The ending of another format than that of `path`, with or without its dot.
+
+    Returns
+    -------
+    Skeleton
+        From JSON and npz everything. From other formats the graph alone: `points`, `normals` and `vertex_of_point` are
+        empty, and radii that the format has no place for are NaN. Edges are sorted; repeated edges and those from a
+        vertex to itself are dropped. Polylines are joined where their ends have equal coordinates.
+
+    Raises
+    ------
+    FileNotFoundError
+    FileFormatError
+        A folder, a cloud, an unknown ending, or a file that is damaged or from a newer release.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> skeleton = skeletonize(torus(1000).points)
+    >>> with TemporaryDirectory() as folder:
+    ...     skeleton.save(f"{folder}/ring.json")
+    ...     again = read_skeleton(f"{folder}/ring.json")
+    >>> bool((again.vertices == skeleton.vertices).all())
+    True
+    """
+    path = existing_file(path)
+    ending = skeleton_ending(path, format)
+    data = path.read_bytes()
+    try:
+        return FORMATS[ending].read(data)
+    except MissingPackageError:
+        raise
+    except NoEdges:
+        raise FileFormatError(f"{path}: is a cloud, not a skeleton: make one with glsk_o3d.skeletonize") from None
+    except Exception as error:  # whatever a parser raises on a hostile file
+        raise FileFormatError(f"{path}: not a valid {ending} skeleton: {error}") from error
+
+
+def holds_skeleton(path: str | os.PathLike) -> bool:
+    """Whether a file holds a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    bool
+        False also for what does not exist or is unknown: reading it as a cloud says so.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if not path.is_file() or ending not in _HOLDS_LINES:
+        return path.is_file() and ending not in CLOUD_ENDINGS + MESH_ENDINGS
+    with path.open("rb") as stream:
+        return _HOLDS_LINES[ending](stream)
+
+
+_HOLDS_LINES = {".ply": ply.holds_lines, ".obj": obj.holds_lines}  # formats that scans have, too
+
+
+def skeleton_ending(path: Path, format: str | None = None) -> str:
+    """The ending in the table of formats that a file name has, or that `format` names.
+
+    Parameters
+    ----------
+    path : Path
+    format : str, optional
+        An ending, with or without its dot.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    FileFormatError
+        If there is no such format; the message lists them.
+    """
+    name = path.name.lower() if format is None else "." + format.lower().lstrip(".")
+    found = [ending for ending in FORMATS if (name.endswith(ending) if format is None else name == ending)]
+    if not found:
+        raise unknown_ending(path if format is None else f"format {format!r}", FORMATS)
+    return found[0]

@@ -1,0 +1,70 @@
+"""Files appear complete or not at all."""
+
+import os
+import stat
+
+import pytest
+
+from glsk_o3d.errors import FileFormatError
+from glsk_o3d.interop.writing import check_ending, write_atomically, write_json
+
+
+def test_interrupted_write_leaves_nothing(tmp_path):
+    def interrupt(temporary):
+        temporary.write_text("half")
+        assert temporary.parent == tmp_path
+        assert temporary.suffix == ".png"
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_atomically(tmp_path / "p.png", interrupt)
+    assert not list(tmp_path.iterdir())
+
+
+def test_written_files_look_like_ordinary_ones(tmp_path):
+    (tmp_path / "plain").write_text("")
+    write_atomically(tmp_path / "new", lambda temporary: temporary.write_text("x"))
+    assert (tmp_path / "new").stat().st_mode == (tmp_path / "plain").stat().st_mode
+    (tmp_path / "new").chmod(0o600)
+    write_atomically(tmp_path / "new", lambda temporary: temporary.write_text("y"))
+    assert stat.S_IMODE((tmp_path / "new").stat().st_mode) == 0o600
+    (tmp_path / "link").symlink_to("new")
+    write_atomically(tmp_path / "link", lambda temporary: temporary.write_text("z"))
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "new").read_text() == "z"
+    long = tmp_path / ("n" * 250)
+    write_atomically(long, lambda temporary: temporary.write_text("x"))
+    assert long.exists()
+
+
+def test_folders_and_devices_are_not_replaced(tree, tmp_path):
+    (tmp_path / "s.ply").mkdir()
+    for path in (tmp_path / "s.ply", os.devnull):
+        with pytest.raises(OSError, match="not a file"):
+            tree.save(path, format="ply")
+
+
+def test_until_a_file_is_complete_the_old_one_is_there(tmp_path):
+    (tmp_path / "s.json").write_text("old")
+
+    def write(temporary):
+        temporary.write_text("ne")
+        assert (tmp_path / "s.json").read_text() == "old"
+        temporary.write_text("new")
+
+    write_atomically(tmp_path / "s.json", write)
+    assert (tmp_path / "s.json").read_text() == "new"
+    assert [path.name for path in tmp_path.iterdir()] == ["s.json"]
+
+
+@pytest.mark.parametrize("path", ["missing/s.json", "s.json"])
+def test_json_that_cannot_be_written_leaves_nothing(tmp_path, path):
+    with pytest.raises((FileNotFoundError, ValueError)):
+        write_json(tmp_path / path, {"x": float("nan")})
+    assert not list(tmp_path.iterdir())
+
+
+def test_endings_of_files_to_be_written():
+    check_ending("p.PNG", "preview is a picture", ".png", ".svg")
+    with pytest.raises(FileFormatError, match=r"p\.jpg.*\.png"):
+        check_ending("p.jpg", "preview is a picture", ".png", ".svg")

@@ -1,0 +1,119 @@
+"""Scans from files."""
+
+import numpy as np
+import pytest
+
+from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.clouds import read_cloud, read_scan
+from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
+from glsk_o3d.io.skeletons import FORMATS
+
+
+@pytest.mark.parametrize("name", ["c.ply", "c.pcd", "c.xyz", "c.xyzn", "c.xyzrgb", "c.pts", "C.PLY", "c é.Pcd"])
+@pytest.mark.parametrize("options", [{}, {"write_ascii": True}, {"compressed": True}], ids=str)
+def test_clouds_that_open3d_writes(cloud, xyz, tmp_path, name, options):
+    import open3d as o3d
+
+    plain = tmp_path / f"plain.{name.lower().split('.')[1]}"
+    assert o3d.io.write_point_cloud(str(plain), cloud, **options)
+    plain.rename(tmp_path / name)
+    back = read_cloud(tmp_path / name)
+    np.testing.assert_allclose(np.asarray(back.points), xyz, rtol=1e-5)  # six digits in text
+    assert back.has_normals() == (name.lower().split(".")[1] in ("ply", "pcd", "xyzn"))
+    assert back.has_colors() == (name.lower().split(".")[1] in ("ply", "pcd", "xyzrgb", "pts"))
+
+
+@pytest.mark.parametrize("ending", ["off", "obj", "stl", "gltf", "ply"])
+def test_meshes_give_their_vertices(tmp_path, ending):
+    import open3d as o3d
+
+    mesh = o3d.geometry.TriangleMesh.create_octahedron()
+    mesh.compute_vertex_normals()
+    o3d.io.write_triangle_mesh(str(tmp_path / f"m.{ending}"), mesh)
+    back = np.unique(np.asarray(read_cloud(tmp_path / f"m.{ending}").points).round(6), axis=0)
+    np.testing.assert_array_equal(back, np.unique(np.asarray(mesh.vertices), axis=0))
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_a_skeleton_is_no_scan(skeleton, tmp_path, ending):
+    skeleton.save(tmp_path / f"s{ending}", **({"cut_loops": True} if ending == ".swc" else {}))
+    with pytest.raises(FileFormatError, match=rf"s\{ending}: is a skeleton"):
+        read_cloud(tmp_path / f"s{ending}")
+
+
+@pytest.mark.parametrize("name", ["c.npz", "c.json", "c.txt"])
+def test_what_is_neither_scan_nor_skeleton(tmp_path, name):
+    (tmp_path / name).write_text("{}")
+    with pytest.raises(FileFormatError, match=rf"{name}.*\.ply.*\.pcd"):
+        read_cloud(tmp_path / name)
+
+
+@pytest.mark.parametrize("ending", ["ply", "off", "obj", "stl", "gltf"])
+@pytest.mark.parametrize(("resolution", "coarse"), [(5, True), (40, False)])
+def test_a_mesh_with_few_vertices_is_told(tmp_path, caplog, ending, resolution, coarse):
+    import open3d as o3d
+
+    mesh = o3d.geometry.TriangleMesh.create_sphere(2.0, resolution).translate((1000, 0, 0))
+    mesh.compute_vertex_normals()
+    o3d.io.write_triangle_mesh(str(tmp_path / f"m.{ending}"), mesh)
+    cloud, triangles = read_scan(tmp_path / f"m.{ending}")
+    assert len(triangles) == len(mesh.triangles)
+    assert triangles.max() < len(cloud.points)
+    assert ("sample_points_uniformly" in caplog.text) == coarse
+
+
+def test_a_mesh_whose_triangles_name_what_is_not_there(tmp_path, caplog):
+    (tmp_path / "m.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"
+    )
+    assert len(read_cloud(tmp_path / "m.ply").points) == 3
+    assert not caplog.text
+
+
+def test_nan_passes_through(tmp_path):
+    (tmp_path / "c.xyz").write_text("nan 0 0\n1 2 3\n")
+    assert np.isnan(np.asarray(read_cloud(tmp_path / "c.xyz").points)[0, 0])
+
+
+@pytest.mark.parametrize("ending", CLOUD_ENDINGS + MESH_ENDINGS)
+@pytest.mark.parametrize("data", [b"", b"\n", b"hello world\nthis is text\n" * 5, bytes(range(256)) * 4, b"\0" * 500])
+def test_files_without_a_cloud(tmp_path, capfd, ending, data):
+    (tmp_path / f"c{ending}").write_bytes(data)
+    with pytest.raises(FileFormatError, match=rf"c\{ending}"):
+        read_cloud(tmp_path / f"c{ending}")
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("c.xyz", "1,2,3\n4,5,6\n"), ("c.obj", "v 1 2 3\nv 4 5 6\n")], ids=["xyz", "obj"]
+)
+def test_files_of_text_without_points(tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(FileFormatError, match=rf"{name}.*no points"):
+        read_cloud(tmp_path / name)
+
+
+def test_skipped_lines_are_logged(tmp_path, caplog):
+    (tmp_path / "c.xyz").write_text("# a comment\n1 2 3\n4 5\n\n7 8 9\n")
+    assert len(read_cloud(tmp_path / "c.xyz").points) == 2
+    assert "c.xyz: 1 of 3 lines" in caplog.text
+    caplog.clear()
+    (tmp_path / "c.xyz").write_text("# a comment\n1 2 3\n7 8 9\n")
+    read_cloud(tmp_path / "c.xyz")
+    assert not caplog.text
+
+
+def test_unknown_cloud_endings(tmp_path):
+    (tmp_path / "c.las").write_bytes(b"LASF")
+    with pytest.raises(FileFormatError, match=r"c\.las.*\.ply.*\.pcd.*\.glb"):
+        read_cloud(tmp_path / "c.las")
+
+
+def test_verbosity_is_restored(tmp_path):
+    import open3d as o3d
+
+    (tmp_path / "c.xyz").write_text("1 2 3\n")
+    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Debug):
+        read_cloud(tmp_path / "c.xyz")
+        assert o3d.utility.get_verbosity_level() == o3d.utility.VerbosityLevel.Debug

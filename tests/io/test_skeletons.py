@@ -1,0 +1,188 @@
+"""The table of formats: what is true of all of them."""
+
+import contextlib
+import re
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io import swc
+from glsk_o3d.io.skeletons import FORMATS, holds_skeleton, read_skeleton, save_skeleton
+from glsk_o3d.report import Report
+from glsk_o3d.skeleton import Skeleton
+
+SAME_ORDER = (".ply", ".obj", ".graphml")
+WITH_RADII = (".ply", ".swc", ".graphml")
+ALL = tuple(FORMATS)
+GRAPHS = tuple(ending for ending in ALL if ending not in (".json", ".npz"))
+
+
+@pytest.mark.parametrize("ending", GRAPHS)
+def test_graph_formats(skeleton, tmp_path, isomorphic, ending):
+    cut = ending == ".swc" and skeleton.n_loops
+    save_skeleton(skeleton, tmp_path / f"s{ending}", cut_loops=bool(cut))
+    back = read_skeleton(tmp_path / f"s{ending}")
+    if cut:
+        return
+    assert isomorphic(back, skeleton, ending in WITH_RADII)
+    if ending in SAME_ORDER:
+        np.testing.assert_array_equal(back.vertices, skeleton.vertices)
+        np.testing.assert_array_equal(back.edges, skeleton.edges)
+    if ending not in WITH_RADII:
+        assert np.isnan(back.radii).all()
+    assert np.isnan(back.confidence).all()
+    assert len(back.confidence) == len(back.vertices)
+    assert len(back.radii) == len(back.vertices)
+    assert len(back.points) == len(back.normals) == len(back.vertex_of_point) == 0
+
+
+@st.composite
+def random_skeletons(draw):
+    m = draw(st.integers(1, 12))
+    pairs = [(i, j) for j in range(m) for i in range(j)]
+    edges = draw(st.lists(st.sampled_from(pairs), unique=True, max_size=16)) if pairs else []
+    number = st.floats(allow_nan=False, allow_infinity=False, width=64, max_value=1e150, min_value=-1e150)
+    vertices = draw(st.lists(st.tuples(number, number, number), min_size=m, max_size=m, unique=True))
+    radii = draw(st.lists(st.floats(0, 1e300), min_size=m, max_size=m))
+    owners = draw(st.lists(st.integers(-1, m - 1), max_size=4))
+    anything = st.tuples(*[st.floats()] * 3)
+    points, normals = (draw(st.lists(anything, min_size=len(owners), max_size=len(owners))) for _ in "pn")
+    confidence = draw(st.none() | st.lists(st.floats(0, 1), min_size=m, max_size=m))
+    measured = {} if confidence is None else dict(confidence=confidence)
+    return Skeleton(vertices, sorted(edges), radii, owners, points, normals, Report(versions={}), **measured)
+
+
+@given(skeleton=random_skeletons())
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+def test_random_graphs_through_every_format(assert_identical, isomorphic, skeleton):
+    for ending in (".json", ".npz"):
+        assert_identical(FORMATS[ending].read(FORMATS[ending].write(skeleton)), skeleton)
+    for ending in GRAPHS:
+        if ending != ".swc":
+            back = FORMATS[ending].read(FORMATS[ending].write(skeleton))
+            assert isomorphic(back, skeleton, ending in WITH_RADII)
+    tree = swc.read(swc.write(skeleton, cut_loops=True))
+    assert tree.n_loops == 0
+    assert tree.n_components == skeleton.n_components
+    assert sorted(map(tuple, tree.vertices)) == sorted(map(tuple, skeleton.vertices))
+
+
+@given(data=st.binary(max_size=200), ending=st.sampled_from(ALL))
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+def test_any_bytes_give_a_skeleton_or_a_format_error(tmp_path_factory, data, ending):
+    path = tmp_path_factory.getbasetemp() / f"any{ending}"
+    path.write_bytes(data)
+    with contextlib.suppress(FileFormatError):
+        assert isinstance(read_skeleton(path), Skeleton)
+
+
+@pytest.mark.parametrize("ending", ALL)
+def test_broken_off_files(tree, tmp_path, ending):
+    path = tmp_path / f"s{ending}"
+    save_skeleton(tree, path)
+    whole = path.read_bytes()
+    for cut in range(0, len(whole) - 1, max(1, len(whole) // 60)):
+        path.write_bytes(whole[:cut])
+        try:
+            back = read_skeleton(path)
+        except FileFormatError:
+            continue
+        assert ending in (".obj", ".swc", ".cgal", ".polylines.txt"), (
+            "only a format of independent lines can end anywhere"
+        )
+        assert len(back.vertices) <= len(tree.vertices)
+
+
+def test_saving_twice_gives_the_same_bytes(tree, tmp_path):
+    for ending in ALL:
+        for name in "ab":
+            tree.save(tmp_path / f"{name}{ending}")
+        assert (tmp_path / f"a{ending}").read_bytes() == (tmp_path / f"b{ending}").read_bytes()
+
+
+@pytest.mark.parametrize("text", ["", "\0\xff garbage\n" * 9], ids=["empty", "garbage"])
+@pytest.mark.parametrize("ending", ALL)
+def test_hostile_files(tmp_path, ending, text):
+    (tmp_path / f"s{ending}").write_text(text, encoding="latin-1")
+    with pytest.raises(FileFormatError, match=rf"s\{ending}"):
+        read_skeleton(tmp_path / f"s{ending}")
+
+
+def test_endings(tree, tmp_path, assert_identical):
+    for name in ("s.vtk", "s", "s.txt"):
+        with pytest.raises(FileFormatError, match=r"\.ply.*\.obj.*\.json.*\.polylines\.txt"):
+            tree.save(tmp_path / name)
+    with pytest.raises(FileFormatError, match="format 'vtk'"):
+        tree.save(tmp_path / "s.ply", format="vtk")
+    assert not list(tmp_path.iterdir())
+    tree.save(tmp_path / "S.JSON")
+    assert_identical(read_skeleton(tmp_path / "S.JSON"), tree)
+    for format in ("npz", ".NPZ"):
+        tree.save(tmp_path / "s.bak", format=format)
+        assert_identical(read_skeleton(tmp_path / "s.bak", format=format), tree)
+
+
+def test_no_folder_to_save_in(tree, tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"missing.*folder.*s\.ply"):
+        tree.save(tmp_path / "missing" / "s.ply")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("ending", ALL)
+def test_failure_keeps_the_old_file_and_leaves_nothing(tree, tmp_path, monkeypatch, ending):
+    path = tmp_path / f"s{ending}"
+    path.write_text("old")
+
+    def fail(*_):
+        raise OSError("disk full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("os.replace", fail)
+        with pytest.raises(OSError, match="disk full"):
+            tree.save(path)
+    with monkeypatch.context() as patch:
+        patch.setattr("pathlib.Path.write_bytes", lambda self, data: open(self, "wb").close() or fail())
+        with pytest.raises(OSError, match="disk full"):
+            tree.save(path)
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+    assert path.read_text() == "old"
+
+
+@pytest.mark.parametrize("ending", [".ply", ".obj"])
+@pytest.mark.parametrize("mesh", [False, True])
+def test_a_scan_is_no_skeleton(cloud, tmp_path, ending, mesh):
+    import open3d as o3d
+
+    path = tmp_path / f"c{ending}"
+    if mesh:
+        o3d.io.write_triangle_mesh(str(path), o3d.geometry.TriangleMesh.create_octahedron())
+    elif ending == ".ply":
+        o3d.io.write_point_cloud(str(path), cloud)
+    else:
+        path.write_text("v 0 0 0\nv 1 0 0\n")
+    with pytest.raises(FileFormatError, match=rf"c\{ending}: is a cloud.*glsk_o3d\.skeletonize"):
+        read_skeleton(path)
+
+
+def test_every_format_says_what_it_keeps_and_stands_in_the_docstring():
+    for ending, module in FORMATS.items():
+        assert re.search(rf"^ *[\w., ]*\{ending}\b", save_skeleton.__doc__, re.MULTILINE)
+        assert re.search("keeps? ", module.__doc__)
+
+
+@pytest.mark.parametrize("ending", ALL)
+def test_whether_a_file_holds_a_skeleton(cloud, skeleton, tmp_path, ending):
+    import open3d as o3d
+
+    assert not holds_skeleton(tmp_path / f"s{ending}")
+    skeleton.save(tmp_path / f"s{ending}", **({"cut_loops": True} if ending == ".swc" else {}))
+    assert holds_skeleton(tmp_path / f"s{ending}")
+    if ending in (".ply", ".obj"):
+        mesh = o3d.geometry.TriangleMesh.create_octahedron()
+        o3d.io.write_triangle_mesh(str(tmp_path / f"m{ending}"), mesh)
+        assert not holds_skeleton(tmp_path / f"m{ending}")
+    o3d.io.write_point_cloud(str(tmp_path / "c.ply"), cloud)
+    assert not holds_skeleton(tmp_path / "c.ply")
