@@ -35,6 +35,7 @@ from glsk_o3d.analysis import Truth
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.interop.writing import write_atomically
+from glsk_o3d.recipes.catalogue import named_pipeline
 from glsk_o3d.report import Report
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -153,7 +154,7 @@ def cases(folder: Path | None, own: bool, variants: str, shapes: str = "") -> li
 def named(names: str) -> dict[str, Pipeline]:
     """The pipelines of these names, with commas."""
     try:
-        return {name: pipelines.named_pipeline(name) for name in names.split(",")}
+        return {name: named_pipeline(name) for name in names.split(",")}
     except InvalidParameterError as error:
         raise typer.BadParameter(str(error)) from None
 

@@ -65,18 +65,20 @@ from glsk_o3d.pipelines import default, wen2024
 from glsk_o3d.report import REFUSED
 
 STAGES = {
-    "order": Stage(("numerics.ordering:morton_order",)),
+    "order": Stage(("numerics.morton:morton_order",)),
     "kNN": Stage(("numerics.neighbourhoods:nearest_neighbours", "numerics.neighbourhoods:nearest_left")),
     "outliers, noise": Stage(
         (
-            "numerics.outliers:without_outliers",
-            "numerics.ridges:noise_share",
-            "numerics.thinning:average_noisy",
-            "numerics.ridges:to_ridges",
+            "preparation.outliers:without_outliers",
+            "preparation.denoising:noise_share",
+            "preparation.thinning:average_noisy",
+            "preparation.denoising:to_ridges",
         )
     ),
     "planes": Stage(("numerics.neighbourhoods:principal",)),
-    "thinning": Stage(("numerics.thinning:thin", "numerics.thinning:thin_smooth", "numerics.thinning:thin_to_grid")),
+    "thinning": Stage(
+        ("preparation.thinning:thin", "preparation.thinning:thin_smooth", "preparation.sampling:thin_to_grid")
+    ),
     "rings": Stage(("numerics.rings:star_rings",)),
     "rest of the rings": Stage(("ring_builder:RingBuilder._run",), open=True),
     "Laplacian": Stage(("numerics.cotangent:cotangent_laplacian",)),
@@ -86,7 +88,7 @@ STAGES = {
     "refinement of the solve": Stage((), open=True, after=("normal matrix", "factorisation")),
     "LPR": Stage(("lpr_reducer:LPRReducer._run",)),
     "rest of the contraction": Stage(("contractor:Contractor._run",), open=True),
-    "sampling": Stage(("connector:local_thickness", "numerics.sampling:farthest_point_sampling")),
+    "sampling": Stage(("connector:local_thickness", "numerics.farthest_point:farthest_point_sampling")),
     "connection": Stage(("connector:Connector._run",), open=True),
     "refinement of the graph": Stage(("refiner:Refiner._run",)),
 }
