@@ -5,12 +5,15 @@ Means over several draws of the points, of the default pipeline but for what is 
 
 from __future__ import annotations
 
+from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
-from _common import Tables, fill, number, page_with, pick, run, save, show
+from _common.results import pick, save
+from _common.runs import run
+from _common.tables import Tables, fill, number, page_with, present
 
 from glsk_o3d import samples
 from glsk_o3d.analysis import compare
@@ -109,9 +112,7 @@ def options(
         raise SystemExit(f"{failed[0]['cloud']} with {failed[0]['settings'] or 'no settings'}: {failed[0]['failure']}")
     save(output, rows)
     found = tables(rows)
-    for part in found.values():
-        for table in part:
-            show(*table, markdown=page is None)
+    present([*chain(*found.values())], markdown=page is None)
     if page is not None:
         fill(page, found)
 
