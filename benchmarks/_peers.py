@@ -16,7 +16,8 @@ import numpy as np
 import open3d as o3d
 from scipy.spatial import cKDTree
 
-from glsk_o3d import pipelines, samples
+from glsk_o3d import samples
+from glsk_o3d.recipes.catalogue import named_pipeline
 
 Graph = tuple[np.ndarray, np.ndarray]  # vertices (M, 3) and edges (E, 2)
 Mesh = tuple[np.ndarray, np.ndarray]  # vertices (V, 3) and triangles (F, 3)
@@ -72,7 +73,7 @@ def poisson(points: np.ndarray) -> Mesh:
 
 def ours(name: str, points: np.ndarray) -> Graph:
     """A pipeline of this package."""
-    skeleton = pipelines.named_pipeline(name)(points)
+    skeleton = named_pipeline(name)(points)
     return skeleton.vertices, skeleton.edges
 
 

@@ -22,7 +22,9 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from _common import Markdown, Output, number, save, show
+from _common.command_line import Markdown, Output
+from _common.results import save
+from _common.tables import number, show
 
 from glsk_o3d import samples
 

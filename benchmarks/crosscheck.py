@@ -14,7 +14,11 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from _common import Case, Folder, Jobs, Markdown, Output, Own, Shapes, Variants, cases, number, run, save, show
+from _common.clouds import Case, cases
+from _common.command_line import Folder, Jobs, Markdown, Output, Own, Shapes, Variants, application
+from _common.results import save
+from _common.runs import run
+from _common.tables import number, show
 
 from glsk_o3d import RingBuilder, read_cloud, samples
 from glsk_o3d.analysis import compare
@@ -28,9 +32,7 @@ from glsk_o3d.numerics.mesh_rings import umbrellas
 EVERY = "clean_1024,clean_4096,density_4096,holes_4096,scan2_4096,noise1_4096,noise2_4096,outliers_4096"
 GOOD = dict(error=0.4, inside=0.9, completeness=0.9)  # and the right topology: a skeleton that deserves trust
 
-app = typer.Typer(
-    help=__doc__, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
-)
+app = application(__doc__)
 
 
 def checked(points, axis=None, picture=None, title=None) -> dict:
@@ -65,7 +67,7 @@ def verdicts(
 ) -> None:
     """How often each verdict is given, and how often it is right."""
     found = cases(folder, own, variant, shapes)
-    rows = run(checked_case, [(dict(variant=case.variant, shape=case.shape), (case,)) for case in found], jobs)
+    rows = run(checked_case, [(case.facts, (case,)) for case in found], jobs)
     save(output, rows)
     lines = []
     for name in (*dict.fromkeys(case.variant for case in found), "all"):
@@ -164,19 +166,8 @@ def scans(
     ]
     rows = run(scanned, work, jobs)
     save(output, rows)
-    header = [
-        "cloud",
-        "points",
-        "CPU s",
-        "covered",
-        "same rings",
-        "angle",
-        "90 %",
-        "apart",
-        "95 %",
-        "components",
-        "loops",
-    ]
+    header = ["cloud", "points", "CPU s", "covered", "same rings", "angle", "90 %", "apart", "95 %"]
+    header += ["components", "loops", "note"]
     lines = []
     for row in rows:
         if "failure" in row:
@@ -186,15 +177,11 @@ def scans(
         angles = [number(of["angle"].get(name), 1) for name in ("median", "p90")]
         distances = [number(apart[name], 2) for name in ("distance_in_radii", "hausdorff95_in_radii")]
         counts = ["{}, {}".format(*apart[name]) for name in ("components", "loops")]
-        facts = [
-            str(row["points"]["used"]),
-            number(row["cpu"], 1),
-            number(of["covered"], 2),
-            number(of["same_rings"], 2),
-        ]
+        shares = [number(of[name], 2) for name in ("covered", "same_rings")]
+        facts = [str(row["points"]["used"]), number(row["cpu"], 1), *shares]
         mesh = f"{row['verdict']} ({row['surface'].replace('_', ' ')})"
         lines.append([row["cloud"], *facts, *angles, *distances, *counts, mesh])
-    show("Cross-checks", [*header, "note"], lines, markdown)
+    show("Cross-checks", header, lines, markdown)
 
 
 if __name__ == "__main__":

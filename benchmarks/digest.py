@@ -1,8 +1,10 @@
 """Digests of skeletons, to show that a change of the code did not change a bit of a result.
 
 Each cloud is skeletonised by three pipelines; a SHA-256 stands for the vertices, edges, radii and vertex_of_point of
-each result, or for the error that came instead. `digest.py make BEFORE.json` writes them, and after the change
-`digest.py compare BEFORE.json` makes them anew and prints the table; exit code 1 if anything differs.
+each result, or the name of the error that came instead. `digest.py make BEFORE.json` writes them, and after the change
+`digest.py compare BEFORE.json` makes them anew, prints a table and what differs; exit code 1 if anything does.
+
+It uses only what older versions of the package have too, so that it also runs with one of these on PYTHONPATH.
 """
 
 from __future__ import annotations
@@ -10,10 +12,11 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import sys
 import warnings
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from itertools import product
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -34,9 +37,12 @@ ARRAYS = ("vertices", "edges", "radii", "vertex_of_point")
 SAMPLES = ("tube", "y_junction", "torus", "two_rings", "helix", "sauropod")
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
-app = typer.Typer(add_completion=False, help=__doc__, pretty_exceptions_enable=False)
+Digests = dict[str, dict[str, dict[str, str]]]  # by group, cloud and pipeline
+
+app = typer.Typer(add_completion=False, help=__doc__, pretty_exceptions_enable=False, rich_markup_mode=None)
 Shared = Annotated[Path, typer.Option(help="Folder with data/*.ply and truth/*.npz; left out where there is none.")]
-Size = Annotated[int, typer.Option(help="Points of the truth clouds and samples.")]
+Size = Annotated[int, typer.Option(min=8, help="Points of the truth clouds and samples.")]
+Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
 
 
 def clouds(shared: Path, size: int) -> Iterator[tuple[str, str, Any]]:
@@ -51,7 +57,7 @@ def clouds(shared: Path, size: int) -> Iterator[tuple[str, str, Any]]:
         yield "samples", f"{name} {size}", (name, size)
 
 
-def load(source: Any) -> Any:
+def load(source: Any) -> np.ndarray:
     """The points that `clouds` names."""
     if isinstance(source, Path):
         return np.asarray(glsk.read_cloud(source).points)
@@ -63,7 +69,7 @@ def load(source: Any) -> Any:
 
 
 def digest(cloud: np.ndarray, pipeline: str) -> str:
-    """What stands for a skeleton: the first 16 digits of a SHA-256 of its arrays, or the error."""
+    """What stands for a skeleton: the first 16 digits of a SHA-256 of its arrays, or the error's name."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -82,38 +88,40 @@ def _digests(case: tuple[str, str, Any]) -> tuple[str, str, dict[str, str]]:
     return group, name, {pipeline: digest(cloud, pipeline) for pipeline in PIPELINES}
 
 
-def digests(shared: Path, size: int, jobs: int) -> dict[str, dict[str, dict[str, str]]]:
-    """Digest by group, cloud and pipeline."""
+def digests(shared: Path, size: int, jobs: int) -> Digests:
+    """Those of all clouds."""
     every = list(clouds(shared, size))
-    found: dict[str, dict[str, dict[str, str]]] = {}
-    with ProcessPoolExecutor(jobs) as pool:
+    found: Digests = {}
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
         for group, name, told in track(pool.map(_digests, every), "clouds", len(every), console=Console(stderr=True)):
             found.setdefault(group, {})[name] = told
     return found
 
 
 @app.command()
-def make(out: Path, shared: Shared = SHARED, size: Size = 4096, jobs: int = 2) -> None:
+def make(out: Path, shared: Shared = SHARED, size: Size = 4096, jobs: Jobs = 2) -> None:
     """Write the digests of all clouds."""
     out.write_text(json.dumps(digests(shared, size, jobs), indent=1, sort_keys=True) + "\n")
 
 
 @app.command()
-def compare(before: Path, shared: Shared = SHARED, size: Size = 4096, jobs: int = 2) -> None:
+def compare(before: Path, shared: Shared = SHARED, size: Size = 4096, jobs: Jobs = 2) -> None:
     """Make the digests anew, and say where they differ from a file of earlier ones."""
     old, new = json.loads(before.read_text()), digests(shared, size, jobs)
     table = Table("clouds", "number", *PIPELINES, box=SIMPLE_HEAD, title="identical skeletons, to the last bit")
     changed = []
     for group in sorted({*old, *new}):
-        here, there = new.get(group, {}), old.get(group, {})
-        names = sorted({*here, *there})
-        same = {p: [n for n in names if here.get(n, {}).get(p) == there.get(n, {}).get(p)] for p in PIPELINES}
-        changed += [f"{name}: {p}" for p in PIPELINES for name in names if name not in same[p]]
-        table.add_row(group, str(len(names)), *(str(len(same[p])) for p in PIPELINES))
+        there, here = old.get(group, {}), new.get(group, {})
+        same = dict.fromkeys(PIPELINES, 0)
+        for name, pipeline in product(sorted({*there, *here}), PIPELINES):
+            before, now = (it.get(name, {}).get(pipeline, "nothing") for it in (there, here))
+            same[pipeline] += before == now
+            if before != now:
+                changed.append(f"differs: {name}, {pipeline}: {before} before, {now} now")
+        table.add_row(group, str(len({*there, *here})), *map(str, same.values()))
     Console().print(table)
-    for line in changed:
-        print(f"differs: {line}")
-    sys.exit(bool(changed))
+    print(*changed, sep="\n", end="\n" * bool(changed))
+    raise typer.Exit(bool(changed))
 
 
 if __name__ == "__main__":

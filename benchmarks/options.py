@@ -5,19 +5,22 @@ Means over several draws of the points, of the default pipeline but for what is 
 
 from __future__ import annotations
 
+from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
-from _common import Tables, fill, number, page_with, pick, run, save, show
+from _common.results import pick, save
+from _common.runs import run
+from _common.tables import Tables, fill, number, page_with, present
 
 from glsk_o3d import samples
 from glsk_o3d.analysis import compare
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.pipelines import default
 
-PARTS = ("twigs", "radii", "spacing")  # of the page
+PARTS = ("spurs", "radii", "spacing")  # of the page
 NOISE = dict(noise=0.01)
 CLOUDS = {
     "`torus`": (samples.torus, {}),
@@ -34,11 +37,11 @@ CLOUDS = {
 """Samples by what the tables call them; 4096 points where nothing else is said."""
 
 ANIMALS = [name for name in CLOUDS if name.startswith("animal") and "1024" not in name]
-TWIGS = {
-    "0": "Refiner.twig=0",
+SPURS = {
+    "0": "Refiner.spur=0",
     "1.3, the default": "",
-    "2": "Refiner.twig=2",
-    "3": "Refiner.twig=3",
+    "2": "Refiner.spur=2",
+    "3": "Refiner.spur=3",
     "1.3, with `RingBuilder.k=24`": "RingBuilder.k=24",
 }
 RADII = [name for name in CLOUDS if "y_j" in name or "animal" in name]
@@ -61,7 +64,7 @@ def measure(cloud: str, settings: str, seed: int) -> dict:
 
 def wanted() -> list[tuple[str, str]]:
     """Clouds and settings of all tables, each once."""
-    pairs = [(ANIMALS, TWIGS), (RADII, NEIGHBOURS), (CURVES, SPACING)]
+    pairs = [(ANIMALS, SPURS), (RADII, NEIGHBOURS), (CURVES, SPACING)]
     return list(dict.fromkeys((cloud, it) for clouds, options in pairs for cloud in clouds for it in options.values()))
 
 
@@ -77,7 +80,7 @@ def tables(rows: list[dict]) -> dict[str, Tables]:
     def ends(cloud, settings):
         return " ".join(f"{more:+d}" if more else "0" for more in values(cloud, settings, "leaves"))
 
-    twigs = [[name, *(ends(cloud, it) for cloud in ANIMALS)] for name, it in TWIGS.items()]
+    spurs = [[name, *(ends(cloud, it) for cloud in ANIMALS)] for name, it in SPURS.items()]
     radii = [
         [cloud, *(mean(cloud, it, what) for what in ("radius_error", "ends") for it in NEIGHBOURS.values())]
         for cloud in RADII
@@ -88,7 +91,7 @@ def tables(rows: list[dict]) -> dict[str, Tables]:
         pairs = [(mean(cloud, it, "vertices", digits=0), mean(cloud, it, "error", digits=3)) for it in SPACING.values()]
         spacing.append([cloud, *map(", ".join, pairs)])
     return {
-        "twigs": [("ends too many or too few, in each draw", ["`Refiner.twig`", *ANIMALS], twigs)],
+        "spurs": [("ends too many or too few, in each draw", ["`Refiner.spur`", *ANIMALS], spurs)],
         "radii": [("mean error of the radii over the true one, and distance of the true ends in radii", header, radii)],
         "spacing": [("vertices, and mean error of the curve in radii", ["cloud", *SPACING], spacing)],
     }
@@ -109,9 +112,7 @@ def options(
         raise SystemExit(f"{failed[0]['cloud']} with {failed[0]['settings'] or 'no settings'}: {failed[0]['failure']}")
     save(output, rows)
     found = tables(rows)
-    for part in found.values():
-        for table in part:
-            show(*table, markdown=page is None)
+    present([*chain(*found.values())], markdown=page is None)
     if page is not None:
         fill(page, found)
 

@@ -11,36 +11,19 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
-from _common import (
-    Case,
-    Folder,
-    Jobs,
-    Markdown,
-    Output,
-    Own,
-    Shapes,
-    Tables,
-    Variants,
-    cases,
-    fill,
-    machine,
-    markdown_table,
-    number,
-    page_with,
-    pick,
-    run,
-    save,
-    show,
-    summary,
-    writable,
-)
+from _common.clouds import Case, cases
+from _common.command_line import Folder, Jobs, Markdown, Output, Own, Shapes, Variants, writable
+from _common.results import machine, pick, save, summary
+from _common.runs import run
+from _common.tables import Tables, fill, markdown_table, number, page_with, present
 from _peers import PEERS, Peer
 
 from glsk_o3d import plot_skeleton
@@ -70,6 +53,23 @@ def measure(case: Case, peer: Peer, drawn: bool = False) -> dict:
     skeleton = Skeleton(vertices, simple_edges(edges), np.full(len(vertices), np.nan), (), (), ())
     found = dict(cpu=cpu, vertices=len(vertices)) | compare(skeleton, truth).as_dict()
     return found | dict(skeleton=skeleton) if drawn else found
+
+
+def measured(known: list[dict], found: list[Case], peers: dict[str, Peer], keep: Callable, **options) -> list[dict]:
+    """The rows that are known and those that were not, kept after each variant; options as for `run`."""
+    done = {(row["tool"], row["variant"], row["shape"]) for row in known}
+    rows = [*known]
+    for variant in dict.fromkeys(case.variant for case in found):
+        work = [
+            (dict(tool=name, **case.facts), (case, peer))
+            for case in found
+            for name, peer in peers.items()
+            if case.variant == variant and (name, variant, case.shape) not in done
+        ]
+        rows += run(measure, work, **options)
+        keep(rows)
+    order = list(PEERS)
+    return sorted(rows, key=lambda row: order.index(row["tool"]))
 
 
 @contextmanager
@@ -162,9 +162,8 @@ def draw(rows: list[dict], path: Path) -> None:
         plot_skeleton(row.get("skeleton"), axes, cloud=points, view=(14, -60))
         axes.set_title(caption(row), fontsize=9, y=0.97)
     canvas.draw()
-    image = Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3]).quantize(
-        32
-    )  # a fifth of the size of a figure's
+    pixels = np.asarray(canvas.buffer_rgba())[:, :, :3]
+    image = Image.fromarray(pixels).quantize(32)  # a fifth of the size of a figure's
     write_atomically(path, lambda temporary: image.save(temporary, "PNG", optimize=True))
 
 
@@ -191,7 +190,9 @@ def main(
     tool: Annotated[str, typer.Option("--tool", metavar="NAMES", help="With commas; else all installed.")] = "",
     variant: Variants = EVERY,
     shapes: Shapes = "",
-    limit: Annotated[float, typer.Option("--limit", help="Seconds for a skeleton, imports included.")] = 60.0,
+    limit: Annotated[
+        float, typer.Option("--limit", help="Seconds for a skeleton, imports included; 0 for any.")
+    ] = 60.0,
     jobs: Jobs = 2,
     page: Annotated[
         Path | None,
@@ -213,29 +214,17 @@ def main(
     where = f"{machine()} {versions(peers)}."  # now, since writing the page changes the working tree
     for name in THREADS:
         os.environ[name] = "1"
-    rows = [row for path in earlier or () for row in json.loads(path.read_text(encoding="utf-8"))["rows"]]
-    known = {(row["tool"], row["variant"], row["shape"]) for row in rows}
-    work = [
-        (dict(tool=name, variant=case.variant, shape=case.shape), (case, peer))
-        for case in found
-        for name, peer in peers.items()
-        if (name, case.variant, case.shape) not in known
-    ]
-    for name in dict.fromkeys(facts["variant"] for facts, _ in work):
-        rows += run(measure, [job for job in work if job[0]["variant"] == name], jobs, fresh=True, limit=limit)
-        save(output, rows)  # as far as it has come: what is stopped can go on with --from
-    order = {name: i for i, name in enumerate(PEERS)}
-    rows.sort(key=lambda row: order[row["tool"]])
-    shown = tables(rows)
+    known = [row for path in earlier or () for row in json.loads(path.read_text(encoding="utf-8"))["rows"]]
+    options = dict(processes=jobs, fresh=True, limit=limit or None)
+    # kept as far as it has come: what is stopped can go on with --from
+    shown = tables(measured(known, found, peers, partial(save, output), **options))
     if picture is not None:
         work = [(dict(tool=name), (DRAWN, peers[name], True)) for name in DRAWN_BY if name in peers]
-        draw(run(measure, work, jobs, fresh=True, limit=limit), picture)
+        draw(run(measure, work, **options), picture)
     if page is not None:
         body = "\n".join([where, "", *(markdown_table(*table) for table in shown)])
         fill(page, {"builtin" if own else "folder": body})
-    typer.echo(f"{where}\n")
-    for table in shown:
-        show(*table, markdown)
+    present(shown, markdown, where)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ import importlib
 import math
 import os
 import sys
+from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -32,6 +33,24 @@ def shared_dir() -> Path:
     if not place.is_dir():
         pytest.skip(f"needs the data folder {place}, which is not in the repository (set GLSK_SHARED)")
     return place
+
+
+@pytest.fixture(scope="session")
+def benchmark(root):
+    """A context with a benchmark as a module. The processes that it starts find it too; afterwards nobody does."""
+    folder = root / "benchmarks"
+
+    @contextmanager
+    def imported(name):
+        before = {*sys.modules}
+        with pytest.MonkeyPatch.context() as patch:
+            patch.syspath_prepend(str(folder))
+            yield importlib.import_module(name)
+        for new in {*sys.modules} - before:
+            if folder in Path(getattr(sys.modules[new], "__file__", None) or "").parents:
+                del sys.modules[new]
+
+    return imported
 
 
 @pytest.fixture

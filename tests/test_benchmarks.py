@@ -6,7 +6,6 @@ import math
 import re
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from itertools import chain
 from types import SimpleNamespace
 
@@ -24,13 +23,17 @@ from glsk_o3d.skeleton import Skeleton
 
 
 @pytest.fixture(scope="module")
-def tool(root):
-    """The benchmark as a module. Its folder stays on the path, on which the processes that it starts look for it."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(root / "benchmarks"))
-        yield SimpleNamespace(common=importlib.import_module("_common"), **vars(importlib.import_module("accuracy")))
-    for name in ("_common", "_plots", "accuracy"):
-        del sys.modules[name]
+def tool(benchmark):
+    with benchmark("accuracy") as module:
+        yield module
+
+
+@pytest.fixture(scope="module")
+def parts(tool):
+    """The modules that it is made of, by their names."""
+    made_of = {"_accuracy", "_common"}
+    found = ((name.split("."), module) for name, module in sys.modules.items())
+    return SimpleNamespace(**{name[1]: module for name, module in found if name[0] in made_of and name[1:]})
 
 
 @pytest.fixture
@@ -55,96 +58,96 @@ class TestBuiltinClouds:
     @pytest.mark.parametrize(
         "variant", ["clean_300", "density_300", "holes_300", "outliers_300", "noise2_300", "scan2_300"]
     )
-    def test_have_their_size_and_are_repeatable(self, tool, variant):
-        for shape in tool.common.BUILTIN:
-            points, axis = tool.common.builtin(shape, variant)
+    def test_have_their_size_and_are_repeatable(self, parts, variant):
+        for shape in parts.clouds.BUILTIN:
+            points, axis = parts.clouds.builtin(shape, variant)
             assert points.shape == (300, 3)
             assert len(axis.edges) > 0
-            np.testing.assert_array_equal(points, tool.common.builtin(shape, variant)[0])
+            np.testing.assert_array_equal(points, parts.clouds.builtin(shape, variant)[0])
 
-    def test_density_falls_tenfold(self, tool):
-        x = tool.common.builtin("tube", "density_20000")[0][:, 0]
+    def test_density_falls_tenfold(self, parts):
+        x = parts.clouds.builtin("tube", "density_20000")[0][:, 0]
         dense, thin = (np.count_nonzero(abs(x - at) < 0.05) for at in (0.45, -0.45))
         assert dense / thin == pytest.approx(10**0.75, rel=0.1)
 
-    def test_holes_are_empty_and_sever_nothing(self, tool):
-        whole, holed = (tool.common.builtin("torus", f"{kind}_4096")[0] for kind in ("clean", "holes"))
+    def test_holes_are_empty_and_sever_nothing(self, parts):
+        whole, holed = (parts.clouds.builtin("torus", f"{kind}_4096")[0] for kind in ("clean", "holes"))
         away = cKDTree(holed).query(whole)[0]
         assert 0.08 < away.max() < 0.12
         angle = np.arctan2(holed[:, 1], holed[:, 0])
         assert np.histogram(angle, 100)[0].min() > 0
 
-    def test_two_cameras_see_all_but_what_is_below(self, tool):
-        whole, seen = (tool.common.builtin("tube", f"{kind}_4096")[0] for kind in ("clean", "scan2"))
+    def test_two_cameras_see_all_but_what_is_below(self, parts):
+        whole, seen = (parts.clouds.builtin("tube", f"{kind}_4096")[0] for kind in ("clean", "scan2"))
         below = [np.count_nonzero(-points[:, 2] > abs(points[:, 1])) for points in (whole, seen)]
         assert below[0] > 800
         assert below[1] < 0.2 * below[0]
         assert cKDTree(seen).query(whole[whole[:, 2] > 0])[0].max() < 0.05
 
-    def test_outliers_are_one_percent(self, tool):
-        points = tool.common.builtin("torus", "outliers_4096")[0]
+    def test_outliers_are_one_percent(self, parts):
+        points = parts.clouds.builtin("torus", "outliers_4096")[0]
         on_ring = np.hypot(np.hypot(points[:, 0], points[:, 1]) - 0.4, points[:, 2])
         assert np.count_nonzero(abs(on_ring - 0.1) > 1e-9) == 40
 
 
 class TestArithmetic:
-    def test_summary_takes_means_and_counts_failures_as_wrong(self, tool):
+    def test_summary_takes_means_and_counts_failures_as_wrong(self, parts):
         rows = [row(error=0.1, ends=0.5), row(error=0.3, topology=False, loops=1), row(leaves=1, error=0.2)]
-        mean = tool.summary([*rows, dict(shape="mug", failure="ValueError: no")])
+        mean = parts.results.summary([*rows, dict(shape="mug", failure="ValueError: no")])
         assert (mean["n"], mean["right"], mean["leaves"]) == (4, 2, 1)
         assert mean["error"] == pytest.approx(0.2)
         assert mean["ends"] == 0.5
 
-    def test_summary_of_failures_only(self, tool):
-        mean = tool.summary([dict(shape="mug", failure="ValueError: no")])
+    def test_summary_of_failures_only(self, parts):
+        mean = parts.results.summary([dict(shape="mug", failure="ValueError: no")])
         assert math.isnan(mean["error"])
         assert mean["right"] == 0
 
-    def test_wrong_says_what(self, tool):
-        assert tool.wrong(row()) == ""
-        assert tool.wrong(row(loops=2, components=-1, topology=False)) == "torus +2 loops -1 components"
-        assert tool.wrong(dict(shape="mug", failure="ValueError: no")) == "mug (ValueError: no)"
+    def test_wrong_says_what(self, parts):
+        assert parts.known_axes.wrong(row()) == ""
+        assert parts.known_axes.wrong(row(loops=2, components=-1, topology=False)) == "torus +2 loops -1 components"
+        assert parts.known_axes.wrong(dict(shape="mug", failure="ValueError: no")) == "mug (ValueError: no)"
 
-    def test_ablation_is_sorted_by_what_is_lost(self, tool):
+    def test_ablation_is_sorted_by_what_is_lost(self, parts):
         rows = [row(), row(variant="noise1_512", error=0.3)]
-        for name, error, right in (("twigs cut", 0.1, True), ("denoising", 0.5, True), ("threads cut", 0.1, False)):
+        for name, error, right in (("spurs cut", 0.1, True), ("denoising", 0.5, True), ("weak loops cut", 0.1, False)):
             rows += [row(pipeline=name, error=error), row(pipeline=name, variant="noise1_512", topology=right)]
         rows += [row(pipeline="cao2010"), row(pipeline="cao2010", variant="noise1_512")]
-        header, lines = tool.ablation_table(rows)
+        ((_, header, lines),) = parts.ideas.ablation_tables(rows)
         assert header == ["", "clean_512 (1)", "noise1_512 (1)", "all (2)", "setting"]
         assert lines[0] == ["default", "0.100 / 1", "0.300 / 1", "0.200 / 2", ""]
         names = [line[0] for line in lines[1:]]
-        assert names == ["without denoising", "without threads cut", "without twigs cut", "cao2010"]
+        assert names == ["without denoising", "without weak loops cut", "without spurs cut", "cao2010"]
         assert lines[1] == ["without denoising", "0.500 / 1", "0.100 / 1", "0.300 / 2", "`RingBuilder.denoise=0`"]
 
-    def test_effects_go_behind_the_settings_of_a_page(self, tool, tmp_path):
+    def test_effects_go_behind_the_settings_of_a_page(self, parts, tmp_path):
         rows = [row(), row(variant="noise1_512", error=0.3)]
         rows += [row(pipeline="denoising"), row(pipeline="denoising", variant="noise1_512", error=0.5, topology=False)]
         page = tmp_path / "page.md"
         page.write_text("| a | 1 before<br>`RingBuilder.denoise=0`: ? |\n| b | `Refiner.spur=0`: old |\n")
-        tool.write_effects(page, rows)
+        parts.ideas.write_effects(page, rows)
         told = "0.200 / 2 → 0.300 / 1; noise1_512: 0.300 / 1 → 0.500 / 0"
         expected = f"| a | 1 before<br>`RingBuilder.denoise=0`: {told} |\n| b | `Refiner.spur=0`: old |\n"
         assert page.read_text() == expected
-        tool.write_effects(page, rows)
+        parts.ideas.write_effects(page, rows)
         assert page.read_text() == expected
 
-    def test_feet_on_a_square(self, tool):
+    def test_feet_on_a_square(self, parts):
         nodes = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
         edges = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
-        distance, edge, part = tool.feet(np.array([[0.5, 0.1, 0], [3, 2.0, 0], [-1, 0.5, 0]]), nodes, edges)
+        distance, edge, part = parts.axis.feet(np.array([[0.5, 0.1, 0], [3, 2.0, 0], [-1, 0.5, 0]]), nodes, edges)
         np.testing.assert_allclose(distance, [0.1, 1, 1])
         np.testing.assert_array_equal(edge[[0, 2]], [0, 3])
         np.testing.assert_allclose(part[[0, 2]], [0.25, 0.75])
 
-    def test_local_radius_is_interpolated(self, tool):
+    def test_local_radius_is_interpolated(self, parts):
         axis = SimpleNamespace(nodes=np.array([[0.0, 0, 0], [1, 0, 0]]), edges=np.array([[0, 1]]), radii=np.r_[1.0, 2])
-        np.testing.assert_allclose(tool.local_radius(axis, np.array([[0.25, 3, 0], [5, 0, 0]])), [1.25, 2])
+        np.testing.assert_allclose(parts.axis.local_radius(axis, np.array([[0.25, 3, 0], [5, 0, 0]])), [1.25, 2])
 
 
 class TestPipelines:
-    def test_all_ideas_off_are_the_publications(self, tool):
-        off = {name: setting.split() for name, setting in tool.IDEAS.items()}
+    def test_all_ideas_off_are_the_publications(self, parts):
+        off = {name: setting.split() for name, setting in parts.ideas.IDEAS.items()}
         published = ("point reduction", "stop by score")
         wen = chain.from_iterable(setting for name, setting in off.items() if name not in published)
         assert override(pipelines.default(), wen) == pipelines.wen2024()
@@ -153,8 +156,8 @@ class TestPipelines:
         assert override(pipelines.default(), [*left, "Contractor.max_iterations=20"]) == pipelines.cao2010()
 
     @pytest.mark.parametrize("n", [0, 1, 3, 6])
-    def test_as_many_solves_as_asked_for(self, tool, n):
-        skeleton = tool.with_solves(pipelines.default(), n)(torus(512).points)
+    def test_as_many_solves_as_asked_for(self, parts, n):
+        skeleton = parts.command_line.with_solves(pipelines.default(), n)(torus(512).points)
         assert len(skeleton.report.iterations) == n
 
 
@@ -183,17 +186,17 @@ class TestCommands:
         assert "broken (" in printed
 
     def test_ablation(self, call):
-        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--idea", "twigs cut,mended rings")
+        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--idea", "spurs cut,mended rings")
         lines = call("ablation", *few, "--markdown", "--jobs", 0).splitlines()
         table = [line for line in lines if line.startswith("|")]
         assert table[0] == "|  | clean_512 (1) | all (1) | setting |"
         assert len(table) == 7
-        assert "without twigs cut" in "".join(table[3:5])
+        assert "without spurs cut" in "".join(table[3:5])
 
     def test_ablation_writes_into_a_page(self, call, tmp_path):
         page = tmp_path / "page.md"
         page.write_text("| `Refiner.spur=0`:  |")
-        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--idea", "twigs cut", "--jobs", 0)
+        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--idea", "spurs cut", "--jobs", 0)
         call("ablation", *few, "--page", page)
         assert re.fullmatch(
             r"\| `Refiner.spur=0`: 0.\d+ / 1 → 0.\d+ / 1; clean_512: 0.\d+ / 1 → .* \|", page.read_text()
@@ -212,7 +215,7 @@ class TestCommands:
         few = ("--builtin", "--shapes", "torus", "--variant", "clean_512,noise1_512", "--jobs", 0)
         saved = [tmp_path / f"{command}.json" for command in ("truth", "ablation", "stop")]
         for path in saved:
-            words = (path.stem, *few, *(("--idea", "twigs cut,thinning") if path.stem == "ablation" else ()))
+            words = (path.stem, *few, *(("--idea", "spurs cut,thinning") if path.stem == "ablation" else ()))
             monkeypatch.setattr(sys, "argv", ["accuracy.py", *map(str, words)])  # so that the file says what it is
             call(*words, "-o", path)
         page = tmp_path / "page.md"
@@ -273,19 +276,10 @@ class TestCommands:
         assert "Invalid value" in call(*wrong, code=2)
 
 
-@contextmanager
-def benchmark(root, monkeypatch, name, *parts):
-    """A benchmark as a module, which nobody finds afterwards, nor the parts of its own that it imports."""
-    monkeypatch.syspath_prepend(str(root / "benchmarks"))
-    yield importlib.import_module(name)
-    for each in (name, *parts):
-        del sys.modules[each]
-
-
 class TestCrosscheck:
     @pytest.fixture
-    def tool(self, root, monkeypatch):
-        with benchmark(root, monkeypatch, "crosscheck") as module:
+    def tool(self, benchmark):
+        with benchmark("crosscheck") as module:
             yield module
 
     def test_verdicts(self, call, tmp_path):
@@ -310,13 +304,11 @@ class TestCrosscheck:
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # the work is done in this process
-def test_scans_for_batches(tool, tmp_path):
-    batch = importlib.import_module("batch")
+def test_scans_for_batches(benchmark, tmp_path):
     (tmp_path / "in").mkdir()
-    batch.make_scans(tmp_path / "in", 12, 256, 400)
-    with ThreadPoolExecutor(1) as pool:
+    with benchmark("batch") as batch, ThreadPoolExecutor(1) as pool:
+        batch.make_scans(tmp_path / "in", 12, 256, 400)
         result = run_batch(tmp_path / "in", tmp_path / "out", executor=pool)
-    del sys.modules["batch"]
     failed = {name[5:] for name, row in result.rows.items() if row["status"] == "failed"}
     assert failed == {name.partition(".")[0] for name in batch.CORRUPT}
     sizes = [row["points"] for row in result.rows.values() if row["status"] == "done"]
@@ -332,7 +324,8 @@ def crash(points):
     os.kill(os.getpid(), signal.SIGSEGV)
 
 def hang(points):
-    time.sleep(600)
+    while True:
+        time.sleep(600)
 
 def nothing(points):
     return np.empty((0, 3)), np.empty((0, 2), int)
@@ -341,8 +334,8 @@ def nothing(points):
 
 class TestOptions:
     @pytest.fixture
-    def tool(self, root, monkeypatch):
-        with benchmark(root, monkeypatch, "options") as module:
+    def tool(self, benchmark):
+        with benchmark("options") as module:
             yield module
 
     def test_tables(self, tool):
@@ -351,9 +344,9 @@ class TestOptions:
             return dict(cloud=cloud, settings=settings) | values
 
         found = tool.tables([row(*which, seed) for which in tool.wanted() for seed in range(3)])
-        ((_, _, twigs),), ((_, header, radii),), ((_, _, spacing),) = (found[part] for part in tool.PARTS)
-        assert [line[0] for line in twigs] == list(tool.TWIGS)
-        assert {cell for line in twigs for cell in line[1:]} == {"-1 0 +1"}
+        ((_, _, spurs),), ((_, header, radii),), ((_, _, spacing),) = (found[part] for part in tool.PARTS)
+        assert [line[0] for line in spurs] == list(tool.SPURS)
+        assert {cell for line in spurs for cell in line[1:]} == {"-1 0 +1"}
         assert dict(zip(header, radii[0], strict=True))["ends, `k=24`"] == "0.50"
         assert spacing[0] == ["`torus`", *["61, 0.100"] * 3]
 
@@ -374,8 +367,8 @@ class TestOptions:
 
 class TestPeers:
     @pytest.fixture
-    def tool(self, root, monkeypatch):
-        with benchmark(root, monkeypatch, "peers", "_peers") as module:
+    def tool(self, benchmark):
+        with benchmark("peers") as module:
             yield module
 
     def test_one_that_crashes_or_hangs_is_a_failure_and_ends_nothing(self, tool, call, tmp_path, monkeypatch):
@@ -387,25 +380,26 @@ class TestPeers:
         monkeypatch.setattr(tool, "PEERS", bad | {"default": tool.PEERS["default"]})
         page, out = tmp_path / "page.md", tmp_path / "out.json"
         page.write_text("<!-- builtin -->\n<!-- end -->\n<!-- folder -->\nkept\n<!-- end -->\n")
-        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--limit", 10, "--jobs", 4)
-        call(*few, "-o", out, "--page", page)
+        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--jobs", 2, "-o", out)
+        call(*few, "--tool", "crash,nothing,default", "--limit", 0)
+        call(*few, "--tool", "hang", "--limit", 1, "--from", out, "--page", page)
         rows = {row["tool"]: row for row in json.loads(out.read_text())["rows"]}
         assert rows["crash"]["failure"] == "its process died: SIGSEGV"
-        assert rows["hang"]["failure"] == "not done after 10 s"
+        assert rows["hang"]["failure"] == "not done after 1 s"
         assert rows["nothing"]["failure"].startswith("InvalidParameterError: the skeleton is empty")
         assert rows["default"]["topology"]
         assert 0 < rows["default"]["error"] < 0.2
         lines = page.read_text().splitlines()
         assert "kept" in lines
         assert any(line.startswith("| crash | points | - / 0 | - |") for line in lines)
-        assert any(line.endswith("| torus (not done after 10 s) |") for line in lines)
+        assert any(line.endswith("| torus (not done after 1 s) |") for line in lines)
         del sys.modules["bad_tools"]
         again = call(*few, "--from", out)  # nothing is measured
-        assert "torus (not done after 10 s)" in again
+        assert "torus (not done after 1 s)" in again
 
     def test_picture(self, call, tmp_path):
         few = ("--builtin", "--shapes", "tube", "--variant", "clean_256", "--tool", "default", "--jobs", 1)
-        call(*few, "--picture", tmp_path / "peers.png")
+        call(*few, "--limit", 0, "--picture", tmp_path / "peers.png")
         assert (tmp_path / "peers.png").read_bytes().startswith(b"\x89PNG")
 
     @pytest.mark.filterwarnings("ignore")  # theirs
@@ -414,7 +408,7 @@ class TestPeers:
         others = [name for name, peer in there.items() if peer.packages]
         if not others:
             pytest.skip("none of the other tools is installed: make peers")
-        points, axis = importlib.import_module("_common").builtin("tube", "clean_4096")
+        points, axis = importlib.import_module("_common.clouds").builtin("tube", "clean_4096")
         for name in others:
             vertices, edges = there[name](points)
             found = compare(Skeleton(vertices, edges, [math.nan] * len(vertices), (), (), ()), axis)

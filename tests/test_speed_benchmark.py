@@ -1,44 +1,45 @@
 """The speed benchmark: its stopwatch, its arithmetic, its table of stages, and its commands on tiny clouds."""
 
-import importlib
 import json
 import math
 import mmap
 import os
 import sys
-import time
+from itertools import count
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from glsk_o3d import LPRReducer, contractor, numerics, pipelines
+from glsk_o3d import LPRReducer, Skeleton, contractor, numerics, pipelines
 from glsk_o3d.numerics.cores import cores
 from glsk_o3d.samples import sauropod
 
-MODULES = ("speed", "_stopwatch", "_common", "_plots")
+
+@pytest.fixture(scope="module")
+def tool(benchmark):
+    with benchmark("speed") as module:
+        yield module
 
 
 @pytest.fixture(scope="module")
-def tool(root):
-    """The benchmark as a module. Its folder stays on the path, on which the processes that it starts look for it."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(root / "benchmarks"))
-        yield importlib.import_module("speed")
-    for name in MODULES:
-        sys.modules.pop(name, None)
+def parts(tool):
+    """The modules that it is made of, by their names."""
+    made_of = {"_speed", "_common"}
+    found = ((name.split("."), module) for name, module in sys.modules.items())
+    return SimpleNamespace(**{name[1]: module for name, module in found if name[0] in made_of and name[1:]})
 
 
 @pytest.fixture(scope="module")
-def stopwatch(tool):
-    return sys.modules["_stopwatch"]
+def stopwatch(parts):
+    return parts.stopwatch
 
 
 @pytest.fixture
-def call(tool, monkeypatch):
+def call(tool, parts, monkeypatch):
     """Run a command, small clouds only as often as asked for; gives what it printed."""
-    monkeypatch.setattr(tool, "LEAST", 0.0)
+    monkeypatch.setattr(parts.timing, "LEAST", 0.0)
 
     def run(*arguments, code=0):
         result = CliRunner().invoke(tool.app, [*map(str, arguments)])
@@ -80,7 +81,7 @@ class TestStopwatch:
 
     def test_of_an_open_stage_what_is_inside_counts_for_itself(self, stopwatch, played):
         module, spend = played
-        stages = dict(all=stopwatch.Stage(("played:outer",), open=True), part=stopwatch.Stage(("played:inner",)))
+        stages = dict(all=stopwatch.Stage("played:outer", open=True), part=stopwatch.Stage("played:inner"))
         with stopwatch.Stopwatch(stages) as watch:
             spend(0.5)
             assert module.outer() == "done"
@@ -90,7 +91,7 @@ class TestStopwatch:
 
     def test_a_closed_stage_has_all_that_is_inside(self, stopwatch, played):
         module, _ = played
-        stages = dict(all=stopwatch.Stage(("played:outer",)), part=stopwatch.Stage(("played:inner",)))
+        stages = dict(all=stopwatch.Stage("played:outer"), part=stopwatch.Stage("played:inner"))
         with stopwatch.Stopwatch(stages) as watch:
             module.outer()
             module.inner()
@@ -98,8 +99,8 @@ class TestStopwatch:
 
     def test_what_comes_after_an_inner_stage_may_be_another(self, stopwatch, played):
         module, _ = played
-        stages = dict(before=stopwatch.Stage(("played:outer",), open=True), part=stopwatch.Stage(("played:inner",)))
-        stages["after"] = stopwatch.Stage((), after=("before", "part"))
+        stages = dict(before=stopwatch.Stage("played:outer", open=True), part=stopwatch.Stage("played:inner"))
+        stages["after"] = stopwatch.Stage(after=("before", "part"))
         with stopwatch.Stopwatch(stages) as watch:
             module.outer()
             module.inner()
@@ -108,16 +109,16 @@ class TestStopwatch:
     def test_everything_is_as_before_also_after_an_error(self, stopwatch, played):
         module, _ = played
         originals = dict(vars(module))
-        stages = dict(all=stopwatch.Stage(("played:outer",), open=True), part=stopwatch.Stage(("played:inner",)))
+        stages = dict(all=stopwatch.Stage("played:outer", open=True), part=stopwatch.Stage("played:inner"))
         watch = stopwatch.Stopwatch(stages)
         with pytest.raises(ValueError, match="no"), watch:
             module.outer(fail=True)
         assert vars(module) == originals
         assert self.shares(watch) == {"all": (1, 1.0), "part": (1, 3.0)}
 
-    def test_functions_are_found_wherever_the_package_knows_them(self, stopwatch, tool):
+    def test_functions_are_found_wherever_the_package_knows_them(self, stopwatch, parts):
         linear, run = contractor.cotangent_laplacian, LPRReducer._run
-        with stopwatch.Stopwatch(tool.STAGES):
+        with stopwatch.Stopwatch(parts.table_of_stages.STAGES):
             assert contractor.cotangent_laplacian is numerics.cotangent.cotangent_laplacian is not linear
             assert LPRReducer._run is not run
         assert contractor.cotangent_laplacian is numerics.cotangent.cotangent_laplacian is linear
@@ -135,7 +136,7 @@ class TestStopwatch:
 
         module.inner = lambda: fill(64)
         module.outer = lambda: (module.inner(), fill(16))
-        stages = dict(all=stopwatch.Stage(("played:outer",), open=True), part=stopwatch.Stage(("played:inner",)))
+        stages = dict(all=stopwatch.Stage("played:outer", open=True), part=stopwatch.Stage("played:inner"))
         before = stopwatch.resident()
         with stopwatch.Stopwatch(stages, memory=True) as watch:
             module.outer()
@@ -146,81 +147,80 @@ class TestStopwatch:
 
 
 class TestTableOfStages:
-    def test_its_functions_exist(self, tool):
-        tool.find(tool.STAGES)
+    def test_its_functions_exist(self, stopwatch, parts):
+        stopwatch.find(parts.table_of_stages.STAGES)
 
     @pytest.mark.parametrize(
         "path", ["numerics.rings:no_such", "no_such:star_rings", "contractor:Contractor.__or__", "contractor:LINE"]
     )
-    def test_a_function_that_is_no_more_is_named(self, tool, path):
+    def test_a_function_that_is_no_more_is_named(self, stopwatch, path):
         with pytest.raises(LookupError, match=f"'rings'.* no function {path} of its own"):
-            tool.find({"rings": tool.Stage((path,))})
+            stopwatch.find({"rings": stopwatch.Stage(path)})
 
-    def test_a_stage_of_nothing_is_refused(self, tool):
+    def test_a_stage_of_nothing_is_refused(self, stopwatch):
         with pytest.raises(LookupError, match="'rings' needs"):
-            tool.find({"rings": tool.Stage(())})
+            stopwatch.find({"rings": stopwatch.Stage()})
         with pytest.raises(LookupError, match="'rings' needs"):
-            tool.find({"rings": tool.Stage((), after=("no", "such"))})
+            stopwatch.find({"rings": stopwatch.Stage(after=("no", "such"))})
 
-    def test_the_default_pipeline_goes_through_every_stage(self, tool):
+    def test_the_default_pipeline_goes_through_every_stage(self, stopwatch, parts, monkeypatch):
         points = sauropod(1200, noise=0.01).points
         pipelines.default()(points)  # so that nothing is imported below
-        start = time.process_time(), time.perf_counter()
-        with tool.Stopwatch(tool.STAGES) as watch:
+        ticks = count()
+        monkeypatch.setattr(stopwatch, "_clocks", lambda: (next(ticks), 0.0))
+        with stopwatch.Stopwatch(parts.table_of_stages.STAGES) as watch:
             skeleton = pipelines.default()(points)
-        spent = time.process_time() - start[0], time.perf_counter() - start[1]
-        calls = {name: share.calls for name, share in watch.shares.items() if name != tool.REST}
+        calls = {name: share.calls for name, share in watch.shares.items() if name != stopwatch.REST}
         assert min(calls.values()) > 0, calls
         solves = calls["Laplacian"]
         assert solves == len(skeleton.report.iterations) == calls["refinement of the solve"]
         assert all(share.cpu > 0 for share in watch.shares.values())
-        assert 0.7 * spent[0] < watch.cpu <= spent[0]
-        assert 0.7 * spent[1] < watch.wall <= spent[1]
+        assert watch.cpu == next(ticks) - 1  # nothing is lost, nothing counts twice
 
 
-def contracted(tool, shape="tube", n=1024, **changed):
+def contracted(parts, shape="tube", n=1024, **changed):
     """A row of `figures`: every contraction costs 8 s and takes four solves, but for those named."""
     runs = []
-    for key in tool.contractors(4):
+    for key in parts.figures.contractors(4):
         name = "_".join([key[0], "lpr" if key[1] else "all", key[2]])
         run = dict(key=list(key), cpu=8.0, wall=8.0, left=n // 2, contracted=n, solves=4, refused=False)
         runs.append(run | changed.get(name, {}))
-    whole = {name: 10.0 + i for i, name in enumerate(tool.WHOLE)}
+    whole = {name: 10.0 + i for i, name in enumerate(parts.figures.WHOLE)}
     return dict(measure="figures", n=n, shape=shape, fixed=4, runs=runs, whole=whole)
 
 
 class TestArithmetic:
-    def test_growth_of_powers(self, tool):
+    def test_growth_of_powers(self, parts):
         sizes = [256, 1024, 4096, 16384, 65536, 262144]
-        assert tool.growth(sizes, [3e-6 * n**1.7 for n in sizes]) == pytest.approx(1.7)
+        assert parts.stages.growth(sizes, [3e-6 * n**1.7 for n in sizes]) == pytest.approx(1.7)
         bent = [n**0.5 if n < 4096 else n**1.25 for n in sizes]
-        assert tool.growth(sizes, bent, *tool.MIDDLE) == pytest.approx(1.25)
-        assert math.isnan(tool.growth([256, 4096], [1, 2], *tool.MIDDLE))
-        assert math.isnan(tool.growth([256, 4096], [0, 2]))
+        assert parts.stages.growth(sizes, bent, *parts.stages.MIDDLE) == pytest.approx(1.25)
+        assert math.isnan(parts.stages.growth([256, 4096], [1, 2], *parts.stages.MIDDLE))
+        assert math.isnan(parts.stages.growth([256, 4096], [0, 2]))
 
-    def test_turns(self, tool, monkeypatch):
-        monkeypatch.setattr(tool, "LEAST", 0.0)
+    def test_turns(self, parts, monkeypatch):
+        monkeypatch.setattr(parts.timing, "LEAST", 0.0)
         order = []
-        found = tool.in_turns({name: lambda name=name: order.append(name) or name for name in "ab"}, 3)
+        found = parts.timing.in_turns({name: lambda name=name: order.append(name) or name for name in "ab"}, 3)
         assert order == [*"ababab"]
         assert {name: (result, facts["runs"]) for name, (result, facts) in found.items()} == {
             "a": ("a", 3),
             "b": ("b", 3),
         }
 
-    def test_turns_go_on_while_they_are_short(self, tool, monkeypatch):
+    def test_turns_go_on_while_they_are_short(self, parts, monkeypatch):
         now = iter(range(100))
-        monkeypatch.setattr(tool, "LEAST", 8.0)
-        monkeypatch.setattr(tool.time, "process_time", lambda: float(next(now)))
-        monkeypatch.setattr(sys.modules["_stopwatch"], "_clocks", lambda: (0.0, 0.0))
-        assert tool.in_turns({"a": str}, 1)["a"][1]["runs"] == 8
+        monkeypatch.setattr(parts.timing, "LEAST", 8.0)
+        monkeypatch.setattr(parts.timing.time, "process_time", lambda: float(next(now)))
+        monkeypatch.setattr(parts.stopwatch, "_clocks", lambda: (0.0, 0.0))
+        assert parts.timing.in_turns({"a": str}, 1)["a"][1]["runs"] == 8
 
-    def test_short(self, tool):
-        assert [tool.short(value) for value in (0.1234, 9.876, 98.76, 987.6)] == ["0.12", "9.88", "98.8", "988"]
+    def test_short(self, parts):
+        assert [parts.tables.short(value) for value in (0.1234, 9.876, 98.76, 987.6)] == ["0.12", "9.88", "98.8", "988"]
 
-    def test_named_contractions_are_the_pipelines(self, tool):
-        found = tool.contractors(4)
-        for name, key in tool.shown().items():
+    def test_named_contractions_are_the_pipelines(self, parts):
+        found = parts.figures.contractors(4)
+        for name, key in parts.figures.shown().items():
             ahead, contractor = found[key]
             rings, same = getattr(pipelines, name)().stages[:2]
             assert ahead.stages == (rings,)
@@ -228,21 +228,21 @@ class TestArithmetic:
             for field in set(vars(same)) - {*aside}:
                 assert getattr(contractor, field) == getattr(same, field), (name, field)
 
-    def test_ratios_are_paired(self, tool):
+    def test_ratios_are_paired(self, parts):
         rows = [
-            contracted(tool, wen2024_lpr_own=dict(cpu=2.0), wen2024_all_own=dict(cpu=4.0)),
-            contracted(tool, wen2024_lpr_own=dict(cpu=1.0), wen2024_all_own=dict(cpu=4.0)),
-            contracted(tool, wen2024_lpr_fixed=dict(cpu=2.0)),
-            contracted(tool, wen2024_lpr_fixed=dict(cpu=4.0, solves=3, refused=True)),
+            contracted(parts, wen2024_lpr_own=dict(cpu=2.0), wen2024_all_own=dict(cpu=4.0)),
+            contracted(parts, wen2024_lpr_own=dict(cpu=1.0), wen2024_all_own=dict(cpu=4.0)),
+            contracted(parts, wen2024_lpr_fixed=dict(cpu=2.0)),
+            contracted(parts, wen2024_lpr_fixed=dict(cpu=4.0, solves=3, refused=True)),
         ]
         own, plain = ("wen2024", True, "own"), ("wen2024", False, "own")
-        np.testing.assert_allclose(tool.ratios(rows, own, plain), [0.5, 0.25, 1, 1])
-        fixed = tool.ratios(rows, ("wen2024", True, "fixed"), ("wen2024", False, "fixed"))
+        np.testing.assert_allclose(parts.figures.ratios(rows, own, plain), [0.5, 0.25, 1, 1])
+        fixed = parts.figures.ratios(rows, ("wen2024", True, "fixed"), ("wen2024", False, "fixed"))
         np.testing.assert_allclose(fixed, [1, 1, 0.25])  # not the one that was refused a solve
 
-    def test_the_gain_is_that_of_the_reduction_times_that_of_the_rule(self, tool):
-        row = contracted(tool, wen2024_lpr_own=dict(cpu=3.0), wen2024_all_own=dict(cpu=6.0))
-        (_, header, (line,)), *_ = tool.figure_tables(
+    def test_the_gain_is_that_of_the_reduction_times_that_of_the_rule(self, parts):
+        row = contracted(parts, wen2024_lpr_own=dict(cpu=3.0), wen2024_all_own=dict(cpu=6.0))
+        (_, header, (line,)), *_ = parts.figures.figure_tables(
             [row, dict(n=1024, shape="mug", fixed=4, failure="ValueError: no")]
         )
         cells = dict(zip(header, line, strict=True))
@@ -251,41 +251,41 @@ class TestArithmetic:
         assert cells["own rule, no LPR"] == "0.75 (0.75 to 0.75)"
         assert (cells["clouds"], cells["paper"], cells["of these"]) == ("1", "about 1", "1")
 
-    def test_whole_pipelines_in_knn(self, tool):
-        rows = [contracted(tool, shape) for shape in ("tube", "mug")]
+    def test_whole_pipelines_in_knn(self, parts):
+        rows = [contracted(parts, shape) for shape in ("tube", "mug")]
         rows[1]["whole"] = dict(rows[0]["whole"], default=16.0)
-        title, header, lines = tool.figure_tables(rows)[-1]
+        title, header, lines = parts.figures.figure_tables(rows)[-1]
         assert (title, header[-2:]) == ("end to end, in kNN", ["mean", "most"])
         assert lines[0] == ["cao2010", "1024", "10.0 (10.0 to 10.0)", "10.0", "10.0"]
         assert lines[2] == ["default", "1024", "14.0 (13.0 to 15.0)", "14.0", "16.0"]
 
-    def test_failures_are_lines(self, tool):
+    def test_failures_are_lines(self, parts):
         failed = dict(measure="figures", n=512, shape="mug", fixed=4, failure="ValueError: no")
-        assert ["512", "mug", "ValueError: no"] in tool.figure_tables([failed])[-1][2]
+        assert ["512", "mug", "ValueError: no"] in parts.figures.figure_tables([failed])[-1][2]
         failed = dict(measure="stages", n=512, shape="mug", pipeline="default", failure="ValueError: no")
-        assert tool.stage_tables([failed])[0][2] == [["default", "512", *"-" * 8, "mug: ValueError: no"]]
+        assert parts.stages.stage_tables([failed])[0][2] == [["default", "512", *"-" * 8, "mug: ValueError: no"]]
 
 
 class TestPictures:
-    def test_tables_come_back_from_a_page(self, tool, tmp_path):
+    def test_tables_come_back_from_a_page(self, parts, tmp_path):
         tables = [("whole", ["", "points", "note"], [["default", "512", ""], ["", "-", "mug: no"]])]
         tables += [("default: CPU ms (in kNN)", ["", "512"], [["rings", "1.0 (0.50)"]])]
         page = tmp_path / "page.md"
         page.write_text("<!-- machine -->\n<!-- end -->\n<!-- stages -->\n<!-- end -->\n")
-        tool.fill(page, {"machine": "| no table |\n", "stages": tables})
-        assert tool.tables_of(page, "stages") == tables
+        parts.tables.fill(page, {"machine": "| no table |\n", "stages": tables})
+        assert parts.pictures.tables_of(page, "stages") == tables
 
-    def test_every_stage_is_in_one_share(self, tool):
-        shown = [stage for stages, _ in tool.SHARES.values() for stage in stages]
-        assert sorted(shown) == sorted([*tool.STAGES, tool.REST])
+    def test_every_stage_is_in_one_share(self, stopwatch, parts):
+        shown = [stage for stages, _ in parts.table_of_stages.SHARES.values() for stage in stages]
+        assert sorted(shown) == sorted([*parts.table_of_stages.STAGES, stopwatch.REST])
 
     @pytest.mark.parametrize(("n", "words"), [(300, "300"), (4096, "4k"), (1536, "1.5k"), (2**20, "1M")])
-    def test_thousands(self, tool, n, words):
-        assert tool.thousands(n) == words
+    def test_thousands(self, parts, n, words):
+        assert parts.pictures.thousands(n) == words
 
-    def test_nothing_to_show_is_no_picture(self, tool, tmp_path):
+    def test_nothing_to_show_is_no_picture(self, parts, tmp_path):
         failed = dict(measure="stages", n=512, shape="mug", pipeline="default", failure="ValueError: no")
-        tool.draw_stages(tool.stage_tables([failed]), tmp_path)
+        parts.pictures.draw_stages(parts.stages.stage_tables([failed]), tmp_path)
         assert list(tmp_path.iterdir()) == []
 
 
@@ -309,20 +309,20 @@ class TestCommands:
             assert min(row["cpu"], row["knn_cpu"], row["iterations"], row["vertices"]) > 0
         assert "| LPR |" not in printed.partition("cao2010: CPU")[2]
 
-    def test_memory_is_that_of_a_fresh_process(self, tool, tmp_path):
+    def test_memory_is_that_of_a_fresh_process(self, parts, tmp_path):
         np.save(tmp_path / "cloud.npy", sauropod(20000).points)
         job = dict(n=20000), (tmp_path / "cloud.npy", pipelines.cao2010())
-        (row,) = sys.modules["_common"].run(tool.most_memory, [job], 1, fresh=True)
+        (row,) = parts.runs.run(parts.stages.most_memory, [job], 1, fresh=True)
         assert 20 < row["peak"] < 200
         if row["stage_peaks"]:
             assert row["peak"] == max(row["stage_peaks"].values())
             assert row["stage_peaks"]["order"] < 20
 
-    def test_a_process_that_dies_is_a_failure_of_its_job_alone(self, tool):
-        rows = sys.modules["_common"].run(os._exit, [(dict(name="bad"), (1,))], 1, fresh=True)
+    def test_a_process_that_dies_is_a_failure_of_its_job_alone(self, parts):
+        rows = parts.runs.run(os._exit, [(dict(name="bad"), (1,))], 1, fresh=True)
         assert rows == [dict(name="bad", failure="its process died: exit code 1")]
 
-    def test_figures(self, call, tmp_path, tool):
+    def test_figures(self, call, tmp_path, parts):
         out = tmp_path / "out.json"
         words = ("figures", "--builtin", "--shapes", "tube,torus", "--sizes", "256,300", "--jobs", 0)
         printed = call(*words, "-o", out, "--pictures", tmp_path / "new", "--markdown")
@@ -334,10 +334,10 @@ class TestCommands:
             (256, "torus"),
         ]
         for row in rows:
-            left = {name: tool.take(row, key)["left"] for name, key in tool.shown().items()}
+            left = {name: parts.figures.take(row, key)["left"] for name, key in parts.figures.shown().items()}
             assert left["cao2010"] == row["n"] > left["wen2024"]
             assert all(run["solves"] == 4 for run in row["runs"] if run["key"][2] == "fixed" and not run["refused"])
-            assert all(row["whole"][name] > 1 for name in tool.WHOLE)
+            assert all(row["whole"][name] > 0 for name in parts.figures.WHOLE)
         assert printed.count("| 300 | 2 | ") == 2
         assert {path.name for path in (tmp_path / "new").iterdir()} == {"contraction_256.png", "contraction_300.png"}
 
@@ -360,13 +360,16 @@ class TestCommands:
             ("scan", 256, 256),
         ]
 
-    def test_sizes_that_a_folder_lacks_are_of_built_in_shapes(self, tool, tmp_path, monkeypatch):
+    def test_sizes_that_a_folder_lacks_are_of_built_in_shapes(self, parts, tmp_path, monkeypatch):
         shape = sauropod(256)
         axis = dict(nodes=shape.nodes, edges=shape.edges, radii=shape.radii)
         np.savez(tmp_path / "shape.npz", **axis, clean_256=shape.points)
         monkeypatch.setenv("GLSK_DATA", str(tmp_path / "none"))
-        found = tool.objects(tmp_path, False, "", [256, 512])
-        assert [(n, cloud.shape) for n, cloud in found] == [(256, "shape"), *((512, name) for name in tool.BUILTIN)]
+        found = parts.figures.objects(tmp_path, False, "", [256, 512])
+        assert [(n, cloud.shape) for n, cloud in found] == [
+            (256, "shape"),
+            *((512, name) for name in parts.clouds.BUILTIN),
+        ]
         assert all(len(cloud.load()[0]) == n for n, cloud in found)
 
     def test_rate(self, call, tmp_path):
@@ -429,23 +432,22 @@ class TestCommands:
         out = tmp_path / "out.json"
         printed = call("large", "--sizes", 300, "--shapes", "tube", "--file", "--jobs", 0, "-o", out, "--markdown")
         (row,) = json.loads(out.read_text())["rows"]
-        assert row["file_cpu"] > 0.2
-        assert row["file_wall"] > 0.2
+        assert min(row["file_cpu"], row["file_wall"]) > 0
         assert 100 < row["file_peak"] < 2000
         assert "file MB" in printed
 
-    def test_distance_of_curves(self, tool):
+    def test_distance_of_curves(self, parts):
         ends = np.array([[0.0, 0, 0], [10, 0, 0]])
-        curve, beside = (tool.Skeleton(ends + [0, y, 0], np.array([[0, 1]]), np.ones(2), (), (), ()) for y in (0, 1))
-        assert tool.apart(curve, beside, 20) == pytest.approx((5, 5))
-        longer = tool.Skeleton(ends * 2, curve.edges, curve.radii, (), (), ())
-        mean, most = tool.apart(longer, curve, 20)
+        curve, beside = (Skeleton(ends + [0, y, 0], np.array([[0, 1]]), np.ones(2), (), (), ()) for y in (0, 1))
+        assert parts.large.apart(curve, beside, 20) == pytest.approx((5, 5))
+        longer = Skeleton(ends * 2, curve.edges, curve.radii, (), (), ())
+        mean, most = parts.large.apart(longer, curve, 20)
         assert most == pytest.approx(50, abs=0.1)
         assert mean == pytest.approx((100 * 5 / 20 / 2 + 0) / 2, abs=0.1)  # half of it is 5 away on average, back none
 
-    def test_failures_of_large_clouds_are_lines(self, tool):
+    def test_failures_of_large_clouds_are_lines(self, parts):
         failed = dict(measure="large", shape="tube", n=300, failure="ValueError: no")
-        ((_, header, (line,)),) = tool.large_tables([failed])
+        ((_, header, (line,)),) = parts.large.large_tables([failed])
         assert len(header) == len(line)
         assert line == ["tube", "300", *"-" * 9, "ValueError: no"]
 

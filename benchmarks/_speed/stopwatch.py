@@ -21,8 +21,9 @@ MB = 2**20
 class Stage(NamedTuple):
     """Functions of the package that make a stage, and how it stands to others."""
 
-    functions: tuple[str, ...]
-    """As ``module:name`` or ``module:class.name``, the module without the package."""
+    functions: str = ""
+    """As ``module:name`` or ``module:class.name``, the module without the package, with blanks between them; several
+    of one module as ``module:name,name``."""
     open: bool = False
     """Whether the stages inside count for themselves; else whatever happens inside is of this one."""
     after: tuple[str, str] | None = None
@@ -55,7 +56,7 @@ def find(stages: Mapping[str, Stage]) -> dict[str, list[tuple[object, str]]]:
         found[stage] = []
         if bool(functions) == bool(after) or not {*(after or ())} <= {*stages}:
             raise LookupError(f"stage {stage!r} needs functions, or two other stages that it comes after")
-        for path in functions:
+        for path in _paths(functions):
             module, _, name = path.partition(":")
             *outer, name = name.split(".")
             try:
@@ -69,6 +70,12 @@ def find(stages: Mapping[str, Stage]) -> dict[str, list[tuple[object, str]]]:
                 ) from None
             found[stage].append((owner, name))
     return found
+
+
+def _paths(functions):
+    """Of ``a:b,c d:e`` a:b, a:c and d:e."""
+    places = (place.partition(":") for place in functions.split())
+    return [f"{module}:{name}" for module, _, names in places for name in names.split(",")]
 
 
 class Stopwatch:
@@ -89,7 +96,7 @@ class Stopwatch:
     def __init__(self, stages: Mapping[str, Stage], memory: bool = False):
         self.shares = {name: Share() for name in (*stages, REST)}
         self._found = find(stages)
-        self._stages = {**stages, REST: Stage((), open=True)}
+        self._stages = {**stages, REST: Stage(open=True)}
         self._next = {stage.after: name for name, stage in stages.items() if stage.after}
         self._memory = memory and reset_peak()
         self._running: list[str] = []

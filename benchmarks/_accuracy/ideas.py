@@ -1,0 +1,96 @@
+"""What every idea of the method contributes: `default` with each of them switched off."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from _common.command_line import PUBLISHED
+from _common.results import pick, summary
+from _common.tables import Tables, number
+
+from glsk_o3d.interop.writing import write_atomically
+
+from .measuring import by_pipeline, by_variant
+
+IDEAS = {
+    "neighbours by size": "RingBuilder.k=published",
+    "frame that turns along": "RingBuilder.frame=box",
+    "thinning": "RingBuilder.thin_to=all",
+    "outliers set aside": "RingBuilder.outlier_factor=0",
+    "denoising": "RingBuilder.denoise=0",
+    "point reduction": "Contractor.reducer=none",
+    "mass of merged points": "LPRReducer.conserve_mass=false",
+    "cheapest merges first": "LPRReducer.order=index",
+    "mended rings": "LPRReducer.mend_rings=false",
+    "reduction that stops": "Contractor.reduce_above=0",
+    "stop by score": "Contractor.stop=RingSizeRatio",
+    "stop at 3 %": "ExplainedScore.threshold=0.02",
+    "last solve kept": "Contractor.keep_last=false",
+    "floor of attraction": "Contractor.min_attraction=0",
+    "hold on lines": "Contractor.line_hold=1",
+    "runaways held": "Contractor.retries=0",
+    "sampling by thickness": "Connector.radius=2% Connector.thickness=0",
+    "all ring links": "Connector.links=nearest",
+    "unsupported vertices dropped": "Connector.min_support=0",
+    "loops must open": "Refiner.opening=0",
+    "weak loops cut": "Refiner.weak_loop_bonds=0",
+    "unsure loops cut": "Refiner.weak_loop_opening=0",
+    "spurs cut": "Refiner.spur=0",
+    "edges subdivided": "Refiner.spacing=0",
+    "fit to the axis": "Refiner.recentre=0",
+}
+"""What `default` adds to the publications, and the settings that switch it off. All of them together (but for the
+reduction and the stop rule, which are published) are `wen2024`."""
+
+
+def lost(mean: dict, whole: dict) -> float:
+    """The relative rise of the error and the relative fall of the number of shapes with right topology."""
+    return mean["error"] / whole["error"] - mean["right"] / max(whole["right"], 1)
+
+
+def cell(mean: dict) -> str:
+    """Error / right topologies."""
+    return f"{number(mean['error'])} / {mean['right']}"
+
+
+def effect(rows: list[dict], idea: str) -> str:
+    """What is lost without an idea: over all clouds, and in the variant in which it counts most."""
+
+    def pair(here):
+        return [summary(pick(here, pipeline=name)) for name in ("default", idea)]
+
+    pairs = {variant: pair(group) for variant, group in by_variant(rows).items()}
+    most = max(pairs, key=lambda variant: lost(pairs[variant][1], pairs[variant][0]))
+    whole, there = (" → ".join(map(cell, it)) for it in (pair(rows), pairs[most]))
+    return f"{whole}; {most}: {there}"
+
+
+def write_effects(page: Path, rows: list[dict]) -> None:
+    """Put the effects behind the settings that a page names in cells of its tables, up to the end of cell or line."""
+    text = page.read_text(encoding="utf-8")
+    for name in IDEAS.keys() & {row["pipeline"] for row in rows}:
+        words = effect(rows, name)
+        text = re.sub(rf"(`{re.escape(IDEAS[name])}`: ).*?(?= \||<br>)", lambda it, words=words: it[1] + words, text)
+    write_atomically(page, lambda temporary: Path(temporary).write_text(text, encoding="utf-8"))
+
+
+def losses(rows: list[dict]) -> tuple[dict[str, dict], list[str]]:
+    """Means of every pipeline over all variants, and the ideas in it by how much is `lost` without them."""
+    mean = {name: summary(here) for name, here in by_pipeline(rows).items()}
+    ideas = (name for name in mean if name in IDEAS)
+    return mean, sorted(ideas, key=lambda name: lost(mean[name], mean["default"]), reverse=True)
+
+
+def ablation_tables(rows: list[dict]) -> Tables:
+    """`default`, the ideas by how much is lost without them, and the publications."""
+    variants, (mean, ideas) = by_variant(rows), losses(rows)
+    lines = []
+    for name in ["default", *ideas, *(name for name in PUBLISHED if name in mean)]:
+        parts = [summary(pick(group, pipeline=name)) for group in variants.values()]
+        cells = [cell(part) for part in (*parts, mean[name])]
+        label, setting = (f"without {name}", f"`{IDEAS[name]}`") if name in IDEAS else (name, "")
+        lines.append([label, *cells, setting])
+    titles = [f"{variant} ({len(pick(group, pipeline='default'))})" for variant, group in variants.items()]
+    header = ["", *titles, f"all ({mean['default']['n']})", "setting"]
+    return [("one idea off at a time", header, lines)]

@@ -1,0 +1,166 @@
+"""Clouds with known axes: the built-in ones, and those of a folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+import open3d as o3d
+import typer
+from scipy.spatial import cKDTree
+
+from glsk_o3d import read_truth, samples
+from glsk_o3d.analysis import Truth
+
+from .results import ROOT
+
+HOLES = 6  # in a built-in cloud with holes, each of them as far across as the part it is in
+SHOWN = 0.98  # least share of the true axis that a cloud must show for its skeleton to be scored
+
+BUILTIN: dict[str, Callable[..., samples.Sample]] = {
+    "tube": samples.tube,
+    "thin_tube": partial(samples.tube, radius=0.04),
+    "y_junction": samples.y_junction,
+    "uneven_y": partial(samples.y_junction, radii=(0.12, 0.06, 0.04), angle=130.0),
+    "torus": samples.torus,
+    "thin_torus": partial(samples.torus, radius=0.05),
+    "two_rings": samples.two_rings,
+    "helix": samples.helix,
+    "sauropod": partial(samples.sauropod, cameras=None),
+}
+"""Samples of the package that have an axis, as whole surfaces."""
+BUILTIN_VARIANT = re.compile(r"(clean|density|holes|outliers|scan(?=2_)|noise(?=\d))(\d*)_(\d+)")
+CAMERAS = np.array([[1, -2, 2], [-1, 2, 2]]) / 3  # where from a built-in scan is taken; nothing is hidden from both
+
+
+@dataclass(frozen=True)
+class Case:
+    """A cloud with a known axis: a shape of a folder, or a built-in one (no folder), in some state of disrepair."""
+
+    shape: str
+    variant: str
+    folder: Path | None = None
+
+    @property
+    def size(self) -> int:
+        """Points, as its variant says."""
+        return int(self.variant.rpartition("_")[2])
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """What a row says of it."""
+        return dict(variant=self.variant, shape=self.shape)
+
+    def load(self) -> tuple[np.ndarray, Truth]:
+        """The points and the axis."""
+        if self.folder is None:
+            return builtin(self.shape, self.variant)
+        path = self.folder / f"{self.shape}.npz"
+        with np.load(path) as archive:
+            return archive[self.variant].astype(float), read_truth(path)
+
+
+def builtin(shape: str, variant: str) -> tuple[np.ndarray, Truth]:
+    """A built-in shape as KIND_SIZE: clean, density, holes, outliers, scan2, or noise with its percentage."""
+    found = BUILTIN_VARIANT.fullmatch(variant)
+    if found is None:
+        raise ValueError(
+            f"{variant}: built-in variants are clean_N, density_N, holes_N, outliers_N, scan2_N and noiseP_N"
+        )
+    kind, percent, n = found[1], int(found[2] or 0), int(found[3])
+    rng = np.random.default_rng(1)
+    # the points of a sample are independent, so that the first n of those kept are a fair choice
+    more, noise = 10 if kind in ("density", "holes", "scan") else 1, percent / 100 if kind == "noise" else 0.0
+    drawn = BUILTIN[shape](more * n, noise=noise)
+    points, kept = drawn.points, np.ones(len(drawn.points), bool)
+    if kind == "density":  # ten times as dense at one end as at the other
+        along = points[:, np.ptp(points, axis=0).argmax()]
+        kept = rng.random(len(points)) < 10 ** ((along - along.min()) / np.ptp(along) - 1)
+    elif kind == "holes":
+        centres = points[rng.choice(len(points), HOLES)]
+        widths = drawn.radii[cKDTree(drawn.nodes).query(centres)[1]]
+        kept = (np.linalg.norm(points[:, None] - centres, axis=2) > widths).all(axis=1)
+    elif kind == "scan":
+        kept = _seen(points)
+    elif kind == "outliers":
+        points = points.copy()
+        points[: n // 100] = rng.uniform(points.min(axis=0), points.max(axis=0), (n // 100, 3))
+    return points[kept][:n], Truth(drawn.nodes, drawn.edges, drawn.radii)
+
+
+def _seen(points):
+    """Which points one of the two cameras sees."""
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    size, seen = np.linalg.norm(np.ptp(points, axis=0)), np.zeros(len(points), bool)
+    for camera in cloud.get_axis_aligned_bounding_box().get_center() + 2 * size * CAMERAS:
+        seen[cloud.hidden_point_removal(camera, 1000 * size)[1]] = True
+    return seen
+
+
+def cases(folder: Path | None, own: bool, variants: str, shapes: str = "") -> list[Case]:
+    """What a command is to run on; what there is not, or the manifest says not to score, is left out, and said so.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        Else $GLSK_TRUTH, else the folder shared/truth beside the repository.
+    own : bool
+        The built-in shapes instead.
+    variants : str
+        Names with commas.
+    shapes : str
+        Names with commas, a number for so many of all kinds, or empty for all.
+    """
+    if own:
+        folder, known = None, {name: {} for name in BUILTIN}
+    else:
+        folder = folder_or(folder, "GLSK_TRUTH", "shared/truth")
+        known = _shapes(folder)
+    names = shapes.split(",") if shapes else list(known)
+    if shapes.isdecimal():
+        spread = np.linspace(0, len(known) - 1, min(int(shapes), len(known)))
+        names = [list(known)[i] for i in spread.round().astype(int)]
+    unknown = [name for name in names if name not in known]
+    if unknown or not names:
+        raise typer.BadParameter(f"no shape {', '.join(unknown)}: there are {', '.join(known) or 'none'}")
+    wanted = [Case(name, variant, folder) for variant in variants.split(",") for name in names]
+    there = [case for case in wanted if _offered(case, known[case.shape])]
+    if not there:
+        raise typer.BadParameter(f"no such variants: {variants}")
+    for variant, count in Counter(case.variant for case in wanted if case not in there).items():
+        typer.echo(f"left out: {variant} of {count} shapes", err=True)
+    return there
+
+
+def folder_or(folder: Path | None, variable: str, beside: str) -> Path:
+    """The folder if given, else that of an environment variable, else the one beside the repository."""
+    folder = folder or Path(os.environ.get(variable, ROOT.parent / beside))
+    if not folder.is_dir():
+        raise typer.BadParameter(f"there is no folder {folder}: name one, or set {variable}")
+    return folder
+
+
+def _shapes(folder: Path) -> dict[str, dict[str, float]]:
+    """Shapes with a meaningful skeleton, and how much of each of their axes a variant's cloud shows."""
+    if not (folder / "manifest.json").exists():
+        return {path.stem: {} for path in sorted(folder.glob("*.npz"))}
+    shapes = json.loads((folder / "manifest.json").read_text())["shapes"]
+    return {shape["name"]: shape.get("coverage", {}) for shape in shapes if shape["meaningful_skeleton"]}
+
+
+def _offered(case: Case, coverage: dict[str, float]) -> bool:
+    if case.folder is None:
+        return BUILTIN_VARIANT.fullmatch(case.variant) is not None
+    try:
+        with np.load(case.folder / f"{case.shape}.npz") as archive:
+            return case.variant in archive.files and coverage.get(case.variant, 1.0) >= SHOWN
+    except (OSError, ValueError, BadZipFile):
+        return True  # its row will say what is wrong with the file
