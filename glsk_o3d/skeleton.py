@@ -207,15 +207,19 @@ class Skeleton:
             Nodes have ``position`` (3-tuple), ``radius``, ``confidence``, ``curvature`` and ``torsion``; edges
             ``length`` and ``branch``. ``graph.graph["branches"]`` is the branch table, a list of dicts, with a row for
             every value of ``branch``.
-        """
-        import networkx
 
+        Raises
+        ------
+        MissingPackageError
+            networkx is not installed.
+        """
         from .analysis.curvature import curvature_torsion
         from .analysis.segmentation import branch_of_edge
+        from .interop.packages import require
 
         names = ("radius", "confidence", "curvature", "torsion")
         values = np.stack([self.radii, self.confidence, *curvature_torsion(self)], axis=1).tolist()
-        graph = networkx.Graph(branches=list(self.branch_table(root)) if len(self.vertices) else [])
+        graph = require("networkx").Graph(branches=list(self.branch_table(root)) if len(self.vertices) else [])
         for i, (position, facts) in enumerate(zip(self.vertices.tolist(), values, strict=True)):
             graph.add_node(i, position=tuple(position), **dict(zip(names, facts, strict=True)))
         facts = zip(self.edges.tolist(), self.edge_lengths.tolist(), branch_of_edge(self).tolist(), strict=True)

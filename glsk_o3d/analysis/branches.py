@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import InvalidParameterError
 from ..interop.writing import write_atomically
 from .curvature import curvature_torsion
+from .graph import on_loops
 from .segmentation import branch_of_point
 
 if TYPE_CHECKING:
@@ -355,15 +356,13 @@ def _axes(parent, level, start, angle, radius):
 
 
 def _kinds(skeleton, paths):
-    import networkx
-
-    graph = networkx.Graph(skeleton.edges.tolist())
-    bridges = {frozenset(edge) for edge in networkx.bridges(graph)} if len(graph) else set()
+    looped = skeleton.edges[on_loops(len(skeleton.vertices), skeleton.edges)]
+    looped = {frozenset(edge) for edge in looped.tolist()}
 
     def kind(path):
         if len(path) == 1:
             return "isolated"
-        if frozenset(path[:2].tolist()) not in bridges:
+        if frozenset(path[:2].tolist()) in looped:
             return "loop"
         return "tip" if (skeleton.degree[path[[0, -1]]] == 1).any() else "inner"
 

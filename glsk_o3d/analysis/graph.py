@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import breadth_first_order
 
 from ..errors import InvalidParameterError
 from ..numerics.components import component_labels
@@ -67,3 +69,34 @@ def count_components(n, edges):
     int
     """
     return int(component_labels(n, edges).max(initial=-1)) + 1
+
+
+def on_loops(n, edges):
+    """Which edges lie on a loop: those without which their ends are still connected.
+
+    Parameters
+    ----------
+    n : int
+    edges : (E, 2) int array
+        Each once, and none from a node to itself.
+
+    Returns
+    -------
+    (E,) bool array
+    """
+    # a tree from a root above all components; every edge that is not in it closes a loop with the tree
+    _, first = np.unique(component_labels(n, edges), return_index=True)
+    linked = np.concatenate([edges, np.column_stack([np.full(len(first), n), first])])
+    graph = coo_matrix((np.ones(len(linked)), linked.T), shape=(n + 1, n + 1)).tocsr()
+    order, parent = breadth_first_order(graph, n, directed=False)
+    is_parent = parent[edges[:, ::-1]] == edges  # an end, of the other one
+    closing = ~is_parent.any(axis=1)
+    # of each node the loops with one end in its subtree and the other outside, a bit each: they pass the edge above it
+    passing = [0] * (n + 1)
+    for loop, ends in enumerate(edges[closing].tolist()):
+        for node in ends:
+            passing[node] ^= 1 << loop
+    for node in order[:0:-1].tolist():
+        passing[parent[node]] ^= passing[node]
+    below = np.where(is_parent[:, 0], edges[:, 1], edges[:, 0])
+    return closing | np.array([loops != 0 for loops in passing])[below]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -110,13 +111,26 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
     """
     toml = recipe_ending(path) == ".toml"
     recipe = to_recipe(pipeline)
-    if toml:
-        import tomlkit
-
-        text = tomlkit.dumps(recipe)
-    else:
-        text = json.dumps(recipe, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    text = _toml(recipe) if toml else json.dumps(recipe, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     write_atomically(path, lambda temporary: temporary.write_bytes(text.encode()))
+
+
+def _toml(table: dict[str, Any], path: str = "") -> str:
+    """A table as TOML: what is neither a table nor a list of tables is written as JSON does, which TOML reads."""
+    plain, tables = [], []
+    for name, value in table.items():
+        key = name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _toml_value(name)
+        if isinstance(value, dict):
+            tables.append(f"[{path}{key}]\n{_toml(value, f'{path}{key}.')}")
+        elif isinstance(value, list) and value and all(isinstance(part, dict) for part in value):
+            tables += [f"[[{path}{key}]]\n{_toml(part, f'{path}{key}.')}" for part in value]
+        else:
+            plain.append(f"{key} = {_toml_value(value)}\n")
+    return "\n".join(["".join(plain), *tables] if plain else tables)
+
+
+def _toml_value(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
 
 
 def recipe_ending(path: str | os.PathLike) -> str:
