@@ -31,9 +31,11 @@ def picture(skeleton: Skeleton) -> str:
     -------
     str
     """
+    require("PIL", "pillow")
+    from PIL import Image
+
     from .preview import DPI, draw
 
-    Image = require("PIL.Image", "pillow")
     figure, stream = draw(skeleton, SIZE, None, caption=False), io.BytesIO()
     figure.set_dpi(DPI)
     figure.canvas.draw()
