@@ -72,12 +72,12 @@ $(BIN)/python: | system-deps
 
 $(VENV)/.installed-demo: pyproject.toml | $(BIN)/python
 	@echo "Installing glsk-o3d and the packages it needs into $(VENV); the first time this takes a minute or more"
-	@$(PIP) install --editable .
+	@$(PIP) install --editable '.[pictures]'
 	@touch $@
 
 $(VENV)/.installed-test: pyproject.toml | $(BIN)/python
 	@echo "Installing glsk-o3d and what its tests need into $(VENV); the first time this takes a minute or more"
-	@$(PIP) install --editable '.[dev]'
+	@$(PIP) install --editable '.[test,lint]'
 	@touch $@ $(VENV)/.installed-demo
 
 $(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
@@ -89,6 +89,6 @@ $(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
 $(PEERS)/.installed: pyproject.toml benchmarks/peers.txt | system-deps
 	@echo "Installing glsk-o3d and other tools into $(PEERS); the first time this takes some minutes"
 	@test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
-	@$(PEERS)/bin/python -m pip --disable-pip-version-check -qq install --editable . -r benchmarks/peers.txt
+	@$(PEERS)/bin/python -m pip --disable-pip-version-check -qq install --editable ".[pictures]" -r benchmarks/peers.txt
 	@$(PEERS)/bin/python -m pip --disable-pip-version-check -qq install --no-deps pc-skeletor==1.0.0
 	@touch $@

@@ -208,9 +208,12 @@ class Skeleton:
             Nodes have ``position`` (3-tuple), ``radius``, ``confidence``, ``curvature`` and ``torsion``; edges
             ``length`` and ``branch``. ``graph.graph["branches"]`` is the branch table, a list of dicts, with a row for
             every value of ``branch``.
-        """
-        import networkx
 
+        Raises
+        ------
+        MissingPackageError
+            networkx is not installed.
+        """
         from .analysis.curvature import curvature_torsion
         from .analysis.segmentation import branch_of_edge
 

@@ -124,11 +124,9 @@ class GraspCandidates:
         ------
         MissingPackageError
         """
-        from matplotlib import colormaps
+        from ..interop.packages import import_open3d, require
 
-        from ..interop.packages import import_open3d
-
-        o3d = import_open3d()
+        o3d, viridis = import_open3d(), require("matplotlib").colormaps["viridis"]
         side, back = self.opening[:, None] / 2 * self.closing, -self.opening[:, None] * self.approach
         fork = [side, side + back, -side + back, -side, back, (1 + STEM) * back]
         ends = (self.positions + np.array(fork)).transpose(1, 0, 2).reshape(-1, 3)
@@ -138,7 +136,7 @@ class GraspCandidates:
         drawn.lines = o3d.utility.Vector2iVector(lines.reshape(-1, 2).astype(np.int32))
         worst, best = self.quality.min(initial=1), self.quality.max(initial=0)
         shade = (self.quality - worst) / (best - worst) if best > worst else np.ones(len(self))
-        drawn.colors = o3d.utility.Vector3dVector(np.repeat(colormaps["viridis"](shade)[:, :3], 4, axis=0))
+        drawn.colors = o3d.utility.Vector3dVector(np.repeat(viridis(shade)[:, :3], 4, axis=0))
         return drawn
 
     def to_csv(self, path: str | os.PathLike) -> None:

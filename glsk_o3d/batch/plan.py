@@ -13,6 +13,7 @@ from typing import Any
 
 from ..driver import as_pipeline
 from ..errors import FileFormatError, InvalidParameterError
+from ..interop.packages import require_for
 from ..io.skeletons import skeleton_ending
 from ..pipeline import Filter, Pipeline
 from ..recipes import to_recipe
@@ -138,6 +139,8 @@ def plan_batch(
     InvalidParameterError
         The pipeline or a format is wrong, there is nothing to write, or a result would replace an input, the result of
         another input that is still there, or, in a folder without a ledger, a file that no batch has made.
+    MissingPackageError
+        A format, or the picture, is written by a package that is not installed.
     RecipeError
         No recipe can hold the pipeline: then it cannot be told whether two runs are the same.
 
@@ -157,6 +160,8 @@ def plan_batch(
         raise InvalidParameterError(str(error)) from None
     if not endings:
         raise InvalidParameterError("there is nothing to write: give a format")
+    for ending in endings:
+        require_for(ending)
     given = [inputs] if isinstance(inputs, str | os.PathLike) else list(inputs)
     out = Path(os.path.abspath(out_dir))
     found = find_inputs(given, out, recursive=recursive)

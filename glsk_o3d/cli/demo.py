@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .console import holding_interrupts, progress, reporting
+from .console import holding_interrupts, progress, reporting, say
 from .options import PipelineName, Quiet, Verbose
 
 
@@ -29,6 +29,8 @@ def demo(
     skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
     """
     with reporting(quiet=quiet, verbose=verbose):
+        from ..errors import MissingPackageError
+        from ..interop.packages import require_for
         from ..interop.writing import write_atomically
         from ..recipes.catalogue import named_pipeline
         from ..samples import sample_object
@@ -40,8 +42,13 @@ def demo(
         if folder.exists() and not folder.is_dir():
             raise NotADirectoryError(f"{folder}: is a file, not a folder")
         folder.mkdir(parents=True, exist_ok=True)
-        *outputs, preview, scan = (folder / name for name in names)
-        for path in (*outputs, preview, scan):
+        *outputs, picture, scan = (folder / name for name in names)
+        try:
+            require_for(picture.suffix)
+            preview, missing = picture, ""
+        except MissingPackageError as error:  # all else can be shown
+            preview, missing = None, str(error)
+        for path in (*outputs, *([preview] if preview else []), scan):
             check_writable(path)
         with progress(not quiet and not verbose) as update:
             update("making the sample")
@@ -52,6 +59,8 @@ def demo(
             title = f"{sample.name}: a scan and its curve skeleton"
             written, problems = write(skeleton, outputs, preview, title=title, cut_loops=False, update=update)
         print_results(skeleton, seconds, [scan, *written], problems, quiet=quiet, verbose=verbose)
+        if missing and not quiet:
+            say("warning", f"no {picture.name}: {missing}")
 
 
 def _write_cloud(path: Path, points) -> None:

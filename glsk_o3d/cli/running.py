@@ -15,6 +15,7 @@ import typer
 
 from ..analysis.summary import summary
 from ..errors import FileFormatError, GlskError
+from ..interop.packages import require_for
 from ..io.skeletons import skeleton_ending
 from ..skeleton import Skeleton
 from ..viewing.page import save_report
@@ -120,12 +121,19 @@ def check_findings(report: Path | None, picture: Path | None, *inputs: Path | No
 
 
 def check_writable(path: Path) -> None:
-    """Raise OSError unless the file can be made or replaced.
+    """Raise before the work what would keep the file from being made or replaced after it.
 
     Parameters
     ----------
     path : Path
+
+    Raises
+    ------
+    MissingPackageError
+        A file with this ending is written by a package that is not installed.
+    OSError
     """
+    require_for(path.suffix)
     folder = Path(os.path.realpath(path)).parent
     if not folder.is_dir():
         raise FileNotFoundError(f"{path.parent}: no such folder: make it before writing {path.name}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+from collections import Counter
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, requires
 from typing import Any
@@ -26,10 +27,11 @@ _DEBIAN = {  # shared library -> Debian package, where the one does not follow f
     "libc++": "libc++1",
     "libc++abi": "libc++abi1",
 }
+_WRITERS = {".html": "matplotlib", ".png": "matplotlib"}
 
 
 def require(package: str, install: str | None = None) -> Any:
-    """Import an optional package, or say what to install: it by itself, in the version that this package asks for.
+    """Import a package, or say what to install: the extra of this package that brings it, or it in the version we need.
 
     Parameters
     ----------
@@ -56,19 +58,41 @@ def require(package: str, install: str | None = None) -> Any:
             debian = _DEBIAN.get(library[1])
             cure = f"apt-get install {debian}" if debian else f"install the system library {library[1]}"
         elif isinstance(error, ModuleNotFoundError) and error.name == package.partition(".")[0]:
-            cure = f'pip install "{_versioned(asked)}"'
+            cure = f'pip install "{_asked_for(asked)[1]}"'
         else:
-            cure = f'its installation is damaged ({error}): pip install --force-reinstall "{_versioned(asked)}"'
+            cure = f'its installation is damaged ({error}): pip install --force-reinstall "{_asked_for(asked)[0]}"'
         need = f"needs {library[0].partition(':')[0]}, which this machine lacks" if library else "cannot be imported"
         raise MissingPackageError(f"{package} {need}: {cure}", name=package) from error
 
 
-def _versioned(package: str) -> str:
+def require_for(ending: str) -> None:
+    """Find out before the work whether files of a kind can be written.
+
+    Parameters
+    ----------
+    ending : str
+        With its dot.
+
+    Raises
+    ------
+    MissingPackageError
+        They are written by a package that is not installed.
+    """
+    if ending.lower() in _WRITERS:
+        require(_WRITERS[ending.lower()])
+
+
+def _asked_for(package: str) -> tuple[str, str]:
+    """A package as our metadata asks for it, and what brings it: the extra that has it, or it by itself."""
     with suppress(PackageNotFoundError):  # run from a folder, not installed
-        for line in requires("glsk-o3d") or ():
-            if re.split(r"[^\w.-]", line)[0] == package:
-                return line.partition(";")[0].strip()
-    return package
+        lines = [line.partition(";") for line in requires("glsk-o3d") or ()]
+        asked = [(line[0].strip(), re.search(r"extra == ['\"]([\w-]+)", line[2])) for line in lines]
+        of_extra = Counter(extra[1] for _, extra in asked if extra)
+        mine = [(versioned, extra) for versioned, extra in asked if re.split(r"[^\w.-]", versioned)[0] == package]
+        if mine:  # larger extras have it among much else
+            versioned, extra = min(mine, key=lambda found: of_extra[found[1][1]] if found[1] else 0)
+            return versioned, f"glsk-o3d[{extra[1]}]" if extra else versioned
+    return package, package
 
 
 def import_open3d() -> Any:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 
 from ..errors import InvalidParameterError
+from ..interop.packages import require
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -41,6 +42,8 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
     Raises
     ------
     InvalidParameterError
+    MissingPackageError
+        matplotlib is not installed, and asked for is not one colour for all.
     """
     if not isinstance(color, str) or color not in NAMES:
         try:
@@ -50,8 +53,7 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
         if one.shape != (3,) or not ((one >= 0) & (one <= 1)).all():
             raise InvalidParameterError(f"color = {color!r}: must be one of {NAMES} or three numbers from 0 to 1")
         return np.tile(one, (len(branch), 1))
-    from matplotlib import colormaps
-
+    colormaps = require("matplotlib").colormaps
     if color == "branch":
         palette = np.delete(colormaps["tab20"].colors, [14, 15], axis=0)  # grey is for none
         palette = np.concatenate([palette[::2], palette[1::2]])  # the strong ones first

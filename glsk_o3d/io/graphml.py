@@ -19,7 +19,8 @@ _KEYS = ("x", "y", "z", "radius")
 
 def write(skeleton: Skeleton) -> bytes:
     """The content of a GraphML file."""
-    networkx = require("networkx")
+    import networkx
+
     graph = networkx.Graph()
     table = np.column_stack([skeleton.vertices, skeleton.radii]).tolist()
     graph.add_nodes_from((i, dict(zip(_KEYS, row, strict=True))) for i, row in enumerate(table))

@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import FileFormatError
-from ..interop.packages import require
 from ..skeleton import Skeleton
 from .graph import graph_skeleton
 from .text import line, text, words_by_line
@@ -37,7 +36,8 @@ def write(skeleton: Skeleton, cut_loops: bool = False) -> bytes:
             f"SWC holds trees only and the skeleton has {skeleton.n_loops} loop(s): "
             "pass cut_loops=True to drop an edge of each, or choose another format"
         )
-    networkx = require("networkx")
+    import networkx
+
     graph = networkx.Graph()
     graph.add_nodes_from(range(len(skeleton.vertices)))
     graph.add_weighted_edges_from(zip(*skeleton.edges.T.tolist(), skeleton.edge_lengths.tolist(), strict=True))

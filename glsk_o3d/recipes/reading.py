@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,11 @@ from ..parameters import FROM, NONE, Parameters, problem_with
 from ..pipeline import RECIPE_VERSION, Pipeline
 from .catalogue import catalogue, find, named_pipeline, serves
 from .writing import recipe_ending, refuse_gaps
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 
 def load_recipe(path: str | os.PathLike) -> Pipeline:
@@ -67,13 +73,7 @@ def _read_json(text: str) -> Any:
     return json.loads(text, object_pairs_hook=table)
 
 
-def _read_toml(text: str) -> Any:
-    import tomlkit
-
-    return tomlkit.parse(text).unwrap()
-
-
-_READERS: dict[str, Callable[[str], Any]] = {".json": _read_json, ".toml": _read_toml}
+_READERS: dict[str, Callable[[str], Any]] = {".json": _read_json, ".toml": tomllib.loads}
 
 
 def from_recipe(recipe: dict[str, Any]) -> Pipeline:

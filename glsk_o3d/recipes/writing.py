@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from ..errors import RecipeError
 from ..interop.writing import write_atomically
 from ..parameters import UNWRITTEN, Parameters
@@ -110,12 +112,7 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
     """
     toml = recipe_ending(path) == ".toml"
     recipe = to_recipe(pipeline)
-    if toml:
-        import tomlkit
-
-        text = tomlkit.dumps(recipe)
-    else:
-        text = json.dumps(recipe, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    text = tomli_w.dumps(recipe) if toml else json.dumps(recipe, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     write_atomically(path, lambda temporary: temporary.write_bytes(text.encode()))
 
 

@@ -86,7 +86,7 @@ def save_assessment(
 
 
 def _colour(figure, values, label, best, unknown):
-    from matplotlib import colormaps
+    from matplotlib import colormaps  # it is there: the figure was drawn with it
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap, Normalize

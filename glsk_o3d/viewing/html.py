@@ -138,9 +138,7 @@ def hexadecimal(colors: np.ndarray) -> list[str]:
     -------
     list of str
     """
-    from matplotlib.colors import to_hex
-
-    return [to_hex(color) for color in colors]
+    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(255 * colors[:, :3]).astype(int).tolist()]
 
 
 def origin(report: Report) -> str:

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import MissingPackageError
+from ..interop.packages import require
+
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
@@ -28,7 +31,8 @@ def picture(skeleton: Skeleton) -> str:
     -------
     str
     """
-    from PIL import Image  # matplotlib needs it, too
+    require("PIL", "pillow")
+    from PIL import Image
 
     from .preview import DPI, draw
 
@@ -46,6 +50,8 @@ def picture(skeleton: Skeleton) -> str:
 
 def to_html(skeleton: Skeleton) -> str:
     """A picture from three sides and the numbers, as a piece of HTML that needs nothing else.
+
+    Without what draws pictures, the numbers and what to install.
 
     Parameters
     ----------
@@ -69,14 +75,20 @@ def to_html(skeleton: Skeleton) -> str:
     style = 'style="text-align:right;padding:2px 10px"'  # all here, since not every notebook has Jupyter's sheet
     heads = "".join(f"<th {style}>{name}</th>" for name in told)
     cells = "".join(f"<td {style}>{value}</td>" for value in told.values())
+    image, missing = "", []
+    try:
+        image = (
+            f'<img alt="{escape(repr(skeleton))}" style="width:100%;background:#fff;border-radius:4px" '
+            f'src="{picture(skeleton)}">'
+        )
+    except MissingPackageError as error:
+        missing = [str(error)]
     warnings = "".join(
         f'<p style="margin:4px 0;border-left:3px solid #c77700;padding-left:8px">{escape(text)}</p>'
-        for text in dict.fromkeys(report.warnings)
+        for text in dict.fromkeys([*missing, *report.warnings])
     )
     return (
         '<div style="max-width:1100px;font:13px/1.5 system-ui,sans-serif">'
-        f'<img alt="{escape(repr(skeleton))}" style="width:100%;background:#fff;border-radius:4px" '
-        f'src="{picture(skeleton)}">'
-        f'<table style="font:inherit;border-collapse:collapse;margin-top:4px"><thead>'
+        f'{image}<table style="font:inherit;border-collapse:collapse;margin-top:4px"><thead>'
         f"<tr>{heads}</tr></thead><tbody><tr>{cells}</tr></tbody></table>{warnings}</div>"
     )

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..analysis.segmentation import branch_of_edge, branch_of_point, branch_of_vertex
 from ..errors import InvalidParameterError
+from ..interop.packages import require
 from ..interop.writing import check_ending, write_atomically
 from . import html as sections
 from .notebook import picture
@@ -125,8 +126,7 @@ def _followed(skeleton, recorder) -> tuple[np.ndarray, list[np.ndarray]]:
 
 
 def _data(skeleton, shown, positions) -> dict[str, Any]:
-    from matplotlib import colormaps
-
+    colormaps = require("matplotlib").colormaps
     box = np.concatenate([positions[0], skeleton.vertices])
     low, high = (box.min(axis=0), box.max(axis=0)) if len(box) else np.zeros((2, 3))
     centre = low + (high - low) / 2

@@ -299,7 +299,7 @@ def test_wrong_recipes(tmp_path, message, recipe):
         ("r.json", b"[" * 100_000, "not valid JSON: "),
         ("r.json", b'{"a":' * 600 + b"1" + b"}" * 600, ""),
         ("r.toml", b"[glsk_o3d]\nversion = ", "not valid TOML: "),
-        ("r.toml", b"[glsk_o3d]\nversion = 1\nversion = 1", 'not valid TOML: Key "version" already exists'),
+        ("r.toml", b"[glsk_o3d]\nversion = 1\nversion = 1", "not valid TOML: Cannot overwrite a value"),
         ("r.toml", b"", "glsk_o3d.version: is missing"),
         ("r.yaml", b"glsk_o3d:", "unknown ending; recipes are .json or .toml files"),
     ],

@@ -100,7 +100,7 @@ def test_other_endings_are_refused(tree, tmp_path, name):
 
 def test_without_matplotlib(tree, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(MissingPackageError, match='pip install "matplotlib>='):
+    with pytest.raises(MissingPackageError, match=r'pip install "glsk-o3d\[pictures\]"$'):
         save_preview(tree, tmp_path / "p.png")
 
 

@@ -1,0 +1,70 @@
+"""What is published: the page on PyPI, the extras, the workflows, the notes of a release."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+import tomlkit
+
+
+@pytest.fixture
+def pyproject(root):
+    return tomlkit.parse((root / "pyproject.toml").read_text("utf-8")).unwrap()
+
+
+def test_links_of_the_readme_lead_to_the_repository_on_pypi(root, pyproject):
+    readme = (root / "README.md").read_text("utf-8")
+    relative = re.findall(r"\]\((?!\w+:)([^)#]+)", readme)
+    assert len(relative) > 20
+    assert all((root / target).exists() for target in relative)
+    for rule in pyproject["tool"]["hatch"]["metadata"]["hooks"]["fancy-pypi-readme"]["substitutions"]:
+        readme = re.sub(rule["pattern"], rule["replacement"], readme)
+    pages, pictures = "https://github.com/", "https://raw.githubusercontent.com/"
+    home = "glsk-o3d/glsk-o3d"
+    assert pyproject["project"]["urls"]["Repository"] == pages + home
+    links = re.findall(r"(!?)\[[^]]*\]\(([^)]+)\)", readme)
+    assert all(target.startswith("https://") for _, target in links)
+    assert [target for mark, target in links if mark] == [
+        f"{pictures}{home}/v$HFPR_VERSION/{target}" for target in relative if target.endswith(".png")
+    ]
+    for target in relative:
+        assert target.endswith(".png") or f"({pages}{home}/blob/v$HFPR_VERSION/{target}" in readme
+
+
+def test_every_extra_for_users_is_in_the_readme(root, pyproject):
+    readme = (root / "README.md").read_text("utf-8")
+    extras = pyproject["project"]["optional-dependencies"]
+    (full,) = extras["full"]
+    users = set(full[len("glsk-o3d[") : -1].split(","))
+    assert set(re.findall(r"^\| `(\w+)` \| .* \|$", readme, re.MULTILINE)) >= users
+    assert set(extras) == {*users, "full", "test", "lint", "docs", "dev"}
+
+
+def test_pythons_are_the_same_everywhere(root, pyproject):
+    named = [line.rpartition(" ")[2] for line in pyproject["project"]["classifiers"] if " :: 3." in line]
+    (tested,) = re.findall(r"python: \[(.*)\]", (root / ".github/workflows/ci.yml").read_text("utf-8"))
+    assert [word.strip('" ') for word in tested.split(",")] == named
+    assert pyproject["project"]["requires-python"] == f">={named[0]}"
+    assert f"Python {named[0]} to {named[-1]}" in (root / "README.md").read_text("utf-8")
+
+
+def test_release_notes(root, tmp_path):
+    (tmp_path / "scripts").mkdir()
+    (tmp_path / "glsk_o3d").mkdir()
+    script = tmp_path / "scripts" / "release_notes.py"
+    script.write_text((root / "scripts" / "release_notes.py").read_text("utf-8"))
+    (tmp_path / "glsk_o3d" / "__init__.py").write_text('__version__ = "0.2.0"\n')
+    (tmp_path / "CITATION.cff").write_text("cff-version: 1.2.0\nversion: 0.2.0\n")
+    changes = tmp_path / "CHANGELOG.md"
+
+    def notes(tag):
+        return subprocess.run([sys.executable, str(script), tag], capture_output=True, text=True)
+
+    changes.write_text("# Changelog\n\n## [0.2.0] - unreleased\n\n- New.\n\n## [0.1.0] - 2026-01-01\n\nOld.\n")
+    assert "CHANGELOG.md: needs a heading" in notes("v0.2.0").stderr
+    changes.write_text(changes.read_text().replace("unreleased", "2026-02-01"))
+    assert notes("v0.2.0").stdout == "- New.\n"
+    done = notes("v0.3.0")
+    assert done.returncode == 1
+    assert "the tag is v0.3.0" in done.stderr
