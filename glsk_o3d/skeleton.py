@@ -208,12 +208,9 @@ class Skeleton:
             Nodes have ``position`` (3-tuple), ``radius``, ``confidence``, ``curvature`` and ``torsion``; edges
             ``length`` and ``branch``. ``graph.graph["branches"]`` is the branch table, a list of dicts, with a row for
             every value of ``branch``.
-
-        Raises
-        ------
-        MissingPackageError
-            networkx is not installed.
         """
+        import networkx
+
         from .analysis.curvature import curvature_torsion
         from .analysis.segmentation import branch_of_edge
 

@@ -33,7 +33,8 @@ for ending in ("ply", "obj", "json", "npz", "cgal", "swc", "graphml"):
     glsk.read_skeleton(f"s.{ending}")
 glsk.save_recipe(glsk.pipelines.default(), "r.toml")
 assert glsk.load_recipe("r.toml") == glsk.pipelines.default()
-skeleton.to_networkx(), skeleton.to_line_set(), skeleton.to_tensor_line_set(), skeleton.annotate(points, color=(1, 0, 0))
+skeleton.to_networkx(), skeleton.to_line_set(), skeleton.to_tensor_line_set()
+skeleton.annotate(points, color=(1, 0, 0))
 table = skeleton.branch_table()
 table.to_csv("branches.csv"), str(table), glsk.analysis.grasp_candidates(skeleton, max_opening=1.0)
 """
