@@ -14,9 +14,10 @@ Sample('sauropod', 2000 points, 54 nodes, 54 edges)
 from .capsules import signed_distance
 from .sample import Sample
 from .sauropod import TWO_CAMERAS, sauropod
-from .shapes import helix, sample_object, sheet, sphere, torus, tube, two_rings, y_junction
+from .shapes import SAMPLES, helix, sample_object, sheet, sphere, torus, tube, two_rings, y_junction
 
 __all__ = [
+    "SAMPLES",
     "TWO_CAMERAS",
     "Sample",
     "helix",

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import glsk_o3d as glsk
 from glsk_o3d import (
     Connector,
+    Contraction,
     Contractor,
     ExplainedScore,
     InvalidParameterError,
@@ -30,7 +31,7 @@ from glsk_o3d import (
     save_recipe,
     skeletonize,
 )
-from glsk_o3d.pipeline import Filter, recipe_of
+from glsk_o3d.pipeline import Filter, after, recipe_of, with_stage
 from glsk_o3d.recipes import from_recipe, to_recipe
 from glsk_o3d.recipes.catalogue import BUILTIN
 from glsk_o3d.report import Report
@@ -264,7 +265,7 @@ WRONG = {
     },
     "set.Connector: must be a table of parameters, not 5": {**HEAD, "extends": "default", "set": {"Connector": 5}},
     "set: must be a table of filters, not 5": {**HEAD, "extends": "default", "set": 5},
-    "set.LPRReducer: it is not in the pipeline 'cao2010', which has "
+    "set: LPRReducer.phi: LPRReducer is not in the pipeline, which has "
     "RingBuilder, Contractor, RingSizeRatio, Connector, Refiner": {
         **HEAD,
         "extends": "cao2010",
@@ -333,7 +334,7 @@ def thin(state):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Homemade(Filter):
-    consumes = produces = "Contraction"
+    consumes = produces = Contraction
 
     def _run(self, state, watch):
         return state
@@ -343,29 +344,52 @@ def never(iterations):
     return None
 
 
-UNWRITABLE = [
-    (Contractor(reducer=thin), r"pipeline\[1\]\.reducer: .*\.thin is no number, word, filter or rule"),
-    (Contractor(reducer=Homemade()), r"pipeline\[1\]\.reducer: .*\.Homemade is not among the filters and rules"),
-    (Contractor(stop=never), r"pipeline\[1\]\.stop: .*\.never is no number, word, filter or rule"),
-    (Homemade(), r"pipeline\[1\]: .*\.Homemade is not among the filters and rules"),
-]
+UNWRITABLE = {
+    "reducer": (Contractor(reducer=thin), "pipeline[1].reducer", "thin", "unwritten"),
+    "rule": (Contractor(stop=never), "pipeline[1].stop", "never", "unwritten"),
+    "filter inside": (Contractor(reducer=Homemade()), "pipeline[1].reducer", "Homemade", "from"),
+    "stage": (Homemade(), "pipeline[1]", "Homemade", "from"),
+}
 
 
-@pytest.mark.parametrize(("stage", "message"), UNWRITABLE, ids=["function", "filter", "rule", "stage"])
+@pytest.mark.parametrize(("stage", "place", "name", "key"), UNWRITABLE.values(), ids=UNWRITABLE)
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
-def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, message):
-    message = message.replace(": ", ": a recipe cannot hold it: ", 1)
+def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, place, name, key):
     pipeline = RingBuilder() | stage | Connector() | Refiner()
-    with pytest.raises(RecipeError, match=f"^{message}"):
+    with pytest.raises(RecipeError, match=rf"^{re.escape(place)}: .*\.{name}"):
         save_recipe(pipeline, tmp_path / "r.json")
     assert list(tmp_path.iterdir()) == []
     skeleton = pipeline(POINTS)
     skeleton.save(tmp_path / "s.json")
-    report = glsk.read_skeleton(tmp_path / "s.json").report
-    assert report.recipe == skeleton.report.recipe
-    assert "unwritten" in json.dumps(report.recipe)
-    with pytest.raises(RecipeError, match=f"^{message}"):
+    recipe = glsk.read_skeleton(tmp_path / "s.json").report.recipe
+    assert recipe == skeleton.report.recipe
+    table = recipe["pipeline"][1]
+    for field in place.split(".")[1:]:
+        table = table[field]
+    assert key in table
+    with pytest.raises(RecipeError, match=rf"^{re.escape(place)}.*{name}"):
         rerun(skeleton)
+
+
+def test_a_class_of_another_module_is_named_with_it():
+    """So that who lacks the plugin knows it, and a namesake is not taken for it."""
+    recipe = recipe_of(Homemade().table())
+    assert recipe["pipeline"] == [{"filter": "Homemade", "from": __name__}]
+    with pytest.raises(RecipeError, match=re.escape(f"install {__name__}")):
+        from_recipe(recipe)
+    for module, right in (("glsk_o3d.lpr_reducer", True), (__name__, False)):
+        recipe = recipe_of({"filter": "LPRReducer", "from": module})
+        if right:
+            assert from_recipe(recipe) == Pipeline(LPRReducer())
+        else:
+            with pytest.raises(RecipeError, match=rf"^pipeline\[0\]\.from: .*{re.escape(module)}"):
+                from_recipe(recipe)
+
+
+def test_a_namesake_is_not_written():
+    namesake = dataclasses.make_dataclass("Refiner", [], bases=(Homemade,), frozen=True, kw_only=True)
+    with pytest.raises(RecipeError, match=r"^pipeline\[0\]: .*Refiner"):
+        to_recipe(Pipeline(namesake()))
 
 
 def test_a_wrong_parameter_is_not_written(tmp_path):
@@ -491,8 +515,8 @@ def test_a_report_with_a_malformed_recipe(recipe):
 
 
 def test_reports_ahead_add_up():
-    ahead = Report().with_stage(RingBuilder(), 1.0)
-    report = Report(n_input=3).with_stage(RingBuilder(k=9), 0.5).with_stage(Refiner(), 0.25).after(ahead)
+    ahead = with_stage(Report(), RingBuilder(), 1.0)
+    report = after(with_stage(with_stage(Report(n_input=3), RingBuilder(k=9), 0.5), Refiner(), 0.25), ahead)
     assert report.stages == tuple(map(repr, (RingBuilder(), RingBuilder(k=9), Refiner())))
     assert report.seconds == {"RingBuilder": 1.5, "Refiner": 0.25}
     assert report.recipe == recipe_of(*(stage.table() for stage in (RingBuilder(), RingBuilder(k=9), Refiner())))
