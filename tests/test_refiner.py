@@ -81,7 +81,7 @@ def test_complete_graphs_become_trees(name, m, assert_sound):
     assert skeleton.n_components == 1
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.integers(1, 12), st.sets(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=40), st.integers(0, 9))
 def test_random_graphs(assert_sound, m, edges, seed):
     rng = np.random.default_rng(seed)
