@@ -47,7 +47,7 @@ def later(request):
 
 
 def test_needs_a_contraction_first():
-    with pytest.raises(StageError, match="run Contractor first"):
+    with pytest.raises(StageError, match="Contractor"):
         LPRReducer()(RingBuilder()(CLOUDS["torus"]))
 
 

