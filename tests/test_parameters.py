@@ -68,7 +68,7 @@ def test_wrong_parameters_are_named_when_the_filter_is_called(cls, name, value):
 
 @pytest.mark.parametrize("word", ["published ", "Auto", "16", ""])
 def test_a_parameter_of_any_type_takes_its_words_and_no_others(word):
-    with pytest.raises(InvalidParameterError, match="'auto'.*'published'"):
+    with pytest.raises(InvalidParameterError, match=r"'auto'.*'published'"):
         RingBuilder(k=word).check()
     RingBuilder(k="auto").check()
     assert "k : 'auto' or 'published' or int [points], default 'auto'" in RingBuilder.__doc__

@@ -159,7 +159,7 @@ def test_duplicates_are_one_point():
 def test_invalid_points_are_counted_and_dropped_only_when_asked():
     points = TORUS.copy()
     points[[5, 70, 599]] = [[np.nan, 0, 0], [0, np.inf, 0], [0, 0, -np.inf]]
-    with pytest.raises(InvalidCloudError, match="index 5.*drop_invalid=True"):
+    with pytest.raises(InvalidCloudError, match=r"index 5.*drop_invalid=True"):
         RingBuilder()(points)
     state = RingBuilder(drop_invalid=True)(points)
     assert (state.report.n_input, state.report.n_dropped, state.report.n_distinct) == (600, 3, 597)

@@ -220,7 +220,7 @@ def test_filters_of_clouds_in_a_row(example):
 def test_a_filter_of_clouds_belongs_in_front():
     import glsk_example
 
-    with pytest.raises(InvalidParameterError, match="Voxel.*RingBuilder"):
+    with pytest.raises(InvalidParameterError, match=r"Voxel.*RingBuilder"):
         glsk.RingBuilder() | glsk_example.Voxel()
     with pytest.raises(StageError, match="Voxel"):
         glsk_example.Voxel()(glsk.RingBuilder()(POINTS))
@@ -238,7 +238,7 @@ def test_a_filter_that_breaks_its_promise(produces, given, what):
 
 def test_a_filter_that_leaves_nothing_is_named():
     nothing = type("Crop", (Filter,), {"produces": Cloud, "_run": lambda *_: POINTS[:0], "check": lambda self: None})
-    with pytest.raises(InvalidCloudError, match="^Crop"):
+    with pytest.raises(InvalidCloudError, match=r"^Crop"):
         nothing()(POINTS)
 
 
