@@ -4,6 +4,7 @@ import importlib
 import math
 import os
 import sys
+import time
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomlkit
+from hypothesis import HealthCheck, settings
 
 from glsk_o3d.recipes.plugins import forget_plugins
 from glsk_o3d.report import IterationRecord, Report
@@ -18,6 +20,11 @@ from glsk_o3d.ring_builder import RingBuilder
 from glsk_o3d.skeleton import Skeleton
 
 ROOT = Path(__file__).resolve().parents[1]
+
+# No test depends on the clock: a busy machine makes examples slow, not wrong. And no example depends on chance: what
+# failed yesterday fails today.
+settings.register_profile("suite", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("suite")
 
 
 @pytest.fixture(scope="session")
@@ -51,6 +58,29 @@ def benchmark(root):
                 del sys.modules[new]
 
     return imported
+
+
+def patience() -> float:
+    """Seconds, where somebody else's function must be told how long to wait: more than any busy machine needs."""
+    return 900.0
+
+
+@pytest.fixture(scope="session")
+def until():
+    """Wait until something is true, however long it takes, unless one of the processes that bring it about has ended.
+
+    What never comes true is ended with its test by ``faulthandler_timeout`` in ``pyproject.toml``.
+    """
+
+    def wait(condition, *processes):
+        while True:
+            ended = [process.args for process in processes if process.poll() is not None]
+            if found := condition():
+                return found
+            assert not ended, "waited in vain"
+            time.sleep(0.02)
+
+    return wait
 
 
 @pytest.fixture

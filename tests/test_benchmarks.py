@@ -317,7 +317,7 @@ def test_scans_for_batches(benchmark, tmp_path):
 
 
 BAD = """
-import os, signal, time
+import os, signal
 import numpy as np
 
 def crash(points):
@@ -371,7 +371,7 @@ class TestPeers:
         with benchmark("peers") as module:
             yield module
 
-    def test_one_that_crashes_or_hangs_is_a_failure_and_ends_nothing(self, tool, call, tmp_path, monkeypatch):
+    def test_one_that_crashes_or_hangs_is_a_failure_and_ends_nothing(self, tool, call, tmp_path, monkeypatch, patience):
         (tmp_path / "bad_tools.py").write_text(BAD)
         monkeypatch.syspath_prepend(tmp_path)
         module = importlib.import_module("bad_tools")

@@ -259,7 +259,7 @@ def graphs(draw):
     return edges, count, np.array(draw(st.lists(st.booleans() | st.just(True), min_size=m, max_size=m)), bool)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(graphs(), st.sampled_from([0.0, 0.1, 0.5, 1.0]), st.integers(0, 100))
 def test_drop_stray_by_its_definition(graph, share, seed):
     edges, count, noisy = graph
@@ -284,7 +284,7 @@ def test_drop_stray_by_its_definition(graph, share, seed):
     np.testing.assert_array_equal(skeleton.points, raw.points)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(graphs(), st.integers(0, 100))
 def test_drop_stray_does_not_mind_numbers(graph, seed):
     edges, count, noisy = graph

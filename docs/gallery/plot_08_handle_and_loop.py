@@ -20,7 +20,9 @@ graph = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.
 # The raw graph is full of small loops. Those of three edges are no loops but triangles, and the refinement closes
 # them, as published. Larger ones are left: they open less than a part is thick.
 
-published = glsk.Refiner(opening=0, twig=0, spacing=0, recentre=0, weak=0, sure=0, bridge=0)(graph)
+published = glsk.Refiner(opening=0, spur=0, spacing=0, recentre=0, weak_loop_bonds=0, weak_loop_opening=0, bridge=0)(
+    graph
+)
 skeleton = glsk.Refiner()(graph)
 for name, each in (("raw graph", graph), ("without triangles", published), ("recommended", skeleton)):
     print(f"{name:17} {each.n_loops:4} loops")

@@ -159,14 +159,13 @@ def _part(table: Any, path: str, role: str) -> Parameters:
     if not isinstance(table, dict) or kind not in table:
         raise RecipeError(f'{path}: must be a table such as {{"{kind}": NAME, ...}}, not {_short(table)}')
     name = table[kind]
-    cls = find(name) if isinstance(name, str) else None
+    cls, origin = find(name) if isinstance(name, str) else None, table.get(FROM)
     if cls is None or not serves(cls, role):
         fitting = [other for other, its in catalogue().items() if serves(its, role)]
         message = did_you_mean(str(name), fitting, role.replace("stop", "stopping rule"))
-        plugin = " (or install the plugin that it is from)" * (cls is None)
+        plugin = f" (or install {'the plugin that it is from' if origin is None else origin})" * (cls is None)
         raise RecipeError(f"{path}.{kind}: {message}{plugin}")
-    origin = table.get(FROM, cls.__module__)
-    if origin != cls.__module__:
+    if origin not in (None, cls.__module__):
         raise RecipeError(f"{path}.{FROM}: {name!r} of {origin} is not among the filters and rules of 'glsk filters'")
     values = _values(cls, {key: value for key, value in table.items() if key not in (kind, FROM)}, path)
     return _valid(lambda: cls(**values), path)

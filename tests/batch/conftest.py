@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from collections import Counter
 from pathlib import Path
 
@@ -25,8 +24,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from glsk_o3d import Filter
-from glsk_o3d.parameters import documented, parameter
+from glsk_o3d import Cloud, Filter
+from glsk_o3d.parameters import documented
 from glsk_o3d.interop.clouds import cloud_points
 
 
@@ -35,13 +34,10 @@ from glsk_o3d.interop.clouds import cloud_points
 class Saboteur(Filter):
     """Harm."""
 
-    consumes: ClassVar[str] = "cloud"
-    produces: ClassVar[str] = "cloud"
-    seconds: float = parameter(0.0, "Wait for so long.", type="float", low=0)
-
+    consumes: ClassVar[type] = Cloud
+    produces: ClassVar[type] = Cloud
     def _run(self, cloud, watch):
         points = cloud_points(cloud)
-        time.sleep(self.seconds)
         order = int(points[0, 0]) // 1000 * 1000
         if order == 1000:
             os.kill(os.getpid(), signal.SIGKILL)
@@ -50,6 +46,11 @@ class Saboteur(Filter):
             os._exit(3)
         if order == 3000:
             raise ZeroDivisionError("a bug")
+        if order == 4000:
+            gate = Path(os.environ["GATE"])
+            (gate / str(os.getpid())).touch()
+            while not (gate / "open").exists():
+                time.sleep(0.01)
         return points
 '''
 
@@ -60,10 +61,33 @@ def saboteur(install, monkeypatch, tmp_path) -> Path:
     folder = install("glsk-saboteur", "1", SABOTEUR, "[glsk_o3d.filters]\nSaboteur = glsk_saboteur:Saboteur\n")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]))
     monkeypatch.setenv("ONCE", str(tmp_path / "once"))
+    monkeypatch.setenv("GATE", str(tmp_path / "gate"))
     stages = [{"filter": name} for name in ("Saboteur", "RingBuilder", "Contractor", "Connector", "Refiner")]
     recipe = tmp_path / "saboteur.json"
     recipe.write_text(json.dumps({"glsk_o3d": {"version": 1}, "pipeline": stages}))
     return recipe
+
+
+@pytest.fixture
+def gate(tmp_path, until):
+    """Where workers wait in the middle of a scan of the order 4000, until it opens."""
+
+    class Gate:
+        folder = tmp_path / "gate"
+
+        def waiting(self, *processes) -> set[int]:
+            """The workers that have come to it, once there are any."""
+            return until(lambda: {int(path.name) for path in self.folder.glob("[0-9]*")}, *processes)
+
+        def open(self):
+            (self.folder / "open").touch()
+
+        def forget(self):
+            for path in self.folder.iterdir():
+                path.unlink()
+
+    Gate.folder.mkdir()
+    return Gate()
 
 
 @pytest.fixture
@@ -127,17 +151,3 @@ def start(tmp_path):
     for process in begun:
         process.kill()
         process.communicate()
-
-
-@pytest.fixture
-def until():
-    """Wait until something is true."""
-
-    def wait(condition, seconds=30.0):
-        end = time.monotonic() + seconds
-        while not (found := condition()):
-            assert time.monotonic() < end, "waited in vain"
-            time.sleep(0.02)
-        return found
-
-    return wait

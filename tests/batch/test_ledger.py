@@ -98,14 +98,16 @@ def test_the_lock(tmp_path):
 
 def test_the_lock_dies_with_its_owner(tmp_path):
     code = """
-import sys, time
+import sys
 from pathlib import Path
 from glsk_o3d.batch.ledger import locked
 with locked(Path(sys.argv[1])):
     print("mine", flush=True)
-    time.sleep(60)
+    sys.stdin.read()
 """
-    owner = subprocess.Popen([sys.executable, "-c", code, tmp_path], stdout=subprocess.PIPE, text=True)
+    owner = subprocess.Popen(
+        [sys.executable, "-c", code, tmp_path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
     assert owner.stdout.readline() == "mine\n"
     with pytest.raises(BatchError, match=f"process {owner.pid} on"), locked(tmp_path):
         pytest.fail("two hold it")

@@ -4,17 +4,15 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import psutil  # comes with distributed
 import pytest
 
-from glsk_o3d import BatchError, load_recipe
+from glsk_o3d import BatchError
 from glsk_o3d.batch import run_batch
 from glsk_o3d.batch.run import WORKER_DIED
 from glsk_o3d.batch.workers import GivenWorkers, LocalWorkers
-from glsk_o3d.cli.overrides import override
 
 
 def test_workers_compute_in_one_thread_and_ignore_ctrl_c(monkeypatch):
@@ -52,7 +50,7 @@ def test_a_script_without_a_guard_blames_no_scan(tmp_path, write):
     write(tmp_path / "in" / "a.ply")
     script = tmp_path / "script.py"
     script.write_text("from glsk_o3d.batch import run_batch\nrun_batch('in', 'out', workers=1)\n")
-    run = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    run = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 1
     assert "BatchError: worker processes die before they begin; stderr may say why" in run.stderr
     assert (tmp_path / "out" / "ledger.jsonl").read_text() == ""
@@ -73,59 +71,67 @@ def finished(out):
 
 
 @pytest.fixture
-def slow(saboteur, write, tmp_path):
-    """Six scans that take some time each, and the words that run them."""
+def six(saboteur, write, tmp_path):
+    """Six scans of which the third waits at the gate, and the words that run them."""
     for i in range(6):
-        write(tmp_path / "in" / f"{i}.ply", seed=i)
-    return "in", "-o", "out", "--recipe", saboteur, "--set", "Saboteur.seconds=0.3", "--workers", "1"
+        write(tmp_path / "in" / f"{i}.ply", seed=i, order=4000 * (i == 2))
+    return "in", "-o", "out", "--recipe", saboteur, "--workers", "1"
 
 
-def test_ctrl_c_and_on_again(start, until, slow, saboteur, rows, tmp_path):
-    out = tmp_path / "out"
-    run = start(*slow)
-    until(lambda: finished(out) >= 2)
+def ctrl_c(run):
     os.killpg(run.pid, signal.SIGINT)
-    _, said = run.communicate(timeout=30)
-    assert run.returncode == 130, said
-    assert "finishing what is in work (1), nothing else" in said
+
+
+def told_of(run, words):
+    """What a process says up to the line with these words."""
+    said = ""
+    for line in run.stderr:
+        said += line
+        if words in line:
+            return said
+    pytest.fail(f"ended without a word of it: {said}")
+
+
+def test_ctrl_c_and_on_again(start, gate, six, saboteur, rows, tmp_path):
+    out = tmp_path / "out"
+    run = start(*six)
+    gate.waiting(run)
+    assert finished(out) == 2
+    ctrl_c(run)
+    told_of(run, "finishing what is in work (1), nothing else")
+    gate.open()
+    said = run.stderr.read()
+    assert run.wait() == 130, said
     assert said.splitlines()[-1] == "glsk: error: interrupted; no file is half-written"
     first = rows(out)
-    assert 2 <= len(first) < 6
-    pipeline = override(load_recipe(saboteur), ["Saboteur.seconds=0.3"])
+    assert sorted(first) == ["0", "1", "2"]
     with ThreadPoolExecutor(1) as pool:
-        result = run_batch(tmp_path / "in", out, pipeline=pipeline, executor=pool)
-    assert (result.done, result.skipped) == (6 - len(first), len(first))
+        result = run_batch(tmp_path / "in", out, pipeline=saboteur, executor=pool)
+    assert (result.done, result.skipped) == (3, 3)
     again = rows(out)
     assert len(again) == 6
     assert {name: again[name] for name in first} == first  # not done twice
 
 
-def test_ctrl_c_twice_and_a_batch_that_is_killed_leave_no_worker(start, until, slow, rows, tmp_path):
+def test_ctrl_c_twice_and_a_batch_that_is_killed_leave_no_worker(start, until, gate, six, rows, tmp_path):
     out = tmp_path / "out"
-    slow = [word.replace("0.3", "60") if isinstance(word, str) else word for word in slow]
 
-    def workers(run):
-        return [child for child in psutil.Process(run.pid).children() if "spawn_main" in str(child.cmdline())]
+    def gone(worker):
+        return not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE  # nobody has asked after it
 
-    def gone(child):
-        return not child.is_running() or child.status() == psutil.STATUS_ZOMBIE  # nobody has asked after it
-
-    run = start(*slow)
-    [worker] = until(lambda: workers(run))
-    time.sleep(1)
-    begun = time.monotonic()
-    os.killpg(run.pid, signal.SIGINT)
-    time.sleep(0.3)
-    os.killpg(run.pid, signal.SIGINT)
-    _, said = run.communicate(timeout=20)
-    assert run.returncode == 130, said
-    assert time.monotonic() - begun < 15
+    run = start(*six)
+    [worker] = map(psutil.Process, gate.waiting(run))
+    ctrl_c(run)
+    told_of(run, "Ctrl-C again stops at once")
+    ctrl_c(run)
+    said = run.stderr.read()  # to its end, although the gate never opens
+    assert run.wait() == 130, said
     until(lambda: gone(worker))
-    assert rows(out) == {}
+    assert sorted(rows(out)) == ["0", "1"]
 
-    run = start(*slow)
-    [worker] = until(lambda: workers(run))
-    time.sleep(1)
+    gate.forget()
+    run = start(*six)
+    [worker] = map(psutil.Process, gate.waiting(run))
     run.kill()
     until(lambda: gone(worker))
-    assert rows(out) == {}
+    assert sorted(rows(out)) == ["0", "1"]

@@ -51,7 +51,6 @@ def glsk(tmp_path):
             cwd=tmp_path,
             capture_output=True,
             text=True,
-            timeout=60,
             env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
             **options,
         )

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glsk_o3d import Connector, Contractor, Filter, LPRReducer, Pipeline, Refiner, RingBuilder
+from glsk_o3d import Cloud, Connector, Contractor, Filter, LPRReducer, Pipeline, Refiner, RingBuilder, Skeleton
 from glsk_o3d.interop.clouds import cloud_points
 from glsk_o3d.parameters import Parameters, documented, parameter, resolve_length
 
@@ -17,8 +17,8 @@ from glsk_o3d.parameters import Parameters, documented, parameter, resolve_lengt
 class Voxel(Filter):
     """Replace the points in every cell of a grid by their mean."""
 
-    consumes: ClassVar[str] = "cloud"
-    produces: ClassVar[str] = "cloud"
+    consumes: ClassVar[type] = Cloud
+    produces: ClassVar[type] = Cloud
 
     size: float | str = parameter(
         "2%", "Side of a cell.", type="length", unit="cloud's units, or % of the diagonal", low=0, open_low=True
@@ -38,8 +38,8 @@ class Voxel(Filter):
 class RadiusFloor(Filter):
     """Let no radius be less than a share of the median radius."""
 
-    consumes: ClassVar[str] = "Skeleton"
-    produces: ClassVar[str] = "Skeleton"
+    consumes: ClassVar[type] = Skeleton
+    produces: ClassVar[type] = Skeleton
 
     share: float = parameter(0.5, "Least radius over the median radius.", type="float", low=0)
 

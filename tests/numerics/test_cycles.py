@@ -47,7 +47,7 @@ def weighted(graph, rng, whole=False):
     return graph
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(1, 14), st.floats(0.05, 0.9), st.integers(0, 10**6), st.booleans())
 def test_random_graphs(n, density, seed, whole):
     graph = weighted(nx.gnp_random_graph(n, density, seed=seed), np.random.default_rng(seed), whole)
@@ -65,7 +65,7 @@ def parallel_chains(rng):
     return graph
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 10**6))
 def test_chains_trees_rings_and_components(seed):
     rng = np.random.default_rng(seed)

@@ -238,7 +238,7 @@ WHOLE = st.integers(-4, 4)
 NEIGHBOURHOOD = st.lists(st.tuples(WHOLE, WHOLE, st.booleans() | st.just(True)), min_size=1, max_size=14)
 
 
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=1500)
 @given(NEIGHBOURHOOD)
 def test_against_exact_arithmetic(rows):
     offsets, valid = [row[:2] for row in rows], [row[2] for row in rows]
@@ -270,7 +270,7 @@ def test_grids_that_are_hardly_disturbed(jitter):
         assert turned([offsets[j] for j in ring]) == turned(expected)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.lists(st.tuples(*2 * [st.floats(-1.6, 1.6, allow_subnormal=False)]), min_size=1, max_size=12))
 def test_any_numbers_give_a_proper_ring(offsets):
     offsets = np.array(offsets)

@@ -59,7 +59,7 @@ def test_balls_cover_and_centres_keep_apart(name, points):
     np.testing.assert_array_equal(owner[samples], np.arange(len(samples)))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(arrays(float, st.tuples(st.integers(1, 30), st.just(3)), elements=st.integers(-3, 3)), st.data())
 def test_every_point_lies_in_the_ball_of_its_sample(points, data):
     radius = data.draw(arrays(float, len(points), elements=st.sampled_from([0.25, 0.5, 1.0, 2.0, 3.0])))

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from glsk_o3d.numerics.groups import group_median, group_sum
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.tuples(st.integers(0, 6), st.floats(-1e3, 1e3)), max_size=40))
 def test_median_against_a_loop(rows):
     group, values = np.array([g for g, _ in rows], int), np.array([v for _, v in rows], float)

@@ -156,7 +156,7 @@ def test_rename_merges_neighbours_that_fall_together(row, index, expected, close
 RING = st.lists(st.integers(0, 5), max_size=8, unique=True)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(
     st.lists(st.tuples(RING, st.booleans()), min_size=1, max_size=5), st.lists(st.sampled_from(range(6)), max_size=3)
 )

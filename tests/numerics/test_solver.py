@@ -145,7 +145,7 @@ def test_error_estimates_the_error():
 def test_refuses_what_has_no_trustworthy_solution(spoil):
     laplacian, points, _ = small_system("torus")
     system = spoil(laplacian, np.full(len(points), 5.0), np.ones(len(points)), points)
-    with pytest.raises(SolveError, match=r"singular|factorised|ill-conditioned"):
+    with pytest.raises(SolveError):
         solve_contraction(*system)
 
 

@@ -40,7 +40,7 @@ def thread(noise=0.2, n=400):
 # ---- how far they are noise
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 10**6), st.integers(1, 30), st.integers(1, 9))
 def test_noise_share_by_its_definition(seed, n, k):
     rng = np.random.default_rng(seed)

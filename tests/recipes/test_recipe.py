@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import glsk_o3d as glsk
 from glsk_o3d import (
     Connector,
+    Contraction,
     Contractor,
     ExplainedScore,
     InvalidParameterError,
@@ -30,7 +31,7 @@ from glsk_o3d import (
     save_recipe,
     skeletonize,
 )
-from glsk_o3d.pipeline import Filter, recipe_of
+from glsk_o3d.pipeline import Filter, after, recipe_of, with_stage
 from glsk_o3d.recipes import from_recipe, to_recipe
 from glsk_o3d.recipes.catalogue import BUILTIN
 from glsk_o3d.report import Report
@@ -158,114 +159,107 @@ def test_extends(tmp_path):
 # ---- refused
 
 GOOD = {"filter": "RingBuilder"}
+# Where it is wrong, and the words that help.
 WRONG = {
-    'glsk_o3d.version: is missing; a recipe is a table such as {"glsk_o3d": {"version": 1}, "pipeline": [...]}': {
-        "pipeline": [GOOD]
-    },
-    "glsk_o3d.version: is 2 and this release reads 1: update glsk-o3d": {
+    ("glsk_o3d.version", '{"glsk_o3d": {"version": 1}, "pipeline": [...]}'): {"pipeline": [GOOD]},
+    ("glsk_o3d.version", "update"): {
         "glsk_o3d": {"version": 2},
         "stages": "of whatever shape",
     },
-    "glsk_o3d.extra: there is only 'version' in this table": {
+    ("glsk_o3d.extra", "'version'"): {
         "glsk_o3d": {"version": 1, "extra": 4},
         "pipeline": [GOOD],
     },
-    "glsk_o3d.version: must be 1, not '1'": {"glsk_o3d": {"version": "1"}, "pipeline": [GOOD]},
-    "a recipe is a table such as "
-    '{"glsk_o3d": {"version": 1}, "pipeline": [...]}, not [{\'filter\': \'RingBuilder\'}]': [GOOD],
-    "piepline: no key of a recipe is called 'piepline': did you mean 'pipeline'?": {**HEAD, "piepline": [GOOD]},
-    "a recipe has either 'pipeline' or 'extends', and this one lacks both": HEAD,
-    "a recipe has either 'pipeline' or 'extends', and this one has both": {
+    ("glsk_o3d.version", "'1'"): {"glsk_o3d": {"version": "1"}, "pipeline": [GOOD]},
+    ("", "not [{'filter': 'RingBuilder'}]"): [GOOD],
+    ("piepline", "'pipeline'"): {**HEAD, "piepline": [GOOD]},
+    ("", "lacks both"): HEAD,
+    ("", "has both"): {
         **HEAD,
         "pipeline": [GOOD],
         "extends": "default",
     },
-    "pipeline: must be a list of at least one stage, not []": {**HEAD, "pipeline": []},
-    "pipeline: must be a list of at least one stage, not {'filter': 'RingBuilder'}": {**HEAD, "pipeline": GOOD},
-    "pipeline[1]: must be a table such as {\"filter\": NAME, ...}, not 'Contractor'": {
+    ("pipeline", "[]"): {**HEAD, "pipeline": []},
+    ("pipeline", "list"): {**HEAD, "pipeline": GOOD},
+    ("pipeline[1]", '{"filter": NAME, ...}'): {
         **HEAD,
         "pipeline": [GOOD, "Contractor"],
     },
-    "pipeline[1].filter: no filter is called 'Contracter': did you mean 'Contractor'? "
-    "(or install the plugin that it is from)": {
+    ("pipeline[1].filter", "'Contractor'"): {
         **HEAD,
         "pipeline": [GOOD, {"filter": "Contracter"}],
     },
-    "pipeline[0].filter: no filter is called 'ExplainedScore': "
-    "there are RingBuilder, Contractor, LPRReducer, Connector, Refiner": {
+    ("pipeline[0].filter", "there are RingBuilder, Contractor, LPRReducer, Connector, Refiner"): {
         **HEAD,
         "pipeline": [{"filter": "ExplainedScore"}],
     },
-    "pipeline[0].kk: no parameter of RingBuilder is called 'kk': did you mean 'k'?": {
+    ("pipeline[0].kk", "'k'"): {
         **HEAD,
         "pipeline": [{"filter": "RingBuilder", "kk": 20}],
     },
-    "pipeline[0].k: must be an int, or 'auto', or 'published', not 7.5": {
+    ("pipeline[0].k", "7.5"): {
         **HEAD,
         "pipeline": [{"filter": "RingBuilder", "k": 7.5}],
     },
-    "pipeline[0].drop_invalid: must be True or False, not 'yes'": {
+    ("pipeline[0].drop_invalid", "'yes'"): {
         **HEAD,
         "pipeline": [{"filter": "RingBuilder", "drop_invalid": "yes"}],
     },
-    "pipeline[0].frame: must be one of 'spread', 'box', not ['box']": {
+    ("pipeline[0].frame", "'spread', 'box'"): {
         **HEAD,
         "pipeline": [{"filter": "RingBuilder", "frame": ["box"]}],
     },
-    "pipeline[0].radius: a percentage of the diagonal lies above 0% and up to 100%, not '200%'": {
+    ("pipeline[0].radius", "100%"): {
         **HEAD,
         "pipeline": [{"filter": "Connector", "radius": "200%"}],
     },
-    "pipeline[0].outlier_factor: must be finite, not nan": {
+    ("pipeline[0].outlier_factor", "nan"): {
         **HEAD,
         "pipeline": [{"filter": "RingBuilder", "outlier_factor": float("nan")}],
     },
-    "pipeline[1].reducer.phi: must be above 0, not -1": {
+    ("pipeline[1].reducer.phi", "above 0"): {
         **HEAD,
         "pipeline": [GOOD, {"filter": "Contractor", "reducer": {"filter": "LPRReducer", "phi": -1}}],
     },
-    "pipeline[0].reducer.filter: no reducer is called 'Refiner': there are Contractor, LPRReducer": {
+    ("pipeline[0].reducer.filter", "there are Contractor, LPRReducer"): {
         **HEAD,
         "pipeline": [{"filter": "Contractor", "reducer": {"filter": "Refiner"}}],
     },
-    "pipeline[0].stop: must be a table such as {\"rule\": NAME, ...}, not {'filter': 'RingSizeRatio'}": {
+    ("pipeline[0].stop", '{"rule": NAME, ...}'): {
         **HEAD,
         "pipeline": [{"filter": "Contractor", "stop": {"filter": "RingSizeRatio"}}],
     },
-    "pipeline[0].stop.rule: no stopping rule is called 'RingRatio': did you mean 'RingSizeRatio'? "
-    "(or install the plugin that it is from)": {
+    ("pipeline[0].stop.rule", "'RingSizeRatio'"): {
         **HEAD,
         "pipeline": [{"filter": "Contractor", "stop": {"rule": "RingRatio"}}],
     },
-    "pipeline: Connector takes a Contraction but Connector gives a Skeleton: "
-    "the order is RingBuilder | Contractor | Connector | Refiner": {
+    ("pipeline", "RingBuilder | Contractor | Connector | Refiner"): {
         **HEAD,
         "pipeline": [{"filter": "Connector"}, {"filter": "Connector"}],
     },
-    "pipeline[0].reducer: a recipe cannot hold it: a function": {
+    ("pipeline[0].reducer", "a function"): {
         **HEAD,
         "pipeline": [{"filter": "Contractor", "reducer": {"unwritten": "a function"}}],
     },
-    "extends: no pipeline is called 'best': there are default, wen2024, cao2010": {**HEAD, "extends": "best"},
-    "set: changes the pipeline that 'extends' names, and there is no 'extends'": {
+    ("extends", "default, wen2024, cao2010"): {**HEAD, "extends": "best"},
+    ("set", "'extends'"): {
         **HEAD,
         "pipeline": [GOOD],
         "set": {},
     },
-    "set.Connecter: no filter or rule is called 'Connecter': did you mean 'Connector'?": {
+    ("set.Connecter", "'Connector'"): {
         **HEAD,
         "extends": "default",
         "set": {"Connecter": {"radius": 1}},
     },
-    "set.Connector.radios: no parameter of Connector is called 'radios': did you mean 'radius'?": {
+    ("set.Connector.radios", "'radius'"): {
         **HEAD,
         "extends": "default",
         "set": {"Connector": {"radios": 1}},
     },
-    "set.Connector: must be a table of parameters, not 5": {**HEAD, "extends": "default", "set": {"Connector": 5}},
-    "set: must be a table of filters, not 5": {**HEAD, "extends": "default", "set": 5},
-    "set.LPRReducer: it is not in the pipeline 'cao2010', which has "
-    "RingBuilder, Contractor, RingSizeRatio, Connector, Refiner": {
+    ("set.Connector", "5"): {**HEAD, "extends": "default", "set": {"Connector": 5}},
+    ("set", "5"): {**HEAD, "extends": "default", "set": 5},
+    ("set", "LPRReducer.phi: "): {
         **HEAD,
         "extends": "cao2010",
         "set": {"LPRReducer": {"phi": 1}},
@@ -275,39 +269,41 @@ WRONG = {
 
 @pytest.mark.parametrize(("message", "recipe"), WRONG.items(), ids=range(len(WRONG)))
 def test_wrong_recipes(tmp_path, message, recipe):
+    place, words = message
     with pytest.raises(RecipeError) as raised:
         from_recipe(recipe)
-    assert str(raised.value) == message
+    assert str(raised.value).startswith(f"{place}: " if place else "")
+    assert words in str(raised.value)
     path = tmp_path / "r.json"
     path.write_text(json.dumps(recipe))
-    with pytest.raises(RecipeError) as raised:
+    with pytest.raises(RecipeError) as in_file:
         skeletonize(POINTS, path)
-    assert str(raised.value) == f"{path}: {message}"
+    assert str(in_file.value) == f"{path}: {raised.value}"
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "message"),
+    ("name", "content", "words"),
     [
         (
             "r.json",
             b'{"glsk_o3d": {"version": 1},\n "pipeline": [}',
-            "not valid JSON: Expecting value: line 2 column",
+            "JSON.* line 2",
         ),
-        ("r.json", b"", "not valid JSON: Expecting value: line 1 column 1"),
-        ("r.json", b'{"a": 1, "b": {"k": 1, "k": 2}}', "not valid JSON: the key 'k' stands twice in one table"),
-        ("r.json", b"\xff\xfe", "not valid JSON: 'utf-8' codec can't decode byte 0xff"),
-        ("r.json", b"[" * 100_000, "not valid JSON: "),
+        ("r.json", b"", "JSON.* line 1"),
+        ("r.json", b'{"a": 1, "b": {"k": 1, "k": 2}}', "'k'"),
+        ("r.json", b"\xff\xfe", "JSON"),
+        ("r.json", b"[" * 100_000, "JSON"),
         ("r.json", b'{"a":' * 600 + b"1" + b"}" * 600, ""),
-        ("r.toml", b"[glsk_o3d]\nversion = ", "not valid TOML: "),
-        ("r.toml", b"[glsk_o3d]\nversion = 1\nversion = 1", "not valid TOML: Cannot overwrite a value"),
-        ("r.toml", b"", "glsk_o3d.version: is missing"),
-        ("r.yaml", b"glsk_o3d:", "unknown ending; recipes are .json or .toml files"),
+        ("r.toml", b"[glsk_o3d]\nversion = ", "TOML"),
+        ("r.toml", b"[glsk_o3d]\nversion = 1\nversion = 1", "TOML"),
+        ("r.toml", b"", "glsk_o3d.version"),
+        ("r.yaml", b"glsk_o3d:", ".json or .toml"),
     ],
 )
-def test_files_that_are_no_recipes(tmp_path, name, content, message):
+def test_files_that_are_no_recipes(tmp_path, name, content, words):
     path = tmp_path / name
     path.write_bytes(content)
-    with pytest.raises(RecipeError, match=re.escape(f"{path}: {message}")):
+    with pytest.raises(RecipeError, match=f"^{re.escape(str(path))}: .*{words}"):
         load_recipe(path)
 
 
@@ -321,9 +317,9 @@ def test_files_that_are_not_there(tmp_path):
         load_recipe(tmp_path / "none.json")
     with pytest.raises(FileNotFoundError):
         skeletonize(POINTS, "none.json")
-    with pytest.raises(RecipeError, match=r"none: unknown ending"):
+    with pytest.raises(RecipeError, match=r"none.*\.json"):
         skeletonize(POINTS, tmp_path / "none")  # a path is never a name
-    with pytest.raises(FileNotFoundError, match="no such folder"):
+    with pytest.raises(FileNotFoundError):
         save_recipe(pipelines.default(), tmp_path / "no" / "r.json")
 
 
@@ -333,7 +329,7 @@ def thin(state):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Homemade(Filter):
-    consumes = produces = "Contraction"
+    consumes = produces = Contraction
 
     def _run(self, state, watch):
         return state
@@ -343,33 +339,56 @@ def never(iterations):
     return None
 
 
-UNWRITABLE = [
-    (Contractor(reducer=thin), r"pipeline\[1\]\.reducer: .*\.thin is no number, word, filter or rule"),
-    (Contractor(reducer=Homemade()), r"pipeline\[1\]\.reducer: .*\.Homemade is not among the filters and rules"),
-    (Contractor(stop=never), r"pipeline\[1\]\.stop: .*\.never is no number, word, filter or rule"),
-    (Homemade(), r"pipeline\[1\]: .*\.Homemade is not among the filters and rules"),
-]
+UNWRITABLE = {
+    "reducer": (Contractor(reducer=thin), "pipeline[1].reducer", "thin", "unwritten"),
+    "rule": (Contractor(stop=never), "pipeline[1].stop", "never", "unwritten"),
+    "filter inside": (Contractor(reducer=Homemade()), "pipeline[1].reducer", "Homemade", "from"),
+    "stage": (Homemade(), "pipeline[1]", "Homemade", "from"),
+}
 
 
-@pytest.mark.parametrize(("stage", "message"), UNWRITABLE, ids=["function", "filter", "rule", "stage"])
+@pytest.mark.parametrize(("stage", "place", "name", "key"), UNWRITABLE.values(), ids=UNWRITABLE)
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
-def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, message):
-    message = message.replace(": ", ": a recipe cannot hold it: ", 1)
+def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, place, name, key):
     pipeline = RingBuilder() | stage | Connector() | Refiner()
-    with pytest.raises(RecipeError, match=f"^{message}"):
+    with pytest.raises(RecipeError, match=rf"^{re.escape(place)}: .*\.{name}"):
         save_recipe(pipeline, tmp_path / "r.json")
     assert list(tmp_path.iterdir()) == []
     skeleton = pipeline(POINTS)
     skeleton.save(tmp_path / "s.json")
-    report = glsk.read_skeleton(tmp_path / "s.json").report
-    assert report.recipe == skeleton.report.recipe
-    assert "unwritten" in json.dumps(report.recipe)
-    with pytest.raises(RecipeError, match=f"^{message}"):
+    recipe = glsk.read_skeleton(tmp_path / "s.json").report.recipe
+    assert recipe == skeleton.report.recipe
+    table = recipe["pipeline"][1]
+    for field in place.split(".")[1:]:
+        table = table[field]
+    assert key in table
+    with pytest.raises(RecipeError, match=rf"^{re.escape(place)}.*{name}"):
         rerun(skeleton)
 
 
+def test_a_class_of_another_module_is_named_with_it():
+    """So that who lacks the plugin knows it, and a namesake is not taken for it."""
+    recipe = recipe_of(Homemade().table())
+    assert recipe["pipeline"] == [{"filter": "Homemade", "from": __name__}]
+    with pytest.raises(RecipeError, match=re.escape(f"install {__name__}")):
+        from_recipe(recipe)
+    for module, right in (("glsk_o3d.lpr_reducer", True), (__name__, False)):
+        recipe = recipe_of({"filter": "LPRReducer", "from": module})
+        if right:
+            assert from_recipe(recipe) == Pipeline(LPRReducer())
+        else:
+            with pytest.raises(RecipeError, match=rf"^pipeline\[0\]\.from: .*{re.escape(module)}"):
+                from_recipe(recipe)
+
+
+def test_a_namesake_is_not_written():
+    namesake = dataclasses.make_dataclass("Refiner", [], bases=(Homemade,), frozen=True, kw_only=True)
+    with pytest.raises(RecipeError, match=r"^pipeline\[0\]: .*Refiner"):
+        to_recipe(Pipeline(namesake()))
+
+
 def test_a_wrong_parameter_is_not_written(tmp_path):
-    with pytest.raises(InvalidParameterError, match=r"RingBuilder\.k = 1"):
+    with pytest.raises(InvalidParameterError, match=r"RingBuilder\.k"):
         save_recipe(Pipeline(RingBuilder(k=1)), tmp_path / "r.json")
     assert list(tmp_path.iterdir()) == []
 
@@ -432,7 +451,7 @@ def test_a_run_that_the_caller_stopped_cannot_be_repeated():
     pipeline = RingBuilder() | Contractor(max_iterations=1) | Contractor() | Connector()
     stopped = skeletonize(POINTS, pipeline, on_iteration=lambda record: record.iteration < 3)
     assert [("unwritten" in stage) for stage in stopped.report.recipe["pipeline"]] == [False, False, True, True]
-    with pytest.raises(RecipeError, match=r"^pipeline\[2\]: .* stopped by the caller after solve 3$"):
+    with pytest.raises(RecipeError, match=r"^pipeline\[2\]: .*solve 3"):
         rerun(stopped)
     whole = skeletonize(POINTS, pipeline, on_iteration=lambda record: None)
     assert whole.report.recipe == to_recipe(pipeline)
@@ -451,7 +470,7 @@ def test_a_result_that_others_made_differs():
     moved = dataclasses.replace(
         skeleton, vertices=skeleton.vertices + 1e-15, report=dataclasses.replace(skeleton.report, versions=old)
     )
-    with pytest.warns(SkeletonWarning, match=f"^the rerun differs .* made with numpy 1.0 instead of {np.__version__}$"):
+    with pytest.warns(SkeletonWarning, match=f"numpy 1.0 .*{np.__version__}"):
         rerun(moved)
 
 
@@ -463,10 +482,10 @@ def test_old_results_load_but_have_no_recipe(tmp_path):
     old = glsk.read_skeleton(tmp_path / "old.json")
     assert old.report.stages
     assert old.report.recipe == {}
-    with pytest.raises(RecipeError, match=r"^it holds no recipe"):
+    with pytest.raises(RecipeError):
         rerun(old)
     old.save(tmp_path / "s.ply")
-    with pytest.raises(RecipeError, match=r"^it holds no recipe"):
+    with pytest.raises(RecipeError):
         rerun(glsk.read_skeleton(tmp_path / "s.ply"))
 
 
@@ -475,13 +494,13 @@ def test_results_that_do_not_start_from_a_cloud(tmp_path):
     refined = Refiner(recentre=0, spacing=0, spur=0, opening=0, weak_loop_bonds=0, weak_loop_opening=0)(
         glsk.read_skeleton(tmp_path / "s.ply")
     )
-    with pytest.raises(RecipeError, match=r"^pipeline: Refiner\(.* does not lead from a cloud to a skeleton$"):
+    with pytest.raises(RecipeError):
         rerun(refined)
 
 
 def test_results_without_their_points():
     skeleton = dataclasses.replace(skeletonize(POINTS), points=np.empty((0, 3)))
-    with pytest.raises(RecipeError, match=r"^it holds no points: give the scan$"):
+    with pytest.raises(RecipeError, match="scan"):
         rerun(skeleton)
     assert len(rerun(skeleton, POINTS).vertices) == len(skeleton.vertices)
 
@@ -493,8 +512,8 @@ def test_a_report_with_a_malformed_recipe(recipe):
 
 
 def test_reports_ahead_add_up():
-    ahead = Report().with_stage(RingBuilder(), 1.0)
-    report = Report(n_input=3).with_stage(RingBuilder(k=9), 0.5).with_stage(Refiner(), 0.25).after(ahead)
+    ahead = with_stage(Report(), RingBuilder(), 1.0)
+    report = after(with_stage(with_stage(Report(n_input=3), RingBuilder(k=9), 0.5), Refiner(), 0.25), ahead)
     assert report.stages == tuple(map(repr, (RingBuilder(), RingBuilder(k=9), Refiner())))
     assert report.seconds == {"RingBuilder": 1.5, "Refiner": 0.25}
     assert report.recipe == recipe_of(*(stage.table() for stage in (RingBuilder(), RingBuilder(k=9), Refiner())))

@@ -384,7 +384,7 @@ def test_vertices_between_points_bridge_them():
     assert confidence[~middle].max() > 0.9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(1, 9), st.floats(0.2, 1.5), st.integers(0, 4), st.booleans(), st.booleans())
 def test_is_finite_and_in_bounds_whatever_the_graph(random_skeleton, seed, m, reach, passes, every, together):
     raw = random_skeleton(seed, m, reach, n=max(20, m), every=every)
@@ -415,7 +415,7 @@ def test_all_in_one_place():
 # ---- edges at vertices, places on edges
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(1, 9), st.sets(st.tuples(st.integers(0, 8), st.integers(0, 8)), max_size=20))
 def test_incident_edges_by_their_definition(m, pairs):
     edges = np.array(sorted((a, b) for a, b in pairs if a < b < m), int).reshape(-1, 2)
@@ -427,7 +427,7 @@ def test_incident_edges_by_their_definition(m, pairs):
         assert row == here + [-1] * (most - len(here))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(1, 6), st.integers(1, 4))
 def test_nearest_on_edges_against_dense_samples(seed, e, columns):
     rng = np.random.default_rng(seed)

@@ -185,7 +185,7 @@ def test_scattered_bars_have_bridges():
     assert np.mean([bridged(scattered(seed), GAP)[1] for seed in range(10)]) > 1
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10**6), st.integers(0, 99))
 def test_numbers_do_not_matter(seed, other):
     raw = scattered(seed)
@@ -200,7 +200,7 @@ def test_numbers_do_not_matter(seed, other):
     assert set(new_edges(renamed, again)) == named
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10**6), st.sampled_from([1e-9, 1.0, 1e9]))
 def test_goes_with_the_skeleton_and_keeps_a_forest(seed, scale):
     raw = scattered(seed)

@@ -50,7 +50,7 @@ def test_axis_of_half_a_tube_is_out_of_reach_but_not_far():
     np.testing.assert_allclose(moved, [0, 0, max(mean - CLAMP_REACH * spread, 0)], atol=1e-5)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(1, 8), st.booleans())
 def test_by_its_definition(random_skeleton, seed, m, every):
     raw = random_skeleton(seed, m, n=40, every=every)

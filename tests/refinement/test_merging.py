@@ -19,7 +19,7 @@ def test_support_counts_witnesses_and_is_at_least_one(ringed):
     assert support(skeleton).dtype == float
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 10**6), st.lists(st.integers(-3, 5), min_size=12, max_size=12), st.booleans())
 def test_by_its_definition(random_skeleton, seed, labels, every):
     raw, group = random_skeleton(seed, every=every), np.array(labels)

@@ -44,7 +44,7 @@ def test_tiny_radii_make_no_endless_subdivision():
     assert len(subdivide_edges(bar(5000, radii=(0, 0)), 0.5).edges) <= 1000
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 10**6), st.integers(1, 9), st.floats(0.2, 1.2), st.floats(0.3, 5))
 def test_topology_and_length_stay(random_skeleton, seed, m, reach, spacing):
     raw = random_skeleton(seed, m, reach, n=200)
@@ -59,7 +59,7 @@ def test_topology_and_length_stay(random_skeleton, seed, m, reach, spacing):
     np.testing.assert_array_equal(skeleton.edges, np.unique(skeleton.edges, axis=0))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 10**6), st.integers(2, 5))
 def test_points_go_to_the_nearest_sample_of_their_own_vertex(random_skeleton, seed, m):
     """Brute force: the vertex itself and the inner samples of its edges."""

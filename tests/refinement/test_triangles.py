@@ -37,7 +37,7 @@ def slow(skeleton):
     return members, position, links
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.integers(0, 10**6), st.integers(3, 25), st.floats(0.3, 1.2), st.booleans())
 def test_always_the_cheapest_edge(random_skeleton, seed, m, reach, every):
     raw = random_skeleton(seed, m, reach, every=every)
@@ -56,7 +56,7 @@ def test_always_the_cheapest_edge(random_skeleton, seed, m, reach, every):
     np.testing.assert_array_equal(skeleton.vertex_of_point, [vertex[v] for v in raw.vertex_of_point.tolist()])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 10**6), st.integers(3, 40), st.floats(0.3, 1.2))
 def test_what_is_left(random_skeleton, seed, m, reach):
     raw = random_skeleton(seed, m, reach, n=3 * m)

@@ -84,7 +84,7 @@ def slow_bonds(skeleton):
     return found
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 10**6), st.integers(2, 8), st.integers(4, 60))
 def test_bonds_by_their_definition(random_skeleton, seed, m, n):
     skeleton = random_skeleton(seed, m, n=max(n, m))
@@ -197,7 +197,7 @@ def slow_crossings(cycle, pairs, weight):
     return across
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(3, 12), st.integers(0, 5), st.integers(0, 40), st.integers(0, 10**6))
 def test_crossings_against_a_walk(n, others, count, seed):
     rng = np.random.default_rng(seed)
@@ -378,7 +378,7 @@ def test_cutting_what_two_loops_share_takes_one_edge(around, seed):
     assert cut in sorted_edges(name[empty].tolist())
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.integers(0, 10**6), st.integers(3, 9), st.floats(0.3, 1.0), st.booleans(),
     st.sampled_from([0, 0.03, 1.0, 100.0]), st.sampled_from([0, 0.65, 100.0]),
@@ -400,7 +400,7 @@ def test_never_tears_a_component_and_leaves_no_false_loop(random_skeleton, seed,
     assert bridges <= set(map(frozenset, skeleton.edges.tolist()))
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.integers(0, 10**6), st.integers(4, 9), st.floats(0.3, 1.0), st.sampled_from([1, 1e4]))
 def test_what_nothing_supports_becomes_a_forest(random_skeleton, seed, m, reach, size):
     raw = random_skeleton(seed, m, reach, n=4 * m)

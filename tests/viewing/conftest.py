@@ -22,7 +22,7 @@ def run():
 
 
 @pytest.fixture(scope="module")
-def launch():
+def launch(patience):
     """Start a headless Chromium with other flags than the usual ones."""
     names = (os.environ.get("GLSK_CHROMIUM", ""), "chromium", "chromium-browser", "google-chrome", "chrome")
     browser = next(filter(None, map(shutil.which, names)), None)
@@ -34,7 +34,7 @@ def launch():
 
         def start(*flags):
             flags = ("--no-sandbox", "--disable-background-networking", *flags)  # root may not have a sandbox
-            running.append(driver.chromium.launch(executable_path=browser, args=flags))
+            running.append(driver.chromium.launch(executable_path=browser, args=flags, timeout=1e3 * patience))
             return running[-1]
 
         yield start
@@ -48,7 +48,7 @@ def browser(launch):
 
 
 @pytest.fixture
-def look(browser):
+def look(browser, patience):
     """Open a page offline, in an empty profile of its own; it must not complain or ask for anything but itself."""
     contexts, trouble = [], []
 
@@ -56,6 +56,7 @@ def look(browser):
         context = within.new_context(
             viewport={"width": width, "height": height}, color_scheme=scheme, offline=True, **options
         )
+        context.set_default_timeout(1e3 * patience)
         contexts.append(context)
         page = context.new_page()
         page.on("console", lambda message: trouble.append(f"console: {message.text}"))

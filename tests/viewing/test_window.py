@@ -124,7 +124,7 @@ def test_on_a_screen(run, screen, tmp_path):
     (tmp_path / "look.py").write_text(LOOK)
     command = [sys.executable, "look.py", "s.json"]
     environment = {**os.environ, "DISPLAY": screen, "PYTHONPATH": os.pathsep.join(sys.path)}
-    told = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60)
+    told = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert told.returncode == 0, told.stderr
     first, tubes, again, cloud, nothing = map(int, told.stdout.splitlines()[-1].split())
     assert tubes != first == again > cloud > nothing == 1
