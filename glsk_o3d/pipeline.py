@@ -377,7 +377,7 @@ def _is_of(data: Any, flow: type) -> bool:
 
 
 def _named(flow: type) -> str:
-    return "cloud" if flow is Cloud else flow.__name__
+    return "cloud" if flow is Cloud else getattr(flow, "__name__", repr(flow))
 
 
 def _called(data: Any) -> str:
