@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .numerics.components import component_labels
 from .numerics.radii import witnesses
 from .numerics.vectors import norm
 from .report import Report
@@ -119,8 +120,6 @@ class Skeleton:
     @cached_property
     def component_of_vertex(self) -> np.ndarray:
         """Connected component of every vertex, (M,) int array."""
-        from .numerics.components import component_labels
-
         return component_labels(len(self.vertices), self.edges)
 
     @property

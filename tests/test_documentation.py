@@ -27,7 +27,7 @@ from glsk_o3d.recipes.catalogue import BUILTIN
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "_ext"))
-api, architecture, figures = (importlib.import_module(name) for name in ("api", "architecture", "figures"))
+api, figures = (importlib.import_module(name) for name in ("api", "figures"))
 sys.path.pop(0)
 
 PAGES = [
@@ -255,7 +255,7 @@ def test_the_pages_say_when_to_touch_each_option(cls):
     assert re.findall(r"^(\w+): .", notes, re.MULTILINE) == [field.name for field in dataclasses.fields(cls)]
 
 
-# -------------------------------------------------------------------------------------------- equations, diagram, links
+# --------------------------------------------------------------------------------------------------- equations, links
 
 
 def test_every_equation_has_a_number_of_its_own():
@@ -267,23 +267,6 @@ def test_every_equation_has_a_number_of_its_own():
             numbers.append(number)
     assert len(numbers) > 15
     assert len(set(numbers)) == len(numbers)
-
-
-def test_the_diagram_matches_the_imports():
-    assert architecture.upward() == set()
-    modules = {name for name in architecture.imports() if name != "__init__"}
-    assert {name for name in modules if architecture.box_of(name) is None} == set()
-    for row in architecture.ROWS:
-        for prefixes in row.values():
-            for prefix in prefixes:
-                assert any(name == prefix or name.startswith(f"{prefix}.") for name in modules)
-
-
-def test_numerics_knows_no_open3d():
-    for path in (ROOT / "glsk_o3d" / "numerics").glob("*.py"):
-        assert not re.search(r"^\s*(import|from) (open3d|matplotlib|networkx|\.\.)", path.read_text(), re.MULTILINE), (
-            path
-        )
 
 
 @pytest.mark.parametrize("path", [pytest.param(path, id=str(path.relative_to(ROOT))) for path in PAGES])
