@@ -18,6 +18,12 @@ class Cloud:
     """Anything that carries points: a name for what filters of clouds take and give, which has no instances.
 
     See `cloud_points` for what counts as one.
+
+    Examples
+    --------
+    >>> from glsk_o3d import RingBuilder
+    >>> RingBuilder.consumes is Cloud
+    True
     """
 
 
