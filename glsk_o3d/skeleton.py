@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
     from .analysis.branches import BranchTable
 
-Quantity = Literal["branch", "radius", "confidence"]
-Color = Quantity | Sequence[float] | np.ndarray
+Color = Literal["branch", "radius", "confidence"] | Sequence[float] | np.ndarray
 Root = int | Sequence[float] | np.ndarray | None
 
 
@@ -190,7 +189,7 @@ class Skeleton:
 
         return branch_table(self, root)
 
-    def annotate(self, cloud: Any = None, *, color: Quantity | None = None) -> Any:
+    def annotate(self, cloud: Any = None, *, color: Color | None = None) -> Any:
         """A copy of a cloud with the attributes ``skeleton_vertex``, ``branch`` and ``radius``.
 
         See `glsk_o3d.io.annotation.annotate`.

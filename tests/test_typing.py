@@ -52,7 +52,7 @@ skeleton.to_line_set("brnch")  # wrong
 skeleton.to_line_set(colour="branch")  # wrong
 skeleton.to_line_set().colours  # wrong
 skeleton.to_tubes(sides="8")  # wrong
-skeleton.annotate(color=(0, 0, 1))  # wrong
+skeleton.annotate(color="red")  # wrong
 skeleton.report.iterations[0].n_point  # wrong
 glsk.skeletonise(cloud)  # wrong
 glsk.skeletonize(cloud).vertexes  # wrong

@@ -20,9 +20,9 @@ ROWS = (
     {"analysis": ("analysis",), "recipes and plugins": ("recipes",)},
     {"named pipelines": ("pipelines",)},
     {"filters": ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "stopping")},
-    {"pipeline": ("pipeline",)},
+    {"refinement": ("refinement",), "pipeline": ("pipeline",)},
     {"what filters share": ("parameters", "state", "skeleton", "report")},
-    {"refinement": ("refinement",), "preparation": ("preparation",)},
+    {"preparation": ("preparation",)},
     {"numerics": ("numerics",), "Open3D's clouds": ("interop",), "samples": ("samples",)},
     {"errors": ("errors",)},
 )
@@ -30,7 +30,7 @@ ROWS = (
 
 ASIDE = {
     **dict.fromkeys(("cross-check", "pictures and windows", "files", "analysis", "refinement", "numerics"), -3.3),
-    **{"MeshLab": 3.3, "preparation": -0.7, "Open3D's clouds": 1.2, "samples": 3.7},
+    **{"MeshLab": 3.3, "preparation": -1.2, "Open3D's clouds": 1.2, "samples": 3.7},
 }
 """Where in the drawing the boxes are that are not in its middle."""
 
