@@ -189,7 +189,7 @@ class Skeleton:
 
         return branch_table(self, root)
 
-    def annotate(self, cloud: Any = None, *, color: Color | None = None) -> Any:
+    def annotate(self, cloud: Any = None, *, color: Literal["branch", "radius", "confidence"] | None = None) -> Any:
         """A copy of a cloud with the attributes ``skeleton_vertex``, ``branch`` and ``radius``.
 
         See `glsk_o3d.io.annotation.annotate`.
