@@ -34,7 +34,10 @@ root_doc = "docs/index"
 include_patterns = ["*.md", "docs/**", "benchmarks/README.md", "filters/README.md"]
 exclude_patterns = [".*", "build", "dist", "demo", "tests", "glsk_o3d", "examples", "docs/_*", "docs/gallery", "**/.*"]
 nitpicky = True
-nitpick_ignore = [("py:class", "pymeshlab.pmeshlab.MeshSet")]
+nitpick_ignore = [
+    ("py:class", "pymeshlab.pmeshlab.MeshSet"),
+    ("py:obj", "glsk_o3d.pipeline.Produced"),  # a type variable
+]
 default_role = "autolink"
 
 myst_enable_extensions = ["deflist", "dollarmath"]

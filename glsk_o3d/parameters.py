@@ -52,6 +52,8 @@ def parameter(
 def documented(cls: _Class) -> _Class:
     """Class decorator: append the numpydoc "Parameters" section made from the fields' own facts.
 
+    The docstrings of this package's own classes also say which page has all about the options.
+
     Parameters
     ----------
     cls : dataclass
@@ -71,6 +73,10 @@ def documented(cls: _Class) -> _Class:
         lines += [f"{field.name} : {kind}{unit}, default {field.default!r}", f"    {facts['doc']}"]
     if lines:
         text = inspect.cleandoc(cls.__doc__ or "")
+        if cls.__module__.startswith(f"{__package__}."):
+            page = f"docs/filters/{cls.__module__.rpartition('.')[2]}.md"
+            prose, *rest = re.split(r"(?=\n\n\w[\w ]*\n-{3,}\n)", text, maxsplit=1)
+            text = f"{prose}\n\nEvery option, and when to touch it: {page}.{''.join(rest)}"
         cls.__doc__ = f"{text}\n\nParameters\n----------\n" + "\n".join(lines) + "\n"
     return cls
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 import warnings as _warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -65,7 +66,7 @@ class IterationRecord:
     seconds: float
 
 
-def _known(cls, data: dict) -> dict:
+def _known(cls: type[Report] | type[IterationRecord], data: Mapping[str, Any]) -> dict[str, Any]:
     names = {field.name for field in dataclasses.fields(cls)}
     return {name: value for name, value in data.items() if name in names}
 
@@ -152,12 +153,12 @@ class Report:
             _warnings.warn(message, SkeletonWarning, stacklevel=outside())
         return dataclasses.replace(self, warnings=(*self.warnings, message))
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         """Plain dict of numbers, strings, lists and dicts, as saved in JSON."""
         return dataclasses.asdict(self)
 
     @classmethod
-    def from_dict(cls, data: dict) -> Report:
+    def from_dict(cls, data: Mapping[str, Any]) -> Report:
         """Inverse of `to_dict`; entries of a later version that this one does not know are passed over."""
         values = _known(cls, data)
         recipe = values.get("recipe", {})

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .numerics.components import component_labels
 from .numerics.radii import supporting_points
 from .numerics.vectors import norm
 from .report import Report
@@ -16,9 +18,13 @@ if TYPE_CHECKING:
     from os import PathLike
 
     import networkx
+    import open3d
+    import pymeshlab
 
     from .analysis.branches import BranchTable
     from .io.colors import ColorChoice
+
+Root = int | Sequence[float] | np.ndarray | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +74,7 @@ class Skeleton:
     report: Report = field(default_factory=Report)
     confidence: np.ndarray = field(default_factory=lambda: np.empty(0))
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         # steps that merge or add vertices pass on what was measured before them: it means nothing any more
         if len(self.confidence) != len(self.vertices):
             object.__setattr__(self, "confidence", np.full(len(self.vertices), np.nan))
@@ -85,7 +91,7 @@ class Skeleton:
             array = array.reshape(-1, columns) if columns else array.reshape(-1)
             object.__setattr__(self, name, array)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return (
             f"Skeleton({len(self.vertices)} vertices, {len(self.edges)} edges, {self.n_components} components, "
             f"{self.n_loops} loops, {len(self.leaves)} leaves, {len(self.junctions)} junctions)"
@@ -120,8 +126,6 @@ class Skeleton:
     @cached_property
     def component_of_vertex(self) -> np.ndarray:
         """Connected component of every vertex, (M,) int array."""
-        from .numerics.components import component_labels
-
         return component_labels(len(self.vertices), self.edges)
 
     @property
@@ -173,19 +177,19 @@ class Skeleton:
                 paths.append(np.array(path))
         return tuple(paths)
 
-    def segment(self, cloud=None) -> np.ndarray:
+    def segment(self, cloud: Any = None) -> np.ndarray:
         """Label every point with its branch, (N,) int64 array. See `glsk_o3d.analysis.segment`."""
         from .analysis.segmentation import segment
 
         return segment(self, cloud)
 
-    def branch_table(self, root=None) -> BranchTable:
+    def branch_table(self, root: Root = None) -> BranchTable:
         """One row of measures per branch. See `glsk_o3d.analysis.branch_table`."""
         from .analysis.branches import branch_table
 
         return branch_table(self, root)
 
-    def annotate(self, cloud=None, *, color: ColorChoice | None = None):
+    def annotate(self, cloud: Any = None, *, color: ColorChoice | None = None) -> Any:
         """A copy of a cloud with the attributes ``skeleton_vertex``, ``branch`` and ``radius``.
 
         See `glsk_o3d.io.annotation.annotate`.
@@ -194,7 +198,7 @@ class Skeleton:
 
         return annotate(self, cloud, color=color)
 
-    def to_networkx(self, root=None) -> networkx.Graph:
+    def to_networkx(self, root: Root = None) -> networkx.Graph:
         """Graph that carries everything that is known about the skeleton.
 
         Parameters
@@ -224,7 +228,7 @@ class Skeleton:
             graph.add_edge(a, b, length=length, branch=branch)
         return graph
 
-    def to_line_set(self, color=(0.85, 0.1, 0.1)):
+    def to_line_set(self, color: ColorChoice = (0.85, 0.1, 0.1)) -> open3d.geometry.LineSet:
         """The skeleton as an ``open3d.geometry.LineSet``.
 
         Parameters
@@ -236,7 +240,7 @@ class Skeleton:
 
         return to_line_set(self, color)
 
-    def to_tensor_line_set(self, color=None):
+    def to_tensor_line_set(self, color: ColorChoice | None = None) -> open3d.t.geometry.LineSet:
         """The skeleton as an ``open3d.t.geometry.LineSet`` with the point attributes ``radius`` and ``confidence``.
 
         Parameters
@@ -248,7 +252,9 @@ class Skeleton:
 
         return to_tensor_line_set(self, color)
 
-    def to_tubes(self, color="branch", *, radius: float | None = None, sides: int = 16):
+    def to_tubes(
+        self, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16
+    ) -> open3d.geometry.TriangleMesh:
         """The skeleton as tubes as thick as the object, an ``open3d.geometry.TriangleMesh``.
 
         See `glsk_o3d.io.tubes.to_tubes`.
@@ -257,14 +263,14 @@ class Skeleton:
 
         return to_tubes(self, color, radius=radius, sides=sides)
 
-    def to_pymeshlab(self):
+    def to_pymeshlab(self) -> pymeshlab.Mesh:
         """The skeleton as a ``pymeshlab.Mesh`` of vertices and edges (extra ``meshlab``)."""
         from .meshlab import to_pymeshlab
 
         return to_pymeshlab(self)
 
-    def save(self, path: str | PathLike, **options) -> None:
+    def save(self, path: str | PathLike[str], *, cut_loops: bool = False, format: str | None = None) -> None:
         """Write the skeleton to a file; the ending chooses the format. See `glsk_o3d.save_skeleton`."""
         from .io.skeletons import save_skeleton
 
-        save_skeleton(self, path, **options)
+        save_skeleton(self, path, cut_loops=cut_loops, format=format)

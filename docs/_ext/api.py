@@ -4,30 +4,51 @@ import importlib
 import inspect
 from pathlib import Path
 
+TASKS = {
+    "From a cloud to its skeleton": (
+        *("skeletonize", "Skeleton", "Report", "IterationRecord"),
+        "remove_redundant_points",
+    ),
+    "Filters and stopping rules": (
+        *("RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner"),
+        *("ExplainedScore", "RingSizeRatio"),
+    ),
+    "Pipelines, and what runs in them": ("Pipeline", "Filter", "Cloud", "Contraction"),
+    "Pipelines as files": ("to_recipe", "from_recipe", "save_recipe", "load_recipe", "rerun"),
+    "Reading and writing": ("read_cloud", "read_skeleton", "save_skeleton", "read_truth"),
+    "Looking": ("plot_skeleton", "save_preview", "save_report", "save_assessment", "ContractionRecorder"),
+    "In MeshLab's way": ("MeshSet",),
+    "Errors and warnings": (
+        *("GlskError", "BatchError", "DisplayError", "FileFormatError", "InvalidCloudError", "InvalidParameterError"),
+        *("MissingPackageError", "RecipeError", "ScriptError", "StageError", "PluginWarning", "SkeletonWarning"),
+    ),
+}
+"""The names of the package itself, by what they are for."""
 PACKAGES = {
     "glsk_o3d": "The package",
-    "glsk_o3d.analysis": "Analysis",
-    "glsk_o3d.batch": "Batches",
-}
-"""Packages that list their names."""
-MODULES = {
     "glsk_o3d.pipelines": "Named pipelines",
-    "glsk_o3d.parameters": "Making filters",
-    "glsk_o3d.recipes.catalogue": "What there is by name",
-    "glsk_o3d.recipes": "Recipes",
-    "glsk_o3d.recipes.plugins": "Plugins",
+    "glsk_o3d.analysis": "Analysis",
+    "glsk_o3d.crosscheck": "Cross-check",
+    "glsk_o3d.batch": "Batches",
     "glsk_o3d.samples": "Sample clouds",
+}
+"""What users import from."""
+MODULES = {
     "glsk_o3d.io.annotation": "Attributes on clouds",
     "glsk_o3d.io.tubes": "Tubes",
     "glsk_o3d.io.colors": "Colours",
+    "glsk_o3d.parameters": "Making filters",
     "glsk_o3d.interop.clouds": "What counts as a cloud",
+    "glsk_o3d.recipes": "Comparing runs",
+    "glsk_o3d.recipes.catalogue": "What there is by name",
+    "glsk_o3d.recipes.plugins": "Plugins",
     "glsk_o3d.meshlab.steps": "Filter scripts",
 }
-"""Modules whose functions and classes are all public but for those with an underscore."""
+"""What the package's own parts, and those who extend it, import from."""
 
 
 def names(module):
-    """The public names of a module or package, modules left out.
+    """The public functions and classes of a module: those in ``__all__``, or else all that it defines.
 
     Parameters
     ----------
@@ -37,13 +58,18 @@ def names(module):
     -------
     list of str
     """
+    if module == "glsk_o3d":
+        return [name for told in TASKS.values() for name in told]
     loaded = importlib.import_module(module)
-    if module in PACKAGES:
-        found = [*loaded.__all__, *(["MeshSet"] if module == "glsk_o3d" else [])]
-    else:
-        found = [name for name, thing in vars(loaded).items() if getattr(thing, "__module__", None) == module]
-    found = [name for name in found if not name.startswith("_")]
-    return sorted((name for name in found if not inspect.ismodule(getattr(loaded, name))), key=str.lower)
+    own = [name for name, thing in vars(loaded).items() if getattr(thing, "__module__", None) == module]
+    found = getattr(loaded, "__all__", [name for name in own if not name.startswith("_")])
+    return sorted((name for name in found if callable(getattr(loaded, name))), key=str.lower)
+
+
+def listed(module, names):
+    """Lines of a list of names with the first sentence of each, and for the menu."""
+    yield from (f".. currentmodule:: {module}", "", ".. autosummary::", "", *(f"   {name}" for name in names), "")
+    yield from (".. toctree::", "   :hidden:", "", *(f"   {module}.{name}" for name in names), "")
 
 
 def write(folder: Path) -> None:
@@ -53,9 +79,12 @@ def write(folder: Path) -> None:
     for module, title in {**PACKAGES, **MODULES}.items():
         loaded = importlib.import_module(module)
         new = [name for name in names(module) if done.setdefault(id(getattr(loaded, name)), module) == module]
-        index += [title, "-" * len(title), "", f".. automodule:: {module}", "", ".. autosummary::", ""]
-        index += [*(f"   {name}" for name in new), "", ".. toctree::", "   :hidden:", ""]
-        index += [*(f"   {module}.{name}" for name in new), ""]
+        index += [title, "-" * len(title), "", f".. automodule:: {module}", ""]
+        if module == "glsk_o3d":
+            for task, told in TASKS.items():
+                index += [task, "^" * len(task), "", *listed(module, told)]
+        else:
+            index += listed(module, new)
         for name in new:
             full, kind = f"{module}.{name}", "class" if inspect.isclass(getattr(loaded, name)) else "function"
             members = "   :members:\n   :show-inheritance:\n" if kind == "class" else ""

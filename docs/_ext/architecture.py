@@ -1,8 +1,8 @@
-"""The diagram of the architecture page: boxes by hand, arrows from the imports of the code."""
+"""The rooms of the house and who may import whom: drawn for the architecture page, and tested."""
 
 import ast
-from collections import defaultdict
 from pathlib import Path
+from typing import NamedTuple
 
 import networkx as nx
 from matplotlib import rc_context
@@ -14,104 +14,153 @@ PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
 
 ROWS = (
     {"command line": ("cli", "__main__")},
-    {"batch": ("batch",), "viewing": ("viewing",), "MeshLab": ("interop.meshlab",)},
-    {
-        "recipes, plugins, catalogue": ("recipes", "plugins", "catalogue", "summary"),
-        "analysis": ("analysis",),
-        "reduction": ("reduction",),
-    },
-    {"pipeline": ("pipeline", "pipelines")},
-    {"filters": ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner")},
-    {"what filters share": ("filter", "stopping"), "files and pictures": ("interop",)},
-    {"what flows between them": ("state", "skeleton"), "refinement": ("refinement",)},
-    {"report": ("report",), "numerics": ("numerics",), "samples": ("samples",)},
-    {"Open3D's clouds": ("interop.open3d", "interop.verbosity")},
+    {"cross-check": ("crosscheck",), "batches": ("batch",), "MeshLab": ("meshlab",)},
+    {"pictures and windows": ("viewing",)},
+    {"files": ("io",), "driver": ("driver",)},
+    {"analysis": ("analysis",), "recipes and plugins": ("recipes",)},
+    {"named pipelines": ("pipelines",)},
+    {"filters": ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "stopping")},
+    {"refinement": ("refinement",), "pipeline": ("pipeline",)},
+    {"what filters share": ("parameters", "state", "skeleton", "report")},
+    {"preparation": ("preparation",)},
+    {"numerics": ("numerics",), "Open3D's clouds": ("interop",), "samples": ("samples",)},
     {"errors": ("errors",)},
 )
-"""Boxes by row, users above the used, and the modules in each; the longest name that fits counts."""
+"""Boxes by row, users above the used, and the modules and packages in each."""
+
+ASIDE = {
+    **dict.fromkeys(("cross-check", "pictures and windows", "files", "analysis", "refinement", "numerics"), -3.3),
+    **{"MeshLab": 3.3, "preparation": -1.2, "Open3D's clouds": 1.2, "samples": 3.7},
+}
+"""Where in the drawing the boxes are that are not in its middle."""
+
+COMFORTS = {
+    "skeleton.Skeleton._repr_html_": ("viewing.notebook",),
+    "skeleton.Skeleton.annotate": ("io.annotation",),
+    "skeleton.Skeleton.branch_table": ("analysis.branches",),
+    "skeleton.Skeleton.save": ("io.files",),
+    "skeleton.Skeleton.segment": ("analysis.segmentation",),
+    "skeleton.Skeleton.to_line_set": ("io.line_sets",),
+    "skeleton.Skeleton.to_networkx": ("analysis.curvature", "analysis.segmentation"),
+    "skeleton.Skeleton.to_pymeshlab": ("meshlab",),
+    "skeleton.Skeleton.to_tensor_line_set": ("io.line_sets",),
+    "skeleton.Skeleton.to_tubes": ("io.tubes",),
+    "state.Contraction.annotate": ("io.annotation",),
+}
+"""The only imports that go up: by method, what it fetches when it is called. Comforts for users, used by no filter."""
+
+
+class Import(NamedTuple):
+    """An import inside the package, names without the package's own."""
+
+    module: str
+    """Where it stands."""
+    place: str
+    """The same with the class and function that it stands in, if it does."""
+    target: str
+    """The module that it needs; a name of a package is traced to the module that the package's stub has it from."""
 
 
 def box_of(module):
-    """The box that a module of the package is in, None for the package itself.
-
-    Parameters
-    ----------
-    module : str
-        Without the package, such as ``"interop.files"``.
-    """
-    known = {prefix: box for row in ROWS for box, prefixes in row.items() for prefix in prefixes}
-    words = module.split(".")
-    return next((known[".".join(words[:n])] for n in range(len(words), 0, -1) if ".".join(words[:n]) in known), None)
+    """The box that a module such as ``"io.files"`` is in, None for the package itself."""
+    return next((box for row in ROWS for box, names in row.items() if module.split(".")[0] in names), None)
 
 
 def imports(package=PACKAGE):
-    """What each module imports when it is imported itself: not inside functions, and not for type checkers.
+    """All imports inside the package, the late ones in functions too, but not those for type checkers alone.
 
     Returns
     -------
-    dict of str to set of str
-        Names without the package.
+    set of Import
     """
-    modules = {".".join(path.relative_to(package).with_suffix("").parts): path for path in package.rglob("*.py")}
-    found = defaultdict(set)
-    for name, path in modules.items():
-        here = (
-            name.removesuffix("__init__").removesuffix(".").split(".")
-            if name.endswith("__init__")
-            else name.split(".")[:-1]
-        )
-        for node in ast.parse(path.read_text()).body:
-            if not (isinstance(node, ast.ImportFrom) and node.level):
+    modules = {name_of(path, package): path for path in package.rglob("*.py")}
+    stubs = {
+        name_of(path, package): {
+            alias.asname or alias.name: target
+            for node in ast.parse(path.read_text()).body
+            for target, alias in targets(node, path, package, modules)
+        }
+        for path in package.rglob("__init__.pyi")
+    }
+    found = set()
+
+    def walk(node, module, place):
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
                 continue
-            base = here[: len(here) - node.level + 1] + (node.module or "").split(".") * bool(node.module)
-            for alias in node.names:
-                whole = ".".join([*base, alias.name])
-                target = whole if whole in modules or f"{whole}.__init__" in modules else ".".join(base)
-                if target:
-                    found[name.removesuffix(".__init__")].add(target)
-    return {name.removesuffix(".__init__"): found[name.removesuffix(".__init__")] for name in modules}
+            for target, alias in targets(child, modules[module], package, modules):
+                found.add(Import(module, place, stubs.get(target, {}).get(alias.name, target)))
+            named = isinstance(child, ast.ClassDef | ast.FunctionDef)
+            walk(child, module, f"{place}.{child.name}" if named else place)
+
+    for name, path in modules.items():
+        walk(ast.parse(path.read_text()), name, name)
+    return found
+
+
+def name_of(path, package):
+    """The name of a module without the package's, that of a package without ``__init__``."""
+    return ".".join(path.relative_to(package).with_suffix("").parts).removesuffix("__init__").removesuffix(".")
+
+
+def targets(node, path, package, modules):
+    """Yield what a statement imports from the package: the module, and what of it."""
+    if isinstance(node, ast.Import) and any(alias.name.split(".")[0] == package.name for alias in node.names):
+        raise ValueError(f"{path}:{node.lineno}: imports inside the package are relative")
+    if isinstance(node, ast.ImportFrom) and node.level:
+        here = path.relative_to(package).parts[: -node.level]
+        base = [*here, *(node.module.split(".") if node.module else ())]
+        for alias in node.names:
+            whole = ".".join([*base, alias.name])
+            yield whole if whole in modules else ".".join(base), alias
+
+
+def comforts():
+    """The imports that may go up, as a set of (place, target)."""
+    return {(place, target) for place, targets in COMFORTS.items() for target in targets}
+
+
+def upward():
+    """The imports that go up, or sideways out of their box, as a set of (place, target)."""
+    row = {box: n for n, boxes in enumerate(ROWS) for box in boxes}
+    pairs = {(each.place, each.target): (box_of(each.module), box_of(each.target)) for each in imports()}
+    return {pair for pair, (a, b) in pairs.items() if a and b and a != b and row[b] <= row[a]}
+
+
+def circles():
+    """The circles of modules that import each other, the comforts left out, as a list of sets."""
+    graph = nx.DiGraph((each.module, each.target) for each in imports() if (each.place, each.target) not in comforts())
+    return [found for found in nx.strongly_connected_components(graph) if len(found) > 1]
 
 
 def arrows():
-    """Which box imports which other one, set of (str, str)."""
-    pairs = {(box_of(name), box_of(target)) for name, targets in imports().items() for target in targets}
+    """Which box imports which other one, the comforts left out, as a set of (str, str)."""
+    pairs = {
+        (box_of(each.module), box_of(each.target)) for each in imports() if (each.place, each.target) not in comforts()
+    }
     return {(a, b) for a, b in pairs if a and b and a != b}
 
 
 def draw():
     """The boxes, and an arrow for every import that does not already follow from others."""
-    place, top = {}, len(ROWS)
+    place = {box: (ASIDE.get(box, 0), -y) for y, row in enumerate(ROWS) for box in row}
     figure = Figure((8, 8.4), layout="constrained", facecolor="white")
     FigureCanvasSVG(figure)
     axes = figure.add_subplot()
-    axes.set(xlim=(-5, 5), ylim=(-0.6, top - 0.4))
+    axes.set(xlim=(-5, 5), ylim=(-len(ROWS) + 0.4, 0.6))
     axes.set_axis_off()
-    for y, row in enumerate(reversed(ROWS)):
-        for n, box in enumerate(row):
-            place[box] = ((n - (len(row) - 1) / 2) * (10 / max(len(row), 3)), y)
     for a, b in sorted(nx.transitive_reduction(nx.DiGraph(arrows())).edges):
         (x, y), (u, v) = place[a], place[b]
         style = dict(arrowstyle="-|>", color="#888888", linewidth=0.9, shrinkA=0, shrinkB=0)
         axes.annotate("", (u, v + 0.27), (x, y - 0.27), arrowprops=style, zorder=0)
-    for row in ROWS:
-        for box, prefixes in row.items():
-            x, y = place[box]
-            names = ", ".join(prefixes)
-            names = names if names != box else ""
-            half = 1.1 if len(row) > 3 else 1.5 if len(names) < 40 else 2.6
-            axes.add_patch(
-                FancyBboxPatch(
-                    (x - half, y - 0.25),
-                    2 * half,
-                    0.5,
-                    boxstyle="round,pad=0,rounding_size=0.08",
-                    facecolor="#f3f0ea",
-                    edgecolor="#333333",
-                    linewidth=0.8,
-                )
-            )
-            axes.text(x, y + 0.09 * bool(names), box, ha="center", va="center", fontsize=9, color="#222222")
-            axes.text(x, y - 0.12, names, ha="center", va="center", fontsize=6.5, color="#666666", family="monospace")
+    for box, modules in (item for row in ROWS for item in row.items()):
+        x, y = place[box]
+        names = "" if modules == (box,) else ", ".join(modules)
+        half = 1.2 if len(names) < 25 else 1.6 if len(names) < 45 else 2.6
+        style = dict(boxstyle="round,pad=0,rounding_size=0.08", facecolor="#f3f0ea", edgecolor="#333333", linewidth=0.8)
+        axes.add_patch(FancyBboxPatch((x - half, y - 0.25), 2 * half, 0.5, **style))
+        axes.text(x, y + 0.09 * bool(names), box, ha="center", va="center", fontsize=9, color="#222222")
+        axes.text(x, y - 0.12, names, ha="center", va="center", fontsize=6.5, color="#666666", family="monospace")
     return figure
 
 
@@ -119,9 +168,3 @@ def write(folder: Path) -> None:
     """Draw the diagram, the same bytes from the same imports."""
     with rc_context({"svg.hashsalt": "architecture"}):
         draw().savefig(folder / "architecture.svg", metadata=dict.fromkeys(("Creator", "Date")))
-
-
-def upward():
-    """Imports that go up, or sideways into another box of the same row, set of (str, str)."""
-    row = {box: n for n, boxes in enumerate(ROWS) for box in boxes}
-    return {(a, b) for a, b in arrows() if row[b] <= row[a]}

@@ -1,5 +1,6 @@
-"""Writes the API pages from the code before Sphinx reads anything."""
+"""Writes the API pages from the code before Sphinx reads anything, and mends what docstrings say in plain words."""
 
+import re
 from pathlib import Path
 
 import api
@@ -16,7 +17,13 @@ def plain(app, env, node, contnode):
     return contnode if node["reftype"] == "obj" and "." not in node["reftarget"] else None
 
 
+def link(app, what, name, thing, options, lines):
+    """Pages that docstrings name by their path become links."""
+    lines[:] = [re.sub(r"docs/filters/(\w+)\.md", r":doc:`/docs/filters/\1`", line) for line in lines]
+
+
 def setup(app):
+    app.connect("autodoc-process-docstring", link)
     app.connect("missing-reference", plain)
     app.connect("config-inited", write)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

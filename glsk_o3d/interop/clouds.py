@@ -18,6 +18,12 @@ class Cloud:
     """Anything that carries points: what a filter of clouds `consumes` or `produces`.
 
     A name alone, without instances and without subclasses; `cloud_points` says what counts as a cloud.
+
+    Examples
+    --------
+    >>> from glsk_o3d import RingBuilder
+    >>> RingBuilder.consumes is Cloud
+    True
     """
 
 
