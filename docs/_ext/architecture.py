@@ -38,7 +38,7 @@ COMFORTS = {
     "skeleton.Skeleton._repr_html_": ("viewing.notebook",),
     "skeleton.Skeleton.annotate": ("io.annotation",),
     "skeleton.Skeleton.branch_table": ("analysis.branches",),
-    "skeleton.Skeleton.save": ("io.files",),
+    "skeleton.Skeleton.save": ("io.skeletons",),
     "skeleton.Skeleton.segment": ("analysis.segmentation",),
     "skeleton.Skeleton.to_line_set": ("io.line_sets",),
     "skeleton.Skeleton.to_networkx": ("analysis.curvature", "analysis.segmentation"),
@@ -62,7 +62,7 @@ class Import(NamedTuple):
 
 
 def box_of(module):
-    """The box that a module such as ``"io.files"`` is in, None for the package itself."""
+    """The box that a module such as ``"io.ply"`` is in, None for the package itself."""
     return next((box for row in ROWS for box, names in row.items() if module.split(".")[0] in names), None)
 
 

@@ -11,7 +11,7 @@ from glsk_o3d import Skeleton
 from glsk_o3d.refinement.spurs import SPUR_QUANTILE, distance_over_thickness, prune_spurs
 
 N = 21  # vertices of the trunk
-PER = 60  # points of each: many, so that a cut twig does not change the thickness of its junction
+PER = 60  # points of each: many, so that a cut spur does not change the thickness of its junction
 
 
 def directions(n, seed=0):
@@ -19,7 +19,7 @@ def directions(n, seed=0):
     return towards / np.linalg.norm(towards, axis=1, keepdims=True)
 
 
-def tree(*twigs, radius=0.1, length=None, share=1.0, per=10, along=0.0):
+def tree(*spurs, radius=0.1, length=None, share=1.0, per=10, along=0.0):
     """A trunk along x from -1 to 1, every point of it at the distance `radius` from its vertex.
 
     Twigs (vertex, reach) grow from it in two edges each, along z, as long as they reach or `length` long. All their
@@ -30,7 +30,7 @@ def tree(*twigs, radius=0.1, length=None, share=1.0, per=10, along=0.0):
     trunk = np.column_stack([x, 0 * x, 0 * x])
     vertices, edges, owner = [*trunk], [(i, i + 1) for i in range(N - 1)], [np.repeat(np.arange(N), PER)]
     points = [np.repeat(trunk, PER, axis=0) + np.repeat(np.broadcast_to(radius, N), PER)[:, None] * directions(N * PER)]
-    for at, reach in twigs:
+    for at, reach in spurs:
         first = len(vertices)
         edges += [(at, first), (first, first + 1)]
         vertices += [trunk[at] + [0, 0, (length or reach) * part] for part in (0.4, 1)]
@@ -99,12 +99,12 @@ def test_points_count_and_not_the_curve(reach, length, cut):
 
 
 @pytest.mark.parametrize(("share", "cut"), [(1.0, True), (SPUR_QUANTILE + 0.02, True), (SPUR_QUANTILE - 0.02, False)])
-def test_a_few_far_points_do_not_save_a_twig(share, cut):
+def test_a_few_far_points_do_not_save_a_spur(share, cut):
     skeleton = prune_spurs(tree((10, 0.05), share=share, per=100), 1.0)
     assert (len(skeleton.vertices) == N) == cut
 
 
-def test_a_twig_without_points_reaches_nowhere():
+def test_a_spur_without_points_reaches_nowhere():
     raw = tree((10, 0.5), per=0)
     skeleton = prune_spurs(raw, 1e-6)
     assert len(skeleton.vertices) == N
@@ -112,7 +112,7 @@ def test_a_twig_without_points_reaches_nowhere():
 
 
 def test_points_without_a_say_do_not_count():
-    """Outliers hang on the twig: they have no normal, and do not make it longer."""
+    """Outliers hang on the spur: they have no normal, and do not make it longer."""
     raw = tree((10, 0.05), share=0.5)
     distance = np.linalg.norm(raw.points - raw.vertices[10], axis=1)
     raw.normals[(raw.vertex_of_point >= N) & (distance > 0.1)] = np.nan
@@ -131,7 +131,7 @@ def test_a_junction_stays_what_it_was():
 
 
 def test_ends_of_the_trunk_stay():
-    """Only what leaves a junction is a twig: a path shorter than it is thick is all there is."""
+    """Only what leaves a junction is a spur: a path shorter than it is thick is all there is."""
     raw = tree(radius=50.0)
     assert prune_spurs(raw, 0.8) is raw
 
@@ -187,8 +187,8 @@ def test_several_at_one_junction_and_in_any_numbering():
         assert gap.max() < 1e-12
 
 
-def test_loops_at_a_junction_and_bridges_are_no_twigs(ringed):
-    """A tiny ring on a stem, and a short link between two junctions: no leaf, no twig."""
+def test_loops_at_a_junction_and_bridges_are_no_spurs(ringed):
+    """A tiny ring on a stem, and a short link between two junctions: no leaf, no spur."""
     tiny = [[0, 0, 0.02], [0.01, 0, 0.03], [0, 0, 0.04], [-0.01, 0, 0.03]]
     line = [[x, 0, 0] for x in (-1, 0, 1)]
     edges = [(0, 1), (1, 2), (1, 3), (3, 4), (4, 5), (5, 6), (3, 6)]
