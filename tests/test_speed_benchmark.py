@@ -1,12 +1,12 @@
 """The speed benchmark: its stopwatch, its arithmetic, its table of stages, and its commands on tiny clouds."""
 
 import importlib
-import itertools
 import json
 import math
 import mmap
 import os
 import sys
+import time
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
@@ -153,27 +153,29 @@ class TestTableOfStages:
         "path", ["numerics.rings:no_such", "no_such:star_rings", "contractor:Contractor.__or__", "contractor:LINE"]
     )
     def test_a_function_that_is_no_more_is_named(self, tool, path):
-        with pytest.raises(LookupError, match=f"'rings'.*{path}"):
+        with pytest.raises(LookupError, match=f"'rings'.* no function {path} of its own"):
             tool.find({"rings": tool.Stage((path,))})
 
     def test_a_stage_of_nothing_is_refused(self, tool):
-        with pytest.raises(LookupError, match="'rings'"):
+        with pytest.raises(LookupError, match="'rings' needs"):
             tool.find({"rings": tool.Stage(())})
-        with pytest.raises(LookupError, match="'rings'"):
+        with pytest.raises(LookupError, match="'rings' needs"):
             tool.find({"rings": tool.Stage((), after=("no", "such"))})
 
-    def test_the_default_pipeline_goes_through_every_stage(self, tool, stopwatch, monkeypatch):
-        ticks = itertools.count()
-        monkeypatch.setattr(stopwatch, "_clocks", lambda: (next(ticks),) * 2)  # one later whenever somebody looks
+    def test_the_default_pipeline_goes_through_every_stage(self, tool):
         points = sauropod(1200, noise=0.01).points
+        pipelines.default()(points)  # so that nothing is imported below
+        start = time.process_time(), time.perf_counter()
         with tool.Stopwatch(tool.STAGES) as watch:
             skeleton = pipelines.default()(points)
+        spent = time.process_time() - start[0], time.perf_counter() - start[1]
         calls = {name: share.calls for name, share in watch.shares.items() if name != tool.REST}
         assert min(calls.values()) > 0, calls
         solves = calls["Laplacian"]
         assert solves == len(skeleton.report.iterations) == calls["refinement of the solve"]
         assert all(share.cpu > 0 for share in watch.shares.values())
-        assert watch.cpu == watch.wall == next(ticks) - 1  # nothing is lost, nothing counts twice
+        assert 0.7 * spent[0] < watch.cpu <= spent[0]
+        assert 0.7 * spent[1] < watch.wall <= spent[1]
 
 
 def contracted(tool, shape="tube", n=1024, **changed):
@@ -335,7 +337,7 @@ class TestCommands:
             left = {name: tool.take(row, key)["left"] for name, key in tool.shown().items()}
             assert left["cao2010"] == row["n"] > left["wen2024"]
             assert all(run["solves"] == 4 for run in row["runs"] if run["key"][2] == "fixed" and not run["refused"])
-            assert all(row["whole"][name] > 0 for name in tool.WHOLE)
+            assert all(row["whole"][name] > 1 for name in tool.WHOLE)
         assert printed.count("| 300 | 2 | ") == 2
         assert {path.name for path in (tmp_path / "new").iterdir()} == {"contraction_256.png", "contraction_300.png"}
 
@@ -427,8 +429,8 @@ class TestCommands:
         out = tmp_path / "out.json"
         printed = call("large", "--sizes", 300, "--shapes", "tube", "--file", "--jobs", 0, "-o", out, "--markdown")
         (row,) = json.loads(out.read_text())["rows"]
-        assert row["file_cpu"] > 0
-        assert row["file_wall"] > 0
+        assert row["file_cpu"] > 0.2
+        assert row["file_wall"] > 0.2
         assert 100 < row["file_peak"] < 2000
         assert "file MB" in printed
 
