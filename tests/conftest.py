@@ -4,9 +4,9 @@ import importlib
 import math
 import os
 import sys
-import time
 from dataclasses import fields, replace
 from pathlib import Path
+from time import sleep
 
 import numpy as np
 import pytest
@@ -41,6 +41,16 @@ def shared_dir() -> Path:
     return place
 
 
+@pytest.fixture
+def no_run(monkeypatch):
+    """Fail if anything is computed."""
+
+    def run(self, data, watch):
+        pytest.fail("computed before everything was checked")
+
+    monkeypatch.setattr(RingBuilder, "_run", run)
+
+
 @pytest.fixture(scope="session")
 def patience() -> float:
     """Seconds, where somebody else's function must be told how long to wait: more than any busy machine needs."""
@@ -60,19 +70,9 @@ def until():
             if found := condition():
                 return found
             assert not ended, "waited in vain"
-            time.sleep(0.02)
+            sleep(0.02)
 
     return wait
-
-
-@pytest.fixture
-def no_run(monkeypatch):
-    """Fail if anything is computed."""
-
-    def run(self, data, watch):
-        pytest.fail("computed before everything was checked")
-
-    monkeypatch.setattr(RingBuilder, "_run", run)
 
 
 @pytest.fixture(scope="session")
