@@ -295,7 +295,7 @@ def test_wrong_recipes(tmp_path, message, recipe):
         ("r.json", b"[" * 100_000, "JSON"),
         ("r.json", b'{"a":' * 600 + b"1" + b"}" * 600, ""),
         ("r.toml", b"[glsk_o3d]\nversion = ", "TOML"),
-        ("r.toml", b"[glsk_o3d]\nversion = 1\nversion = 1", 'TOML.*"version"'),
+        ("r.toml", b"[glsk_o3d]\nversion = 1\nversion = 1", "TOML"),
         ("r.toml", b"", "glsk_o3d.version"),
         ("r.yaml", b"glsk_o3d:", ".json or .toml"),
     ],
