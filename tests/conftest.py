@@ -4,10 +4,10 @@ import importlib
 import math
 import os
 import sys
-import time
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
+from time import sleep
 
 import numpy as np
 import pytest
@@ -42,6 +42,16 @@ def shared_dir() -> Path:
     return place
 
 
+@pytest.fixture
+def no_run(monkeypatch):
+    """Fail if anything is computed."""
+
+    def run(self, data, watch):
+        pytest.fail("computed before everything was checked")
+
+    monkeypatch.setattr(RingBuilder, "_run", run)
+
+
 @pytest.fixture(scope="session")
 def benchmark(root):
     """A context with a benchmark as a module. The processes that it starts find it too; afterwards nobody does."""
@@ -60,6 +70,7 @@ def benchmark(root):
     return imported
 
 
+@pytest.fixture(scope="session")
 def patience() -> float:
     """Seconds, where somebody else's function must be told how long to wait: more than any busy machine needs."""
     return 900.0
@@ -78,19 +89,9 @@ def until():
             if found := condition():
                 return found
             assert not ended, "waited in vain"
-            time.sleep(0.02)
+            sleep(0.02)
 
     return wait
-
-
-@pytest.fixture
-def no_run(monkeypatch):
-    """Fail if anything is computed."""
-
-    def run(self, data, watch):
-        pytest.fail("computed before everything was checked")
-
-    monkeypatch.setattr(RingBuilder, "_run", run)
 
 
 @pytest.fixture(scope="session")

@@ -317,7 +317,7 @@ def test_scans_for_batches(benchmark, tmp_path):
 
 
 BAD = """
-import os, signal
+import os, signal, time
 import numpy as np
 
 def crash(points):
@@ -371,7 +371,7 @@ class TestPeers:
         with benchmark("peers") as module:
             yield module
 
-    def test_one_that_crashes_or_hangs_is_a_failure_and_ends_nothing(self, tool, call, tmp_path, monkeypatch, patience):
+    def test_one_that_crashes_or_hangs_is_a_failure_and_ends_nothing(self, tool, call, tmp_path, monkeypatch):
         (tmp_path / "bad_tools.py").write_text(BAD)
         monkeypatch.syspath_prepend(tmp_path)
         module = importlib.import_module("bad_tools")
@@ -385,17 +385,17 @@ class TestPeers:
         call(*few, "--tool", "hang", "--limit", 1, "--from", out, "--page", page)
         rows = {row["tool"]: row for row in json.loads(out.read_text())["rows"]}
         assert rows["crash"]["failure"] == "its process died: SIGSEGV"
-        assert rows["hang"]["failure"] == "not done after 1 s"
+        assert rows["hang"]["failure"] == "not done after 10 s"
         assert rows["nothing"]["failure"].startswith("InvalidParameterError: the skeleton is empty")
         assert rows["default"]["topology"]
         assert 0 < rows["default"]["error"] < 0.2
         lines = page.read_text().splitlines()
         assert "kept" in lines
         assert any(line.startswith("| crash | points | - / 0 | - |") for line in lines)
-        assert any(line.endswith("| torus (not done after 1 s) |") for line in lines)
+        assert any(line.endswith("| torus (not done after 10 s) |") for line in lines)
         del sys.modules["bad_tools"]
         again = call(*few, "--from", out)  # nothing is measured
-        assert "torus (not done after 1 s)" in again
+        assert "torus (not done after 10 s)" in again
 
     def test_picture(self, call, tmp_path):
         few = ("--builtin", "--shapes", "tube", "--variant", "clean_256", "--tool", "default", "--jobs", 1)
