@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     import networkx
 
-    from .analysis.branches import BranchTable
+    from .analysis.branch_rows import BranchTable
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from .console import WrongUsage, holding_interrupts, print_json, print_rows, progress, reporting
+from .console import print_json, print_rows, progress
 from .options import DropInvalid, Json, PipelineName, Quiet, Verbose
+from .reporting import WrongUsage, holding_interrupts, reporting
 
 
 def crosscheck(
@@ -60,10 +61,9 @@ def crosscheck(
         from ..interop.writing import write_json
         from ..io.files import read_cloud
         from ..io.meshes import read_mesh
-        from ..recipes.catalogue import named_pipeline
         from ..viewing.preview import printable
-        from .overrides import override
-        from .running import check_findings
+        from .outputs import check_findings
+        from .overrides import choose
 
         if mesh is not None and method != "auto":
             raise WrongUsage("--mesh gives a mesh: there is none to make with --method")
@@ -71,8 +71,7 @@ def crosscheck(
             raise WrongUsage(did_you_mean(method, ("auto", *SURFACES), "method"))
         files = [path for path in (output, picture) if path is not None]
         check_findings(output, picture, scan, mesh)
-        settings = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
-        chosen = override(named_pipeline(pipeline), settings, name=pipeline)
+        chosen = choose(pipeline, None, (), drop_invalid)
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")
             with holding_interrupts():

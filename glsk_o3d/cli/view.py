@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .console import holding_interrupts, reporting
 from .options import Quiet, Verbose
+from .reporting import holding_interrupts, reporting
 
 
 def view(
@@ -35,7 +35,7 @@ def view(
         from ..io.files import holds_skeleton, read_cloud, read_skeleton
         from ..skeleton import Skeleton
         from ..viewing.window import show
-        from .running import check_outputs, write
+        from .outputs import check_outputs, write
 
         elsewhere = preview is not None or report is not None
         if elsewhere:

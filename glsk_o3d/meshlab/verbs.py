@@ -193,10 +193,14 @@ class Verb:
                 made[name] = self.slots[name].checked(value)
             except ValueError as error:
                 raise InvalidParameterError(f"{name} = {value!r}: {error}") from None
-        slots = [(self.slots[name], value) for name, value in made.items()]
-        return self.start(made).with_options(
-            {f"{slot.owner.__name__}.{slot.field}": value for slot, value in slots if slot.owner is not None}
-        )
+        options = {
+            f"{slot.owner.__name__}.{slot.field}": name for name in made if (slot := self.slots[name]).owner is not None
+        }
+        try:
+            return self.start(made).with_options({option: made[name] for option, name in options.items()})
+        except InvalidParameterError as error:  # say it with the name that the verb has for it
+            option, colon, why = str(error).partition(": ")
+            raise InvalidParameterError(f"{options.get(option, option)}{colon}{why}") from None
 
     def values(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """All parameters that matter, the given ones and the defaults of the others.

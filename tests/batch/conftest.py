@@ -21,11 +21,10 @@ import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
-from glsk_o3d import Filter
+from glsk_o3d import Cloud, Filter
 from glsk_o3d.parameters import documented, parameter
 from glsk_o3d.interop.clouds import cloud_points
 
@@ -35,8 +34,7 @@ from glsk_o3d.interop.clouds import cloud_points
 class Saboteur(Filter):
     """Harm."""
 
-    consumes: ClassVar[str] = "cloud"
-    produces: ClassVar[str] = "cloud"
+    consumes = produces = Cloud
     seconds: float = parameter(0.0, "Wait for so long.", type="float", low=0)
 
     def _run(self, cloud, watch):

@@ -243,7 +243,7 @@ def test_a_segmented_mesh_keeps_its_faces():
         (
             "generate_contracted_cloud_glsk",
             {"reducer": None, "lprreducer_phi": 3},
-            "lprreducer_phi: there is no LPRReducer here, only Contractor, ExplainedScore",
+            "lprreducer_phi: LPRReducer is not in the pipeline, which has Contractor, ExplainedScore",
         ),
         ("generate_one_rings_glsk", {"layer": 7}, "layer = 7: there is no such layer"),
     ],
