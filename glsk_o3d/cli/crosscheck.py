@@ -56,7 +56,8 @@ def crosscheck(
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
         from ..crosscheck import cross_check, save_crosscheck_picture
-        from ..crosscheck.verdict import SURFACES, UNTOLD
+        from ..crosscheck.surfaces import SURFACES
+        from ..crosscheck.verdict import UNTOLD
         from ..errors import InvalidCloudError, did_you_mean
         from ..interop.writing import write_json
         from ..io.files import read_cloud
