@@ -29,7 +29,7 @@ def grasp_candidates(
     min_confidence: float = 0.5,
     up: Any = (0.0, 0.0, 1.0),
 ) -> GraspCandidates:
-    r"""Candidates for grasps with parallel jaws, from the axis and the thickness of a skeleton's branches.
+    r"""Candidates for grasps with parallel jaws, from the axis and the radii of a skeleton's branches.
 
     The jaws close across a branch: at places along its curve, from directions around it. With the radius r of the ball
     on the axis that touches the surface and its change :math:`r' = dr/ds` along the curve, a part of round section is

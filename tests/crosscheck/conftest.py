@@ -1,8 +1,11 @@
-"""Meshes and clouds with known one-rings."""
+"""Meshes and clouds with known one-rings, and the check of a torus."""
 
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
+
+from glsk_o3d import samples
+from glsk_o3d.crosscheck import cross_check
 
 
 @pytest.fixture(scope="session")
@@ -20,3 +23,13 @@ def even_ball():
         return points, faces
 
     return make
+
+
+@pytest.fixture(scope="session")
+def ring():
+    return samples.torus(1500)
+
+
+@pytest.fixture(scope="session")
+def check(ring):
+    return cross_check(ring.points)
