@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..interop.packages import import_open3d
 from ..interop.writing import write_csv, write_json
 
 STEM_LENGTH = 0.5  # of the drawn gripper behind its palm, over its opening
@@ -118,8 +119,6 @@ class GraspCandidates:
         MissingPackageError
         """
         from matplotlib import colormaps
-
-        from ..interop.packages import import_open3d
 
         o3d = import_open3d()
         side, back = self.opening[:, None] / 2 * self.closing, -self.opening[:, None] * self.approach

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -46,14 +45,9 @@ def branches(
     with reporting(quiet=quiet, verbose=verbose):
         from ..errors import FileFormatError
         from ..io.files import read_skeleton
-        from .outputs import check_writable
+        from .outputs import check_findings
 
-        if output is not None:
-            if output.suffix.lower() != ".csv":
-                raise WrongUsage(f"{output}: the table is CSV and its name ends in .csv")
-            if os.path.realpath(output) == os.path.realpath(skeleton):
-                raise WrongUsage(f"{output}: is the skeleton itself: choose another name")
-            check_writable(output)
+        check_findings([(output, ".csv", "table is CSV")], skeleton)
         place = _root(root)
         curve = read_skeleton(skeleton)
         if len(curve.vertices) == 0:

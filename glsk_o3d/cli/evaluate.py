@@ -69,10 +69,10 @@ def evaluate(
         from ..interop.writing import write_json
         from ..io.files import read_cloud, read_skeleton
         from ..io.truth import read_truth
-        from .outputs import check_findings
+        from .outputs import PICTURE, REPORT, check_findings
 
         files = [path for path in (output, preview) if path is not None]
-        check_findings(output, preview, skeleton, cloud, truth)
+        check_findings([(output, *REPORT), (preview, *PICTURE)], skeleton, cloud, truth)
         with progress(not quiet and not verbose) as update:
             update(f"reading {skeleton.name}")
             curve = read_skeleton(skeleton)

@@ -19,6 +19,8 @@ from .reporting import WrongUsage
 
 _MADE_WITH = {".png": "; a picture is made with --preview", ".html": "; a page is made with --report"}
 
+REPORT, PICTURE = (".json", "report is JSON"), (".png", "picture is a PNG")
+
 
 def check_outputs(
     outputs: Sequence[Path],
@@ -78,15 +80,13 @@ def check_outputs(
         check_writable(path)
 
 
-def check_findings(report: Path | None, picture: Path | None, *inputs: Path | None) -> None:
+def check_findings(files: Iterable[tuple[Path | None, str, str]], *inputs: Path | None) -> None:
     """Find out before computing whether what is found can be written, and that no input is among the files.
 
     Parameters
     ----------
-    report : Path or None
-        JSON.
-    picture : Path or None
-        PNG.
+    files : iterable of (Path or None, str, str)
+        Each with its ending and what it is, such as ``"report is JSON"``.
     *inputs : Path or None
 
     Raises
@@ -97,7 +97,7 @@ def check_findings(report: Path | None, picture: Path | None, *inputs: Path | No
         A folder is missing, or a file cannot be written.
     """
     taken = [os.path.realpath(path) for path in inputs if path is not None]
-    for path, ending, what in ((report, ".json", "report is JSON"), (picture, ".png", "picture is a PNG")):
+    for path, ending, what in files:
         if path is None:
             continue
         if path.suffix.lower() != ending:

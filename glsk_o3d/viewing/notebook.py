@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .preview import DPI, draw
+
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
@@ -29,8 +31,6 @@ def picture(skeleton: Skeleton) -> str:
     str
     """
     from PIL import Image  # matplotlib needs it, too
-
-    from .preview import DPI, draw
 
     figure, stream = draw(skeleton, SIZE, None, caption=False), io.BytesIO()
     figure.set_dpi(DPI)
