@@ -34,7 +34,7 @@ from .ring_builder import RingBuilder
 from .skeleton import Skeleton
 from .state import Contraction
 from .stopping import ExplainedScore, RingSizeRatio
-from .viewing.assessment import save_assessment
+from .viewing.assessment_picture import save_assessment
 from .viewing.page import save_report
 from .viewing.plot import plot_skeleton
 from .viewing.preview import save_preview

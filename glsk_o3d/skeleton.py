@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import open3d
     import pymeshlab
 
-    from .analysis.branches import BranchTable
+    from .analysis.branch_rows import BranchTable
     from .io.colors import ColorChoice
 
 Root = int | Sequence[float] | np.ndarray | None

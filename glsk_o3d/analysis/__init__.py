@@ -1,9 +1,12 @@
 """What a skeleton says about its object, and how good it is: against a known axis, or its cloud alone."""
 
-from .branches import BranchTable, branch_table
+from .assessment import Assessment, Loop, assess
+from .branch_rows import BranchTable
+from .branches import branch_table
+from .comparison import Comparison, compare
 from .curvature import curvature_torsion
-from .grasps import GraspCandidates, grasp_candidates
-from .metrics import Assessment, Comparison, Loop, assess, compare
+from .grasps import grasp_candidates
+from .grippers import GraspCandidates
 from .segmentation import segment
 from .truth import Truth
 

@@ -18,7 +18,11 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
+from ..analysis.summary import summary
 from ..errors import GlskError
+from ..io.clouds import read_cloud
+from ..recipes import from_recipe
+from ..viewing.preview import save_preview
 from .ledger import DONE, FAILED, Row, file_hash
 
 _log = logging.getLogger(__name__)
@@ -107,10 +111,6 @@ def clear(job: Job, written: Iterable[str] = ()) -> None:
 
 
 def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
-    from ..analysis.summary import summary
-    from ..io.clouds import read_cloud
-    from ..recipes import from_recipe
-    from ..viewing.preview import save_preview
 
     skeleton = from_recipe(job.recipe)(read_cloud(job.path))
     messages += skeleton.report.warnings

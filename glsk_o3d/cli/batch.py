@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import WrongUsage, print_json, print_rows, progress, reporting, said_here, say
+from .console import print_json, print_rows, progress, say
 from .options import CutLoops, DropInvalid, Json, PipelineName, Quiet, Recipe, Settings, Verbose
+from .reporting import WrongUsage, reporting, said_here
 
 if TYPE_CHECKING:
     from ..batch import Plan

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import WrongUsage, print_json, print_table, reporting
+from .console import print_json, print_table
 from .options import Json, Quiet, Verbose
+from .reporting import WrongUsage, reporting
 
 if TYPE_CHECKING:
     from ..analysis import BranchTable
@@ -38,21 +38,16 @@ def branches(
 ) -> None:
     """Measure every branch of a skeleton.
 
-    Lengths are in the units of the file. 'first' and 'last' are the radii at the ends, from the root on; 'bent' is the
-    length over the distance of the ends, 'angle' in degrees to the parent, 'sure' the mean confidence. Branches that
-    continue each other have the same 'axis' and 'order'; 'level' counts the branches from the root.
+    Lengths are in the units of the file. A branch starts where it is nearer to the root. Its tortuosity is its length
+    over the distance of its ends, its angle is in degrees to the parent. Branches that continue each other have the
+    same axis and order; the level counts branches from the root.
     """
     with reporting(quiet=quiet, verbose=verbose):
         from ..errors import FileFormatError
         from ..io.skeletons import read_skeleton
-        from .running import check_writable
+        from .outputs import check_findings
 
-        if output is not None:
-            if output.suffix.lower() != ".csv":
-                raise WrongUsage(f"{output}: the table is CSV and its name ends in .csv")
-            if os.path.realpath(output) == os.path.realpath(skeleton):
-                raise WrongUsage(f"{output}: is the skeleton itself: choose another name")
-            check_writable(output)
+        check_findings([(output, ".csv", "table is CSV")], skeleton)
         place = _root(root)
         curve = read_skeleton(skeleton)
         if len(curve.vertices) == 0:
@@ -81,11 +76,11 @@ def _print(table: BranchTable) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    from ..analysis.branches import COLUMNS, cell
+    from ..analysis.branch_rows import COLUMNS, cell
 
     shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
-    for head, (_, form) in COLUMNS.items():
-        shown.add_column(head, justify="left" if form == "s" else "right")
+    for name, form in COLUMNS.items():
+        shown.add_column(name, justify="left" if form == "s" else "right")
     for row in table:
-        shown.add_row(*(cell(row, head) for head in COLUMNS))
+        shown.add_row(*(cell(row, name) for name in COLUMNS))
     print_table(shown, whole=True)

@@ -1,43 +1,17 @@
-"""What the commands say, and where: results on stdout; errors, warnings, logs and progress on stderr."""
+"""What the commands print: results on stdout, lines and progress on stderr."""
 
 from __future__ import annotations
 
 import json
-import logging
 import math
 import shutil
-import signal
 import sys
 import textwrap
-import threading
-import traceback
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import typer
-
-from ..errors import GlskError, InvalidCloudError, InvalidParameterError, PluginWarning, SkeletonWarning
-
-FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
-
-# The library speaks Python; these are the same cures on the command line.
-_SAID_HERE = {
-    "drop them with RingBuilder(drop_invalid=True), or remove them first": "drop them with --drop-invalid",
-    "raise max_points": "raise --max-points",
-    "max_points = ": "--max-points ",
-    "must be None or a whole number": "must be 0 (no limit) or a whole number",
-    "make one with glsk_o3d.skeletonize": "run 'glsk skeletonize' first",
-    "pass cut_loops=True to drop": "add --cut-loops to drop",
-    "taken with recursive": "taken with --recursive",
-    "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
-}
-
-
-class WrongUsage(Exception):
-    """The command line asks for something impossible, whatever the scan holds."""
 
 
 def console(*, stderr: bool = False) -> Any:
@@ -72,84 +46,6 @@ def print_table(table: Any, *, stderr: bool = False, whole: bool = False) -> Non
     with out.capture() as captured:
         out.print(table)
     typer.echo("\n".join(line.rstrip() for line in captured.get().splitlines()), err=stderr)
-
-
-@contextmanager
-def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool = False) -> Iterator[None]:
-    """Run a command: errors become one line and an exit code, warnings one line each.
-
-    Parameters
-    ----------
-    cloud : Path, optional
-        The file that the points are from: what is wrong with them is said with its name.
-    quiet : bool
-        Hide the warnings.
-    verbose : bool
-        Show the log, and the traceback of an error before its line.
-
-    Raises
-    ------
-    typer.Exit
-        With code 1, 2 or 130. What is no mistake of the user's passes through with its traceback.
-    """
-    if hasattr(sys.stdout, "reconfigure"):
-        sys.stdout.reconfigure(errors="replace")  # a file name that the terminal cannot show is no reason to fail
-    lines: dict[str, None] = {}
-
-    def keep(message, category, filename, lineno, file=None, line=None):
-        if issubclass(category, SkeletonWarning | PluginWarning):
-            lines[str(message)] = None
-        else:
-            show(message, category, filename, lineno, file, line)
-
-    with warnings.catch_warnings(), _logging(quiet, verbose):
-        show, warnings.showwarning = warnings.showwarning, keep
-        for category in (SkeletonWarning, PluginWarning):
-            warnings.simplefilter("always", category)
-        problem: BaseException | None = None
-        code = 0
-        try:
-            yield
-        except BrokenPipeError:
-            raise  # the reader of our output has gone; typer ends quietly
-        except (WrongUsage, InvalidParameterError) as error:
-            problem, code = error, WRONG_USAGE
-        except InvalidCloudError as error:
-            problem, code = error, FAILED
-            if cloud is not None:
-                error.args = (f"{cloud}: {error}",)
-        except (GlskError, OSError, MemoryError) as error:
-            problem, code = error, FAILED
-        except KeyboardInterrupt as error:
-            problem, code = error, INTERRUPTED
-        finally:
-            if not quiet:
-                for line in lines:
-                    say("warning", said_here(line))
-    if problem is not None:
-        if verbose:
-            traceback.print_exception(problem)
-        say("error", _message(problem))
-        raise typer.Exit(code)
-
-
-@contextmanager
-def holding_interrupts() -> Iterator[None]:
-    """Let Ctrl-C wait until the block is done, for code that cannot bear it.
-
-    Open3D, for one: interrupted while it is imported, it spills pages of text.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    held: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, frame: held.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if held:
-        raise KeyboardInterrupt
 
 
 def say(kind: str, message: str) -> None:
@@ -279,48 +175,3 @@ def _finite(data):
     if isinstance(data, list | tuple):
         return [_finite(value) for value in data]
     return None if isinstance(data, float) and not math.isfinite(data) else data
-
-
-def _message(problem: BaseException) -> str:
-    if isinstance(problem, KeyboardInterrupt):
-        return "interrupted; no file is half-written"
-    if isinstance(problem, MemoryError):
-        return f"out of memory ({problem}): thin the cloud first, for example with voxel_down_sample"
-    if isinstance(problem, OSError) and problem.strerror and problem.filename is not None:
-        return f"{problem.filename}: {problem.strerror}"
-    return said_here(str(problem) or type(problem).__name__)
-
-
-def said_here(message: str) -> str:
-    """What the library says, with the cures of the command line.
-
-    Parameters
-    ----------
-    message : str
-
-    Returns
-    -------
-    str
-    """
-    for there, here in _SAID_HERE.items():
-        message = message.replace(there, here)
-    return message
-
-
-class _Lines(logging.Handler):
-    def emit(self, record):
-        say(record.levelname.lower(), record.getMessage())
-
-
-@contextmanager
-def _logging(quiet: bool, verbose: bool) -> Iterator[None]:
-    """What the library logs, on stderr: all of it, or its warnings, or only its errors."""
-    log, handler = logging.getLogger("glsk_o3d"), _Lines()
-    before = log.level
-    log.setLevel(logging.DEBUG if verbose else logging.ERROR if quiet else logging.WARNING)
-    log.addHandler(handler)
-    try:
-        yield
-    finally:
-        log.removeHandler(handler)
-        log.setLevel(before)

@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from .console import WrongUsage, holding_interrupts, print_json, print_rows, progress, reporting
+from .console import print_json, print_rows, progress
 from .options import DropInvalid, Json, PipelineName, Quiet, Verbose
+from .reporting import WrongUsage, holding_interrupts, reporting
 
 
 def crosscheck(
@@ -55,24 +56,23 @@ def crosscheck(
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
         from ..crosscheck import cross_check, save_crosscheck_picture
-        from ..crosscheck.verdict import SURFACES, UNTOLD
+        from ..crosscheck.surfaces import SURFACES
+        from ..crosscheck.verdict import UNTOLD
         from ..errors import InvalidCloudError, did_you_mean
         from ..interop.writing import write_json
         from ..io.clouds import read_cloud
         from ..io.meshes import read_mesh
-        from ..recipes.catalogue import named_pipeline
         from ..viewing.preview import printable
-        from .overrides import override
-        from .running import check_findings
+        from .outputs import PICTURE, REPORT, check_findings
+        from .overrides import choose
 
         if mesh is not None and method != "auto":
             raise WrongUsage("--mesh gives a mesh: there is none to make with --method")
         if method not in ("auto", *SURFACES):
             raise WrongUsage(did_you_mean(method, ("auto", *SURFACES), "method"))
         files = [path for path in (output, picture) if path is not None]
-        check_findings(output, picture, scan, mesh)
-        settings = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
-        chosen = override(named_pipeline(pipeline), settings, name=pipeline)
+        check_findings([(output, *REPORT), (picture, *PICTURE)], scan, mesh)
+        chosen = choose(pipeline, None, (), drop_invalid)
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")
             with holding_interrupts():

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from .console import holding_interrupts, progress, reporting, say
+from .console import progress, say
 from .options import PipelineName, Quiet, Verbose
+from .reporting import holding_interrupts, reporting
 
 
 def demo(
@@ -34,7 +35,8 @@ def demo(
         from ..interop.writing import write_atomically
         from ..recipes.catalogue import named_pipeline
         from ..samples import sample_object
-        from .running import check_writable, print_results, run, write
+        from .outputs import check_writable, write
+        from .running import print_results, run
 
         chosen = named_pipeline(pipeline)
         chosen.check_complete()

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import holding_interrupts, print_json, print_table, progress, reporting
+from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
+from .console import print_json, print_table, progress
 from .options import Json, Quiet, Verbose
+from .reporting import holding_interrupts, reporting
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from ..analysis import Assessment, Comparison
+    from ..analysis import Assessment, Comparison, Truth
+    from ..skeleton import Skeleton
 
 _BLACK = "around a junction, not measured"
 _NUMBERS = {  # measure: (best, what it is), as the table shows them
@@ -62,18 +65,15 @@ def evaluate(
     how far is it from the true axis.
     """
     with reporting(cloud, quiet=quiet, verbose=verbose):
-        from ..analysis import assess, compare
-        from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
         from ..interop.clouds import cloud_points
         from ..interop.writing import write_json
         from ..io.clouds import read_cloud
         from ..io.skeletons import read_skeleton
         from ..io.truth import read_truth
-        from ..viewing.assessment import save_assessment
-        from .running import check_findings
+        from .outputs import PICTURE, REPORT, check_findings
 
         files = [path for path in (output, preview) if path is not None]
-        check_findings(output, preview, skeleton, cloud, truth)
+        check_findings([(output, *REPORT), (preview, *PICTURE)], skeleton, cloud, truth)
         with progress(not quiet and not verbose) as update:
             update(f"reading {skeleton.name}")
             curve = read_skeleton(skeleton)
@@ -82,18 +82,10 @@ def evaluate(
             with holding_interrupts():
                 points = cloud_points(read_cloud(cloud))
             update("measuring")
-            try:
-                comparison = compare(curve, axis) if axis is not None else None
-                # a ball's skeleton is a vertex: it can be compared, but lies along nothing
-                assessment = assess(curve, points) if comparison is None or curve.edge_lengths.any() else None
-            except InvalidParameterError as error:  # the file's fault, not that of the command line
-                raise FileFormatError(f"{skeleton}: {error}") from error
+            assessment, comparison = _measured(skeleton, curve, points, axis)
             if assessment is not None and _elsewhere(assessment, curve.vertices, points):
-                warnings.warn(
-                    f"{cloud}: the skeleton does not lie in it: is this the cloud it was made from, in its units?",
-                    SkeletonWarning,
-                    stacklevel=1,
-                )
+                message = "the skeleton does not lie in it: is this the cloud it was made from, in its units?"
+                warnings.warn(f"{cloud}: {message}", SkeletonWarning, stacklevel=1)
             told = {
                 "skeleton": str(skeleton),
                 "cloud": str(cloud),
@@ -105,19 +97,47 @@ def evaluate(
                 write_json(output, told)
             if preview is not None:
                 update(f"drawing {preview.name}")
-                if comparison is not None:
-                    values, label, best = comparison.edge_error, "error in true radii", 0
-                elif assessment is not None:
-                    values, label, best = assessment.edge_centredness, "centredness", 1
-                save_assessment(
-                    curve, points, values, preview, label=label, best=best, unknown=_BLACK, title=skeleton.name
-                )
+                _draw(curve, points, assessment, comparison, preview, skeleton.name)
         if as_json:
             print_json({**told, "files": [str(path) for path in files]})
         elif not quiet:
             _print_measures(assessment, comparison)
             for path in files:
                 typer.echo(f"wrote {path}")
+
+
+def _measured(
+    path: Path, curve: Skeleton, points: np.ndarray, axis: Truth | None
+) -> tuple[Assessment | None, Comparison | None]:
+    """The measures that need only the cloud, and those against the truth if there is one."""
+    from ..analysis import assess, compare
+
+    try:
+        comparison = compare(curve, axis) if axis is not None else None
+        # a ball's skeleton is a vertex: it can be compared, but lies along nothing
+        assessment = assess(curve, points) if comparison is None or curve.edge_lengths.any() else None
+    except InvalidParameterError as error:  # the file's fault, not that of the command line
+        raise FileFormatError(f"{path}: {error}") from error
+    return assessment, comparison
+
+
+def _draw(
+    curve: Skeleton,
+    points: np.ndarray,
+    assessment: Assessment | None,
+    comparison: Comparison | None,
+    picture: Path,
+    title: str,
+) -> None:
+    """The skeleton in its cloud, its edges coloured by the error, or without a truth by the centredness."""
+    from ..viewing.assessment_picture import save_assessment
+
+    if comparison is not None:
+        values, label, best = comparison.edge_error, "error in true radii", 0
+    else:
+        assert assessment is not None
+        values, label, best = assessment.edge_centredness, "centredness", 1
+    save_assessment(curve, points, values, picture, label=label, best=best, unknown=_BLACK, title=title)
 
 
 def _elsewhere(assessment: Assessment, vertices: np.ndarray, points: np.ndarray) -> bool:
@@ -146,8 +166,10 @@ def _print_measures(assessment: Assessment | None, comparison: Comparison | None
         told = f"{assessment.wide_loops} open wider than their tube; missing ones show with --truth"
         table.add_row("loops", f"{len(assessment.loops)}", "", told)
         for i, loop in enumerate(assessment.loops, 1):
-            ratio = f"{loop.opening / loop.thickness:.2f}" if loop.thickness > 0 else "inf"
-            table.add_row(f"  loop {i}", ratio, "> 1", f"opening {loop.opening:.4g}, thickness {loop.thickness:.4g}")
+            ratio = f"{loop.opening / loop.tube_radius:.2f}" if loop.tube_radius > 0 else "inf"
+            table.add_row(
+                f"  loop {i}", ratio, "> 1", f"opening {loop.opening:.4g}, tube radius {loop.tube_radius:.4g}"
+            )
     if comparison is not None:
         table.add_section()
         _add_numbers(table, comparison)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import WrongUsage, console, print_json, print_table, reporting
+from .console import console, print_json, print_table
 from .options import Json
+from .reporting import WrongUsage, reporting
 
 if TYPE_CHECKING:
     from ..parameters import Parameters
@@ -62,13 +63,14 @@ def facts(cls: type[Parameters]) -> dict[str, Any]:
     """
     from ..pipeline import Filter
 
-    flow = (cls.consumes, cls.produces) if issubclass(cls, Filter) else (None, None)
+    flow: dict[str, str | None] = {"consumes": None, "produces": None}
+    if issubclass(cls, Filter):
+        flow = {name: _flow_name(getattr(cls, name)) for name in flow}
     return {
         "name": cls.__name__,
-        "kind": "filter" if flow[0] else "stopping rule",
+        "kind": "filter" if flow["consumes"] else "stopping rule",
         "plugin": _plugin(cls),
-        "consumes": flow[0],
-        "produces": flow[1],
+        **flow,
         "doc": _prose(cls),
         "parameters": [
             {
@@ -106,6 +108,12 @@ def limits(metadata) -> str:
     if metadata["high"] is not None:
         said.append(f"at most {metadata['high']:g}")
     return ", ".join(said)
+
+
+def _flow_name(flow: type) -> str:
+    from ..pipeline import Cloud
+
+    return "cloud" if flow is Cloud else flow.__name__
 
 
 def _plain(value):

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import holding_interrupts, print_iterations, print_json, print_rows, reporting
+from .console import print_iterations, print_json, print_rows
 from .options import Json, Quiet, Verbose
+from .reporting import holding_interrupts, reporting
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton

@@ -41,8 +41,9 @@ Settings = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
-        metavar="FILTER.PARAMETER=VALUE",
-        help="Change a parameter, such as Connector.radius=2%; may be repeated. See 'glsk filters'.",
+        metavar="[FILTER.]PARAMETER=VALUE",
+        help="Change a parameter, such as Connector.radius=2%, or k=24 where only one filter has a k; may be repeated. "
+        "See 'glsk filters'.",
     ),
 ]
 DropInvalid = Annotated[bool, typer.Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")]

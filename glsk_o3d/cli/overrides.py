@@ -1,4 +1,4 @@
-"""``--set Filter.parameter=value``: a pipeline with some parameters changed."""
+"""``--set Filter.parameter=value``, or ``--set parameter=value``: a pipeline with some parameters changed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..parameters import Parameters
 from ..pipeline import Pipeline, parts
 from ..recipes import load_recipe
 from ..recipes.catalogue import catalogue, find, named_pipeline, serves
-from .console import WrongUsage
+from .reporting import WrongUsage
 
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 
@@ -59,9 +59,10 @@ def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pip
     ----------
     pipeline : Pipeline
     settings : iterable of str
-        Each ``Filter.parameter=value``. Values are written as in Python or as plain words: ``16``, ``1e4``, ``2%``,
-        ``true``, ``none``, ``index``; reducers and rules by their names (``Contractor.stop=RingSizeRatio``). Those are
-        put in first, so that the order does not matter.
+        Each ``Filter.parameter=value``, or ``parameter=value`` where only one part of the pipeline has a parameter of
+        that name. Values are written as in Python or as plain words: ``16``, ``1e4``, ``2%``, ``true``, ``none``,
+        ``index``; reducers and rules by their names (``Contractor.stop=RingSizeRatio``). Those are put in first, so
+        that the order does not matter.
     name : str
         What the user called the pipeline, for messages.
 
@@ -78,54 +79,57 @@ def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pip
     Examples
     --------
     >>> from glsk_o3d import Connector, RingBuilder, pipelines
-    >>> override(pipelines.default(), ["RingBuilder.k=20", "Connector.links=nearest"]).stages[2]
+    >>> override(pipelines.default(), ["k=20", "Connector.links=nearest"]).stages[2]
     Connector(radius='1%', thickness=0.6, links='nearest', stray=0.1)
     """
-    options = {setting: _parse(setting, pipeline) for setting in settings}
-    put_in = {f"{cls.__name__}.{name}": value for cls, name, value in options.values() if isinstance(value, Parameters)}
-    present = {type(part).__name__ for part in parts(pipeline.with_options(put_in))}
-    for setting, (cls, _, _) in options.items():
-        if cls.__name__ not in present:
-            place = f"the pipeline {name!r}" if name else "the pipeline"
-            raise InvalidParameterError(
-                f"--set {setting}: {cls.__name__} is not in {place}, which has {', '.join(present)}{_how_to_add(cls)}"
-            )
-    return pipeline.with_options({f"{cls.__name__}.{name}": value for cls, name, value in options.values()})
+    place = f"the pipeline {name!r}" if name else "the pipeline"
+    settings, ready = list(settings), pipeline
+    for setting in settings:
+        with suppress(InvalidParameterError):  # whatever is wrong is said below
+            option, value = _parse(setting, ready, place)
+            if isinstance(value, Parameters):
+                ready = ready.with_options({option: value})
+    return pipeline.with_options(dict(_parse(setting, ready, place) for setting in settings))
 
 
-def _parse(setting: str, pipeline: Pipeline) -> tuple[type[Parameters], str, Any]:
+def _parse(setting: str, pipeline: Pipeline, place: str) -> tuple[str, Any]:
+    """A setting as `Pipeline.with_options` takes it: ``"Filter.parameter"`` and the value."""
     key, equals, text = (word.strip() for word in setting.partition("="))
     owner, dot, name = (word.strip() for word in key.rpartition("."))
     if not (equals and (owner or not dot) and name and text):
         raise InvalidParameterError(
             f"--set {setting}: write it as Filter.parameter=value, for example Connector.radius=2%"
         )
-    if not owner:
-        try:
-            owner = pipeline.owner_of(name).__name__
-        except InvalidParameterError as error:
-            raise InvalidParameterError(f"--set {setting}: {error}") from None
+    try:
+        owner = owner or pipeline.owner_of(name).__name__
+    except InvalidParameterError as error:
+        raise InvalidParameterError(f"--set {setting}: {error}") from None
     cls = find(owner)
     if cls is None:
         raise InvalidParameterError(f"--set {setting}: {did_you_mean(owner, catalogue(), 'filter')}")
     kinds = {field.name: field.metadata["type"] for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
     if name not in kinds:
         raise InvalidParameterError(f"--set {setting}: {did_you_mean(name, kinds, f'parameter of {owner}')}")
-    kind = kinds[name]
-    if kind.rstrip("?") not in ("reducer", "stop") or (kind.endswith("?") and text.lower() == "none"):
-        return cls, name, _value(text, kind)
-    known = catalogue()
-    fitting = [other for other, its in known.items() if its is not cls and serves(its, kind.rstrip("?"))]
-    if text not in fitting:
-        raise InvalidParameterError(f"--set {setting}: {did_you_mean(text, fitting, kind.rstrip('?'))}")
-    return cls, name, known[text]()
+    value = _value(setting, cls, text, kinds[name])
+    present = dict.fromkeys(type(part).__name__ for part in parts(pipeline))
+    if owner not in present:
+        raise InvalidParameterError(
+            f"--set {setting}: {owner} is not in {place}, which has {', '.join(present)}{_how_to_add(cls)}"
+        )
+    return f"{owner}.{name}", value
 
 
-def _value(text: str, kind: str) -> Any:
+def _value(setting: str, cls: type[Parameters], text: str, kind: str) -> Any:
     """Text as a value of the kind, or as it is where it is none: then the filter's own check says what is wrong."""
     if kind.endswith("?") and text.lower() == "none":
         return None
     kind = kind.rstrip("?")
+    if kind in ("reducer", "stop"):
+        known = catalogue()
+        fitting = [other for other, its in known.items() if its is not cls and serves(its, kind)]
+        if text not in fitting:
+            raise InvalidParameterError(f"--set {setting}: {did_you_mean(text, fitting, kind)}")
+        return known[text]()
     if kind == "bool":
         return _BOOLS.get(text.lower(), text)
     for convert in {"int": (int, float), "float": (float,), "length": (float,)}.get(kind, ()):

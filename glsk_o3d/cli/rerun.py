@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from .console import holding_interrupts, progress, reporting
+from .console import progress
 from .options import CutLoops, Json, Output, Preview, Quiet, ReportPage, Verbose
+from .reporting import holding_interrupts, reporting
 
 
 def rerun(
@@ -41,7 +42,8 @@ def rerun(
         from ..recipes import identical
         from ..recipes import rerun as run_again
         from ..viewing.recorder import ContractionRecorder
-        from .running import check_outputs, print_results, run, write
+        from .outputs import check_outputs, write
+        from .running import print_results, run
 
         outputs = output or []
         if outputs or preview is not None or report is not None:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import WrongUsage, holding_interrupts, print_json, print_table, progress, reporting
+from .console import print_json, print_table, progress
 from .options import CutLoops, Json, Quiet, Verbose
+from .reporting import WrongUsage, holding_interrupts, reporting
 
 if TYPE_CHECKING:
     from ..meshlab.steps import Step
@@ -46,7 +47,7 @@ def run(
     with reporting(scan, quiet=quiet, verbose=verbose):
         from ..meshlab.layers import Layer, check_ending
         from ..meshlab.steps import PlainLayers, find_script, read_steps
-        from .running import check_outputs, write_each
+        from .outputs import check_outputs, write_each
 
         if listed:
             _list(as_json)

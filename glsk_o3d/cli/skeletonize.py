@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .console import holding_interrupts, progress, reporting
+from .console import progress
 from .options import (
     CutLoops,
     DropInvalid,
@@ -22,6 +22,7 @@ from .options import (
     Settings,
     Verbose,
 )
+from .reporting import holding_interrupts, reporting
 
 
 def skeletonize(
@@ -57,8 +58,9 @@ def skeletonize(
         from ..recipes import to_recipe
         from ..recipes.writing import recipe_ending
         from ..viewing.recorder import ContractionRecorder
+        from .outputs import check_outputs, write
         from .overrides import choose
-        from .running import check_outputs, print_results, run, write
+        from .running import print_results, run
 
         chosen = choose(pipeline, recipe, settings or [], drop_invalid)
         outputs = output or []

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .console import holding_interrupts, reporting
 from .options import Quiet, Verbose
+from .reporting import holding_interrupts, reporting
 
 
 def view(
@@ -36,7 +36,7 @@ def view(
         from ..io.skeletons import holds_skeleton, read_skeleton
         from ..skeleton import Skeleton
         from ..viewing.window import show
-        from .running import check_outputs, write
+        from .outputs import check_outputs, write
 
         elsewhere = preview is not None or report is not None
         if elsewhere:

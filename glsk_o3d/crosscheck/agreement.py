@@ -194,7 +194,7 @@ def mesh_fit(state, vertices, faces):
     used = np.unique(faces)
     border = border_lengths(len(vertices), faces)[used] > TEAR
     piece = component_labels(len(vertices), np.concatenate([faces[:, :2], faces[:, 1:]]))[used]
-    edges = np.column_stack([rings.owners, rings.indices])
+    edges = np.column_stack([rings.centres, rings.indices])
     near = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1) < REACH * step
     part = component_labels(len(points), edges[near])
     on = part[cKDTree(points).query(vertices[used])[1]]

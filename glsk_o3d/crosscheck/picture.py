@@ -12,7 +12,7 @@ from ..interop.writing import check_ending
 from ..viewing.preview import DPI, INK, MOST_POINTS, colour_bar, printable, room, save_figure, three_views
 
 if TYPE_CHECKING:
-    from .verdict import CrossCheck
+    from .check import CrossCheck
 
 _OURS, _THEIRS, _UNKNOWN = "#111111", "#0a6fc2", "#c9c9c9"
 _MOST_REASONS = 3

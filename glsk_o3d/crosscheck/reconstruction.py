@@ -83,6 +83,6 @@ def without_bare(vertices, faces):
 def _with_normals(points, normals, rings):
     o3d = import_open3d()
     cloud = to_point_cloud(points)
-    edges = np.column_stack([rings.owners, rings.indices])
+    edges = np.column_stack([rings.centres, rings.indices])
     cloud.normals = o3d.utility.Vector3dVector(orient_normals(points, normals, edges))
     return cloud

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import shutil
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,29 @@ def write_json(path: str | os.PathLike, data: Any) -> None:
     """
     text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def write_csv(path: str | os.PathLike, names: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
+    """Write a table, a line of names and a line per row; it appears complete or not at all.
+
+    Parameters
+    ----------
+    path : path-like
+    names : sequence of str
+    rows : iterable of iterable
+        What is None or empty is left empty.
+
+    Raises
+    ------
+    OSError
+        As for `write_atomically`.
+    """
+
+    def write(temporary: Path) -> None:
+        with temporary.open("w", newline="", encoding="utf-8") as stream:
+            csv.writer(stream, lineterminator="\n").writerows([names, *rows])
+
+    write_atomically(path, write)
 
 
 def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -> None:

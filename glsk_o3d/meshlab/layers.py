@@ -131,6 +131,26 @@ class Layer:
         mine, its = (none if layer.edges is None else layer.edges for layer in (self, other))
         return np.array_equal(self.vertices, other.vertices) and np.array_equal(mine, its)
 
+    def summary(self) -> dict[str, Any]:
+        """The layer in a few numbers, as MeshLab's filters return them.
+
+        Returns
+        -------
+        dict of str to int, float, bool or str
+        """
+        found: dict[str, Any] = {"vertices": len(self.vertices)}
+        flow = self.flow
+        if isinstance(flow, Skeleton):
+            found |= {"edges": len(flow.edges), "components": flow.n_components, "loops": flow.n_loops}
+            found |= {"length": flow.length}
+        elif self.colors is not None and self.scalars is not None:
+            found["branches"] = int(self.scalars.max(initial=-1)) + 1
+        if flow is not None:
+            report = flow.report
+            found |= {"iterations": len(report.iterations), "converged": report.converged}
+            found |= {"stop_reason": report.stop_reason, "warnings": list(report.warnings)}
+        return found
+
     def to_pymeshlab(self) -> Any:
         """The layer as a ``pymeshlab.Mesh``.
 

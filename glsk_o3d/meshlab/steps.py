@@ -17,7 +17,7 @@ from ..errors import GlskError, InvalidParameterError, MissingPackageError, Scri
 from . import builtin
 from .layers import Layer
 from .script import VECTORS, Call, read_script
-from .verbs import Verb, facts, verbs
+from .verbs import Verb, verbs
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ class PlainLayers:
         with step.named_in_errors():
             layer = self.layer(step.values.get("layer", -1))
             self.layers.append(step.verb.run(layer, step.values, on_iteration))
-        return {"layer": len(self.layers) - 1, **facts(self.layers[-1])}
+        return {"layer": len(self.layers) - 1, **self.layers[-1].summary()}
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
         """Write the last layer. See ``Layer.save``."""

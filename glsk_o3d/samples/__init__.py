@@ -11,10 +11,12 @@ Examples
 Sample('sauropod', 2000 points, 54 nodes, 54 edges)
 """
 
+from .by_name import SAMPLES, sample_object
 from .capsules import signed_distance
+from .rings import torus, two_rings
 from .sample import Sample
 from .sauropod import TWO_CAMERAS, sauropod
-from .shapes import SAMPLES, helix, sample_object, sheet, sphere, torus, tube, two_rings, y_junction
+from .shapes import helix, sheet, sphere, tube, y_junction
 
 __all__ = [
     "SAMPLES",

@@ -79,14 +79,14 @@ def union_sample(name, nodes, edges, radii, n, noise, seed, cameras=None) -> Sam
         points[~on_ball] = a[cone] + (b - a)[cone] * share[:, None] + radius[:, None] * out
         points = points[signed_distance(points, nodes, edges, radii) > -1e-9]
         if cameras is not None:
-            seen = [_visible(points, camera, nodes, edges, radii) for camera in cameras]
+            seen = [visible(points, camera, nodes, edges, radii) for camera in cameras]
             points = points[np.any(seen, axis=0)]
         return points
 
     return Sample(noisy(collect(draw, n), noise, rng), nodes, edges, radii, name)
 
 
-def _visible(points, camera, nodes, edges, radii) -> np.ndarray:
+def visible(points, camera, nodes, edges, radii) -> np.ndarray:
     """Which points on the surface the camera, which is outside, sees: its ray meets nothing before them.
 
     Each tapered capsule is two balls and a cone between them; a ray meets all three in closed form.

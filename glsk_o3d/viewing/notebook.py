@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import MissingPackageError
 from ..interop.packages import require
+from .preview import DPI, draw
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -33,8 +34,6 @@ def picture(skeleton: Skeleton) -> str:
     """
     require("PIL", "pillow")
     from PIL import Image
-
-    from .preview import DPI, draw
 
     figure, stream = draw(skeleton, SIZE, None, caption=False), io.BytesIO()
     figure.set_dpi(DPI)

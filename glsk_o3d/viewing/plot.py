@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analysis.segmentation import branch_of_edge
 from ..errors import InvalidParameterError
 from ..interop.clouds import cloud_points
 from ..interop.packages import require
+from ..io.colors import shades
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -79,9 +81,6 @@ def plot_skeleton(
     import matplotlib.pyplot as plt
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
     from mpl_toolkits.mplot3d.proj3d import proj_transform
-
-    from ..analysis.segmentation import branch_of_edge
-    from ..io.colors import shades
 
     if axes is None:
         axes = plt.figure(figsize=(6, 4), layout="constrained").add_subplot(projection="3d")

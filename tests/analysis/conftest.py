@@ -1,22 +1,48 @@
-"""Meshes and clouds with known one-rings."""
+"""Curves without a cloud, and shapes with a known axis."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull
+
+from glsk_o3d.samples import torus, tube
+from glsk_o3d.skeleton import Skeleton
 
 
 @pytest.fixture(scope="session")
-def even_ball():
-    """Points on a sphere of radius 1/2, almost a regular lattice (Fibonacci), and their Delaunay triangles."""
+def curve():
+    """A skeleton without a cloud; a path through the vertices if no edges are given."""
 
-    def make(n):
-        i = np.arange(n) + 0.5
-        z, turn = 1 - 2 * i / n, np.pi * (1 + np.sqrt(5)) * i
-        points = np.column_stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z]) / 2
-        faces = ConvexHull(points).simplices.astype(np.int64)
-        a, b, c = points[faces].transpose(1, 0, 2)
-        inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
-        faces[inward] = faces[inward][:, ::-1]
-        return points, faces
+    def make(vertices, edges=None, radii=np.nan):
+        vertices = np.asarray(vertices, float)
+        n = len(vertices)
+        if edges is None:
+            edges = np.column_stack([np.arange(n - 1), np.arange(1, n)])
+        return Skeleton(vertices, edges, np.broadcast_to(radii, n), (), (), ())
 
     return make
+
+
+@pytest.fixture(scope="session")
+def axis_of(curve):
+    """The axis of a sample as a skeleton."""
+
+    def make(sample, scale=1.0, shift=0.0):
+        return curve(sample.nodes * scale + np.asarray(shift), sample.edges, sample.radii)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def pipe():
+    """An open tube along x, radius 0.1, length 1: 100 rings of 40 points, each turned against the one before."""
+    ring, place = np.divmod(np.arange(4000), 40)
+    angle = 2 * np.pi * (place / 40 + 0.618034 * ring)
+    points = np.column_stack([(ring + 0.5) / 100 - 0.5, 0.1 * np.cos(angle), 0.1 * np.sin(angle)])
+    return replace(tube(8, capped=False), points=points)
+
+
+@pytest.fixture(scope="session")
+def ring():
+    """A torus around z: radii 0.4 and 0.1."""
+    return torus(16000)

@@ -160,8 +160,8 @@ def test_the_legend_tells_what_black_is(ring, moved, tmp_path):
 
 
 def test_the_picture_needs_a_value_per_edge(ring, moved, tmp_path):
-    with pytest.raises(InvalidParameterError, match="128 edges need as many values"):
+    with pytest.raises(InvalidParameterError, match="128 edges"):
         save_assessment(moved, ring.points, np.zeros(3), tmp_path / "p.png", label="measure")
-    with pytest.raises(FileFormatError, match=r"p\.jpg: the picture is a PNG"):
+    with pytest.raises(FileFormatError, match=r"p\.jpg: .*PNG"):
         save_assessment(moved, ring.points, np.zeros(128), tmp_path / "p.jpg", label="measure")
     assert list(tmp_path.iterdir()) == []

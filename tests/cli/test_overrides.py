@@ -102,6 +102,13 @@ def test_the_order_does_not_matter_but_the_last_word_counts():
     assert find(override(default(), ["Contractor.reducer=none"]), "Contractor").reducer is None
 
 
+def test_a_name_alone_where_one_part_has_it():
+    assert override(default(), ["k=24", "reducer=none"]) == default().with_options(k=24, reducer=None)
+    settings = ["threshold=0.5", "stop=RingSizeRatio", "RingSizeRatio.threshold=0.6"]
+    assert find(override(default(), settings[:2]), "Contractor").stop.threshold == 0.5
+    assert find(override(default(), settings), "Contractor").stop.threshold == 0.6
+
+
 def test_every_occurrence_is_changed():
     pipeline = Pipeline(RingBuilder(), Contractor(reducer=LPRReducer()), LPRReducer())
     changed = override(pipeline, ["LPRReducer.phi=7"])
@@ -112,7 +119,9 @@ def test_every_occurrence_is_changed():
     ("setting", "message"),
     [
         ("Connector.radius", "write it as Filter.parameter=value"),
-        ("radius=2%", "write it as Filter.parameter=value"),
+        ("radius=2%", "--set radius=2%: radius: more than one part of the pipeline has it"),
+        ("radius=2%", "write 'RingBuilder.radius' or 'Connector.radius'"),
+        ("max_iteration=2", "did you mean 'max_iterations'?"),
         ("Connector.=2%", "write it as Filter.parameter=value"),
         (".radius=2%", "write it as Filter.parameter=value"),
         ("Connector.radius=", "write it as Filter.parameter=value"),

@@ -173,7 +173,7 @@ def test_a_name_that_is_no_unicode(invoke, scans, tmp_path):
 
 
 def test_a_writer_that_breaks_does_not_keep_the_others_from_it(invoke, scans, tmp_path, monkeypatch):
-    monkeypatch.setattr("glsk_o3d.cli.running.save_preview", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("glsk_o3d.cli.outputs.save_preview", lambda *_, **__: 1 / 0)
     result = invoke("skeletonize", scans / "ring.ply", "--preview", "s.png", "--report", "s.html")
     assert result.exit_code == 1
     assert result.stderr == "glsk: error: s.png: cannot be written: ZeroDivisionError: division by zero\n"

@@ -243,7 +243,7 @@ def test_a_segmented_mesh_keeps_its_faces():
         (
             "generate_contracted_cloud_glsk",
             {"reducer": None, "lprreducer_phi": 3},
-            "lprreducer_phi: there is no LPRReducer here, only Contractor, ExplainedScore",
+            "lprreducer_phi: LPRReducer is not in the pipeline, which has Contractor, ExplainedScore",
         ),
         ("generate_one_rings_glsk", {"layer": 7}, "layer = 7: there is no such layer"),
     ],
@@ -256,12 +256,12 @@ def test_wrong_names_and_values(meshes, name, params, message):
 
 
 def test_layers_that_are_no_clouds(meshes):
-    with pytest.raises(InvalidCloudError, match="there is no layer: load a scan first"):
+    with pytest.raises(InvalidCloudError, match="load a scan first"):
         glsk.MeshSet().generate_curve_skeleton_glsk()
-    with pytest.raises(InvalidCloudError, match=r"the current layer \(cloud\) has no edges: it is no skeleton"):
+    with pytest.raises(InvalidCloudError, match=r"\(cloud\) has no edges"):
         meshes.current_skeleton()
     meshes.generate_curve_skeleton_glsk()
-    with pytest.raises(InvalidCloudError, match="is a skeleton or another line drawing: make the scan the"):
+    with pytest.raises(InvalidCloudError, match="make the scan the current layer"):
         meshes.generate_curve_skeleton_glsk()
 
 
@@ -437,7 +437,7 @@ def test_a_segmentation_has_the_points_of_its_skeleton(points):
 def test_a_contracted_cloud_is_no_scan(meshes):
     meshes.generate_contracted_cloud_glsk()
     for name in ("curve_skeleton", "one_rings", "refined_skeleton", "segmented_cloud"):
-        with pytest.raises(InvalidCloudError, match=r"\(Contracted Cloud of cloud\) is contracted and no scan"):
+        with pytest.raises(InvalidCloudError, match=r"\(Contracted Cloud of cloud\) .*make the scan the current layer"):
             meshes.apply_filter(f"generate_{name}_glsk")
     meshes.generate_skeleton_graph_glsk()
     meshes.generate_one_rings_glsk(layer=0)

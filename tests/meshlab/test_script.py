@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import glsk_o3d
-from glsk_o3d import Filter, samples
+from glsk_o3d import Filter, Skeleton, samples
 from glsk_o3d.errors import FileFormatError, MissingPackageError, ScriptError
 from glsk_o3d.meshlab.layers import Layer
 from glsk_o3d.meshlab.script import MOST_BYTES, Call, Param, read_script, script_text, write_script
@@ -104,8 +104,8 @@ BROKEN = {
             '  <Param type="RichString" name="pipeline" value="cao2010"/>',
             '  <Param type="RichFloat" name="lprreducer_phi" value="10"/>',
         ),
-        f"s.mlx, line 3: filter '{SKELETON}': lprreducer_phi: there is no LPRReducer here, only RingBuilder, "
-        "Contractor, RingSizeRatio, Connector, Refiner",
+        f"s.mlx, line 3: filter '{SKELETON}': lprreducer_phi: LPRReducer is not in the pipeline, which has "
+        "RingBuilder, Contractor, RingSizeRatio, Connector, Refiner",
     ),
     "given twice": (
         _theirs(*['  <Param type="RichInt" name="KNearest" value="32"/>'] * 2),
@@ -316,7 +316,7 @@ def test_a_new_filter_is_a_verb_by_itself(monkeypatch, tmp_path):
     class VertexDoubler(Filter):
         """Twice as large."""
 
-        consumes = produces = "Skeleton"
+        consumes = produces = Skeleton
         factor: float = parameter(2.0, "How much.", type="float", low=1)
 
         def _run(self, skeleton, watch):

@@ -10,6 +10,7 @@ from scipy.stats import chisquare, kstest
 from glsk_o3d import samples
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.samples import SAMPLES, sample_object, signed_distance
+from glsk_o3d.samples.capsules import union_sample, visible
 
 UNIONS = ("sauropod", "tube", "y_junction")
 
@@ -149,7 +150,7 @@ def test_capsule_is_uniform_by_area():
 def test_tapered_capsule_is_uniform_by_area():
     # density over the axis coordinate is the same on both balls, and falls linearly with the radius on the cone between
     nodes, radii, edges = np.array([[0.0, 0, 0], [1, 0, 0]]), np.array([0.3, 0.1]), np.array([[0, 1]])
-    x = samples._union_sample("cone", nodes, edges, radii, 40000, 0, 7).points[:, 0]
+    x = union_sample("cone", nodes, edges, radii, 40000, 0, 7).points[:, 0]
     slope = 0.2
     cuts = np.array([-0.3, 0.3 * slope, 1 + 0.1 * slope, 1.1])
     areas = np.pi * np.array([2 * 0.3**2 * (1 + slope), (1 - slope**2) * 0.4, 2 * 0.1**2 * (1 - slope)])
@@ -225,7 +226,7 @@ def march(points, camera, sample):
 def test_visibility_against_sphere_tracing():
     whole = samples.sauropod(n=800, cameras=None)
     for camera in np.array([*samples.TWO_CAMERAS, (0, 0, 3), (2, 0.1, 0.4), (0.01, -2, 0.02)]):
-        seen = samples._visible(whole.points, camera, whole.nodes, whole.edges, whole.radii)
+        seen = visible(whole.points, camera, whole.nodes, whole.edges, whole.radii)
         arrived, stopped = march(whole.points, camera, whole)
         assert (arrived | stopped).mean() > 0.95
         assert seen.sum() > 80
@@ -235,9 +236,7 @@ def test_visibility_against_sphere_tracing():
 
 def test_scan_misses_what_neither_camera_sees():
     whole, scan = samples.sauropod(n=20000, cameras=None), samples.sauropod(n=20000)
-    seen = [
-        samples._visible(whole.points, np.array(c), whole.nodes, whole.edges, whole.radii) for c in samples.TWO_CAMERAS
-    ]
+    seen = [visible(whole.points, np.array(c), whole.nodes, whole.edges, whole.radii) for c in samples.TWO_CAMERAS]
     hidden = ~np.any(seen, axis=0)
     assert 0.1 < hidden.mean() < 0.3
     to_scan = cKDTree(scan.points).query(whole.points)[0]

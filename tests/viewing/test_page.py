@@ -160,7 +160,7 @@ def test_names_that_are_no_unicode(tree, tmp_path):
 
 @pytest.mark.parametrize("name", ["r.txt", "r"])
 def test_other_endings_are_refused(tree, tmp_path, name):
-    with pytest.raises(FileFormatError, match=rf"{name}: the report is a page and its name ends in \.html"):
+    with pytest.raises(FileFormatError, match=rf"{name}: .*\.html"):
         save_report(tree, tmp_path / name)
     assert not list(tmp_path.iterdir())
 

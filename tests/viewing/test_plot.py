@@ -83,7 +83,7 @@ def test_colours_of_edges(skeleton, color):
 def test_what_is_wrong(tree):
     with pytest.raises(InvalidParameterError, match="color"):
         plot_skeleton(tree, color="size")
-    with pytest.raises(InvalidParameterError, match="7 points need as many colours"):
+    with pytest.raises(InvalidParameterError, match="7 points"):
         plot_skeleton(tree, point_colors=np.zeros((3, 3)))
     with pytest.raises(InvalidCloudError):
         plot_skeleton(tree, cloud="scan.ply")

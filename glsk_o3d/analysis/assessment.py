@@ -1,4 +1,4 @@
-"""Measures of a skeleton: against a known axis (`compare`), or against its cloud alone (`assess`)."""
+"""How a skeleton lies in its cloud, without knowing the truth."""
 
 from __future__ import annotations
 
@@ -15,156 +15,12 @@ from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..skeleton import Skeleton
 from .cross_sections import cross_sections
-from .curves import along, pieces
 from .graph import check_graph, count_components, simple_edges
-from .truth import Truth
 
-FINENESS = 0.1  # spacing of the places where curves are compared, in median true radii
-NEIGHBOURS = 16  # of each point, in the graph whose components are the clusters of a cloud
-LEAST = 6  # points that make a cross-section
-OPEN = (
-    4 * np.pi / 3
-)  # angle without points at which a place is outside; a scan from one side leaves a little over pi open
-
-
-# ------------------------------------------------------------------------------------------------------ with a truth
-
-
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """How far a skeleton is from a known axis.
-
-    Curves are compared at places a tenth of the median true radius apart. A place on one curve is measured to the
-    nearest place on the other, and "radius" is the true one there.
-
-    Attributes
-    ----------
-    error : float
-        Mean over the skeleton of its distance to the axis over the radius. 0 is best; 1 is the surface.
-    inside : float
-        Share of the skeleton that is less than a radius away from the axis. 0 to 1, 1 is best.
-    completeness : float
-        Share of the axis that is less than a radius away from the skeleton. 0 to 1, 1 is best.
-    ends : float or None
-        Mean over the axis's leaves of the distance to the nearest leaf of the skeleton (to its nearest vertex, if it
-        has no leaf) over the radius at the axis's leaf. 0 is best. None if the axis has no leaf.
-    radius_error : float or None
-        Mean over the skeleton of ``|r - radius| / radius``, with its own radii r interpolated along its edges. 0 is
-        best. None if the skeleton has no radii; places between vertices of which one has none do not count.
-    components, loops, leaves, junctions : int
-        Their number in the skeleton minus that in the axis. Loops are counted by the cycle rank.
-    topology : bool
-        Whether components and loops agree.
-    edge_error : (E,) float array
-        `error` of each edge of the skeleton. Not part of `as_dict`.
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> ring = torus(2000)
-    >>> found = compare(skeletonize(ring.points), ring)
-    >>> found.error < 0.2, found.loops, found.topology
-    (True, 0, True)
-    """
-
-    error: float
-    inside: float
-    completeness: float
-    ends: float | None
-    radius_error: float | None
-    components: int
-    loops: int
-    leaves: int
-    junctions: int
-    topology: bool
-    edge_error: np.ndarray = field(repr=False)
-
-    def as_dict(self) -> dict[str, Any]:
-        """The numbers, as JSON holds them.
-
-        Returns
-        -------
-        dict of str to float, int, bool or None
-        """
-        return {name: value for name, value in vars(self).items() if name != "edge_error"}
-
-
-def compare(skeleton: Skeleton, truth: Any) -> Comparison:
-    """Measure a skeleton against a known axis.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Only `vertices`, `edges` and `radii` count. If it has edges, vertices without an edge count as components alone.
-    truth : Truth, Sample, or anything else with `nodes`, `edges` and `radii`
-        In the units of the skeleton.
-
-    Returns
-    -------
-    Comparison
-
-    Raises
-    ------
-    InvalidParameterError
-        The skeleton is empty or not finite, or the truth is no axis (see `Truth`).
-
-    Examples
-    --------
-    >>> from glsk_o3d.samples import torus
-    >>> from glsk_o3d.skeleton import Skeleton
-    >>> ring = torus(500)
-    >>> axis = Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ())
-    >>> compare(axis, ring).topology
-    True
-    """
-    truth = truth if isinstance(truth, Truth) else Truth(truth.nodes, truth.edges, truth.radii)
-    vertices, edges = skeleton.vertices, check_graph(skeleton.vertices, skeleton.edges, "skeleton")
-    step = FINENESS * np.median(truth.radii)
-    row, part = pieces(truth.nodes, truth.edges, step)
-    axis, axis_radius = (along(truth.edges, row, part, values) for values in (truth.nodes, truth.radii))
-    row, part = pieces(vertices, edges, step)
-    radii = skeleton.radii if len(skeleton.radii) == len(vertices) else np.full(len(vertices), np.nan)
-    curve, curve_radius = (along(edges, row, part, values) for values in (vertices, radii))
-    to_axis, nearest = cKDTree(axis).query(curve)
-    to_curve, _ = cKDTree(curve).query(axis)
-    radius = axis_radius[nearest]
-
-    mine, degree = _structure(len(vertices), edges)
-    true, true_degree = _structure(len(truth.nodes), truth.edges)
-    difference = {name: mine[name] - true[name] for name in true}
-    tips = np.flatnonzero(true_degree == 1)
-    leaves = vertices[degree == 1] if (degree == 1).any() else vertices
-    to_leaf = cKDTree(leaves).query(truth.nodes[tips])[0] / truth.radii[tips]
-    known = np.isfinite(curve_radius)
-    off = np.abs(curve_radius - radius)[known] / radius[known]
-    return Comparison(
-        error=float(np.mean(to_axis / radius)),
-        inside=float(np.mean(to_axis < radius)),
-        completeness=float(np.mean(to_curve < axis_radius)),
-        ends=float(to_leaf.mean()) if len(tips) else None,
-        radius_error=float(off.mean()) if len(off) else None,
-        **difference,
-        topology=difference["components"] == 0 == difference["loops"],
-        edge_error=_mean_per_edge(to_axis / radius, row, len(edges)),
-    )
-
-
-def _mean_per_edge(values, row, n):
-    return np.bincount(row, values)[:n] / np.bincount(row)[:n] if n else np.empty(0)
-
-
-def _structure(n, edges):
-    """Components, loops, leaves and junctions of a graph, and the degrees of its n vertices."""
-    edges = simple_edges(edges)
-    components = count_components(n, edges)
-    degree = np.bincount(edges.ravel(), minlength=n)
-    loops = len(edges) - n + components
-    leaves, junctions = int((degree == 1).sum()), int((degree > 2).sum())
-    return {"components": components, "loops": loops, "leaves": leaves, "junctions": junctions}, degree
-
-
-# --------------------------------------------------------------------------------------------------- without a truth
+CLUSTER_NEIGHBOURS = 16  # of each point, in the graph whose components are the clusters of a cloud
+MIN_SECTION_POINTS = 6
+# without points in so wide an angle a place is outside; a scan from one side leaves a little over pi open
+OPEN_ANGLE = 4 * np.pi / 3
 
 
 @dataclass(frozen=True)
@@ -175,7 +31,7 @@ class Loop:
     ----------
     opening : float
         Radius of the largest circle inside it, in the cloud's units.
-    thickness : float
+    tube_radius : float
         Radius of the tube that makes it: the median over its vertices of the nearest cross-section's.
 
     Examples
@@ -184,17 +40,17 @@ class Loop:
     >>> from glsk_o3d.samples import torus
     >>> points = torus(2000).points
     >>> (loop,) = assess(skeletonize(points), points).loops
-    >>> loop.opening > loop.thickness
+    >>> loop.opening > loop.tube_radius
     True
     """
 
     opening: float
-    thickness: float
+    tube_radius: float
 
     @property
     def wider(self) -> bool:
-        """Whether it opens wider than its tube is thick, as every true loop does."""
-        return self.opening > self.thickness
+        """Whether it opens wider than its tube, as every true loop does."""
+        return self.opening > self.tube_radius
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +83,7 @@ class Assessment:
         leaves do not count. 1 on a straight line, 1 - r / (pi R) on a circle of radius R.
     topology : float
         min(components, clusters) / max(components, clusters), times the share of the loops that open wider than their
-        tube is thick (1 without loops).
+        tube (1 without loops).
     components, clusters : int
         Connected parts of the skeleton, and of the cloud when every point is joined to its 15 nearest.
     loops : tuple of Loop
@@ -262,7 +118,7 @@ class Assessment:
 
     @property
     def wide_loops(self) -> int:
-        """Loops that open wider than their tube is thick."""
+        """Loops that open wider than their tube."""
         return sum(loop.wider for loop in self.loops)
 
     def as_dict(self) -> dict[str, Any]:
@@ -271,7 +127,7 @@ class Assessment:
         Returns
         -------
         dict of str to float, int or list
-            `loops` is a list of dicts with `opening`, `thickness` and `wider`.
+            `loops` is a list of dicts with `opening`, `tube_radius` and `wider`.
         """
         shown = {name: value for name, value in vars(self).items() if name != "edge_centredness"}
         return {**shown, "loops": [{**asdict(loop), "wider": loop.wider} for loop in self.loops]}
@@ -317,27 +173,27 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
         raise InvalidParameterError("the skeleton has no edge with a length: there is no curve to assess")
     reach, clusters = _neighbourhood(cloud)
     sections = cross_sections(skeleton.vertices, skeleton.branches, cloud, shortest=reach)
-    found = sections.counts >= LEAST
+    found = sections.counts >= MIN_SECTION_POINTS
     if not found.any():
         raise InvalidCloudError(
-            f"no part of the skeleton has {LEAST} points around it: is this the cloud it was made from?"
+            f"no part of the skeleton has {MIN_SECTION_POINTS} points around it: is this the cloud it was made from?"
         )
     apart = ~_at_junctions(skeleton, sections.places, cloud)
     counted = apart if (apart & found).any() else np.ones_like(found)
     found &= counted
     offsets, radii = sections.offsets[found], sections.radii[found]
     centred = 1 - np.divide(offsets, radii, out=np.sign(offsets), where=offsets < radii)
-    bounded = found & (sections.open_angles < OPEN)
+    bounded = found & (sections.open_angles < OPEN_ANGLE)
     nearest = cKDTree(sections.places[found])
-    thickness = sections.radii[found][nearest.query(skeleton.vertices)[1]]
-    loops = _loops(skeleton, thickness)
+    radius = sections.radii[found][nearest.query(skeleton.vertices)[1]]
+    loops = _loops(skeleton, radius)
     components = skeleton.n_components
     agreement = min(components, clusters) / max(components, clusters)
     wide = sum(loop.wider for loop in loops) / len(loops) if loops else 1.0
     return Assessment(
         centredness=float(np.average(centred, weights=sections.lengths[found])),
         boundedness=float(np.average(bounded[counted], weights=sections.lengths[counted])),
-        smoothness=max(0.0, 1 - _turning(skeleton, thickness) / (np.pi * skeleton.length)),
+        smoothness=max(0.0, 1 - _turning(skeleton, radius) / (np.pi * skeleton.length)),
         topology=agreement * wide,
         components=components,
         clusters=clusters,
@@ -353,8 +209,8 @@ def _at_junctions(skeleton, places, cloud):
     return (cdist(places, junctions) < clearance).any(axis=1)
 
 
-def _turning(skeleton, thickness):
-    """Sum over the vertices with two edges of the angle between these, times the thickness there."""
+def _turning(skeleton, radius):
+    """Sum over the vertices with two edges of the angle between these, times the radius there."""
     inner = np.flatnonzero(skeleton.degree == 2)
     ends = np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
     ends = ends[skeleton.degree[ends[:, 0]] == 2]
@@ -363,20 +219,19 @@ def _turning(skeleton, thickness):
     # between the one edge and the other turned back; the arctangent is exact also near 0, where the arccosine is not
     angle = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), -(before * after).sum(axis=1))
     straight = (before == 0).all(axis=1) | (after == 0).all(axis=1)
-    return float((np.where(straight, 0, angle) * thickness[inner]).sum())
+    return float((np.where(straight, 0, angle) * radius[inner]).sum())
 
 
-def _loops(skeleton, thickness):
+def _loops(skeleton, radius):
     cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
     return tuple(
-        Loop(float(inscribed_circle(skeleton.vertices[cycle])[1]), float(np.median(thickness[cycle])))
-        for cycle in cycles
+        Loop(float(inscribed_circle(skeleton.vertices[cycle])[1]), float(np.median(radius[cycle]))) for cycle in cycles
     )
 
 
 def _neighbourhood(cloud):
     """Median distance to the last of the neighbours, and the connected components of the neighbour graph."""
-    k = min(NEIGHBOURS, len(cloud))
+    k = min(CLUSTER_NEIGHBOURS, len(cloud))
     if k < 2:
         return 0.0, len(cloud)
     distance, neighbour = nearest_neighbours(cloud, k)

@@ -1,0 +1,178 @@
+"""A row of measures per branch: to read, to iterate over, to write."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from ..interop.writing import write_csv
+
+PRINTED_ROWS = 20  # at most
+COLUMNS = {  # format, of the columns that are read by people
+    "branch": "d",
+    "kind": "s",
+    "parent": "d",
+    "level": "d",
+    "axis": "d",
+    "order": "d",
+    "length": ".4g",
+    "mean_radius": ".3g",
+    "start_radius": ".3g",
+    "end_radius": ".3g",
+    "tortuosity": ".2f",
+    "angle": ".1f",
+    "points": "d",
+    "confidence": ".2f",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class BranchTable:
+    """One row per branch: those of `Skeleton.branches` in their order, then the vertices without edges.
+
+    Lengths are in the cloud's units. Means are along the curve. NaN where something is unknown or means nothing.
+    Iteration gives a dict of plain numbers and strings per row; the two points become ``start_x`` and so on. ``print``
+    shows the main columns, as ``glsk branches`` does.
+
+    Attributes
+    ----------
+    kind : (B,) str array
+        ``"loop"`` for branches that lie on a loop, ``"tip"`` for others with a free end, ``"inner"`` for others between
+        junctions, ``"isolated"`` for a vertex without edges.
+    component : (B,) int array
+    parent : (B,) int array
+        The row that a branch grows from, on the shortest way from the root; -1 for those at the root.
+    level : (B,) int array
+        Steps from the root: 0 for those at the root, 1 for their children.
+    start, end : (B,) int arrays
+        Vertices at the ends, `start` towards the root.
+    start_point, end_point : (B, 3) float arrays
+    length : (B,) float array
+    tortuosity : (B,) float array
+        Length over the distance of the ends: 1 for a straight branch, infinite for a closed one.
+    mean_radius, start_radius, end_radius : (B,) float arrays
+    angle : (B,) float array
+        Degrees between the direction in which the parent arrives and that in which the branch leaves: 0 goes straight
+        on. Each is taken from one to three radii away from the junction, without radii from the nearest quarter. NaN
+        without a parent, and where the branch or its parent is closed: it has no direction.
+    mean_curvature, mean_torsion : (B,) float arrays
+        See `curvature_torsion`.
+    points : (B,) int array
+        Points of the skeleton's cloud that belong to the branch; see `segment`.
+    confidence : (B,) float array
+        Mean confidence.
+    axis : (B,) int array
+        The first row of the axis that a branch is part of. Where branches part, the one with the largest mean radius
+        times cos(`angle`) continues the axis of its parent, unless it turns back; each other one begins an axis.
+    order : (B,) int array
+        Centrifugal (Gravelius) order: 0 for axes at the root, and one more for each axis that grows from another.
+        Unlike `level` it is the same all along a stem.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import y_junction
+    >>> table = skeletonize(y_junction(2000).points).branch_table()
+    >>> len(table), list(table)[0]["kind"], table.length.shape
+    (3, 'tip', (3,))
+    """
+
+    kind: np.ndarray
+    component: np.ndarray
+    parent: np.ndarray
+    level: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    start_point: np.ndarray
+    end_point: np.ndarray
+    length: np.ndarray
+    tortuosity: np.ndarray
+    mean_radius: np.ndarray
+    start_radius: np.ndarray
+    end_radius: np.ndarray
+    angle: np.ndarray
+    mean_curvature: np.ndarray
+    mean_torsion: np.ndarray
+    points: np.ndarray
+    confidence: np.ndarray
+    axis: np.ndarray
+    order: np.ndarray
+
+    def __len__(self):
+        return len(self.kind)
+
+    def _columns(self) -> dict[str, list]:
+        columns: dict[str, list] = {"branch": list(range(len(self)))}
+        for field in fields(self):
+            array = getattr(self, field.name)
+            if array.ndim == 1:
+                columns[field.name] = array.tolist()
+            else:
+                name = field.name.removesuffix("_point")
+                columns |= {f"{name}_{axis}": column.tolist() for axis, column in zip("xyz", array.T, strict=True)}
+        return columns
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        columns = self._columns()
+        for row in zip(*columns.values(), strict=True):
+            yield dict(zip(columns, row, strict=True))
+
+    def __repr__(self):
+        return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
+
+    def __str__(self):
+        rows = [[*COLUMNS], *([cell(row, name) for name in COLUMNS] for row in self)]
+        if len(rows) > PRINTED_ROWS + 1:
+            rows[PRINTED_ROWS - 4 : -4] = [["..."] + [""] * (len(COLUMNS) - 1)]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = (
+            "  ".join(
+                word.ljust(width) if form == "s" else word.rjust(width)
+                for word, width, form in zip(row, widths, COLUMNS.values(), strict=True)
+            )
+            for row in rows
+        )
+        return "\n".join([f"{self!r}: lengths in the cloud's units, angles in degrees", *map(str.rstrip, lines)])
+
+    def to_csv(self, path: str | os.PathLike) -> None:
+        """Write the table as CSV: a line of names, then a line per branch.
+
+        NaN and infinity are left empty, as JSON has null for both.
+
+        Parameters
+        ----------
+        path : path-like
+            Appears complete or not at all.
+
+        Raises
+        ------
+        OSError
+            The folder does not exist, or the file cannot be written.
+        """
+        rows = (("" if isinstance(v, float) and not math.isfinite(v) else v for v in row.values()) for row in self)
+        write_csv(path, [*self._columns()], rows)
+
+
+def cell(row: dict[str, Any], name: str) -> str:
+    """A number of a row as people read it, a dash for what is unknown.
+
+    Parameters
+    ----------
+    row : dict
+        As iteration over a `BranchTable` gives it.
+    name : str
+        Of `COLUMNS`.
+
+    Returns
+    -------
+    str
+    """
+    value = row[name]
+    if (name == "parent" and value < 0) or (isinstance(value, float) and math.isnan(value)):
+        return "-"
+    return format(value, COLUMNS[name])

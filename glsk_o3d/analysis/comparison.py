@@ -1,0 +1,150 @@
+"""How far a skeleton is from a known axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..skeleton import Skeleton
+from .curves import along, pieces
+from .graph import check_graph, count_components, simple_edges
+from .truth import Truth
+
+PLACE_SPACING = 0.1  # of the places where curves are compared, in median true radii
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """How far a skeleton is from a known axis.
+
+    Curves are compared at places a tenth of the median true radius apart. A place on one curve is measured to the
+    nearest place on the other, and "radius" is the true one there.
+
+    Attributes
+    ----------
+    error : float
+        Mean over the skeleton of its distance to the axis over the radius. 0 is best; 1 is the surface.
+    inside : float
+        Share of the skeleton that is less than a radius away from the axis. 0 to 1, 1 is best.
+    completeness : float
+        Share of the axis that is less than a radius away from the skeleton. 0 to 1, 1 is best.
+    ends : float or None
+        Mean over the axis's leaves of the distance to the nearest leaf of the skeleton (to its nearest vertex, if it
+        has no leaf) over the radius at the axis's leaf. 0 is best. None if the axis has no leaf.
+    radius_error : float or None
+        Mean over the skeleton of ``|r - radius| / radius``, with its own radii r interpolated along its edges. 0 is
+        best. None if the skeleton has no radii; places between vertices of which one has none do not count.
+    components, loops, leaves, junctions : int
+        Their number in the skeleton minus that in the axis. Loops are counted by the cycle rank.
+    topology : bool
+        Whether components and loops agree.
+    edge_error : (E,) float array
+        `error` of each edge of the skeleton. Not part of `as_dict`.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = torus(2000)
+    >>> found = compare(skeletonize(ring.points), ring)
+    >>> found.error < 0.2, found.loops, found.topology
+    (True, 0, True)
+    """
+
+    error: float
+    inside: float
+    completeness: float
+    ends: float | None
+    radius_error: float | None
+    components: int
+    loops: int
+    leaves: int
+    junctions: int
+    topology: bool
+    edge_error: np.ndarray = field(repr=False)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The numbers, as JSON holds them.
+
+        Returns
+        -------
+        dict of str to float, int, bool or None
+        """
+        return {name: value for name, value in vars(self).items() if name != "edge_error"}
+
+
+def compare(skeleton: Skeleton, truth: Any) -> Comparison:
+    """Measure a skeleton against a known axis.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Only `vertices`, `edges` and `radii` count. If it has edges, vertices without an edge count as components alone.
+    truth : Truth, Sample, or anything else with `nodes`, `edges` and `radii`
+        In the units of the skeleton.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InvalidParameterError
+        The skeleton is empty or not finite, or the truth is no axis (see `Truth`).
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> from glsk_o3d.skeleton import Skeleton
+    >>> ring = torus(500)
+    >>> axis = Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ())
+    >>> compare(axis, ring).topology
+    True
+    """
+    truth = truth if isinstance(truth, Truth) else Truth(truth.nodes, truth.edges, truth.radii)
+    vertices, edges = skeleton.vertices, check_graph(skeleton.vertices, skeleton.edges, "skeleton")
+    step = PLACE_SPACING * np.median(truth.radii)
+    row, part = pieces(truth.nodes, truth.edges, step)
+    axis, axis_radius = (along(truth.edges, row, part, values) for values in (truth.nodes, truth.radii))
+    row, part = pieces(vertices, edges, step)
+    radii = skeleton.radii if len(skeleton.radii) == len(vertices) else np.full(len(vertices), np.nan)
+    curve, curve_radius = (along(edges, row, part, values) for values in (vertices, radii))
+    to_axis, nearest = cKDTree(axis).query(curve)
+    to_curve, _ = cKDTree(curve).query(axis)
+    radius = axis_radius[nearest]
+
+    mine, degree = _structure(len(vertices), edges)
+    true, true_degree = _structure(len(truth.nodes), truth.edges)
+    difference = {name: mine[name] - true[name] for name in true}
+    tips = np.flatnonzero(true_degree == 1)
+    leaves = vertices[degree == 1] if (degree == 1).any() else vertices
+    to_leaf = cKDTree(leaves).query(truth.nodes[tips])[0] / truth.radii[tips]
+    known = np.isfinite(curve_radius)
+    off = np.abs(curve_radius - radius)[known] / radius[known]
+    return Comparison(
+        error=float(np.mean(to_axis / radius)),
+        inside=float(np.mean(to_axis < radius)),
+        completeness=float(np.mean(to_curve < axis_radius)),
+        ends=float(to_leaf.mean()) if len(tips) else None,
+        radius_error=float(off.mean()) if len(off) else None,
+        **difference,
+        topology=difference["components"] == 0 == difference["loops"],
+        edge_error=_mean_per_edge(to_axis / radius, row, len(edges)),
+    )
+
+
+def _mean_per_edge(values, row, n):
+    return np.bincount(row, values)[:n] / np.bincount(row)[:n] if n else np.empty(0)
+
+
+def _structure(n, edges):
+    """Components, loops, leaves and junctions of a graph, and the degrees of its n vertices."""
+    edges = simple_edges(edges)
+    components = count_components(n, edges)
+    degree = np.bincount(edges.ravel(), minlength=n)
+    loops = len(edges) - n + components
+    leaves, junctions = int((degree == 1).sum()), int((degree > 2).sum())
+    return {"components": components, "loops": loops, "leaves": leaves, "junctions": junctions}, degree

@@ -1,0 +1,192 @@
+"""`assess` on closed forms, and what it and `compare` refuse."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glsk_o3d.analysis import assess, compare
+from glsk_o3d.analysis.cross_sections import cross_sections
+from glsk_o3d.errors import InvalidCloudError, InvalidParameterError
+from glsk_o3d.samples import helix, sample_object, torus, tube, two_rings, y_junction
+
+SAMPLES = [tube, torus, helix, y_junction, two_rings, sample_object]
+LINE = [[0, 0, 0], [1, 0, 0]]
+
+
+@pytest.mark.parametrize(
+    ("d", "centredness", "boundedness"),
+    [(0, 1, 1), (0.02, 0.8, 1), (0.05, 0.5, 1), (0.09, 0.1, 1), (0.1, 0, 1), (0.14, 0, 0), (0.3, 0, 0)],
+)
+def test_a_tube_and_a_line_beside_its_axis(pipe, d, centredness, boundedness, axis_of):
+    """Every point of an open tube lies on the circle that is fitted: exact however few points there are."""
+    found = assess(axis_of(pipe, shift=[0, d, 0]), pipe.points)
+    assert found.centredness == pytest.approx(centredness, abs=1e-12)
+    assert found.boundedness == boundedness
+    assert found.smoothness == found.topology == 1
+    np.testing.assert_allclose(found.edge_centredness, [centredness], atol=1e-12)
+
+
+def test_what_is_seen_of_a_tube_from_outside(pipe):
+    """arcsin(r / x) / pi of all directions."""
+    for x in (0.11, 0.2, 0.4):
+        sections = cross_sections(pipe.nodes + [0, 0, x], [np.array([0, 1])], pipe.points, shortest=0.1)
+        seen = 1 - np.average(sections.open_angles, weights=sections.counts) / (2 * np.pi)
+        assert seen == pytest.approx(np.arcsin(0.1 / x) / np.pi, rel=0.01)
+        np.testing.assert_allclose(sections.radii, 0.1, rtol=1e-9)
+        np.testing.assert_allclose(sections.offsets, x, rtol=1e-9)
+
+
+def test_between_two_tubes_is_outside(pipe, axis_of):
+    """Two tubes whose axes are 2 x apart show 2 arcsin(r / x) / pi: a third from their middle at x = 2 r."""
+    for x, bounded in ((0.19, 1), (0.21, 0)):
+        both = np.concatenate([pipe.points + [0, x, 0], pipe.points - [0, x, 0]])
+        assert assess(axis_of(pipe), both).boundedness == bounded
+
+
+@pytest.mark.parametrize(("ring_radius", "centredness"), [(0.4, 1), (0.35, 0.5), (0.45, 0.5), (0.5, 0), (0.3, 0)])
+def test_a_torus_and_circles_beside_its_axis(ring, ring_radius, centredness, axis_of):
+    found = assess(axis_of(ring, scale=ring_radius / 0.4), ring.points)
+    assert found.centredness == pytest.approx(centredness, abs=2e-3)  # a section is a little longer than thin
+    assert found.smoothness == pytest.approx(1 - 0.1 / (np.pi * ring_radius), abs=1e-3)
+    (loop,) = found.loops
+    assert (loop.opening, loop.tube_radius) == (pytest.approx(ring_radius, rel=0.01), pytest.approx(0.1, rel=0.01))
+    assert (loop.wider, found.topology) == (True, 1)
+
+
+def test_a_circle_in_the_hole_of_a_torus_is_outside(ring, axis_of):
+    found = assess(axis_of(ring, scale=0.5), ring.points)
+    assert (found.centredness, found.boundedness) == (0, 0)
+
+
+@pytest.mark.parametrize("make", SAMPLES)
+@pytest.mark.parametrize("n", [1000, 4096])
+def test_the_axis_of_every_sample_is_good(make, n, axis_of):
+    sample = make(n)
+    found = assess(axis_of(sample), sample.points)
+    assert found.centredness > (0.85 if make is sample_object else 0.97)  # two cameras did not see all of it
+    assert found.boundedness > 0.94
+    assert found.smoothness > 0.9
+    assert found.topology == 1
+    assert found.components == found.clusters == (2 if make is two_rings else 1)
+    assert len(found.loops) == found.wide_loops == {torus: 1, two_rings: 2, sample_object: 1}.get(make, 0)
+
+
+def test_half_a_tube_has_the_axis_of_the_whole(pipe, axis_of):
+    seen = pipe.points[pipe.points[:, 2] > 0]
+    found = assess(axis_of(pipe), seen)
+    assert found.centredness == pytest.approx(1, abs=1e-12)
+    assert found.boundedness == 1
+
+
+def test_a_bridge_through_the_air_is_outside(pipe, curve):
+    """Two tubes end to end, one tube's length apart."""
+    both = np.concatenate([pipe.points - [1, 0, 0], pipe.points + [1, 0, 0]])
+    found = assess(curve([[-1.5, 0, 0], [1.5, 0, 0]]), both)
+    assert found.boundedness == pytest.approx(2 / 3, abs=0.02)
+    assert found.centredness == pytest.approx(1, abs=0.02)
+    assert (found.components, found.clusters, found.topology) == (1, 2, 0.5)
+
+
+def test_smoothness_of_a_zigzag(pipe, curve):
+    """Turning by 90 degrees every 0.02 in a tube of radius 0.1."""
+    x = np.arange(-20, 21) * 0.02 / np.sqrt(2)
+    zigzag = curve(np.column_stack([x, 0.02 / np.sqrt(2) * (np.arange(41) % 2), 0 * x]))
+    assert assess(zigzag, pipe.points).smoothness == 0
+    coarse = curve([[-0.5, 0, 0], [0, 0, 0], [0, 0.05, 0], [0.5, 0.05, 0]])
+    expected = 1 - 2 * (np.pi / 2) * 0.1 / (np.pi * coarse.length)
+    assert assess(coarse, pipe.points).smoothness == pytest.approx(expected, rel=0.02)
+
+
+def test_repeated_points_do_not_turn(pipe, curve):
+    path = np.linspace([-0.5, 0, 0], [0.5, 0, 0], 9)
+    assert assess(curve(np.repeat(path, 2, axis=0)), pipe.points).smoothness == 1
+
+
+def test_false_loops_open_less_than_their_tube(pipe, curve):
+    square = curve(
+        [[-0.5, 0, 0], [0, -0.03, 0], [0, 0.03, 0], [0.06, 0.03, 0], [0.06, -0.03, 0], [0.5, 0, 0]],
+        [[0, 1], [1, 2], [2, 3], [3, 4], [1, 4], [4, 5]],
+    )
+    found = assess(square, pipe.points)
+    (loop,) = found.loops
+    assert loop.opening == pytest.approx(0.03, rel=0.02)
+    assert (loop.wider, found.wide_loops, found.topology) == (False, 0, 0)
+    assert np.isnan(found.edge_centredness).any()  # at its junctions
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_assessments_have_no_unit(scale, axis_of):
+    sample = sample_object(2000)
+    axis = axis_of(sample)
+    expected = assess(axis, sample.points)
+    found = assess(replace(axis, vertices=axis.vertices * scale + scale), sample.points * scale + scale)
+    assert found.clusters == expected.clusters == 1
+    for name in ("centredness", "boundedness", "smoothness", "topology"):
+        assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-6)
+
+
+def test_outliers_and_points_that_are_not_finite(pipe, axis_of):
+    found = assess(axis_of(pipe), np.concatenate([pipe.points, [[0, 3, 0], [np.nan, 0, 0], [0, 0, -np.inf]]]))
+    assert found.centredness == pytest.approx(1, abs=1e-12)
+    assert found.boundedness == found.topology == 1
+
+
+def test_edges_may_be_given_in_any_way(ring, curve):
+    shuffled = np.random.default_rng(0).permutation(np.concatenate([ring.edges, ring.edges[:5, ::-1], [[7, 7]]]))
+    one, other = (assess(curve(ring.nodes, edges), ring.points) for edges in (ring.edges, shuffled))
+    assert one.as_dict() == other.as_dict()
+    assert other.edge_centredness.shape == (len(shuffled),)
+
+
+def test_nothing_is_modified(ring, axis_of):
+    axis, points = axis_of(ring), ring.points.copy()
+    arrays = (axis.vertices, axis.edges, axis.radii, points)
+    before = [array.copy() for array in arrays]
+    for array in arrays:
+        array.flags.writeable = False
+    assess(axis, points)
+    compare(axis, ring)
+    assert all((a == b).all() for a, b in zip(arrays, before, strict=True))
+
+
+@pytest.mark.parametrize("vertices", [[[0, 0, 0]], [[1, 1, 1], [1, 1, 1]]])
+def test_no_curve_to_assess(pipe, vertices, curve):
+    with pytest.raises(InvalidParameterError, match="no edge with a length"):
+        assess(curve(vertices), pipe.points)
+
+
+@pytest.mark.parametrize(("away", "centredness"), [(0, 1), (1, 0), (100, 0)])
+def test_points_in_a_row_have_sections_without_a_radius(away, centredness, curve):
+    row = np.linspace(LINE[0], LINE[1], 200) + np.cross(np.subtract(*LINE), [1, 2, 3]) * away
+    assert assess(curve(LINE), row).centredness == centredness
+
+
+@pytest.mark.parametrize("cloud", [np.zeros((20, 3)), np.full((20, 3), np.nan), np.eye(3)])
+def test_clouds_with_too_few_points(cloud, curve):
+    with pytest.raises(InvalidCloudError, match="6 points around"):
+        assess(curve(LINE), cloud)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "edges", "message"),
+    [
+        (np.empty((0, 3)), np.empty((0, 2), int), "the skeleton is empty"),
+        ([[0, 0, 0], [np.nan, 0, 0]], [[0, 1]], "coordinates that are not finite"),
+        (LINE, [[0, 2]], "names a vertex that is not there"),
+        (LINE, [[-1, 1]], "names a vertex that is not there"),
+    ],
+)
+def test_skeletons_that_are_none(pipe, vertices, edges, message, curve):
+    for measure in (lambda s: compare(s, pipe), lambda s: assess(s, pipe.points)):
+        with pytest.raises(InvalidParameterError, match=message):
+            measure(curve(vertices, edges))
+
+
+def test_the_example_in_the_documentation(root, capsys):
+    (code,) = re.findall(r"```python\n(.*?)```", (root / "docs" / "evaluation.md").read_text(), re.DOTALL)
+    exec(compile(code, "docs/evaluation.md", "exec"), {})
+    promised = re.findall(r"# prints (.*)", code)
+    assert capsys.readouterr().out.splitlines() == promised
+    assert promised

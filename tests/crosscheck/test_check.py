@@ -1,0 +1,399 @@
+"""The cross-check of a cloud against a mesh: what agrees, what must not, and what cannot be checked."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import open3d as o3d
+import pytest
+from scipy.spatial.transform import Rotation
+
+from glsk_o3d import Connector, Contractor, LPRReducer, Refiner, RingBuilder, read_cloud, samples, skeletonize
+from glsk_o3d.crosscheck import cross_check
+from glsk_o3d.crosscheck.agreement import (
+    compare_rows,
+    compare_skeletons,
+    mesh_fit,
+)
+from glsk_o3d.crosscheck.mesh_contraction import MeshContractor
+from glsk_o3d.crosscheck.reconstruction import spacing
+from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
+from glsk_o3d.io.meshes import mesh_arrays, read_mesh
+from glsk_o3d.numerics.mesh_rings import border_lengths
+from glsk_o3d.numerics.solver import SolveError
+from glsk_o3d.report import REFUSED
+
+SPIKY = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+
+
+@pytest.mark.parametrize("shape", ["tube", "torus", "helix", "y_junction", "two_rings"])
+def test_clean_and_dense_shapes_agree(shape):
+    sample = samples.SAMPLES[shape](3000)
+    found = cross_check(sample.points)
+    assert (found.verdict, found.reasons, found.surface) == ("agrees", (), "ball_pivoting")
+    assert found.rows.one_to_one
+    assert found.rows.covered > 0.8
+    assert found.rows.same_rings > 0.5
+    assert found.rows.angle["median"] < 0.1
+    assert found.rows.length["median"] == pytest.approx(1, abs=0.01)
+    assert found.skeletons.topology
+    assert found.skeletons.distance_in_radii < 0.05
+
+
+@pytest.mark.parametrize("noise", [0.0025, 0.01])
+def test_noise_turns_the_rows_before_it_moves_the_skeleton(noise):
+    found = cross_check(samples.torus(2048, noise=noise).points)
+    assert (found.verdict, found.surface) == ("agrees in part", "poisson")
+    assert found.rows.angle["median"] > 15
+    assert found.skeletons.topology
+    assert found.skeletons.distance_in_radii < 0.1
+    assert len(found.reasons) == 1
+    assert "a quarter of the Laplacian coordinates" in found.reasons[0]
+
+
+@pytest.mark.parametrize("shape", ["tube", "torus"])
+def test_it_tells_where_the_cloud_is_noisy(shape):
+    points = samples.SAMPLES[shape](3000).points.copy()
+    noisy = points[:, 0] < 0
+    points[noisy] += np.random.default_rng(0).normal(scale=0.008, size=(noisy.sum(), 3))
+    found = cross_check(points)
+    assert found.verdict == "agrees in part"
+    assert found.doubtful[noisy].mean() > 0.5
+    assert found.doubtful[~noisy].mean() < 0.05
+    assert np.nanmedian(found.angle[noisy]) > 10 * np.nanmedian(found.angle[~noisy])
+
+
+@SPIKY
+@pytest.mark.parametrize(
+    ("verdict", "shape", "n", "noise"),
+    [
+        ("do not trust", "sheet", 1024, 0),
+        ("do not trust", "sauropod", 128, 0),
+        ("cannot tell", "torus", 128, 0),
+        ("cannot tell", "torus", 1024, 0.08),
+    ],
+)
+def test_too_sparse_too_noisy_or_without_a_curve(verdict, shape, n, noise):
+    assert cross_check(samples.SAMPLES[shape](n, noise=noise).points).verdict == verdict
+
+
+def test_even_points_agree_to_rounding(even_ball):
+    points, faces = even_ball(600)
+    with pytest.warns(SkeletonWarning):
+        found = cross_check(points, (points, faces))
+    assert found.surface == "given"
+    assert found.rows.compared == found.rows.closed == 600
+    assert found.rows.same_rings > 0.95
+    same = found.ring_share == 1
+    assert found.angle[same].max() < 1e-4
+    np.testing.assert_allclose(found.length_ratio[same], 1, rtol=1e-9)
+    assert found.verdict != "agrees"  # a ball: the run itself warns
+    assert any("itself warns" in reason for reason in found.reasons)
+
+
+def test_the_fit_of_meshes_that_are_known(ring, check):
+    state = RingBuilder()(ring.points)
+    vertices = state.frame.into(check.vertices)
+    whole = mesh_fit(state, vertices, check.faces)
+    assert (whole.far, whole.pieces, whole.parts, whole.torn) == (0, 1, 1, 0)
+    assert whole.open < 0.02
+    cut = np.abs(vertices[check.faces].mean(axis=1)[:, 0]) > 0.1  # a slab of the ring is missing, and so two pieces
+    fit = mesh_fit(state, vertices, check.faces[cut])
+    off = np.abs(vertices[:, 0]) < 0.1 - spacing(vertices)
+    assert (fit.pieces, fit.parts) == (2, 1)
+    assert 0.4 < fit.torn <= 0.5
+    assert off.mean() / 2 < fit.far < off.mean() * 2
+    assert fit.open > whole.open + 0.05
+    apart = np.abs(ring.points[:, 0]) > 0.1
+    fit = mesh_fit(RingBuilder()(ring.points[apart]), vertices, check.faces[cut])
+    assert (fit.pieces, fit.parts, fit.torn) == (2, 2, 0)
+
+
+def test_open_ends_that_the_cloud_has_too_are_not_held_against_a_mesh():
+    tube = samples.tube(2000, capped=False)
+    found = cross_check(tube.points, "ball_pivoting")
+    assert border_lengths(len(found.vertices), found.faces).max() > 12
+    assert found.fit.open < 0.05
+
+
+@SPIKY
+def test_a_mesh_whose_contraction_fails(ring, monkeypatch):
+    """Its skeleton, of the only solve that is left, differs: that says nothing of the cloud's."""
+    solve = MeshContractor._solve_in_box
+
+    def refuse(self, state, *system):
+        if state.report.iterations:
+            raise SolveError("too spiky")
+        return solve(self, state, *system)
+
+    monkeypatch.setattr(MeshContractor, "_solve_in_box", refuse)
+    found = cross_check(ring.points)
+    assert found.mesh_skeleton.report.stop_reason == f"solve 2 {REFUSED}: too spiky"
+    assert found.verdict == "cannot tell"
+    assert f"the mesh's own contraction failed: {found.mesh_skeleton.report.stop_reason}" in found.reasons
+
+
+# -------------------------------------------------------------------------------------------------------- the numbers
+
+
+@pytest.mark.parametrize("tilt", [0, 0.4])
+def test_flat_rows_have_one_direction(tilt):
+    x, y = (grid.ravel() + 0.0 for grid in np.meshgrid(np.arange(12), np.arange(12)))
+    points = np.column_stack([x, y, tilt * x])
+    state = RingBuilder(denoise=0)(points)
+    order = np.lexsort(state.points[state.point_of_survivor].T[:2])  # rows of the grid
+    corner = (np.arange(11)[:, None] * 12 + np.arange(11)).ravel()
+    faces = order[np.concatenate([corner[:, None] + [0, 1, 13], corner[:, None] + [0, 13, 12]])]
+    angle, length, _, found = compare_rows(state, state.cloud, faces)
+    compared = np.isfinite(angle)
+    assert compared.sum() == found.compared > 50
+    assert found.flat > 0.9
+    assert (angle[compared] == 0).mean() >= found.flat
+    assert (length[compared] == 1).mean() >= found.flat
+
+
+def test_the_astray_end_of_either_skeleton_counts(make):
+    def path(end):
+        line = make(np.column_stack([np.linspace(0, end, 50), np.zeros((50, 2))]), np.arange(49)[:, None] + [0, 1])
+        return replace(line, radii=np.full(50, 0.5))
+
+    for ours, theirs in ((1, 3), (3, 1)):
+        found = compare_skeletons(path(ours), path(theirs), 3.0)
+        # of 3 units the last 2 are up to 2 from the other, whose radius is the same
+        assert found.hausdorff95_in_radii == pytest.approx(1.85 / 0.5, rel=0.01)
+        assert found.hausdorff95 == pytest.approx(1.85 / 3, rel=0.01)
+
+
+def test_it_is_the_skeleton_of_skeletonize(ring, check):
+    np.testing.assert_array_equal(check.skeleton.vertices, skeletonize(ring.points).vertices)
+
+
+def test_numbers_of_points_fit_the_numbers_of_all(ring, check):
+    np.testing.assert_array_equal(check.points, ring.points)
+    compared = np.isfinite(check.angle)
+    assert check.rows.compared == compared.sum()
+    assert check.rows.covered == compared.sum() / check.rows.closed
+    assert check.rows.same_rings == (check.ring_share[compared] == 1).mean()
+    np.testing.assert_array_equal(check.angle > 1e-3, compared & (check.ring_share < 1) & (check.angle > 1e-3))
+    assert (check.doubtful == (~compared | (check.angle > 30))).all()
+    assert check.to_dict()["points"]["not_compared"] == (~compared).sum()
+
+
+def test_units_place_turn_and_order_do_not_matter(ring, check):
+    order = np.random.default_rng(0).permutation(len(ring.points))
+    turn = Rotation.from_rotvec([0.3, -1, 2]).as_matrix()
+    moved = cross_check(1000 * ring.points[order] @ turn.T + [5e5, 4e6, 300])
+    assert moved.verdict == check.verdict
+    # ties in Morton order and in the balls' way may fall differently, so not to the last digit
+    assert moved.rows.covered == pytest.approx(check.rows.covered, abs=0.03)
+    assert moved.rows.same_rings == pytest.approx(check.rows.same_rings, abs=0.05)
+    assert moved.skeletons.distance == pytest.approx(check.skeletons.distance, abs=1e-3)
+    scaled = cross_check(8.0 * ring.points)
+    np.testing.assert_allclose(scaled.angle, check.angle, atol=1e-4)
+    assert scaled.skeletons.distance_in_radii == pytest.approx(check.skeletons.distance_in_radii, rel=1e-6)
+
+
+def test_json(check):
+    told = json.loads(json.dumps(check.to_dict(), allow_nan=False))
+    assert told == check.to_dict() | {"skeletons": told["skeletons"], "stop_reasons": told["stop_reasons"]}
+    assert told["verdict"] == "agrees"
+    assert told["skeletons"]["loops"] == [1, 1]
+    assert told["rows"]["one_to_one"] is told["skeletons"]["topology"] is True
+    assert "2 igl.cotmatrix" in told["convention"]
+
+
+def test_every_pipeline_and_legacy_and_tensor_clouds(ring, check):
+    for name in ("wen2024", "cao2010"):
+        found = cross_check(ring.points, pipeline=name)
+        np.testing.assert_array_equal(found.skeleton.vertices, skeletonize(ring.points, name).vertices)
+        mesh, cloud = found.mesh_skeleton.report.stages, found.skeleton.report.stages
+        assert mesh[0].startswith("MeshContractor(reducer=None, ")
+        assert mesh[1:] == cloud[-2:]
+    legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(ring.points))
+    tensor = o3d.t.geometry.PointCloud(ring.points.astype(np.float32))
+    assert cross_check(legacy).rows == check.rows
+    assert cross_check(tensor).verdict == check.verdict
+
+
+# ---------------------------------------------------------------------------------------------------------- the meshes
+
+
+@pytest.fixture(scope="module")
+def surface(check):
+    """The reconstructed mesh as a user's, with its vertices in another order."""
+    order = np.random.default_rng(1).permutation(len(check.vertices))
+    return check.vertices[order], np.argsort(order)[check.faces]
+
+
+def test_a_mesh_of_the_clouds_own_points(ring, check, surface):
+    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(surface[0]), o3d.utility.Vector3iVector(surface[1]))
+    tensor = o3d.t.geometry.TriangleMesh(o3d.core.Tensor(surface[0].astype(np.float32)), o3d.core.Tensor(surface[1]))
+    for given in (surface, mesh, tensor):
+        found = cross_check(ring.points, given)
+        assert found.surface == "given"
+        assert found.rows == check.rows
+        assert found.skeletons.distance == pytest.approx(check.skeletons.distance, rel=1e-3)
+
+
+def test_a_mesh_of_other_points(ring):
+    # a fine regular mesh of the same torus: curvature normals are compared, interpolated
+    u, v = (np.arange(m) * 2 * np.pi / m for m in (160, 40))
+    radius, width = np.linalg.norm(ring.nodes[0]), ring.radii[0]
+    u, v = np.meshgrid(u, v, indexing="ij")
+    vertices = np.stack(
+        [(radius + width * np.cos(v)) * np.cos(u), (radius + width * np.cos(v)) * np.sin(u), width * np.sin(v)], -1
+    ).reshape(-1, 3)
+    i, j = np.meshgrid(np.arange(160), np.arange(40), indexing="ij")
+    a, b, c, d = ((i + p) % 160 * 40 + (j + q) % 40 for p, q in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
+    found = cross_check(ring.points, (vertices, faces))
+    assert not found.rows.one_to_one
+    assert found.rows.same_rings is found.rows.common_triangles is None
+    assert np.isnan(found.ring_share).all()
+    assert found.rows.covered == 1
+    assert found.rows.angle["median"] < 5
+    assert 0.7 < found.rows.length["median"] < 1.6
+    assert found.verdict == "agrees"
+
+
+def test_holes_extra_triangles_and_bare_vertices(ring, check):
+    # a mesh with a fin, a triangle given twice, and a hole, some vertices of which have no triangle left
+    hole = check.vertices[:, 0] > 0.3
+    faces = check.faces[~hole[check.faces].any(axis=1)]
+    i, j = faces[0, :2]
+    fin = [i, j, np.flatnonzero(~hole & ~np.isin(np.arange(len(hole)), faces[:50]))[0]]
+    found = cross_check(ring.points, (check.vertices, np.vstack([faces, faces[:1, ::-1], [fin]])))
+    assert found.rows.one_to_one
+    missing = ring.points[:, 0] > 0.3
+    assert np.isnan(found.angle[missing]).all()
+    assert np.isnan(found.angle).sum() < np.isnan(check.angle).sum() + 1.5 * missing.sum() + 20
+    assert found.skeletons.loops[0] == 1
+    assert found.verdict == "cannot tell"  # the mesh's ring is broken
+
+
+def test_poisson_and_a_single_method(ring):
+    found = cross_check(ring.points, "poisson")
+    assert (found.surface, found.verdict, found.rows.one_to_one) == ("poisson", "agrees", False)
+    noisy = cross_check(samples.torus(1500, noise=0.02).points, "ball_pivoting")
+    assert noisy.surface == "ball_pivoting"
+    assert noisy.rows.covered < 0.7
+
+
+@pytest.mark.parametrize(
+    ("mesh", "message"),
+    [
+        ("alpha", "mesh = 'alpha': must be 'auto', 'ball_pivoting', 'poisson', or a mesh"),
+        (7, "int is no triangle mesh"),
+        ((np.eye(3), np.zeros((0, 3), int)), r"needs \(V, 3\) vertices and \(F, 3\) triangles"),
+        ((np.eye(3), [[0, 1, 3]]), "names a vertex that is not there"),
+        ((np.eye(3), [[0.0, 1, 2]]), "names a vertex that is not there"),
+        ((np.eye(3) * np.nan, [[0, 1, 2]]), "not finite"),
+        (o3d.geometry.TriangleMesh(), "needs"),
+    ],
+)
+def test_useless_meshes(ring, mesh, message):
+    with pytest.raises(InvalidParameterError, match=message):
+        cross_check(ring.points, mesh)
+
+
+def test_a_mesh_that_lies_elsewhere(ring):
+    with pytest.raises(InvalidCloudError, match="same units and place"):
+        cross_check(ring.points, (np.eye(3) + 100, [[0, 1, 2]]))
+
+
+def test_a_mesh_is_read_once(surface, tmp_path, monkeypatch):
+    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(surface[0]), o3d.utility.Vector3iVector(surface[1]))
+    read = o3d.io.read_triangle_mesh
+    for ending in ("ply", "off"):
+        o3d.io.write_triangle_mesh(str(tmp_path / f"m.{ending}"), mesh)
+        once = iter([read])
+        for name in ("read_triangle_mesh", "read_point_cloud"):
+            monkeypatch.setattr(o3d.io, name, lambda *words, once=once, **_: next(once)(*words))
+        assert len(read_mesh(tmp_path / f"m.{ending}").triangles) == len(surface[1])
+
+
+def test_arrays_of_a_mesh_are_copies():
+    vertices, faces = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)
+    found = mesh_arrays((vertices, faces))
+    assert [array.dtype for array in found] == [np.float64, np.int64]
+
+
+# ---------------------------------------------------------------------------------------------------------- the clouds
+
+
+def test_large_clouds_are_thinned_and_the_user_is_told(ring):
+    with pytest.warns(SkeletonWarning, match="1000 of 1500 points .*max_points") as caught:
+        found = cross_check(ring.points, max_points=1000)
+    assert caught[0].filename == __file__
+    assert (found.n_input, len(found.points), found.rows.rows) == (1500, 1000, 1000)
+    assert len(np.unique(found.points, axis=0)) == 1000
+    assert {tuple(point) for point in found.points} <= {tuple(point) for point in ring.points}
+    assert found.skeletons.loops == (1, 1)
+    assert cross_check(ring.points, max_points=None).n_input == 1500
+    for wrong in (7, 0, 1.5, "all"):
+        with pytest.raises(InvalidParameterError, match="max_points"):
+            cross_check(ring.points, max_points=wrong)
+
+
+def test_points_that_are_not_finite_and_outliers(ring, check):
+    spoilt = np.vstack([ring.points, [[np.nan, 0, 0], [0.45, 0.4, 0.4]]])
+    with pytest.raises(InvalidCloudError, match="1 of 1502 points"):
+        cross_check(spoilt)
+    pipeline = RingBuilder(drop_invalid=True) | Contractor(reducer=LPRReducer()) | Connector() | Refiner()
+    found = cross_check(spoilt, pipeline=pipeline)
+    assert np.isnan(found.angle[1500:]).all()
+    np.testing.assert_allclose(found.angle[:1500], check.angle, atol=1e-3)
+    with pytest.warns(SkeletonWarning):
+        thinned = cross_check(spoilt, pipeline=pipeline, max_points=1000)
+    assert np.isnan(thinned.points).any(axis=1).sum() == 1
+    assert len(thinned.points) == 1001
+
+
+@SPIKY
+def test_where_poisson_fails_the_balls_surface_is_better_than_none():
+    ring = samples.torus(800).points
+    far = np.vstack([ring, ring + [300, 0, 0]])  # cells as wide as a ring
+    found = cross_check(far)
+    assert found.surface == "ball_pivoting"
+    assert found.rows.compared > 300
+    assert found.skeletons.components == (2, 2)
+    with pytest.raises(InvalidCloudError, match="1600 points by poisson"):
+        cross_check(far, "poisson")
+
+
+def test_duplicates_share_their_row(ring, check):
+    found = cross_check(np.vstack([ring.points, ring.points[:10]]))
+    np.testing.assert_array_equal(found.angle[1500:], found.angle[:10])
+    assert found.rows.rows == 1500
+
+
+@SPIKY
+def test_clouds_without_a_surface():
+    line = np.column_stack([np.linspace(0, 1, 50), np.zeros(50), np.zeros(50)])
+    with pytest.raises(InvalidCloudError, match="50 points"):
+        cross_check(line, "ball_pivoting")
+    found = cross_check(np.column_stack([np.linspace(0, 1, 500), np.zeros((500, 2))]))  # Poisson invents one
+    assert found.rows.compared == 0
+    assert found.verdict == "cannot tell"
+    assert "no Laplacian coordinates could be compared" in found.reasons
+    for wrong in (np.eye(3), np.empty((0, 3))):
+        with pytest.raises(InvalidCloudError):
+            cross_check(wrong)
+
+
+@pytest.mark.parametrize("pipeline", [Contractor() | Connector(), RingBuilder() | Contractor(), "none", None])
+def test_useless_pipelines(ring, pipeline):
+    with pytest.raises(InvalidParameterError):
+        cross_check(ring.points, pipeline=pipeline)
+
+
+def test_the_input_is_not_changed(ring):
+    points = ring.points.copy()
+    points.flags.writeable = False
+    cross_check(points)
+    np.testing.assert_array_equal(points, ring.points)
+
+
+def test_a_real_scan(shared_dir):
+    found = cross_check(read_cloud(shared_dir / "data" / "omni_dumbbell.ply"))
+    assert (found.verdict, found.skeletons.loops) == ("agrees", (0, 0))
