@@ -97,7 +97,7 @@ class Connector(Filter[Skeleton]):
         survivor = state.survivor_of_point
         vertex_of_point = np.where(survivor >= 0, vertex_of_survivor[survivor], -1)
         normals = np.full_like(state.points, np.nan)
-        normals[state.witness] = state.normals[state.row_of_point[state.witness]]
+        normals[state.sampled] = state.normals[state.representative_of_point[state.sampled]]
         skeleton = Skeleton(
             vertices=vertices,
             edges=self._edges(state, vertex_of_survivor),
@@ -107,7 +107,7 @@ class Connector(Filter[Skeleton]):
             normals=normals,
             report=state.report,
         )
-        vertex_of_row = vertex_of_survivor[state.owner]
+        vertex_of_row = vertex_of_survivor[state.representative]
         count = np.bincount(vertex_of_row, minlength=len(samples))
         noise = np.bincount(vertex_of_row, state.noise, len(samples)) / np.maximum(count, 1)
         return drop_unsupported(skeleton, count, (noise > UNSUPPORTED_NOISE) & (self.min_support > 0), self.min_support)
@@ -203,6 +203,6 @@ def contraction_distance(state: Contraction) -> np.ndarray:
     (n,) float array
         In the working frame.
     """
-    distance = group_median(norm(state.cloud - state.positions[state.owner]), state.owner, len(state))
+    distance = group_median(norm(state.cloud - state.positions[state.representative]), state.representative, len(state))
     _, neighbours = nearest_neighbours(state.positions, min(16, len(state)))
     return row_medians(distance.take(neighbours))

@@ -115,7 +115,7 @@ class LPRReducer(Filter[Contraction]):
         return replace(
             state,
             survivors=state.survivors[keep],
-            owner=index[into][state.owner],
+            representative=index[into][state.representative],
             positions=state.positions[keep],
             previous=state.previous[keep],
             laplacian_coordinates=state.laplacian_coordinates[keep],

@@ -219,15 +219,15 @@ def _contraction(
     n = len(rings)
     return Contraction(
         points=points,
-        row_of_point=representative,
+        representative_of_point=representative,
         outlier=outlier,
-        witness=sampled,
+        sampled=sampled,
         frame=surface.frame,
         cloud=surface.points,
         noise=surface.noise,
         normals=surface.normals,
         survivors=thinned.survivors,
-        owner=thinned.representative,
+        representative=thinned.representative,
         mass=np.bincount(thinned.representative, surface.merged) * (n / surface.merged.sum()),
         **at_rest(surface.points[thinned.survivors], rings),
         report=Report(

@@ -49,11 +49,11 @@ class Contraction:
     ----------
     points : (N, 3) float64 array
         The input.
-    row_of_point : (N,) int array
+    representative_of_point : (N,) int array
         Row of `cloud` that each input point is; -1 if it was dropped as not finite.
     outlier : (N,) bool array
-        Input points that were set aside; `row_of_point` is the distinct point nearest to them.
-    witness : (N,) bool array
+        Input points that were set aside; `representative_of_point` is the distinct point nearest to them.
+    sampled : (N,) bool array
         Input points that say where the surface is: no outliers, and of a large cloud a sample; others are only mapped.
     frame : Frame
     cloud : (m, 3) float64 array
@@ -64,7 +64,7 @@ class Contraction:
         Unit normals of the tangent planes before points were moved to ridges, up to their sign.
     survivors : (n,) int array
         Rows of `cloud` still there, ascending.
-    owner : (m,) int array
+    representative : (m,) int array
         The survivor (0 .. n-1) that each distinct point was merged into; itself for a survivor.
     positions, previous : (n, 3) float64 array
         Contracted positions, and those before the last solve.
@@ -95,15 +95,15 @@ class Contraction:
     """
 
     points: np.ndarray
-    row_of_point: np.ndarray
+    representative_of_point: np.ndarray
     outlier: np.ndarray
-    witness: np.ndarray
+    sampled: np.ndarray
     frame: Frame
     cloud: np.ndarray
     noise: np.ndarray
     normals: np.ndarray
     survivors: np.ndarray
-    owner: np.ndarray
+    representative: np.ndarray
     positions: np.ndarray
     previous: np.ndarray
     laplacian_coordinates: np.ndarray
@@ -130,14 +130,14 @@ class Contraction:
     @property
     def survivor_of_point(self) -> np.ndarray:
         """For every input point the survivor that speaks for it, (N,) int array; -1 for dropped points."""
-        return np.where(self.row_of_point >= 0, self.owner[self.row_of_point], -1)
+        return np.where(self.representative_of_point >= 0, self.representative[self.representative_of_point], -1)
 
     @property
     def point_of_survivor(self) -> np.ndarray:
         """For every survivor the first input point that it is, (n,) int array."""
-        valid = np.flatnonzero(self.witness)
+        valid = np.flatnonzero(self.sampled)
         first = np.empty(len(self.cloud), int)
-        first[self.row_of_point[valid[::-1]]] = valid[::-1]
+        first[self.representative_of_point[valid[::-1]]] = valid[::-1]
         return first[self.survivors]
 
     @property

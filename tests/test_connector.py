@@ -135,8 +135,8 @@ def test_bad_radius(state, radius):
 
 def slow_thickness(state, k=16):
     n = len(state)
-    distance = np.linalg.norm(state.cloud - state.positions[state.owner], axis=1)
-    own = np.array([np.median(distance[state.owner == i]) for i in range(n)])
+    distance = np.linalg.norm(state.cloud - state.positions[state.representative], axis=1)
+    own = np.array([np.median(distance[state.representative == i]) for i in range(n)])
     near = np.argsort(cdist(state.positions, state.positions), axis=1)[:, :k]
     return np.median(own[near], axis=1)
 

@@ -45,7 +45,7 @@ def golden(request):
         reduced=WEN.reducer(solved),
         cao=CAO(start),
         wen=WEN(start),
-        row=built.row_of_point,
+        row=built.representative_of_point,
         point=built.point_of_survivor,
     )
 

@@ -92,9 +92,9 @@ def test_state_says_what_it_is():
     assert isinstance(state, Contraction)
     assert len(state) == state.report.n_input == state.report.n_distinct == n
     np.testing.assert_array_equal(state.points, TORUS)
-    np.testing.assert_array_equal(np.sort(state.row_of_point), np.arange(n))
-    np.testing.assert_array_equal(state.survivor_of_point, state.row_of_point)
-    np.testing.assert_array_equal(state.row_of_point[state.point_of_survivor], np.arange(n))
+    np.testing.assert_array_equal(np.sort(state.representative_of_point), np.arange(n))
+    np.testing.assert_array_equal(state.survivor_of_point, state.representative_of_point)
+    np.testing.assert_array_equal(state.representative_of_point[state.point_of_survivor], np.arange(n))
     np.testing.assert_allclose(state.contracted[state.survivor_of_point], TORUS, atol=1e-15)
     np.testing.assert_array_equal(state.mass, 1)
     assert state.ring_ratio == 1
@@ -153,7 +153,7 @@ def test_duplicates_are_one_point():
     state = RingBuilder()(TORUS[order])
     assert (state.report.n_input, state.report.n_distinct, len(state)) == (1800, 600, 600)
     np.testing.assert_allclose(state.cloud, single.cloud, atol=1e-15)
-    np.testing.assert_array_equal(state.row_of_point, single.row_of_point[order])
+    np.testing.assert_array_equal(state.representative_of_point, single.representative_of_point[order])
     np.testing.assert_array_equal(state.rings.indices, single.rings.indices)
     np.testing.assert_array_equal(order[state.point_of_survivor], single.point_of_survivor)
     first = np.unique(order, return_index=True)[1]
@@ -167,7 +167,7 @@ def test_invalid_points_are_counted_and_dropped_only_when_asked():
         RingBuilder()(points)
     state = RingBuilder(drop_invalid=True)(points)
     assert (state.report.n_input, state.report.n_dropped, state.report.n_distinct) == (600, 3, 597)
-    np.testing.assert_array_equal(np.flatnonzero(state.row_of_point < 0), [5, 70, 599])
+    np.testing.assert_array_equal(np.flatnonzero(state.representative_of_point < 0), [5, 70, 599])
     np.testing.assert_array_equal(np.flatnonzero(state.survivor_of_point < 0), [5, 70, 599])
     valid = np.delete(TORUS, [5, 70, 599], axis=0)
     np.testing.assert_array_equal(state.cloud, RingBuilder()(valid).cloud)
@@ -212,10 +212,10 @@ def test_what_is_left_is_the_cloud_without_them(outliers):
     np.testing.assert_array_equal(state.rings.indices, clean.rings.indices)
     assert state.frame.diagonal == pytest.approx(clean.frame.diagonal, rel=1e-15)
     kept = order < 600
-    np.testing.assert_array_equal(state.row_of_point[kept], clean.row_of_point[order[kept]])
+    np.testing.assert_array_equal(state.representative_of_point[kept], clean.representative_of_point[order[kept]])
     # outliers go with the nearest point that is none
     nearest = cKDTree(TORUS).query(mixed[~kept])[1]
-    np.testing.assert_array_equal(state.row_of_point[~kept], clean.row_of_point[nearest])
+    np.testing.assert_array_equal(state.representative_of_point[~kept], clean.representative_of_point[nearest])
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -255,7 +255,7 @@ def noisy_tube(n=800):
 
 def in_order(state):
     """The working cloud in the user's order and units."""
-    return state.frame.out_of(state.cloud)[state.row_of_point]
+    return state.frame.out_of(state.cloud)[state.representative_of_point]
 
 
 BY_16 = RingBuilder(k=16)
@@ -277,7 +277,7 @@ def test_denoising_moves_the_cloud_to_its_ridges_before_the_rings(passes):
     np.testing.assert_array_equal(calm.cloud, subspace_mean_shift(plain.cloud, noise, passes))
     np.testing.assert_array_equal(calm.positions, calm.cloud)
     assert calm.positions is calm.previous
-    np.testing.assert_array_equal(calm.row_of_point, plain.row_of_point)
+    np.testing.assert_array_equal(calm.representative_of_point, plain.representative_of_point)
     np.testing.assert_array_equal(calm.points, points)
     # a ridge has no normals, and is not noisy any more
     for state in (plain, calm):
@@ -313,7 +313,7 @@ def test_dense_noisy_clouds_are_averaged(n, noise):
     sample = samples.torus(n, noise=noise)
     state = RingBuilder()(sample.points)
     assert 4096 <= len(state.cloud) < 8192 + 400
-    assert state.report.n_distinct == state.report.n_input - state.report.n_outliers == state.witness.sum()
+    assert state.report.n_distinct == state.report.n_input - state.report.n_outliers == state.sampled.sum()
     assert state.mass.mean() == pytest.approx(1, rel=1e-12)
     alone = RingBuilder(thin_to="all")(sample.points)
 
@@ -347,10 +347,10 @@ def test_clean_parts_are_not_averaged():
     points = samples.torus(9000).points
     noisy = samples.torus(20000, noise=0.02).points + [0, 0, 1]
     state = RingBuilder(around=0)(np.concatenate([points, noisy]))
-    assert len(np.unique(state.row_of_point[:9000])) == 9000
-    assert len(np.unique(state.row_of_point[9000:][~state.outlier[9000:]])) < 20000 / 2
+    assert len(np.unique(state.representative_of_point[:9000])) == 9000
+    assert len(np.unique(state.representative_of_point[9000:][~state.outlier[9000:]])) < 20000 / 2
     # each counts for all that it is the mean of
-    many = np.unique(state.row_of_point[~state.outlier], return_counts=True)[1]
+    many = np.unique(state.representative_of_point[~state.outlier], return_counts=True)[1]
     np.testing.assert_allclose(state.mass, many / many.mean(), rtol=1e-12)
 
 
@@ -388,9 +388,9 @@ def test_denoised_points_that_stand_alone_are_set_aside(noise, seed, passes):
     np.testing.assert_array_equal(state.noise, share[~alone])
     np.testing.assert_array_equal(state.normals, plain.normals[~alone])
     # they are outliers, like those found before, and go with the nearest that is left
-    np.testing.assert_array_equal(state.outlier, plain.outlier | alone[plain.row_of_point])
+    np.testing.assert_array_equal(state.outlier, plain.outlier | alone[plain.representative_of_point])
     expected = cKDTree(state.cloud).query(calm)[1]
-    np.testing.assert_array_equal(state.row_of_point, expected[plain.row_of_point])
+    np.testing.assert_array_equal(state.representative_of_point, expected[plain.representative_of_point])
     assert state.report.n_outliers == state.outlier.sum() == plain.report.n_outliers + alone.sum()
     assert state.report.n_distinct == len(state) == 800 - state.report.n_outliers
     # nothing else of the state knows them
@@ -408,9 +408,9 @@ def test_copies_share_the_fate_of_their_point_and_dropped_ones_have_none(seed):
     kept, source = order < 800, order[order < 800]
     assert once.report.n_outliers > RAW(points).report.n_outliers > 0
     np.testing.assert_array_equal(state.cloud, once.cloud)
-    np.testing.assert_array_equal(state.row_of_point[kept], once.row_of_point[source])
+    np.testing.assert_array_equal(state.representative_of_point[kept], once.representative_of_point[source])
     np.testing.assert_array_equal(state.outlier[kept], once.outlier[source])
-    assert (state.row_of_point[~kept] == -1).all()
+    assert (state.representative_of_point[~kept] == -1).all()
     assert not state.outlier[~kept].any()
     report = state.report
     assert (report.n_input, report.n_dropped, report.n_distinct) == (len(order), 30, once.report.n_distinct)
@@ -542,12 +542,12 @@ def test_thinned_clouds_keep_all_points_and_their_mass(thin_to):
     n = min(thin_to, 2000)
     assert len(state) == n == state.report.n_contracted
     assert state.report.n_sampled == state.report.n_distinct == 2000
-    assert state.witness.all()
+    assert state.sampled.all()
     np.testing.assert_array_equal(state.cloud, whole.cloud)
     np.testing.assert_array_equal(state.normals, whole.normals)
     np.testing.assert_array_equal(state.positions, state.cloud[state.survivors])
-    np.testing.assert_array_equal(state.owner[state.survivors], np.arange(n))
-    np.testing.assert_allclose(state.mass, np.bincount(state.owner) * n / 2000, rtol=1e-14)
+    np.testing.assert_array_equal(state.representative[state.survivors], np.arange(n))
+    np.testing.assert_allclose(state.mass, np.bincount(state.representative) * n / 2000, rtol=1e-14)
     skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
     assert len(skeleton.vertex_of_point) == 2000
     assert skeleton.n_loops == 1
@@ -602,22 +602,22 @@ def test_a_large_cloud_is_sampled_and_every_point_has_its_place():
     state = RingBuilder(thin_to=800, drop_invalid=True)(points)
     assert 800 < state.report.n_sampled < 3 * 1600
     assert state.report.n_contracted <= 800
-    assert state.witness.sum() == state.report.n_distinct
-    assert state.row_of_point[17] == -1
+    assert state.sampled.sum() == state.report.n_distinct
+    assert state.representative_of_point[17] == -1
     assert state.outlier[4000]
-    assert not state.witness[[17, 4000]].any()
+    assert not state.sampled[[17, 4000]].any()
     np.testing.assert_allclose(
-        state.frame.out_of(state.cloud[state.row_of_point[state.witness]]), points[state.witness], atol=1e-12
+        state.frame.out_of(state.cloud[state.representative_of_point[state.sampled]]), points[state.sampled], atol=1e-12
     )
     others = np.flatnonzero(np.isfinite(points).all(axis=1) & ~state.outlier)
-    away = np.linalg.norm(state.frame.out_of(state.cloud[state.row_of_point[others]]) - points[others], axis=1)
+    away = np.linalg.norm(state.frame.out_of(state.cloud[state.representative_of_point[others]]) - points[others], axis=1)
     assert away.max() < 0.1
     skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
     assert skeleton.n_loops == 1
     assert (skeleton.vertex_of_point >= 0).sum() == 7999
-    assert len(skeleton.supporting_points) == state.witness.sum()
+    assert len(skeleton.supporting_points) == state.sampled.sum()
     # who says where the surface is has a normal, nobody else
-    np.testing.assert_array_equal(np.isfinite(skeleton.normals[:, 0]), state.witness)
+    np.testing.assert_array_equal(np.isfinite(skeleton.normals[:, 0]), state.sampled)
 
 
 def test_a_sampled_cloud_has_the_skeleton_of_the_whole():
@@ -656,7 +656,7 @@ def test_a_sample_is_denoised_by_how_many_points_it_stands_for(sampled):
     plain, calm = (replace(filter, denoise=passes)(points) for passes in (0, 4))
     near = nearest_neighbours(plain.cloud, 16)[1]
     noise = noise_share(principal(plain.cloud, near)[0], near)
-    weight = np.bincount(plain.row_of_point[~plain.outlier])
+    weight = np.bincount(plain.representative_of_point[~plain.outlier])
     assert plain.report.n_outliers >= 3
     assert weight.max() > 10
     ridge = subspace_mean_shift(plain.cloud, noise, 4, weight)
@@ -674,7 +674,7 @@ def test_a_sample_is_averaged_by_how_many_points_it_stands_for(sampled, monkeypa
     state = filter(points)
     assert MOST_IN_ONE * len(state.cloud) < len(plain.cloud)
     counted = ~plain.outlier
-    row, place = state.row_of_point[counted], plain.cloud[plain.row_of_point[counted]]
+    row, place = state.representative_of_point[counted], plain.cloud[plain.representative_of_point[counted]]
     mean = np.column_stack([np.bincount(row, axis) for axis in place.T]) / np.bincount(row)[:, None]
     np.testing.assert_allclose(state.cloud, mean, atol=1e-13)
 

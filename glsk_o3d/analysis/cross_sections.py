@@ -70,20 +70,20 @@ def cross_sections(vertices, branches, points, shortest=0.0) -> Sections:
     """
     places, tangents, lengths = _cut(vertices, branches, len(points), shortest)
     n = len(places)
-    distance, owner = cKDTree(places).query(points)
-    kept = distance <= FAR * group_median(distance, owner, n)[owner]
-    owner = owner[kept]
-    q = np.einsum("nij,ni->nj", plane_axes(tangents)[owner], points[kept] - places[owner])
-    count = np.bincount(owner, minlength=n)
+    distance, section = cKDTree(places).query(points)
+    kept = distance <= FAR * group_median(distance, section, n)[section]
+    section = section[kept]
+    q = np.einsum("nij,ni->nj", plane_axes(tangents)[section], points[kept] - places[section])
+    count = np.bincount(section, minlength=n)
     total = np.maximum(count, 1)
-    mean = group_sum(q, owner, n) / total[:, None]
-    u = q - mean[owner]
-    spread = group_sum(u[:, :, None] * u[:, None, :], owner, n)
-    skew = group_sum((u**2).sum(axis=1, keepdims=True) * u, owner, n)
+    mean = group_sum(q, section, n) / total[:, None]
+    u = q - mean[section]
+    spread = group_sum(u[:, :, None] * u[:, None, :], section, n)
+    skew = group_sum((u**2).sum(axis=1, keepdims=True) * u, section, n)
     # the pseudo-inverse leaves the centre where the mean is in directions in which the outline is flat
     centre = mean + np.einsum("sij,sj->si", np.linalg.pinv(spread, rcond=FLAT, hermitian=True), skew) / 2
-    squared = group_sum(((q - centre[owner]) ** 2).sum(axis=1), owner, n) / total
-    return Sections(places, lengths, count, np.linalg.norm(centre, axis=1), np.sqrt(squared), _open(q, owner, n))
+    squared = group_sum(((q - centre[section]) ** 2).sum(axis=1), section, n) / total
+    return Sections(places, lengths, count, np.linalg.norm(centre, axis=1), np.sqrt(squared), _open(q, section, n))
 
 
 def _cut(vertices, branches, n_points, shortest):
@@ -108,13 +108,13 @@ def _cut(vertices, branches, n_points, shortest):
     return np.concatenate(middles), tangent, np.concatenate(lengths)
 
 
-def _open(q, owner, n):
+def _open(q, section, n):
     """Sum of the gaps wider than a right angle between the directions to the points of each group."""
     angle = np.arctan2(q[:, 1], q[:, 0])
-    order = np.lexsort((angle, owner))
-    angle, owner = angle[order], owner[order]
-    last = np.r_[owner[1:] != owner[:-1], True][: len(owner)]
-    first = np.flatnonzero(np.r_[True, last[:-1]][: len(owner)])
+    order = np.lexsort((angle, section))
+    angle, section = angle[order], section[order]
+    last = np.r_[section[1:] != section[:-1], True][: len(section)]
+    first = np.flatnonzero(np.r_[True, last[:-1]][: len(section)])
     gap = np.roll(angle, -1) - angle
     gap[last] = angle[first] + 2 * np.pi - angle[last]
-    return np.bincount(owner, np.where(gap > np.pi / 2, gap, 0), n)
+    return np.bincount(section, np.where(gap > np.pi / 2, gap, 0), n)

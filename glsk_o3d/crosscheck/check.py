@@ -191,8 +191,8 @@ def cross_check(
     skeletons = compare_skeletons(skeleton, other, diagonal)
     fit = mesh_fit(state, vertices, faces)
     verdict, reasons = judge(rows, skeletons, skeleton.report.warnings, other.report, fit)
-    of_point = state.row_of_point
-    angle, length, share = (np.where(state.witness, values[of_point], np.nan) for values in (angle, length, share))
+    of_point = state.representative_of_point
+    angle, length, share = (np.where(state.sampled, values[of_point], np.nan) for values in (angle, length, share))
     return CrossCheck(
         verdict=verdict,
         reasons=reasons,

@@ -119,9 +119,9 @@ def mesh_state(state, vertices, faces):
         state = replace(
             state,
             points=state.frame.out_of(vertices),
-            row_of_point=np.arange(m),
+            representative_of_point=np.arange(m),
             outlier=np.zeros(m, bool),
-            witness=np.ones(m, bool),
+            sampled=np.ones(m, bool),
             cloud=vertices,
             noise=np.zeros(m),
             normals=igl.per_vertex_normals(vertices, faces),
@@ -134,7 +134,7 @@ def mesh_state(state, vertices, faces):
     begun = replace(
         state,
         survivors=survivors,
-        owner=cKDTree(positions).query(vertices)[1],
+        representative=cKDTree(positions).query(vertices)[1],
         mass=np.ones(n),
         **at_rest(positions, rings),
         report=Report(n_input=len(state.points), n_distinct=n, n_contracted=n),

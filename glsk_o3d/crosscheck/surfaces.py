@@ -40,10 +40,10 @@ def surface_of(state, mesh):
 
 def _given(state, vertices, faces):
     """A user's mesh in the frame, on the cloud's own points if these are its vertices."""
-    good = state.witness
+    good = state.sampled
     distance, nearest = cKDTree(state.frame.into(state.points[good])).query(state.frame.into(vertices))
     if distance.max() < SAME_POINT * state.frame.diagonal:
-        row = state.row_of_point[good][nearest]
+        row = state.representative_of_point[good][nearest]
         return state.cloud, clean_faces(state.cloud, row[faces])
     vertices = state.frame.into(vertices)
     return without_bare(vertices, clean_faces(vertices, faces))

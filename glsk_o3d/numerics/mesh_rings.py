@@ -83,8 +83,8 @@ def mesh_rings(n: int, faces: np.ndarray) -> Rings:
         Their `triangles` mean nothing.
     """
     edges = np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
-    owner, neighbour = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).T
-    return Rings(np.searchsorted(owner, np.arange(n + 1)), neighbour, umbrellas(n, faces))
+    centre, neighbour = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).T
+    return Rings(np.searchsorted(centre, np.arange(n + 1)), neighbour, umbrellas(n, faces))
 
 
 def common_share(rings: Rings, faces: np.ndarray) -> np.ndarray:

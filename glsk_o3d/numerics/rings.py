@@ -90,8 +90,8 @@ class Rings:
             length = self.edge_lengths(points)
             distance = np.minimum.reduceat(length, self.indptr[:-1])
             hits = np.flatnonzero(length == np.repeat(distance, self.sizes))
-            owner = self.centres[hits]
-            first = np.append(True, owner[1:] != owner[:-1])
+            centre = self.centres[hits]
+            first = np.append(True, centre[1:] != centre[:-1])
             found = self.indices[hits[first]], distance
             self.__dict__["_nearest"] = points, found
         return found

@@ -140,8 +140,8 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
     thin, middle, _ = np.sort(high - low)
     across = int(np.argmin(high - low)) if thin < FLAT * middle else 2 if np.argmax(high - low) == 1 else 1
     lone = np.flatnonzero(skeleton.degree == 0)  # drawn as edges without a length
-    owner = skeleton.vertex_of_point[shown] if len(skeleton.vertices) else np.full(len(shown), -1)
-    label = branch_of_point(skeleton, skeleton.points[shown], owner) if len(skeleton.vertices) else owner
+    vertex = skeleton.vertex_of_point[shown] if len(skeleton.vertices) else np.full(len(shown), -1)
+    label = branch_of_point(skeleton, skeleton.points[shown], vertex) if len(skeleton.vertices) else vertex
     dots = len(skeleton.branches) + np.arange(len(lone))
     return {
         "captions": _captions(skeleton, len(positions) - 1),
@@ -151,7 +151,7 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
         "ramp": sections.hexadecimal(colormaps["viridis"](np.linspace(0, 1, 24))),
         "ranges": ranges,
         "positions": _packed(np.rint(32767 * steps), "<i2"),
-        "vertex_of_point": _packed(owner, "<i4"),
+        "vertex_of_point": _packed(vertex, "<i4"),
         "branch_of_point": _packed(label, "<i4"),
         "vertices": _packed((skeleton.vertices - centre) / unit, "<f4"),
         "radii": _packed(np.nan_to_num(skeleton.radii / unit, nan=0.0), "<f4"),

@@ -55,7 +55,7 @@ def cloud_and_mesh(points, **parameters):
 def test_our_rows_are_twice_libigls_where_the_rings_are_the_same(even_ball):
     points, faces = even_ball(700)
     state = RingBuilder(frame="box")(points)
-    row = state.row_of_point
+    row = state.representative_of_point
     faces, cloud = row[faces], state.frame.out_of(state.cloud)
     same = common_share(state.rings, faces) == 1
     assert same.mean() > 0.95  # the others lie on squares, which have two diagonals
