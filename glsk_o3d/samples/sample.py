@@ -25,6 +25,7 @@ class Sample:
 
     Examples
     --------
+    >>> from glsk_o3d.samples import torus
     >>> ring = torus(1000)
     >>> ring.points.shape, float(ring.radii.max())
     ((1000, 3), 0.1)
