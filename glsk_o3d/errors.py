@@ -62,10 +62,6 @@ def did_you_mean(word: str, known: Iterable[str], what: str) -> str:
     what : str
         What `word` should have been, such as ``"filter"``.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> did_you_mean("radios", ["radius", "links"], "parameter of Connector")

@@ -167,10 +167,6 @@ def cell(row: dict[str, Any], name: str) -> str:
         As iteration over a `BranchTable` gives it.
     name : str
         Of `COLUMNS`.
-
-    Returns
-    -------
-    str
     """
     value = row[name]
     if (name == "parent" and value < 0) or (isinstance(value, float) and math.isnan(value)):

@@ -171,15 +171,5 @@ def _plain(value, unknown=None):
 
 
 def told(left_out: Mapping[str, int], before: str) -> str:
-    """How many places were left out and why, after some words; nothing where there are none.
-
-    Parameters
-    ----------
-    left_out : mapping of str to int
-    before : str
-
-    Returns
-    -------
-    str
-    """
+    """How many places were left out and why, after some words; nothing where there are none."""
     return before + ", ".join(f"{count} {reason}" for reason, count in left_out.items()) if left_out else ""

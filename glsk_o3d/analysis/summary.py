@@ -9,17 +9,7 @@ if TYPE_CHECKING:
 
 
 def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
-    """A run in a few numbers.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    seconds : float
-
-    Returns
-    -------
-    dict of str to int, float, bool or str
-    """
+    """A run in a few numbers."""
     report = skeleton.report
     return {
         "points": report.n_input,
@@ -39,16 +29,7 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
 
 
 def structure(skeleton: Skeleton) -> dict[str, Any]:
-    """The counts of a skeleton's graph, and its length.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-
-    Returns
-    -------
-    dict of str to int or float
-    """
+    """The counts of a skeleton's graph, and its length."""
     return {
         "vertices": len(skeleton.vertices),
         "edges": len(skeleton.edges),

@@ -80,12 +80,7 @@ class Ledger:
         write_atomically(self.path, lambda temporary: temporary.write_bytes(data))
 
     def add(self, row: Row) -> None:
-        """Add a row, to the file at once; it replaces the one of its name.
-
-        Parameters
-        ----------
-        row : dict
-        """
+        """Add a row, to the file at once; it replaces the one of its name."""
         self._keep(row)
         if self._stream is None:
             self._stream = self.path.open("ab")
@@ -118,16 +113,7 @@ def _cell(value: Any) -> Any:
 
 
 def file_hash(path: str | os.PathLike) -> str:
-    """SHA-256 of the bytes of a file, as ``sha256sum`` prints it.
-
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    str
-    """
+    """SHA-256 of the bytes of a file, as ``sha256sum`` prints it."""
     digest = hashlib.sha256()
     with open(path, "rb") as stream:
         while chunk := stream.read(1 << 20):
@@ -140,10 +126,6 @@ def locked(folder: Path) -> Iterator[None]:
     """Keep other batches out of an output folder.
 
     The lock is one of the operating system: it ends with the process that holds it, however that dies.
-
-    Parameters
-    ----------
-    folder : Path
 
     Raises
     ------

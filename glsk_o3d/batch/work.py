@@ -62,10 +62,6 @@ class Job:
 def work(job: Job) -> Row:
     """Skeletonise a cloud and write the results.
 
-    Parameters
-    ----------
-    job : Job
-
     Returns
     -------
     dict
@@ -125,16 +121,7 @@ def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
 
 
 def told(error: BaseException) -> str:
-    """An error in one line; of a mistake in the code also the place.
-
-    Parameters
-    ----------
-    error : BaseException
-
-    Returns
-    -------
-    str
-    """
+    """An error in one line; of a mistake in the code also the place."""
     if isinstance(error, MemoryError):
         return f"out of memory {error}".strip()
     if isinstance(error, OSError) and error.strerror and error.filename is not None:

@@ -42,16 +42,7 @@ class Workers(Protocol):
 
 
 def died(error: BaseException | None) -> bool:
-    """Whether an error says that the worker died with the work.
-
-    Parameters
-    ----------
-    error : BaseException or None
-
-    Returns
-    -------
-    bool
-    """
+    """Whether an error says that the worker died with the work."""
     return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"  # the latter is Dask's
 
 

@@ -160,12 +160,7 @@ def print_iterations(records, *, stderr: bool = False) -> None:
 
 
 def print_json(data: Any) -> None:
-    """Print JSON on stdout; numbers that are not finite become null.
-
-    Parameters
-    ----------
-    data : dict, list, str, int, float, bool or None
-    """
+    """Print JSON on stdout; numbers that are not finite become null."""
     typer.echo(json.dumps(_finite(data), indent=2, ensure_ascii=False, allow_nan=False))
 
 

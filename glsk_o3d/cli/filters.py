@@ -50,10 +50,6 @@ def filters(
 def facts(cls: type[Parameters]) -> dict[str, Any]:
     """What a filter or stopping rule says about itself.
 
-    Parameters
-    ----------
-    cls : subclass of Parameters
-
     Returns
     -------
     dict
@@ -91,10 +87,6 @@ def limits(metadata) -> str:
     ----------
     metadata : mapping
         As `glsk_o3d.parameters.parameter` makes it.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -90,10 +90,6 @@ def cloud_facts(cloud: Any, triangles: int = 0) -> dict[str, Any]:
 def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
     """What there is to know about a skeleton, and about the run that made it if its file says so.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-
     Returns
     -------
     dict

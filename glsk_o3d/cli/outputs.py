@@ -111,10 +111,6 @@ def check_findings(files: Iterable[tuple[Path | None, str, str]], *inputs: Path 
 def check_writable(path: Path) -> None:
     """Raise before the work what would keep the file from being made or replaced after it.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     MissingPackageError

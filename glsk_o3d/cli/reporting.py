@@ -125,16 +125,7 @@ def _message(problem: BaseException) -> str:
 
 
 def said_here(message: str) -> str:
-    """What the library says, with the cures of the command line.
-
-    Parameters
-    ----------
-    message : str
-
-    Returns
-    -------
-    str
-    """
+    """What the library says, with the cures of the command line."""
     for there, here in _SAID_HERE.items():
         message = message.replace(there, here)
     return message

@@ -97,10 +97,6 @@ def _held(cloud: Any) -> Any:
 def open3d_class(thing: Any) -> tuple[str, bool]:
     """The name of the Open3D class that something is of, and whether it is one of the tensor API.
 
-    Parameters
-    ----------
-    thing : object
-
     Returns
     -------
     name : str
@@ -116,10 +112,6 @@ def open3d_class(thing: Any) -> tuple[str, bool]:
 
 def search_parameters(given: Any) -> dict[str, Any]:
     """The number of neighbours and the radius in Open3D's ``KDTreeSearchParam*``.
-
-    Parameters
-    ----------
-    given : object
 
     Returns
     -------

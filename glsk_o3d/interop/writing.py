@@ -17,11 +17,6 @@ from ..errors import FileFormatError
 def write_json(path: str | os.PathLike, data: Any) -> None:
     """Write what JSON can hold, indented; it appears complete or not at all.
 
-    Parameters
-    ----------
-    path : path-like
-    data : object
-
     Raises
     ------
     OSError

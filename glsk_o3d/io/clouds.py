@@ -65,10 +65,6 @@ def read_cloud(path: str | os.PathLike) -> Any:
 def read_scan(path: str | os.PathLike) -> tuple[Any, np.ndarray]:
     """Read a point cloud as `read_cloud` does, and the triangles between its points if it is a mesh.
 
-    Parameters
-    ----------
-    path : path-like
-
     Returns
     -------
     cloud : open3d.geometry.PointCloud
@@ -100,14 +96,6 @@ def read_scan(path: str | os.PathLike) -> tuple[Any, np.ndarray]:
 
 def check_scan(path: str | os.PathLike) -> Path:
     """Find out before reading a scan whether it is there and complete.
-
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    Path
 
     Raises
     ------

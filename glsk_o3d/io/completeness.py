@@ -37,10 +37,6 @@ class Promise(NamedTuple):
 def check_complete(path: Path) -> None:
     """Raise FileFormatError unless a file holds the points that it promises; other formats promise nothing.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     FileFormatError

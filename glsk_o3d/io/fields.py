@@ -33,10 +33,6 @@ def decode(values: Any) -> Skeleton:
     values : dict
         With ``format``, ``format_version``, the arrays or lists of numbers, and the report as a dict of `plain` values.
 
-    Returns
-    -------
-    Skeleton
-
     Raises
     ------
     ValueError

@@ -23,10 +23,6 @@ def graph_skeleton(vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | Non
     radii : (M,) array_like, optional
         By default unknown: NaN.
 
-    Returns
-    -------
-    Skeleton
-
     Raises
     ------
     ValueError
@@ -42,10 +38,6 @@ def graph_skeleton(vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | Non
 
 def checked(skeleton: Skeleton) -> Skeleton:
     """A skeleton, if its arrays fit together.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
 
     Returns
     -------

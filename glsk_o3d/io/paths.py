@@ -17,14 +17,6 @@ MESH_ENDINGS = (".off", ".obj", ".stl", ".gltf", ".glb")
 def existing_file(path: str | os.PathLike) -> Path:
     """The path of a file that is there and not empty.
 
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    Path
-
     Raises
     ------
     FileNotFoundError
@@ -49,9 +41,5 @@ def unknown_ending(what: object, known: Iterable[str]) -> FileFormatError:
     what : object
         The file, for the message.
     known : iterable of str
-
-    Returns
-    -------
-    FileFormatError
     """
     return FileFormatError(f"{what}: unknown ending; known are {', '.join(known)}")

@@ -57,10 +57,6 @@ class Element(NamedTuple):
 def read_header(stream: BinaryIO) -> tuple[str, list[Element]]:
     """Read the header of a PLY file; what the stream gives next are the data.
 
-    Parameters
-    ----------
-    stream : binary file
-
     Returns
     -------
     order : {"<", ">", ""}
@@ -96,16 +92,7 @@ def read_header(stream: BinaryIO) -> tuple[str, list[Element]]:
 
 
 def ply_elements(path: str | os.PathLike) -> dict[str, list[str]]:
-    """The elements that a PLY file holds at least one of, with the names of their properties.
-
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    dict of str to list of str
-    """
+    """The elements that a PLY file holds at least one of, with the names of their properties."""
     with open(path, "rb") as stream:
         _, elements = read_header(stream)
     return {element.name: element.columns for element in elements if element.rows}

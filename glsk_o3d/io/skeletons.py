@@ -144,10 +144,6 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
 def holds_skeleton(path: str | os.PathLike) -> bool:
     """Whether a file holds a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending.
 
-    Parameters
-    ----------
-    path : path-like
-
     Returns
     -------
     bool
@@ -172,10 +168,6 @@ def skeleton_ending(path: Path, format: str | None = None) -> str:
     path : Path
     format : str, optional
         An ending, with or without its dot.
-
-    Returns
-    -------
-    str
 
     Raises
     ------

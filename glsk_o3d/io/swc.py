@@ -22,10 +22,6 @@ def write(skeleton: Skeleton, cut_loops: bool = False) -> bytes:
     cut_loops : bool
         Drop one edge per loop, keeping the spanning forest of least length, instead of refusing.
 
-    Returns
-    -------
-    bytes
-
     Raises
     ------
     FileFormatError

@@ -135,10 +135,6 @@ class Call:
 def read_script(path: str | os.PathLike) -> list[Call]:
     """Read a filter script. Whether its filters exist is not asked here.
 
-    Parameters
-    ----------
-    path : path-like
-
     Returns
     -------
     list of Call
@@ -237,16 +233,7 @@ class _Reader:
 
 
 def script_text(calls: Iterable[Call]) -> str:
-    """Filters as the text of a script.
-
-    Parameters
-    ----------
-    calls : iterable of Call
-
-    Returns
-    -------
-    str
-    """
+    """Filters as the text of a script."""
     lines = ["<!DOCTYPE FilterScript>", "<FilterScript>"]
     for call in calls:
         inner = [f"  <Param {_attributes(param)}/>" for param in call.params]
@@ -263,11 +250,6 @@ def _attributes(param: Param) -> str:
 def write_script(path: str | os.PathLike, calls: Sequence[Call]) -> None:
     """Write filters as a script, complete or not at all.
 
-    Parameters
-    ----------
-    path : path-like
-    calls : sequence of Call
-
     Raises
     ------
     OSError
@@ -277,16 +259,7 @@ def write_script(path: str | os.PathLike, calls: Sequence[Call]) -> None:
 
 
 def comment(path: str | os.PathLike) -> str:
-    """The first comment of a script, in one line; empty if it has none.
-
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    str
-    """
+    """The first comment of a script, in one line; empty if it has none."""
     comments: list[str] = []
     parser = expat.ParserCreate()
     parser.CommentHandler = comments.append

@@ -117,10 +117,6 @@ class Slot:
 def slots_of(cls: type[Parameters]) -> Iterator[Slot]:
     """A slot for each parameter of a filter, reducer or rule.
 
-    Parameters
-    ----------
-    cls : subclass of Parameters
-
     Yields
     ------
     Slot
@@ -137,9 +133,5 @@ def facts_of(doc: str, type: str, choices: tuple[str, ...] = (), low: float | No
     ----------
     doc, type, choices, low
         As in `glsk_o3d.parameters.parameter`.
-
-    Returns
-    -------
-    mapping
     """
     return parameter(None, doc, type=type, choices=choices, low=low).metadata

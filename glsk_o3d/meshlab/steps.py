@@ -70,10 +70,6 @@ def step(verb: Verb, values: Mapping[str, Any]) -> Step:
     values : mapping of str to object
         Those that differ from the defaults; the script gets all of them, so that it stays true when defaults change.
 
-    Returns
-    -------
-    Step
-
     Raises
     ------
     InvalidParameterError
@@ -84,14 +80,6 @@ def step(verb: Verb, values: Mapping[str, Any]) -> Step:
 
 def read_steps(path: str | os.PathLike) -> list[Step]:
     """Read a filter script and check all of it.
-
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    list of Step
 
     Raises
     ------
@@ -152,14 +140,6 @@ def scripts() -> dict[str, Path]:
 def find_script(name: str | os.PathLike) -> Path:
     """The file of a script: a path that ends in .mlx or names a folder, or the name of one that comes with the package.
 
-    Parameters
-    ----------
-    name : str or path-like
-
-    Returns
-    -------
-    Path
-
     Raises
     ------
     InvalidParameterError
@@ -219,10 +199,6 @@ def exact_digits(step: Step, values: Mapping[str, Any]) -> Step:
     values : mapping of str to object
         By pymeshlab's names. MeshLab's numbers and vectors are float32, its matrices float64. What differs by more than
         the digits lost stays as MeshLab wrote it.
-
-    Returns
-    -------
-    Step
     """
 
     def exact(param):

@@ -105,16 +105,7 @@ class Verb:
             raise InvalidParameterError(f"{options.get(option, option)}{colon}{why}") from None
 
     def values(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """All parameters that matter, the given ones and the defaults of the others.
-
-        Parameters
-        ----------
-        given : mapping of str to object
-
-        Returns
-        -------
-        dict of str to object
-        """
+        """All parameters that matter, the given ones and the defaults of the others."""
         pipeline = self.plan(given)
         found: dict[str, Any] = {}
         for slot in self.slots.values():

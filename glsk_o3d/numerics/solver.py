@@ -27,10 +27,6 @@ def factorised(matrix: csc_array, **options: Any) -> SuperLU:
     **options
         More of SuperLU's own.
 
-    Returns
-    -------
-    scipy.sparse.linalg.SuperLU
-
     Raises
     ------
     RuntimeError

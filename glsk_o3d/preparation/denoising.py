@@ -31,10 +31,6 @@ def average_noise(surface: Surface, k: Callable[[int], int]) -> Surface:
     surface : Surface
     k : callable
         Neighbours to look up for so many points.
-
-    Returns
-    -------
-    Surface
     """
     while np.count_nonzero(surface.noise) >= 2 * ENOUGH_NOISY:
         representative, mean, weight = average_noisy(

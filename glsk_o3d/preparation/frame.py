@@ -152,10 +152,6 @@ def to_working_frame(points: np.ndarray, counts: np.ndarray, by: str, k: Callabl
     k : callable
         Neighbours to look up for so many points.
 
-    Returns
-    -------
-    DistinctPoints
-
     Raises
     ------
     InvalidCloudError

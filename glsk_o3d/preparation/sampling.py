@@ -27,10 +27,6 @@ def sample_cloud(points: np.ndarray, n: int) -> Sample:
     ----------
     points : (m, 3) float array
     n : int
-
-    Returns
-    -------
-    Sample
     """
     return sample_grid(points, n) if len(points) > 2 * n else everybody(points)
 

@@ -36,10 +36,6 @@ def thin_surface(surface: Surface, around: float, most: int, k: Callable[[int], 
     most : int
     k : callable
         Neighbours to have among so many points.
-
-    Returns
-    -------
-    Thinned
     """
     points, spread = surface.points, surface.spread
     survivors, representative, neighbours = np.arange(len(points)), np.arange(len(points)), surface.neighbours

@@ -13,27 +13,13 @@ from .plugins import plugin_filters, plugin_pipelines
 
 
 def catalogue() -> dict[str, type[Parameters]]:
-    """All filters and stopping rules by name, those of plugins after the built-in ones; first the filters.
-
-    Returns
-    -------
-    dict of str to class
-    """
+    """All filters and stopping rules by name, those of plugins after the built-in ones; first the filters."""
     known = {**BUILTIN, **plugin_filters()}
     return dict(sorted(known.items(), key=lambda item: not issubclass(item[1], Filter)))
 
 
 def find(name: str) -> type[Parameters] | None:
-    """The filter or stopping rule of that name, if there is one; plugins are only loaded for names of their own.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    class or None
-    """
+    """The filter or stopping rule of that name, if there is one; plugins are only loaded for names of their own."""
     return BUILTIN.get(name) or catalogue().get(name)
 
 
@@ -44,10 +30,6 @@ def serves(cls: type[Parameters], kind: str) -> bool:
     ----------
     cls : class
     kind : {"filter", "reducer", "stop"}
-
-    Returns
-    -------
-    bool
     """
     if kind == "stop" or not issubclass(cls, Filter):
         return kind == "stop" and not issubclass(cls, Filter)
@@ -67,14 +49,6 @@ def known_pipelines() -> dict[str, Callable[[], Pipeline]]:
 
 def named_pipeline(name: str) -> Pipeline:
     """The pipeline of that name, built in or of a plugin.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    Pipeline
 
     Raises
     ------

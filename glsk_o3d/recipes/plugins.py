@@ -30,10 +30,6 @@ _lock = threading.RLock()
 def plugin_filters() -> dict[str, type[Parameters]]:
     """Filters and stopping rules of the entry-point group ``glsk_o3d.filters``, by name.
 
-    Returns
-    -------
-    dict of str to class
-
     Warns
     -----
     PluginWarning

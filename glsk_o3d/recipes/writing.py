@@ -119,14 +119,6 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
 def recipe_ending(path: str | os.PathLike) -> str:
     """The ending of a recipe's file name.
 
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    {".json", ".toml"}
-
     Raises
     ------
     RecipeError
@@ -139,13 +131,7 @@ def recipe_ending(path: str | os.PathLike) -> str:
 
 
 def refuse_unknown(part: Parameters, path: str) -> None:
-    """Raise RecipeError if a filter or rule, or one inside it, is none that a recipe could name.
-
-    Parameters
-    ----------
-    part : Parameters
-    path : str
-    """
+    """Raise RecipeError if a filter or rule, or one inside it, is none that a recipe could name."""
     cls = type(part)
     if find(cls.__name__) is not cls:
         name = f"{cls.__module__}.{cls.__qualname__}"

@@ -20,14 +20,6 @@ def clamp_to_points(skeleton: Skeleton) -> Skeleton:
 
     The axis of a half tube is 0.83 of the points' root mean square distance away from their mean; what is cut off there
     the fit to the axis gives back.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-
-    Returns
-    -------
-    Skeleton
     """
     supporting = skeleton.supporting_points
     vertex, m = skeleton.vertex_of_point[supporting], len(skeleton.vertices)

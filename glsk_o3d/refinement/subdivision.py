@@ -23,10 +23,6 @@ def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
     skeleton : Skeleton
     spacing : float
         Longest edge afterwards, over the mean radius of its ends; longer where points are few: a piece for 8.
-
-    Returns
-    -------
-    Skeleton
     """
     ends = skeleton.edges
     m = len(skeleton.vertices)

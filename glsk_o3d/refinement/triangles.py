@@ -14,10 +14,6 @@ from .merging import merge_vertices, support
 def collapse_triangles(skeleton: Skeleton) -> Skeleton:
     """Merge the two ends of edges that lie on a triangle, cheapest first, until there is no triangle.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-
     Returns
     -------
     Skeleton

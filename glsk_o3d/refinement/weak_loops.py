@@ -103,10 +103,6 @@ def cut_weak_loops(skeleton: Skeleton, weak_bonds: float, weak_opening: float) -
         Least bonds across an edge over the median along its loop.
     weak_opening : float
         Least opening over the distance to the surface, times the mean confidence.
-
-    Returns
-    -------
-    Skeleton
     """
     m = len(skeleton.vertices)
     cycles = minimum_cycle_basis(m, skeleton.edges, skeleton.edge_lengths)

@@ -113,11 +113,6 @@ def branches(skeleton: Skeleton) -> str:
 def branch_colors(skeleton: Skeleton, n: int) -> list[str]:
     """The colours of the first n branches, the same as in Open3D's windows.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    n : int
-
     Returns
     -------
     list of str
@@ -133,10 +128,6 @@ def hexadecimal(colors: np.ndarray) -> list[str]:
     ----------
     colors : (n, 3) or (n, 4) float array
         From 0 to 1.
-
-    Returns
-    -------
-    list of str
     """
     return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(255 * colors[:, :3]).astype(int).tolist()]
 

@@ -51,14 +51,6 @@ def to_html(skeleton: Skeleton) -> str:
     """A picture from three sides and the numbers, as a piece of HTML that needs nothing else.
 
     Without what draws pictures, the numbers and what to install.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-
-    Returns
-    -------
-    str
     """
     report = skeleton.report
     told = {

@@ -194,16 +194,7 @@ def save_figure(figure, path: str | os.PathLike) -> None:
 
 
 def printable(text: object) -> str:
-    """A text that may be a file name, which may be no Unicode, as one that can be drawn and encoded.
-
-    Parameters
-    ----------
-    text : object
-
-    Returns
-    -------
-    str
-    """
+    """A text that may be a file name, which may be no Unicode, as one that can be drawn and encoded."""
     return str(text).encode("utf-8", "replace").decode()
 
 

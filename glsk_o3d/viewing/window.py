@@ -117,12 +117,7 @@ def _switch(shapes, shown):
 
 
 def has_display() -> bool:
-    """Whether a window can be seen: on Linux and the like, whether an X server or a Wayland compositor answers.
-
-    Returns
-    -------
-    bool
-    """
+    """Whether a window can be seen: on Linux and the like, whether an X server or a Wayland compositor answers."""
     if sys.platform in ("win32", "darwin"):
         return True
     if "WAYLAND_DISPLAY" in os.environ:
