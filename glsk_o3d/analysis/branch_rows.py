@@ -159,15 +159,7 @@ class BranchTable:
 
 
 def cell(row: dict[str, Any], name: str) -> str:
-    """A number of a row as people read it, a dash for what is unknown.
-
-    Parameters
-    ----------
-    row : dict
-        As iteration over a `BranchTable` gives it.
-    name : str
-        Of `COLUMNS`.
-    """
+    """A number of a row of a `BranchTable` as people read it, a dash for what is unknown; `name` is of `COLUMNS`."""
     value = row[name]
     if (name == "parent" and value < 0) or (isinstance(value, float) and math.isnan(value)):
         return "-"

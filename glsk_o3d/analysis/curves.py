@@ -31,16 +31,7 @@ def along(edges, row, part, values):
 def distances(curve, other, step):
     """From places along a curve to the nearest places along another, and the mean of the two radii there.
 
-    Parameters
-    ----------
-    curve, other : Skeleton
-    step : float
-        Spacing of the places, in the units of both.
-
-    Returns
-    -------
-    distance, radius : (n,) float array
-        The radius is at least `step`.
+    Two (n,) float arrays; the places are `step` apart, and the radius is at least that.
     """
     (here, radius), (there, radius_there) = (_places(skeleton, step) for skeleton in (curve, other))
     distance, nearest = cKDTree(there).query(here)

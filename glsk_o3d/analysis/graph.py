@@ -40,30 +40,11 @@ def check_graph(vertices, edges, name):
 
 
 def simple_edges(edges):
-    """Edges as pairs i < j, sorted, each once, and none from a node to itself.
-
-    Parameters
-    ----------
-    edges : (E, 2) int array
-
-    Returns
-    -------
-    (F, 2) int array
-    """
+    """Edges, (E, 2) int array, as pairs i < j, sorted, each once, and none from a node to itself."""
     edges = np.unique(np.sort(edges, axis=1), axis=0)
     return edges[edges[:, 0] != edges[:, 1]]
 
 
 def count_components(n, edges):
-    """Connected components of a graph with n nodes.
-
-    Parameters
-    ----------
-    n : int
-    edges : (E, 2) int array
-
-    Returns
-    -------
-    int
-    """
+    """Connected components of a graph with n nodes and `edges`, (E, 2) int array."""
     return int(component_labels(n, edges).max(initial=-1)) + 1

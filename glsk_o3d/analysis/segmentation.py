@@ -57,18 +57,10 @@ def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
 
 
 def vertex_of_cloud(skeleton, cloud=None):
-    """The points of a cloud and the vertex of each; -1 for those that are not finite.
+    """The points of a cloud and the vertex of each, (N, 3) float64 and (N,) int64 array; -1 for those that are not
+    finite.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    cloud : cloud, optional
-        As for `segment`.
-
-    Returns
-    -------
-    points : (N, 3) float64 array
-    vertex : (N,) int64 array
+    Without a cloud it is that of the skeleton.
     """
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: there is nothing to label points with")
@@ -142,18 +134,7 @@ def branch_of_vertex(skeleton):
 
 @np.errstate(all="ignore")
 def branch_of_point(skeleton, points, vertex):
-    """`segment`, for points whose vertices are known.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    points : (N, 3) float array
-    vertex : (N,) int array
-
-    Returns
-    -------
-    (N,) int64 array
-    """
+    """`segment` for points, (N, 3) float array, whose vertices are known, (N,) int array: (N,) int64 array."""
     label = np.where(vertex >= 0, branch_of_vertex(skeleton)[vertex], -1)
     edge_branch = branch_of_edge(skeleton)
     unsure = np.flatnonzero((vertex >= 0) & (label < 0))

@@ -123,14 +123,9 @@ def file_hash(path: str | os.PathLike) -> str:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep other batches out of an output folder.
+    """Keep other batches out of an output folder: BatchError where another process has it.
 
     The lock is one of the operating system: it ends with the process that holds it, however that dies.
-
-    Raises
-    ------
-    BatchError
-        Another process has it.
     """
     with (folder / ".ledger.lock").open("a+", encoding="utf-8") as stream:
         try:

@@ -60,13 +60,10 @@ class Job:
 
 
 def work(job: Job) -> Row:
-    """Skeletonise a cloud and write the results.
+    """Skeletonise a cloud and write the results; gives what the ledger is to say.
 
-    Returns
-    -------
-    dict
-        What the ledger is to say. Whatever goes wrong is in it: nothing is raised. ``kept`` is in it where the cloud
-        is not there: then earlier results, if any, are its outputs.
+    Whatever goes wrong is in it: nothing is raised. ``kept`` is in it where the cloud is not there: then earlier
+    results, if any, are its outputs.
     """
     start = time.perf_counter()
     row: Row = {"error": "", "outputs": [], "version": __version__}
@@ -89,15 +86,9 @@ def work(job: Job) -> Row:
 
 
 def clear(job: Job, written: Iterable[str] = ()) -> None:
-    """Remove what is there of earlier batches and of a job that broke off; what cannot be removed is logged.
+    """Remove what is there of earlier batches and of a job that broke off, but what was `written`; failures are logged.
 
     Only afterwards, since a cluster may do a job once more, and end while it does.
-
-    Parameters
-    ----------
-    job : Job
-    written : iterable of str
-        Outputs to keep.
     """
     for path in sorted({*job.stale, *job.outputs}.difference(job.foreign, written)):
         try:

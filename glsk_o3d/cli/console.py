@@ -15,30 +15,15 @@ import typer
 
 
 def console(*, stderr: bool = False) -> Any:
-    """A rich console that prints text as it is, without markup or highlighting.
-
-    Parameters
-    ----------
-    stderr : bool
-
-    Returns
-    -------
-    rich.console.Console
-    """
+    """A rich console that prints text as it is, without markup or highlighting."""
     from rich.console import Console
 
     return Console(stderr=stderr, markup=False, highlight=False, emoji=False)
 
 
 def print_table(table: Any, *, stderr: bool = False, whole: bool = False) -> None:
-    """Print a rich table without the spaces that fill its lines.
-
-    Parameters
-    ----------
-    table : rich.table.Table
-    stderr : bool
-    whole : bool
-        Leave the columns as wide as they are, however narrow the terminal is.
+    """Print a rich table without the spaces that fill its lines; a `whole` one is as wide as it is, whatever the
+    terminal.
     """
     out = console(stderr=stderr)
     if whole:
@@ -49,13 +34,7 @@ def print_table(table: Any, *, stderr: bool = False, whole: bool = False) -> Non
 
 
 def say(kind: str, message: str) -> None:
-    """Print one line to stderr, yellow for a warning and red for an error.
-
-    Parameters
-    ----------
-    kind : {"error", "warning", "info", "debug"}
-    message : str
-    """
+    """Print one line to stderr, yellow for a "warning" and red for an "error"; other kinds are "info" and "debug"."""
     from rich.text import Text
 
     style = {"error": "red", "warning": "yellow"}.get(kind, "dim")
@@ -67,16 +46,8 @@ def say(kind: str, message: str) -> None:
 def progress(shown: bool, *, remaining: bool = False) -> Iterator[Callable[..., None]]:
     """A line with a bar on stderr that goes away in the end, if stderr is a terminal.
 
-    Parameters
-    ----------
-    shown : bool
-    remaining : bool
-        Also say how many are done of how many, and how long the others will take.
-
-    Yields
-    ------
-    callable
-        ``update(text, done=None, total=None)``; without numbers the bar only moves.
+    Gives ``update(text, done=None, total=None)``; without numbers the bar only moves. With `remaining` it also says how
+    many are done of how many, and how long the others will take.
     """
     if not (shown and sys.stderr is not None and sys.stderr.isatty()):
         yield lambda text, done=None, total=None: None
@@ -106,11 +77,7 @@ def progress(shown: bool, *, remaining: bool = False) -> Iterator[Callable[..., 
 def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
     """Print names and values in two columns on stdout, broken to the width of a terminal but not in a file or a pipe.
 
-    Parameters
-    ----------
-    rows : mapping of str to object
-        Those that are None are left out; floats are printed with six digits.
-    title : str
+    Those that are None are left out; floats are printed with six digits.
     """
     if title:
         console().print(title, style="bold", soft_wrap=True)
@@ -128,13 +95,7 @@ def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
 
 
 def print_iterations(records, *, stderr: bool = False) -> None:
-    """Print a contraction's iterations as a table.
-
-    Parameters
-    ----------
-    records : sequence of IterationRecord
-    stderr : bool
-    """
+    """Print a contraction's iterations as a table."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 

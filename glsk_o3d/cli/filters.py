@@ -50,12 +50,9 @@ def filters(
 def facts(cls: type[Parameters]) -> dict[str, Any]:
     """What a filter or stopping rule says about itself.
 
-    Returns
-    -------
-    dict
-        ``name``, ``kind``, ``plugin`` (the package that it is from, None for this one), ``consumes``, ``produces``
-        (None for a rule), ``doc`` and ``parameters``: a list of dicts of the field's metadata, with ``name``,
-        ``default`` and ``limits`` in words.
+    That is ``name``, ``kind``, ``plugin`` (the package that it is from, None for this one), ``consumes``, ``produces``
+    (None for a rule), ``doc`` and ``parameters``: a list of dicts of the field's metadata, with ``name``, ``default``
+    and ``limits`` in words.
     """
     from ..pipeline import Filter
 

@@ -49,18 +49,9 @@ def info(
 
 
 def cloud_facts(cloud: Any, triangles: int = 0) -> dict[str, Any]:
-    """What there is to know about a cloud before skeletonising it.
+    """What there is to know about a cloud, or the vertices of so many triangles, before skeletonising it.
 
-    Parameters
-    ----------
-    cloud : open3d.geometry.PointCloud
-    triangles : int
-        Of the mesh whose vertices the points are, if they are.
-
-    Returns
-    -------
-    dict
-        Lengths in the cloud's units; the spacing is the median distance of a point to the nearest other one.
+    Lengths are in the cloud's units; the spacing is the median distance of a point to the nearest other one.
     """
     import numpy as np
     from scipy.spatial import KDTree
@@ -88,13 +79,7 @@ def cloud_facts(cloud: Any, triangles: int = 0) -> dict[str, Any]:
 
 
 def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
-    """What there is to know about a skeleton, and about the run that made it if its file says so.
-
-    Returns
-    -------
-    dict
-        Values that the file lacks are None.
-    """
+    """What there is to know about a skeleton and the run that made it; None for what its file lacks."""
     import numpy as np
 
     from ..analysis.summary import structure

@@ -34,27 +34,8 @@ def check_outputs(
 ) -> None:
     """Find out before computing whether the files can be written.
 
-    Parameters
-    ----------
-    outputs : sequence of Path
-    preview : Path, optional
-    scan : Path, optional
-        The input, which must not be overwritten.
-    page : Path, optional
-        The report.
-    others : iterable of Path
-        Other files to be written.
-    check_ending : callable
-        Raises FileFormatError for an output whose ending is wrong.
-    **inputs : Path or None
-        Other inputs, by what they are.
-
-    Raises
-    ------
-    WrongUsage
-        An unknown ending, one file twice, the input among them, or no file at all.
-    OSError
-        A folder is missing, or a file cannot be written.
+    WrongUsage for an unknown ending (as `check_ending` has it, which raises FileFormatError), one file twice, the scan
+    or another input among them, or no file at all; OSError where a folder is missing, or a file cannot be written.
     """
     for path in outputs:
         try:
@@ -82,20 +63,10 @@ def check_outputs(
 
 
 def check_findings(files: Iterable[tuple[Path | None, str, str]], *inputs: Path | None) -> None:
-    """Find out before computing whether what is found can be written, and that no input is among the files.
+    """Find out before computing whether what is found can be written; `files` come with ending and what they are, or
+    None.
 
-    Parameters
-    ----------
-    files : iterable of (Path or None, str, str)
-        Each with its ending and what it is, such as ``"report is JSON"``.
-    *inputs : Path or None
-
-    Raises
-    ------
-    WrongUsage
-        A wrong ending, or an input.
-    OSError
-        A folder is missing, or a file cannot be written.
+    WrongUsage for a wrong ending, or an input; OSError where a folder is missing, or a file cannot be written.
     """
     taken = [os.path.realpath(path) for path in inputs if path is not None]
     for path, ending, what in files:
@@ -111,11 +82,7 @@ def check_findings(files: Iterable[tuple[Path | None, str, str]], *inputs: Path 
 def check_writable(path: Path) -> None:
     """Raise before the work what would keep the file from being made or replaced after it.
 
-    Raises
-    ------
-    MissingPackageError
-        A file with this ending is written by a package that is not installed.
-    OSError
+    MissingPackageError where files with this ending are written by a package that is not installed, or OSError.
     """
     require_for(path.suffix)
     folder = Path(os.path.realpath(path)).parent
@@ -141,30 +108,9 @@ def write(
     update,
     recorder: ContractionRecorder | None = None,
 ) -> tuple[list[Path], list[str]]:
-    """Write all files that can be written; one that cannot does not keep the others from it.
+    """Write all files of a run, and `others`, as `write_each` does.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    outputs : sequence of Path
-    preview : Path or None
-    page : Path, optional
-        The report.
-    others : mapping of Path to callable
-        Other files, and what writes each.
-    title : str
-        Above the preview and the report.
-    cut_loops : bool
-        Cut loops where the format holds only trees.
-    update : callable
-        From `console.progress`.
-    recorder : ContractionRecorder, optional
-        What watched the run, for the report.
-
-    Returns
-    -------
-    list of Path, list of str
-        The files that were written, and what was wrong with the others.
+    The title is above the preview and the page; the recorder watched the run, for the page.
     """
     writers: dict[Path, Callable[[Path], object]] = {
         path: partial(skeleton.save, cut_loops=cut_loops) for path in outputs
@@ -177,19 +123,9 @@ def write(
 
 
 def write_each(writers: Mapping[Path, Callable[[Path], object]], update) -> tuple[list[Path], list[str]]:
-    """Write all files that can be written; one that cannot does not keep the others from it.
+    """Write all files that can be written, each with its function; one that cannot does not keep the others from it.
 
-    Parameters
-    ----------
-    writers : mapping of Path to callable
-        The files, and what writes each.
-    update : callable
-        From `console.progress`.
-
-    Returns
-    -------
-    list of Path, list of str
-        The files that were written, and what was wrong with the others.
+    Gives the files that were written, and what was wrong with the others. `update` is that of `console.progress`.
     """
     written, problems = [], []
     for path, save in writers.items():

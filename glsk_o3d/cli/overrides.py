@@ -19,29 +19,9 @@ _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no"
 
 
 def choose(pipeline: str, recipe: Path | None, settings: Iterable[str], drop_invalid: bool) -> Pipeline:
-    """The pipeline that the options of a command ask for.
+    """The pipeline, from a cloud to a skeleton, that the options of a command ask for.
 
-    Parameters
-    ----------
-    pipeline : str
-        Its name.
-    recipe : Path or None
-        A file to take instead.
-    settings : iterable of str
-        See `override`.
-    drop_invalid : bool
-        Drop points that are not finite.
-
-    Returns
-    -------
-    Pipeline
-        Checked, from a cloud to a skeleton.
-
-    Raises
-    ------
-    WrongUsage
-        A recipe and the name of a pipeline.
-    InvalidParameterError, RecipeError
+    WrongUsage for a recipe and the name of a pipeline; InvalidParameterError and RecipeError as they come.
     """
     if recipe is not None and pipeline != "default":
         raise WrongUsage(f"--recipe {recipe} and --pipeline {pipeline}: give one of them")

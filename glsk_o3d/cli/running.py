@@ -24,23 +24,7 @@ _DOING = {
 
 
 def run(pipeline: Callable[..., Skeleton], cloud: Any, update, on_state=None) -> tuple[Skeleton, float]:
-    """Run a pipeline and show how far it is.
-
-    Parameters
-    ----------
-    pipeline : Pipeline, or callable
-        Given the cloud, and ``on_iteration`` and ``on_stage`` as keywords.
-    cloud : cloud
-    update : callable
-        From `console.progress`.
-    on_state : callable, optional
-        Called with the Contraction after each solve.
-
-    Returns
-    -------
-    Skeleton, float
-        The skeleton, and the seconds it took.
-    """
+    """Run a pipeline and show how far it is; gives the skeleton, and the seconds it took."""
     start = time.perf_counter()
     on_stage, on_iteration = _watch(update)
     skeleton = pipeline(cloud, on_iteration=on_iteration, on_state=on_state, on_stage=on_stage)
@@ -73,23 +57,7 @@ def print_results(
     verbose,
     as_json=False,
 ) -> None:
-    """Print the summary and the files written; then raise if some were not.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    seconds : float
-    written : sequence of Path
-    problems : sequence of str
-    more : mapping of str to object
-        Facts beyond the summary.
-    quiet, verbose, as_json : bool
-
-    Raises
-    ------
-    OSError
-        If there are problems; the message holds them all.
-    """
+    """Print the summary, with `more` facts, and the files written; then raise OSError if there were problems."""
     if verbose:
         print_iterations(skeleton.report.iterations, stderr=True)
     facts = {**summary(skeleton, seconds), **more}

@@ -174,20 +174,9 @@ def compare_rows(state, vertices, faces):
 
 
 def mesh_fit(state, vertices, faces):
-    """How well a mesh describes a cloud.
+    """How well a mesh, its faces as from `clean_faces` and its vertices in the frame, describes a cloud.
 
-    Parameters
-    ----------
-    state : Contraction
-        Fresh from the ring builder.
-    vertices : (V, 3) float array
-        In its frame.
-    faces : (f, 3) int array
-        As from `clean_faces`.
-
-    Returns
-    -------
-    MeshFit
+    The state is fresh from the ring builder.
     """
     points, rings, step = state.cloud, state.rings, spacing(state.cloud)
     squared = require("igl", "libigl").point_mesh_squared_distance(points, vertices, faces)[0]
@@ -229,18 +218,7 @@ def _quantiles(values, which):
 
 
 def compare_skeletons(ours, theirs, diagonal):
-    """How two skeletons agree.
-
-    Parameters
-    ----------
-    ours, theirs : Skeleton
-    diagonal : float
-        In their units.
-
-    Returns
-    -------
-    SkeletonAgreement
-    """
+    """How two skeletons agree, in a cloud with this diagonal in their units."""
     step = STEP * diagonal
     both = [distances(ours, theirs, step), distances(theirs, ours, step)]
     return SkeletonAgreement(

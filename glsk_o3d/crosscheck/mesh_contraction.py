@@ -59,17 +59,7 @@ def ring_areas(points, rings):
 def curvature_normals(laplacian, areas, points):
     """Mean curvature normals, (n, 3) float array: -2 n / r on a sphere, -n / r on a cylinder, n pointing outward.
 
-    Parameters
-    ----------
-    laplacian : (n, n) sparse array
-        Twice the cotangent matrix, as here and in `cotangent_laplacian`.
-    areas : (n,) float array
-    points : (n, 3) float array
-
-    Returns
-    -------
-    (n, 3) float array
-        NaN where there is no area.
+    NaN where there is no area. The Laplacian is twice the cotangent matrix, as here and in `cotangent_laplacian`.
     """
     with np.errstate(invalid="ignore"):
         return (laplacian @ points) / np.where(areas > 0, 2 * areas, np.nan)[:, None]

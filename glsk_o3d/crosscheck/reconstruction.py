@@ -24,19 +24,8 @@ def spacing(points):
 def ball_pivoting(points, normals, rings):
     """Triangulate a cloud by rolling balls over it (Bernardini et al. 1999): its points are the vertices.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float array
-        The normals up to their sign.
-    rings : Rings
-        Which points are neighbours.
-
-    Returns
-    -------
-    vertices : (n, 3) float array
-        `points`.
-    faces : (f, 3) int array
-        Not always manifold, nor of all vertices; none where no ball finds three points.
+    The normals are good up to their sign; the rings say which points are neighbours. The faces, (f, 3) int array, are
+    not always manifold, nor of all vertices; there are none where no ball finds three points.
     """
     o3d = import_open3d()
     radii = o3d.utility.DoubleVector(spacing(points) * np.array(BALLS))
@@ -46,21 +35,10 @@ def ball_pivoting(points, normals, rings):
 
 
 def poisson(points, normals, rings):
-    """Screened Poisson reconstruction (Kazhdan and Hoppe 2013), cut where there is no cloud.
+    """Screened Poisson reconstruction (Kazhdan and Hoppe 2013), cut where there is no cloud; takes what `ball_pivoting`
+    does.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float array
-        The normals up to their sign.
-    rings : Rings
-        Which points are neighbours.
-
-    Returns
-    -------
-    vertices : (m, 3) float array
-        About as many as points, but not these.
-    faces : (f, 3) int array
-        Of all vertices.
+    There are about as many vertices as points, but not these; the faces are of all of them.
     """
     o3d = import_open3d()
     step = spacing(points)

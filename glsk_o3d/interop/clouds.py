@@ -97,11 +97,7 @@ def _held(cloud: Any) -> Any:
 def open3d_class(thing: Any) -> tuple[str, bool]:
     """The name of the Open3D class that something is of, and whether it is one of the tensor API.
 
-    Returns
-    -------
-    name : str
-        Empty if it is not Open3D's.
-    tensor : bool
+    The name is empty if the class is not Open3D's.
     """
     for cls in type(thing).__mro__:
         package, *_ = parts = cls.__module__.split(".")
@@ -111,13 +107,9 @@ def open3d_class(thing: Any) -> tuple[str, bool]:
 
 
 def search_parameters(given: Any) -> dict[str, Any]:
-    """The number of neighbours and the radius in Open3D's ``KDTreeSearchParam*``.
+    """The ``k`` and the ``radius`` in Open3D's ``KDTreeSearchParam*``, none of them in anything else.
 
-    Returns
-    -------
-    dict
-        With ``k``, and with ``radius`` (float) if there is one; for a radius alone, `k` is `MOST_NEIGHBOURS`. Empty for
-        anything else.
+    For a radius alone `k` is `MOST_NEIGHBOURS`.
     """
     name, _ = open3d_class(given)
     if name == "KDTreeSearchParamKNN":
@@ -130,19 +122,6 @@ def search_parameters(given: Any) -> dict[str, Any]:
 
 
 def to_point_cloud(points: np.ndarray) -> Any:
-    """Points as an ``open3d.geometry.PointCloud``.
-
-    Parameters
-    ----------
-    points : (N, 3) array_like
-
-    Returns
-    -------
-    open3d.geometry.PointCloud
-
-    Raises
-    ------
-    MissingPackageError
-    """
+    """Points, (N, 3) array_like, as an ``open3d.geometry.PointCloud``; MissingPackageError without Open3D."""
     o3d = import_open3d()
     return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.ascontiguousarray(points, float).reshape(-1, 3)))

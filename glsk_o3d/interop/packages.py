@@ -66,18 +66,7 @@ def require(package: str, install: str | None = None) -> Any:
 
 
 def require_for(ending: str) -> None:
-    """Find out before the work whether files of a kind can be written.
-
-    Parameters
-    ----------
-    ending : str
-        With its dot.
-
-    Raises
-    ------
-    MissingPackageError
-        They are written by a package that is not installed.
-    """
+    """MissingPackageError if files with an ending are written by a package that is not installed."""
     if ending.lower() in _WRITERS:
         require(_WRITERS[ending.lower()])
 
@@ -96,15 +85,5 @@ def _asked_for(package: str) -> tuple[str, str]:
 
 
 def import_open3d() -> Any:
-    """The module ``open3d``.
-
-    Returns
-    -------
-    module
-
-    Raises
-    ------
-    MissingPackageError
-        Open3D or a shared library that it needs is not installed; the message says what to install.
-    """
+    """The module ``open3d``; the MissingPackageError says what to install."""
     return require("open3d")

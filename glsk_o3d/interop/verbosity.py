@@ -11,12 +11,7 @@ QUIET, TALKATIVE = 0, 3  # int(o3d.utility.VerbosityLevel.Error) and .Debug
 
 
 def open3d_is(level: int) -> bool:
-    """Whether Open3D has been imported and set to a verbosity level; it is not imported to find out.
-
-    Parameters
-    ----------
-    level : {QUIET, TALKATIVE}
-    """
+    """Whether Open3D has been imported and set to a verbosity level; it is not imported to find out."""
     utility = getattr(sys.modules.get("open3d"), "utility", None)
     return utility is not None and int(utility.get_verbosity_level()) == level
 

@@ -15,31 +15,14 @@ from ..errors import FileFormatError
 
 
 def write_json(path: str | os.PathLike, data: Any) -> None:
-    """Write what JSON can hold, indented; it appears complete or not at all.
-
-    Raises
-    ------
-    OSError
-        As for `write_atomically`.
-    """
+    """Write what JSON can hold, indented, as `write_atomically` does."""
     text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
 def write_csv(path: str | os.PathLike, names: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
-    """Write a table, a line of names and a line per row; it appears complete or not at all.
-
-    Parameters
-    ----------
-    path : path-like
-    names : sequence of str
-    rows : iterable of iterable
-        What is None or empty is left empty.
-
-    Raises
-    ------
-    OSError
-        As for `write_atomically`.
+    """Write a table, a line of names and a line per row, as `write_atomically` does; what is None or empty is left
+    empty.
     """
 
     def write(temporary: Path) -> None:
@@ -87,15 +70,9 @@ def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -
 
 
 def check_ending(path: str | os.PathLike, what: str, *endings: str) -> None:
-    """Raise FileFormatError unless the name of a file to be written has the ending of what is written.
+    """Raise FileFormatError unless the name of a file to be written has one of the endings of what is written.
 
-    Parameters
-    ----------
-    path : path-like
-    what : str
-        For the message, such as ``"preview is a picture"``.
-    *endings : str
-        With their dots; the message names the first.
+    The message says `what` that is, such as ``"preview is a picture"``, and names the first ending.
     """
     if Path(path).suffix.lower() not in endings:
         raise FileFormatError(f"{os.fspath(path)}: the {what} and its name ends in {endings[0]}")

@@ -63,13 +63,7 @@ def read_cloud(path: str | os.PathLike) -> Any:
 
 
 def read_scan(path: str | os.PathLike) -> tuple[Any, np.ndarray]:
-    """Read a point cloud as `read_cloud` does, and the triangles between its points if it is a mesh.
-
-    Returns
-    -------
-    cloud : open3d.geometry.PointCloud
-    triangles : (T, 3) int array
-    """
+    """Read a point cloud as `read_cloud` does, and the triangles between its points, (T, 3) int array, if it is a mesh."""
     path = check_scan(path)
     ending = path.suffix.lower()
     if _is_skeleton(path):
@@ -97,11 +91,7 @@ def read_scan(path: str | os.PathLike) -> tuple[Any, np.ndarray]:
 def check_scan(path: str | os.PathLike) -> Path:
     """Find out before reading a scan whether it is there and complete.
 
-    Raises
-    ------
-    FileNotFoundError
-    FileFormatError
-        A folder, or a file that is empty or breaks off.
+    FileNotFoundError, or FileFormatError for a folder, or a file that is empty or breaks off.
     """
     path = existing_file(path)
     check_complete(path)

@@ -37,12 +37,7 @@ class Promise(NamedTuple):
 def check_complete(path: Path) -> None:
     """Raise FileFormatError unless a file holds the points that it promises; other formats promise nothing.
 
-    Raises
-    ------
-    FileFormatError
-        It breaks off, or is damaged.
-    OSError
-        It may not be read.
+    It may also be damaged, or OSError where it may not be read.
     """
     with path.open("rb") as stream:  # whatever the format: where it may not be read, this says so
         read_promise = _PROMISES.get(path.suffix.lower())

@@ -37,17 +37,8 @@ def graph_skeleton(vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | Non
 
 
 def checked(skeleton: Skeleton) -> Skeleton:
-    """A skeleton, if its arrays fit together.
-
-    Returns
-    -------
-    Skeleton
-        The same.
-
-    Raises
-    ------
-    ValueError
-        Lengths differ, or something names a vertex that is not there.
+    """A skeleton, if its arrays fit together; ValueError where lengths differ, or something names a vertex that is not
+    there.
     """
     m, vertex_of_point = len(skeleton.vertices), skeleton.vertex_of_point
     if skeleton.edges.size and (skeleton.edges.min() < 0 or skeleton.edges.max() >= m):

@@ -17,11 +17,7 @@ MESH_ENDINGS = (".off", ".obj", ".stl", ".gltf", ".glb")
 def existing_file(path: str | os.PathLike) -> Path:
     """The path of a file that is there and not empty.
 
-    Raises
-    ------
-    FileNotFoundError
-    FileFormatError
-        A folder, or an empty file.
+    FileNotFoundError, or FileFormatError for a folder or an empty file.
     """
     path = Path(path)
     if path.is_dir():
@@ -34,12 +30,5 @@ def existing_file(path: str | os.PathLike) -> Path:
 
 
 def unknown_ending(what: object, known: Iterable[str]) -> FileFormatError:
-    """The error for a file whose ending is that of no format; it lists those that are known.
-
-    Parameters
-    ----------
-    what : object
-        The file, for the message.
-    known : iterable of str
-    """
+    """The error for a file (`what`, for the message) whose ending is that of no format; it lists those that are known."""
     return FileFormatError(f"{what}: unknown ending; known are {', '.join(known)}")

@@ -57,16 +57,7 @@ class Element(NamedTuple):
 def read_header(stream: BinaryIO) -> tuple[str, list[Element]]:
     """Read the header of a PLY file; what the stream gives next are the data.
 
-    Returns
-    -------
-    order : {"<", ">", ""}
-        NumPy's byte order; empty for text.
-    elements : list of Element
-
-    Raises
-    ------
-    ValueError
-        It is no PLY file, or its header is damaged.
+    Gives NumPy's byte order, empty for text, and the elements. ValueError if it is no PLY file, or damaged.
     """
     if stream.readline(16).strip() != b"ply":
         raise ValueError("it does not start with 'ply'")

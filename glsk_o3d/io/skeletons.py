@@ -144,10 +144,7 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
 def holds_skeleton(path: str | os.PathLike) -> bool:
     """Whether a file holds a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending.
 
-    Returns
-    -------
-    bool
-        False also for what does not exist or is unknown: reading it as a cloud says so.
+    False also for what does not exist or is unknown: reading it as a cloud says so.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -161,18 +158,9 @@ _HOLDS_LINES = {".ply": ply.holds_lines, ".obj": obj.holds_lines}  # formats tha
 
 
 def skeleton_ending(path: Path, format: str | None = None) -> str:
-    """The ending in the table of formats that a file name has, or that `format` names.
+    """The ending in the table of formats that a file name has, or that `format` names, with or without its dot.
 
-    Parameters
-    ----------
-    path : Path
-    format : str, optional
-        An ending, with or without its dot.
-
-    Raises
-    ------
-    FileFormatError
-        If there is no such format; the message lists them.
+    FileFormatError if there is none; the message lists them.
     """
     name = path.name.lower() if format is None else "." + format.lower().lstrip(".")
     found = [ending for ending in FORMATS if (name.endswith(ending) if format is None else name == ending)]

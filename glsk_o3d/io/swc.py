@@ -14,18 +14,9 @@ from .text import line, text, words_by_line
 
 
 def write(skeleton: Skeleton, cut_loops: bool = False) -> bytes:
-    """The content of an SWC file.
+    """The content of an SWC file; FileFormatError if the skeleton has loops.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    cut_loops : bool
-        Drop one edge per loop, keeping the spanning forest of least length, instead of refusing.
-
-    Raises
-    ------
-    FileFormatError
-        The skeleton has loops.
+    With `cut_loops` one edge per loop is dropped instead, keeping the spanning forest of least length.
     """
     if skeleton.n_loops and not cut_loops:
         raise FileFormatError(

@@ -19,10 +19,7 @@ from .script import BOOL, FLOAT, INT, LENGTH, MATRIX, POINT, TEXT, Param
 def names() -> dict[str, str]:
     """What MeshLab calls its filters in menus and scripts, and what pymeshlab does. (pymeshlab cannot be asked.)
 
-    Returns
-    -------
-    dict of str to str
-        Such as ``{"Select Outliers": "compute_selection_point_cloud_outliers", ...}``.
+    Such as ``{"Select Outliers": "compute_selection_point_cloud_outliers", ...}``.
     """
     text = resources.files(__package__).joinpath("filter_names.txt").read_text("utf-8")
     pairs = (line.split(maxsplit=1) for line in text.splitlines())
@@ -47,17 +44,7 @@ def trial() -> Any:
 
 
 def defaults(name: str) -> dict[str, Any]:
-    """The parameters of a MeshLab filter, with their defaults for a mesh of size 1.
-
-    Parameters
-    ----------
-    name : str
-        As pymeshlab calls the filter.
-
-    Returns
-    -------
-    dict of str to object
-    """
+    """The parameters of a filter, by pymeshlab's name, with their defaults for a mesh of size 1."""
     return dict(trial().filter_parameter_values(name))
 
 

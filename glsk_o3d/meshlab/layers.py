@@ -58,18 +58,7 @@ class Layer:
 
     @classmethod
     def of(cls, data: Any, label: str = "cloud", source: Layer | None = None) -> Layer:
-        """The layer that shows a skeleton, a contraction or a cloud.
-
-        Parameters
-        ----------
-        data : Skeleton, Contraction or cloud
-        label : str
-        source : Layer, optional
-
-        Returns
-        -------
-        Layer
-        """
+        """The layer that shows a skeleton, a contraction or a cloud."""
         common: dict[str, Any] = dict(label=label, source=source)
         if isinstance(data, Skeleton):
             return cls(data.vertices, edges=data.edges, scalars=data.radii, flow=data, **common)
@@ -132,12 +121,7 @@ class Layer:
         return np.array_equal(self.vertices, other.vertices) and np.array_equal(mine, its)
 
     def summary(self) -> dict[str, Any]:
-        """The layer in a few numbers, as MeshLab's filters return them.
-
-        Returns
-        -------
-        dict of str to int, float, bool or str
-        """
+        """The layer in a few numbers, as MeshLab's filters return them."""
         found: dict[str, Any] = {"vertices": len(self.vertices)}
         flow = self.flow
         if isinstance(flow, Skeleton):
@@ -152,12 +136,7 @@ class Layer:
         return found
 
     def to_pymeshlab(self) -> Any:
-        """The layer as a ``pymeshlab.Mesh``.
-
-        Raises
-        ------
-        MissingPackageError
-        """
+        """The layer as a ``pymeshlab.Mesh``; MissingPackageError without pymeshlab."""
         pymeshlab = require("pymeshlab")
         given = dict(
             vertex_matrix=(self.vertices, float),
@@ -260,11 +239,7 @@ def _elements(path, ending) -> dict[str, list[str]]:
 def check_ending(path: Path, what: str) -> None:
     """Raise FileFormatError unless the ending is that of a format for such a layer.
 
-    Parameters
-    ----------
-    path : Path
-    what : {"skeleton", "points", "points or mesh", "skeleton, points or mesh"}
-        What the layer may be.
+    `what` it may be is "skeleton", "points", "points or mesh", or "skeleton, points or mesh".
     """
     known = [ending for kind, endings in ENDINGS.items() if kind in what for ending in endings]
     if path.suffix.lower() in known:

@@ -248,13 +248,7 @@ def _attributes(param: Param) -> str:
 
 
 def write_script(path: str | os.PathLike, calls: Sequence[Call]) -> None:
-    """Write filters as a script, complete or not at all.
-
-    Raises
-    ------
-    OSError
-        The folder is missing, or the file cannot be written.
-    """
+    """Write filters as a script, as `write_atomically` does."""
     write_atomically(path, lambda temporary: temporary.write_text(script_text(calls), encoding="utf-8"))
 
 

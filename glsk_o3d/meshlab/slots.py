@@ -68,12 +68,7 @@ class Slot:
         return f"{name} or str" if self.words and name != "str" else name
 
     def checked(self, value: Any) -> Any:
-        """The value as the filter takes it, reducers and rules made from their names.
-
-        Raises
-        ------
-        ValueError
-        """
+        """The value as the filter takes it, reducers and rules made from their names; ValueError if it is wrong."""
         if isinstance(value, np.generic):
             value = value.item()
         if value == "none" and "none" in self.words:
@@ -92,12 +87,7 @@ class Slot:
         return value
 
     def read(self, param: Param) -> Any:
-        """The value of a parameter in a script, checked but not resolved.
-
-        Raises
-        ------
-        ValueError
-        """
+        """The value of a parameter in a script, checked but not resolved; ValueError if it is wrong."""
         param.check_type(self.types)
         value = param.value()
         self.checked(value)
@@ -117,21 +107,12 @@ class Slot:
 def slots_of(cls: type[Parameters]) -> Iterator[Slot]:
     """A slot for each parameter of a filter, reducer or rule.
 
-    Yields
-    ------
-    Slot
-        Its name is that of the class in small letters, an underscore and that of the parameter.
+    Its name is that of the class in small letters, an underscore and that of the parameter.
     """
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]
         yield Slot(f"{cls.__name__.lower()}_{field.name}", field.metadata, cls, field.name)
 
 
 def facts_of(doc: str, type: str, choices: tuple[str, ...] = (), low: float | None = None) -> Mapping[str, Any]:
-    """The facts of a parameter that is no filter's.
-
-    Parameters
-    ----------
-    doc, type, choices, low
-        As in `glsk_o3d.parameters.parameter`.
-    """
+    """The facts of a parameter that is no filter's, as `glsk_o3d.parameters.parameter` has them."""
     return parameter(None, doc, type=type, choices=choices, low=low).metadata

@@ -215,10 +215,7 @@ class SegmentVerb(Verb):
 def verbs() -> dict[str, Verb]:
     """Our filters for MeshLab by their names in Python.
 
-    Returns
-    -------
-    dict of str to Verb
-        The whole pipeline first, then each filter of the catalogue, then the segmentation.
+    The whole pipeline first, then each filter of the catalogue, then the segmentation.
     """
     known = catalogue()
     whole = {type(part): None for make in known_pipelines().values() for part in parts(make())}

@@ -37,31 +37,15 @@ def principal_parts(entries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def largest_eigenvalue(entries: np.ndarray) -> np.ndarray:
-    """Largest eigenvalue of symmetric 3 x 3 matrices.
-
-    Parameters
-    ----------
-    entries : (6, n) float array
-
-    Returns
-    -------
-    (n,) float array
-    """
+    """Largest eigenvalue of symmetric 3 x 3 matrices, (n,) float array from their `entries` (6, n)."""
     mean, size, shape = _reduced(entries)
     return mean + size * _outer(shape)[1]
 
 
 def main_direction(entries: np.ndarray) -> np.ndarray:
-    """Direction of the largest eigenvalue of symmetric 3 x 3 matrices.
+    """Direction of the largest eigenvalue of symmetric 3 x 3 matrices, (n, 3) float array from their `entries` (6, n).
 
-    Parameters
-    ----------
-    entries : (6, n) float array
-
-    Returns
-    -------
-    (n, 3) float array
-        Unit vectors; any of those with the largest eigenvalue, where there is more than one.
+    Unit vectors; any of those with the largest eigenvalue, where there is more than one.
     """
     shape = _reduced(entries)[2]
     return _direction(shape, _outer(shape)[1], 2)

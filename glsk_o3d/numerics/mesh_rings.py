@@ -37,11 +37,7 @@ def corners(faces: np.ndarray) -> np.ndarray:
 def umbrellas(n: int, faces: np.ndarray) -> np.ndarray:
     """Vertices whose triangles make one closed umbrella, (n,) bool array: neither border nor fan of fans nor bare.
 
-    Parameters
-    ----------
-    n : int
-    faces : (f, 3) int array
-        As from `clean_faces`.
+    The faces, (f, 3) int array, are as from `clean_faces`.
     """
     corner = corners(faces)
     spokes = np.concatenate([corner[:, [0, 1]], corner[:, [0, 2]]])
@@ -56,11 +52,7 @@ def umbrellas(n: int, faces: np.ndarray) -> np.ndarray:
 def border_lengths(n: int, faces: np.ndarray) -> np.ndarray:
     """How many edges the border has that each vertex is on, (n,) int array: 0 inside, 3 at a hole of one triangle.
 
-    Parameters
-    ----------
-    n : int
-    faces : (f, 3) int array
-        As from `clean_faces`.
+    The faces, (f, 3) int array, are as from `clean_faces`.
     """
     edges = np.sort(np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)

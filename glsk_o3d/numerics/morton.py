@@ -10,16 +10,9 @@ BITS = 21  # per axis: 63 bits in all
 
 
 def morton_order(points: np.ndarray) -> np.ndarray:
-    """Permutation that sorts points along the Morton curve of their bounding box.
+    """Permutation, (n,) int array, that sorts `points` (n, 3) along the Morton curve of their bounding box.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-
-    Returns
-    -------
-    (n,) int array
-        Stable: equal points keep their order.
+    Stable: equal points keep their order.
     """
     return np.argsort(morton_codes(points, 2**BITS - 1), kind="stable")
 

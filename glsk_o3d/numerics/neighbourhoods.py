@@ -116,15 +116,7 @@ def row_medians(values: np.ndarray) -> np.ndarray:
 def scatter(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Scatter matrix of every neighbourhood: the sums of products of what its points deviate from their mean.
 
-    Parameters
-    ----------
-    points : (m, 3) float array
-    neighbours : (n, k) int array
-
-    Returns
-    -------
-    (6, n) float array
-        Its entries xx, xy, xz, yy, yz, zz.
+    (6, n) float array from `points` (m, 3) and `neighbours` (n, k): its entries xx, xy, xz, yy, yz, zz.
     """
     coordinates, entries = np.ascontiguousarray(points.T), np.empty((6, len(neighbours)))
     share = np.full(neighbours.shape[1], 1 / neighbours.shape[1])
@@ -197,14 +189,7 @@ def uprightness(points: np.ndarray, normals: np.ndarray, p: np.ndarray, q: np.nd
 def plane_axes(normals: np.ndarray) -> np.ndarray:
     """Two orthonormal axes perpendicular to each normal (Duff et al. 2017, "Building an orthonormal basis, revisited").
 
-    Parameters
-    ----------
-    normals : (n, 3) float array
-        Unit vectors.
-
-    Returns
-    -------
-    (n, 3, 2) float array
+    (n, 3, 2) float array from `normals` (n, 3), unit vectors.
     """
     x, y, z = normals.T
     sign = np.copysign(1.0, z)

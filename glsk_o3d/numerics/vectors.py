@@ -10,29 +10,11 @@ ROWS, COLUMNS = np.array(PAIRS).T
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Dot product of each two rows.
-
-    Parameters
-    ----------
-    a, b : (n, 3) float array
-
-    Returns
-    -------
-    (n,) float array
-    """
+    """Dot product of each two rows of `a` and `b`, (n, 3) float arrays: (n,) float array."""
     (x, y, z), (u, v, w) = a.T, b.T
     return x * u + y * v + z * w
 
 
 def norm(a: np.ndarray) -> np.ndarray:
-    """Length of each row.
-
-    Parameters
-    ----------
-    a : (n, 3) float array
-
-    Returns
-    -------
-    (n,) float array
-    """
+    """Length of each row of `a`, (n, 3) float array: (n,) float array."""
     return np.sqrt(dot(a, a))

@@ -24,36 +24,21 @@ def find(name: str) -> type[Parameters] | None:
 
 
 def serves(cls: type[Parameters], kind: str) -> bool:
-    """Whether an instance can be a parameter of the type ``"reducer"`` or ``"stop"``, or a stage: ``"filter"``.
-
-    Parameters
-    ----------
-    cls : class
-    kind : {"filter", "reducer", "stop"}
-    """
+    """Whether an instance can be a parameter of the type "reducer" or "stop", or a stage: "filter"."""
     if kind == "stop" or not issubclass(cls, Filter):
         return kind == "stop" and not issubclass(cls, Filter)
     return kind == "filter" or cls.consumes is cls.produces is Contraction
 
 
 def known_pipelines() -> dict[str, Callable[[], Pipeline]]:
-    """All pipelines by name, those of plugins after the built-in ones.
-
-    Returns
-    -------
-    dict of str to callable
-        Each makes a Pipeline.
-    """
+    """What makes each pipeline, by its name, those of plugins after the built-in ones."""
     return {**PIPELINES, **plugin_pipelines()}
 
 
 def named_pipeline(name: str) -> Pipeline:
     """The pipeline of that name, built in or of a plugin.
 
-    Raises
-    ------
-    InvalidParameterError
-        If there is none; the message says which was meant, or lists the names.
+    InvalidParameterError if there is none; the message says which was meant, or lists the names.
     """
     make = PIPELINES.get(name) or known_pipelines().get(name)
     if make is None:

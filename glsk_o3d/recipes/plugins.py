@@ -30,27 +30,14 @@ _lock = threading.RLock()
 def plugin_filters() -> dict[str, type[Parameters]]:
     """Filters and stopping rules of the entry-point group ``glsk_o3d.filters``, by name.
 
-    Warns
-    -----
-    PluginWarning
-        Once for each that is broken, with its distribution and what is wrong; it is left out, and the others are not.
+    PluginWarning, once, for each that is broken, with its distribution and what is wrong; it is left out, and the
+    others are not.
     """
     return _plugins(FILTER_GROUP, BUILTIN, _check_filter)
 
 
 def plugin_pipelines() -> dict[str, Callable[[], Pipeline]]:
-    """Pipelines of the entry-point group ``glsk_o3d.pipelines``, by name.
-
-    Returns
-    -------
-    dict of str to callable
-        Each makes a Pipeline.
-
-    Warns
-    -----
-    PluginWarning
-        As `plugin_filters`.
-    """
+    """What makes each pipeline of the entry-point group ``glsk_o3d.pipelines``, by name; warns as `plugin_filters`."""
     return _plugins(PIPELINE_GROUP, PIPELINES, _check_pipeline)
 
 

@@ -111,24 +111,12 @@ def branches(skeleton: Skeleton) -> str:
 
 
 def branch_colors(skeleton: Skeleton, n: int) -> list[str]:
-    """The colours of the first n branches, the same as in Open3D's windows.
-
-    Returns
-    -------
-    list of str
-        As ``"#rrggbb"``.
-    """
+    """The colours of the first n branches as ``"#rrggbb"``, the same as in Open3D's windows."""
     return hexadecimal(shades(skeleton, "branch", np.arange(n), np.arange(n)))
 
 
 def hexadecimal(colors: np.ndarray) -> list[str]:
-    """Colours as ``"#rrggbb"``.
-
-    Parameters
-    ----------
-    colors : (n, 3) or (n, 4) float array
-        From 0 to 1.
-    """
+    """Colours from 0 to 1, (n, 3) or (n, 4) float array, as ``"#rrggbb"``."""
     return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(255 * colors[:, :3]).astype(int).tolist()]
 
 

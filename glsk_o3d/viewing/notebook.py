@@ -22,16 +22,7 @@ COLOURS = 48  # of the picture: greys, red, and what lies between; a third of th
 
 
 def picture(skeleton: Skeleton) -> str:
-    """The preview as a ``data:`` address, for an HTML image.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-
-    Returns
-    -------
-    str
-    """
+    """The preview as a ``data:`` address, for an HTML image."""
     require("PIL", "pillow")
     from PIL import Image
 

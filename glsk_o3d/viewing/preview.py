@@ -112,15 +112,9 @@ def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] 
 
 
 def room(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Middle and size of the box that is drawn: matplotlib's transforms lose digits unless the middle is taken off.
+    """Middle and size, (3,) float arrays, of the box of points, (n, 3) float array, that is drawn.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-
-    Returns
-    -------
-    centre, extent : (3,) float array
+    matplotlib's transforms lose digits unless the middle is taken off.
     """
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else np.zeros((2, 3))
     return low + (high - low) / 2, np.maximum(high - low, 0.08 * (high - low).max() or 1.0)
@@ -131,21 +125,8 @@ def three_views(
 ) -> Iterator[tuple[int, int, Any]]:
     """Axes for the views along the coordinate axes, all at one scale, with the names of their axes below.
 
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    extent : (3,) float array
-        Of what is drawn, around the origin.
-    head, foot : float
-        Room above and below, in inches.
-    names : float
-        Height of the names, in inches.
-
-    Yields
-    ------
-    across, up : int
-        The coordinates that are drawn.
-    axes : matplotlib.axes.Axes
+    What is drawn is around the origin, of this extent, (3,) float array; head and foot are the room above and below,
+    and names the height of the names, in inches. Gives the coordinates that are drawn, across and up, and their axes.
     """
     width, height = figure.get_size_inches()
     across, up = np.array([extent[[a, b]] for a, b in _VIEWS]).T
@@ -164,17 +145,7 @@ def three_views(
 
 
 def colour_bar(figure, scale, box, ticks: list[float], labels: list[str] | None = None) -> None:
-    """A small horizontal colour bar.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    scale : matplotlib.cm.ScalarMappable
-    box : 4 floats
-        Left, bottom, width and height, as shares of the figure.
-    ticks : list of float
-    labels : list of str, optional
-    """
+    """A small horizontal colour bar; the box is left, bottom, width and height, as shares of the figure."""
     bar = figure.colorbar(scale, cax=figure.add_axes(box), orientation="horizontal")
     bar.set_ticks(ticks, labels=labels)
     bar.outline.set_visible(False)
@@ -182,13 +153,7 @@ def colour_bar(figure, scale, box, ticks: list[float], labels: list[str] | None 
 
 
 def save_figure(figure, path: str | os.PathLike) -> None:
-    """Write a figure as PNG, without the version of matplotlib; it appears complete or not at all.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    path : path-like
-    """
+    """Write a figure as PNG, without the version of matplotlib; it appears complete or not at all."""
     options = {"format": "png", "dpi": DPI, "metadata": {"Software": None}}
     write_atomically(path, lambda temporary: figure.savefig(temporary, **options))
 

@@ -49,18 +49,7 @@ class ContractionRecorder:
 
 
 def thinned(points: np.ndarray, most: int) -> np.ndarray:
-    """At most so many of the finite points, drawn at random but always the same.
-
-    Parameters
-    ----------
-    points : (N, 3) float array
-    most : int
-
-    Returns
-    -------
-    (K,) int array
-        Indices, ascending.
-    """
+    """At most so many of the finite points, drawn at random but always the same: their indices, ascending."""
     finite = np.flatnonzero(np.isfinite(points).all(axis=1))
     if len(finite) <= most:
         return finite

@@ -76,17 +76,7 @@ def open_window(skeleton: Skeleton, cloud: Any, title: str) -> Any:
 
 
 def layers(skeleton: Skeleton, cloud: Any = None) -> dict[str, list[Any]]:
-    """What the window can show, by name: Open3D geometries.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    cloud : open3d.geometry.PointCloud, optional
-
-    Returns
-    -------
-    dict of str to list
-    """
+    """What the window can show, by name: Open3D geometries."""
     if cloud is None:
         cloud = to_point_cloud(skeleton.points[np.isfinite(skeleton.points).all(axis=1)])
     else:
