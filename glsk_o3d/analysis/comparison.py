@@ -132,12 +132,8 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
         radius_error=float(off.mean()) if len(off) else None,
         **difference,
         topology=difference["components"] == 0 == difference["loops"],
-        edge_error=_mean_per_edge(to_axis / radius, row, len(edges)),
+        edge_error=np.bincount(row, to_axis / radius) / np.bincount(row) if len(edges) else np.empty(0),
     )
-
-
-def _mean_per_edge(values, row, n):
-    return np.bincount(row, values)[:n] / np.bincount(row)[:n] if n else np.empty(0)
 
 
 def _structure(n, edges):

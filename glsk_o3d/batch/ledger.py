@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import json
 import logging
 import os
@@ -15,7 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import BatchError
-from ..interop.writing import write_atomically
+from ..interop.writing import write_atomically, write_csv
 
 try:
     import fcntl
@@ -93,12 +91,7 @@ class Ledger:
             self._stream.close()
             self._stream = None
         self.rewrite()
-        text = io.StringIO(newline="")
-        writer = csv.DictWriter(text, COLUMNS, extrasaction="ignore", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows({name: _cell(value) for name, value in row.items()} for row in self.rows.values())
-        data = text.getvalue().encode("utf-8", "replace")
-        write_atomically(self.table, lambda temporary: temporary.write_bytes(data))
+        write_csv(self.table, COLUMNS, ([_cell(row.get(name)) for name in COLUMNS] for row in self.rows.values()))
 
 
 def _line(row: Row) -> bytes:

@@ -166,7 +166,8 @@ def plan_batch(
     out = Path(os.path.abspath(out_dir))
     found = find_inputs(given, out, recursive=recursive)
     sources = {str(path) for path in found.values()}
-    parameters = _hash({"recipe": recipe, "cut_loops": cut_loops} if cut_loops else recipe)
+    told = {"recipe": recipe, "cut_loops": cut_loops} if cut_loops else recipe
+    parameters = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
     ledger, tasks = Ledger(out), []
     results = {name + ending for name in found for ending in endings}
     names = {row["input"]: name for name, row in ledger.rows.items()}
@@ -236,7 +237,3 @@ def _compared(tasks: list[Task], rows: dict[str, Row]) -> tuple[Task, ...]:
 
     with ThreadPoolExecutor() as pool:
         return tuple(pool.map(look, tasks))
-
-
-def _hash(data: Any) -> str:
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
-import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..errors import BatchError, InvalidParameterError
+from ..interop.interrupts import counted_interrupts
 from ..interop.writing import write_json
 from ..numerics.cores import cores
 from .ledger import COLUMNS, DONE, FAILED, STALE, Row, locked
@@ -28,6 +26,7 @@ if TYPE_CHECKING:
     import distributed
 
 _POLL = 0.2  # seconds until Ctrl-C is noticed
+CANCELLED = "the work was cancelled, or its scheduler has gone: run the same batch to go on"
 WORKER_DIED = "the worker died with it, twice: out of memory, or a crash in native code"
 _log = logging.getLogger(__name__)
 
@@ -198,7 +197,7 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
         if on_result is not None:
             on_result(row)
 
-    with _counted_interrupts() as interrupts:
+    with counted_interrupts() as interrupts:  # no line of the ledger is torn
         while running or ((queue or again) and not interrupts):
             while queue and not interrupts and len(running) < workers.capacity():
                 hand_out(queue.popleft())
@@ -209,7 +208,7 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
             lost: BatchError | None = None
             for future in ready:
                 task = running.pop(future)
-                error = _gone() if future.cancelled() else future.exception()
+                error = BatchError(CANCELLED) if future.cancelled() else future.exception()
                 if isinstance(error, BatchError):
                     lost = error
                 elif died(error) and not alone:
@@ -229,10 +228,6 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
             raise KeyboardInterrupt
 
 
-def _gone() -> BatchError:
-    return BatchError("the work was cancelled, or its scheduler has gone: run the same batch to go on")
-
-
 def _row(task: Task, future: Future, error: BaseException | None, before: Row) -> Row:
     if error is None:
         row = future.result()
@@ -249,17 +244,3 @@ def _row(task: Task, future: Future, error: BaseException | None, before: Row) -
         "outputs": [],
         "version": __version__,
     }
-
-
-@contextmanager
-def _counted_interrupts() -> Iterator[list[int]]:
-    """Count Ctrl-C instead of being torn out of a line of the ledger by it."""
-    pressed: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield pressed
-        return
-    before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
-    try:
-        yield pressed
-    finally:
-        signal.signal(signal.SIGINT, before)

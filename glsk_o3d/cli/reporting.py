@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import logging
-import signal
 import sys
-import threading
 import traceback
 import warnings
 from collections.abc import Iterator
@@ -15,6 +13,7 @@ from pathlib import Path
 import typer
 
 from ..errors import GlskError, InvalidCloudError, InvalidParameterError, PluginWarning, SkeletonWarning
+from ..interop.interrupts import counted_interrupts
 from .console import say
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
@@ -101,15 +100,8 @@ def holding_interrupts() -> Iterator[None]:
 
     Open3D, for one: interrupted while it is imported, it spills pages of text.
     """
-    if threading.current_thread() is not threading.main_thread():
+    with counted_interrupts() as held:
         yield
-        return
-    held: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, frame: held.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
     if held:
         raise KeyboardInterrupt
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +15,6 @@ from .reporting import WrongUsage, holding_interrupts, reporting
 
 if TYPE_CHECKING:
     from ..meshlab.steps import Step
-    from ..report import IterationRecord
 
 
 def run(
@@ -48,6 +47,7 @@ def run(
         from ..meshlab.layers import Layer, check_ending
         from ..meshlab.steps import PlainLayers, find_script, read_steps
         from .outputs import check_outputs, write_each
+        from .running import tell_files
 
         if listed:
             _list(as_json)
@@ -73,7 +73,8 @@ def run(
             for i, step in enumerate(steps, 1):
                 doing = f"{i} of {len(steps)}: {step.call.name}"
                 update(doing)
-                results.append(_plain(layers.apply_step(step, partial(_solved, update, doing)) or {}))
+                said = layers.apply_step(step, lambda record, doing=doing: update(f"{doing}, solve {record.iteration}"))
+                results.append(_plain(said or {}))
             save = partial(layers.save, cut_loops=cut_loops)
             written, problems = write_each(dict.fromkeys(outputs, save), update)
         if as_json:
@@ -81,14 +82,7 @@ def run(
             print_json({"steps": done, "files": [str(path) for path in written]})
         elif not quiet:
             _print_results(steps, results)
-            for path in written:
-                typer.echo(f"wrote {path}")
-        if problems:
-            raise OSError("; ".join(problems))
-
-
-def _solved(update: Callable[..., None], doing: str, record: IterationRecord) -> None:
-    update(f"{doing}, solve {record.iteration}")
+        tell_files(written, problems, quiet=quiet or as_json)
 
 
 def _print_results(steps: Sequence[Step], results: Sequence[dict[str, Any]]) -> None:

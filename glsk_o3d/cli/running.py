@@ -74,6 +74,12 @@ def print_results(
             hidden["contracted"] = None
         words = {name: "yes" if value else "no" for name, value in facts.items() if isinstance(value, bool)}
         print_rows({**facts, **words, **hidden})
+    tell_files(written, problems, quiet=quiet or as_json)
+
+
+def tell_files(written: Sequence[Path], problems: Sequence[str] = (), *, quiet: bool) -> None:
+    """Print which files were written; then raise OSError if some were not."""
+    if not quiet:
         for path in written:
             typer.echo(f"wrote {path}")
     if problems:

@@ -37,6 +37,7 @@ def view(
         from ..skeleton import Skeleton
         from ..viewing.window import show
         from .outputs import check_outputs, write
+        from .running import tell_files
 
         elsewhere = preview is not None or report is not None
         if elsewhere:
@@ -56,8 +57,4 @@ def view(
         written, problems = write(
             skeleton, [], preview, report, title=file.name, cut_loops=False, update=lambda text: None
         )
-        if not quiet:
-            for path in written:
-                typer.echo(f"wrote {path}")
-        if problems:
-            raise OSError("; ".join(problems))
+        tell_files(written, problems, quiet=quiet)

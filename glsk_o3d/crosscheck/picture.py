@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..interop.packages import require
 from ..interop.writing import check_ending
-from ..viewing.preview import DPI, INK, MOST_POINTS, colour_bar, printable, room, save_figure, three_views
+from ..viewing.preview import INK, MOST_POINTS, colour_bar, new_figure, printable, room, save_figure, three_views
 
 if TYPE_CHECKING:
     from .check import CrossCheck
@@ -60,27 +59,23 @@ def save_crosscheck_picture(
     True
     """
     check_ending(path, "picture is a PNG", ".png")
-    save_figure(_draw(check, np.asarray(size) / DPI, title), path)
+    save_figure(_draw(check, size, title), path)
 
 
 def _draw(check, size, title):
-    require("matplotlib")
+    figure = new_figure(size)
     from matplotlib import colormaps
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
-    from matplotlib.colors import Normalize
-    from matplotlib.figure import Figure
+    from matplotlib.colors import Normalize, to_rgba
 
-    width, height = size
-    figure = Figure((width, height), facecolor="white")
-    FigureCanvasAgg(figure)
+    height = figure.get_figheight()
     scale = ScalarMappable(Normalize(0, _MOST, clip=True), colormaps["YlOrRd"])
     points, angle = _shown(check)
     shown = np.concatenate([points, check.skeleton.vertices, check.mesh_skeleton.vertices])  # they may differ widely
     centre, extent = room(shown)
     points = points - centre
-    colours = np.where(np.isnan(angle)[:, None], _rgba(_UNKNOWN), scale.to_rgba(np.nan_to_num(angle)))
+    colours = np.where(np.isnan(angle)[:, None], to_rgba(_UNKNOWN), scale.to_rgba(np.nan_to_num(angle)))
     for a, b, axes in three_views(figure, extent, head=_HEAD, foot=_FOOT, names=0.62):
         dot = float(np.clip(16000 / max(len(points), 1), 2, 6))
         axes.scatter(points[:, a], points[:, b], s=dot, c=colours, linewidths=0, clip_on=False)
@@ -121,9 +116,3 @@ def _write(figure, check, title, height):
     figure.text(0.625, level, grey, color="#999999", **beside)
     figure.text(0.70, level, "skeleton of the cloud", color=_OURS, **beside)
     figure.text(0.81, level, "of the mesh", color=_THEIRS, **beside)
-
-
-def _rgba(colour):
-    from matplotlib.colors import to_rgba
-
-    return to_rgba(colour)

@@ -26,7 +26,7 @@ def write_csv(path: str | os.PathLike, names: Sequence[str], rows: Iterable[Iter
     """
 
     def write(temporary: Path) -> None:
-        with temporary.open("w", newline="", encoding="utf-8") as stream:
+        with temporary.open("w", newline="", encoding="utf-8", errors="replace") as stream:
             csv.writer(stream, lineterminator="\n").writerows([names, *rows])
 
     write_atomically(path, write)

@@ -63,7 +63,7 @@ def read_cloud(path: str | os.PathLike) -> Any:
 
 
 def read_scan(path: str | os.PathLike) -> tuple[Any, np.ndarray]:
-    """Read a point cloud as `read_cloud` does, and the triangles between its points, (T, 3) int array, if it is a mesh."""
+    """Read a cloud as `read_cloud` does, and the triangles between its points, (T, 3) int array, if it is a mesh."""
     path = check_scan(path)
     ending = path.suffix.lower()
     if _is_skeleton(path):

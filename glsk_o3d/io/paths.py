@@ -30,5 +30,5 @@ def existing_file(path: str | os.PathLike) -> Path:
 
 
 def unknown_ending(what: object, known: Iterable[str]) -> FileFormatError:
-    """The error for a file (`what`, for the message) whose ending is that of no format; it lists those that are known."""
+    """The error for a file, or what else, whose ending is that of no format; it lists those that are known."""
     return FileFormatError(f"{what}: unknown ending; known are {', '.join(known)}")

@@ -100,7 +100,7 @@ def common_share(rings: Rings, faces: np.ndarray) -> np.ndarray:
     fans[:, 1:] = np.sort(fans[:, 1:], axis=1)
     in_rings, in_mesh = (_triangle_keys(corner, n) for corner in (fans, corners(faces)))
     ours, theirs, both = (
-        np.bincount(_vertex_of_key(keys, n), minlength=n)
+        np.bincount(keys // (n * n), minlength=n)
         for keys in (in_rings, in_mesh, np.intersect1d(in_rings, in_mesh, assume_unique=True))
     )
     return both / np.maximum(ours + theirs - both, 1)
@@ -111,7 +111,3 @@ def common_share(rings: Rings, faces: np.ndarray) -> np.ndarray:
 
 def _triangle_keys(corner: np.ndarray, n: int) -> np.ndarray:
     return np.unique(corner @ np.array([n * n, n, 1], np.int64))
-
-
-def _vertex_of_key(keys: np.ndarray, n: int) -> np.ndarray:
-    return keys // (n * n)

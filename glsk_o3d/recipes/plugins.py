@@ -108,7 +108,8 @@ def _entries(group: str, problems: list[str]) -> Iterator[tuple[str, metadata.En
 
 
 def _check_filter(name: str, cls: Any) -> None:
-    if not (isinstance(cls, type) and issubclass(cls, Parameters) and _is_frozen(cls)):
+    frozen = getattr(getattr(cls, "__dataclass_params__", None), "frozen", False)
+    if not (isinstance(cls, type) and issubclass(cls, Parameters) and frozen):
         raise _Unfit("it is no frozen dataclass derived from glsk_o3d.Filter")
     if cls.__name__ != name:
         raise _Unfit(f"the entry point must have the name of the class, {cls.__name__!r}")
@@ -133,10 +134,6 @@ def _check_filter(name: str, cls: Any) -> None:
 
 def _flow(flow: Any) -> str:
     return getattr(flow, "__name__", repr(flow))
-
-
-def _is_frozen(cls) -> bool:
-    return getattr(getattr(cls, "__dataclass_params__", None), "frozen", False)
 
 
 def _check_pipeline(name: str, make: Any) -> None:

@@ -83,6 +83,7 @@ def save_report(
 
 def _page(skeleton, recorder, title) -> str:
     shown, positions = _followed(skeleton, recorder)
+    finite = np.isfinite(skeleton.points).all(axis=1).sum()
     script = _asset("report.js")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     kind = "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
@@ -95,7 +96,9 @@ def _page(skeleton, recorder, title) -> str:
         "figures": sections.figures(skeleton),
         "warnings": sections.warnings(skeleton.report.warnings),
         "still": picture(skeleton),
-        "thinning": _thinning(len(shown), int(np.isfinite(skeleton.points).all(axis=1).sum())),
+        "thinning": f"The view shows {len(shown):,} of {finite:,} points, drawn at random."
+        if len(shown) < finite
+        else "",
         "sections": sections.contraction(skeleton.report)
         + sections.branches(skeleton)
         + sections.origin(skeleton.report),
@@ -172,7 +175,3 @@ def _captions(skeleton, n_solves) -> list[str]:
         left = record.n_points - record.n_merged
         told.append(f"After solve {record.iteration} of {n_solves}: {left:,} points left")
     return told
-
-
-def _thinning(n_shown, n_points) -> str:
-    return f"The view shows {n_shown:,} of {n_points:,} points, drawn at random." if n_shown < n_points else ""

@@ -70,15 +70,11 @@ def save_preview(
 
 
 def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] = ()):
-    """The figure, on a canvas of its own: pyplot and its global state stay out of it."""
-    require("matplotlib")
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    """The figure, not yet in a file."""
+    figure = new_figure(size)
     from matplotlib.collections import LineCollection
-    from matplotlib.figure import Figure
 
-    width, height = np.asarray(size) / DPI  # inches, as everything below
-    figure = Figure((width, height), facecolor=_PAPER)
-    FigureCanvasAgg(figure)
+    width, height = figure.get_size_inches()
     cloud = skeleton.points[np.isfinite(skeleton.points).all(axis=1)]
     cloud = cloud[:: max(1, -(-len(cloud) // MOST_POINTS))]
     centre, extent = room(np.concatenate([cloud, skeleton.vertices]))
@@ -87,11 +83,11 @@ def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] 
     below = _LINE * len(warned)
     views = three_views(figure, extent, head=0.55 if title else 0.25, foot=0.6 + below, names=0.36 + below)
     for a, b, axes in views:
-        style = {"linewidths": 0, "clip_on": False}
+        style = {"linewidths": 0, "clip_on": False, "s": np.clip(4500 / max(len(cloud), 1), 0.8, 3)}
         depth, toward = cloud[:, 3 - a - b], 1 if (a, b) != (0, 2) else -1  # x, y, z are right-handed
         order = np.argsort(toward * depth, kind="stable")
         near = (np.arange(len(order)) / max(len(order) - 1, 1))[:, None]
-        axes.scatter(cloud[order, a], cloud[order, b], s=_dot(len(cloud)), c=_FAR + near * (_NEAR - _FAR), **style)
+        axes.scatter(cloud[order, a], cloud[order, b], c=_FAR + near * (_NEAR - _FAR), **style)
         segments = vertices[skeleton.edges][:, :, [a, b]]
         axes.add_collection(LineCollection(segments, colors=_RED, linewidths=1.5, capstyle="round", clip_on=False))
         for chosen, face, area in (
@@ -108,6 +104,17 @@ def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] 
         figure.text(0.5, place, printable(line), ha="center", color=_AMBER, fontsize=8, parse_math=False)
     if title:
         figure.text(0.5, 1 - 0.33 / height, printable(title), ha="center", color=INK, fontsize=12, parse_math=False)
+    return figure
+
+
+def new_figure(size: tuple[int, int]) -> Any:
+    """A white figure of so many pixels, on a canvas of its own: pyplot and its global state stay out of it."""
+    require("matplotlib")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(np.asarray(size) / DPI, facecolor=_PAPER)
+    FigureCanvasAgg(figure)
     return figure
 
 
@@ -161,11 +168,6 @@ def save_figure(figure, path: str | os.PathLike) -> None:
 def printable(text: object) -> str:
     """A text that may be a file name, which may be no Unicode, as one that can be drawn and encoded."""
     return str(text).encode("utf-8", "replace").decode()
-
-
-def _dot(n: int) -> float:
-    """Area of a dot of the cloud, in square points."""
-    return float(np.clip(4500 / max(n, 1), 0.8, 3))
 
 
 def _warned(warnings: Sequence[str], width: float, room: int) -> list[str]:
