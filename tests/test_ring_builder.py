@@ -610,9 +610,7 @@ def test_a_large_cloud_is_sampled_and_every_point_has_its_place():
         state.frame.out_of(state.cloud[state.representative_of_point[state.sampled]]), points[state.sampled], atol=1e-12
     )
     others = np.flatnonzero(np.isfinite(points).all(axis=1) & ~state.outlier)
-    away = np.linalg.norm(
-        state.frame.out_of(state.cloud[state.representative_of_point[others]]) - points[others], axis=1
-    )
+    away = np.linalg.norm(state.frame.out_of(state.cloud[state.representative_of_point[others]]) - points[others], axis=1)
     assert away.max() < 0.1
     skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
     assert skeleton.n_loops == 1
