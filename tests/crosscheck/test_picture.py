@@ -36,7 +36,7 @@ def test_the_picture_has_room_for_both_skeletons(check):
     below = check.mesh_skeleton.vertices - [0, 0, 3]  # its vertices lie far out of the cloud
     reasons = tuple(f"reason {i}" for i in range(5))
     moved = replace(check, mesh_skeleton=replace(check.mesh_skeleton, vertices=below), reasons=reasons)
-    figure = _draw(moved, (12, 5.7), None)
+    figure = _draw(moved, (1800, 855), None)
     words = [text.get_text() for text in figure.texts]
     assert "reason 2; and 2 more" in words
     for axes in figure.axes[:3]:
