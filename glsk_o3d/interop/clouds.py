@@ -97,7 +97,15 @@ def _held(cloud: Any) -> Any:
 def open3d_class(thing: Any) -> tuple[str, bool]:
     """The name of the Open3D class that something is of, and whether it is one of the tensor API.
 
-    The name is empty if the class is not Open3D's.
+    Parameters
+    ----------
+    thing : object
+
+    Returns
+    -------
+    name : str
+        Empty if it is not Open3D's.
+    tensor : bool
     """
     for cls in type(thing).__mro__:
         package, *_ = parts = cls.__module__.split(".")
@@ -107,9 +115,17 @@ def open3d_class(thing: Any) -> tuple[str, bool]:
 
 
 def search_parameters(given: Any) -> dict[str, Any]:
-    """The ``k`` and the ``radius`` in Open3D's ``KDTreeSearchParam*``, none of them in anything else.
+    """The number of neighbours and the radius in Open3D's ``KDTreeSearchParam*``.
 
-    For a radius alone `k` is `MOST_NEIGHBOURS`.
+    Parameters
+    ----------
+    given : object
+
+    Returns
+    -------
+    dict
+        With ``k``, and with ``radius`` (float) if there is one; for a radius alone, `k` is `MOST_NEIGHBOURS`. Empty for
+        anything else.
     """
     name, _ = open3d_class(given)
     if name == "KDTreeSearchParamKNN":
@@ -122,6 +138,19 @@ def search_parameters(given: Any) -> dict[str, Any]:
 
 
 def to_point_cloud(points: np.ndarray) -> Any:
-    """Points, (N, 3) array_like, as an ``open3d.geometry.PointCloud``; MissingPackageError without Open3D."""
+    """Points as an ``open3d.geometry.PointCloud``.
+
+    Parameters
+    ----------
+    points : (N, 3) array_like
+
+    Returns
+    -------
+    open3d.geometry.PointCloud
+
+    Raises
+    ------
+    MissingPackageError
+    """
     o3d = import_open3d()
     return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.ascontiguousarray(points, float).reshape(-1, 3)))

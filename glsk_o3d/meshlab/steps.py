@@ -62,10 +62,21 @@ class Step:
 
 
 def step(verb: Verb, values: Mapping[str, Any]) -> Step:
-    """One of our filters with its parameters, checked (InvalidParameterError) and as it is written into a script.
+    """One of our filters with its parameters, checked and as it is written into a script.
 
-    The values are those that differ from the defaults; the script gets all of them, so that it stays true when defaults
-    change.
+    Parameters
+    ----------
+    verb : Verb
+    values : mapping of str to object
+        Those that differ from the defaults; the script gets all of them, so that it stays true when defaults change.
+
+    Returns
+    -------
+    Step
+
+    Raises
+    ------
+    InvalidParameterError
     """
     params = tuple(verb.slots[name].written(value) for name, value in verb.values(values).items())
     return Step(verb.name, dict(values), Call(verb.title, params))
@@ -73,6 +84,14 @@ def step(verb: Verb, values: Mapping[str, Any]) -> Step:
 
 def read_steps(path: str | os.PathLike) -> list[Step]:
     """Read a filter script and check all of it.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    list of Step
 
     Raises
     ------
@@ -133,7 +152,18 @@ def scripts() -> dict[str, Path]:
 def find_script(name: str | os.PathLike) -> Path:
     """The file of a script: a path that ends in .mlx or names a folder, or the name of one that comes with the package.
 
-    InvalidParameterError if there is none of that name; the message says which there are.
+    Parameters
+    ----------
+    name : str or path-like
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InvalidParameterError
+        There is no script of that name; the message says which there are.
     """
     path, known = Path(name), scripts()
     if path.suffix.lower() == ".mlx" or str(name) != path.name:
@@ -183,8 +213,16 @@ class PlainLayers:
 def exact_digits(step: Step, values: Mapping[str, Any]) -> Step:
     """A step of MeshLab's with the numbers that it was run with, where MeshLab itself writes six digits of them.
 
-    The values are by pymeshlab's names. MeshLab's numbers and vectors are float32, its matrices float64. What differs
-    by more than the digits lost stays as MeshLab wrote it.
+    Parameters
+    ----------
+    step : Step
+    values : mapping of str to object
+        By pymeshlab's names. MeshLab's numbers and vectors are float32, its matrices float64. What differs by more than
+        the digits lost stays as MeshLab wrote it.
+
+    Returns
+    -------
+    Step
     """
 
     def exact(param):

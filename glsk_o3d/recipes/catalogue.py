@@ -13,32 +13,73 @@ from .plugins import plugin_filters, plugin_pipelines
 
 
 def catalogue() -> dict[str, type[Parameters]]:
-    """All filters and stopping rules by name, those of plugins after the built-in ones; first the filters."""
+    """All filters and stopping rules by name, those of plugins after the built-in ones; first the filters.
+
+    Returns
+    -------
+    dict of str to class
+    """
     known = {**BUILTIN, **plugin_filters()}
     return dict(sorted(known.items(), key=lambda item: not issubclass(item[1], Filter)))
 
 
 def find(name: str) -> type[Parameters] | None:
-    """The filter or stopping rule of that name, if there is one; plugins are only loaded for names of their own."""
+    """The filter or stopping rule of that name, if there is one; plugins are only loaded for names of their own.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    class or None
+    """
     return BUILTIN.get(name) or catalogue().get(name)
 
 
 def serves(cls: type[Parameters], kind: str) -> bool:
-    """Whether an instance can be a parameter of the type "reducer" or "stop", or a stage: "filter"."""
+    """Whether an instance can be a parameter of the type ``"reducer"`` or ``"stop"``, or a stage: ``"filter"``.
+
+    Parameters
+    ----------
+    cls : class
+    kind : {"filter", "reducer", "stop"}
+
+    Returns
+    -------
+    bool
+    """
     if kind == "stop" or not issubclass(cls, Filter):
         return kind == "stop" and not issubclass(cls, Filter)
     return kind == "filter" or cls.consumes is cls.produces is Contraction
 
 
 def known_pipelines() -> dict[str, Callable[[], Pipeline]]:
-    """What makes each pipeline, by its name, those of plugins after the built-in ones."""
+    """All pipelines by name, those of plugins after the built-in ones.
+
+    Returns
+    -------
+    dict of str to callable
+        Each makes a Pipeline.
+    """
     return {**PIPELINES, **plugin_pipelines()}
 
 
 def named_pipeline(name: str) -> Pipeline:
     """The pipeline of that name, built in or of a plugin.
 
-    InvalidParameterError if there is none; the message says which was meant, or lists the names.
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    Pipeline
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is none; the message says which was meant, or lists the names.
     """
     make = PIPELINES.get(name) or known_pipelines().get(name)
     if make is None:

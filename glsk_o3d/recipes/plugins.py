@@ -30,14 +30,31 @@ _lock = threading.RLock()
 def plugin_filters() -> dict[str, type[Parameters]]:
     """Filters and stopping rules of the entry-point group ``glsk_o3d.filters``, by name.
 
-    PluginWarning, once, for each that is broken, with its distribution and what is wrong; it is left out, and the
-    others are not.
+    Returns
+    -------
+    dict of str to class
+
+    Warns
+    -----
+    PluginWarning
+        Once for each that is broken, with its distribution and what is wrong; it is left out, and the others are not.
     """
     return _plugins(FILTER_GROUP, BUILTIN, _check_filter)
 
 
 def plugin_pipelines() -> dict[str, Callable[[], Pipeline]]:
-    """What makes each pipeline of the entry-point group ``glsk_o3d.pipelines``, by name; warns as `plugin_filters`."""
+    """Pipelines of the entry-point group ``glsk_o3d.pipelines``, by name.
+
+    Returns
+    -------
+    dict of str to callable
+        Each makes a Pipeline.
+
+    Warns
+    -----
+    PluginWarning
+        As `plugin_filters`.
+    """
     return _plugins(PIPELINE_GROUP, PIPELINES, _check_pipeline)
 
 
