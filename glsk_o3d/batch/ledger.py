@@ -24,7 +24,7 @@ except ImportError:  # Windows
 
 Row = dict[str, Any]
 DONE, FAILED, STALE = "done", "failed", "stale"  # the last: what is there is of something else, and to be done anew
-COLUMNS = (
+LEDGER_COLUMNS = (
     *("name", "input", "status", "error", "seconds", "points", "dropped", "sampled", "outliers"),
     *("distinct", "contracted", "vertices", "edges", "components", "loops", "leaves", "junctions", "length"),
     *("loops_closed", "loops_cut"),
@@ -99,7 +99,7 @@ class Ledger:
             self._stream = None
         self.rewrite()
         text = io.StringIO(newline="")
-        writer = csv.DictWriter(text, COLUMNS, extrasaction="ignore", lineterminator="\n")
+        writer = csv.DictWriter(text, LEDGER_COLUMNS, extrasaction="ignore", lineterminator="\n")
         writer.writeheader()
         writer.writerows({name: _cell(value) for name, value in row.items()} for row in self.rows.values())
         data = text.getvalue().encode("utf-8", "replace")

@@ -13,7 +13,7 @@ from .loops import surface_distance
 from .merging import merge_vertices
 
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
-SPUR_CHUNK = 2**20  # pairs of a point and an edge at a time: memory stays flat
+SPUR_CHUNK = 2**20  # measured: pairs of a point and an edge at a time: memory stays flat
 
 
 def prune_spurs(skeleton: Skeleton, reach: float) -> Skeleton:
