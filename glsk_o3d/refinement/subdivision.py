@@ -16,7 +16,7 @@ SUBDIVISION_CHUNK = 65536  # measured: points at a time: memory stays flat
 
 
 def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
-    """Subdivide the edges to a share of the local thickness; points go to the nearest sample around their vertex.
+    """Subdivide the edges to a share of the local radius; points go to the nearest sample around their vertex.
 
     Parameters
     ----------
