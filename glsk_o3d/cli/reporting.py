@@ -21,7 +21,7 @@ FAILURE_CODE, USAGE_CODE, INTERRUPTED_CODE = 1, 2, 130
 
 # The library speaks Python; these are the same cures on the command line.
 _SAID_HERE = {
-    "drop them with RingBuilder(drop_invalid=True), or remove them first": "drop them with --drop-invalid",
+    "drop them with drop_invalid=True, or remove them first": "drop them with --drop-invalid",
     "raise max_points": "raise --max-points",
     "max_points = ": "--max-points ",
     "must be None or a whole number": "must be 0 (no limit) or a whole number",

@@ -133,7 +133,7 @@ def finite_points(points: np.ndarray, drop: bool) -> np.ndarray:
     if dropped and not drop:
         raise InvalidCloudError(
             f"{dropped} of {len(points)} points have NaN or infinite coordinates, the first at index "
-            f"{int(np.argmin(finite))}: drop them with drop_invalid=True (--drop-invalid), or remove them first"
+            f"{int(np.argmin(finite))}: drop them with drop_invalid=True, or remove them first"
         )
     return finite
 
