@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from .interop.clouds import open3d_class
 from .interop.packages import import_open3d
 from .lpr_reducer import LPRReducer
 from .pipeline import Filter, OnIteration, OnState, Pipeline
-from .recipes import ENDINGS, load_recipe
+from .recipes import RECIPE_ENDINGS, load_recipe
 from .recipes.catalogue import named_pipeline
 from .ring_builder import RingBuilder
 from .skeleton import Skeleton
@@ -88,7 +87,7 @@ def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathL
     InvalidParameterError, RecipeError
         As in `skeletonize`.
     """
-    if isinstance(pipeline, os.PathLike) or (isinstance(pipeline, str) and Path(pipeline).suffix.lower() in ENDINGS):
+    if isinstance(pipeline, os.PathLike) or (isinstance(pipeline, str) and pipeline.lower().endswith(RECIPE_ENDINGS)):
         pipeline = load_recipe(pipeline)
     elif isinstance(pipeline, str):
         pipeline = named_pipeline(pipeline)

@@ -82,7 +82,7 @@ def documented(cls: _Class) -> _Class:
 
 
 NONE, UNWRITTEN, FROM = "none", "unwritten", "from"
-RESERVED = ("filter", "rule", UNWRITTEN, FROM)
+RESERVED_WORDS = ("filter", "rule", UNWRITTEN, FROM)
 """Names that no parameter has, since recipes use them."""
 
 

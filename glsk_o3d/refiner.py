@@ -74,14 +74,14 @@ class Refiner(Filter[Skeleton]):
     )
     spur: float = parameter(
         1.3,
-        "Least reach of a branch's points from the branches it leaves over the thickness there; others are cut. 0 "
-        "keeps all.",
+        "Least reach of a branch's points from the branches it leaves over the distance of the surface there; others "
+        "are cut. 0 keeps all.",
         type="float",
         low=0,
     )
     spacing: float = parameter(
         0.5,
-        "Longest edge over the local thickness, by subdivision; 0 leaves the edges. Long ones cut corners.",
+        "Longest edge over the local radius, by subdivision; 0 leaves the edges. Long ones cut corners.",
         type="float",
         low=0,
     )

@@ -100,8 +100,9 @@ class Report:
         Input points, those dropped as not finite, those that a large cloud was sampled to (all of a smaller one), those
         set aside as outliers, the distinct ones of the sample, and those of them that were contracted.
     n_loops_closed, n_loops_cut : int
-        Loops that were zipped up because they open less than their tube is thick, and loops that were cut because they
-        hang by a thread or because the points are not sure enough of them. In noise a true loop may be among these.
+        Loops that were zipped up because they open less than their tube is thick, and weak loops, which were cut: the
+        surface hardly goes on across them, or there is little confidence in them. In noise a true loop may be among
+        these.
     n_bridges : int
         Gaps between parts that were bridged.
     stages : tuple of str

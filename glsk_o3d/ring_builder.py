@@ -22,7 +22,7 @@ from .preparation.thinning import Thinned, thin_surface
 from .report import Report
 from .state import Contraction, at_rest
 
-LEAST_RING = 3  # neighbours that a radius leaves, at least
+LEAST_RING = 3  # derived: neighbours that a radius leaves, at least
 
 
 def default_k(n: int) -> int:

@@ -37,7 +37,7 @@ class Skeleton:
     edges : (E, 2) int64 array
         Pairs i < j, sorted, each once.
     radii : (M,) float64 array
-        Local thickness: the median distance from the vertex to the tangent planes of the points it owns, or, where
+        Local radius: the median distance from the vertex to the tangent planes of the points it owns, or, where
         noise has tilted these, from the fitted curve to the points; on the axis of a tube the tube's radius.
     vertex_of_point : (N,) int64 array
         For every input point the vertex it belongs to; -1 only for points that were dropped as not finite.

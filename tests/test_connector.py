@@ -168,7 +168,7 @@ def test_local_thickness_of_fewer_points_than_neighbours():
     np.testing.assert_allclose(contraction_distance(moved), expected)
 
 
-# ---- stray vertices
+# ---- vertices that few points support
 
 
 def counted(edges, count, seed=0):
@@ -191,9 +191,9 @@ BETWEEN = {
     "a bridge beside an edge": ([(2, 3), (2, 6), (6, 3)], [6]),
     "a bridge of two beside an edge": ([(2, 3), (1, 6), (6, 7), (7, 4)], [6, 7]),
     "a bridge within one part": ([(0, 6), (6, 2)], [6]),
-    "a twig": ([(2, 6)], [6]),
-    "twigs of both": ([(2, 6), (3, 7)], [6, 7]),
-    "a twig of two": ([(2, 6), (6, 7)], [6, 7]),
+    "a spur": ([(2, 6)], [6]),
+    "spurs of both": ([(2, 6), (3, 7)], [6, 7]),
+    "a spur of two": ([(2, 6), (6, 7)], [6, 7]),
     "three in a row hold the last, too far from what is thick": ([(2, 6), (6, 7), (7, 8)], []),
     "alone": ([], []),
 }
@@ -241,10 +241,10 @@ def slow_stray(edges, count, noisy, share):
     graph = nx.Graph(edges)
     graph.add_nodes_from(range(len(count)))
     near = [nx.single_source_shortest_path_length(graph, v, cutoff=2) for v in range(len(count))]
-    stray = [v for v in graph if noisy[v] and count[v] < share * max(count[w] for w in near[v])]
-    parts = list(nx.connected_components(graph.subgraph(set(graph) - set(stray))))
+    little = [v for v in graph if noisy[v] and count[v] < share * max(count[w] for w in near[v])]
+    parts = list(nx.connected_components(graph.subgraph(set(graph) - set(little))))
     dropped = []
-    for group in nx.connected_components(graph.subgraph(stray)):
+    for group in nx.connected_components(graph.subgraph(little)):
         touched = [part for part in parts if any(set(graph[v]) & part for v in group)]
         dropped += group if len(touched) == 1 else []
     return sorted(dropped)

@@ -262,7 +262,7 @@ def test_progress_can_stop_the_run(built, after):
 
 
 def same(a, b):
-    for name in ("positions", "previous", "survivors", "owner", "mass", "ring_size", "laplacian_coordinates"):
+    for name in ("positions", "previous", "survivors", "representative", "mass", "ring_size", "laplacian_coordinates"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
     assert a.contraction_weight == b.contraction_weight
     assert [replace(r, seconds=0) for r in a.report.iterations] == [replace(r, seconds=0) for r in b.report.iterations]

@@ -23,7 +23,7 @@ SCENE = np.concatenate(
 
 
 def write_scene(path, dtype):
-    """Two objects above the ground, and stray points."""
+    """Two objects above the ground, and outliers."""
     scene = o3d.t.geometry.PointCloud(o3d.core.Tensor(SCENE.astype(dtype)))
     scene.point.intensity = o3d.core.Tensor(SCENE[:, 2:].astype(np.float32))
     assert o3d.t.io.write_point_cloud(str(path), scene)

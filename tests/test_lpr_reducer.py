@@ -214,23 +214,23 @@ class TestBookkeeping:
         assert set(after.survivors.tolist()) < set(before.survivors.tolist())
         assert (np.diff(after.survivors) > 0).all()
         # the owners are total, and a survivor owns itself
-        assert after.owner.shape == (n,)
-        assert after.owner.min() == 0
-        assert after.owner.max() == len(after) - 1
-        np.testing.assert_array_equal(after.owner[after.survivors], np.arange(len(after)))
+        assert after.representative.shape == (n,)
+        assert after.representative.min() == 0
+        assert after.representative.max() == len(after) - 1
+        np.testing.assert_array_equal(after.representative[after.survivors], np.arange(len(after)))
         # a point that stayed keeps its place, and takes in at most one other survivor
         at = np.searchsorted(before.survivors, after.survivors)
         for name in ("positions", "previous", "laplacian_coordinates"):
             np.testing.assert_array_equal(getattr(after, name), getattr(before, name)[at], err_msg=name)
-        new_owner = after.owner[before.survivors]
-        assert np.bincount(new_owner).max() == 2
+        new_representative = after.representative[before.survivors]
+        assert np.bincount(new_representative).max() == 2
         # who was owned together stays together
-        np.testing.assert_array_equal(after.owner, new_owner[before.owner])
+        np.testing.assert_array_equal(after.representative, new_representative[before.representative])
         # every merge joins a point and its nearest ring neighbour, and pays
         nearest, _ = before.rings.nearest(before.positions)
         energy = merge_energy(before)
         swallowed = np.setdiff1d(np.arange(len(before)), at)
-        keepers = at[new_owner[swallowed]]
+        keepers = at[new_representative[swallowed]]
         np.testing.assert_array_equal(nearest[keepers], swallowed)
         assert (energy[keepers] < reducer.phi * before.ring_size[keepers] ** 2).all()
 
@@ -244,7 +244,7 @@ class TestBookkeeping:
     def test_mass(self, state, reducer):
         reduced = reducer(state)
         if reducer.conserve_mass:
-            np.testing.assert_array_equal(reduced.mass, np.bincount(reduced.owner))
+            np.testing.assert_array_equal(reduced.mass, np.bincount(reduced.representative))
             assert reduced.mass.sum() == reduced.report.n_distinct
         else:
             np.testing.assert_array_equal(reduced.mass, 1)
@@ -284,7 +284,7 @@ def test_lowest_index_first(state):
     combined = combine_rings(state, np.arange(len(state)), nearest)
     may = (merge_energy(state) < 1e5 * state.ring_size**2) & (combined.sizes + combined.closed > 3)
     first = min(np.flatnonzero(may), key=lambda i: state.point_of_survivor[i])
-    assert reduced.owner[state.survivors[first]] == reduced.owner[state.survivors[nearest[first]]]
+    assert reduced.representative[state.survivors[first]] == reduced.representative[state.survivors[nearest[first]]]
     assert state.survivors[first] in reduced.survivors
 
 
@@ -293,7 +293,7 @@ def test_mass_is_conserved_over_a_whole_run():
     reduced = Contractor(reducer=LPRReducer(), max_iterations=6)(RingBuilder()(points))
     assert reduced.mass.sum() == reduced.report.n_distinct == 600
     assert reduced.report.n_input == 1200
-    np.testing.assert_array_equal(np.bincount(reduced.owner), reduced.mass)
+    np.testing.assert_array_equal(np.bincount(reduced.representative), reduced.mass)
     assert reduced.survivor_of_point.min() == 0
     assert len(np.unique(reduced.survivor_of_point)) == len(reduced)
 

@@ -192,7 +192,7 @@ def stands_out(points):
 
 @pytest.mark.parametrize("seed", [2, 4, 9, 13])
 def test_a_group_of_outliers_that_hide_each_other_is_found_in_rounds(seed):
-    """At first most of ten have others among their neighbours that are as lonely."""
+    """At first most of ten have others among their neighbours that are as far off."""
     points = np.concatenate([TORUS, group(10, 0.4, seed)])
     first = stands_out(points)
     assert not first[:600].any()
@@ -271,22 +271,22 @@ def test_no_denoising_leaves_the_points():
 @pytest.mark.parametrize("passes", [1, 4])
 def test_denoising_moves_the_cloud_to_its_ridges_before_the_rings(passes):
     points = noisy_tube()
-    plain, calm = RAW(points), replace(BY_16, denoise=passes, outlier_factor=0)(points)
+    plain, denoised = RAW(points), replace(BY_16, denoise=passes, outlier_factor=0)(points)
     spread, normals = principal(plain.cloud, nearest_neighbours(plain.cloud, 16)[1])
     noise = noise_share(spread, nearest_neighbours(plain.cloud, 16)[1])
-    np.testing.assert_array_equal(calm.cloud, subspace_mean_shift(plain.cloud, noise, passes))
-    np.testing.assert_array_equal(calm.positions, calm.cloud)
-    assert calm.positions is calm.previous
-    np.testing.assert_array_equal(calm.representative_of_point, plain.representative_of_point)
-    np.testing.assert_array_equal(calm.points, points)
+    np.testing.assert_array_equal(denoised.cloud, subspace_mean_shift(plain.cloud, noise, passes))
+    np.testing.assert_array_equal(denoised.positions, denoised.cloud)
+    assert denoised.positions is denoised.previous
+    np.testing.assert_array_equal(denoised.representative_of_point, plain.representative_of_point)
+    np.testing.assert_array_equal(denoised.points, points)
     # a ridge has no normals, and is not noisy any more
-    for state in (plain, calm):
+    for state in (plain, denoised):
         np.testing.assert_array_equal(state.normals, normals)
         np.testing.assert_array_equal(state.noise, noise)
     # rings are those of the moved cloud
-    np.testing.assert_array_equal(calm.ring_size, calm.rings.nearest(calm.cloud)[1])
-    near = nearest_neighbours(calm.cloud, 16)[1]
-    assert all(set(calm.rings[i].tolist()) <= set(near[i].tolist()) for i in range(len(calm)))
+    np.testing.assert_array_equal(denoised.ring_size, denoised.rings.nearest(denoised.cloud)[1])
+    near = nearest_neighbours(denoised.cloud, 16)[1]
+    assert all(set(denoised.rings[i].tolist()) <= set(near[i].tolist()) for i in range(len(denoised)))
 
 
 def test_denoised_tube_is_thinner():
@@ -298,9 +298,9 @@ def test_denoised_tube_is_thinner():
 
 @pytest.mark.parametrize("points", [TORUS, SHEET], ids=["torus", "sheet"])
 def test_clean_clouds_are_not_denoised(points):
-    plain, calm = RingBuilder(denoise=0)(points), RingBuilder(denoise=9)(points)
-    np.testing.assert_array_equal(calm.cloud, plain.cloud)
-    np.testing.assert_array_equal(calm.rings.indices, plain.rings.indices)
+    plain, denoised = RingBuilder(denoise=0)(points), RingBuilder(denoise=9)(points)
+    np.testing.assert_array_equal(denoised.cloud, plain.cloud)
+    np.testing.assert_array_equal(denoised.rings.indices, plain.rings.indices)
 
 
 # ---- averaging where noise is wider than neighbourhoods
@@ -367,14 +367,14 @@ def test_noisy_points_stay_where_averaging_them_would_hardly_make_fewer(monkeypa
 # ---- points that stand alone after denoising
 
 
-def lonely(plain, passes):
+def denoised_outliers(plain, passes):
     """The denoised cloud and which of its points stand alone, by definition."""
     near = nearest_neighbours(plain.cloud, 16)[1]
     noise = noise_share(principal(plain.cloud, near)[0], near)
-    calm = subspace_mean_shift(plain.cloud, noise, passes)
-    distance, near = nearest_neighbours(calm, 16)
+    denoised = subspace_mean_shift(plain.cloud, noise, passes)
+    distance, near = nearest_neighbours(denoised, 16)
     alone = local_outlier_ratio(distance[:, 1:].mean(axis=1), near) > DENOISED_RATIO
-    return calm, alone & (noise > DENOISED_NOISE), noise
+    return denoised, alone & (noise > DENOISED_NOISE), noise
 
 
 @pytest.mark.parametrize("passes", [1, 4])
@@ -382,14 +382,14 @@ def lonely(plain, passes):
 def test_denoised_points_that_stand_alone_are_set_aside(noise, seed, passes):
     points = samples.tube(n=800, radius=0.1, noise=noise, seed=seed).points
     plain, state = RAW(points), replace(BY_16, denoise=passes)(points)
-    calm, alone, share = lonely(plain, passes)
+    denoised, alone, share = denoised_outliers(plain, passes)
     assert 0 < alone.sum() < 20
-    np.testing.assert_array_equal(state.cloud, calm[~alone])
+    np.testing.assert_array_equal(state.cloud, denoised[~alone])
     np.testing.assert_array_equal(state.noise, share[~alone])
     np.testing.assert_array_equal(state.normals, plain.normals[~alone])
     # they are outliers, like those found before, and go with the nearest that is left
     np.testing.assert_array_equal(state.outlier, plain.outlier | alone[plain.representative_of_point])
-    expected = cKDTree(state.cloud).query(calm)[1]
+    expected = cKDTree(state.cloud).query(denoised)[1]
     np.testing.assert_array_equal(state.representative_of_point, expected[plain.representative_of_point])
     assert state.report.n_outliers == state.outlier.sum() == plain.report.n_outliers + alone.sum()
     assert state.report.n_distinct == len(state) == 800 - state.report.n_outliers
@@ -420,7 +420,7 @@ def test_copies_share_the_fate_of_their_point_and_dropped_ones_have_none(seed):
 def test_no_factor_no_lonely_points():
     points = samples.tube(n=800, radius=0.1, noise=0.06, seed=2).points
     state = replace(BY_16, outlier_factor=0)(points)
-    assert lonely(replace(RAW, outlier_factor=0)(points), 4)[1].any()
+    assert denoised_outliers(replace(RAW, outlier_factor=0)(points), 4)[1].any()
     assert (state.report.n_outliers, len(state), state.outlier.any()) == (0, 800, False)
 
 
@@ -610,7 +610,9 @@ def test_a_large_cloud_is_sampled_and_every_point_has_its_place():
         state.frame.out_of(state.cloud[state.representative_of_point[state.sampled]]), points[state.sampled], atol=1e-12
     )
     others = np.flatnonzero(np.isfinite(points).all(axis=1) & ~state.outlier)
-    away = np.linalg.norm(state.frame.out_of(state.cloud[state.representative_of_point[others]]) - points[others], axis=1)
+    away = np.linalg.norm(
+        state.frame.out_of(state.cloud[state.representative_of_point[others]]) - points[others], axis=1
+    )
     assert away.max() < 0.1
     skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
     assert skeleton.n_loops == 1
@@ -653,15 +655,15 @@ def sampled():
 
 def test_a_sample_is_denoised_by_how_many_points_it_stands_for(sampled):
     points, filter = sampled
-    plain, calm = (replace(filter, denoise=passes)(points) for passes in (0, 4))
+    plain, denoised = (replace(filter, denoise=passes)(points) for passes in (0, 4))
     near = nearest_neighbours(plain.cloud, 16)[1]
     noise = noise_share(principal(plain.cloud, near)[0], near)
     weight = np.bincount(plain.representative_of_point[~plain.outlier])
     assert plain.report.n_outliers >= 3
     assert weight.max() > 10
     ridge = subspace_mean_shift(plain.cloud, noise, 4, weight)
-    np.testing.assert_array_equal(calm.cloud, ridge[np.isin(ridge, calm.cloud).all(axis=1)])
-    assert len(calm.cloud) > 0.9 * len(ridge)
+    np.testing.assert_array_equal(denoised.cloud, ridge[np.isin(ridge, denoised.cloud).all(axis=1)])
+    assert len(denoised.cloud) > 0.9 * len(ridge)
 
 
 def test_a_sample_is_averaged_by_how_many_points_it_stands_for(sampled, monkeypatch):

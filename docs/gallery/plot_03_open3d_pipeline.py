@@ -15,7 +15,7 @@ import glsk_o3d as glsk
 from glsk_o3d import samples
 
 # %%
-# The scene: a Y, a torus, the table, and stray points.
+# The scene: a Y, a torus, the table, and outliers.
 
 rng = np.random.default_rng(0)
 table = np.column_stack([rng.uniform([-0.7, -0.6], [1.9, 0.6], (6000, 2)), rng.normal(scale=0.002, size=6000)])

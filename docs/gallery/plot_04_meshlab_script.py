@@ -53,7 +53,7 @@ print(f"{len(scan)} points, {len(cleaned)} after cleaning; layers: {meshes.mesh_
 print(skeleton)
 
 # %%
-# The skeleton is one open curve with the coil's two turns. In the right picture no stray is left; any that a filter
+# The skeleton is one open curve with the coil's two turns. In the right picture no outlier is left; any that a filter
 # misses would be set aside by :class:`glsk_o3d.RingBuilder`.
 
 figure = plt.figure(figsize=(9, 4.5), layout="constrained")

@@ -31,7 +31,7 @@ for name, each in (("raw graph", graph), ("without triangles", published), ("rec
 # ``assess`` measures what remains: the radius of the largest circle inside the loop, and that of the tube around it.
 
 for loop in assess(skeleton, cloud).loops:
-    print(f"opening {loop.opening:.3f}, tube {loop.thickness:.3f}, wider: {loop.wider}")
+    print(f"opening {loop.opening:.3f}, tube {loop.tube_radius:.3f}, wider: {loop.wider}")
 
 # %%
 # Which vertices lie on the loop, and how long it is, is a question for networkx.

@@ -17,9 +17,9 @@ from ..skeleton import Skeleton
 from .cross_sections import cross_sections
 from .graph import check_graph, count_components, simple_edges
 
-CLUSTER_NEIGHBOURS = 16  # of each point, in the graph whose components are the clusters of a cloud
-MIN_SECTION_POINTS = 6
-# without points in so wide an angle a place is outside; a scan from one side leaves a little over pi open
+CLUSTER_NEIGHBOURS = 16  # fitted: of each point, in the graph whose components are the clusters of a cloud
+MIN_SECTION_POINTS = 6  # fitted: below which a place counts as outside
+# fitted: without points in so wide an angle a place is outside; a scan from one side leaves a little over pi open
 OPEN_ANGLE = 4 * np.pi / 3
 
 

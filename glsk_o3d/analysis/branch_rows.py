@@ -12,8 +12,8 @@ import numpy as np
 
 from ..interop.writing import write_csv
 
-PRINTED_ROWS = 20  # at most
-COLUMNS = {  # format, of the columns that are read by people
+PRINTED_ROWS = 20  # at most; fitted to a screen
+PRINTED_COLUMNS = {  # format, of the columns that are read by people
     "branch": "d",
     "kind": "s",
     "parent": "d",
@@ -126,14 +126,14 @@ class BranchTable:
         return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
 
     def __str__(self):
-        rows = [[*COLUMNS], *([cell(row, name) for name in COLUMNS] for row in self)]
+        rows = [[*PRINTED_COLUMNS], *([cell(row, name) for name in PRINTED_COLUMNS] for row in self)]
         if len(rows) > PRINTED_ROWS + 1:
-            rows[PRINTED_ROWS - 4 : -4] = [["..."] + [""] * (len(COLUMNS) - 1)]
+            rows[PRINTED_ROWS - 4 : -4] = [["..."] + [""] * (len(PRINTED_COLUMNS) - 1)]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = (
             "  ".join(
                 word.ljust(width) if form == "s" else word.rjust(width)
-                for word, width, form in zip(row, widths, COLUMNS.values(), strict=True)
+                for word, width, form in zip(row, widths, PRINTED_COLUMNS.values(), strict=True)
             )
             for row in rows
         )
@@ -163,4 +163,4 @@ def cell(row: dict[str, Any], name: str) -> str:
     value = row[name]
     if (name == "parent" and value < 0) or (isinstance(value, float) and math.isnan(value)):
         return "-"
-    return format(value, COLUMNS[name])
+    return format(value, PRINTED_COLUMNS[name])

@@ -15,7 +15,8 @@ from .segmentation import branch_of_point
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-HEADING_SPAN = (1.0, 3.0)  # radii from a junction between which a branch has its direction: nearer, parts blend
+# fitted: radii from a junction between which a branch has its direction; nearer, parts blend
+HEADING_SPAN = (1.0, 3.0)
 
 
 @np.errstate(all="ignore")  # a file may hold coordinates whose squares no float64 holds

@@ -13,7 +13,7 @@ from .curves import along, pieces
 from .graph import check_graph, count_components, simple_edges
 from .truth import Truth
 
-PLACE_SPACING = 0.1  # of the places where curves are compared, in median true radii
+PLACE_SPACING = 0.1  # fitted: of the places where curves are compared, in median true radii
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,12 @@ from scipy.spatial import cKDTree
 from ..numerics.groups import group_median, group_sum
 from ..numerics.neighbourhoods import plane_axes
 
-POINTS_PER_SECTION, MOST_SECTIONS = 24, 1000
-FAR = 3.0  # times the median distance of a section's points; those farther belong to no tube around the curve
-FLAT = 0.1  # least variance of an outline across itself over that along it: arcs below about 130 degrees have less
+# All fitted; what an arc has is derived.
+POINTS_PER_SECTION, MOST_SECTIONS = 24, 1000  # points on average, and sections of a skeleton at most
+# times the median distance of a section's points: those farther belong to no tube around the curve
+FAR_FROM_SECTION = 3.0
+# least variance of an outline across itself over that along it: arcs below about 130 degrees have less
+MIN_ARC_VARIANCE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +74,7 @@ def cross_sections(vertices, branches, points, shortest=0.0) -> Sections:
     places, tangents, lengths = _cut(vertices, branches, len(points), shortest)
     n = len(places)
     distance, section = cKDTree(places).query(points)
-    kept = distance <= FAR * group_median(distance, section, n)[section]
+    kept = distance <= FAR_FROM_SECTION * group_median(distance, section, n)[section]
     section = section[kept]
     q = np.einsum("nij,ni->nj", plane_axes(tangents)[section], points[kept] - places[section])
     count = np.bincount(section, minlength=n)
@@ -81,7 +84,7 @@ def cross_sections(vertices, branches, points, shortest=0.0) -> Sections:
     spread = group_sum(u[:, :, None] * u[:, None, :], section, n)
     skew = group_sum((u**2).sum(axis=1, keepdims=True) * u, section, n)
     # the pseudo-inverse leaves the centre where the mean is in directions in which the outline is flat
-    centre = mean + np.einsum("sij,sj->si", np.linalg.pinv(spread, rcond=FLAT, hermitian=True), skew) / 2
+    centre = mean + np.einsum("sij,sj->si", np.linalg.pinv(spread, rcond=MIN_ARC_VARIANCE, hermitian=True), skew) / 2
     squared = group_sum(((q - centre[section]) ** 2).sum(axis=1), section, n) / total
     return Sections(places, lengths, count, np.linalg.norm(centre, axis=1), np.sqrt(squared), _open(q, section, n))
 

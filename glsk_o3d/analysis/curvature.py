@@ -12,10 +12,11 @@ from ..errors import InvalidParameterError
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-DEGREE = 4  # of the local polynomials: with an odd one less the second derivative of a bend is too small
-LEAST = 7  # vertices in a window, where the branch has as many
-REACH = 5.0  # half the window, in median radii of the branch
-STRAIGHT = 0.1  # radians turned over half a window below which a curve has no osculating plane to speak of
+# All fitted, on circles, helices and skeletons of sampled clouds.
+POLYNOMIAL_DEGREE = 4  # of the local polynomials: with an odd one less the second derivative of a bend is too small
+MIN_WINDOW_VERTICES = 7  # vertices in a window, where the branch has as many
+WINDOW_RADII = 5.0  # half the window, in median radii of the branch
+STRAIGHT_ANGLE = 0.1  # radians turned over half a window below which a curve has no osculating plane to speak of
 
 
 def curvature_torsion(skeleton: Skeleton, window: float | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -65,7 +66,7 @@ def curvature_torsion(skeleton: Skeleton, window: float | None = None) -> tuple[
         raise InvalidParameterError(f"window = {window!r}: must be a length above 0, in the cloud's units")
     curvature, torsion = np.full((2, len(skeleton.vertices)), np.nan)
     for path in skeleton.branches:
-        half = window or REACH * float(np.median(skeleton.radii[path]))
+        half = window or WINDOW_RADII * float(np.median(skeleton.radii[path]))
         curve = skeleton.vertices[path]
         closed = path[0] == path[-1] and skeleton.degree[path[0]] == 2
         curvature[path], torsion[path] = bend(curve, half if np.isfinite(half) and half > 0 else None, closed)
@@ -102,7 +103,7 @@ def bend(curve, half=None, closed=False):
         along = np.concatenate([along[:-1] - length, along[:-1], along + length])
     else:
         centre = np.clip(along, half / 2, length - half / 2)
-    least = min(LEAST, len(along))
+    least = min(MIN_WINDOW_VERTICES, len(along))
     reach = np.maximum(half, 1.001 * cKDTree(along[:, None]).query(centre[:, None], [least])[0][:, 0])
     first, last = np.searchsorted(along, centre - reach), np.searchsorted(along, centre + reach, side="right")
     row = first[:, None] + np.arange((last - first).max())
@@ -110,9 +111,9 @@ def bend(curve, half=None, closed=False):
     row = np.minimum(row, len(along) - 1)
     u = (along[row] - centre[:, None]) / reach[:, None]
     weight = np.where(inside, np.maximum(1 - np.abs(u), 0) ** 1.5 + 1e-3, 0)[:, :, None]
-    powers = u[:, :, None] ** np.arange(min(DEGREE, least - 1) + 1)
+    powers = u[:, :, None] ** np.arange(min(POLYNOMIAL_DEGREE, least - 1) + 1)
     local = curve[row] - curve[row].mean(axis=1, keepdims=True)
-    fit = np.zeros((n, DEGREE + 1, 3))
+    fit = np.zeros((n, POLYNOMIAL_DEGREE + 1, 3))
     seen = (weight**2 * powers).transpose(0, 2, 1)
     fit[:, : powers.shape[2]] = np.linalg.pinv(seen @ powers, hermitian=True) @ (seen @ local)
     scale = reach[:, None]
@@ -121,6 +122,6 @@ def bend(curve, half=None, closed=False):
     size = np.linalg.norm(normal, axis=1)
     speed = np.linalg.norm(velocity, axis=1)
     curvature = np.divide(size, speed**3, out=np.full(n, np.nan), where=speed > 0)
-    planar = (curvature * reach > STRAIGHT) & (least > 3)
+    planar = (curvature * reach > STRAIGHT_ANGLE) & (least > 3)
     torsion = np.divide((normal * jerk).sum(axis=1), size**2, out=np.full(n, np.nan), where=planar)
     return curvature / unit, torsion / unit

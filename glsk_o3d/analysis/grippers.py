@@ -13,9 +13,9 @@ import numpy as np
 from ..interop.packages import import_open3d, require
 from ..interop.writing import write_csv, write_json
 
-STEM_LENGTH = 0.5  # of the drawn gripper behind its palm, over its opening
-_VECTORS, _NUMBERS = ("position", "approach", "closing"), ("opening", "branch", "confidence", "quality")
-_COLUMNS = [f"{name}_{axis}" for name in _VECTORS for axis in "xyz"] + list(_NUMBERS)
+GRIPPER_STEM = 0.5  # fitted to the eye: length of the drawn gripper behind its palm, over its opening
+_GRASP_VECTORS, _GRASP_NUMBERS = ("position", "approach", "closing"), ("opening", "branch", "confidence", "quality")
+_GRASP_COLUMNS = [f"{name}_{axis}" for name in _GRASP_VECTORS for axis in "xyz"] + list(_GRASP_NUMBERS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class GraspCandidates:
     def __iter__(self) -> Iterator[dict[str, Any]]:
         columns = [column for array in self._vectors for column in array.T] + self._numbers
         for row in zip(*(column.tolist() for column in columns), strict=True):
-            yield dict(zip(_COLUMNS, row, strict=True))
+            yield dict(zip(_GRASP_COLUMNS, row, strict=True))
 
     def __repr__(self):
         return f"GraspCandidates({len(self)} at {self.places} places{told(self.left_out, '; not taken: ')})"
@@ -120,7 +120,7 @@ class GraspCandidates:
         """
         o3d, viridis = import_open3d(), require("matplotlib").colormaps["viridis"]
         side, back = self.opening[:, None] / 2 * self.closing, -self.opening[:, None] * self.approach
-        fork = [side, side + back, -side + back, -side, back, (1 + STEM_LENGTH) * back]
+        fork = [side, side + back, -side + back, -side, back, (1 + GRIPPER_STEM) * back]
         ends = (self.positions + np.array(fork)).transpose(1, 0, 2).reshape(-1, 3)
         lines = np.array([[0, 1], [1, 2], [2, 3], [4, 5]]) + len(fork) * np.arange(len(self))[:, None, None]
         drawn = o3d.geometry.LineSet()
@@ -144,7 +144,7 @@ class GraspCandidates:
         OSError
             The folder does not exist, or the file cannot be written.
         """
-        write_csv(path, _COLUMNS, ([_plain(value, "") for value in row.values()] for row in self))
+        write_csv(path, _GRASP_COLUMNS, ([_plain(value, "") for value in row.values()] for row in self))
 
     def to_json(self, path: str | os.PathLike) -> None:
         """Write candidates, poses and the reasons for what was left out; an unknown confidence is null.
@@ -159,7 +159,9 @@ class GraspCandidates:
         OSError
             The folder does not exist, or the file cannot be written.
         """
-        columns = dict(zip((*_VECTORS, *_NUMBERS), self._vectors + self._numbers, strict=True), pose=self.poses)
+        columns = dict(
+            zip((*_GRASP_VECTORS, *_GRASP_NUMBERS), self._vectors + self._numbers, strict=True), pose=self.poses
+        )
         rows = zip(*(array.tolist() for array in columns.values()), strict=True)
         grasps = [{name: _plain(value) for name, value in zip(columns, row, strict=True)} for row in rows]
         frame = "origin on the axis, x closing, y along the part, z approach; the cloud's units"

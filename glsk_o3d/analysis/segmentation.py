@@ -15,7 +15,7 @@ from .curves import along, pieces
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-PIECES = 4000  # that a curve is cut into, to find the one nearest to a point
+PIECES_PER_CURVE = 4000  # fitted: that a curve is cut into, to find the one nearest to a point
 
 
 def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
@@ -106,7 +106,7 @@ def _nearest_vertex(skeleton, points):
     alone = np.flatnonzero(skeleton.degree == 0)
     if length == 0:
         return cKDTree(skeleton.vertices).query(points)[1]
-    row, part = pieces(skeleton.vertices, skeleton.edges, length / PIECES)
+    row, part = pieces(skeleton.vertices, skeleton.edges, length / PIECES_PER_CURVE)
     places = np.concatenate([along(skeleton.edges, row, part, skeleton.vertices), skeleton.vertices[alone]])
     ends = np.where(part < 0.5, *skeleton.edges[row].T)
     return np.concatenate([ends, alone])[cKDTree(places).query(points)[1]]

@@ -11,8 +11,8 @@ from pathlib import Path
 from ..errors import InvalidParameterError
 from ..io.paths import CLOUD_ENDINGS, MESH_ENDINGS
 
-ENDINGS = CLOUD_ENDINGS + MESH_ENDINGS
-RESERVED = ("ledger", "recipe")
+INPUT_ENDINGS = CLOUD_ENDINGS + MESH_ENDINGS
+RESERVED_STEMS = ("ledger", "recipe")
 """Names of files that a batch itself writes into the output folder."""
 
 
@@ -93,12 +93,12 @@ def _clouds(paths: Iterable[str], root: str, out: str, none: str) -> list[str]:
     found = [
         path
         for path in paths
-        if path.lower().endswith(ENDINGS)
+        if path.lower().endswith(INPUT_ENDINGS)
         and os.path.isfile(path)
         and not (inside and path.startswith(os.path.join(out, "")))
     ]
     if not found:
-        raise FileNotFoundError(f"{none}; known endings are {', '.join(ENDINGS)}")
+        raise FileNotFoundError(f"{none}; known endings are {', '.join(INPUT_ENDINGS)}")
     return found
 
 
@@ -123,7 +123,7 @@ def _named(roots: dict[str, str]) -> dict[str, Path]:
     often = Counter(short.values())
     named: dict[str, Path] = {}
     for path in whole:
-        name = short[path] if often[short[path]] == 1 and short[path] not in RESERVED else whole[path]
+        name = short[path] if often[short[path]] == 1 and short[path] not in RESERVED_STEMS else whole[path]
         if name in named:
             raise InvalidParameterError(
                 f"the results of {named[name]} and {path} would both be called {name}: give the folder above them, "

@@ -22,7 +22,7 @@ except ImportError:  # Windows
 
 Row = dict[str, Any]
 DONE, FAILED, STALE = "done", "failed", "stale"  # the last: what is there is of something else, and to be done anew
-COLUMNS = (
+LEDGER_COLUMNS = (
     *("name", "input", "status", "error", "seconds", "points", "dropped", "sampled", "outliers"),
     *("distinct", "contracted", "vertices", "edges", "components", "loops", "leaves", "junctions", "length"),
     *("loops_closed", "loops_cut"),
@@ -91,7 +91,11 @@ class Ledger:
             self._stream.close()
             self._stream = None
         self.rewrite()
-        write_csv(self.table, COLUMNS, ([_cell(row.get(name)) for name in COLUMNS] for row in self.rows.values()))
+        write_csv(
+            self.table,
+            LEDGER_COLUMNS,
+            ([_cell(row.get(name)) for name in LEDGER_COLUMNS] for row in self.rows.values()),
+        )
 
 
 def _line(row: Row) -> bytes:

@@ -21,9 +21,9 @@ from .inputs import find_inputs
 from .ledger import DONE, STALE, Ledger, Row, file_hash
 from .work import Job
 
-SKIP = "done"
-RECIPE = "recipe.json"
-NEW, AGAIN, FAILED_BEFORE, INTERRUPTED = "new", "asked for", "failed before", "interrupted before"
+UP_TO_DATE = "done"
+RECIPE_FILE = "recipe.json"
+NEW_INPUT, ASKED_FOR, FAILED_BEFORE, INTERRUPTED_BEFORE = "new", "asked for", "failed before", "interrupted before"
 OTHER_PARAMETERS, OUTPUTS_GONE, INPUT_CHANGED = "other parameters", "outputs are gone", "input changed"
 
 
@@ -88,7 +88,7 @@ class Plan:
     @property
     def todo(self) -> list[Task]:
         """Those that are not done."""
-        return [task for task in self.tasks if task.why != SKIP]
+        return [task for task in self.tasks if task.why != UP_TO_DATE]
 
     @property
     def skipped(self) -> int:
@@ -183,10 +183,10 @@ def plan_batch(
         stale |= {each for each in ledger.rows.get(before, {}).get("outputs", ()) if _is_of(before, each)} - results
         foreign = tuple(each for each in outputs if each not in listed and os.path.lexists(out / each))
         job = Job(name, str(path), str(out), outputs, recipe, cut_loops, tuple(sorted(stale)), foreign)
-        tasks.append(Task(job, AGAIN if force else _why(job, row, parameters)))
+        tasks.append(Task(job, ASKED_FOR if force else _why(job, row, parameters)))
     if not ledger.path.exists():
         strange = [each for task in tasks for each in task.job.foreign]
-        strange += [each for each in (ledger.table.name, RECIPE) if os.path.lexists(out / each)]
+        strange += [each for each in (ledger.table.name, RECIPE_FILE) if os.path.lexists(out / each)]
         if strange:
             raise InvalidParameterError(
                 f"{out / strange[0]}: is not the result of a batch, since there is no ledger here: give the results "
@@ -196,7 +196,7 @@ def plan_batch(
     for task in compared:
         row = ledger.rows.get(task.job.name, {})
         theirs = row.get("input", task.job.path)
-        if task.why != SKIP and row.get("outputs") and theirs not in sources and os.path.exists(theirs):
+        if task.why != UP_TO_DATE and row.get("outputs") and theirs not in sources and os.path.exists(theirs):
             raise InvalidParameterError(
                 f"{task.job.path}: its results, {task.job.name}, would replace those of {theirs}: give another folder "
                 "for them"
@@ -207,15 +207,15 @@ def plan_batch(
 def _why(job: Job, row: Row, parameters: str) -> str:
     """Why a cloud is to be done, as far as the cloud itself has no say."""
     if not row:
-        return NEW
+        return NEW_INPUT
     if row["status"] != DONE:
-        return INTERRUPTED if row["status"] == STALE else FAILED_BEFORE
+        return INTERRUPTED_BEFORE if row["status"] == STALE else FAILED_BEFORE
     if row.get("parameters") != parameters:
         return OTHER_PARAMETERS
     there = set(job.outputs) <= set(row.get("outputs", ())) and all(
         Path(job.out_dir, each).is_file() for each in job.outputs
     )
-    return SKIP if there else OUTPUTS_GONE
+    return UP_TO_DATE if there else OUTPUTS_GONE
 
 
 def _is_of(name: str, output: str) -> bool:
@@ -227,7 +227,7 @@ def _compared(tasks: list[Task], rows: dict[str, Row]) -> tuple[Task, ...]:
     """The tasks, after a look at the inputs that seem done."""
 
     def look(task: Task) -> Task:
-        if task.why != SKIP:
+        if task.why != UP_TO_DATE:
             return task
         try:
             same = file_hash(task.job.path) == rows[task.job.name].get("input_hash")

@@ -17,15 +17,15 @@ from ..errors import BatchError, InvalidParameterError
 from ..interop.interrupts import counted_interrupts
 from ..interop.writing import write_json
 from ..numerics.cores import cores
-from .ledger import COLUMNS, DONE, FAILED, STALE, Row, locked
-from .plan import RECIPE, SKIP, Plan, Task, plan_batch
+from .ledger import DONE, FAILED, LEDGER_COLUMNS, STALE, Row, locked
+from .plan import RECIPE_FILE, UP_TO_DATE, Plan, Task, plan_batch
 from .work import clear, told, work
 from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, died
 
 if TYPE_CHECKING:
     import distributed
 
-_POLL = 0.2  # seconds until Ctrl-C is noticed
+_POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed
 CANCELLED = "the work was cancelled, or its scheduler has gone: run the same batch to go on"
 WORKER_DIED = "the worker died with it, twice: out of memory, or a crash in native code"
 _log = logging.getLogger(__name__)
@@ -172,12 +172,12 @@ def _make_room(plan: Plan) -> None:
     rows = plan.ledger.rows
     for task in plan.tasks:
         name, path = task.job.name, task.job.path
-        if task.why == SKIP and rows[name]["input"] != path:  # the same bytes somewhere else
+        if task.why == UP_TO_DATE and rows[name]["input"] != path:  # the same bytes somewhere else
             rows[name] = rows.pop(name) | {"input": path}
-        elif task.why != SKIP and rows.get(name, {}).get("status") == DONE:
+        elif task.why != UP_TO_DATE and rows.get(name, {}).get("status") == DONE:
             rows[name]["status"] = STALE
     plan.ledger.rewrite()
-    write_json(plan.out_dir / RECIPE, plan.recipe)
+    write_json(plan.out_dir / RECIPE_FILE, plan.recipe)
     for folder in {(plan.out_dir / task.job.name).parent for task in plan.todo}:
         folder.mkdir(parents=True, exist_ok=True)
 
@@ -192,7 +192,7 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
 
     def enter(task, row):
         row = {"parameters": plan.parameters} | row | {"name": task.job.name, "input": task.job.path}
-        row = {name: row[name] for name in COLUMNS if name in row}
+        row = {name: row[name] for name in LEDGER_COLUMNS if name in row}
         plan.ledger.add(row)
         if on_result is not None:
             on_result(row)
@@ -204,7 +204,7 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
             if again and not running and not interrupts:
                 alone = True
                 hand_out(again.popleft())
-            ready, _ = wait(running, _POLL, FIRST_COMPLETED)
+            ready, _ = wait(running, _POLL_SECONDS, FIRST_COMPLETED)
             lost: BatchError | None = None
             for future in ready:
                 task = running.pop(future)

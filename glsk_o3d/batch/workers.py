@@ -23,7 +23,7 @@ from ..interop.packages import import_open3d, require
 from ..numerics.cores import cores
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-_PATIENCE = 10  # seconds until a scheduler must answer
+_SCHEDULER_SECONDS = 10  # seconds until a scheduler must answer
 _DASK_LOG = logging.getLogger("distributed.client")
 _log = logging.getLogger(__name__)
 
@@ -224,7 +224,7 @@ class DaskWorkers:
                     where = {"scheduler_file": text}
                 else:
                     where = {"address": distributed.comm.resolve_address(text)}  # a client that cannot is slow to go
-                scheduler = distributed.Client(**where, timeout=_PATIENCE, set_as_default=False)
+                scheduler = distributed.Client(**where, timeout=_SCHEDULER_SECONDS, set_as_default=False)
             except Exception as error:  # no answer, no address, no such protocol
                 raise BatchError(f"{text}: no Dask scheduler answers there: {error}") from error
         self._client, self._level = scheduler, _DASK_LOG.level

@@ -63,7 +63,7 @@ def crosscheck(
         from ..io.clouds import read_cloud
         from ..io.meshes import read_mesh
         from ..viewing.preview import printable
-        from .outputs import PICTURE, REPORT, check_findings
+        from .outputs import PICTURE_FILE, REPORT_FILE, check_findings
         from .overrides import choose
 
         if mesh is not None and method != "auto":
@@ -71,7 +71,7 @@ def crosscheck(
         if method not in ("auto", *SURFACES):
             raise WrongUsage(did_you_mean(method, ("auto", *SURFACES), "method"))
         files = [path for path in (output, picture) if path is not None]
-        check_findings([(output, *REPORT), (picture, *PICTURE)], scan, mesh)
+        check_findings([(output, *REPORT_FILE), (picture, *PICTURE_FILE)], scan, mesh)
         chosen = choose(pipeline, None, (), drop_invalid)
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")

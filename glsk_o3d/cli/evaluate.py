@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from ..analysis import Assessment, Comparison, Truth
     from ..skeleton import Skeleton
 
-_BLACK = "around a junction, not measured"
-_NUMBERS = {  # measure: (best, what it is), as the table shows them
+_BLACK_MEANS = "around a junction, not measured"
+_MEASURES = {  # measure: (best, what it is), as the table shows them
     "centredness": ("1", "1 - offset from the section's middle, in radii"),
     "boundedness": ("1", "share of the length inside the cloud"),
     "smoothness": ("1", "1 - half turns per radius travelled"),
@@ -70,10 +70,10 @@ def evaluate(
         from ..io.clouds import read_cloud
         from ..io.skeletons import read_skeleton
         from ..io.truth import read_truth
-        from .outputs import PICTURE, REPORT, check_findings
+        from .outputs import PICTURE_FILE, REPORT_FILE, check_findings
 
         files = [path for path in (output, preview) if path is not None]
-        check_findings([(output, *REPORT), (preview, *PICTURE)], skeleton, cloud, truth)
+        check_findings([(output, *REPORT_FILE), (preview, *PICTURE_FILE)], skeleton, cloud, truth)
         with progress(not quiet and not verbose) as update:
             update(f"reading {skeleton.name}")
             curve = read_skeleton(skeleton)
@@ -137,7 +137,7 @@ def _draw(
     else:
         assert assessment is not None
         values, label, best = assessment.edge_centredness, "centredness", 1
-    save_assessment(curve, points, values, picture, label=label, best=best, unknown=_BLACK, title=title)
+    save_assessment(curve, points, values, picture, label=label, best=best, unknown=_BLACK_MEANS, title=title)
 
 
 def _elsewhere(assessment: Assessment, vertices: np.ndarray, points: np.ndarray) -> bool:
@@ -183,5 +183,5 @@ def _print_measures(assessment: Assessment | None, comparison: Comparison | None
 
 def _add_numbers(table: Any, measures: Assessment | Comparison) -> None:
     for name, value in measures.as_dict().items():
-        if isinstance(value, float) and name in _NUMBERS:
-            table.add_row(name.replace("_", " "), f"{value:.4f}", *_NUMBERS[name])
+        if isinstance(value, float) and name in _MEASURES:
+            table.add_row(name.replace("_", " "), f"{value:.4f}", *_MEASURES[name])

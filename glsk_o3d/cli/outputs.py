@@ -20,7 +20,7 @@ from .reporting import WrongUsage
 
 _MADE_WITH = {".png": "; a picture is made with --preview", ".html": "; a page is made with --report"}
 
-REPORT, PICTURE = (".json", "report is JSON"), (".png", "picture is a PNG")
+REPORT_FILE, PICTURE_FILE = (".json", "report is JSON"), (".png", "picture is a PNG")
 
 
 def check_outputs(

@@ -60,7 +60,7 @@ def override(pipeline: Pipeline, settings: Iterable[str], name: str = "") -> Pip
     --------
     >>> from glsk_o3d import Connector, RingBuilder, pipelines
     >>> override(pipelines.default(), ["k=20", "Connector.links=nearest"]).stages[2]
-    Connector(radius='1%', thickness=0.6, links='nearest', stray=0.1)
+    Connector(radius='1%', thickness=0.6, links='nearest', min_support=0.1)
     """
     place = f"the pipeline {name!r}" if name else "the pipeline"
     settings, ready = list(settings), pipeline

@@ -16,11 +16,11 @@ from ..errors import GlskError, InvalidCloudError, InvalidParameterError, Plugin
 from ..interop.interrupts import counted_interrupts
 from .console import say
 
-FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
+FAILURE_CODE, USAGE_CODE, INTERRUPTED_CODE = 1, 2, 130
 
 # The library speaks Python; these are the same cures on the command line.
 _SAID_HERE = {
-    "drop them with RingBuilder(drop_invalid=True), or remove them first": "drop them with --drop-invalid",
+    "drop them with drop_invalid=True, or remove them first": "drop them with --drop-invalid",
     "raise max_points": "raise --max-points",
     "max_points = ": "--max-points ",
     "must be None or a whole number": "must be 0 (no limit) or a whole number",
@@ -74,15 +74,15 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
         except BrokenPipeError:
             raise  # the reader of our output has gone; typer ends quietly
         except (WrongUsage, InvalidParameterError) as error:
-            problem, code = error, WRONG_USAGE
+            problem, code = error, USAGE_CODE
         except InvalidCloudError as error:
-            problem, code = error, FAILED
+            problem, code = error, FAILURE_CODE
             if cloud is not None:
                 error.args = (f"{cloud}: {error}",)
         except (GlskError, OSError, MemoryError) as error:
-            problem, code = error, FAILED
+            problem, code = error, FAILURE_CODE
         except KeyboardInterrupt as error:
-            problem, code = error, INTERRUPTED
+            problem, code = error, INTERRUPTED_CODE
         finally:
             if not quiet:
                 for line in lines:

@@ -14,11 +14,12 @@ from ..numerics.components import component_labels
 from ..numerics.cotangent import cotangent_laplacian
 from ..numerics.mesh_rings import border_lengths, common_share, umbrellas
 from .mesh_contraction import curvature_normals, mesh_areas, mesh_laplacian, ring_areas
-from .reconstruction import REACH, spacing
+from .reconstruction import INVENTED_DISTANCE, spacing
 
-FLAT = 1e-3  # of the ring's size: smaller Laplacian coordinates have no direction
-TEAR = 12  # edges of a border: ball pivoting leaves shorter ones everywhere
-STEP = 0.002  # of the diagonal: spacing of the places where skeletons are compared
+# All fitted.
+FLAT_LAPLACIAN = 1e-3  # of the ring's size: smaller Laplacian coordinates have no direction
+TEAR_EDGES = 12  # edges of a border: ball pivoting leaves shorter ones everywhere
+COMPARISON_STEP = 0.002  # of the diagonal: spacing of the places where skeletons are compared
 
 
 @dataclass(frozen=True)
@@ -146,12 +147,12 @@ def compare_rows(state, vertices, faces):
         normals = curvature_normals(other, mesh_areas(vertices, faces), vertices)
         normals[~umbrellas(len(vertices), faces)] = np.nan
         theirs, distance = _on_mesh(points, vertices, faces, normals)
-        there = np.isfinite(theirs).all(axis=1) & (distance < REACH * spacing(points))
+        there = np.isfinite(theirs).all(axis=1) & (distance < INVENTED_DISTANCE * spacing(points))
         share = np.full(len(points), np.nan)
         size = size / np.where(areas > 0, 2 * areas, np.inf)
     compared = rings.closed & there & np.isfinite(ours).all(axis=1)
     a, b = np.linalg.norm(ours, axis=1), np.linalg.norm(theirs, axis=1)
-    flat = compared & (np.maximum(a, b) <= FLAT * np.abs(size))
+    flat = compared & (np.maximum(a, b) <= FLAT_LAPLACIAN * np.abs(size))
     with np.errstate(invalid="ignore", divide="ignore"):
         cosine = np.einsum("ij,ij->i", ours, theirs) / (a * b)
         angle, length = np.degrees(np.arccos(np.clip(cosine, -1, 1))), a / b
@@ -181,10 +182,10 @@ def mesh_fit(state, vertices, faces):
     points, rings, step = state.cloud, state.rings, spacing(state.cloud)
     squared = require("igl", "libigl").point_mesh_squared_distance(points, vertices, faces)[0]
     used = np.unique(faces)
-    border = border_lengths(len(vertices), faces)[used] > TEAR
+    border = border_lengths(len(vertices), faces)[used] > TEAR_EDGES
     piece = component_labels(len(vertices), np.concatenate([faces[:, :2], faces[:, 1:]]))[used]
     edges = np.column_stack([rings.centres, rings.indices])
-    near = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1) < REACH * step
+    near = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1) < INVENTED_DISTANCE * step
     part = component_labels(len(points), edges[near])
     on = part[cKDTree(points).query(vertices[used])[1]]
     shared = coo_array((np.ones(len(used), int), (on, piece))).tocsr()  # vertices of each piece on each part
@@ -219,7 +220,7 @@ def _quantiles(values, which):
 
 def compare_skeletons(ours, theirs, diagonal):
     """How two skeletons agree, in a cloud with this diagonal in their units."""
-    step = STEP * diagonal
+    step = COMPARISON_STEP * diagonal
     both = [distances(ours, theirs, step), distances(theirs, ours, step)]
     return SkeletonAgreement(
         distance=float(np.mean([distance.mean() for distance, _ in both]) / diagonal),

@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..interop.writing import check_ending
-from ..viewing.preview import INK, MOST_POINTS, colour_bar, new_figure, printable, room, save_figure, three_views
+from ..viewing.preview import INK, MOST_DRAWN_POINTS, colour_bar, new_figure, printable, room, save_figure, three_views
 
 if TYPE_CHECKING:
     from .check import CrossCheck
 
 _OURS, _THEIRS, _UNKNOWN = "#111111", "#0a6fc2", "#c9c9c9"
-_MOST_REASONS = 3
-_MOST = 60.0  # degrees at which the colours end
-_HEAD, _FOOT = 0.95, 0.85  # inches
+
+# All fitted to the eye.
+_MOST_REASONS = 3  # lines of text
+_MOST_DEGREES = 60.0  # degrees at which the colours end
+_HEAD_ROOM, _FOOT_ROOM = 0.95, 0.85  # inches above and below the three views
 
 
 def save_crosscheck_picture(
@@ -70,13 +72,13 @@ def _draw(check, size, title):
     from matplotlib.colors import Normalize, to_rgba
 
     height = figure.get_figheight()
-    scale = ScalarMappable(Normalize(0, _MOST, clip=True), colormaps["YlOrRd"])
+    scale = ScalarMappable(Normalize(0, _MOST_DEGREES, clip=True), colormaps["YlOrRd"])
     points, angle = _shown(check)
     shown = np.concatenate([points, check.skeleton.vertices, check.mesh_skeleton.vertices])  # they may differ widely
     centre, extent = room(shown)
     points = points - centre
     colours = np.where(np.isnan(angle)[:, None], to_rgba(_UNKNOWN), scale.to_rgba(np.nan_to_num(angle)))
-    for a, b, axes in three_views(figure, extent, head=_HEAD, foot=_FOOT, names=0.62):
+    for a, b, axes in three_views(figure, extent, head=_HEAD_ROOM, foot=_FOOT_ROOM, names=0.62):
         dot = float(np.clip(16000 / max(len(points), 1), 2, 6))
         axes.scatter(points[:, a], points[:, b], s=dot, c=colours, linewidths=0, clip_on=False)
         for skeleton, colour, line in ((check.mesh_skeleton, _THEIRS, 2.6), (check.skeleton, _OURS, 1.2)):
@@ -95,7 +97,7 @@ def _draw(check, size, title):
 def _shown(check):
     """Finite points and their angles, those that cannot be compared first and the worst last."""
     finite = np.flatnonzero(np.isfinite(check.points).all(axis=1))
-    finite = finite[:: max(1, -(-len(finite) // MOST_POINTS))]
+    finite = finite[:: max(1, -(-len(finite) // MOST_DRAWN_POINTS))]
     order = finite[np.argsort(np.nan_to_num(check.angle[finite], nan=-1), kind="stable")]
     return check.points[order], check.angle[order]
 

@@ -11,9 +11,10 @@ from ..numerics.mesh_rings import clean_faces
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.orientation import orient_normals
 
-BALLS = (1.0, 2.0, 4.0)  # radii of the rolling balls, in spacings
-DEPTHS = (5, 9)  # of Poisson's octree; below 5 Open3D makes the same mesh, and complains
-REACH = 3.0  # spacings from the cloud beyond which Poisson's surface is an invention
+BALL_RADII = (1.0, 2.0, 4.0)  # fitted: of the rolling balls, in spacings
+# measured: of Poisson's octree; below 5 Open3D makes the same mesh, and complains
+POISSON_DEPTHS = (5, 9)
+INVENTED_DISTANCE = 3.0  # fitted: spacings from the cloud beyond which Poisson's surface is an invention
 
 
 def spacing(points):
@@ -28,7 +29,7 @@ def ball_pivoting(points, normals, rings):
     not always manifold, nor of all vertices; there are none where no ball finds three points.
     """
     o3d = import_open3d()
-    radii = o3d.utility.DoubleVector(spacing(points) * np.array(BALLS))
+    radii = o3d.utility.DoubleVector(spacing(points) * np.array(BALL_RADII))
     cloud = _with_normals(points, normals, rings)
     mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, radii)
     return points, clean_faces(points, np.asarray(mesh.triangles))
@@ -42,12 +43,12 @@ def poisson(points, normals, rings):
     """
     o3d = import_open3d()
     step = spacing(points)
-    depth = int(np.clip(np.log2(1.1 * np.ptp(points, axis=0).max() / step), *DEPTHS))
+    depth = int(np.clip(np.log2(1.1 * np.ptp(points, axis=0).max() / step), *POISSON_DEPTHS))
     cloud = _with_normals(points, normals, rings)
     # with several threads the last digits change from run to run
     mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=depth, n_threads=1)
     vertices = np.array(mesh.vertices)
-    near = cKDTree(points).query(vertices, distance_upper_bound=REACH * step)[0] < np.inf
+    near = cKDTree(points).query(vertices, distance_upper_bound=INVENTED_DISTANCE * step)[0] < np.inf
     faces = np.asarray(mesh.triangles)
     return without_bare(vertices, clean_faces(vertices, faces[near[faces].all(axis=1)]))
 

@@ -13,8 +13,9 @@ from .reconstruction import ball_pivoting, poisson, without_bare
 
 SURFACES = {"ball_pivoting": ball_pivoting, "poisson": poisson}
 
-COVERED_SHARE = 0.7  # of the closed rings that a mesh closes too; below it, Poisson follows on ball pivoting
-SAME_POINT = 1e-6  # of the diagonal: nearer vertices are points of the cloud, whichever file has fewer digits
+COVERED_SHARE = 0.7  # fitted: of the closed rings that a mesh closes too; below it, Poisson follows on ball pivoting
+# derived: of the diagonal; nearer vertices are points of the cloud, the digits of a float32 in whichever file
+SAME_VERTEX = 1e-6
 
 
 def surface_of(state, mesh):
@@ -42,7 +43,7 @@ def _given(state, vertices, faces):
     """A user's mesh in the frame, on the cloud's own points if these are its vertices."""
     good = state.sampled
     distance, nearest = cKDTree(state.frame.into(state.points[good])).query(state.frame.into(vertices))
-    if distance.max() < SAME_POINT * state.frame.diagonal:
+    if distance.max() < SAME_VERTEX * state.frame.diagonal:
         row = state.representative_of_point[good][nearest]
         return state.cloud, clean_faces(state.cloud, row[faces])
     vertices = state.frame.into(vertices)

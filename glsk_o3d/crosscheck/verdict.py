@@ -10,7 +10,7 @@ from .surfaces import COVERED_SHARE
 
 AGREES, IN_PART, DISTRUST, UNTOLD = VERDICTS = "agrees", "agrees in part", "do not trust", "cannot tell"
 
-# What separates clean, dense samples of known shapes from sparse and noisy ones; see docs/crosscheck.md.
+# All measured: what separates clean, dense samples of known shapes from sparse and noisy ones; see docs/crosscheck.md.
 TURNED_ANGLE = 30.0  # degrees
 NEAR_RADII, FAR_RADII = 0.2, 0.5  # mean distance, in local radii
 HAUSDORFF_RADII = 1.0  # local radii, in 95 % of the length

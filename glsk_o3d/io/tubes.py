@@ -10,12 +10,11 @@ import numpy as np
 from ..errors import InvalidParameterError
 from ..interop.packages import import_open3d
 from ..numerics.neighbourhoods import plane_axes
+from ..numerics.vectors import TINY
 from .colors import ColorChoice, shades
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
-
-TINY = np.finfo(float).tiny
 
 
 def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16) -> Any:

@@ -20,7 +20,7 @@ from ..io.skeletons import read_skeleton, save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
 from ..state import Contraction
 
-ENDINGS = {"points": (".ply", ".pcd", ".xyz"), "mesh": (".ply", ".obj", ".off", ".stl")}
+LAYER_ENDINGS = {"points": (".ply", ".pcd", ".xyz"), "mesh": (".ply", ".obj", ".off", ".stl")}
 """What layers without edges are written as."""
 
 
@@ -210,7 +210,7 @@ class Layer:
             vector(np.empty((0, 3)) if array is None else np.ascontiguousarray(array[:, :3], float))
             for array in (self.vertices, self.normals, self.colors)
         )
-        if path.suffix.lower() in ENDINGS["points"]:
+        if path.suffix.lower() in LAYER_ENDINGS["points"]:
             cloud = o3d.geometry.PointCloud(points)
             cloud.normals, cloud.colors = normals, colors
             done = o3d.io.write_point_cloud(str(path), cloud)
@@ -241,7 +241,7 @@ def check_ending(path: Path, what: str) -> None:
 
     `what` it may be is "skeleton", "points", "points or mesh", or "skeleton, points or mesh".
     """
-    known = [ending for kind, endings in ENDINGS.items() if kind in what for ending in endings]
+    known = [ending for kind, endings in LAYER_ENDINGS.items() if kind in what for ending in endings]
     if path.suffix.lower() in known:
         return
     if "skeleton" in what:

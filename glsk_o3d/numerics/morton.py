@@ -6,7 +6,7 @@ import numpy as np
 
 from .vectors import TINY
 
-BITS = 21  # per axis: 63 bits in all
+BITS = 21  # derived: per axis: 63 bits in all
 
 
 def morton_order(points: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Local thickness: how far the surface is from a vertex, also where noise has tilted the normals."""
+"""Local radius: how far the surface is from a vertex, also where noise has tilted the normals."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def plane_distance_radii(
     normals: np.ndarray,
     otherwise: np.ndarray | float = 0.0,
 ) -> np.ndarray:
-    """Local thickness: median distance from each vertex to the tangent planes of the points it owns.
+    """Local radius: median distance from each vertex to the tangent planes of the points it owns.
 
     On the axis of a tube this is the tube's radius, however far along the axis a point lies from its vertex.
 

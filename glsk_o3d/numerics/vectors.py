@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-TINY = np.finfo(float).tiny
-PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # the entries of a symmetric 3 x 3 matrix
+TINY = np.finfo(float).tiny  # derived: what a divisor is at least
+PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # derived: the entries of a symmetric 3 x 3 matrix
 ROWS, COLUMNS = np.array(PAIRS).T
 
 

@@ -18,7 +18,7 @@ from .surface import Surface
 from .thinning import MOST_IN_ONE, STEADY_SHARE
 
 RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
-RIDGE_CHUNK = 16384  # points at a time: memory stays flat
+RIDGE_CHUNK = 16384  # measured: points at a time: memory stays flat
 ENOUGH_NOISY = 4096  # fitted: noisy points that are enough; down to about so many they are averaged
 DENOISED_RATIO, DENOISED_NOISE = 1.8, 0.2  # fitted: local outlier ratio of a denoised outlier, and its least noise
 

@@ -15,7 +15,7 @@ from ..numerics.neighbourhoods import nearest_neighbours
 FRAME_SIDE = 1.6  # published: longest side of the box
 CLOUD_SLACK = 1.2  # published: how much larger than the cloud the contracted one may be
 FLAT_BOX = 0.01  # fitted: least half side of the box for that, over its diagonal
-MIN_POINTS = 8  # the least that can have rings of three and a curve
+MIN_POINTS = 8  # derived: the least that can have rings of three and a curve
 MIN_EXTENT, MAX_EXTENT = 1e-120, 1e120  # derived: a float64 holds their squares and products
 SAME_POINT = 4e-15  # derived: a few roundings in the working frame; points nearer than this are duplicates
 
@@ -133,7 +133,7 @@ def finite_points(points: np.ndarray, drop: bool) -> np.ndarray:
     if dropped and not drop:
         raise InvalidCloudError(
             f"{dropped} of {len(points)} points have NaN or infinite coordinates, the first at index "
-            f"{int(np.argmin(finite))}: drop them with drop_invalid=True (--drop-invalid), or remove them first"
+            f"{int(np.argmin(finite))}: drop them with drop_invalid=True, or remove them first"
         )
     return finite
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..errors import PluginWarning
 from ..interop.clouds import Cloud
-from ..parameters import RESERVED, TYPES, Parameters
+from ..parameters import RESERVED_WORDS, TYPES, Parameters
 from ..pipeline import FLOWS, Filter, Pipeline
 from ..pipelines import BUILTIN, PIPELINES
 from ..report import outside
@@ -133,7 +133,7 @@ def _check_filter(name: str, cls: Any) -> None:
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]
         if "type" not in field.metadata:
             raise _Unfit(f"its field {field.name!r} is not made by glsk_o3d.parameters.parameter")
-        if field.name in RESERVED:
+        if field.name in RESERVED_WORDS:
             raise _Unfit(f"recipes have another meaning for a parameter {field.name!r}")
         if str(field.metadata["type"]).removesuffix("?") not in TYPES:
             raise _Unfit(f"its parameter {field.name!r} has a type that is none of {', '.join(TYPES)}")

@@ -17,7 +17,7 @@ from ..parameters import UNWRITTEN, Parameters
 from ..pipeline import Pipeline, recipe_of
 from .catalogue import find
 
-ENDINGS = (".json", ".toml")
+RECIPE_ENDINGS = (".json", ".toml")
 """Files that hold recipes."""
 
 
@@ -125,8 +125,8 @@ def recipe_ending(path: str | os.PathLike) -> str:
         It is another one.
     """
     ending = Path(path).suffix.lower()
-    if ending not in ENDINGS:
-        raise RecipeError(f"{os.fspath(path)}: unknown ending; recipes are {' or '.join(ENDINGS)} files")
+    if ending not in RECIPE_ENDINGS:
+        raise RecipeError(f"{os.fspath(path)}: unknown ending; recipes are {' or '.join(RECIPE_ENDINGS)} files")
     return ending
 
 

@@ -43,11 +43,9 @@ def close_loops(skeleton: Skeleton, opening: float) -> Skeleton:
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
         if not cycles:
             return skeleton
-        thickness = surface_distance(skeleton)
+        distance = surface_distance(skeleton)
         false = [
-            cycle
-            for cycle in cycles
-            if not opens_wider(skeleton.vertices[cycle], opening * np.median(thickness[cycle]))
+            cycle for cycle in cycles if not opens_wider(skeleton.vertices[cycle], opening * np.median(distance[cycle]))
         ]
         if not false:
             return skeleton

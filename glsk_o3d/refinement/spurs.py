@@ -13,7 +13,7 @@ from .loops import surface_distance
 from .merging import merge_vertices
 
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
-SPUR_CHUNK = 2**20  # pairs of a point and an edge at a time: memory stays flat
+SPUR_CHUNK = 2**20  # measured: pairs of a point and an edge at a time: memory stays flat
 
 
 def prune_spurs(skeleton: Skeleton, reach: float) -> Skeleton:
@@ -37,8 +37,8 @@ def prune_spurs(skeleton: Skeleton, reach: float) -> Skeleton:
         Points of a cut spur belong to its junction.
     """
     while True:
-        thickness, degree = surface_distance(skeleton), skeleton.degree
-        thickness = np.where(thickness > 0, thickness, skeleton.radii)  # of vertices without points
+        surface, degree = surface_distance(skeleton), skeleton.degree
+        surface = np.where(surface > 0, surface, skeleton.radii)  # of vertices without points
         supporting = skeleton.supporting_points
         supporting = supporting[np.argsort(skeleton.vertex_of_point[supporting], kind="stable")]
         stop = np.cumsum(np.bincount(skeleton.vertex_of_point[supporting], minlength=len(degree)))
@@ -57,9 +57,9 @@ def prune_spurs(skeleton: Skeleton, reach: float) -> Skeleton:
             junction, spur = (a, branch[1:]) if degree[b] == 1 else (b, branch[:-1])
             points = skeleton.points[np.concatenate([supporting[start[v] : stop[v]] for v in spur])]
             others = [other for other in at[junction] if other is not branch]
-            thick = np.where(ending, np.minimum(thickness, thickness[junction]), thickness)
+            tubes = np.where(ending, np.minimum(surface, surface[junction]), surface)
             far = (
-                np.quantile(distance_over_thickness(points, skeleton.vertices, thick, others), SPUR_QUANTILE)
+                np.quantile(relative_distance(points, skeleton.vertices, tubes, others), SPUR_QUANTILE)
                 if len(points)
                 else 0.0
             )
@@ -76,22 +76,23 @@ def prune_spurs(skeleton: Skeleton, reach: float) -> Skeleton:
         skeleton = replace(merge_vertices(skeleton, group), **kept)
 
 
-def distance_over_thickness(
-    points: np.ndarray, vertices: np.ndarray, thickness: np.ndarray, paths: list[np.ndarray]
+def relative_distance(
+    points: np.ndarray, vertices: np.ndarray, surface: np.ndarray, paths: list[np.ndarray]
 ) -> np.ndarray:
-    """Distance from the edge of some paths from which it is least over the thickness, which is linear along an edge.
+    """Distance from the edge of some paths from which it is least over that to the surface, linear along an edge.
 
     Parameters
     ----------
     points : (n, 3) float array
     vertices : (M, 3) float array
-    thickness : (M,) float array
+    surface : (M,) float array
+        Distance from each vertex to the surface.
     paths : list of (p,) int array
 
     Returns
     -------
     (n,) float array
-        Over the thickness at the nearest place of that edge.
+        Over the distance to the surface at the nearest place of that edge.
     """
     a, b = (np.concatenate([path[part] for path in paths]) for part in (slice(-1), slice(1, None)))
     start, step = vertices[a], vertices[b] - vertices[a]
@@ -108,6 +109,6 @@ def distance_over_thickness(
         squared = (p**2).sum(axis=1)[:, None] - 2 * p @ start.T + (start**2).sum(axis=1)
         foot = np.clip(along, 0, length)
         distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
-        thick = thickness[a] + foot / np.maximum(length, tiny) * (thickness[b] - thickness[a])
-        found[first : first + rows] = (distance / np.maximum(thick, least)).min(axis=1)
+        there = surface[a] + foot / np.maximum(length, tiny) * (surface[b] - surface[a])
+        found[first : first + rows] = (distance / np.maximum(there, least)).min(axis=1)
     return found

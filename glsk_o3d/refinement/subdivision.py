@@ -12,11 +12,11 @@ from .axis_fit import incident_edges
 from .merging import support
 
 POINTS_PER_PIECE = 8  # fitted: an edge is cut into at most one piece for every so many input points, begun ones counted
-SUBDIVISION_CHUNK = 65536  # points at a time: memory stays flat
+SUBDIVISION_CHUNK = 65536  # measured: points at a time: memory stays flat
 
 
 def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
-    """Subdivide the edges to a share of the local thickness; points go to the nearest sample around their vertex.
+    """Subdivide the edges to a share of the local radius; points go to the nearest sample around their vertex.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Cut weak loops: those across which the surface hardly goes on, and those that few points are sure of."""
+"""Cut weak loops: those across which the surface hardly goes on, and narrow ones with little confidence."""
 
 from __future__ import annotations
 
@@ -109,13 +109,13 @@ def cut_weak_loops(skeleton: Skeleton, weak_bonds: float, weak_opening: float) -
     if not cycles:
         return skeleton
     pairs, weight = bonds(skeleton, np.concatenate(cycles))  # cutting makes no new cycles elsewhere
-    thickness = surface_distance(skeleton)
+    distance = surface_distance(skeleton)
     while True:
         keys = skeleton.edges @ [m, 1]
         cut, used = [], np.zeros(len(keys), bool)
         for cycle in cycles:
             across = crossings(cycle, m, pairs, weight)
-            tube, loop = np.median(thickness[cycle]), skeleton.confidence[cycle].mean() * skeleton.vertices[cycle]
+            tube, loop = np.median(distance[cycle]), skeleton.confidence[cycle].mean() * skeleton.vertices[cycle]
             if across.min() < weak_bonds * np.median(across) or not opens_wider(loop, weak_opening * tube):
                 edges = np.searchsorted(keys, np.sort(np.column_stack([cycle, np.roll(cycle, -1)]), axis=1) @ [m, 1])
                 if not used[edges].any():  # two cuts in what two loops share would tear a piece out of it

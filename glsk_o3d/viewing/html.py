@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from ..report import IterationRecord, Report
     from ..skeleton import Skeleton
 
-MOST_BRANCHES = 12  # rows of the table
-_COLUMNS = (  # heading, field of the record, format, whether there is no room for it on a narrow screen
+MOST_LISTED_BRANCHES = 12  # rows of the table
+_SOLVE_COLUMNS = (  # heading, field of the record, format, whether there is no room for it on a narrow screen
     ("solve", "iteration", "d", False),
     ("points", "n_points", ",d", False),
     ("merged", "n_merged", ",d", False),
@@ -69,10 +69,10 @@ def contraction(report: Report) -> str:
     told = f"<h2>Contraction</h2><p>{end}</p>"
     if not records:
         return told
-    heads = "".join(f"<th{_extra(hidden)}>{head}</th>" for head, _, _, hidden in _COLUMNS)
+    heads = "".join(f"<th{_extra(hidden)}>{head}</th>" for head, _, _, hidden in _SOLVE_COLUMNS)
     rows = ""
     for record in records:
-        cells = (f"<td{_extra(hidden)}>{getattr(record, name):{form}}</td>" for _, name, form, hidden in _COLUMNS)
+        cells = (f"<td{_extra(hidden)}>{getattr(record, name):{form}}</td>" for _, name, form, hidden in _SOLVE_COLUMNS)
         rows += f'<tr data-solve="{record.iteration:d}">{"".join(cells)}</tr>'
     marks = {"explained_change": _threshold(report.recipe)}
     charts = "".join(_chart(caption, records, name, form, marks.get(name)) for caption, name, form in _CHARTS)
@@ -101,11 +101,11 @@ def branches(skeleton: Skeleton) -> str:
     heads = "<th>branch</th><th>kind</th>"
     heads += "".join(f"<th{_extra(hidden)}>{name.replace('_', ' ')}</th>" for name, _, hidden in columns)
     rows = ""
-    for row in table[:MOST_BRANCHES]:
+    for row in table[:MOST_LISTED_BRANCHES]:
         swatch = f'<span class="swatch" style="background:{colors[row["branch"]]}"></span>'
         cells = "".join(f"<td{_extra(hidden)}>{_number(row[name], form)}</td>" for name, form, hidden in columns)
         rows += f"<tr><td>{swatch}{row['branch']}</td><td>{row['kind']}</td>{cells}<td>{row['points']:,}</td></tr>"
-    rest = len(table) - MOST_BRANCHES
+    rest = len(table) - MOST_LISTED_BRANCHES
     more = f'<p class="muted small">and {rest:,} shorter ones</p>' if rest > 0 else ""
     return f"<h2>Longest branches</h2>{_table(heads + '<th>points</th>', rows, 'branches')}{more}"
 

@@ -16,9 +16,9 @@ from .preview import DPI, draw
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-SIZE = (1200, 500)
-MARGIN = 16  # in pixels
-COLOURS = 48  # of the picture: greys, red, and what lies between; a third of the bytes of the full range
+NOTEBOOK_SIZE = (1200, 500)
+NOTEBOOK_MARGIN = 16  # in pixels
+NOTEBOOK_COLOURS = 48  # of the picture: greys, red, and what lies between; a third of the bytes of the full range
 
 
 def picture(skeleton: Skeleton) -> str:
@@ -26,13 +26,13 @@ def picture(skeleton: Skeleton) -> str:
     require("PIL", "pillow")
     from PIL import Image
 
-    figure, stream = draw(skeleton, SIZE, None, caption=False), io.BytesIO()
+    figure, stream = draw(skeleton, NOTEBOOK_SIZE, None, caption=False), io.BytesIO()
     figure.set_dpi(DPI)
     figure.canvas.draw()
     drawn = np.asarray(figure.canvas.buffer_rgba())[..., :3]
     rows = np.flatnonzero((drawn < 250).any(axis=(1, 2)))  # without the white bands above and below flat drawings
-    drawn = drawn[max(rows[0] - MARGIN, 0) : rows[-1] + MARGIN]
-    Image.fromarray(drawn.copy()).quantize(COLOURS, method=Image.Quantize.MEDIANCUT).save(
+    drawn = drawn[max(rows[0] - NOTEBOOK_MARGIN, 0) : rows[-1] + NOTEBOOK_MARGIN]
+    Image.fromarray(drawn.copy()).quantize(NOTEBOOK_COLOURS, method=Image.Quantize.MEDIANCUT).save(
         stream, format="png", optimize=True
     )
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()

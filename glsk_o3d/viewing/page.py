@@ -20,13 +20,13 @@ from ..interop.packages import require
 from ..interop.writing import check_ending, write_atomically
 from . import html as sections
 from .notebook import picture
-from .recorder import MOST_POINTS, ContractionRecorder, thinned
+from .recorder import MOST_RECORDED_POINTS, ContractionRecorder, thinned
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-FLAT = 0.85  # a box whose least side is less than this share of the next is flat
-_ROOM = 1.25  # positions are stored as shares of so many half diagonals: contracted points may leave the box a little
+FLAT_SIDE = 0.85  # a box whose least side is less than this share of the next is flat
+_STORED_RANGE = 1.25  # half diagonals that positions are stored as shares of: contracted points may leave the box a bit
 
 
 def save_report(
@@ -119,7 +119,7 @@ def _asset(name: str) -> str:
 def _followed(skeleton, recorder) -> tuple[np.ndarray, list[np.ndarray]]:
     """The points to show, and where they are: at first, and after each solve."""
     if recorder is None or not recorder.positions:
-        shown = thinned(skeleton.points, MOST_POINTS)
+        shown = thinned(skeleton.points, MOST_RECORDED_POINTS)
         return shown, [skeleton.points[shown]]
     shown, positions = recorder.shown, recorder.positions
     same = len(positions) == len(skeleton.report.iterations) + 1 and shown.max(initial=-1) < len(skeleton.points)
@@ -133,7 +133,7 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
     box = np.concatenate([positions[0], skeleton.vertices])
     low, high = (box.min(axis=0), box.max(axis=0)) if len(box) else np.zeros((2, 3))
     centre = low + (high - low) / 2
-    unit = _ROOM * float(np.linalg.norm(high - low)) / 2 or 1.0
+    unit = _STORED_RANGE * float(np.linalg.norm(high - low)) / 2 or 1.0
     steps = np.clip([(state - centre) / unit for state in positions], -1, 1)
     ranges: dict[str, list[float] | None] = {"branch": None}
     for name, values in (("radius", skeleton.radii / unit), ("confidence", skeleton.confidence)):
@@ -141,7 +141,7 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
         if len(finite) == len(values) > 0 or (name == "confidence" and len(finite)):
             ranges[name] = [float(finite.min()), float(finite.max())]
     thin, middle, _ = np.sort(high - low)
-    across = int(np.argmin(high - low)) if thin < FLAT * middle else 2 if np.argmax(high - low) == 1 else 1
+    across = int(np.argmin(high - low)) if thin < FLAT_SIDE * middle else 2 if np.argmax(high - low) == 1 else 1
     lone = np.flatnonzero(skeleton.degree == 0)  # drawn as edges without a length
     vertex = skeleton.vertex_of_point[shown] if len(skeleton.vertices) else np.full(len(shown), -1)
     label = branch_of_point(skeleton, skeleton.points[shown], vertex) if len(skeleton.vertices) else vertex

@@ -15,9 +15,9 @@ from ..io.colors import shades
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-_PAPER, _INK = 0.93, 0.55  # greys of the farthest and of the nearest point
-_TITLE = 0.3  # inches
-_ROOM = 0.09  # from the middle of what matplotlib's orthographic eye sees to its edge
+_FAR_GREY, _NEAR_GREY = 0.93, 0.55  # of the farthest and of the nearest point
+_TITLE_ROOM = 0.3  # inches
+_EYE_MARGIN = 0.09  # from the middle of what matplotlib's orthographic eye sees to its edge
 
 
 def plot_skeleton(
@@ -96,7 +96,7 @@ def plot_skeleton(
     eye = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
     drawn = finite[:: max(1, -(-len(finite) // most_points))]
     drawn = drawn[np.argsort((points[drawn] - low) @ eye, kind="stable")]
-    grey = np.linspace(_PAPER, _INK, len(drawn))[:, None].repeat(3, axis=1)
+    grey = np.linspace(_FAR_GREY, _NEAR_GREY, len(drawn))[:, None].repeat(3, axis=1)
     paint = grey if point_colors is None else np.asarray(point_colors)[drawn]
     axes.computed_zorder = False
     axes.scatter(*points[drawn].T, s=point_size, c=paint, linewidths=0, depthshade=False, clip_on=False, zorder=1)
@@ -114,7 +114,7 @@ def plot_skeleton(
     axes.set_box_aspect(half)
     if len(shown):  # matplotlib leaves room for the corners of the box, which is empty there
         across, up, _ = proj_transform(*shown.T, axes.get_proj())
-        room = _ROOM * _squares(axes)
+        room = _EYE_MARGIN * _squares(axes)
         axes.set_box_aspect(half, zoom=min(room[0] / np.abs(across).max(), room[1] / np.abs(up).max()))
     axes.set_axis_off()
     return axes
@@ -128,4 +128,4 @@ def _squares(axes):
     else:
         rows, columns, *_ = spec.get_geometry()
         width, height = size * [len(spec.colspan) / columns, len(spec.rowspan) / rows]
-    return np.array([width, min(max(height - _TITLE, height / 2), width)]) / min(width, height)
+    return np.array([width, min(max(height - _TITLE_ROOM, height / 2), width)]) / min(width, height)

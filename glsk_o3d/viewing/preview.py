@@ -15,12 +15,12 @@ from ..interop.writing import check_ending, write_atomically
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-MOST_POINTS = 20_000
+MOST_DRAWN_POINTS = 20_000
 DPI = 150
-_VIEWS, _PAD = ((0, 1), (0, 2), (1, 2)), 0.3  # inches between them at least
+_VIEWS, _VIEW_GAP = ((0, 1), (0, 2), (1, 2)), 0.3  # inches between them at least
 INK, _RED, _AMBER, _PAPER = "#333333", "#d0121f", "#a05000", "white"
-_LINE, _LETTER, _MOST_LINES, _MOST_WARNINGS = 0.16, 0.066, 2, 2  # inches; lines of each warning, warnings
-_FAR, _NEAR = np.array([0.90] * 3), np.array([0.68] * 3)
+_LINE_HEIGHT, _LETTER_WIDTH, _MOST_LINES, _MOST_WARNINGS = 0.16, 0.066, 2, 2  # inches; lines of each warning, warnings
+_FAR_DOT, _NEAR_DOT = np.array([0.90] * 3), np.array([0.68] * 3)
 
 
 def save_preview(
@@ -76,18 +76,18 @@ def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] 
 
     width, height = figure.get_size_inches()
     cloud = skeleton.points[np.isfinite(skeleton.points).all(axis=1)]
-    cloud = cloud[:: max(1, -(-len(cloud) // MOST_POINTS))]
+    cloud = cloud[:: max(1, -(-len(cloud) // MOST_DRAWN_POINTS))]
     centre, extent = room(np.concatenate([cloud, skeleton.vertices]))
     cloud, vertices = cloud - centre, skeleton.vertices - centre
-    warned = _warned(warnings, width, int(height / 3 / _LINE))
-    below = _LINE * len(warned)
+    warned = _warned(warnings, width, int(height / 3 / _LINE_HEIGHT))
+    below = _LINE_HEIGHT * len(warned)
     views = three_views(figure, extent, head=0.55 if title else 0.25, foot=0.6 + below, names=0.36 + below)
     for a, b, axes in views:
         style = {"linewidths": 0, "clip_on": False, "s": np.clip(4500 / max(len(cloud), 1), 0.8, 3)}
         depth, toward = cloud[:, 3 - a - b], 1 if (a, b) != (0, 2) else -1  # x, y, z are right-handed
         order = np.argsort(toward * depth, kind="stable")
         near = (np.arange(len(order)) / max(len(order) - 1, 1))[:, None]
-        axes.scatter(cloud[order, a], cloud[order, b], c=_FAR + near * (_NEAR - _FAR), **style)
+        axes.scatter(cloud[order, a], cloud[order, b], c=_FAR_DOT + near * (_NEAR_DOT - _FAR_DOT), **style)
         segments = vertices[skeleton.edges][:, :, [a, b]]
         axes.add_collection(LineCollection(segments, colors=_RED, linewidths=1.5, capstyle="round", clip_on=False))
         for chosen, face, area in (
@@ -100,7 +100,7 @@ def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] 
     if caption:
         figure.text(0.5, (0.12 + below) / height, _caption(skeleton), ha="center", color=INK, fontsize=8)
     for row, line in enumerate(reversed(warned)):
-        place = (0.1 + row * _LINE) / height
+        place = (0.1 + row * _LINE_HEIGHT) / height
         figure.text(0.5, place, printable(line), ha="center", color=_AMBER, fontsize=8, parse_math=False)
     if title:
         figure.text(0.5, 1 - 0.33 / height, printable(title), ha="center", color=INK, fontsize=12, parse_math=False)
@@ -137,7 +137,7 @@ def three_views(
     """
     width, height = figure.get_size_inches()
     across, up = np.array([extent[[a, b]] for a, b in _VIEWS]).T
-    scale = min((width - 4 * _PAD) / across.sum(), (height - foot - head) / up.max())
+    scale = min((width - 4 * _VIEW_GAP) / across.sum(), (height - foot - head) / up.max())
     gap = (width - scale * across.sum()) / 4
     left, middle = gap, foot + (height - foot - head) / 2
     for a, b in _VIEWS:
@@ -172,7 +172,7 @@ def printable(text: object) -> str:
 
 def _warned(warnings: Sequence[str], width: float, room: int) -> list[str]:
     """At most so many lines that tell the warnings in a figure so many inches wide; the last counts what is left."""
-    letters = max(int((width - 2 * _PAD) / _LETTER), 20)
+    letters = max(int((width - 2 * _VIEW_GAP) / _LETTER_WIDTH), 20)
     lines: list[str] = []
     more = len(warnings)
     for warning in warnings[:_MOST_WARNINGS]:

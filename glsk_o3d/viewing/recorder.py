@@ -6,7 +6,7 @@ import numpy as np
 
 from ..state import Contraction
 
-MOST_POINTS = 20_000
+MOST_RECORDED_POINTS = 20_000
 
 
 class ContractionRecorder:
@@ -36,7 +36,7 @@ class ContractionRecorder:
     (3, (300, 3))
     """
 
-    def __init__(self, most_points: int = MOST_POINTS):
+    def __init__(self, most_points: int = MOST_RECORDED_POINTS):
         self.most_points = most_points
         self.shown = np.empty(0, int)
         self.positions: list[np.ndarray] = []

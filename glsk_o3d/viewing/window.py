@@ -18,8 +18,9 @@ from ..interop.packages import import_open3d
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-KEYS = {"C": "cloud", "S": "skeleton", "T": "radius tubes"}
-GREY, LINE = (0.62, 0.64, 0.66), 0.002  # of points without a colour; radius of the skeleton's lines per diagonal
+WINDOW_KEYS = {"C": "cloud", "S": "skeleton", "T": "radius tubes"}
+CLOUD_GREY = (0.62, 0.64, 0.66)  # of points without a colour
+LINE_RADIUS = 0.002  # of the skeleton's lines per diagonal
 
 
 def show(skeleton: Skeleton, cloud: Any = None, *, title: str = "Curve skeleton") -> None:
@@ -67,7 +68,7 @@ def open_window(skeleton: Skeleton, cloud: Any, title: str) -> Any:
     options = window.get_render_option()
     options.point_size, options.mesh_shade_option = 3.0, o3d.visualization.MeshShadeOption.Color
     shapes = layers(skeleton, cloud)
-    for key, name in KEYS.items():
+    for key, name in WINDOW_KEYS.items():
         shown = name != "radius tubes"
         for shape in shapes[name] if shown else ():
             window.add_geometry(shape)
@@ -82,11 +83,11 @@ def layers(skeleton: Skeleton, cloud: Any = None) -> dict[str, list[Any]]:
     else:
         cloud = import_open3d().geometry.PointCloud(cloud).remove_non_finite_points()
     if not cloud.has_colors():
-        cloud.paint_uniform_color(GREY)
+        cloud.paint_uniform_color(CLOUD_GREY)
     shapes: dict[str, list[Any]] = {"cloud": [cloud] if cloud.has_points() else [], "skeleton": [], "radius tubes": []}
     if len(skeleton.vertices):
         box = np.concatenate([np.asarray(cloud.points), skeleton.vertices])
-        line = LINE * float(np.linalg.norm(np.ptp(box, axis=0))) or 1.0
+        line = LINE_RADIUS * float(np.linalg.norm(np.ptp(box, axis=0))) or 1.0
         # lines of Open3D are a pixel wide: tubes show better
         shapes["skeleton"] = [skeleton.to_line_set("branch"), skeleton.to_tubes("branch", radius=line, sides=8)]
         if np.isfinite(skeleton.radii).all():

@@ -9,7 +9,7 @@ import open3d as o3d
 import pytest
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, samples, skeletonize
-from glsk_o3d.analysis.branch_rows import COLUMNS, BranchTable
+from glsk_o3d.analysis.branch_rows import PRINTED_COLUMNS, BranchTable
 from glsk_o3d.analysis.segmentation import branch_of_edge, vertex_of_cloud
 
 RNG = np.random.default_rng(0)
@@ -245,7 +245,7 @@ def test_a_torso_goes_on_at_both_ends():
 def test_print():
     lines = str(TREE.branch_table()).splitlines()
     assert lines[0].startswith("BranchTable(15 branches, 4 levels): lengths in")
-    assert lines[1].split() == list(COLUMNS)
+    assert lines[1].split() == list(PRINTED_COLUMNS)
     assert len(lines) == 17
     words = lines[2].split()
     table = TREE.branch_table()

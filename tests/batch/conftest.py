@@ -33,8 +33,8 @@ from glsk_o3d.interop.clouds import cloud_points
 class Saboteur(Filter):
     """Harm."""
 
-    consumes: ClassVar[type] = Cloud
-    produces: ClassVar[type] = Cloud
+    consumes = produces = Cloud
+
     def _run(self, cloud, watch):
         points = cloud_points(cloud)
         order = int(points[0, 0]) // 1000 * 1000

@@ -21,7 +21,7 @@ def cluster(tmp_path, until, patience, monkeypatch):
     begun = []
     for name in ("CONNECT", "TCP"):
         monkeypatch.setenv(f"DASK_DISTRIBUTED__COMM__TIMEOUTS__{name}", f"{patience} s")
-    monkeypatch.setattr("glsk_o3d.batch.workers._PATIENCE", patience)
+    monkeypatch.setattr("glsk_o3d.batch.workers._SCHEDULER_SECONDS", patience)
 
     def dask(*words, **environment):
         command = [sys.executable, "-m", "dask", *words, "--no-dashboard"]
@@ -102,6 +102,6 @@ def test_a_scan_that_kills_its_workers(cluster, until, saboteur, write, rows, tm
 @pytest.mark.parametrize("address", ["nonsense", "foo://a:1", "tcp://127.0.0.1:1"])
 def test_nobody_there(write, tmp_path, monkeypatch, address):
     write(tmp_path / "in" / "a.ply")
-    monkeypatch.setattr("glsk_o3d.batch.workers._PATIENCE", 0.5)
+    monkeypatch.setattr("glsk_o3d.batch.workers._SCHEDULER_SECONDS", 0.5)
     with pytest.raises(BatchError, match=f"{address}: no Dask scheduler answers there"):
         run_batch(tmp_path / "in", tmp_path / "out", scheduler=address)

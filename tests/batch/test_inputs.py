@@ -6,7 +6,7 @@ from itertools import chain
 import pytest
 
 from glsk_o3d import InvalidParameterError
-from glsk_o3d.batch.inputs import ENDINGS, find_inputs
+from glsk_o3d.batch.inputs import INPUT_ENDINGS, find_inputs
 
 
 @pytest.fixture(autouse=True)
@@ -37,7 +37,7 @@ def test_a_folder(touch):
     assert names("in", recursive=True) == ["a", "b", "sub/c"]
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", INPUT_ENDINGS)
 def test_every_ending_that_is_read(touch, ending):
     touch(f"in/a{ending}")
     assert names("in") == ["a"]

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from glsk_o3d import BatchError
-from glsk_o3d.batch.ledger import COLUMNS, Ledger, file_hash, locked
+from glsk_o3d.batch.ledger import LEDGER_COLUMNS, Ledger, file_hash, locked
 
 
 def row(name, **values):
@@ -73,7 +73,7 @@ def test_the_table(tmp_path):
     ledger.close()
     with (tmp_path / "ledger.csv").open(encoding="utf-8", newline="") as stream:
         table = list(csv.DictReader(stream))
-    assert tuple(table[0]) == COLUMNS
+    assert tuple(table[0]) == LEDGER_COLUMNS
     assert (table[0]["name"], table[0]["messages"], table[0]["outputs"]) == ('a, \n"b"', "x; y", "a.ply; a.png")
     assert (table[1]["status"], table[1]["error"], table[1]["loops"]) == ("failed", "no", "")
     assert list(Ledger(tmp_path).rows)[1] == os.fsdecode(b"\xff")

@@ -12,7 +12,7 @@ import pytest
 import glsk_o3d
 from glsk_o3d import BatchError, Connector, InvalidParameterError, RecipeError, pipelines, read_skeleton, skeletonize
 from glsk_o3d.batch import plan_batch, run_batch
-from glsk_o3d.batch.ledger import COLUMNS, file_hash, locked
+from glsk_o3d.batch.ledger import LEDGER_COLUMNS, file_hash, locked
 from glsk_o3d.recipes import to_recipe
 from glsk_o3d.samples import torus
 
@@ -50,7 +50,7 @@ def test_every_scan_is_done_once(batch, scans, rows, tmp_path):
     assert batch.result.rate > 0
     assert batch.result.rows == found == {row["name"]: row for row in seen}
     for name, row in found.items():
-        assert tuple(row) == COLUMNS
+        assert tuple(row) == LEDGER_COLUMNS
         assert (row["status"], row["outputs"], row["version"]) == ("done", [f"{name}.ply"], glsk_o3d.__version__)
         assert row["input_hash"] == file_hash(scans / f"{name}.ply")
         skeleton = skeletonize(glsk_o3d.read_cloud(scans / f"{name}.ply"))

@@ -205,8 +205,8 @@ def test_points_without_a_triangle_go_to_the_nearest_with_one():
     begun, local = mesh_state(state, state.cloud, faces)
     assert len(begun) == len(np.unique(faces)) < len(state)
     np.testing.assert_array_equal(begun.survivors[local], faces)
-    np.testing.assert_array_equal(begun.owner[begun.survivors], np.arange(len(begun)))
-    assert (begun.cloud[begun.survivors[begun.owner[gone]], 0] > 0.2).all()
+    np.testing.assert_array_equal(begun.representative[begun.survivors], np.arange(len(begun)))
+    assert (begun.cloud[begun.survivors[begun.representative[gone]], 0] > 0.2).all()
     skeleton = mesh_skeleton(state, state.cloud, faces, pipelines.default())
     assert (skeleton.vertex_of_point >= 0).all()
     assert skeleton.n_components == 1

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import RingBuilder
-from glsk_o3d.crosscheck.reconstruction import REACH, ball_pivoting, poisson, spacing, without_bare
+from glsk_o3d.crosscheck.reconstruction import INVENTED_DISTANCE, ball_pivoting, poisson, spacing, without_bare
 from glsk_o3d.numerics.mesh_rings import umbrellas
 from glsk_o3d.samples import sheet, torus, tube
 
@@ -42,7 +42,7 @@ def test_poisson_lies_on_the_cloud_and_invents_nothing(shape):
     np.testing.assert_array_equal(np.unique(faces), np.arange(len(vertices)))
     distance = cKDTree(state.cloud).query(vertices)[0]
     step = spacing(state.cloud)
-    assert distance.max() < REACH * step
+    assert distance.max() < INVENTED_DISTANCE * step
     assert np.median(distance) < step
     whole = umbrellas(len(vertices), faces).mean()
     assert whole == 1 if shape is torus else 0.8 < whole < 0.99  # the sheet stays open

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from glsk_o3d.errors import InvalidParameterError
-from glsk_o3d.io.colors import GREY, NAMES, shades
+from glsk_o3d.io.colors import COLOR_NAMES, UNKNOWN_GREY, shades
 
 BRANCH, VERTICES = np.array([0, 1, -1]), np.array([0, 5, -1])
 
 
-@pytest.mark.parametrize("color", NAMES)
+@pytest.mark.parametrize("color", COLOR_NAMES)
 def test_what_belongs_to_nothing_is_grey(tree, color):
     shown = shades(tree, color, BRANCH, VERTICES)
     assert shown.shape == (3, 3)
-    np.testing.assert_array_equal(shown[2], GREY)
+    np.testing.assert_array_equal(shown[2], UNKNOWN_GREY)
     assert ((shown >= 0) & (shown <= 1)).all()
 
 

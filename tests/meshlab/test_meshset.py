@@ -358,7 +358,7 @@ def test_obj_of_meshlab_keeps_the_edges(tree, tmp_path):
 
 def test_without_pymeshlab_it_is_named(tree, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
-    with pytest.raises(MissingPackageError, match=r"pymeshlab.*pip install .pymeshlab"):
+    with pytest.raises(MissingPackageError, match=r"pymeshlab.*pip install .glsk-o3d.meshlab"):
         tree.to_pymeshlab()
 
 
@@ -374,7 +374,7 @@ glsk_o3d.MeshSet
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert run.stderr.rstrip().endswith(
-        'MissingPackageError: pymeshlab cannot be imported: pip install "pymeshlab>=2023.12"'
+        'MissingPackageError: pymeshlab cannot be imported: pip install "glsk-o3d[meshlab]"'
     )
 
 

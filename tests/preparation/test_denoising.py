@@ -85,7 +85,7 @@ def test_noise_share_of_the_same_spread_in_all_directions_is_one():
     np.testing.assert_array_equal(noise_of(points, 6), 1)
 
 
-# ---- ridges
+# ---- subspace-constrained mean shift
 
 
 def test_points_of_a_noisy_cylinder_come_nearer_to_it():

@@ -1,4 +1,4 @@
-"""Twigs are cut by how far their points leave the other branches, over the thickness of these."""
+"""Spurs are cut by how far their points leave the other branches, over the distance from these to the surface."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
-from glsk_o3d.refinement.spurs import SPUR_QUANTILE, distance_over_thickness, prune_spurs
+from glsk_o3d.refinement.spurs import SPUR_QUANTILE, prune_spurs, relative_distance
 
 N = 21  # vertices of the trunk
 PER = 60  # points of each: many, so that a cut spur does not change the thickness of its junction
@@ -88,7 +88,7 @@ def test_distance_from_paths_over_their_thickness(far):
             places, thick = (values[a] + share * (values[b] - values[a]) for values in (vertices, thickness[:, None]))
             distance, nearest = cKDTree(places).query(points)
             expected = np.minimum(expected, distance / thick[nearest, 0])
-    found = distance_over_thickness(points + far, vertices + far, thickness, paths)
+    found = relative_distance(points + far, vertices + far, thickness, paths)
     np.testing.assert_allclose(found, expected, rtol=1e-3)
 
 
@@ -147,9 +147,9 @@ def test_a_vertex_without_points_is_as_thick_as_its_radius_says():
 def test_far_points_in_chunks(monkeypatch):
     rng = np.random.default_rng(0)
     points, vertices = rng.normal(size=(50, 3)), rng.normal(size=(8, 3))
-    found = distance_over_thickness(points, vertices, np.arange(8) + 1.0, [np.arange(8)])
+    found = relative_distance(points, vertices, np.arange(8) + 1.0, [np.arange(8)])
     monkeypatch.setattr("glsk_o3d.refinement.spurs.SPUR_CHUNK", 21)
-    np.testing.assert_array_equal(distance_over_thickness(points, vertices, np.arange(8) + 1.0, [np.arange(8)]), found)
+    np.testing.assert_array_equal(relative_distance(points, vertices, np.arange(8) + 1.0, [np.arange(8)]), found)
 
 
 def test_lines_have_no_thickness():

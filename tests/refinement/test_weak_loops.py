@@ -1,4 +1,4 @@
-"""Loops that hang by a thread, or that the points hardly support, are cut; true ones stay."""
+"""Weak loops, across which the surface hardly goes on or with little confidence, are cut; true ones stay."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -237,7 +237,7 @@ def test_crossings_turn_with_the_cycle():
     np.testing.assert_allclose(crossings(np.arange(9)[::-1], 9, pairs, weight), np.roll(across[::-1], -1))
 
 
-# ---- loops that hang by a thread
+# ---- loops across which the surface hardly goes on
 
 
 @pytest.mark.parametrize("missing", [0, 1, 13, 23])

@@ -1,0 +1,87 @@
+"""Constants: one name for one thing, and where each number comes from."""
+
+import ast
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "glsk_o3d"
+ROOMS = ("numerics", "preparation", "refinement", "analysis", "crosscheck")
+FILTERS = ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "stopping")
+NUMERIC = sorted(
+    [*(PACKAGE / f"{name}.py" for name in FILTERS), *(p for room in ROOMS for p in (PACKAGE / room).glob("*.py"))]
+)
+ORIGIN = re.compile(r"\b(derived|published|measured|fitted)\b", re.IGNORECASE)
+
+
+def constants(tree):
+    """The upper-case names that a module assigns, each with its statement."""
+    for statement in tree.body:
+        if isinstance(statement, (ast.Assign, ast.AnnAssign)):
+            targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
+            for node in (node for target in targets for node in ast.walk(target)):
+                if isinstance(node, ast.Name) and node.id.isupper():
+                    yield node.id, statement
+
+
+def is_number(value):
+    """Whether an expression is made of plain numbers: one, a tuple of them, or arithmetic."""
+    if isinstance(value, (ast.Tuple, ast.List)):
+        return bool(value.elts) and all(map(is_number, value.elts))
+    if isinstance(value, ast.BinOp):
+        return is_number(value.left) and is_number(value.right)
+    if isinstance(value, ast.UnaryOp):
+        return is_number(value.operand)
+    return ast.unparse(value) == "np.pi" or (isinstance(value, ast.Constant) and type(value.value) in (int, float))
+
+
+def said(lines, statement):
+    """The comments of a statement: at its end, directly above it, and above the group that it is in."""
+    first, end = statement.lineno - 1, statement.end_lineno
+    top = first
+    while top and lines[top - 1].strip():
+        top -= 1
+    group = next((row for row in range(top, first) if not lines[row].startswith("#")), first)
+    own = next((row + 1 for row in range(first - 1, top - 1, -1) if not lines[row].startswith("#")), top)
+    tail = lines[end - 1].partition("#")[2]
+    return "\n".join([*lines[top:group], *lines[own:first], tail])
+
+
+def test_no_constant_is_assigned_in_two_modules():
+    count = Counter(
+        name
+        for path in PACKAGE.rglob("*.py")
+        for name in {name for name, _ in constants(ast.parse(path.read_text(encoding="utf-8")))}
+    )
+    assert [name for name, times in count.items() if times > 1] == []
+
+
+@pytest.mark.parametrize("path", NUMERIC, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_every_number_says_where_it_comes_from(path):
+    text = path.read_text(encoding="utf-8")
+    silent = [
+        name
+        for name, statement in constants(ast.parse(text))
+        if is_number(statement.value) and not ORIGIN.search(said(text.splitlines(), statement))
+    ]
+    assert silent == []
+
+
+@pytest.mark.parametrize(
+    ("source", "found"),
+    [
+        ("A = 1  # fitted", True),
+        ("# derived: why\nA = 1", True),
+        ("# All fitted.\nB = 2\nA = 1", True),
+        ("# All fitted.\n\nA = 1", False),
+        ("B = 2  # fitted\nA = 1", False),
+        ("# All fitted.\nB = 2\n# of something\nA = 1", True),
+        ("B = 2\n# measured\nC = 3\nA = 1", False),
+        ("A = 1  # unfitted", False),
+    ],
+)
+def test_which_comments_count(source, found):
+    (statement,) = (statement for name, statement in constants(ast.parse(source)) if name == "A")
+    assert bool(ORIGIN.search(said(source.splitlines(), statement))) is found
