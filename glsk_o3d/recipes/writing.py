@@ -104,7 +104,7 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d import pipelines
+    >>> from glsk_o3d import load_recipe, pipelines
     >>> with TemporaryDirectory() as folder:
     ...     save_recipe(pipelines.default(), f"{folder}/usual.toml")
     ...     load_recipe(f"{folder}/usual.toml") == pipelines.default()

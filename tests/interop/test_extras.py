@@ -29,7 +29,7 @@ from glsk_o3d.samples import y_junction
 points = y_junction(600).points
 skeleton = glsk.skeletonize(points)
 for ending in ("ply", "obj", "json", "npz", "cgal", "swc", "graphml"):
-    skeleton.save(f"s.{ending}")
+    skeleton.save(f"s.{ending}", cut_loops=True)
     glsk.read_skeleton(f"s.{ending}")
 glsk.save_recipe(glsk.pipelines.default(), "r.toml")
 assert glsk.load_recipe("r.toml") == glsk.pipelines.default()
@@ -90,7 +90,17 @@ def test_without_extras(bare, tmp_path):
     for name, message in said.items():
         assert f'pip install "glsk-o3d[{NAMED[name]}]"' in message, name
     left = {path.name for path in tmp_path.iterdir()}
-    assert left - {"out"} == {"s.ply", "s.obj", "s.json", "s.npz", "s.cgal", "r.toml", "branches.csv"}
+    assert left - {"out"} == {
+        "s.ply",
+        "s.obj",
+        "s.json",
+        "s.npz",
+        "s.cgal",
+        "s.swc",
+        "s.graphml",
+        "r.toml",
+        "branches.csv",
+    }
 
 
 COMMAND = "from glsk_o3d.cli.main import app; app(sys.argv[1:])"

@@ -1,8 +1,5 @@
 """What is not installed is named, and how to install it."""
 
-from importlib.metadata import PackageNotFoundError
-from pathlib import Path
-
 import pytest
 
 from glsk_o3d.errors import MissingPackageError
@@ -30,22 +27,3 @@ def test_missing_open3d_says_what_to_install(monkeypatch, error, says):
         packages.import_open3d()
     assert "open3d" in str(caught.value)
     assert caught.value.__cause__ is error
-
-
-def test_every_package_that_may_lack_is_asked_for_as_in_our_metadata(monkeypatch):
-    def fail(name):
-        raise ModuleNotFoundError(name, name=name)
-
-    def none(name):
-        raise PackageNotFoundError
-
-    wanted = (Path(__file__).parents[2] / "pyproject.toml").read_text()
-    monkeypatch.setattr("importlib.import_module", fail)
-    for words in (["pymeshlab"], ["distributed"], ["matplotlib"], ["networkx"], ["igl", "libigl"]):
-        with pytest.raises(MissingPackageError) as caught:
-            packages.require(*words)
-        assert f'"{str(caught.value).split(chr(34))[1]}"' in wanted
-        assert f'pip install "{words[-1]}>=' in str(caught.value)
-    monkeypatch.setattr(packages, "requires", none)
-    with pytest.raises(MissingPackageError, match=r'pip install "libigl"$'):
-        packages.require("igl", "libigl")

@@ -1,10 +1,8 @@
-import sys
-
 import networkx
 import numpy as np
 import pytest
 
-from glsk_o3d.errors import FileFormatError, MissingPackageError
+from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.skeletons import read_skeleton
 
 
@@ -29,14 +27,6 @@ def test_graphml_without_coordinates(tmp_path):
     networkx.write_graphml_xml(networkx.path_graph(2), tmp_path / "s.graphml")
     with pytest.raises(FileFormatError, match=r"node '0'.* x, y or z"):
         read_skeleton(tmp_path / "s.graphml")
-
-
-def test_without_networkx(tree, tmp_path, monkeypatch):
-    tree.save(tmp_path / "s.graphml")
-    monkeypatch.setitem(sys.modules, "networkx", None)
-    for action in (lambda: tree.save(tmp_path / "t.graphml"), lambda: read_skeleton(tmp_path / "s.graphml")):
-        with pytest.raises(MissingPackageError, match="networkx"):
-            action()
 
 
 @pytest.mark.parametrize(
