@@ -34,7 +34,7 @@ for name in ("sauropod", "tube", "torus", "helix", "y_junction", "two_rings"):
 # ``processes=False`` out, and put the rest under ``if __name__ == "__main__":``, because every process imports the
 # script; or give the address of a scheduler.
 
-cluster = LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None)
+cluster = LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0")
 client = Client(cluster)
 first = run_batch(scans, results, scheduler=client, formats=["json"])
 again = run_batch(scans, results, scheduler=client, formats=["json"])
