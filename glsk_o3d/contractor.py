@@ -124,9 +124,10 @@ class Contractor(Filter[Contraction]):
         return _finished(state, f"reached max_iterations = {self.max_iterations}")
 
     def _solve(self, state: Contraction) -> tuple[Contraction, dict[str, Any]]:
-        """One contraction step: equations 3 to 5."""
+        """One contraction step: equations 2, 4 and 5; 3 is `solve_contraction`."""
+        # Wen (4)
         contraction = state.contraction_weight * self.amplification or self.initial_contraction / state.mean_ring_edge
-        contraction = min(contraction, self.max_contraction)  # Wen (4)
+        contraction = min(contraction, self.max_contraction)
         with np.errstate(divide="ignore"):
             attraction = state.ring_size0 / state.ring_size  # Wen (5)
         if self.line_hold > 1 and state.report.iterations:
@@ -149,7 +150,7 @@ class Contractor(Filter[Contraction]):
         )
         # In the first pass the published code takes a(1) itself for the drop, not 1 - a(1); so does this one.
         done = state.report.iterations
-        drop = done[-1].ring_ratio - contracted.ring_ratio if done else contracted.ring_ratio
+        drop = done[-1].ring_ratio - contracted.ring_ratio if done else contracted.ring_ratio  # Wen (10)
         return replace(contracted, ring_ratio_drop=drop), facts
 
     def _laplacian(self, state: Contraction) -> csr_matrix:
@@ -239,7 +240,7 @@ def _record(state: Contraction, **facts: Any) -> Contraction:
         n_points=len(state),
         n_merged=0,
         explained=explained,
-        explained_change=abs(explained - before) / kept,
+        explained_change=abs(explained - before) / kept,  # Wen (16)
         ring_ratio=state.ring_ratio,
         contraction_weight=state.contraction_weight,
         **facts,

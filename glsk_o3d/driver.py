@@ -67,8 +67,10 @@ def skeletonize(
     1
     """
     if isinstance(pipeline, Mapping):
-        return skeletonize(cloud, on_iteration=on_iteration, on_state=on_state, **{**pipeline, **options})
-    return as_pipeline(pipeline).with_options(options)(cloud, on_iteration=on_iteration, on_state=on_state)
+        chosen = as_pipeline("default").with_options(pipeline, **options)
+    else:
+        chosen = as_pipeline(pipeline).with_options(options)
+    return chosen(cloud, on_iteration=on_iteration, on_state=on_state)
 
 
 def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathLike[str]) -> Pipeline[Skeleton]:

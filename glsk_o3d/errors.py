@@ -68,7 +68,7 @@ def did_you_mean(word: str, known: Iterable[str], what: str) -> str:
     "no parameter of Connector is called 'radios': did you mean 'radius'?"
     """
     names = {name.lower(): name for name in known}
-    # a long list helps nobody: then the nearest name is said however far it is
-    close = difflib.get_close_matches(word.lower(), names, n=1, cutoff=0.6 if len(names) <= 20 else 0.0)
-    hint = f"did you mean {names[close[0]]!r}?" if close else f"there are {', '.join(names.values()) or 'none'}"
+    close = difflib.get_close_matches(word.lower(), names, n=1)
+    listed = f"there are {', '.join(names.values()) or 'none'}" if len(names) <= 40 else "and none is like it"
+    hint = f"did you mean {names[close[0]]!r}?" if close else listed
     return f"no {what} is called {word!r}: {hint}"

@@ -15,6 +15,9 @@ from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .state import Contraction
 
+PSI_FACTOR = 1.2  # published: psi' over psi
+AMPLIFICATION_SQUARED = 9  # published: s_L squared, in the code and not in the paper
+CURVATURE_WEIGHT = 3  # published: of U in F
 IN_PLANE_SINE = 1e-3  # fitted: sine of the angle below which a direction counts as lying in the tangent plane
 MIN_SHRINKAGE = 1e-4  # published: floor of s - psi' s(0) in the working frame, as in the published code
 
@@ -98,16 +101,16 @@ class LPRReducer(Filter[Contraction]):
         self, state: Contraction, representatives: np.ndarray, swallowed: np.ndarray, combined: Rings
     ) -> Contraction:
         n = len(state)
-        into = np.arange(n)
-        into[swallowed] = representatives
-        keep = into == np.arange(n)
+        representative = np.arange(n)
+        representative[swallowed] = representatives
+        keep = representative == np.arange(n)
         index = np.cumsum(keep) - 1
-        rings = state.rings.replace(representatives, combined).take(np.flatnonzero(keep)).rename(index[into])
+        rings = state.rings.replace(representatives, combined).take(np.flatnonzero(keep)).rename(index[representative])
         if self.mend_rings:
             rings = mend_rings(rings, state.cloud[state.survivors[keep]], state.normals[state.survivors[keep]])
         mass, ring_size0, ring_size = state.mass, state.ring_size0, state.ring_size
         if self.conserve_mass:
-            mass = np.bincount(into, mass, n)[keep]
+            mass = np.bincount(representative, mass, n)[keep]
             _, ring_size0 = rings.nearest(state.cloud[state.survivors[keep]])
             _, ring_size = rings.nearest(state.positions[keep])
         else:
@@ -115,7 +118,7 @@ class LPRReducer(Filter[Contraction]):
         return replace(
             state,
             survivors=state.survivors[keep],
-            representative=index[into][state.representative],
+            representative=index[representative][state.representative],
             positions=state.positions[keep],
             previous=state.previous[keep],
             laplacian_coordinates=state.laplacian_coordinates[keep],
@@ -127,7 +130,7 @@ class LPRReducer(Filter[Contraction]):
 
 
 def merge_energy(state: Contraction) -> np.ndarray:
-    r"""F of every point: what merging it with its nearest ring neighbour would cost (equations 6 to 12).
+    r"""F of every point: what merging it with its nearest ring neighbour would cost (equations 6 to 11).
 
     Parameters
     ----------
@@ -143,15 +146,15 @@ def merge_energy(state: Contraction) -> np.ndarray:
         :math:`U = |\delta_i - \bar\delta_j|^2` over the ring. Minus infinity where a ring did not change.
     """
     s0, s, delta = state.ring_size0, state.ring_size, state.laplacian_coordinates
-    psi = 1.2 * state.ring_ratio_drop  # Wen (10)
-    eta = np.maximum(s - psi * s0, MIN_SHRINKAGE) / s0  # Wen (11)
+    drop = PSI_FACTOR * state.ring_ratio_drop  # psi'
+    eta = np.maximum(s - drop * s0, MIN_SHRINKAGE) / s0  # Wen (11)
     moved = norm(state.positions - state.previous)
     with np.errstate(divide="ignore", invalid="ignore"):
-        pulled = np.nan_to_num(psi * s0 * moved / (eta * (s0 - s)), nan=0.0, posinf=np.inf, neginf=-np.inf)
-    contraction = (9 * state.contraction_weight * eta) ** 2 * dot(delta, delta)  # Wen (7)
+        pulled = np.nan_to_num(drop * s0 * moved / (eta * (s0 - s)), nan=0.0, posinf=np.inf, neginf=-np.inf)
+    contraction = (AMPLIFICATION_SQUARED * state.contraction_weight * eta) ** 2 * dot(delta, delta)  # Wen (7)
     attraction = pulled**2  # Wen (8)
     curvature = ((delta - state.rings.mean_over(delta)) ** 2).sum(axis=1)  # Wen (9)
-    return contraction - attraction + 3 * curvature  # Wen (6)
+    return contraction - attraction + CURVATURE_WEIGHT * curvature  # Wen (6)
 
 
 def combine_rings(state: Contraction, representatives: np.ndarray, swallowed: np.ndarray) -> Rings:

@@ -6,13 +6,13 @@ import dataclasses
 import logging
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from itertools import chain, pairwise
+from itertools import pairwise
 from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageError, did_you_mean
 from .interop.clouds import Cloud, cloud_points
 from .interop.verbosity import following_open3d
-from .parameters import UNWRITTEN, Parameters
+from .parameters import TYPES, UNWRITTEN, Parameters
 from .report import STOPPED_BY_CALLER, IterationRecord, Report
 from .skeleton import Skeleton
 from .state import Contraction
@@ -212,7 +212,8 @@ class Pipeline(Generic[Produced]):
         Raises
         ------
         InvalidParameterError
-            A name is unknown, not in the pipeline or that of several parameters, or a value is wrong.
+            A name is unknown, not in the pipeline or that of several parameters, an option is given twice, or a value
+            is wrong.
 
         Examples
         --------
@@ -222,15 +223,29 @@ class Pipeline(Generic[Produced]):
         (12, None, '2%')
         """
         pipeline: Any = self
-        given = {**(options or {}), **named}
+        left = [*(options or {}).items(), *named.items()]
+        told: dict[tuple[type[Parameters], str], str] = {}
         # reducers and rules first: what is put in has parameters that others may change
-        for name, value in sorted(given.items(), key=lambda item: not isinstance(item[1], Parameters | None)):
-            pipeline = _changed(pipeline, pipeline.owner_of(name), name.rpartition(".")[2], value)
+        for kinds in (("reducer", "stop"), TYPES):
+            for name, value in list(left):
+                try:
+                    cls, field = pipeline.class_of_option(name)
+                except InvalidParameterError:
+                    if kinds is TYPES:
+                        raise
+                    continue
+                if str(field.metadata["type"]).rstrip("?") not in kinds:
+                    continue
+                if (cls, field.name) in told:
+                    raise InvalidParameterError(f"{told[cls, field.name]} and {name} are one option: give it once")
+                told[cls, field.name] = name
+                pipeline = _changed(pipeline, cls, field.name, value)
+                left.remove((name, value))
         pipeline.check()
         return pipeline
 
-    def owner_of(self, name: str) -> type[Parameters]:
-        """The class that a name of an option means.
+    def class_of_option(self, name: str) -> tuple[type[Parameters], dataclasses.Field[Any]]:
+        """The class and the field that the name of an option means.
 
         Parameters
         ----------
@@ -241,28 +256,33 @@ class Pipeline(Generic[Produced]):
         -------
         class
             Of a filter, reducer or stopping rule in the pipeline.
+        dataclasses.Field
+            Of that class, as `parameter` makes it.
 
         Raises
         ------
         InvalidParameterError
             There is none, or more than one.
         """
+        if not isinstance(name, str):
+            raise InvalidParameterError(f"{name!r}: the name of an option is a str")
         present = {type(part).__name__: type(part) for part in parts(self)}
-        owner, dot, field = name.rpartition(".")
-        if dot and owner not in present:
-            raise InvalidParameterError(f"{name}: {owner} is not in the pipeline, which has {', '.join(present)}")
-        fields = {
-            cls: [known.name for known in dataclasses.fields(cls)]  # type: ignore[arg-type]
-            for cls in ([present[owner]] if dot else present.values())
-        }
-        owners = [cls for cls, names in fields.items() if field in names]
-        if not owners:
-            known = dict.fromkeys(chain.from_iterable(fields.values()))
-            raise InvalidParameterError(did_you_mean(field, known, f"parameter of {owner or 'the pipeline'}"))
-        if len(owners) > 1:
-            choice = " or ".join(f"'{cls.__name__}.{field}'" for cls in owners)
+        holder, dot, field = name.rpartition(".")
+        if dot and holder not in present:
+            raise InvalidParameterError(f"{name}: {holder} is not in the pipeline, which has {', '.join(present)}")
+        fields = [
+            (cls, known)
+            for cls in ([present[holder]] if dot else present.values())
+            for known in dataclasses.fields(cls)  # type: ignore[arg-type]
+        ]
+        meant = [(cls, known) for cls, known in fields if known.name == field]
+        if not meant:
+            names = dict.fromkeys(known.name for _, known in fields)
+            raise InvalidParameterError(did_you_mean(field, names, f"parameter of {holder or 'the pipeline'}"))
+        if len(meant) > 1:
+            choice = " or ".join(f"'{cls.__name__}.{field}'" for cls, _ in meant)
             raise InvalidParameterError(f"{name}: more than one part of the pipeline has it: write {choice}")
-        return owners[0]
+        return meant[0]
 
     def __or__(self, other: Filter[Next] | Pipeline[Next]) -> Pipeline[Next]:
         return Pipeline(*self.stages, *(other.stages if isinstance(other, Pipeline) else (other,)))

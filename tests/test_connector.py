@@ -141,26 +141,26 @@ def slow_thickness(state, k=16):
     return np.median(own[near], axis=1)
 
 
-def test_local_thickness_is_a_median_over_sixteen(state):
+def test_contraction_distance_is_a_median_over_sixteen(state):
     """Of the medians of what each survivor speaks for; itself is one of the 16."""
     np.testing.assert_allclose(contraction_distance(state), slow_thickness(state), atol=1e-12)
     assert np.abs(slow_thickness(state, 15) - slow_thickness(state)).max() > 1e-4
 
 
-def test_local_thickness_of_a_tube_is_its_radius():
+def test_contraction_distance_of_a_tube_is_its_radius():
     state = Contractor()(RingBuilder()(samples.tube(n=2000, radius=0.1).points))
     middle = np.abs(state.contracted[:, 0]) < 0.4
     np.testing.assert_allclose(contraction_distance(state)[middle] * state.frame.scale, 0.1, rtol=0.1)
 
 
-def test_local_thickness_ignores_a_few_points_gone_astray(state):
+def test_contraction_distance_ignores_a_few_points_gone_aunsupported(state):
     cloud = state.cloud.copy()
     cloud[state.survivors[::40]] += 100
     astray = replace(state, cloud=cloud)
     assert contraction_distance(astray).max() < 1
 
 
-def test_local_thickness_of_fewer_points_than_neighbours():
+def test_contraction_distance_of_fewer_points_than_neighbours():
     points = np.random.default_rng(0).normal(size=(10, 3))
     state = RingBuilder(outlier_factor=0)(points)
     moved = replace(state, positions=0.5 * state.positions)
@@ -200,7 +200,7 @@ BETWEEN = {
 
 
 @pytest.mark.parametrize("case", BETWEEN)
-def test_stray_vertices_are_dropped_unless_they_hold_parts_together(case):
+def test_unsupported_vertices_are_dropped_unless_they_hold_parts_together(case):
     more, dropped = BETWEEN[case]
     raw, count = counted(THICK + more, [100] * 6 + [5] * 3)
     skeleton = drop_unsupported(raw, count, np.ones(9, bool), 0.1)
@@ -261,7 +261,7 @@ def graphs(draw):
 
 @settings(max_examples=100)
 @given(graphs(), st.sampled_from([0.0, 0.1, 0.5, 1.0]), st.integers(0, 100))
-def test_drop_stray_by_its_definition(graph, share, seed):
+def test_drop_unsupported_by_its_definition(graph, share, seed):
     edges, count, noisy = graph
     raw, count = counted(edges, count, seed)
     skeleton = drop_unsupported(raw, count, noisy, share)
@@ -286,7 +286,7 @@ def test_drop_stray_by_its_definition(graph, share, seed):
 
 @settings(max_examples=30)
 @given(graphs(), st.integers(0, 100))
-def test_drop_stray_does_not_mind_numbers(graph, seed):
+def test_drop_unsupported_does_not_mind_numbers(graph, seed):
     edges, count, noisy = graph
     raw, count = counted(edges, count)
     name = np.random.default_rng(seed).permutation(len(count))
@@ -308,7 +308,7 @@ def test_drop_stray_does_not_mind_numbers(graph, seed):
 
 
 @pytest.mark.parametrize("shape", ["tube", "torus", "y_junction", "two_rings", "sheet"])
-def test_clean_clouds_have_no_stray_vertices(shape):
+def test_clean_clouds_have_no_unsupported_vertices(shape):
     state = contracted(samples.SAMPLES[shape](n=700).points, LPRReducer())
     assert state.noise.max() <= UNSUPPORTED_NOISE
     all_of_them, skeleton = Connector(min_support=0)(state), Connector(min_support=1.0)(state)
@@ -318,7 +318,7 @@ def test_clean_clouds_have_no_stray_vertices(shape):
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.99 * UNSUPPORTED_NOISE, 1.01 * UNSUPPORTED_NOISE, 1.0])
-def test_vertices_are_stray_only_where_noise_is(state, noise, assert_sound):
+def test_vertices_are_unsupported_only_where_noise_is(state, noise, assert_sound):
     all_of_them = Connector(min_support=0)(state)
     share = np.full(len(state.cloud), noise)
     skeleton = Connector(min_support=1.0)(replace(state, noise=share))

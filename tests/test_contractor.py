@@ -462,7 +462,7 @@ def rings_of(neighbours):
     ids=["line", "circle", "ellipse", "ball", "point"],
 )
 @pytest.mark.parametrize("scale", [1e-6, 1, 1e6])
-def test_linearity_of_one_neighbourhood(rim, expected, scale):
+def test_explained_variance_of_one_neighbourhood(rim, expected, scale):
     """A hub in the middle of its ring, whose points know only the hub: its spread is a multiple of theirs."""
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     hub = np.zeros((1, 3))
@@ -479,7 +479,7 @@ def test_roundings_are_no_line():
     assert (share < LINE_VARIANCE).all()
 
 
-def test_linearity_is_that_of_the_place():
+def test_explained_variance_is_that_of_the_place():
     """A long line and a disc in one cloud."""
     line = np.outer(np.arange(200.0), [0, 0, 1])
     disc = np.stack(np.meshgrid(np.arange(15.0), np.arange(15.0), [-50.0]), -1).reshape(-1, 3)

@@ -244,7 +244,7 @@ def test_warns_of_what_is_as_thick_as_long(kind, seed):
 
 
 @pytest.mark.parametrize("name", ["wen2024", "cao2010"])
-def test_duplicates_change_nothing_but_the_owners(name):
+def test_duplicates_change_nothing_but_the_centres(name):
     single, doubled = run(TORUS, name), run(SOUND["every point twice"], name)
     np.testing.assert_allclose(doubled.vertices, single.vertices, atol=1e-12)
     np.testing.assert_array_equal(doubled.edges, single.edges)

@@ -95,8 +95,8 @@ def test_energy_where_a_ring_did_not_change(state):
 @settings(max_examples=300)
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)).filter(lambda pair: pair[0] != pair[1]), max_size=25))
 def test_matching_is_greedy(pairs):
-    keepers, swallowed = (np.array([pair[end] for pair in pairs], int) for end in (0, 1))
-    chosen = match(10, keepers, swallowed).tolist()
+    representatives, swallowed = (np.array([pair[end] for pair in pairs], int) for end in (0, 1))
+    chosen = match(10, representatives, swallowed).tolist()
     taken = set()
     for position, pair in enumerate(pairs):
         if position in chosen:
@@ -112,12 +112,12 @@ def test_matching_is_greedy(pairs):
 
 def test_combined_rings_are_delaunay_stars(state):
     nearest, _ = state.rings.nearest(state.positions)
-    keepers = np.arange(0, len(state), 7)
-    swallowed = nearest[keepers]
-    combined = combine_rings(state, keepers, swallowed)
+    representatives = np.arange(0, len(state), 7)
+    swallowed = nearest[representatives]
+    combined = combine_rings(state, representatives, swallowed)
     cloud = state.cloud[state.survivors]
     flat = 0
-    for at, (i, m) in enumerate(zip(keepers.tolist(), swallowed.tolist(), strict=True)):
+    for at, (i, m) in enumerate(zip(representatives.tolist(), swallowed.tolist(), strict=True)):
         union = sorted((set(state.rings[i].tolist()) | set(state.rings[m].tolist())) - {i, m})
         delta = state.laplacian_coordinates[i]
         direction = delta / np.linalg.norm(delta)
@@ -230,9 +230,9 @@ class TestBookkeeping:
         nearest, _ = before.rings.nearest(before.positions)
         energy = merge_energy(before)
         swallowed = np.setdiff1d(np.arange(len(before)), at)
-        keepers = at[new_representative[swallowed]]
-        np.testing.assert_array_equal(nearest[keepers], swallowed)
-        assert (energy[keepers] < reducer.phi * before.ring_size[keepers] ** 2).all()
+        representatives = at[new_representative[swallowed]]
+        np.testing.assert_array_equal(nearest[representatives], swallowed)
+        assert (energy[representatives] < reducer.phi * before.ring_size[representatives] ** 2).all()
 
     def test_first_pass(self, state, reducer):
         self.check(state, reducer(state), reducer)

@@ -221,7 +221,7 @@ def test_what_is_put_in_may_be_varied_too(order):
     assert pipelines.default().with_options(reducer=None).stages[1].reducer is None
 
 
-def test_owners():
+def test_centres():
     pipeline = pipelines.default()
     for name, owner in {
         "k": RingBuilder,
@@ -232,8 +232,8 @@ def test_owners():
         "reducer": Contractor,
         "spacing": Refiner,
     }.items():
-        assert pipeline.owner_of(name) is owner
-    assert Pipeline(Connector()).owner_of("radius") is Connector  # nobody else there has one
+        assert pipeline.class_of_option(name)[0] is owner
+    assert Pipeline(Connector()).class_of_option("radius")[0] is Connector  # nobody else there has one
 
 
 WRONG_OPTIONS = {
@@ -246,10 +246,36 @@ WRONG_OPTIONS = {
 }
 
 
+@pytest.mark.parametrize(
+    ("options", "named", "words"),
+    [
+        ({"RingBuilder.k": 24}, {"k": 12}, "RingBuilder.k and k"),
+        ({"k": 24}, {"k": 12}, "k and k"),
+        ({1: 2}, {}, "1"),
+        ({"pipeline": "wen2024"}, {}, "pipeline"),
+        ({"on_iterations": None}, {}, "on_iterations"),
+    ],
+)
+def test_options_that_are_none_or_given_twice(options, named, words):
+    with pytest.raises(InvalidParameterError, match=words):
+        pipelines.default().with_options(options, **named)
+    with pytest.raises(InvalidParameterError, match=words):
+        glsk.skeletonize(np.zeros((0, 3)), options, **named)
+
+
+def test_a_rule_of_any_kind_is_put_in_before_its_parameters():
+    """Whatever the order: a threshold of the rule that leaves is one of nothing."""
+    for options in ({"threshold": 0.5, "stop": RingSizeRatio()}, {"stop": RingSizeRatio(), "threshold": 0.5}):
+        assert pipelines.default().with_options(options).stages[1].stop == RingSizeRatio(0.5)
+    for options in ({"threshold": 0.5, "stop": max}, {"stop": max, "threshold": 0.5}):
+        with pytest.raises(InvalidParameterError, match="threshold"):
+            pipelines.default().with_options(options)
+
+
 @pytest.mark.parametrize(("name", "words"), WRONG_OPTIONS.items())
 def test_options_that_nobody_or_more_than_one_has(name, words):
     for ask in (
-        lambda: pipelines.default().owner_of(name),
+        lambda: pipelines.default().class_of_option(name),
         lambda: pipelines.default().with_options({name: 3}),
         lambda: skeletonize(POINTS, {name: 3}),
         lambda: skeletonize(POINTS, **{name: 3}),

@@ -34,9 +34,9 @@ def around_torus(pieces=24, extra=(), n=1500):
     inner = points * [1, 1, 0]
     inner *= 0.4 / np.linalg.norm(inner, axis=1, keepdims=True)
     edges = {tuple(sorted((i, (i + 1) % pieces))) for i in range(pieces)} | set(extra)
-    owner = cKDTree(vertices).query(points)[1]
+    vertex = cKDTree(vertices).query(points)[1]
     report = Report(n_input=n, n_distinct=n)
-    return Skeleton(vertices, sorted(edges), np.full(pieces, 0.1), owner, points, (points - inner) / 0.1, report)
+    return Skeleton(vertices, sorted(edges), np.full(pieces, 0.1), vertex, points, (points - inner) / 0.1, report)
 
 
 @pytest.mark.parametrize("name", VARIANTS)
@@ -86,12 +86,12 @@ def test_complete_graphs_become_trees(name, m, assert_sound):
 def test_random_graphs(assert_sound, m, edges, seed):
     rng = np.random.default_rng(seed)
     edges = sorted((a, b) for a, b in edges if a < b < m)
-    owner = np.concatenate([np.arange(m), rng.integers(0, m, 20), [-1]])  # every vertex has a point, one has no vertex
+    vertex = np.concatenate([np.arange(m), rng.integers(0, m, 20), [-1]])  # every vertex has a point, one has no vertex
     points, normals = rng.normal(size=(2, m + 21, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     points[-1] = normals[-1] = np.nan
     raw = Skeleton(
-        rng.normal(size=(m, 3)), edges, np.full(m, 0.1), owner, points, normals,
+        rng.normal(size=(m, 3)), edges, np.full(m, 0.1), vertex, points, normals,
         Report(n_input=m + 21, n_dropped=1, n_distinct=m + 20),
     )  # fmt: skip
     graph = nx.Graph()
@@ -107,13 +107,13 @@ def test_random_graphs(assert_sound, m, edges, seed):
         assert skeleton.n_loops + gone == collapse_triangles(raw).n_loops
         # points of one component stay in one component
         parts = {part: set() for part in range(raw.n_components)}
-        for before, after in zip(owner[:-1], skeleton.vertex_of_point[:-1], strict=True):
+        for before, after in zip(vertex[:-1], skeleton.vertex_of_point[:-1], strict=True):
             parts[raw.component_of_vertex[before]].add(int(skeleton.component_of_vertex[after]))
         assert all(len(after) == 1 for after in parts.values())
 
 
 @pytest.mark.parametrize("seed", [6, 8])
-def test_a_loop_that_is_cut_leaves_no_twigs(seed):
+def test_a_loop_that_is_cut_leaves_no_spurs(seed):
     """Two legs of a scan touch; the ends of the cut loop are no ends of the animal."""
     skeleton = glsk.skeletonize(samples.sample_object(seed=seed).points)
     assert (skeleton.n_loops, len(skeleton.leaves)) == (1, 6)

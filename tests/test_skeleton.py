@@ -169,8 +169,8 @@ def test_radius_of_a_tube_and_of_a_ball():
     ball = rng.normal(size=(300, 3))
     ball /= np.linalg.norm(ball, axis=1, keepdims=True)
     vertices = np.array([[-0.5, 0, 0], [0.5, 0, 0], [7, 7, 7], [0, 0, 0]])
-    owner = np.concatenate([(along > 0).astype(int), np.full(300, 2), [-1]])
+    vertex = np.concatenate([(along > 0).astype(int), np.full(300, 2), [-1]])
     points = np.concatenate([tube, 2.5 * ball + 7, [[np.nan] * 3]])
     signs = rng.choice([-1, 1], (701, 1))  # normals are known up to their sign only
-    radii = plane_distance_radii(vertices, owner, points, signs * np.concatenate([normals, ball, [[np.nan] * 3]]))
+    radii = plane_distance_radii(vertices, vertex, points, signs * np.concatenate([normals, ball, [[np.nan] * 3]]))
     np.testing.assert_allclose(radii, [0.3, 0.3, 2.5, 0], rtol=1e-12)

@@ -26,7 +26,7 @@ def choose(pipeline: str, recipe: Path | None, settings: Iterable[str], drop_inv
     if recipe is not None and pipeline != "default":
         raise WrongUsage(f"--recipe {recipe} and --pipeline {pipeline}: give one of them")
     base = named_pipeline(pipeline) if recipe is None else load_recipe(recipe)
-    drop = ["RingBuilder.drop_invalid=true"] if drop_invalid else []
+    drop = ["drop_invalid=true"] if drop_invalid else []
     chosen = override(base, [*settings, *drop], name=pipeline if recipe is None else str(recipe))
     chosen.check_complete()
     return chosen
@@ -78,10 +78,10 @@ def _parse(setting: str, pipeline: Pipeline, place: str) -> tuple[str, Any]:
     owner, dot, name = (word.strip() for word in key.rpartition("."))
     if not (equals and (owner or not dot) and name and text):
         raise InvalidParameterError(
-            f"--set {setting}: write it as Filter.parameter=value, for example Connector.radius=2%"
+            f"--set {setting}: write it as Filter.parameter=value or parameter=value, for example Connector.radius=2%"
         )
     try:
-        owner = owner or pipeline.owner_of(name).__name__
+        owner = owner or pipeline.class_of_option(name)[0].__name__
     except InvalidParameterError as error:
         raise InvalidParameterError(f"--set {setting}: {error}") from None
     cls = find(owner)

@@ -6,7 +6,7 @@ import numpy as np
 
 from .vectors import TINY
 
-BITS = 21  # derived: per axis: 63 bits in all
+MORTON_BITS = 21  # derived: per axis: 63 bits in all
 
 
 def morton_order(points: np.ndarray) -> np.ndarray:
@@ -14,7 +14,7 @@ def morton_order(points: np.ndarray) -> np.ndarray:
 
     Stable: equal points keep their order.
     """
-    return np.argsort(morton_codes(points, 2**BITS - 1), kind="stable")
+    return np.argsort(morton_codes(points, 2**MORTON_BITS - 1), kind="stable")
 
 
 def morton_codes(points: np.ndarray, cells: float) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..numerics.morton import BITS, morton_codes
+from ..numerics.morton import MORTON_BITS, morton_codes
 from ..numerics.vectors import dot
 
 GRID_TAIL = 0.001  # fitted: share of the points that may be far off, at either end of each axis
@@ -53,14 +53,14 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     # A few points far off must not decide how wide the cells are.
     low, high = np.quantile(points[:: 1 + len(points) // 100000], [GRID_TAIL, 1 - GRID_TAIL], axis=0)
     inner = np.clip(points, 2 * low - high, 2 * high - low)
-    code = morton_codes(inner, 2**BITS - 1)
+    code = morton_codes(inner, 2**MORTON_BITS - 1)
     order = np.argsort(code, kind="stable")
     ordered = code[order]
     counts = [1]
     while counts[-1] < n:  # cells half as wide
-        if len(counts) > BITS:
+        if len(counts) > MORTON_BITS:
             return everybody(points)
-        counts.append(1 + np.count_nonzero(np.diff(ordered >> np.uint64(3 * (BITS - len(counts))))))
+        counts.append(1 + np.count_nonzero(np.diff(ordered >> np.uint64(3 * (MORTON_BITS - len(counts))))))
     wider = np.log(counts[-1] / n) / np.log(counts[-1] / counts[-2])
     code = morton_codes(inner, 2 ** (len(counts) - 1 - wider))[order]
     again = np.argsort(code, kind="stable")

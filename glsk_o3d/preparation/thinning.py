@@ -13,7 +13,7 @@ from .surface import Surface
 
 MOST_IN_ONE = 4  # fitted: points that one may stand for after a pass, where there are more than enough
 ASK_AGAIN = 0.25  # measured: share of the points left, below which the neighbours are looked up anew
-THIN_FROM, THIN_TO = 1000, 8192  # fitted: points from which on, and down to which, more than enough are merged
+DENSE_FROM, DENSE_TO = 1000, 8192  # fitted: points from which on, and down to which, more than enough are merged
 STEADY_SHARE = 0.9  # fitted: share of the points left by a pass at which passes end
 
 
@@ -38,26 +38,27 @@ def thin_surface(surface: Surface, around: float, most: int, k: Callable[[int], 
         Neighbours to have among so many points.
     """
     points, spread = surface.points, surface.spread
-    survivors, representative, neighbours = np.arange(len(points)), np.arange(len(points)), surface.neighbours
-
-    def merge(into: np.ndarray, kept: np.ndarray) -> Thinned:
-        rows, rank = survivors[kept], np.cumsum(kept) - 1
-        left = nearest_left(points[survivors], neighbours, kept, k(len(rows)))
-        return Thinned(rows, rank[into][representative], left)
-
-    while around and len(survivors) >= THIN_FROM:
-        into = thin_dense(points[survivors], neighbours, spread, around)
-        kept = into == np.arange(len(into))
-        if np.count_nonzero(kept) > STEADY_SHARE * len(into):
+    thinned = Thinned(np.arange(len(points)), np.arange(len(points)), surface.neighbours)
+    while around and len(thinned.survivors) >= DENSE_FROM:
+        representative = thin_dense(points[thinned.survivors], thinned.neighbours, spread, around)
+        if np.count_nonzero(representative == np.arange(len(representative))) > STEADY_SHARE * len(representative):
             break
-        survivors, representative, neighbours = merge(into, kept)
-        if len(survivors) < THIN_TO:
+        thinned = _merged(points, thinned, representative, k)
+        if len(thinned.survivors) < DENSE_TO:
             break
-        spread = principal(points[survivors], neighbours)[0]
-    if most < len(survivors):
-        into = thin(points[survivors], neighbours, most)
-        survivors, representative, neighbours = merge(into, into == np.arange(len(into)))
-    return Thinned(survivors, representative, neighbours)
+        spread = principal(points[thinned.survivors], thinned.neighbours)[0]
+    if most < len(thinned.survivors):
+        thinned = _merged(points, thinned, thin(points[thinned.survivors], thinned.neighbours, most), k)
+    return thinned
+
+
+def _merged(points: np.ndarray, thinned: Thinned, representative: np.ndarray, k: Callable[[int], int]) -> Thinned:
+    """What is left when survivors are merged into others."""
+    kept = representative == np.arange(len(representative))
+    rank = np.cumsum(kept) - 1
+    survivors = thinned.survivors[kept]
+    neighbours = nearest_left(points[thinned.survivors], thinned.neighbours, kept, k(len(survivors)))
+    return Thinned(survivors, rank[representative][thinned.representative], neighbours)
 
 
 def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:

@@ -15,6 +15,7 @@ SHEET_SHARE = 0.9  # of one direction among the normals around a vertex; a tube 
 BALL_SPREAD = 0.5
 # length of the evenly filled box with a part's spread, over the median distance to the surface; balls have 2 to 3
 STUB_LENGTH = 3.3
+MAJORITY = 0.5  # derived: of the points, from which on a cloud is called what they are
 LOW_CONFIDENCE = 0.1  # below which a vertex is not to be trusted
 LOW_CONFIDENCE_SHARE = 0.25  # of the points around such vertices that is worth a warning
 
@@ -35,7 +36,7 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     count = np.bincount(vertex, minlength=len(skeleton.vertices))
     one_way = np.linalg.eigvalsh(group_sum(along, vertex, len(count)))[:, 2] > SHEET_SHARE * np.maximum(count, 1)
     sheet = count[one_way].sum() / len(vertex)
-    if sheet > 0.5:
+    if sheet > MAJORITY:
         return [
             f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
             "so that a curve skeleton says little about it"
@@ -54,7 +55,7 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     spread = group_sum(np.column_stack([miss, distance]), component, n)
     ball = spread[:, 0] < BALL_SPREAD**2 * spread[:, 1]
     share = size[ball].sum() / len(vertex)
-    if share > 0.5:
+    if share > MAJORITY:
         return [
             f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
             "so that no curve skeleton is meaningful there"
@@ -64,7 +65,7 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread - mean[:, :, None] * mean[:, None])[:, 2], 0))
     reach = norm(skeleton.points[supporting] - skeleton.vertices[vertex])
     share = size[length < STUB_LENGTH * group_median(reach, component, n)].sum() / len(vertex)
-    if share > 0.5:
+    if share > MAJORITY:
         return [
             f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
             "so that no curve skeleton is meaningful there"

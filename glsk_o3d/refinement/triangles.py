@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from ..numerics.pairing import final_representatives
 from ..skeleton import Skeleton
 from .merging import merge_vertices, support
 
@@ -30,7 +31,7 @@ def collapse_triangles(skeleton: Skeleton) -> Skeleton:
 
     queue = [(*cost(a, b), a, b) for a, b in skeleton.edges.tolist() if around[a] & around[b]]
     heapq.heapify(queue)
-    into = list(range(len(position)))
+    representative = list(range(len(position)))
     while queue:
         *priced, a, b = heapq.heappop(queue)
         if b not in around[a] or not around[a] & around[b]:
@@ -38,7 +39,7 @@ def collapse_triangles(skeleton: Skeleton) -> Skeleton:
         if tuple(priced) != cost(a, b):
             heapq.heappush(queue, (*cost(a, b), a, b))
             continue
-        into[b] = a
+        representative[b] = a
         both = weight[a] + weight[b]
         position[a] = [(weight[a] * x + weight[b] * y) / both for x, y in zip(position[a], position[b], strict=True)]
         weight[a] = both
@@ -53,7 +54,4 @@ def collapse_triangles(skeleton: Skeleton) -> Skeleton:
             for d in around[c]:
                 if around[c] & around[d]:
                     heapq.heappush(queue, (*cost(c, d), c, d))
-    for v in range(len(into)):  # a vertex's target may have been merged on
-        while into[into[v]] != into[v]:
-            into[v] = into[into[v]]
-    return merge_vertices(skeleton, np.array(into, int))
+    return merge_vertices(skeleton, final_representatives(np.array(representative, int)))

@@ -152,7 +152,7 @@ def test_flat_rows_have_one_direction(tilt):
     assert (length[compared] == 1).mean() >= found.flat
 
 
-def test_the_astray_end_of_either_skeleton_counts(make):
+def test_the_aunsupported_end_of_either_skeleton_counts(make):
     def path(end):
         line = make(np.column_stack([np.linspace(0, end, 50), np.zeros((50, 2))]), np.arange(49)[:, None] + [0, 1])
         return replace(line, radii=np.full(50, 0.5))

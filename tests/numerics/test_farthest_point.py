@@ -15,14 +15,14 @@ def brute_force(points, radius, start=None):
     sample = start
     if sample is None:
         sample = int(np.argmax(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
-    nearest, owner, samples = np.full(len(points), np.inf), np.zeros(len(points), int), []
+    nearest, representative, samples = np.full(len(points), np.inf), np.zeros(len(points), int), []
     while nearest[sample] > 1:
         distance = np.linalg.norm(points - points[sample], axis=1) / radius[sample]
-        owner[distance < nearest] = len(samples)
+        representative[distance < nearest] = len(samples)
         nearest = np.minimum(nearest, distance)
         samples.append(sample)
         sample = int(np.argmax(nearest))
-    return samples, owner
+    return samples, representative
 
 
 def clouds():
@@ -41,22 +41,22 @@ def test_against_brute_force(name, points, size):
     reach = size * np.linalg.norm(np.ptp(points, axis=0))
     rng = np.random.default_rng(1)
     for radius in (np.full(len(points), reach), reach * rng.uniform(0.3, 3, len(points))):
-        samples, owner = farthest_point_sampling(points, radius)
+        samples, representative = farthest_point_sampling(points, radius)
         expected, expected_owner = brute_force(points, radius)
         assert samples.tolist() == expected
-        np.testing.assert_array_equal(owner, expected_owner)
+        np.testing.assert_array_equal(representative, expected_owner)
 
 
 @pytest.mark.parametrize(("name", "points"), list(clouds()))
 def test_balls_cover_and_centres_keep_apart(name, points):
     reach = 0.1 * np.linalg.norm(np.ptp(points, axis=0))
-    samples, owner = farthest_point_sampling(points, np.full(len(points), reach))
+    samples, representative = farthest_point_sampling(points, np.full(len(points), reach))
     distance = cdist(points, points[samples])
-    np.testing.assert_array_equal(distance[np.arange(len(points)), owner], distance.min(axis=1))
+    np.testing.assert_array_equal(distance[np.arange(len(points)), representative], distance.min(axis=1))
     assert distance.min(axis=1).max() <= reach
     between = cdist(points[samples], points[samples])
     assert between[~np.eye(len(samples), dtype=bool)].min(initial=np.inf) > reach
-    np.testing.assert_array_equal(owner[samples], np.arange(len(samples)))
+    np.testing.assert_array_equal(representative[samples], np.arange(len(samples)))
 
 
 @settings(max_examples=100)
@@ -64,12 +64,12 @@ def test_balls_cover_and_centres_keep_apart(name, points):
 def test_every_point_lies_in_the_ball_of_its_sample(points, data):
     radius = data.draw(arrays(float, len(points), elements=st.sampled_from([0.25, 0.5, 1.0, 2.0, 3.0])))
     start = data.draw(st.none() | st.integers(0, len(points) - 1))
-    samples, owner = farthest_point_sampling(points, radius, start)
+    samples, representative = farthest_point_sampling(points, radius, start)
     expected, expected_owner = brute_force(points, radius, start)
     assert samples.tolist() == expected
-    np.testing.assert_array_equal(owner, expected_owner)
+    np.testing.assert_array_equal(representative, expected_owner)
     distance = cdist(points, points[samples]) / radius[samples]
-    own = distance[np.arange(len(points)), owner]
+    own = distance[np.arange(len(points)), representative]
     assert (own <= 1).all()
     np.testing.assert_array_equal(own, distance.min(axis=1))
     assert start is None or samples[0] == start
@@ -79,23 +79,23 @@ def test_order_and_rotation_do_not_matter():
     rng = np.random.default_rng(2)
     points = rng.normal(size=(500, 3))
     radius = rng.uniform(0.3, 0.6, 500)
-    samples, owner = farthest_point_sampling(points, radius)
+    samples, representative = farthest_point_sampling(points, radius)
     order = rng.permutation(500)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     again, owner_again = farthest_point_sampling((points @ turn.T + 3)[order], radius[order])
     np.testing.assert_array_equal(order[again], samples)
-    np.testing.assert_array_equal(owner_again, owner[order])
+    np.testing.assert_array_equal(owner_again, representative[order])
 
 
 def test_one_point_and_one_place():
     for n in (1, 20):
-        samples, owner = farthest_point_sampling(np.ones((n, 3)), np.ones(n))
+        samples, representative = farthest_point_sampling(np.ones((n, 3)), np.ones(n))
         assert len(samples) == 1
-        assert (owner == 0).all()
+        assert (representative == 0).all()
 
 
 def test_tiny_radius_takes_every_distinct_point():
     points = np.random.default_rng(3).normal(size=(50, 3))
-    samples, owner = farthest_point_sampling(points, np.full(50, 1e-9))
+    samples, representative = farthest_point_sampling(points, np.full(50, 1e-9))
     assert sorted(samples.tolist()) == list(range(50))
-    np.testing.assert_array_equal(samples[owner], np.arange(50))
+    np.testing.assert_array_equal(samples[representative], np.arange(50))

@@ -48,7 +48,7 @@ def test_triangles_by_hand():
     assert sorted(rings.triangles.tolist()) == sorted(expected)
 
 
-def test_sizes_owners_and_rows(case):
+def test_sizes_centres_and_rows(case):
     lists, closed, rings = case
     assert lists_of(rings) == lists
     assert len(rings) == len(lists)

@@ -39,8 +39,8 @@ def tube(off=(0, 0), arc=2 * np.pi, m=20, around=24, along=200):
 def path(vertices, points, normals, closed=False):
     m = len(vertices)
     edges = [(i, i + 1) for i in range(m - 1)] + [(0, m - 1)] * closed
-    owner = cKDTree(vertices).query(points)[1]
-    return Skeleton(vertices, sorted(edges), np.full(m, R), owner, points, normals)
+    vertex = cKDTree(vertices).query(points)[1]
+    return Skeleton(vertices, sorted(edges), np.full(m, R), vertex, points, normals)
 
 
 def torus(big=0.4, small=0.1, m=48, shift=(0.03, 0.02)):
@@ -347,14 +347,14 @@ def test_a_vertex_without_edges_stays_and_has_no_confidence(place, own):
 def test_points_without_a_normal_or_a_vertex_have_no_say():
     raw = bent()
     rng = np.random.default_rng(5)
-    normals, owner, points = raw.normals.copy(), raw.vertex_of_point.copy(), raw.points.copy()
+    normals, vertex, points = raw.normals.copy(), raw.vertex_of_point.copy(), raw.points.copy()
     silent, lost = np.arange(0, 400), np.arange(400, 700)
-    normals[silent], owner[lost] = np.nan, -1
+    normals[silent], vertex[lost] = np.nan, -1
     points[:700] += rng.normal(size=(700, 3))
     rest = slice(700, None)
-    expected = fit_axis(replace(raw, points=points[rest], normals=normals[rest], vertex_of_point=owner[rest]), 3)
+    expected = fit_axis(replace(raw, points=points[rest], normals=normals[rest], vertex_of_point=vertex[rest]), 3)
     for got, wanted in zip(
-        fit_axis(replace(raw, points=points, normals=normals, vertex_of_point=owner), 3), expected, strict=True
+        fit_axis(replace(raw, points=points, normals=normals, vertex_of_point=vertex), 3), expected, strict=True
     ):
         np.testing.assert_allclose(got, wanted, atol=1e-12)
 

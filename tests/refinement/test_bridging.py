@@ -219,7 +219,7 @@ def test_goes_with_the_skeleton_and_keeps_a_forest(seed, scale):
 
 def tubes(*spans, radius=0.1):
     """A skeleton of tubes along x with their points, the curve in the axis."""
-    vertices, edges, owner, points, normals = [], [], [], [], []
+    vertices, edges, vertex, points, normals = [], [], [], [], []
     angle, m = np.arange(16) * np.pi / 8, 9
     out = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
     for start, stop in spans:
@@ -229,11 +229,11 @@ def tubes(*spans, radius=0.1):
         x = np.linspace(start, stop, 60)
         points.append((x[:, None, None] * [1, 0, 0] + radius * out).reshape(-1, 3))
         normals.append(np.tile(out, (60, 1)))
-        owner.append(first + np.repeat(np.rint((x - start) / (stop - start) * (m - 1)).astype(int), 16))
-    owner, points, normals = (np.concatenate(part) for part in (owner, points, normals))
+        vertex.append(first + np.repeat(np.rint((x - start) / (stop - start) * (m - 1)).astype(int), 16))
+    vertex, points, normals = (np.concatenate(part) for part in (vertex, points, normals))
     n = len(points)
     report = Report(n_input=n, n_distinct=n)
-    return Skeleton(vertices, edges, np.full(len(vertices), radius), owner, points, normals, report)
+    return Skeleton(vertices, edges, np.full(len(vertices), radius), vertex, points, normals, report)
 
 
 @pytest.mark.parametrize(

@@ -41,17 +41,17 @@ def tube(n=800):
 
 def skeleton_of(*shapes, joined=True):
     """Shapes side by side, each a component: a path over its vertices."""
-    vertices, edges, points, normals, owner = [], [], [], [], []
+    vertices, edges, points, normals, vertex = [], [], [], [], []
     for k, (p, n, v) in enumerate(shapes):
         first = len(vertices)
         nearest = np.linalg.norm(p[:, None] - np.array(v)[None], axis=2).argmin(axis=1)
-        owner.append(first + nearest)
+        vertex.append(first + nearest)
         vertices += (np.array(v) + [10 * k, 0, 0]).tolist()
         points.append(p + [10 * k, 0, 0])
         normals.append(n * np.random.default_rng(k).choice([-1, 1], (len(n), 1)))
         edges += [(i, i + 1) for i in range(first, len(vertices) - 1)] if joined else []
     return Skeleton(
-        vertices, edges, np.ones(len(vertices)), np.concatenate(owner), np.concatenate(points), np.concatenate(normals)
+        vertices, edges, np.ones(len(vertices)), np.concatenate(vertex), np.concatenate(points), np.concatenate(normals)
     )
 
 
@@ -122,10 +122,10 @@ def test_names_the_region_that_is_weakly_supported(size):
 def test_the_region_with_most_points_is_named():
     """Of two regions of a torus, the first has more vertices, but few of its points have a say."""
     skeleton = unsure([torus()], [0, 1, 2, 3, 6, 7, 8])
-    owner, normals = skeleton.vertex_of_point, skeleton.normals.copy()
-    normals[(owner < 4) & (np.arange(len(owner)) % 10 > 0)] = np.nan
+    vertex, normals = skeleton.vertex_of_point, skeleton.normals.copy()
+    normals[(vertex < 4) & (np.arange(len(vertex)) % 10 > 0)] = np.nan
     skeleton = replace(skeleton, normals=normals)
-    share = np.isin(owner[skeleton.supporting_points], [0, 1, 2, 3, 6, 7, 8]).mean()
+    share = np.isin(vertex[skeleton.supporting_points], [0, 1, 2, 3, 6, 7, 8]).mean()
     (message,) = diagnose(skeleton)
     assert message.startswith(f"weakly supported: around {share:.0%} of the points")
     reach, place = weak_place(message)

@@ -90,13 +90,13 @@ def test_zero_opening_keeps_all(ringed):
     assert close_loops(raw, 0) is raw
 
 
-def test_surface_distance_is_the_median_over_the_owned_witnesses(ringed):
+def test_surface_distance_is_the_median_over_the_owned_supporting_points(ringed):
     raw = ringed([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1), (1, 2)], per=5)
-    points, normals, owner = raw.points.copy(), raw.normals.copy(), raw.vertex_of_point.copy()
+    points, normals, vertex = raw.points.copy(), raw.normals.copy(), raw.vertex_of_point.copy()
     points[:5] = np.outer([1, 2, 3, 4, 100], [0, 0, 1])
     normals[4] = np.nan
-    owner[10:] = -1
-    skeleton = replace(raw, points=points, normals=normals, vertex_of_point=owner)
+    vertex[10:] = -1
+    skeleton = replace(raw, points=points, normals=normals, vertex_of_point=vertex)
     np.testing.assert_allclose(surface_distance(skeleton), [2.5, 0.1, 0])
 
 

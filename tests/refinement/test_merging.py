@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from glsk_o3d.refinement.merging import merge_vertices, support
 
 
-def test_support_counts_witnesses_and_is_at_least_one(ringed):
+def test_support_counts_supporting_points_and_is_at_least_one(ringed):
     raw = ringed([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1)], per=3)
     normals = raw.normals.copy()
     normals[[0, 1]] = np.nan  # set aside
-    owner = np.array([0, 0, 0, 1, 1, -1, 1, 1, 1])
-    skeleton = replace(raw, normals=normals, vertex_of_point=owner)
+    vertex = np.array([0, 0, 0, 1, 1, -1, 1, 1, 1])
+    skeleton = replace(raw, normals=normals, vertex_of_point=vertex)
     assert support(skeleton).tolist() == [1, 5, 1]
     assert support(skeleton).dtype == float
 

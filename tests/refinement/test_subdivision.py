@@ -91,8 +91,8 @@ def test_points_never_cross_to_a_strand_that_only_passes_by():
     x = np.tile(np.linspace(-1, 1, 400), 2)
     side = np.repeat([0, 1], 400)
     points, normals = np.column_stack([x, 0 * x + 0.05, 0 * x]), np.tile([0.0, 1, 0], (800, 1))
-    owner = 2 * side + (x > 0)
-    skeleton = subdivide_edges(Skeleton(vertices, [(0, 1), (2, 3)], np.full(4, 0.1), owner, points, normals), 1.0)
+    vertex = 2 * side + (x > 0)
+    skeleton = subdivide_edges(Skeleton(vertices, [(0, 1), (2, 3)], np.full(4, 0.1), vertex, points, normals), 1.0)
     assert len(skeleton.vertices) > 30
     np.testing.assert_array_equal(skeleton.vertices[skeleton.vertex_of_point, 1] > 0.05, side == 1)
     assert np.abs(skeleton.vertices[skeleton.vertex_of_point, 0] - points[:, 0]).max() < 0.051

@@ -349,7 +349,7 @@ def test_zero_keeps_all(torn, ringed):
         assert cut_weak_loops(raw, 0, 0) is raw
 
 
-def test_trees_and_skeletons_without_witnesses_are_left(ringed):
+def test_trees_and_skeletons_without_supporting_points_are_left(ringed):
     tree = sure(ringed(circle(9), ring_edges(9)[:-1]), 0)
     assert cut_weak_loops(tree, 9, 9) is tree
     ring = sure(ringed(circle(9), ring_edges(9)))
