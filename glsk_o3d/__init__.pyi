@@ -21,6 +21,7 @@ from .errors import (
     StageError,
 )
 from .interop.clouds import Cloud
+from .io.annotation import annotate_contraction
 from .io.clouds import read_cloud
 from .io.skeletons import read_skeleton, save_skeleton
 from .io.truth import read_truth
@@ -72,6 +73,7 @@ __all__ = [
     "SkeletonWarning",
     "StageError",
     "analysis",
+    "annotate_contraction",
     "batch",
     "crosscheck",
     "from_recipe",

@@ -150,12 +150,3 @@ class Contraction:
         from .interop.clouds import to_point_cloud
 
         return to_point_cloud(self.contracted)
-
-    def annotate(self, cloud: Any = None) -> Any:
-        """A copy of a cloud with the attribute ``contracted``.
-
-        See `glsk_o3d.io.annotation.annotate_contraction`.
-        """
-        from .io.annotation import annotate_contraction
-
-        return annotate_contraction(self, cloud)

@@ -23,14 +23,14 @@ ROWS = (
     {"refinement": ("refinement",), "pipeline": ("pipeline",)},
     {"what filters share": ("parameters", "state", "skeleton", "report")},
     {"preparation": ("preparation",)},
-    {"numerics": ("numerics",), "Open3D's clouds": ("interop",), "samples": ("samples",)},
+    {"numerics": ("numerics",), "other packages, and files": ("interop",), "samples": ("samples",)},
     {"errors": ("errors",)},
 )
 """Boxes by row, users above the used, and the modules and packages in each."""
 
 ASIDE = {
     **dict.fromkeys(("cross-check", "pictures and windows", "files", "analysis", "refinement", "numerics"), -3.3),
-    **{"MeshLab": 3.3, "preparation": -1.2, "Open3D's clouds": 1.2, "samples": 3.7},
+    **{"MeshLab": 3.3, "preparation": -1.2, "other packages, and files": 1.2, "samples": 3.7},
 }
 """Where in the drawing the boxes are that are not in its middle."""
 
@@ -45,7 +45,6 @@ COMFORTS = {
     "skeleton.Skeleton.to_pymeshlab": ("meshlab",),
     "skeleton.Skeleton.to_tensor_line_set": ("io.line_sets",),
     "skeleton.Skeleton.to_tubes": ("io.tubes",),
-    "state.Contraction.annotate": ("io.annotation",),
 }
 """The only imports that go up: by method, what it fetches when it is called. Comforts for users, used by no filter."""
 

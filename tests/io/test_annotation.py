@@ -5,7 +5,7 @@ import open3d as o3d
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, samples
+from glsk_o3d import InvalidParameterError, annotate_contraction, samples
 
 POINTS = samples.y_junction(800).points
 RNG = np.random.default_rng(1)
@@ -61,7 +61,7 @@ def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton, state)
     np.testing.assert_array_equal(annotated["branch"][:, 0], skeleton.segment())
     np.testing.assert_array_equal(annotated["radius"][:, 0], skeleton.radii[skeleton.vertex_of_point].astype(kind))
 
-    contracted = held(state.annotate(skeleton.annotate(cloud)))
+    contracted = held(annotate_contraction(state, skeleton.annotate(cloud)))
     assert contracted.keys() - annotated.keys() == {"contracted"}
     assert contracted["contracted"].dtype == kind
     np.testing.assert_array_equal(contracted["contracted"], state.contracted[state.survivor_of_point].astype(kind))
@@ -70,7 +70,7 @@ def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton, state)
 
 
 def test_through_selections_and_sampling(cloud, skeleton, state):
-    annotated = state.annotate(skeleton.annotate(cloud))
+    annotated = annotate_contraction(state, skeleton.annotate(cloud))
     everything = held(annotated)
     mask = everything["branch"][:, 0] == 1
     assert_equal(held(annotated.select_by_mask(o3d.core.Tensor(mask))), {n: v[mask] for n, v in everything.items()})
@@ -94,7 +94,7 @@ def test_through_files(cloud, skeleton, tmp_path, ending):
 
 
 def test_contracted_positions_through_files(cloud, state, tmp_path):
-    annotated = state.annotate(cloud)
+    annotated = annotate_contraction(state, cloud)
     for ending in ("npz", "ply"):
         assert o3d.t.io.write_point_cloud(str(tmp_path / f"cloud.{ending}"), annotated)
     back = o3d.t.io.read_point_cloud(str(tmp_path / "cloud.npz"))
@@ -136,10 +136,12 @@ def test_whole_numbers_and_points_that_are_not_finite():
     assert annotated.point.radius.dtype == o3d.core.float64
     points[7] = np.nan
     state = (glsk.RingBuilder(drop_invalid=True) | glsk.Contractor())(points)
-    assert np.isnan(state.annotate(points).point.contracted.numpy()[7]).all()
-    assert np.isfinite(np.delete(state.annotate().point.contracted.numpy(), 7, axis=0)).all()
-    moved = state.annotate(np.r_[points[:3] + 0.1, [[np.inf] * 3]]).point.contracted.numpy()
-    np.testing.assert_array_equal(moved, np.r_[state.annotate().point.contracted.numpy()[:3], [[np.nan] * 3]])
+    assert np.isnan(annotate_contraction(state, points).point.contracted.numpy()[7]).all()
+    assert np.isfinite(np.delete(annotate_contraction(state).point.contracted.numpy(), 7, axis=0)).all()
+    moved = annotate_contraction(state, np.r_[points[:3] + 0.1, [[np.inf] * 3]]).point.contracted.numpy()
+    np.testing.assert_array_equal(
+        moved, np.r_[annotate_contraction(state).point.contracted.numpy()[:3], [[np.nan] * 3]]
+    )
     annotated = (glsk.Connector() | glsk.Refiner())(state).annotate(points, color="radius")
     assert annotated.point.branch.numpy()[7] == annotated.point.skeleton_vertex.numpy()[7] == -1
     assert np.isnan(annotated.point.radius.numpy()[7])
