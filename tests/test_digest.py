@@ -5,6 +5,8 @@ import json
 import pytest
 from typer.testing import CliRunner
 
+from glsk_o3d.samples import SAMPLES
+
 
 @pytest.fixture(scope="module")
 def call(benchmark, tmp_path_factory):
@@ -31,16 +33,16 @@ def made(call, tmp_path_factory):
 
 def test_every_sample_and_pipeline_has_one(made):
     told = json.loads(made.read_text())["samples"]
-    assert [*told] == [f"{name} 64" for name in ("helix", "sauropod", "torus", "tube", "two_rings", "y_junction")]
+    assert [*told] == [f"{name} 64" for name in sorted(SAMPLES)]
     digests = [digest for each in told.values() for digest in each.values()]
-    assert len({*digests}) == len(digests) == 18
+    assert len({*digests}) == len(digests) == 3 * len(SAMPLES)
     assert all(len(digest) == 16 and int(digest, 16) >= 0 for digest in digests)
 
 
 def test_identical(call, made):
     code, printed = call("compare", made)
     assert code == 0
-    assert printed.split()[-5:] == ["samples", "6", "6", "6", "6"]
+    assert printed.split()[-5:] == ["samples", "8", "8", "8", "8"]
 
 
 def test_what_differs_is_said(call, made, tmp_path):
@@ -57,7 +59,7 @@ def test_what_differs_is_said(call, made, tmp_path):
     lines = [line.strip() for line in printed.splitlines()]
     assert [line.split() for line in lines if line.startswith(("data", "samples"))] == [
         ["data", "1", "0", "0", "0"],
-        ["samples", "6", "5", "4", "5"],
+        ["samples", "8", "7", "6", "7"],
     ]
     differs = [line for line in lines if line.startswith("differs: ")]
     assert len(differs) == 7
