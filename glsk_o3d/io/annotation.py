@@ -90,6 +90,14 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
     -----
     Open3D writes the attribute to npz as it is, to PLY as three columns ``contracted_0`` to ``contracted_2``, and not
     to PCD.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Contractor, RingBuilder
+    >>> from glsk_o3d.samples import torus
+    >>> state = (RingBuilder() | Contractor())(torus(500).points)
+    >>> annotate_contraction(state).point.contracted.shape
+    SizeVector[500, 3]
     """
     points = state.points if cloud is None else cloud_points(cloud)
     survivor = label_of_nearest(state.points, state.survivor_of_point, points)
