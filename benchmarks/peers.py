@@ -29,7 +29,7 @@ from _peers import PEERS, Peer
 from glsk_o3d import plot_skeleton
 from glsk_o3d.analysis import compare
 from glsk_o3d.analysis.graph import simple_edges
-from glsk_o3d.interop.writing import write_atomically
+from glsk_o3d.interop.atomic import write_atomically
 from glsk_o3d.skeleton import Skeleton
 
 EVERY = "clean_4096,noise1_4096,scan2_4096,outliers_4096"

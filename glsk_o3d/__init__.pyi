@@ -22,9 +22,9 @@ from .errors import (
 )
 from .interop.clouds import Cloud
 from .io.annotation import annotate_contraction
-from .io.clouds import read_cloud
+from .io.axes import read_truth
+from .io.scans import read_cloud
 from .io.skeletons import read_skeleton, save_skeleton
-from .io.truth import read_truth
 from .lpr_reducer import LPRReducer
 from .meshlab.meshset import MeshSet
 from .pipeline import Filter, Pipeline

@@ -9,7 +9,7 @@ from _common.command_line import PUBLISHED
 from _common.results import pick, summary
 from _common.tables import Tables, number
 
-from glsk_o3d.interop.writing import write_atomically
+from glsk_o3d.interop.atomic import write_atomically
 
 from .measuring import by_pipeline, by_variant
 

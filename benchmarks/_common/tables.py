@@ -13,7 +13,7 @@ from rich import table as rich_table
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 
-from glsk_o3d.interop.writing import write_atomically
+from glsk_o3d.interop.atomic import write_atomically
 
 Table = tuple[str, list[str], list[list[str]]]  # title, header, lines
 Tables = list[Table]

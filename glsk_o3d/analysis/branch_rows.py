@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..interop.writing import write_csv
+from ..interop.atomic import write_csv
 
 PRINTED_ROWS = 20  # at most; fitted to a screen
 PRINTED_COLUMNS = {  # format, of the columns that are read by people

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ..interop.atomic import write_csv, write_json
 from ..interop.packages import import_open3d, require
-from ..interop.writing import write_csv, write_json
 
 GRIPPER_STEM = 0.5  # fitted to the eye: length of the drawn gripper behind its palm, over its opening
 _GRASP_VECTORS, _GRASP_NUMBERS = ("position", "approach", "closing"), ("opening", "branch", "confidence", "quality")

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import BatchError
-from ..interop.writing import write_atomically, write_csv
+from ..interop.atomic import write_atomically, write_csv
 
 try:
     import fcntl

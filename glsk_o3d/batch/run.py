@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..errors import BatchError, InvalidParameterError
+from ..interop.atomic import write_json
 from ..interop.interrupts import counted_interrupts
-from ..interop.writing import write_json
 from ..numerics.cores import cores
 from .ledger import DONE, FAILED, LEDGER_COLUMNS, STALE, Row, locked
 from .plan import RECIPE_FILE, UP_TO_DATE, Plan, Task, plan_batch

@@ -20,7 +20,7 @@ from typing import Any
 from .. import __version__
 from ..analysis.summary import summary
 from ..errors import GlskError
-from ..io.clouds import read_cloud
+from ..io.scans import read_cloud
 from ..recipes import from_recipe
 from ..viewing.preview import save_preview
 from .ledger import DONE, FAILED, Row, file_hash

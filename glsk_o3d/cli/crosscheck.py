@@ -59,9 +59,9 @@ def crosscheck(
         from ..crosscheck.surfaces import SURFACES
         from ..crosscheck.verdict import UNTOLD
         from ..errors import InvalidCloudError, did_you_mean
-        from ..interop.writing import write_json
-        from ..io.clouds import read_cloud
+        from ..interop.atomic import write_json
         from ..io.meshes import read_mesh
+        from ..io.scans import read_cloud
         from ..viewing.preview import printable
         from .outputs import PICTURE_FILE, REPORT_FILE, check_findings
         from .overrides import choose

@@ -31,8 +31,8 @@ def demo(
     """
     with reporting(quiet=quiet, verbose=verbose):
         from ..errors import MissingPackageError
+        from ..interop.atomic import write_atomically
         from ..interop.packages import require_for
-        from ..interop.writing import write_atomically
         from ..recipes.catalogue import named_pipeline
         from ..samples import sample_object
         from .outputs import check_writable, write

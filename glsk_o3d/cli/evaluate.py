@@ -65,11 +65,11 @@ def evaluate(
     how far is it from the true axis.
     """
     with reporting(cloud, quiet=quiet, verbose=verbose):
+        from ..interop.atomic import write_json
         from ..interop.clouds import cloud_points
-        from ..interop.writing import write_json
-        from ..io.clouds import read_cloud
+        from ..io.axes import read_truth
+        from ..io.scans import read_cloud
         from ..io.skeletons import read_skeleton
-        from ..io.truth import read_truth
         from .outputs import PICTURE_FILE, REPORT_FILE, check_findings
 
         files = [path for path in (output, preview) if path is not None]

@@ -26,7 +26,7 @@ def info(
 ) -> None:
     """Say what is in a cloud or skeleton file."""
     with reporting(quiet=quiet, verbose=verbose):
-        from ..io.clouds import read_scan
+        from ..io.scans import read_scan
         from ..io.skeletons import holds_skeleton, read_skeleton
 
         if holds_skeleton(file):

@@ -37,7 +37,7 @@ def rerun(
     """
     with reporting(scan or result, quiet=quiet, verbose=verbose):
         from ..errors import RecipeError
-        from ..io.clouds import read_cloud
+        from ..io.scans import read_cloud
         from ..io.skeletons import read_skeleton
         from ..recipes import identical
         from ..recipes import rerun as run_again

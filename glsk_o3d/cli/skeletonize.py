@@ -53,7 +53,7 @@ def skeletonize(
     Everything that can be checked is checked before the computation starts. Files appear complete or not at all.
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
-        from ..io.clouds import read_cloud
+        from ..io.scans import read_cloud
         from ..recipes import save_recipe as write_recipe
         from ..recipes import to_recipe
         from ..recipes.writing import recipe_ending

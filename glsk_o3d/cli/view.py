@@ -32,7 +32,7 @@ def view(
     with reporting(quiet=quiet, verbose=verbose):
         import numpy as np
 
-        from ..io.clouds import read_cloud
+        from ..io.scans import read_cloud
         from ..io.skeletons import holds_skeleton, read_skeleton
         from ..skeleton import Skeleton
         from ..viewing.window import show

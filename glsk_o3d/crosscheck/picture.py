@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..interop.writing import check_ending
+from ..interop.atomic import check_ending
 from ..viewing.preview import INK, MOST_DRAWN_POINTS, colour_bar, new_figure, printable, room, save_figure, three_views
 
 if TYPE_CHECKING:

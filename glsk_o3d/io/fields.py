@@ -10,7 +10,7 @@ import numpy as np
 
 from ..report import Report
 from ..skeleton import Skeleton
-from .graph import checked
+from .graphs import checked
 
 FORMAT, FORMAT_VERSION = "glsk-o3d skeleton", 1
 ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..interop.packages import require
 from ..skeleton import Skeleton
-from .graph import graph_skeleton
+from .graphs import graph_skeleton
 
 _KEYS = ("x", "y", "z", "radius")
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import FileFormatError, InvalidParameterError
 from ..interop.packages import import_open3d
-from .clouds import check_scan
 from .paths import MESH_ENDINGS
+from .scans import check_scan
 
 
 def read_mesh(path: str | os.PathLike) -> Any:

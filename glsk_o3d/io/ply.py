@@ -13,7 +13,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 
 from ..skeleton import Skeleton
-from .graph import NoEdges, graph_skeleton
+from .graphs import NoEdges, graph_skeleton
 
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _KINDS = {

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..skeleton import Skeleton
-from .graph import graph_skeleton
+from .graphs import graph_skeleton
 from .text import line, text, words_by_line
 
 

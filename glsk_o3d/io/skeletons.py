@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Protocol
 
 from ..errors import FileFormatError, MissingPackageError
-from ..interop.writing import write_atomically
+from ..interop.atomic import write_atomically
 from ..skeleton import Skeleton
 from . import graphml, json, npz, obj, ply, polylines, swc
-from .graph import NoEdges
+from .graphs import NoEdges
 from .paths import CLOUD_ENDINGS, MESH_ENDINGS, existing_file, unknown_ending
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import FileFormatError
 from ..skeleton import Skeleton
-from .graph import graph_skeleton
+from .graphs import graph_skeleton
 from .text import line, text, words_by_line
 
 

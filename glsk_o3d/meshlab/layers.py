@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileFormatError
+from ..interop.atomic import write_atomically
 from ..interop.clouds import cloud_points
 from ..interop.packages import import_open3d, require
-from ..interop.writing import write_atomically
-from ..io.clouds import check_scan, read_scan
-from ..io.graph import graph_skeleton
+from ..io.graphs import graph_skeleton
 from ..io.ply import ply_elements
+from ..io.scans import check_scan, read_scan
 from ..io.skeletons import read_skeleton, save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
 from ..state import Contraction

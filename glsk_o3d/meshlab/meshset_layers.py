@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
+from ..interop.atomic import write_atomically
 from ..interop.packages import require
-from ..interop.writing import write_atomically
-from ..io.clouds import check_scan
 from ..io.paths import CLOUD_ENDINGS, MESH_ENDINGS
+from ..io.scans import check_scan
 from ..io.skeletons import save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
 from .layers import Layer

@@ -24,7 +24,7 @@ from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
 from ..errors import FileFormatError, ScriptError
-from ..interop.writing import write_atomically
+from ..interop.atomic import write_atomically
 
 MOST_BYTES, LONGEST_NAME = 1 << 20, 200
 _ELEMENTS = ("FilterScript", "filter", "Param")  # by depth

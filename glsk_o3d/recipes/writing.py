@@ -12,7 +12,7 @@ from typing import Any
 import tomli_w
 
 from ..errors import RecipeError
-from ..interop.writing import write_atomically
+from ..interop.atomic import write_atomically
 from ..parameters import UNWRITTEN, Parameters
 from ..pipeline import Pipeline, recipe_of
 from .catalogue import find

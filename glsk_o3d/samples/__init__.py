@@ -13,10 +13,10 @@ Sample('sauropod', 2000 points, 54 nodes, 54 edges)
 
 from .by_name import SAMPLES, sample_object
 from .capsules import signed_distance
-from .rings import torus, two_rings
 from .sample import Sample
 from .sauropod import TWO_CAMERAS, sauropod
 from .shapes import helix, sheet, sphere, tube, y_junction
+from .tori import torus, two_rings
 
 __all__ = [
     "SAMPLES",

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..errors import InvalidParameterError
-from .rings import torus, two_rings
 from .sample import Sample
 from .sauropod import sauropod
 from .shapes import helix, sheet, sphere, tube, y_junction
+from .tori import torus, two_rings
 
 SAMPLES: dict[str, Callable[..., Sample]] = {
     shape.__name__: shape for shape in (sauropod, tube, torus, helix, y_junction, two_rings, sphere, sheet)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InvalidParameterError
-from ..interop.writing import check_ending
+from ..interop.atomic import check_ending
 from . import preview
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..analysis.segmentation import branch_of_edge, branch_of_point, branch_of_vertex
 from ..errors import InvalidParameterError
+from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
-from ..interop.writing import check_ending, write_atomically
 from . import html as sections
 from .notebook import picture
 from .recorder import MOST_RECORDED_POINTS, ContractionRecorder, thinned

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
-from ..interop.writing import check_ending, write_atomically
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton

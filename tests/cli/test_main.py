@@ -143,7 +143,7 @@ def test_ctrl_c(refused, scans, monkeypatch):
 
 
 def test_ctrl_c_while_open3d_loads(refused, scans, monkeypatch):
-    import glsk_o3d.io.clouds as clouds
+    import glsk_o3d.io.scans as clouds
 
     def slow(path):
         signal.raise_signal(signal.SIGINT)

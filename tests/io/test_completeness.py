@@ -3,7 +3,7 @@
 import pytest
 
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io.clouds import read_cloud
+from glsk_o3d.io.scans import read_cloud
 
 PLY = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
 

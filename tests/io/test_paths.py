@@ -1,7 +1,7 @@
 import pytest
 
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io.clouds import read_cloud
+from glsk_o3d.io.scans import read_cloud
 from glsk_o3d.io.skeletons import read_skeleton
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from glsk_o3d.io.graph import graph_skeleton
+from glsk_o3d.io.graphs import graph_skeleton
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 

@@ -6,7 +6,7 @@ import stat
 import pytest
 
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.interop.writing import check_ending, write_atomically, write_json
+from glsk_o3d.interop.atomic import check_ending, write_atomically, write_json
 
 
 def test_interrupted_write_leaves_nothing(tmp_path):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io.clouds import read_cloud, read_scan
 from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
+from glsk_o3d.io.scans import read_cloud, read_scan
 from glsk_o3d.io.skeletons import FORMATS
 
 
