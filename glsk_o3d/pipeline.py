@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageError, did_you_mean
 from .interop.clouds import Cloud, cloud_points
 from .interop.verbosity import following_open3d
-from .parameters import TYPES, UNWRITTEN, Parameters
+from .parameters import UNWRITTEN, Parameters
 from .report import STOPPED_BY_CALLER, IterationRecord, Report
 from .skeleton import Skeleton
 from .state import Contraction
@@ -77,7 +77,9 @@ class Filter(Parameters, Generic[Produced]):
         """
         self.check()
         if not _is_of(data, self.consumes):
-            raise StageError(f"{type(self).__name__} takes a {_named(self.consumes)}, not a {_called(data)}: {ORDER}")
+            raise StageError(
+                f"{type(self).__name__} takes a {_named(self.consumes)}, not a {type(data).__name__}: {ORDER}"
+            )
         start = time.perf_counter()
         with following_open3d():
             result = self._ran(data, _watch(on_iteration, on_state))
@@ -85,7 +87,7 @@ class Filter(Parameters, Generic[Produced]):
             _log.debug("%s took %.3f s: %r", type(self).__name__, seconds, result)
         if result is None or not _is_of(result, self.produces):
             raise StageError(
-                f"{type(self).__name__} should give a {_named(self.produces)} and gave a {_called(result)}"
+                f"{type(self).__name__} should give a {_named(self.produces)} and gave a {type(result).__name__}"
             )
         if self.produces is Cloud:
             try:
@@ -223,26 +225,27 @@ class Pipeline(Generic[Produced]):
         (12, None, '2%')
         """
         pipeline: Any = self
-        left = [*(options or {}).items(), *named.items()]
         told: dict[tuple[type[Parameters], str], str] = {}
         # reducers and rules first: what is put in has parameters that others may change
-        for kinds in (("reducer", "stop"), TYPES):
-            for name, value in list(left):
-                try:
-                    cls, field = pipeline.class_of_option(name)
-                except InvalidParameterError:
-                    if kinds is TYPES:
-                        raise
-                    continue
-                if str(field.metadata["type"]).rstrip("?") not in kinds:
-                    continue
-                if (cls, field.name) in told:
-                    raise InvalidParameterError(f"{told[cls, field.name]} and {name} are one option: give it once")
-                told[cls, field.name] = name
-                pipeline = _changed(pipeline, cls, field.name, value)
-                left.remove((name, value))
+        given = [*(options or {}).items(), *named.items()]
+        for name, value in sorted(
+            given, key=lambda option: not (isinstance(option[1], Parameters) or self._puts_in(option[0]))
+        ):
+            cls, field = pipeline.class_of_option(name)
+            if (cls, field.name) in told:
+                raise InvalidParameterError(f"{told[cls, field.name]} and {name} are one option: give it once")
+            told[cls, field.name] = name
+            pipeline = _changed(pipeline, cls, field.name, value)
         pipeline.check()
         return pipeline
+
+    def _puts_in(self, name: str) -> bool:
+        """Whether an option has a reducer or a stopping rule for its value."""
+        try:
+            _, field = self.class_of_option(name)
+        except InvalidParameterError:  # perhaps of a part that is put in
+            return False
+        return field.metadata["type"].rstrip("?") in ("reducer", "stop")
 
     def class_of_option(self, name: str) -> tuple[type[Parameters], dataclasses.Field[Any]]:
         """The class and the field that the name of an option means.
@@ -398,10 +401,6 @@ def _is_of(data: Any, flow: type) -> bool:
 
 def _named(flow: type) -> str:
     return "cloud" if flow is Cloud else getattr(flow, "__name__", repr(flow))
-
-
-def _called(data: Any) -> str:
-    return type(data).__name__
 
 
 def _watch(on_iteration: OnIteration | None, on_state: OnState | None) -> Watch | None:

@@ -65,8 +65,9 @@ def fit_axis(skeleton: Skeleton, passes: int) -> Skeleton:
         return replace(skeleton, confidence=np.zeros(m), radii=_plane_radii(skeleton, skeleton.vertices))
     centre = skeleton.vertices.mean(axis=0)
     x, p, n = skeleton.vertices - centre, skeleton.points[points] - centre, skeleton.normals.take(points, axis=0)
-    around = incident_edges(ends, m)[skeleton.vertex_of_point[points]]
-    pattern = _Pattern.of(skeleton)
+    edges_at = incident_edges(ends, m)
+    around = edges_at[skeleton.vertex_of_point[points]]
+    pattern = _Pattern(skeleton, edges_at)
     far = np.sqrt(dot(p, p).max())
     for step in range(passes):
         near = _nearest(x, ends, around, p, n)
@@ -218,21 +219,16 @@ def _solve(
 class _Pattern:
     """Where the blocks of `_solve` stand in its system: for both ends of edges, vertices, and these with two beside."""
 
-    def __init__(self, m: int, ends: np.ndarray, inner: np.ndarray, beside: np.ndarray) -> None:
-        self.ends, self.inner, self.beside = ends, inner, beside
-        (a, b), every, stencil = ends.T, np.arange(m), np.column_stack([inner, beside])
+    def __init__(self, skeleton: Skeleton, edges_at: np.ndarray) -> None:
+        m, self.ends, self.inner = len(skeleton.vertices), skeleton.edges, np.flatnonzero(skeleton.degree == 2)
+        # the other end of either edge
+        self.beside = self.ends[edges_at[self.inner, :2]].sum(axis=2) - self.inner[:, None]
+        (a, b), every, stencil = self.ends.T, np.arange(m), np.column_stack([self.inner, self.beside])
         rows = np.concatenate([a, a, b, b, every, np.repeat(stencil, 3, axis=1).ravel()])
         columns = np.concatenate([a, b, a, b, every, np.tile(stencil, 3).ravel()])
         places, self._place = np.unique(rows * m + columns, return_inverse=True)
         self._columns = places % m
         self._starts = np.searchsorted(places, m * np.arange(m + 1))
-
-    @classmethod
-    def of(cls, skeleton: Skeleton) -> _Pattern:
-        """That of the edges of a skeleton."""
-        m, ends, inner = len(skeleton.vertices), skeleton.edges, np.flatnonzero(skeleton.degree == 2)
-        beside = ends[incident_edges(ends, m)[inner, :2]].sum(axis=2) - inner[:, None]  # the other end of either edge
-        return cls(m, ends, inner, beside)
 
     def matrix(self, blocks: np.ndarray) -> csc_array:
         """The symmetric matrix that has the sum of the blocks, (b, 3, 3), in every place."""
