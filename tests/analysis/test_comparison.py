@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from glsk_o3d.analysis import Truth, compare
+from glsk_o3d.analysis.matching import matching_f1, merged_junctions
+from glsk_o3d.pipelines import cao2010, default, wen2024
 from glsk_o3d.samples import helix, sample_object, sphere, torus, tube, two_rings, y_junction
 from glsk_o3d.skeleton import Skeleton
 
@@ -22,7 +24,9 @@ def test_the_axis_itself(make, axis_of):
     assert same.ends == (None if make in (torus, two_rings) else 0)
     assert same.radius_error < 1e-12
     assert (same.components, same.loops, same.leaves, same.junctions) == (0, 0, 0, 0)
-    assert same.topology is True
+    assert same.length == pytest.approx(1, rel=1e-12)
+    assert (same.tips_f1, same.junctions_f1) == (1, 1)
+    assert same.topology is same.perfect is True
     assert same.edge_error.shape == (len(sample.edges),)
 
 
@@ -42,6 +46,8 @@ def test_half_of_the_axis(curve):
     assert found.completeness == pytest.approx(0.5 + 0.01 / 4, abs=0.001 / 4)  # and one radius more
     assert (found.error, found.inside) == (pytest.approx(0, abs=1e-12), 1)
     assert found.ends == pytest.approx((0 + 2 / 0.01) / 2)
+    assert found.length == pytest.approx(0.5)
+    assert (found.tips_f1, found.topology, found.perfect) == (0.5, True, False)
 
 
 def test_errors_are_in_the_radius_nearby(curve):
@@ -68,13 +74,15 @@ def test_structure_is_counted(ring, curve):
     assert not twice.topology
     hair = compare(curve([*ring.nodes, [0.5, 0, 0]], [*ring.edges.tolist(), [0, len(ring.nodes)]]), ring)
     assert (hair.leaves, hair.junctions, hair.topology) == (1, 1, True)
+    assert (hair.tips_f1, hair.junctions_f1, hair.perfect) == (0, 0, False)  # the axis has neither
 
 
 def test_a_ball_has_one_node(curve):
     ball = sphere(100, radius=0.5)
     found = compare(curve([[0.1, 0, 0]], np.empty((0, 2), int)), ball)
     assert (found.error, found.inside, found.completeness) == (pytest.approx(0.2), 1, 1)
-    assert (found.ends, found.topology, found.edge_error.shape) == (None, True, (0,))
+    assert (found.ends, found.length, found.topology, found.edge_error.shape) == (None, None, True, (0,))
+    assert (found.tips_f1, found.junctions_f1, found.perfect) == (1, 1, True)
 
 
 def test_a_skeleton_without_leaves_ends_at_its_nearest_vertex(ring, axis_of):
@@ -93,30 +101,155 @@ def test_units_and_places_do_not_matter(scale, curve):
     assert expected["error"] > 0.05
 
 
-@pytest.mark.parametrize("name", ["bent_tube", "double_torus", "ladder", "quadruped", "sphere", "tree2", "two"])
-def test_agrees_with_the_yardstick(shared_dir, name, curve):
+@pytest.fixture(scope="session")
+def yardstick(shared_dir):
     spec = importlib.util.spec_from_file_location("yardstick", shared_dir / "score.py")
-    spec.loader.exec_module(yardstick := importlib.util.module_from_spec(spec))
-    if name == "two":
-        sample = two_rings(100)
-        truth = {key: getattr(sample, key) for key in ("nodes", "edges", "radii")}
-    else:
+    spec.loader.exec_module(module := importlib.util.module_from_spec(spec))
+    return module
+
+
+def agree(yardstick, skeleton, axis):
+    """Check that the yardstick gives the same numbers; what has none is left out here and NaN there."""
+    given = {key: getattr(axis, key) for key in ("nodes", "edges", "radii")}
+    expected = yardstick.score(given, skeleton.vertices, skeleton.edges)
+    found = compare(skeleton, axis).as_dict()
+    del found["radius_error"]
+    missing = {key for key, value in found.items() if value is None}
+    assert missing <= {"ends", "length"}
+    assert missing == found.keys() - {key for key, value in expected.items() if not np.isnan(value)}
+    known = found.keys() - missing
+    assert expected.keys() - {"length"} <= known
+    found, expected = ({key: its[key] for key in known} for its in (found, expected))
+    assert found == pytest.approx(expected, abs=1e-12, rel=1e-12)
+
+
+SHAPES = [
+    "bent_tube",
+    "comb",
+    "double_torus",
+    "figure",
+    "ladder",
+    "linked_rings",
+    "quadruped",
+    "sphere",
+    "tree2",
+    "two",
+]
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_agrees_with_the_yardstick(shared_dir, yardstick, name, curve):
+    axis = two_rings(100)
+    if name != "two":
         with np.load(shared_dir / "truth" / f"{name}.npz") as file:
-            truth = {key: file[key] for key in ("nodes", "edges", "radii")}
-    rng = np.random.default_rng(0)
-    for noise in (0, 0.3, 2):
-        vertices = truth["nodes"] + noise * truth["radii"][:, None] * rng.normal(size=truth["nodes"].shape)
-        edges = truth["edges"][rng.random(len(truth["edges"])) < 0.95]
-        expected = yardstick.score(truth, vertices, edges)
-        found = compare(curve(vertices, edges), SimpleNamespace(**truth)).as_dict()
-        assert found.pop("radius_error") is None
-        assert found.keys() - expected.keys() == ({"ends"} if found["ends"] is None else set())
-        shared = found.keys() & expected.keys()
-        found, expected = ({key: its[key] for key in shared} for its in (found, expected))
-        assert found == pytest.approx(expected, abs=1e-12, rel=1e-12)
+            axis = SimpleNamespace(**{key: file[key] for key in ("nodes", "edges", "radii")})
+    n, rng = len(axis.nodes), np.random.default_rng(0)
+    for noise in (0, 0.3, 1, 2):
+        vertices = axis.nodes + noise * axis.radii[:, None] * rng.normal(size=(n, 3))
+        agree(yardstick, curve(vertices, axis.edges[rng.random(len(axis.edges)) < 0.95]), axis)
+        # spurs of random length on a third of the vertices: leaves and clusters of junctions
+        roots = rng.permutation(n)[: n // 3]
+        spurs = vertices[roots] + rng.normal(size=(len(roots), 3)) * axis.radii[roots, None]
+        edges = np.concatenate([axis.edges, np.column_stack([roots, n + np.arange(len(roots))])])
+        agree(yardstick, curve(np.concatenate([vertices, spurs]), edges), axis)
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.errors.SkeletonWarning")  # bad ones are welcome
+@pytest.mark.parametrize("make", [torus, y_junction, two_rings, sample_object])
+def test_agrees_with_the_yardstick_on_what_pipelines_make(yardstick, make):
+    sample = make(1024)
+    for pipeline in (wen2024(), cao2010(), default()):
+        agree(yardstick, pipeline(sample.points), sample)
 
 
 def test_without_radii_there_is_no_radius_error(ring):
     axis = Skeleton(ring.nodes, ring.edges, (), (), (), ())
     found = compare(axis, ring)
     assert (found.error, found.radius_error) == (pytest.approx(0, abs=1e-12), None)
+
+
+# ----------------------------------------------------------------------------------------------------- tips, junctions
+
+
+@pytest.mark.parametrize(("shift", "share"), [(0, 1), (2.4, 1), (2.6, 0)])
+def test_tips_are_met_within_two_and_a_half_radii(shift, share, axis_of):
+    sample = tube(100, radius=0.1)
+    found = compare(axis_of(sample, shift=[0.1 * shift, 0, 0]), sample)
+    assert (found.tips_f1, found.perfect) == (share, share == 1)
+
+
+def test_a_tip_reaches_as_far_as_it_is_thick(curve):
+    cone = Truth([[0, 0, 0], [4, 0, 0]], [[0, 1]], [0.1, 0.3])
+    assert compare(curve([[0.3, 0, 0], [3.3, 0, 0]]), cone).tips_f1 == 0.5  # three and seven thirds of the radius there
+
+
+def test_each_tip_is_met_once(curve):
+    pipe = Truth([[0, 0, 0], [4, 0, 0]], [[0, 1]], [0.1, 0.1])
+    forked = curve([[0, 0, 0], [3.8, 0, 0], [4, 0.1, 0], [4, -0.1, 0]], [[0, 1], [1, 2], [1, 3]])
+    found = compare(forked, pipe)
+    assert found.tips_f1 == pytest.approx(2 * 2 / (3 + 2))
+    assert (found.junctions_f1, found.topology, found.perfect) == (0, True, False)
+
+
+def test_the_nearest_pair_comes_first():
+    true, found = (np.outer(places, [1.0, 0, 0]) for places in ([0, 1], [0.6, 1.5]))
+    assert matching_f1(found, true, np.array([1.0, 1.0])) == 0.5  # 0.6 takes 1, and 1.5 is too far from 0
+    assert matching_f1(found[::-1], true[::-1], np.array([1.0, 1.0])) == 0.5
+    assert matching_f1(found, true, np.array([1.5, 0.3])) == 0.5  # 0.6 takes 0, and 1.5 is too far from 1
+    assert matching_f1(found[:0], true, np.ones(2)) == matching_f1(found, true[:0], np.ones(0)) == 0
+    assert matching_f1(found[:0], true[:0], np.ones(0)) == 1
+
+
+def cross(gap):
+    """A cross of four arms whose junction is drawn out along x into two, so far apart."""
+    ends = [[-2, -1, 0], [-2, 1, 0], [2, -1, 0], [2, 1, 0]]
+    middle = [[-gap / 2, 0, 0], [gap / 2, 0, 0]]
+    return np.array([*ends, *middle], float), np.array([[0, 4], [1, 4], [2, 5], [3, 5], [4, 5]])
+
+
+@pytest.mark.parametrize(("gap", "share"), [(0.19, 1), (0.21, 2 / 3)])
+def test_junctions_less_than_a_radius_apart_are_one(gap, share, curve):
+    nodes = np.array([[-2, -1, 0], [-2, 1, 0], [2, -1, 0], [2, 1, 0], [0, 0, 0]], float)
+    true = Truth(nodes, [[0, 4], [1, 4], [2, 4], [3, 4]], np.full(5, 0.2))
+    found = compare(curve(*cross(gap)), true)
+    assert found.junctions_f1 == pytest.approx(share)
+    assert (found.tips_f1, found.perfect, found.junctions) == (1, True, 1)
+    vertices, edges = cross(gap)
+    assert compare(curve(nodes, true.edges), Truth(vertices, edges, np.full(6, 0.2))).junctions_f1 == pytest.approx(
+        share
+    )
+
+
+@pytest.mark.parametrize(("away", "share"), [(0.38, 1), (0.42, 0)])
+def test_junctions_are_met_within_two_radii(away, share, curve):
+    vertices, edges = cross(0)
+    moved = vertices + np.outer([0, 0, 0, 0, away, away], [0, 0, 1])
+    assert compare(curve(moved, edges), Truth(vertices, edges, np.full(6, 0.2))).junctions_f1 == share
+
+
+def test_clusters_of_junctions():
+    axis, radius = np.outer(np.arange(100) / 10, [1.0, 0, 0]), np.repeat([0.2, 1.0], 50)
+    chain = np.outer([1, 1.19, 1.38, 3, 7, 7.9], [1.0, 0, 0])
+    means, local = merged_junctions(chain, axis, radius)
+    np.testing.assert_allclose(means[:, 0], [1.19, 3, 7.45])  # link by link; the last two are in the thick half
+    np.testing.assert_allclose(local, [0.2, 0.2, 1])
+    _, local = merged_junctions(np.array([[1.0, 5, 0], [8, 5, 0], [4.5, 0, 0]]), axis, radius)
+    np.testing.assert_allclose(local, [0.2, 1, 1])  # of the nearest place; in both halves, of the thicker
+    assert [len(it) for it in merged_junctions(np.empty((0, 3)), axis, radius)] == [0, 0]
+
+
+def test_length_is_that_of_the_curve(curve):
+    pipe = Truth([[0, 0, 0], [1, 0, 0]], [[0, 1]], [0.1, 0.1])
+    x = np.linspace(0, 1, 11)
+    zigzag = np.column_stack([x, 0.1 * (np.arange(11) % 2), 0 * x])
+    assert compare(curve(zigzag), pipe).length == pytest.approx(np.sqrt(2))
+
+
+def test_the_order_of_vertices_does_not_matter(curve):
+    sample, rng = sample_object(100), np.random.default_rng(2)
+    bent = curve(sample.nodes + 0.05 * rng.normal(size=sample.nodes.shape), sample.edges, sample.radii)
+    order = rng.permutation(len(sample.nodes))
+    edges = rng.permutation(np.argsort(order)[sample.edges])[:, ::-1]
+    assert compare(curve(bent.vertices[order], edges, bent.radii[order]), sample).as_dict() == pytest.approx(
+        compare(bent, sample).as_dict(), rel=1e-9
+    )

@@ -1,0 +1,49 @@
+"""Points found and true points, matched one to one."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from ..numerics.components import component_labels
+
+# derived: one radius from where the axis ends, in the middle of the round end, to the tip, and 1.5 along the axis
+TIP_REACH = 2.5
+# derived: where limbs meet is known to a local radius, that of the junction found and that of the true one
+JUNCTION_REACH = 2.0
+
+
+def matching_f1(found, true, reach):
+    """F1 of found points as a guess at the true ones, (n, 3) and (m, 3); 1 if there are neither.
+
+    Pairs are no further apart than the (m,) `reach` of their true point. They are taken nearest first, each point once.
+    """
+    if len(found) == 0 or len(true) == 0:
+        return float(len(found) == len(true))
+    apart = cdist(found, true)
+    apart[apart > reach] = np.inf
+    pairs = 0
+    while np.isfinite(apart.min()):
+        row, column = np.unravel_index(apart.argmin(), apart.shape)
+        apart[row], apart[:, column] = np.inf, np.inf
+        pairs += 1
+    return 2 * pairs / (len(found) + len(true))
+
+
+def merged_junctions(points, axis, axis_radius):
+    """Junctions, (n, 3), those within a local radius of each other, or of ones between, as one at their mean.
+
+    The local radius is that of the thickest part whose ball around a place of the axis holds the junction, else that of
+    the nearest place; `axis` (k, 3) and `axis_radius` (k,) are places along the true one. With each mean comes the
+    largest local radius of what it stands for.
+    """
+    away = cdist(points, axis)
+    local = np.where(away < axis_radius, axis_radius, 0.0).max(axis=1)
+    local = np.where(local > 0, local, axis_radius[away.argmin(axis=1)])
+    near = cdist(points, points) <= np.maximum(local[:, None], local)
+    group = component_labels(len(points), np.argwhere(near))
+    size = np.bincount(group)
+    means = np.column_stack([np.bincount(group, values) for values in points.T]) / size[:, None]
+    largest = np.zeros(len(size))
+    np.maximum.at(largest, group, local)
+    return means, largest
