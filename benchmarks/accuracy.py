@@ -7,15 +7,15 @@ The README beside this file says what each command shows.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from _accuracy.differences import difference_tables, paired
 from _accuracy.ideas import IDEAS, ablation_tables, write_effects
-from _accuracy.known_axes import overview, truth_tables
-from _accuracy.measuring import by_variant, measured
+from _accuracy.known_axes import details, overview
+from _accuracy.measuring import measured
 from _accuracy.pictures import draw_ablation, draw_stop, draw_truth
 from _accuracy.real import loop_tables, measure_loops
 from _accuracy.solves import mass_tables, stop_tables, tracking
@@ -24,6 +24,7 @@ from _common.clouds import cases, folder_or
 from _common.command_line import (
     PUBLISHED,
     Folder,
+    Folders,
     Jobs,
     Markdown,
     Output,
@@ -35,7 +36,7 @@ from _common.command_line import (
     named,
     with_solves,
 )
-from _common.results import save
+from _common.results import read, save
 from _common.runs import run
 from _common.tables import Tables, fill, present
 
@@ -63,28 +64,42 @@ def altered(pipeline: Pipeline, settings: list[str] | None) -> Pipeline:
 
 @app.command()
 def truth(
-    folder: Folder = None,
+    folders: Folders = None,
     own: Own = False,
     pipeline: Pipelines = "default,cao2010,wen2024",
     changed: Changed = None,
     variant: Variants = f"clean_16384,{EVERY}",
     shapes: Shapes = "",
+    draws: Annotated[int, typer.Option(min=1, help="Clouds of each built-in shape and variant.")] = 1,
     repeat: Annotated[int, typer.Option(min=1, help="Runs, of whose CPU seconds the median counts.")] = 1,
     jobs: Jobs = 2,
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
-    """Pipelines on shapes with known axes, a table per variant."""
+    """Pipelines on shapes with known axes: by kind of cloud, by family of shapes, and what is bad."""
     chosen = {name: altered(it, changed) for name, it in named(pipeline).items()}
-    rows = measured(cases(folder, own, variant, shapes), chosen, jobs, repeat)
+    rows = measured(cases(folders, own, variant, shapes, draws), chosen, jobs, repeat)
     save(output, rows)
-    groups = by_variant(rows)
-    present(truth_tables(groups | ({"all": rows} if len(groups) > 1 else {})), markdown)
+    present(overview(rows) + details(rows), markdown)
+
+
+@app.command()
+def compare(
+    before: Annotated[Path, typer.Argument(metavar="BEFORE", exists=True, dir_okay=False)],
+    after: Annotated[Path, typer.Argument(metavar="AFTER", exists=True, dir_okay=False)],
+    markdown: Markdown = False,
+) -> None:
+    """What has changed from one result of truth to another, cloud by cloud."""
+    earlier, later = (read(path)["rows"] for path in (before, after))
+    pairs = paired(earlier, later)
+    if not pairs:
+        raise typer.BadParameter(f"{before} and {after} have no cloud and pipeline in common")
+    present(difference_tables(pairs), markdown)
 
 
 @app.command()
 def ablation(
-    folder: Folder = None,
+    folders: Folders = None,
     own: Own = False,
     variant: Variants = EVERY,
     shapes: Shapes = "",
@@ -107,7 +122,7 @@ def ablation(
     chosen = {"default": default()}
     chosen |= {name: override(default(), IDEAS[name].split()) for name in idea.split(",")}
     chosen |= named(",".join(PUBLISHED))
-    rows = measured(cases(folder, own, variant, shapes), chosen, jobs)
+    rows = measured(cases(folders, own, variant, shapes), chosen, jobs)
     save(output, rows)
     present(ablation_tables(rows), markdown)
     if page is not None:
@@ -116,7 +131,7 @@ def ablation(
 
 @app.command()
 def stop(
-    folder: Folder = None,
+    folders: Folders = None,
     own: Own = False,
     variant: Variants = "clean_4096,noise2_4096",
     shapes: Shapes = "",
@@ -126,14 +141,14 @@ def stop(
 ) -> None:
     """Where the stop rule stops, and what more or fewer solves would give."""
     chosen = {str(n): with_solves(default(), n) for n in SOLVES} | {"rule": default()}
-    rows = measured(cases(folder, own, variant, shapes), chosen, jobs)
+    rows = measured(cases(folders, own, variant, shapes), chosen, jobs)
     save(output, rows)
     present(stop_tables(rows), markdown)
 
 
 @app.command()
 def mass(
-    folder: Folder = None,
+    folders: Folders = None,
     own: Own = False,
     variant: Variants = "clean_4096",
     shapes: Shapes = "",
@@ -142,7 +157,7 @@ def mass(
     markdown: Markdown = False,
 ) -> None:
     """How well the reduced contraction tracks the full one, with the mass of merged points and without."""
-    found = cases(folder, own, variant, shapes)
+    found = cases(folders, own, variant, shapes)
     rows = run(tracking, [(case.facts, (case,)) for case in found], jobs)
     save(output, rows)
     present(mass_tables(rows), markdown)
@@ -150,7 +165,7 @@ def mass(
 
 @app.command()
 def rotations(
-    folder: Folder = None,
+    folders: Folders = None,
     own: Own = False,
     variant: Variants = "clean_4096",
     shapes: Shapes = "6",
@@ -161,7 +176,7 @@ def rotations(
     markdown: Markdown = False,
 ) -> None:
     """Whether the skeleton depends on how the cloud is turned and in which order its points come."""
-    found = cases(folder, own, variant, shapes)
+    found = cases(folders, own, variant, shapes)
     pipeline = altered(default(), changed)
     rows = run(turned, [(case.facts, (case, count, pipeline)) for case in found], jobs)
     save(output, rows)
@@ -198,13 +213,13 @@ def page(
     results: Annotated[list[Path], typer.Argument(metavar="JSON...", exists=True, dir_okay=False)],
 ) -> None:
     """Put the tables of saved results into a Markdown page, and their pictures into the folder images beside it."""
-    told = {}
+    told: dict[str, list[dict]] = {}
     for path in results:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = read(path)
         command = found["command"][0]
         if command not in PAGE:
             raise typer.BadParameter(f"{path} holds results of {command}: a page shows those of {', '.join(PAGE)}")
-        told[command] = found["rows"]
+        told.setdefault(command, []).extend(found["rows"])
     fill(file, {command: PAGE[command][0](rows) for command, rows in told.items()})
     folder = file.parent / "images"
     folder.mkdir(exist_ok=True)

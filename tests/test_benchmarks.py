@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.spatial import cKDTree
 from typer.testing import CliRunner
 
@@ -49,8 +50,9 @@ def call(tool):
 
 
 def row(shape="torus", variant="clean_512", pipeline="default", **values):
-    found = dict(error=0.1, inside=1.0, completeness=1.0, ends=None, radius_error=0.05, cpu=0.2)
-    found |= dict(components=0, loops=0, leaves=0, junctions=0, topology=True)
+    found = dict(error=0.1, inside=1.0, completeness=1.0, length=1.0, ends=None, radius_error=0.05, cpu=0.2)
+    found |= dict(tips_f1=1.0, junctions_f1=1.0, components=0, loops=0, leaves=0, junctions=0)
+    found |= dict(topology=True, perfect=True, family="built-in", seed=None, draw=0)
     return dict(shape=shape, variant=variant, pipeline=pipeline) | found | values
 
 
@@ -64,6 +66,12 @@ class TestBuiltinClouds:
             assert points.shape == (300, 3)
             assert len(axis.edges) > 0
             np.testing.assert_array_equal(points, parts.clouds.builtin(shape, variant)[0])
+
+    def test_draws_differ_and_the_first_is_that_without_a_number(self, parts):
+        for kind in ("clean", "holes"):
+            first, again, second = (parts.clouds.builtin("torus", f"{kind}_300", *draw)[0] for draw in ((), (0,), (1,)))
+            np.testing.assert_array_equal(first, again)
+            assert not (first == second).any()
 
     def test_density_falls_tenfold(self, parts):
         x = parts.clouds.builtin("tube", "density_20000")[0][:, 0]
@@ -90,6 +98,81 @@ class TestBuiltinClouds:
         assert np.count_nonzero(abs(on_ring - 0.1) > 1e-9) == 40
 
 
+@pytest.fixture
+def zoo(tmp_path):
+    """Two folders of shapes drawn at random; the second has one shape again, and one whose clouds show too little."""
+    ring = torus(512)
+    axis = dict(nodes=ring.nodes, edges=ring.edges, radii=ring.radii)
+
+    def folder(name, covers):
+        (tmp_path / name).mkdir()
+        for shape in covers:
+            np.savez(tmp_path / name / f"{shape}.npz", **axis, clean_512=ring.points, scan2_512=ring.points[::-1])
+        shapes = [dict(name=it, meaningful_skeleton=True, coverage=dict(scan2_512=c)) for it, c in covers.items()]
+        (tmp_path / name / "manifest.json").write_text(json.dumps(dict(variants=["clean", "scan2"], shapes=shapes)))
+        return tmp_path / name
+
+    return folder("one", dict(rings_0=1.0, rings_1=0.97, big_rings_7=0.969)), folder("two", dict(rings_1=1.0, mug=0.96))
+
+
+class TestFolders:
+    def test_families_seeds_and_draws(self, parts, zoo):
+        found = parts.clouds.cases(zoo, False, "clean_512,scan2_512")
+        told = [(case.variant, *(case.facts[name] for name in ("family", "seed", "draw"))) for case in found]
+        rings = [("rings", 0, 0), ("rings", 1, 0), ("rings", 1, 1)]
+        assert told == [
+            *(("clean_512", *it) for it in [*rings, ("big_rings", 7, 0), ("two", None, 0)]),
+            *(("scan2_512", *it) for it in rings),  # of the others too little is seen
+        ]
+        assert [case.folder for case in found[1:3]] == list(zoo)
+
+    def test_what_is_left_out_is_said(self, parts, zoo, capsys):
+        parts.clouds.cases(zoo, False, "clean_512,scan2_512,depth2_512", "rings_1,mug")
+        assert capsys.readouterr().err == "left out: scan2_512 of 1 shapes\nleft out: depth2_512 of 2 shapes\n"
+
+    def test_patterns(self, parts, zoo):
+        found = parts.clouds.cases(zoo[0], False, "s*_512,*_512,clean_512")
+        assert list(dict.fromkeys(case.variant for case in found)) == ["scan2_512", "clean_512"]
+
+    def test_draws_are_of_built_in_shapes_alone(self, parts, zoo):
+        assert [it.draw for it in parts.clouds.cases(None, True, "clean_512", "tube,torus", 3)] == [0, 1, 2] * 2
+        assert [it.draw for it in parts.clouds.cases(zoo[0], False, "clean_512", "rings_0", 3)] == [0]
+
+
+class TestIntervals:
+    @pytest.mark.parametrize(("right", "of"), [(3, 20), (18, 20), (250, 300)])
+    def test_of_a_share_is_binomial(self, parts, right, of):
+        mean, *ends = parts.intervals.mean_with_interval(
+            [*map(str, range(of))], [True] * right + [False] * (of - right)
+        )
+        assert mean == right / of
+        np.testing.assert_allclose(ends, stats.binom.ppf([0.025, 0.975], of, mean) / of, atol=1.001 / of)
+
+    def test_is_that_of_scipy(self, parts):
+        values = np.random.default_rng(3).gamma(1.5, size=40)
+        found = parts.intervals.mean_with_interval([*map(str, range(40))], values)
+        options = dict(method="percentile", n_resamples=20_000, rng=np.random.default_rng(4))
+        expected = stats.bootstrap((values,), np.mean, **options).confidence_interval
+        np.testing.assert_allclose(found, [values.mean(), *expected], atol=0.04)
+
+    def test_more_clouds_of_a_shape_are_no_more_evidence(self, parts):
+        shapes, values = [*map(str, range(30))], np.random.default_rng(5).random(30)
+        once = parts.intervals.mean_with_interval(shapes, values)
+        assert parts.intervals.mean_with_interval(shapes * 4, [*values] * 4) == pytest.approx(once, rel=1e-12)
+        apart = parts.intervals.mean_with_interval([*map(str, range(120))], [*values] * 4)
+        assert apart[2] - apart[1] == pytest.approx((once[2] - once[1]) / 2, rel=0.15)
+
+    def test_shapes_weigh_as_much_as_they_have_clouds(self, parts):
+        assert parts.intervals.mean_with_interval(["a", "a", "b"], [1, 1, 0]) == (2 / 3, 0, 1)
+
+    def test_in_words(self, parts):
+        told = parts.intervals.told
+        assert told(0.984, 0.9, 1) == "0.98 [0.90, 1.00]"
+        assert told(-0.001, -0.0123, 0.0006, 3, "+") == "-0.001 [-0.012, +0.001]"
+        assert told(-0.001, -0.001, 0.0, sign="+") == "+0.00 [+0.00, +0.00]"
+        assert told(*parts.intervals.mean_with_interval([], [])) == "-"
+
+
 class TestArithmetic:
     def test_summary_takes_means_and_counts_failures_as_wrong(self, parts):
         rows = [row(error=0.1, ends=0.5), row(error=0.3, topology=False, loops=1), row(leaves=1, error=0.2)]
@@ -107,6 +190,50 @@ class TestArithmetic:
         assert parts.known_axes.wrong(row()) == ""
         assert parts.known_axes.wrong(row(loops=2, components=-1, topology=False)) == "torus +2 loops -1 components"
         assert parts.known_axes.wrong(dict(shape="mug", failure="ValueError: no")) == "mug (ValueError: no)"
+
+    def test_overview_by_cloud_and_by_family(self, parts):
+        rows = [row("rings_0", family="rings", seed=0, cpu=0.4), row("rings_1", family="rings", seed=1, perfect=False)]
+        rows += [row("knots_0", family="knots", seed=0, error=0.3, topology=False, perfect=False, tips_f1=0.5)]
+        rows += [dict(row("rings_0", "scan2_512", family="rings", seed=0), failure="ValueError: no")]
+        for name in ("topology", "perfect", "error"):
+            del rows[-1][name]
+        rows += [row("mug", family="truth", error=0.9)]
+        by_cloud, by_family = parts.known_axes.overview(rows)
+        header = ["pipeline", "clouds", "topology", "perfect", "error", "tips F1", "junctions F1", "length", "CPU s"]
+        assert (by_cloud[1], by_family[1]) == (["cloud", *header], ["family", *header])
+        assert [line[:3] for line in by_cloud[2]] == [
+            ["clean_512", "`default`", "3"],
+            ["scan2_512", "`default`", "1"],
+            ["all", "`default`", "4"],
+        ]
+        assert by_cloud[2][0][3:] == ["0.67 [0.00, 1.00]", "0.33 [0.00, 1.00]", "0.167", "0.83", "1.00", "1.00", "0.27"]
+        assert by_cloud[2][1][3:6] == ["0.00 [0.00, 0.00]", "0.00 [0.00, 0.00]", "-"]
+        assert [(line[0], line[2], line[5]) for line in by_family[2]] == [
+            ("rings", "3", "0.100"),
+            ("knots", "1", "0.300"),
+            ("truth", "1", "0.900"),
+        ]
+
+    def test_overview_of_shapes_that_are_not_random(self, parts):
+        ((_, _, lines),) = parts.known_axes.overview([row(), row("mug"), row(pipeline="cao2010")])
+        assert [line[:3] for line in lines] == [["clean_512", "`default`", "2"], ["", "`cao2010`", "1"]]
+
+    def test_differences_are_paired(self, parts, capsys):
+        names = [f"rings_{i}" for i in range(20)]
+        before = [row(it, error=0.1 + 0.01 * i, topology=i < 10, seed=i) for i, it in enumerate(names)]
+        after = [row(it, error=0.09 + 0.01 * i, topology=i not in (3, 19), seed=i) for i, it in enumerate(names)]
+        after[0] = dict(row(names[0], seed=0), failure="ValueError: no")
+        for name in ("topology", "perfect", "error"):
+            del after[0][name]
+        pairs = parts.differences.paired([*before, row("gone")], after)
+        assert capsys.readouterr().err == "left out: 1 clouds that only one file has\n"
+        ((_, header, (line,)),) = parts.differences.difference_tables(pairs)
+        told = dict(zip(header[-2:], line[-2:], strict=True))
+        assert told == {"now right": ", ".join(names[10:19]), "now wrong": "rings_0, rings_3"}
+        assert line[:4] == ["clean_512", "`default`", "20", "0.50 → 0.85"]
+        assert line[4].startswith("+0.35 [+0.05, +0.6")
+        assert line[5] == "1.00 → 0.95"
+        assert line[7:9] == ["0.200 → 0.190", "-0.010 [-0.010, -0.010]"]  # of the pairs that both have one
 
     def test_ablation_is_sorted_by_what_is_lost(self, parts):
         rows = [row(), row(variant="noise1_512", error=0.3)]
@@ -167,6 +294,8 @@ class TestCommands:
         printed = call("truth", "--builtin", "--shapes", "tube,torus", "--variant", "clean_512", "-o", out, "--jobs", 1)
         for name in pipelines.PIPELINES:
             assert name in printed
+        assert "by cloud: means" in printed
+        assert "by family" not in printed
         told = json.loads(out.read_text())
         assert {"commit", "machine", "versions", "command"} < set(told)
         assert len(told["rows"]) == 6
@@ -181,7 +310,7 @@ class TestCommands:
         np.savez(tmp_path / "few.npz", **axis, clean_512=ring.points[:3])
         (tmp_path / "broken.npz").write_text("this is no archive")
         printed = call("truth", tmp_path, "--variant", "clean_512", "--pipeline", "default", "--markdown", "--jobs", 0)
-        assert "1/3" in printed
+        assert "| clean_512 | `default` | 3 | 0.33 [0.00, 1.00] |" in printed
         assert "few (InvalidCloudError: 3 finite points" in printed
         assert "broken (" in printed
 
@@ -208,8 +337,34 @@ class TestCommands:
         printed = call("truth", *few, "--variant", "clean_512,clean_300", *settings, "--markdown")
         rows = json.loads((tmp_path / "out.json").read_text())["rows"]
         assert [row["solves"] for row in rows] == [1, 1]
-        assert "**all**" in printed
-        assert "/2 |" in printed.partition("**all**")[2]
+        assert re.search(r"\| all \| `default` \| 2 \| [01]\.", printed)
+
+    def test_truth_of_random_shapes(self, call, zoo, tmp_path):
+        saved = [tmp_path / "a.json", tmp_path / "b.json"]
+        words = ("--variant", "*_512", "--pipeline", "default", "--markdown", "--jobs", 0)
+        printed = call("truth", *zoo, *words, "-o", saved[0])
+        assert "| clean_512 | `default` | 4 | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] |" in printed
+        assert "| rings | `default` | 6 | " in printed
+        assert "| two | `default` | 1 | " in printed
+        rows = json.loads(saved[0].read_text())["rows"]
+        assert len(rows) == 8
+        assert {row["family"] for row in rows} == {"rings", "big_rings", "two"}
+        assert all(row["perfect"] and row["length"] == pytest.approx(1, abs=0.1) for row in rows)
+        call("truth", *zoo, *words, "-o", saved[1], "--set", "Contractor.max_iterations=1")
+        compared = call("compare", *saved, "--markdown")
+        assert re.search(r"\| scan2_512 \| `default` \| 3 \| 1.00 → ", compared)
+        assert re.search(r"\| all \| `default` \| 7 \| 1.00 → ", compared)
+        same = call("compare", saved[0], saved[0], "--markdown")
+        assert "| all | `default` | 7 | 1.00 → 1.00 | +0.00 [+0.00, +0.00] |" in same
+        saved[1].write_text(json.dumps(dict(rows=[])))
+        assert "no cloud and pipeline in common" in call("compare", *saved, code=2)
+
+    def test_draws_of_built_in_shapes(self, call, tmp_path):
+        few = ("--builtin", "--shapes", "torus", "--variant", "clean_300", "--pipeline", "default", "--jobs", 0)
+        call("truth", *few, "--draws", 2, "-o", tmp_path / "out.json")
+        rows = json.loads((tmp_path / "out.json").read_text())["rows"]
+        assert [row["draw"] for row in rows] == [0, 1]
+        assert rows[0]["error"] != rows[1]["error"]
 
     def test_a_page_and_its_pictures(self, call, tmp_path, monkeypatch):
         few = ("--builtin", "--shapes", "torus", "--variant", "clean_512,noise1_512", "--jobs", 0)
@@ -222,7 +377,7 @@ class TestCommands:
         page.write_text("".join(f"<!-- {path.stem} -->\nold\n<!-- end -->\n" for path in saved))
         call("page", page, *saved)
         text = page.read_text()
-        assert text.count("| clean_512 | `default` |") == text.count("|  | `wen2024` |") - 1 == 1
+        assert text.count("| clean_512 | `default` |") == text.count("|  | `wen2024` |") - 2 == 1
         assert text.count("| without ") == 2
         assert text.count("| rule |") == 2
         assert "old" not in text
@@ -230,6 +385,15 @@ class TestCommands:
         assert set(pictures) == {"accuracy_clouds", "accuracy_ideas", "accuracy_solves"}
         call("page", page, *saved[::-1])
         assert page.read_text() == text
+        random = json.loads(saved[0].read_text())
+        for row in random["rows"]:
+            row |= dict(family="rings", seed=0)
+        (tmp_path / "random.json").write_text(json.dumps(random))
+        call("page", page, *saved, tmp_path / "random.json")
+        assert re.findall(r"\| (\S+) \| `default` \| (\d)", page.read_text()) == [
+            *(("clean_512", "1"), ("noise1_512", "1"), ("all", "2"), ("built-in", "2"), ("rings", "2"))
+        ]
+        call("page", page, *saved)
         assert {path.stem: path.read_bytes() for path in (tmp_path / "images").iterdir()} == pictures
         saved[0].write_text(json.dumps(dict(command=["mass"], rows=[])))
         assert "holds results of mass" in call("page", page, saved[0], code=2)

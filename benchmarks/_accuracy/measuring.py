@@ -37,9 +37,18 @@ def measured(found: list[Case], pipelines: dict[str, Pipeline], jobs: int, repea
 
 def by_pipeline(rows: list[dict]) -> dict[str, list[dict]]:
     """The rows of each pipeline, in their order."""
-    return {name: pick(rows, pipeline=name) for name in dict.fromkeys(row["pipeline"] for row in rows)}
+    return _by("pipeline", rows)
 
 
 def by_variant(rows: list[dict]) -> dict[str, list[dict]]:
     """The rows of each variant, in their order."""
-    return {name: pick(rows, variant=name) for name in dict.fromkeys(row["variant"] for row in rows)}
+    return _by("variant", rows)
+
+
+def by_family(rows: list[dict]) -> dict[str, list[dict]]:
+    """The rows of each family of shapes, in their order."""
+    return _by("family", rows)
+
+
+def _by(fact, rows):
+    return {name: pick(rows, **{fact: name}) for name in dict.fromkeys(row[fact] for row in rows)}

@@ -10,26 +10,31 @@ from _common.plots import BLUE, INK, LOOKS, keep, look, plain_log, sheet
 from _common.results import pick, summary
 
 from .ideas import losses
+from .known_axes import random_shapes, share
 from .measuring import by_pipeline, by_variant
 from .solves import stops
 
 
 def draw_truth(rows: list[dict], folder: Path) -> Path:
-    """Error and right topologies of the pipelines, variant by variant."""
-    variants = by_variant(rows)
-    names, places = list(by_pipeline(rows)), np.arange(len(variants))
-    means = {name: [summary(pick(group, pipeline=name)) for group in variants.values()] for name in names}
+    """Error and right topologies of the pipelines, variant by variant, with the intervals of these."""
+    rows = random_shapes(rows)
+    variants, names = by_variant(rows), list(by_pipeline(rows))
+    places = np.arange(len(variants))
+    groups = {name: [pick(group, pipeline=name) for group in variants.values()] for name in names}
     figure, (left, right) = sheet(1.0 + 0.33 * len(variants), columns=2, sharey=True, width_ratios=(3, 2))
-    for axes, key in ((left, "error"), (right, "right")):
+    for axes in (left, right):
         axes.hlines(places, 0, 1, transform=axes.get_yaxis_transform(), color="#e4e4e4", linewidth=0.8, zorder=0)
-        for name in names[::-1]:  # the first on top
-            axes.plot([mean[key] for mean in means[name]], places, linestyle="", markersize=6, label=name, **look(name))
-        axes.set_xlim(0, 1.05 * max(mean[key] for means_of in means.values() for mean in means_of))
         axes.tick_params(axis="y", length=0)
-    left.set(xlabel="mean error, local radii", ylim=(len(variants) - 0.5, -0.5))
+    for i, name in reversed(list(enumerate(names))):  # the first on top
+        style = dict(linestyle="", markersize=6, label=name, **look(name))
+        beside = places + 0.16 * (i - (len(names) - 1) / 2)  # so that no interval hides another
+        left.plot([summary(group)["error"] for group in groups[name]], places, **style)
+        means, low, high = np.transpose([share(group, "topology") for group in groups[name]])
+        right.hlines(beside, low, high, color=style["color"], linewidth=1.5)
+        right.plot(means, beside, **style | dict(markersize=4))
+    left.set(xlabel="mean error, local radii", xlim=(0, None), ylim=(len(variants) - 0.5, -0.5))
     left.set_yticks(places, list(variants))
-    right.set_xlabel(f"right topology, of {max(mean['n'] for mean in means[names[0]])}")
-    right.xaxis.get_major_locator().set_params(integer=True)
+    right.set(xlabel="right topologies", xlim=(0, 1.05))
     shown, labels = (each[::-1] for each in left.get_legend_handles_labels())
     figure.legend(shown, labels, loc="outside upper center", ncols=len(names), frameon=False)
     return keep(figure, folder, "accuracy_clouds")

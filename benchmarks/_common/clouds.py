@@ -6,9 +6,11 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fnmatch import filter as matching
 from functools import partial
+from itertools import chain, product
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -23,7 +25,7 @@ from glsk_o3d.analysis import Truth
 from .results import ROOT
 
 HOLES = 6  # in a built-in cloud with holes, each of them as far across as the part it is in
-SHOWN = 0.98  # least share of the true axis that a cloud must show for its skeleton to be scored
+SHOWN = 0.97  # least share of the true axis that a cloud must show for its skeleton to be scored
 
 BUILTIN: dict[str, Callable[..., samples.Sample]] = {
     "tube": samples.tube,
@@ -38,16 +40,21 @@ BUILTIN: dict[str, Callable[..., samples.Sample]] = {
 }
 """Samples of the package that have an axis, as whole surfaces."""
 BUILTIN_VARIANT = re.compile(r"(clean|density|holes|outliers|scan(?=2_)|noise(?=\d))(\d*)_(\d+)")
+RANDOM_SHAPE = re.compile(r"(.+)_(\d+)")  # a shape drawn at random: its family and the seed
 CAMERAS = np.array([[1, -2, 2], [-1, 2, 2]]) / 3  # where from a built-in scan is taken; nothing is hidden from both
 
 
 @dataclass(frozen=True)
 class Case:
-    """A cloud with a known axis: a shape of a folder, or a built-in one (no folder), in some state of disrepair."""
+    """A cloud with a known axis: a shape of a folder, or a built-in one (no folder), in some state of disrepair.
+
+    Of several clouds of one shape and variant each is another `draw`.
+    """
 
     shape: str
     variant: str
     folder: Path | None = None
+    draw: int = 0
 
     @property
     def size(self) -> int:
@@ -55,20 +62,23 @@ class Case:
         return int(self.variant.rpartition("_")[2])
 
     @property
-    def facts(self) -> dict[str, str]:
-        """What a row says of it."""
-        return dict(variant=self.variant, shape=self.shape)
+    def facts(self) -> dict[str, str | int | None]:
+        """What a row says of it. A shape whose name is not FAMILY_SEED has no seed, and its folder for a family."""
+        random = RANDOM_SHAPE.fullmatch(self.shape)
+        place = "built-in" if self.folder is None else self.folder.resolve().name
+        family, seed = (random[1], int(random[2])) if random else (place, None)
+        return dict(variant=self.variant, shape=self.shape, family=family, seed=seed, draw=self.draw)
 
     def load(self) -> tuple[np.ndarray, Truth]:
         """The points and the axis."""
         if self.folder is None:
-            return builtin(self.shape, self.variant)
+            return builtin(self.shape, self.variant, self.draw)
         path = self.folder / f"{self.shape}.npz"
         with np.load(path) as archive:
             return archive[self.variant].astype(float), read_truth(path)
 
 
-def builtin(shape: str, variant: str) -> tuple[np.ndarray, Truth]:
+def builtin(shape: str, variant: str, draw: int = 0) -> tuple[np.ndarray, Truth]:
     """A built-in shape as KIND_SIZE: clean, density, holes, outliers, scan2, or noise with its percentage."""
     found = BUILTIN_VARIANT.fullmatch(variant)
     if found is None:
@@ -76,10 +86,10 @@ def builtin(shape: str, variant: str) -> tuple[np.ndarray, Truth]:
             f"{variant}: built-in variants are clean_N, density_N, holes_N, outliers_N, scan2_N and noiseP_N"
         )
     kind, percent, n = found[1], int(found[2] or 0), int(found[3])
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(1 + draw)
     # the points of a sample are independent, so that the first n of those kept are a fair choice
     more, noise = 10 if kind in ("density", "holes", "scan") else 1, percent / 100 if kind == "noise" else 0.0
-    drawn = BUILTIN[shape](more * n, noise=noise)
+    drawn = BUILTIN[shape](more * n, noise=noise, seed=draw)
     points, kept = drawn.points, np.ones(len(drawn.points), bool)
     if kind == "density":  # ten times as dense at one end as at the other
         along = points[:, np.ptp(points, axis=0).argmax()]
@@ -105,39 +115,62 @@ def _seen(points):
     return seen
 
 
-def cases(folder: Path | None, own: bool, variants: str, shapes: str = "") -> list[Case]:
+def cases(
+    folders: Path | Sequence[Path] | None, own: bool, variants: str, shapes: str = "", draws: int = 1
+) -> list[Case]:
     """What a command is to run on; what there is not, or the manifest says not to score, is left out, and said so.
 
     Parameters
     ----------
-    folder : Path, optional
-        Else $GLSK_TRUTH, else the folder shared/truth beside the repository.
+    folders : Path or sequence of Path, optional
+        Else $GLSK_TRUTH, else the folder shared/truth beside the repository. A cloud that several have is drawn as
+        often.
     own : bool
         The built-in shapes instead.
     variants : str
-        Names with commas.
+        Names with commas, or patterns such as ``*_4096`` of what the folders have.
     shapes : str
         Names with commas, a number for so many of all kinds, or empty for all.
+    draws : int
+        Clouds of each built-in shape and variant.
     """
+    asked = variants.split(",")
+    offers: dict[Path | None, dict[str, list[str] | None]]
     if own:
-        folder, known = None, {name: {} for name in BUILTIN}
+        makable = [name for name in asked if BUILTIN_VARIANT.fullmatch(name)]
+        offers = {None: dict.fromkeys(BUILTIN, makable)}
     else:
-        folder = folder_or(folder, "GLSK_TRUTH", "shared/truth")
-        known = _shapes(folder)
-    names = shapes.split(",") if shapes else list(known)
+        places = [folders] if isinstance(folders, Path) else folders or [None]
+        offers = {place: _offers(place) for place in (folder_or(it, "GLSK_TRUTH", "shared/truth") for it in places)}
+    named = _chosen(list(dict.fromkeys(chain.from_iterable(offers.values()))), shapes)
+    there = list(dict.fromkeys(it for offer in offers.values() for variants in offer.values() for it in variants or ()))
+    wanted = list(dict.fromkeys(chain.from_iterable(matching(there, name) or [name] for name in asked)))
+    found: list[Case] = []
+    missing: Counter[str] = Counter()
+    for variant, name in product(wanted, named):
+        # a file that cannot be read has whatever is asked for: its row will say what is wrong with it
+        held = {
+            place: wanted if offer.get(name, ()) is None else offer.get(name, ()) for place, offer in offers.items()
+        }
+        having = [place for place, variants in held.items() if variant in variants]
+        found += [Case(name, variant, place, draw) for draw, place in enumerate(having * (draws if own else 1))]
+        missing[variant] += not having
+    if not found:
+        raise typer.BadParameter(f"no such variants: {variants}")
+    for variant, count in (+missing).items():
+        typer.echo(f"left out: {variant} of {count} shapes", err=True)
+    return found
+
+
+def _chosen(known: list[str], shapes: str) -> list[str]:
+    """The names of `known` that are asked for, or so many of them, evenly spread."""
+    names = shapes.split(",") if shapes else known
     if shapes.isdecimal():
-        spread = np.linspace(0, len(known) - 1, min(int(shapes), len(known)))
-        names = [list(known)[i] for i in spread.round().astype(int)]
+        names = [known[i] for i in np.linspace(0, len(known) - 1, min(int(shapes), len(known))).round().astype(int)]
     unknown = [name for name in names if name not in known]
     if unknown or not names:
         raise typer.BadParameter(f"no shape {', '.join(unknown)}: there are {', '.join(known) or 'none'}")
-    wanted = [Case(name, variant, folder) for variant in variants.split(",") for name in names]
-    there = [case for case in wanted if _offered(case, known[case.shape])]
-    if not there:
-        raise typer.BadParameter(f"no such variants: {variants}")
-    for variant, count in Counter(case.variant for case in wanted if case not in there).items():
-        typer.echo(f"left out: {variant} of {count} shapes", err=True)
-    return there
+    return names
 
 
 def folder_or(folder: Path | None, variable: str, beside: str) -> Path:
@@ -148,19 +181,23 @@ def folder_or(folder: Path | None, variable: str, beside: str) -> Path:
     return folder
 
 
-def _shapes(folder: Path) -> dict[str, dict[str, float]]:
-    """Shapes with a meaningful skeleton, and how much of each of their axes a variant's cloud shows."""
+def _offers(folder: Path) -> dict[str, list[str] | None]:
+    """The variants to be scored of each shape with a meaningful skeleton; None if its file cannot be read."""
     if not (folder / "manifest.json").exists():
-        return {path.stem: {} for path in sorted(folder.glob("*.npz"))}
+        return {path.stem: _variants(path, {}) for path in sorted(folder.glob("*.npz"))}
     shapes = json.loads((folder / "manifest.json").read_text())["shapes"]
-    return {shape["name"]: shape.get("coverage", {}) for shape in shapes if shape["meaningful_skeleton"]}
+    return {
+        shape["name"]: _variants(folder / f"{shape['name']}.npz", shape.get("coverage", {}))
+        for shape in shapes
+        if shape["meaningful_skeleton"]
+    }
 
 
-def _offered(case: Case, coverage: dict[str, float]) -> bool:
-    if case.folder is None:
-        return BUILTIN_VARIANT.fullmatch(case.variant) is not None
+def _variants(path: Path, coverage: dict[str, float]) -> list[str] | None:
+    """The clouds of a file that show enough of the axis."""
     try:
-        with np.load(case.folder / f"{case.shape}.npz") as archive:
-            return case.variant in archive.files and coverage.get(case.variant, 1.0) >= SHOWN
+        with np.load(path) as archive:
+            names = [name for name in archive.files if name not in ("nodes", "edges", "radii")]
     except (OSError, ValueError, BadZipFile):
-        return True  # its row will say what is wrong with the file
+        return None
+    return [name for name in names if coverage.get(name, 1.0) >= SHOWN]

@@ -29,8 +29,13 @@ def writable(path: Path | None) -> Path | None:
 
 
 Folder = Annotated[Path | None, typer.Argument(metavar="DIR", help="Folder of shapes, as the README describes it.")]
+Folders = Annotated[
+    list[Path] | None, typer.Argument(metavar="DIR...", help="Folders of shapes, as the README describes them.")
+]
 Own = Annotated[bool, typer.Option("--builtin", help="The package's own samples instead of a folder.")]
-Variants = Annotated[str, typer.Option("--variant", metavar="NAMES", help="KIND_SIZE, with commas.")]
+Variants = Annotated[
+    str, typer.Option("--variant", metavar="NAMES", help="KIND_SIZE, with commas; of a folder also *_SIZE.")
+]
 Shapes = Annotated[str, typer.Option("--shapes", metavar="NAMES", help="With commas, or how many; else all.")]
 Pipelines = Annotated[str, typer.Option("--pipeline", metavar="NAMES", help="With commas.")]
 Jobs = Annotated[int, typer.Option("--jobs", min=0, help="Processes; 0 stays in this one, for a debugger.")]

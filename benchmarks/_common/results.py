@@ -25,7 +25,7 @@ def pick(rows: list[dict], **facts) -> list[dict]:
 def summary(rows: list[dict]) -> dict:
     """Means over the shapes that gave a skeleton, and how many are right; a failure is not."""
     good = [row for row in rows if "failure" not in row]
-    names = ("error", "inside", "completeness", "ends", "radius_error", "cpu")
+    names = ("error", "inside", "completeness", "length", "ends", "radius_error", "tips_f1", "junctions_f1", "cpu")
     values = {name: [row[name] for row in good if row[name] is not None] for name in names}
     right = [row for row in good if row["topology"]]
     counts = dict(n=len(rows), right=len(right), leaves=sum(row["leaves"] == 0 for row in right))
@@ -38,6 +38,11 @@ def save(path: Path | None, rows: list[dict]) -> None:
         return
     told = {"command": sys.argv[1:], **surroundings(), "rows": rows}
     path.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def read(path: Path) -> dict[str, Any]:
+    """What `save` has written."""
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def surroundings() -> dict[str, Any]:

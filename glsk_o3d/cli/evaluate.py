@@ -28,11 +28,11 @@ _MEASURES = {  # measure: (best, what it is), as the table shows them
     "error": ("0", "distance from the true axis, in true radii"),
     "inside": ("1", "share of it within a radius of the axis"),
     "completeness": ("1", "share of the axis within a radius of it"),
-    "length": ("1", "over that of the axis"),
+    "length": ("1", "its length over that of the axis"),
     "ends": ("0", "distance of the axis's ends, in true radii"),
     "radius_error": ("0", "difference from the true radii, relative"),
-    "tips_f1": ("1", "F1 of its leaves as a guess at those of the axis"),
-    "junctions_f1": ("1", "F1 of its junctions as a guess at those of the axis"),
+    "tips_f1": ("1", "its leaves against those of the axis, F1"),
+    "junctions_f1": ("1", "its junctions against those of the axis, F1"),
 }
 
 
@@ -181,7 +181,7 @@ def _print_measures(assessment: Assessment | None, comparison: Comparison | None
             table.add_row(name, f"{difference:+d}" if difference else "0", "0", "more, or fewer, than in the axis")
         for name, agrees, told in (
             ("true topology", comparison.topology, "components and loops as in the axis"),
-            ("perfect", comparison.perfect, "so are the leaves, and each is near one of the axis"),
+            ("perfect", comparison.perfect, "so are the leaves, each near one of it"),
         ):
             table.add_row(name, "yes" if agrees else "no", "yes", told)
     print_table(table)

@@ -74,7 +74,8 @@ def test_with_a_truth(invoke, scans, folder, tmp_path, ring, moved):
     assert told["files"] == ["p.png"]
     table = invoke(*words).stdout
     rows = [" ".join(line.split()) for line in table.splitlines()]
-    for start in ("error 0.5000 0", "radius error 0.1000 0", "true topology yes yes"):
+    told = ("length 1.0000 1", "error 0.5000 0", "radius error 0.1000 0", "tips f1 1.0000 1", "junctions f1 1.0000 1")
+    for start in (*told, "true topology yes yes", "perfect yes yes"):
         assert any(row.startswith(start) for row in rows)
     assert "ends" not in [line.split()[0] for line in table.splitlines() if line.strip()]  # a ring has none
 

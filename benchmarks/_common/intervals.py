@@ -1,0 +1,44 @@
+"""Means with confidence intervals, from drawing the shapes anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+RESAMPLES = 4000  # enough for two digits of an interval's ends
+LEVEL = 95  # % of the resampled means that lie in the interval
+
+
+def mean_with_interval(shapes: Sequence[str], values: Sequence[float]) -> tuple[float, float, float]:
+    """The mean of values, and the ends of its percentile bootstrap interval (Efron 1979).
+
+    Shapes are drawn with replacement, each with all its values, since several clouds of one shape are no independent
+    evidence. Means are over the values. The draws are the same every time.
+
+    Parameters
+    ----------
+    shapes : sequence of str, length n
+        The shape that each value is of.
+    values : sequence of float, length n
+
+    Returns
+    -------
+    tuple of three floats
+        NaN without any value.
+    """
+    if len(values) == 0:
+        return np.nan, np.nan, np.nan
+    names, of = np.unique(shapes, return_inverse=True)
+    total, count = np.bincount(of, np.asarray(values, float)), np.bincount(of)
+    times = np.random.default_rng(0).multinomial(len(names), np.full(len(names), 1 / len(names)), RESAMPLES)
+    low, high = np.percentile((times @ total) / (times @ count), [50 - LEVEL / 2, 50 + LEVEL / 2])
+    return float(total.sum() / count.sum()), float(low), float(high)
+
+
+def told(mean: float, low: float, high: float, digits: int = 2, sign: str = "") -> str:
+    """A mean and its interval as tables show them; a dash for NaN. With the sign "+" positive ones have it."""
+    if np.isnan(mean):
+        return "-"
+    words = [f"{round(value, digits) + 0.0:{sign}.{digits}f}" for value in (mean, low, high)]  # no -0.00
+    return f"{words[0]} [{words[1]}, {words[2]}]"
