@@ -50,5 +50,5 @@ def _change(pairs, name):
 
 def _changed(pairs, now):
     """The shapes whose topology was not `now` and is."""
-    told = ([bool(row.get("topology")) for row in pair["rows"]] for pair in pairs)
-    return [pair["shape"] for pair, was_and_is in zip(pairs, told, strict=True) if was_and_is == [not now, now]]
+    right = ([bool(row.get("topology")) for row in pair["rows"]] for pair in pairs)
+    return [pair["shape"] for pair, was_and_is in zip(pairs, right, strict=True) if was_and_is == [not now, now]]

@@ -30,7 +30,7 @@ def writable(path: Path | None) -> Path | None:
 
 Folder = Annotated[Path | None, typer.Argument(metavar="DIR", help="Folder of shapes, as the README describes it.")]
 Folders = Annotated[
-    list[Path] | None, typer.Argument(metavar="DIR...", help="Folders of shapes, as the README describes them.")
+    list[Path] | None, typer.Argument(metavar="DIR", help="Folders of shapes, as the README describes them.")
 ]
 Own = Annotated[bool, typer.Option("--builtin", help="The package's own samples instead of a folder.")]
 Variants = Annotated[
