@@ -106,20 +106,18 @@ def winding_number(points: np.ndarray, normals: np.ndarray, areas: np.ndarray, q
     centre, extent = points.mean(axis=0), np.ptp(points, axis=0).max() or 1.0
     p, q, area = (points - centre) / extent, (queries - centre) / extent, areas / extent**2
     dipoles = normals * area[:, None] / (4 * np.pi)
-    ones = np.ones(len(q))
-    # both factors of every pair are one product of matrices: |p - q|^2 and (p - q) . n
-    left = np.column_stack([q, dot(q, q), ones]).astype(np.float32)
-    squares = np.stack([*(-2 * p.T), np.ones(len(p)), dot(p, p)]).astype(np.float32)
-    heights = np.stack([*-dipoles.T, np.zeros(len(p)), dot(p, dipoles)]).astype(np.float32)
+    # products of matrices: |p - q|^2 of every pair, and the sums of what does not depend on the query
+    ours = np.column_stack([q, dot(q, q), np.ones(len(q))]).astype(np.float32)
+    theirs = np.stack([*(-2 * p.T), np.ones(len(p)), dot(p, p)]).astype(np.float32)
+    terms = np.column_stack([dipoles, dot(p, dipoles)]).astype(np.float32)
     least = np.maximum(area, LEAST_BALL**2).astype(np.float32)
-    found = np.empty(len(q))
+    sums = np.empty((len(q), 4))
     for start in range(0, len(q), WINDING_CHUNK):
         part = slice(start, start + WINDING_CHUNK)
-        squared = left[part] @ squares
+        squared = ours[part] @ theirs
         np.maximum(squared, least, out=squared)
-        cubed = np.sqrt(squared)
-        cubed *= squared
-        height = left[part] @ heights
-        height /= cubed
-        found[part] = height.sum(axis=1)
-    return found
+        inverse = np.sqrt(squared)
+        inverse *= squared
+        np.reciprocal(inverse, out=inverse)
+        sums[part] = inverse @ terms
+    return sums[:, 3] - dot(q, sums[:, :3])
