@@ -175,7 +175,7 @@ def test_few_or_coincident_points(n):
     assert np.isfinite(field(points, normals, points)).all()
 
 
-def test_doubled_points_count_once_if_neighbours_are_told_apart_by_position():
+def test_doubled_points_count_once():
     points, normals = ball(2000)
     twice = np.repeat(points, 2, axis=0)
     np.testing.assert_allclose(field(twice, np.repeat(normals, 2, axis=0), [[0, 0, 0], X * 2]), [1, 0], atol=0.15)
