@@ -1,0 +1,130 @@
+"""Inside or outside: the winding number of an oriented point cloud."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .vectors import TINY, dot, norm
+
+VOTING_ROUNDS = 10  # measured: more rounds gain in noise what they lose where thin parts are near
+AREA_NEIGHBOURS = 8  # measured: fewer scatter more, more reach across thin parts
+LEAST_BALL = 1e-6  # derived: of the extent; what single precision can tell apart
+WINDING_CHUNK = 16  # measured: queries at a time: the work arrays of 4096 points then stay in the cache
+
+
+def orient_by_curvature(normals: np.ndarray, curvature: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Turn normals outward: against the curvature vector, which points inward on whatever bulges, and then by votes.
+
+    A point's vote is at first the cosine between its normal and its curvature vector, little where the surface is flat.
+    Ten times it becomes the mean of its neighbours' votes, each times the cosine between both normals; votes that
+    contradict each other shrink. Its sign at the end is what counts. Unlike `orient_normals`, which joins all points by
+    a tree, this needs neither a closed surface nor a farthest point, and no wrong turn is handed on; but it needs the
+    Laplacian, and it turns a wide hollow, such as the inside of a bowl, the wrong way.
+
+    Parameters
+    ----------
+    normals : (n, 3) float array
+        Unit vectors; their signs do not matter.
+    curvature : (n, 3) float array
+        Laplacian coordinates, ``L @ points`` with `cotangent_laplacian`.
+    neighbours : (n, k) int array
+        As from `nearest_neighbours`; 16 are enough.
+
+    Returns
+    -------
+    (n, 3) float array
+    """
+    votes = -dot(normals, curvature) / np.maximum(norm(curvature), TINY)
+    here, there = normals.T, np.ascontiguousarray(normals.T).take(neighbours, axis=1)
+    cosines = np.einsum("in,ink->nk", here, there) / neighbours.shape[1]
+    for _ in range(VOTING_ROUNDS):
+        votes = np.einsum("nk,nk->n", cosines, votes.take(neighbours))
+    return normals * np.where(votes < 0, -1.0, 1.0)[:, None]
+
+
+def orient_away(points: np.ndarray, normals: np.ndarray, axis_points: np.ndarray) -> np.ndarray:
+    """Turn normals away from the place on an axis that each point belongs to.
+
+    Parameters
+    ----------
+    points, normals, axis_points : (n, 3) float array
+
+    Returns
+    -------
+    (n, 3) float array
+    """
+    return normals * np.where(dot(normals, points - axis_points) < 0, -1.0, 1.0)[:, None]
+
+
+def point_areas(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    r"""Area that every point stands for: :math:`\pi r_8^2 / 8`, with the distance of the eighth other point.
+
+    It follows the density of the points. Noise thicker than their spacing is counted more than once, and so are two
+    sheets nearer to each other than that: noise of 1 and 2 % of the diagonal makes the areas of 4096 points 1.6 and 2.6
+    times the surface's, after `denoise` .9 and 1.3 times. On the rim of an open surface half of the disc is empty,
+    and counts.
+
+    Parameters
+    ----------
+    points : (m, 3) float array
+    neighbours : (n, k) int array
+        Of each of the n points to measure, as from `nearest_neighbours`, itself first; k is at least 9, or m.
+
+    Returns
+    -------
+    (n,) float array
+        In squared units of the points.
+    """
+    last = min(AREA_NEIGHBOURS, neighbours.shape[1] - 1)
+    away = points[neighbours[:, last]] - points[neighbours[:, 0]]
+    return np.pi / max(last, 1) * dot(away, away)
+
+
+def winding_number(points: np.ndarray, normals: np.ndarray, areas: np.ndarray, queries: np.ndarray) -> np.ndarray:
+    r"""How often an oriented point cloud winds around each query: 1 inside, 0 outside.
+
+    .. math:: w(q) = \sum_i \frac{a_i \, (p_i - q) \cdot n_i}{4 \pi \max(|p_i - q|, h_i)^3}, \quad h_i = \sqrt{a_i}
+
+    With h = 0 this is the winding number of a cloud by Barill et al. (2018), which spikes near points. With h every
+    dipole is, by Newton's shell theorem, exactly averaged over a ball of radius h around the query; those farther away
+    do not change.
+
+    Parameters
+    ----------
+    points, normals : (n, 3) float array
+        Normals are unit vectors that point outward.
+    areas : (n,) float array
+        As from `point_areas`.
+    queries : (m, 3) float array
+
+    Returns
+    -------
+    (m,) float array
+        .5 on the surface, and on the axis of a tube of which one half was seen.
+
+    Notes
+    -----
+    All n times m pairs are summed, in single precision: exact up to 1e-4, and 2 ns a pair, so that 1000 queries cost
+    less than the 16 nearest neighbours of all points. ``igl.fast_winding_number`` with its usual settings takes five
+    times as long for 1000 queries of 4096 points, twice for 4000, and crashes on coincident points.
+    """
+    if not len(points):
+        return np.zeros(len(queries))
+    centre, extent = points.mean(axis=0), np.ptp(points, axis=0).max() or 1.0
+    p, q, area = (points - centre) / extent, (queries - centre) / extent, areas / extent**2
+    dipoles = normals * area[:, None] / (4 * np.pi)
+    # products of matrices: |p - q|^2 of every pair, and the sums of what does not depend on the query
+    ours = np.column_stack([q, dot(q, q), np.ones(len(q))]).astype(np.float32)
+    theirs = np.stack([*(-2 * p.T), np.ones(len(p)), dot(p, p)]).astype(np.float32)
+    terms = np.column_stack([dipoles, dot(p, dipoles)]).astype(np.float32)
+    least = np.maximum(area, LEAST_BALL**2).astype(np.float32)
+    sums = np.empty((len(q), 4))
+    for start in range(0, len(q), WINDING_CHUNK):
+        part = slice(start, start + WINDING_CHUNK)
+        squared = ours[part] @ theirs
+        np.maximum(squared, least, out=squared)
+        inverse = np.sqrt(squared)
+        inverse *= squared
+        np.reciprocal(inverse, out=inverse)
+        sums[part] = inverse @ terms
+    return sums[:, 3] - dot(q, sums[:, :3])

@@ -1,0 +1,256 @@
+"""Inside or outside: orientation, areas and winding numbers, on closed forms."""
+
+import igl
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from glsk_o3d.numerics.cotangent import cotangent_laplacian
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, plane_axes, principal
+from glsk_o3d.numerics.rings import star_rings
+from glsk_o3d.numerics.winding import orient_away, orient_by_curvature, point_areas, winding_number
+from glsk_o3d.samples import sheet, sphere, torus, tube
+
+X = np.eye(3)[0]
+
+
+def ball(n, radius=1.0, seed=0):
+    """Points of a sphere, and their normals."""
+    points = np.random.default_rng(seed).normal(size=(n, 3))
+    normals = points / np.linalg.norm(points, axis=1, keepdims=True)
+    return radius * normals, normals
+
+
+def open_tube(n, half=False, seed=0):
+    """An open tube of radius .1 and length 1, or its upper half: points and normals."""
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(0, np.pi if half else 2 * np.pi, n)
+    normals = np.stack([np.zeros(n), np.cos(angle), np.sin(angle)], axis=1)
+    return 0.1 * normals + rng.uniform(-0.5, 0.5, (n, 1)) * X, normals
+
+
+def ring(n, seed=0):
+    """A torus of radii .4 and .1: points and normals."""
+    points = torus(n, seed=seed).points
+    flat = points * [1, 1, 0]
+    away = points - 0.4 * flat / np.linalg.norm(flat, axis=1, keepdims=True)
+    return points, away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+def areas_of(points):
+    return point_areas(points, nearest_neighbours(points, min(16, len(points)))[1])
+
+
+def field(points, normals, queries):
+    return winding_number(points, normals, areas_of(points), np.atleast_2d(queries))
+
+
+def oriented(points, signs=None):
+    """Normals and neighbours of a cloud, estimated, and its normals oriented by its own Laplacian."""
+    _, neighbours = nearest_neighbours(points, 16)
+    _, normals = principal(points, neighbours)
+    rings = star_rings(points, np.arange(len(points)), neighbours[:, 1:], plane_axes(normals))
+    normals = normals if signs is None else normals * signs[:, None]
+    return orient_by_curvature(normals, cotangent_laplacian(points, rings) @ points, neighbours)
+
+
+# --------------------------------------------------------------------------------------------------------------- field
+
+
+@pytest.mark.parametrize("dtype", [float, np.float32])
+def test_a_ball(dtype):
+    points, normals = (each.astype(dtype) for each in ball(4000))
+    found = field(points, normals, np.outer([0, 0.5, 0.9, 1.1, 1.5, 4], X))
+    np.testing.assert_allclose(found, [1, 1, 1, 0, 0, 0], atol=0.04)
+    on_it = field(points, normals, ball(500, seed=1)[0])
+    assert on_it.mean() == pytest.approx(0.5, abs=0.05)
+    assert on_it.std() < 0.1  # a dipole that is not averaged would spike
+
+
+@pytest.mark.parametrize("half", [False, True])
+def test_a_tube_and_half_of_one(half):
+    found = field(*open_tube(4000, half), np.outer([0, 0.25, 2], X))
+    # what an open tube hides of the sphere of directions
+    ends = [-0.5, 0.5] - np.array([[0], [0.25], [2]])
+    exact = np.diff(ends / np.hypot(ends, 0.1), axis=1)[:, 0] / 2
+    np.testing.assert_allclose(found, exact / (2 if half else 1), atol=0.04)
+
+
+def test_a_torus_is_hollow_in_its_hole_only():
+    points, normals = ring(4000)
+    angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    axis = 0.4 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    np.testing.assert_allclose(field(points, normals, axis), 1, atol=0.04)
+    np.testing.assert_allclose(field(points, normals, axis * np.tile([[0], [0.5], [1.5], [2]], (10, 1))), 0, atol=0.04)
+
+
+def test_two_shells():
+    (outer, away), (inner, inward) = ball(4000), ball(1000, 0.5, seed=1)
+    places = np.outer([0, 0.75, 1.25], X)
+    # one inside another of the same side counts twice; a hollow does not count
+    for sign, exact in ((1, [2, 1, 0]), (-1, [0, 1, 0])):
+        found = field(np.concatenate([outer, inner]), np.concatenate([away, sign * inward]), places)
+        np.testing.assert_allclose(found, exact, atol=0.04)
+
+
+def test_an_uneven_ball():
+    points, normals = ball(8000)
+    kept = np.random.default_rng(1).random(8000) < np.where(points[:, 0] > 0, 1, 0.1)
+    found = field(points[kept], normals[kept], np.outer([-0.7, 0, 0.9, 1.3, -1.5], X))
+    np.testing.assert_allclose(found, [1, 1, 1, 0, 0], atol=0.06)
+
+
+def test_agrees_with_the_mesh_of_libigl():
+    points = ball(1500)[0] * [1, 0.6, 0.3]
+    faces = ConvexHull(points).simplices
+    a, b, c = points[faces].transpose(1, 0, 2)
+    cross = np.cross(b - a, c - a)
+    faces[np.einsum("ij,ij->i", cross, a) < 0] = faces[np.einsum("ij,ij->i", cross, a) < 0][:, ::-1]
+    faces = faces[a[:, 2] < 0.1]  # not closed: between 0 and 1
+    a, b, c = points[faces].transpose(1, 0, 2)
+    cross = np.cross(b - a, c - a)
+    double = np.linalg.norm(cross, axis=1)
+    queries = np.random.default_rng(0).uniform(-0.5, 0.5, (200, 3)) * [1, 0.6, 0.3]
+    exact = igl.winding_number(points, faces.astype(np.int64), queries)
+    found = winding_number((a + b + c) / 3, cross / double[:, None], double / 2, queries)
+    assert np.ptp(exact) > 0.2
+    np.testing.assert_allclose(found, exact, atol=0.02)
+
+
+def test_dipoles_away_from_the_query_are_those_of_the_paper():
+    points, normals = ball(300)
+    areas = areas_of(points)
+    queries = 0.5 * ball(200, seed=1)[0]
+    away = points - queries[:, None]
+    exact = np.einsum("qpi,pi,p->q", away / np.linalg.norm(away, axis=2, keepdims=True) ** 3, normals, areas)
+    assert (np.linalg.norm(away, axis=2) > np.sqrt(areas)).all()
+    np.testing.assert_allclose(winding_number(points, normals, areas, queries), exact / (4 * np.pi), atol=1e-5)
+
+
+def test_near_a_point_it_is_the_mean_over_a_ball():
+    point, area = np.zeros((1, 3)), np.array([0.04])
+    # seen from the dipole the mean is one over directions: what it sends out along each is constant, times the chord
+    z = np.linspace(-1, 1, 200001)[1::2]
+    turn = np.arange(len(z)) * np.pi * (3 - np.sqrt(5))  # directions on a spiral
+    rays = np.stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z], axis=1)
+    for place in np.array([[0.05, 0, 0], [-0.12, 0.1, 0], [-0.1, 0.17, 0.2]]):
+        middle = rays @ place
+        half = np.sqrt(np.maximum(middle**2 - place @ place + 0.2**2, 0))  # of the chord of the ball of radius .2
+        chord = np.maximum(middle + half, 0) - np.maximum(middle - half, 0)
+        mean = -0.04 * (rays[:, 0] * chord).mean() / (4 / 3 * np.pi * 0.2**3)
+        assert winding_number(point, X[None], area, place[None])[0] == pytest.approx(mean, rel=1e-4)
+
+
+def test_does_not_depend_on_pose_units_or_order():
+    points, normals = ring(1500)
+    rng = np.random.default_rng(0)
+    queries = rng.uniform(-0.5, 0.5, (100, 3))
+    before = field(points, normals, queries)
+    turn = Rotation.random(random_state=0)
+    np.testing.assert_allclose(field(turn.apply(points), turn.apply(normals), turn.apply(queries)), before, atol=1e-4)
+    np.testing.assert_allclose(field(points + 1e5, normals, queries + 1e5), before, atol=1e-4)
+    for unit in (1e-30, 1e30):
+        np.testing.assert_allclose(field(points * unit, normals, queries * unit), before, atol=1e-4)
+    order = rng.permutation(len(points))
+    np.testing.assert_allclose(field(points[order], normals[order], queries), before, atol=1e-4)
+    jitter = 1e-7 * rng.normal(size=points.shape)
+    np.testing.assert_allclose(field(points + jitter, normals, queries), before, atol=1e-4)
+
+
+def test_nothing_asked_and_nothing_there():
+    points, normals = ball(100)
+    assert field(points, normals, np.empty((0, 3))).shape == (0,)
+    nothing = np.empty((0, 3))
+    assert winding_number(nothing, nothing, np.empty(0), np.zeros((2, 3))).tolist() == [0, 0]
+
+
+@pytest.mark.parametrize("n", [1, 2, 8])
+def test_few_or_coincident_points(n):
+    coincident = np.ones((n, 3))
+    areas = areas_of(coincident)
+    assert (areas == 0).all()
+    assert np.isfinite(winding_number(coincident, coincident, areas, np.array([[1, 1, 1], [0, 0, 0.0]]))).all()
+    points, normals = ball(n)
+    assert np.isfinite(field(points, normals, points)).all()
+
+
+def test_doubled_points_count_once():
+    points, normals = ball(2000)
+    twice = np.repeat(points, 2, axis=0)
+    np.testing.assert_allclose(field(twice, np.repeat(normals, 2, axis=0), [[0, 0, 0], X * 2]), [1, 0], atol=0.15)
+
+
+# ------------------------------------------------------------------------------------------------------ areas and signs
+
+
+@pytest.mark.parametrize(("shape", "exact"), [(ball, 4 * np.pi), (ring, 0.16 * np.pi**2)])
+def test_areas_sum_up_to_that_of_the_surface(shape, exact):
+    assert areas_of(shape(8000)[0]).sum() == pytest.approx(exact, rel=0.04)
+
+
+def test_areas_follow_the_density():
+    points, _ = ball(9000)
+    kept = np.random.default_rng(1).random(9000) < np.where(points[:, 0] > 0, 1, 0.1)
+    areas = areas_of(points[kept])
+    for side in (points[kept][:, 0] > 0, points[kept][:, 0] < 0):
+        assert areas[side].sum() == pytest.approx(2 * np.pi, rel=0.15)
+
+
+def test_areas_of_some_of_the_points():
+    points, _ = ball(200)
+    _, neighbours = nearest_neighbours(points, 16)
+    np.testing.assert_array_equal(point_areas(points, neighbours[50:60]), point_areas(points, neighbours)[50:60])
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_estimated_normals_turn_outward(seed):
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], 3000)
+    for points, outward in (ball(3000, seed=seed), ring(3000, seed), open_tube(3000, seed=seed)):
+        assert (np.einsum("ij,ij->i", oriented(points, signs), outward) > 0).all()
+    points, outward = open_tube(3000, half=True, seed=seed)
+    # at the rims alone rings are open, and their Laplacian points along the surface
+    assert (np.einsum("ij,ij->i", oriented(points, signs), outward) > 0).mean() > 0.99
+
+
+def test_a_bent_sheet_is_turned_as_a_whole():
+    points = sheet(3000, bend=90).points
+    _, neighbours = nearest_neighbours(points, 8)
+    turned = oriented(points, np.random.default_rng(0).choice([-1.0, 1.0], 3000))
+    assert (np.einsum("ni,nki->nk", turned, turned[neighbours]) > 0).mean() > 0.99
+
+
+def test_noise_turns_few():
+    cloud = tube(3000, noise=0.005)
+    away = cloud.points - cloud.points.clip(-0.4, 0.4) * X
+    assert (np.einsum("ij,ij->i", oriented(cloud.points), away) > 0).mean() > 0.95
+
+
+def test_signs_given_do_not_matter():
+    points = sphere(500).points
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], 500)
+    np.testing.assert_array_equal(oriented(points, signs), oriented(points))
+
+
+def test_normals_without_curvature_or_place_stay():
+    _, normals = ball(20)
+    _, neighbours = nearest_neighbours(normals, 8)
+    np.testing.assert_array_equal(orient_by_curvature(normals, np.zeros((20, 3)), neighbours), normals)
+    np.testing.assert_array_equal(orient_away(normals, normals, normals), normals)
+
+
+def test_normals_turn_away_from_an_axis():
+    points, normals = open_tube(200)
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (200, 1))
+    np.testing.assert_array_equal(orient_away(points, normals * signs, points[:, :1] * X), normals)
+
+
+def test_input_is_not_changed():
+    points, normals = ball(200)
+    areas, queries = areas_of(points), points * 0.5
+    given = [points, normals, areas, queries]
+    for each in given:
+        each.flags.writeable = False
+    winding_number(*given)
+    orient_by_curvature(normals, points, nearest_neighbours(points, 8)[1])
+    orient_away(points, normals, queries)
