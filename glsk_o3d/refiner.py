@@ -7,16 +7,21 @@ from typing import ClassVar
 
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
+from .refinement.air import cut_air
 from .refinement.axis_fit import fit_axis
 from .refinement.bridging import bridge_gaps
 from .refinement.clamp import clamp_to_points
 from .refinement.diagnostics import diagnose
+from .refinement.evidence import Evidence
 from .refinement.loops import close_loops
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
 from .refinement.triangles import collapse_triangles
-from .refinement.weak_loops import cut_weak_loops
+from .report import Judgement
 from .skeleton import Skeleton
+
+CUTTING_ROUNDS = 3  # measured: after two nothing is left to cut
+FITTED_SPUR = 1.15  # fitted: the reach of a spur may be so much more where the axis was fitted
 
 
 @documented
@@ -66,11 +71,26 @@ class Refiner(Filter[Skeleton]):
     consumes: ClassVar[type] = Skeleton
     produces: ClassVar[type] = Skeleton
 
-    opening: float = parameter(
-        1.0,
-        "Least opening of a loop over the radius of its tube; loops that open less are zipped up. 0 keeps all.",
+    handle: float = parameter(
+        0.5,
+        "Least probability that a loop is a handle of the object; others are zipped up. 0 keeps all.",
         type="float",
         low=0,
+        high=1,
+    )
+    air: float = parameter(
+        0.5,
+        "Probability that a branch crosses air from which on it is cut there. 0 cuts none.",
+        type="float",
+        low=0,
+        high=1,
+    )
+    bridge: float = parameter(
+        0.5,
+        "Probability that the object goes on across a gap from which on it is bridged. 0 bridges none.",
+        type="float",
+        low=0,
+        high=1,
     )
     spur: float = parameter(
         1.3,
@@ -88,32 +108,9 @@ class Refiner(Filter[Skeleton]):
     recentre: int = parameter(
         3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", type="int", unit="passes", low=0
     )
-    weak_loop_bonds: float = parameter(
-        0.03,
-        "A loop is cut where so much less of the surface goes across than its median; 0 keeps all.",
-        type="float",
-        low=0,
-    )
-    weak_loop_opening: float = parameter(
-        0.65,
-        "Least opening of a loop over the radius of its tube, times the mean confidence; other loops are cut. 0 keeps "
-        "all.",
-        type="float",
-        low=0,
-    )
-    bridge: float = parameter(
-        0.0,
-        "Longest gap between two parts that continue each other, over their radius; wider gaps stay. 0 bridges none.",
-        type="float",
-        low=0,
-    )
 
     def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
         skeleton = collapse_triangles(skeleton)
-        n_loops = skeleton.n_loops
-        if self.opening:
-            skeleton = close_loops(skeleton, self.opening)
-        n_closed = n_loops - skeleton.n_loops
         if self.spur:
             skeleton = prune_spurs(skeleton, self.spur)
         if self.recentre:
@@ -121,17 +118,57 @@ class Refiner(Filter[Skeleton]):
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
         skeleton = fit_axis(skeleton, self.recentre)
-        n_loops = skeleton.n_loops
-        if self.weak_loop_bonds or self.weak_loop_opening:
-            skeleton = cut_weak_loops(skeleton, self.weak_loop_bonds, self.weak_loop_opening)
-        n_cut = n_loops - skeleton.n_loops
-        if self.spur and n_cut:
-            skeleton = prune_spurs(skeleton, self.spur)
-        n_edges = len(skeleton.edges)
-        if self.bridge:
-            skeleton = bridge_gaps(skeleton, self.bridge)
-        n_bridges = len(skeleton.edges) - n_edges
-        report = replace(skeleton.report, n_loops_closed=n_closed, n_loops_cut=n_cut, n_bridges=n_bridges)
+        if len(skeleton.edges) and (self.handle or self.air or self.bridge):
+            skeleton = self._judge(skeleton)
+        report = skeleton.report
         for message in diagnose(skeleton):
             report = report.with_warning(message)
         return replace(skeleton, report=report)
+
+    def _judge(self, skeleton: Skeleton) -> Skeleton:
+        """Close false loops, cut what crosses air, and bridge gaps; the axis is fitted anew where that changed."""
+        evidence, found = Evidence.of(skeleton), []
+        if self.handle:
+            skeleton, loops = close_loops(skeleton, evidence, self.handle)
+            found += loops
+            if _changed(loops):
+                skeleton = self._refit(skeleton, 1)
+        if self.spur:
+            skeleton = prune_spurs(skeleton, FITTED_SPUR * self.spur)
+        for _ in range(CUTTING_ROUNDS if self.air else 0):
+            skeleton, cuts = cut_air(skeleton, evidence, skeleton.report.noise, self.air)
+            found += cuts
+            if not _changed(cuts):
+                break
+            if self.spur:
+                skeleton = prune_spurs(skeleton, FITTED_SPUR * self.spur)
+        if self.bridge:
+            skeleton, gaps = bridge_gaps(skeleton, evidence, self.bridge)
+            found += gaps
+            if _changed(gaps):
+                skeleton = self._refit(skeleton, 1)
+                if self.handle:
+                    skeleton, loops = close_loops(skeleton, evidence, self.handle)
+                    found += loops
+        if _changed(found):
+            skeleton = self._refit(skeleton, 2)
+            if self.spur:
+                skeleton = prune_spurs(skeleton, FITTED_SPUR * self.spur)
+        counts = {about: sum(it.about == about and it.changed for it in found) for about in ("loop", "air", "gap")}
+        report = replace(
+            skeleton.report,
+            judgements=tuple(found),
+            n_loops_closed=counts["loop"],
+            n_cuts=counts["air"],
+            n_bridges=counts["gap"],
+        )
+        return replace(skeleton, report=report)
+
+    def _refit(self, skeleton: Skeleton, passes: int) -> Skeleton:
+        if self.spacing:
+            skeleton = subdivide_edges(skeleton, self.spacing)
+        return fit_axis(skeleton, min(passes, self.recentre))
+
+
+def _changed(judgements: list[Judgement]) -> bool:
+    return any(it.changed for it in judgements)

@@ -66,7 +66,42 @@ class IterationRecord:
     seconds: float
 
 
-def _known(cls: type[Report] | type[IterationRecord], data: Mapping[str, Any]) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Judgement:
+    """A question about the topology, and how it was answered.
+
+    Attributes
+    ----------
+    about : {"air", "loop", "gap", "limb"}
+        Whether a stretch of a branch crosses air, a loop is a handle, a gap is bridged by the object, or a branch is a
+        limb and no spur.
+    place : (x, y, z)
+        In the cloud's units.
+    probability : float
+        That it is so.
+    changed : bool
+        Whether the graph was changed: the stretch cut, the loop zipped up, the gap bridged, the branch pruned.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> [(it.about, it.changed) for it in skeletonize(torus(1000).points).report.judgements if it.about == "loop"]
+    [('loop', False)]
+    """
+
+    about: str
+    place: tuple[float, float, float]
+    probability: float
+    changed: bool
+
+    @property
+    def is_uncertain(self) -> bool:
+        """Whether the probability lies between a quarter and three quarters."""
+        return 0.25 <= self.probability <= 0.75
+
+
+def _known(cls: type[Report] | type[IterationRecord] | type[Judgement], data: Mapping[str, Any]) -> dict[str, Any]:
     names = {field.name for field in dataclasses.fields(cls)}
     return {name: value for name, value in data.items() if name in names}
 
@@ -99,12 +134,13 @@ class Report:
     n_input, n_dropped, n_sampled, n_outliers, n_distinct, n_contracted : int
         Input points, those dropped as not finite, those that a large cloud was sampled to (all of a smaller one), those
         set aside as outliers, the distinct ones of the sample, and those of them that were contracted.
-    n_loops_closed, n_loops_cut : int
-        Loops that were zipped up because they open less than their tube is thick, and weak loops, which were cut: the
-        surface hardly goes on across them, or there is little confidence in them. In noise a true loop may be among
-        these.
-    n_bridges : int
-        Gaps between parts that were bridged.
+    noise : float
+        Mean share of noise of the neighbourhoods, from 0 to 1.
+    n_loops_closed, n_cuts, n_bridges : int
+        Loops that were zipped up because they are probably no handles, branches that were cut because they probably
+        cross air, and gaps that were bridged.
+    judgements : tuple of Judgement
+        What was asked about the topology, with probabilities, and what was done.
     stages : tuple of str
         The filters that ran, as the expressions that rebuild them.
     recipe : dict
@@ -136,9 +172,11 @@ class Report:
     n_outliers: int = 0
     n_distinct: int = 0
     n_contracted: int = 0
+    noise: float = 0.0
     n_loops_closed: int = 0
-    n_loops_cut: int = 0
+    n_cuts: int = 0
     n_bridges: int = 0
+    judgements: tuple[Judgement, ...] = ()
     stages: tuple[str, ...] = ()
     recipe: dict[str, Any] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -154,6 +192,12 @@ class Report:
             _warnings.warn(message, SkeletonWarning, stacklevel=outside())
         return dataclasses.replace(self, warnings=(*self.warnings, message))
 
+    @property
+    def uncertain(self) -> tuple[Judgement, ...]:
+        """What was judged with a probability between a quarter and three quarters, the least certain first."""
+        found = (it for it in self.judgements if it.is_uncertain)
+        return tuple(sorted(found, key=lambda it: abs(it.probability - 0.5)))
+
     def to_dict(self) -> dict[str, Any]:
         """Plain dict of numbers, strings, lists and dicts, as saved in JSON."""
         return dataclasses.asdict(self)
@@ -167,6 +211,10 @@ class Report:
             raise ValueError("its recipe is none")
         values["iterations"] = tuple(
             IterationRecord(**_known(IterationRecord, record)) for record in values.get("iterations", ())
+        )
+        values["judgements"] = tuple(
+            Judgement(**(_known(Judgement, found) | {"place": tuple(found["place"])}))
+            for found in values.get("judgements", ())
         )
         for name in ("stages", "warnings"):
             values[name] = tuple(values.get(name, ()))

@@ -237,5 +237,6 @@ def _contraction(
             n_sampled=len(sample.kept),
             n_distinct=int(surface.merged.sum()),
             n_contracted=n,
+            noise=float(surface.noise.mean()),
         ),
     )

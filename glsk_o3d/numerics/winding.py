@@ -12,14 +12,39 @@ LEAST_BALL = 1e-6  # derived: of the extent; what single precision can tell apar
 WINDING_CHUNK = 16  # measured: queries at a time: the work arrays of 4096 points then stay in the cache
 
 
-def orient_by_curvature(normals: np.ndarray, curvature: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """Turn normals outward: against the curvature vector, which points inward on whatever bulges, and then by votes.
+def orient_by_votes(normals: np.ndarray, votes: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Turn normals outward as their neighbourhoods vote.
 
-    A point's vote is at first the cosine between its normal and its curvature vector, little where the surface is flat.
-    Ten times it becomes the mean of its neighbours' votes, each times the cosine between both normals; votes that
-    contradict each other shrink. Its sign at the end is what counts. Unlike `orient_normals`, which joins all points by
-    a tree, this needs neither a closed surface nor a farthest point, and no wrong turn is handed on; but it needs the
-    Laplacian, and it turns a wide hollow, such as the inside of a bowl, the wrong way.
+    Ten times a point's vote becomes the mean of its neighbours' votes, each times the cosine between both normals;
+    votes that contradict each other shrink. Its sign at the end is what counts.
+
+    Parameters
+    ----------
+    normals : (n, 3) float array
+        Unit vectors; their signs do not matter.
+    votes : (n,) float array
+        For the normal as it is, where positive, or against it: how clearly each point can tell by itself.
+    neighbours : (n, k) int array
+        As from `nearest_neighbours`.
+
+    Returns
+    -------
+    (n, 3) float array
+    """
+    here, there = normals.T, np.ascontiguousarray(normals.T).take(neighbours, axis=1)
+    cosines = np.einsum("in,ink->nk", here, there) / neighbours.shape[1]
+    for _ in range(VOTING_ROUNDS):
+        votes = np.einsum("nk,nk->n", cosines, votes.take(neighbours))
+    return normals * np.where(votes < 0, -1.0, 1.0)[:, None]
+
+
+def orient_by_curvature(normals: np.ndarray, curvature: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Turn normals outward before there is an axis: against the curvature vector, which points inward where it bulges.
+
+    A point's vote is the cosine between its normal and its curvature vector, little where the surface is flat. Unlike
+    `orient_normals`, which joins all points by a tree, this needs neither a closed surface nor a farthest point, and no
+    wrong turn is handed on; but it needs the Laplacian, and it turns a wide hollow, such as the inside of a bowl, the
+    wrong way.
 
     Parameters
     ----------
@@ -35,25 +60,29 @@ def orient_by_curvature(normals: np.ndarray, curvature: np.ndarray, neighbours: 
     (n, 3) float array
     """
     votes = -dot(normals, curvature) / np.maximum(norm(curvature), TINY)
-    here, there = normals.T, np.ascontiguousarray(normals.T).take(neighbours, axis=1)
-    cosines = np.einsum("in,ink->nk", here, there) / neighbours.shape[1]
-    for _ in range(VOTING_ROUNDS):
-        votes = np.einsum("nk,nk->n", cosines, votes.take(neighbours))
-    return normals * np.where(votes < 0, -1.0, 1.0)[:, None]
+    return orient_by_votes(normals, votes, neighbours)
 
 
-def orient_away(points: np.ndarray, normals: np.ndarray, axis_points: np.ndarray) -> np.ndarray:
+def orient_from_axis(
+    points: np.ndarray, normals: np.ndarray, axis_points: np.ndarray, neighbours: np.ndarray
+) -> np.ndarray:
     """Turn normals away from the place on an axis that each point belongs to.
+
+    A point's vote is the cosine between its normal and its way from the axis: little where the axis is not that of
+    its surface, such as around an edge that crosses from one part to another.
 
     Parameters
     ----------
     points, normals, axis_points : (n, 3) float array
+    neighbours : (n, k) int array
+        As from `nearest_neighbours`.
 
     Returns
     -------
     (n, 3) float array
     """
-    return normals * np.where(dot(normals, points - axis_points) < 0, -1.0, 1.0)[:, None]
+    away = points - axis_points
+    return orient_by_votes(normals, dot(normals, away) / np.maximum(norm(away), TINY), neighbours)
 
 
 def point_areas(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:

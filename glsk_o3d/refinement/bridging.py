@@ -1,76 +1,149 @@
-"""Bridge the gaps that a scan leaves in one part."""
+"""Bridge the gaps that a scan or the contraction leaves in an object."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
 
 from ..numerics.vectors import TINY, dot, norm
+from ..report import Judgement
 from ..skeleton import Skeleton
+from .evidence import Evidence
+from .scores import BRIDGE_WEIGHTS, probability
 
-# All fitted.
-BRIDGE_COSINE = 0.7  # least cosine between the bridge and either end
-BRIDGE_RADIUS_RATIO = 2.0  # most that one end may be thicker than the other
+# All fitted but where it says otherwise.
+BRIDGE_REACH = 6.0  # longest gap, in radii of the end
+BRIDGE_COSINE = 0.5  # least cosine between the bridge and the end
 BRIDGE_LOOK_BACK = 3.0  # radii to look back along a branch for its direction
+DETOUR = 2.0  # least way along the skeleton over that across the gap; less would make a loop of nothing
+DETOUR_RADII = 3.0  # and that many radii more
+BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
+SHEET_WIDTH = 0.7  # radii around a bridge in which a sheet of points lies across it
+CAP_BACK, CAP_AHEAD, CAP_WIDTH = 1.0, 2.5, 1.6  # radii around an end in which its cap is
+END_CHOICES, SIDE_CHOICES = 2, 1  # derived: other ends and other places that are asked, the nearest
 
 
-def bridge_gaps(skeleton: Skeleton, gap: float) -> Skeleton:
-    """Join ends of different components that point at each other and are equally thick; nearest first.
+class _End(NamedTuple):
+    leaf: int
+    place: np.ndarray
+    outward: np.ndarray
+    radius: float
+
+
+def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
+    """Join ends with other ends, or with the side of something, where the object probably goes on; the surest first.
 
     Parameters
     ----------
     skeleton : Skeleton
-    gap : float
-        Longest bridge over the mean radius of the two branches.
+    evidence : Evidence
+    least : float
+        Probability from which on a gap is bridged.
 
     Returns
     -------
     Skeleton
         With an edge for each bridge.
+    judgements : list of Judgement
+        One for each end that points at something, of its likeliest bridge.
     """
-    leaf, direction, radius = _ends(skeleton)
-    if skeleton.n_components < 2 or len(leaf) < 2:
-        return skeleton
-    place, component = skeleton.vertices[leaf], skeleton.component_of_vertex[leaf]
-    i, j = np.triu_indices(len(leaf), 1)
-    way = place[j] - place[i]
-    length = norm(way)
-    way = way / np.maximum(length, TINY)[:, None]
-    relative = length / ((radius[i] + radius[j]) / 2)
-    fits = (
-        (component[i] != component[j])
-        & (relative < gap)
-        & (dot(way, direction[i]) > BRIDGE_COSINE)
-        & (dot(way, direction[j]) < -BRIDGE_COSINE)
-        & (np.maximum(radius[i], radius[j]) < BRIDGE_RADIUS_RATIO * np.minimum(radius[i], radius[j]))
-    )
-    pairs = np.flatnonzero(fits)
-    pairs = pairs[np.argsort(relative[pairs], kind="stable")]
-    used, label, bridges = set(), component, []
-    for one, other in zip(i[pairs].tolist(), j[pairs].tolist(), strict=True):
-        if one in used or other in used or label[one] == label[other]:
-            continue
-        used |= {one, other}
-        label = np.where(label == label[other], label[one], label)
-        bridges.append(sorted((leaf[one], leaf[other])))
+    found = [(probability(BRIDGE_WEIGHTS, facts), pair) for pair, facts in gap_facts(skeleton, evidence)]
+    used: set[int] = set()
+    judgements, bridges = [], []
+    for chance, pair in sorted(found, key=lambda each: -each[0]):
+        if used.isdisjoint(pair):
+            place = skeleton.vertices[list(pair)].mean(axis=0)
+            judgements.append(Judgement("gap", tuple(place.tolist()), chance, chance >= least))
+            used.update(pair)
+            if chance >= least:
+                bridges.append(sorted(pair))
     if not bridges:
-        return skeleton
-    return replace(skeleton, edges=np.unique(np.concatenate([skeleton.edges, bridges]), axis=0))
+        return skeleton, judgements
+    return replace(skeleton, edges=np.unique(np.concatenate([skeleton.edges, bridges]), axis=0)), judgements
 
 
-def _ends(skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Leaves, the directions in which their branches end, and the median radii of these."""
-    found = []
+def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:
+    """What speaks for and against a bridge, for every end and the places that it points at.
+
+    The facts are: the least winding number along the bridge, over the median on the skeleton; the area of surface that
+    lies across it, whichever way it faces, over the bridge's cross-section, as a logarithm; the cosine between bridge
+    and end; and how far the end is closed: the flux of its outward normals through its cross-section, 1 for a cap and 0
+    for a tube cut open, as a logarithm.
+
+    Yields
+    ------
+    (leaf, vertex) : two int
+    facts : dict of str to float
+    """
+    ends = list(_ends(skeleton))
+    if not ends or not len(evidence.points):
+        return
+    typical = max(float(np.median(evidence.winding(skeleton.vertices[skeleton.edges].mean(axis=1)))), TINY)
+    for end, travelled in zip(ends, _along(skeleton, [end.leaf for end in ends]), strict=True):
+        across = skeleton.vertices - end.place
+        away = np.maximum(norm(across), TINY)
+        cosine = across @ end.outward / away
+        free = skeleton.degree == 1
+        gap = away - np.where(free, 0, skeleton.radii)
+        aims = (gap < BRIDGE_REACH * end.radius) & (cosine > BRIDGE_COSINE) & (skeleton.degree > 0)
+        aims &= travelled > DETOUR * away + DETOUR_RADII * np.maximum(end.radius, skeleton.radii)
+        cost = gap + away * (1 - cosine) / 2
+        closed = _cap(end, evidence)
+        for kind, most in ((free, END_CHOICES), (~free, SIDE_CHOICES)):
+            some = np.flatnonzero(aims & kind)
+            for other in some[np.argsort(cost[some], kind="stable")[:most]].tolist():
+                winding = evidence.winding(end.place + BRIDGE_SAMPLES * across[other]).min() / typical
+                yield (
+                    (end.leaf, other),
+                    dict(
+                        winding=float(np.clip(winding, -0.5, 1.3)),
+                        sheets=float(np.log(_sheets(end, across[other], evidence) + 0.05)),
+                        straightness=float(cosine[other]),
+                        cap=float(np.log(closed + 0.1)),
+                    ),
+                )
+
+
+def _along(skeleton: Skeleton, starts: list[int]) -> np.ndarray:
+    """Length of the way along the skeleton from some vertices to all, (s, M) float array."""
+    m, (a, b) = len(skeleton.vertices), skeleton.edges.T
+    graph = coo_array((np.maximum(skeleton.edge_lengths, TINY), (a, b)), shape=(m, m)).tocsr()
+    return dijkstra(graph, directed=False, indices=starts)
+
+
+def _cap(end: _End, evidence: Evidence) -> float:
+    """Flux of the normals that look out of an end, through its cross-section, at least 0."""
+    offset = evidence.points - end.place
+    ahead = offset @ end.outward
+    beside = dot(offset, offset) - ahead**2
+    near = (ahead > -CAP_BACK * end.radius) & (ahead < CAP_AHEAD * end.radius)
+    near &= beside < (CAP_WIDTH * end.radius) ** 2
+    facing = np.maximum(evidence.normals[near] @ end.outward, 0)
+    return float(evidence.areas[near] @ facing / (np.pi * end.radius**2))
+
+
+def _sheets(end: _End, across: np.ndarray, evidence: Evidence) -> float:
+    """Area of the surface across a bridge, over the bridge's cross-section."""
+    length = max(float(np.linalg.norm(across)), TINY)
+    way, offset, radius = across / length, evidence.points - end.place, SHEET_WIDTH * end.radius
+    ahead = offset @ way
+    near = (ahead > 0) & (ahead < length) & (dot(offset, offset) - ahead**2 < radius**2)
+    return float(evidence.areas[near] @ np.abs(evidence.normals[near] @ way) / (np.pi * radius**2))
+
+
+def _ends(skeleton: Skeleton) -> Iterator[_End]:
+    """Leaves, with the directions in which their branches end, and the median radii of these."""
     for branch in skeleton.branches:
         radius = float(np.median(skeleton.radii[branch]))
         for path in (branch, branch[::-1]):
             if skeleton.degree[path[0]] == 1 and radius > 0:
-                found.append((path[0], _outward(skeleton.vertices[path], BRIDGE_LOOK_BACK * radius), radius))
-    if not found:
-        return np.empty(0, int), np.empty((0, 3)), np.empty(0)
-    leaf, direction, radius = zip(*found, strict=True)
-    return np.array(leaf), np.array(direction), np.array(radius)
+                place = skeleton.vertices[path[0]]
+                yield _End(int(path[0]), place, _outward(skeleton.vertices[path], BRIDGE_LOOK_BACK * radius), radius)
 
 
 def _outward(path: np.ndarray, back: float) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..numerics.groups import group_sum
 from ..skeleton import Skeleton
@@ -35,10 +36,33 @@ def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
     total = group_sum(weight, group, n)
     edges = np.sort(group[skeleton.edges], axis=1)
     vertex = skeleton.vertex_of_point
+    radii, confidence = (
+        group_sum(weight * values[:, None], group, n)[:, 0] / total[:, 0]
+        for values in (skeleton.radii, skeleton.confidence)
+    )
     return replace(
         skeleton,
         vertices=group_sum(weight * skeleton.vertices, group, n) / total,
         edges=np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0),
-        radii=(group_sum(weight * skeleton.radii[:, None], group, n) / total)[:, 0],
+        radii=radii,
+        confidence=confidence,
         vertex_of_point=np.where(vertex >= 0, group[vertex], -1),
+    )
+
+
+def drop_lone_vertices(skeleton: Skeleton) -> Skeleton:
+    """Drop vertices without edges, unless there is nothing else; their points go to the nearest vertex left."""
+    left = np.flatnonzero(skeleton.degree > 0)
+    if len(left) in (0, len(skeleton.vertices)):
+        return skeleton
+    representative = cKDTree(skeleton.vertices[left]).query(skeleton.vertices)[1]
+    representative[left] = np.arange(len(left))
+    vertex = skeleton.vertex_of_point
+    return replace(
+        skeleton,
+        vertices=skeleton.vertices[left],
+        edges=representative[skeleton.edges],
+        radii=skeleton.radii[left],
+        confidence=skeleton.confidence[left],
+        vertex_of_point=np.where(vertex >= 0, representative[vertex], -1),
     )

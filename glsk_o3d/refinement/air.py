@@ -1,0 +1,193 @@
+"""Cut the edges that cross air: between parts that noise or flying points join."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..numerics.vectors import TINY, norm
+from ..report import Judgement
+from ..skeleton import Skeleton
+from .evidence import Evidence
+from .merging import drop_lone_vertices
+from .scores import AIR_WEIGHTS, probability
+
+AIR_WINDOW = 1.0  # derived: radii of a branch along which evidence is averaged; a false edge is two radii long or more
+BEYOND_WINDOW = 3.0  # fitted: radii beyond an edge, from one on, in which the skeleton should go on straight
+CROSSING_HOPS = 6  # fitted: edges around a branch whose vertices count to the side where they are
+LOW_WINDING = 0.5  # derived: between inside and outside; edges next to the cut one go, too, where it is less
+LEAST_SCATTER = 0.05  # fitted: of winding numbers along a skeleton
+
+
+def cut_air(skeleton: Skeleton, evidence: Evidence, noise: float, least: float) -> tuple[Skeleton, list[Judgement]]:
+    """Cut every branch where it probably crosses air.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Fitted to its axis.
+    evidence : Evidence
+    noise : float
+        Mean share of noise of the cloud, from 0 to 1.
+    least : float
+        Probability from which on a branch is cut.
+
+    Returns
+    -------
+    Skeleton
+    judgements : list of Judgement
+        One for each branch.
+    """
+    judgements, gone = [], []
+    for branch, facts, place, stretch in branch_facts(skeleton, evidence, noise):
+        chance = probability(AIR_WEIGHTS, facts)
+        middle = skeleton.vertices[branch[place : place + 2]].mean(axis=0)
+        judgements.append(Judgement("air", tuple(middle.tolist()), chance, chance >= least))
+        if chance >= least:
+            gone.append(stretch)
+    if not gone:
+        return skeleton, judgements
+    edges = np.delete(skeleton.edges, np.concatenate(gone), axis=0)
+    return drop_lone_vertices(replace(skeleton, edges=edges)), judgements
+
+
+def branch_facts(
+    skeleton: Skeleton, evidence: Evidence, noise: float
+) -> Iterator[tuple[np.ndarray, dict[str, float], int, np.ndarray]]:
+    """What the evidence says about the weakest place of every branch.
+
+    The weakest place is where the winding number, averaged over one radius, is least. The facts are: by how much it is
+    less than the median of all edges there, over their scatter; the area of surface along the edge, over that of a tube
+    and relative to the median of the skeleton; how straight the skeleton goes on beyond, at the better end, as a
+    cosine; the noise; the least bonds that cross the branch, over the points around a tube; whether both ends have
+    other branches; and the length in radii. All but cosine, noise and ends as logarithms.
+
+    Yields
+    ------
+    branch : (p,) int array
+    facts : dict of str to float
+    place : int
+        Position in the branch of the first end of the weakest edge.
+    stretch : int array
+        The weakest edge, and those beside it that the winding number puts outside, too.
+    """
+    vertices, edges, m = skeleton.vertices, skeleton.edges, len(skeleton.vertices)
+    length = np.maximum(skeleton.edge_lengths, TINY)
+    winding = evidence.winding(vertices[edges].mean(axis=1))
+    typical = np.median(winding)
+    scatter = 1.4826 * np.median(np.abs(winding - typical)) + LEAST_SCATTER * abs(typical)
+    area, tube = evidence.surface_along(skeleton), 2 * np.pi * np.maximum(skeleton.radii[edges].mean(axis=1), TINY)
+    seen = area.sum() / (tube * length).sum()
+    spacing = np.sqrt(np.median(evidence.areas))
+    pairs, weight = evidence.bonds(skeleton)
+    around, keys = _neighbours(skeleton), edges @ [m, 1]
+    for branch in skeleton.branches:
+        edge = np.searchsorted(keys, np.sort(np.column_stack([branch[:-1], branch[1:]]), axis=1) @ [m, 1])
+        radius = max(float(np.median(skeleton.radii[branch])), TINY)
+        end = np.cumsum(length[edge])
+        start = end - length[edge]
+        window = _Window((start + end) / 2, np.append(0, end), AIR_WINDOW * radius)
+        smooth = window.mean(winding[edge] * length[edge])
+        k = int(np.argmin(smooth))
+        low, high = k, k
+        while low > 0 and winding[edge[low - 1]] < LOW_WINDING * typical:
+            low -= 1
+        while high < len(edge) - 1 and winding[edge[high + 1]] < LOW_WINDING * typical:
+            high += 1
+        shown = window.mean(area[edge])[k] / (2 * np.pi * radius)
+        crossing = _crossing(branch, around, m, pairs, weight) * spacing / (2 * np.pi * radius)
+        facts = dict(
+            deficit=np.log1p(max((typical - smooth[k]) / max(scatter, TINY), 0)),
+            surface=np.log(max(shown / max(seen, TINY), 0) + 0.05),
+            straightness=_straightness(vertices, around, branch, k, radius),
+            noise=noise,
+            bonds=np.log(crossing + 0.05),
+            inner=float((skeleton.degree[branch[[0, -1]]] > 1).all()),
+            length=np.log(end[-1] / radius + 0.1),
+        )
+        yield branch, facts, k, edge[low : high + 1]
+
+
+class _Window:
+    """Means over a stretch of a path around each of some places."""
+
+    def __init__(self, places: np.ndarray, ends: np.ndarray, width: float) -> None:
+        self._ends = ends
+        self._low, self._high = np.maximum(places - width / 2, 0), np.minimum(places + width / 2, ends[-1])
+
+    def mean(self, amounts: np.ndarray) -> np.ndarray:
+        """Per length, of what is spread evenly over every edge."""
+        total = np.append(0, np.cumsum(amounts))
+        inside = np.interp(self._high, self._ends, total) - np.interp(self._low, self._ends, total)
+        return inside / np.maximum(self._high - self._low, TINY)
+
+
+def _neighbours(skeleton: Skeleton) -> list[list[tuple[int, float]]]:
+    around: list[list[tuple[int, float]]] = [[] for _ in skeleton.vertices]
+    for (a, b), length in zip(skeleton.edges.tolist(), skeleton.edge_lengths.tolist(), strict=True):
+        around[a].append((b, length))
+        around[b].append((a, length))
+    return around
+
+
+def _crossing(
+    branch: np.ndarray, around: list[list[tuple[int, float]]], m: int, pairs: np.ndarray, weight: np.ndarray
+) -> float:
+    """Least weight of the bonds that cross an edge of a branch, from what is on its one side to what is on the other.
+
+    Vertices beyond its ends, a few edges away, count to their side, but those that are near both.
+    """
+    last, inner = len(branch) - 1, set(branch[1:-1].tolist())
+    sides = []
+    for start, stop in ((int(branch[0]), int(branch[-1])), (int(branch[-1]), int(branch[0]))):
+        found, front = {start}, [start]
+        for _ in range(CROSSING_HOPS):
+            front = [v for u in front for v, _ in around[u] if v not in found and v not in inner and v != stop]
+            found.update(front)
+        sides.append(found)
+    place = np.full(m, -1)
+    place[list(sides[0] - sides[1])] = 0
+    place[list(sides[1] - sides[0])] = last
+    place[branch] = np.arange(last + 1)
+    first, second = np.sort(place[pairs], axis=1).T
+    inside = first >= 0
+    first, second, weight = first[inside], second[inside], weight[inside]
+    steps = np.bincount(first, weight, last + 1) - np.bincount(second, weight, last + 1)
+    return max(float(np.cumsum(steps)[:-1].min()) / 2, 0.0)
+
+
+def _straightness(
+    vertices: np.ndarray, around: list[list[tuple[int, float]]], branch: np.ndarray, k: int, radius: float
+) -> float:
+    """Cosine between an edge of a branch and how the skeleton goes on beyond, at the better of both ends."""
+    low, high = branch[max(k - 1, 0)], branch[min(k + 2, len(branch) - 1)]
+    way = vertices[high] - vertices[low]
+    way = way / max(np.linalg.norm(way), TINY)
+    best = []
+    for here, came, sign in ((int(branch[k + 1]), int(branch[k]), 1), (int(branch[k]), int(branch[k + 1]), -1)):
+        ways = _beyond(vertices, around, here, came, radius, BEYOND_WINDOW * radius)
+        best.append(max((sign * float(way @ onward) for onward in ways), default=1.0))
+    return max(best)
+
+
+def _beyond(
+    vertices: np.ndarray, around: list[list[tuple[int, float]]], start: int, came: int, near: float, far: float
+) -> list[np.ndarray]:
+    """Directions in which a graph goes on from a vertex, between two distances along it."""
+    found, stack = [], [(start, came, 0.0, -1)]
+    visited = {came}
+    while stack:
+        here, before, travelled, first = stack.pop()
+        visited.add(here)
+        if first < 0 and travelled >= near:
+            first = here
+        onward = [(v, travelled + length) for v, length in around[here] if v != before and v not in visited]
+        if travelled < far and onward:
+            stack.extend((v, here, there, first) for v, there in onward)
+        elif first >= 0 and first != here:
+            found.append(vertices[here] - vertices[first])
+        elif here != start:
+            found.append(vertices[here] - vertices[start])
+    return [way / max(float(norm(way[None])[0]), TINY) for way in found]

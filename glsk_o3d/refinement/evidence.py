@@ -1,0 +1,95 @@
+"""What the surface around a fitted skeleton says: which side is out, and what is inside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..numerics.neighbourhoods import nearest_neighbours, uprightness
+from ..numerics.vectors import dot
+from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
+from ..skeleton import Skeleton
+from .axis_fit import incident_edges, nearest_on_edges
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """The points that support a skeleton, as an oriented surface; it holds while the graph is changed.
+
+    Attributes
+    ----------
+    supporting : (n,) int array
+        Which input points.
+    points : (n, 3) float array
+    neighbours : (n, k) int array
+        Nearest points, itself first.
+    normals : (n, 3) float array
+        Unit vectors that point outward.
+    areas : (n,) float array
+        What every point stands for.
+    """
+
+    supporting: np.ndarray
+    points: np.ndarray
+    neighbours: np.ndarray
+    normals: np.ndarray
+    areas: np.ndarray
+
+    @classmethod
+    def of(cls, skeleton: Skeleton) -> Evidence:
+        """The evidence for a skeleton that has edges and was fitted to its points."""
+        supporting = skeleton.supporting_points
+        points = skeleton.points[supporting]
+        edge, t = _nearest_edges(skeleton, supporting)
+        start, stop = skeleton.vertices[skeleton.edges[edge]].transpose(1, 0, 2)
+        axis = np.where(edge[:, None] >= 0, start + t[:, None] * (stop - start), points)
+        _, neighbours = nearest_neighbours(points, min(AREA_NEIGHBOURS + 1, len(points)))
+        normals = orient_from_axis(points, skeleton.normals[supporting], axis, neighbours)
+        return cls(supporting, points, neighbours, normals, point_areas(points, neighbours))
+
+    def winding(self, queries: np.ndarray) -> np.ndarray:
+        """Winding number of the surface around each place, (m,) float array from (m, 3): near 1 inside, 0 outside."""
+        return winding_number(self.points, self.normals, self.areas, queries)
+
+    def surface_along(self, skeleton: Skeleton) -> np.ndarray:
+        """Area of the surface along every edge that has it for its axis, (E,) float array.
+
+        Points of the edges at their vertex belong to the nearest. Each counts by how upright its normal stands on it,
+        sin^2.
+        """
+        edge, _ = _nearest_edges(skeleton, self.supporting)
+        some = np.flatnonzero(edge >= 0)
+        edge, ends = edge[some], skeleton.vertices[skeleton.edges]
+        way = (ends[:, 1] - ends[:, 0]) / np.maximum(skeleton.edge_lengths, np.finfo(float).tiny)[:, None]
+        upright = 1 - dot(self.normals[some], way[edge]) ** 2
+        return np.bincount(edge, self.areas[some] * upright, len(skeleton.edges))
+
+    def bonds(self, skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
+        """How far the surface goes on from vertex to vertex.
+
+        Every two near points of different vertices count by how far their normals agree and stand upright on the line
+        between them, cos^2 times sin^2 times sin^2: not where surfaces of two parts face each other.
+
+        Returns
+        -------
+        pairs : (B, 2) int array
+            Vertices, i < j.
+        weight : (B,) float array
+        """
+        vertex, m = skeleton.vertex_of_point[self.supporting], len(skeleton.vertices)
+        p, q = np.repeat(np.arange(len(vertex)), self.neighbours.shape[1] - 1), self.neighbours[:, 1:].ravel()
+        foreign = vertex[p] != vertex[q]
+        p, q = p[foreign], q[foreign]
+        weight = dot(self.normals[p], self.normals[q]) ** 2 * uprightness(self.points, self.normals, p, q)
+        keys = np.minimum(vertex[p], vertex[q]) * m + np.maximum(vertex[p], vertex[q])
+        keys, which = np.unique(keys, return_inverse=True)
+        return np.column_stack(np.divmod(keys, m)), np.bincount(which, weight, len(keys))
+
+
+def _nearest_edges(skeleton: Skeleton, supporting: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of the edges at a point's vertex the nearest, or -1 if it has none, and where on it."""
+    vertex = skeleton.vertex_of_point[supporting]
+    around = incident_edges(skeleton.edges, len(skeleton.vertices))[vertex]
+    edge, t = nearest_on_edges(skeleton.vertices, skeleton.edges, around, skeleton.points[supporting])
+    return np.where(skeleton.degree[vertex] > 0, edge, -1), t
