@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 
 from ..numerics.components import component_labels
@@ -16,6 +19,7 @@ from .scores import HANDLE_WEIGHTS, probability
 from .triangles import collapse_triangles
 
 SHORTEST_LOOP = 3  # derived: a triangle has nothing to zip up
+WIDE_LOOP = 1.5  # fitted: opening of a loop that is more than two strands in one part
 HOLE_SHARE = 0.6  # fitted: of the largest circle in a loop, the part of it that is asked
 LEAST_INSIDE = 0.2  # derived: winding number on an axis, of which next to nothing was seen
 DIRECTIONS = np.column_stack([f(np.arange(6) * np.pi / 3) for f in (np.cos, np.sin)])  # derived: six, evenly
@@ -30,7 +34,9 @@ def surface_distance(skeleton: Skeleton) -> np.ndarray:
 
 
 def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
-    """Zip up the loops that are probably no handles, until there are none.
+    """Close the loops that are probably no handles, until there are none.
+
+    Narrow ones, two strands in one part, are zipped up; wide ones are cut where the fewest bonds cross.
 
     Parameters
     ----------
@@ -38,40 +44,54 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
         Fitted to its axis.
     evidence : Evidence
     least : float
-        Probability of a handle below which a loop of a minimum cycle basis is zipped up.
+        Probability of a handle below which a loop of a minimum cycle basis is closed.
 
     Returns
     -------
     Skeleton
         Without triangles.
     judgements : list of Judgement
-        One for each loop, zipped up or left.
+        One for each loop, closed or left.
     """
     judgements: list[Judgement] = []
     while True:
         m = len(skeleton.vertices)
         cycles = minimum_cycle_basis(m, skeleton.edges, skeleton.edge_lengths)
-        zipped, kept, found = [], [], loop_facts(skeleton, cycles, evidence)
-        for cycle, (facts, centre) in zip(cycles, found, strict=True):
-            chance = probability(HANDLE_WEIGHTS, facts)
+        kept, pairs, cut, used = [], [], [], set()
+        for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
+            chance = probability(HANDLE_WEIGHTS, loop.facts)
             false = chance < least and len(cycle) > SHORTEST_LOOP
-            (judgements if false else kept).append(Judgement("loop", tuple(centre.tolist()), chance, false))
-            if false:
-                zipped.append(cycle)
-        if not zipped:
+            (judgements if false else kept).append(Judgement("loop", tuple(loop.centre.tolist()), chance, false))
+            if not false:
+                continue
+            if loop.facts["opening"] < np.log(WIDE_LOOP):
+                pairs.append(zip_pairs(skeleton.vertices[cycle], cycle))
+            elif used.isdisjoint(cycle.tolist()):  # two cuts in what two loops share would tear a piece out of it
+                cut.append(sorted((cycle[loop.weakest], cycle[(loop.weakest + 1) % len(cycle)])))
+                used.update(cycle.tolist())
+        if not pairs and not cut:
             return skeleton, judgements + kept
-        pairs = np.concatenate([zip_pairs(skeleton.vertices[cycle], cycle) for cycle in zipped])
-        skeleton = collapse_triangles(merge_vertices(skeleton, component_labels(m, pairs)))
+        if cut:
+            gone = (skeleton.edges[:, None] == np.array(cut)).all(axis=2).any(axis=1)
+            skeleton = replace(skeleton, edges=skeleton.edges[~gone])
+        if pairs:
+            group = component_labels(m, np.concatenate(pairs))
+            skeleton = collapse_triangles(merge_vertices(skeleton, group))
 
 
-def loop_facts(
-    skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence
-) -> list[tuple[dict[str, float], np.ndarray]]:
-    """What speaks for and against that each of some loops is a handle, and where the middle of its hole is.
+class _Loop(NamedTuple):
+    facts: dict[str, float]
+    centre: np.ndarray  # of its hole
+    weakest: int  # position of the edge, from there to the next vertex, that the fewest bonds cross
+
+
+def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[_Loop]:
+    """What speaks for and against that each of some loops is a handle.
 
     The facts are: how wide it opens, the radius of the largest circle inside it over the distance of the surface, as a
     logarithm; the least winding number in that circle, over the median along the loop, since a handle is one if no
-    disc that spans it stays inside; and the mean confidence.
+    disc that spans it stays inside; that median, little where parts are too thin to have an inside; the least bonds
+    that cross it somewhere, over the points around a tube, as a logarithm; and the mean confidence.
 
     Parameters
     ----------
@@ -81,21 +101,53 @@ def loop_facts(
     """
     if not cycles:
         return []
-    surface, found = surface_distance(skeleton), []
-    winding = evidence.winding(skeleton.vertices)
+    surface, winding, found = surface_distance(skeleton), evidence.winding(skeleton.vertices), []
+    pairs, weight = evidence.bonds(skeleton)
+    spacing = np.sqrt(np.median(evidence.areas))
     for cycle in cycles:
         points = skeleton.vertices[cycle]
         centre, radius = inscribed_circle(points)
         axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][:2]
         hole = evidence.winding(centre + HOLE_SHARE * radius * np.vstack([np.zeros(3), DIRECTIONS @ axes])).min()
-        inside = max(float(np.median(winding[cycle])), LEAST_INSIDE)
+        inside, tube = float(np.median(winding[cycle])), max(float(np.median(surface[cycle])), TINY)
+        crossing = crossings(cycle, len(surface), pairs, weight)
         facts = dict(
-            opening=float(np.log(radius / max(float(np.median(surface[cycle])), TINY) + 0.1)),
-            winding=float(np.clip(hole / inside, -0.5, 1.5)),
+            opening=float(np.log(radius / tube + 0.1)),
+            winding=float(np.clip(hole / max(inside, LEAST_INSIDE), -0.5, 1.5)),
+            inside=float(np.clip(inside, 0, 1)),
+            bonds=float(np.log(crossing.min() * spacing / (2 * np.pi * tube) + 0.05)),
             confidence=float(np.nan_to_num(skeleton.confidence[cycle]).mean()),
         )
-        found.append((facts, centre))
+        found.append(_Loop(facts, centre, int(np.argmin(crossing))))
     return found
+
+
+def crossings(cycle: np.ndarray, m: int, pairs: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Bonds across every edge of a cycle, from its vertices on the one side to those on the other, the shorter way.
+
+    Parameters
+    ----------
+    cycle : (n,) int array
+    m : int
+        Vertices of the graph.
+    pairs, weight
+        From `Evidence.bonds`.
+
+    Returns
+    -------
+    (n,) float array
+        For the edge from each vertex of the cycle to the next.
+    """
+    n = len(cycle)
+    place = np.full(m, -1)
+    place[cycle] = np.arange(n)
+    first, last = np.sort(place[pairs], axis=1).T
+    inside = first >= 0
+    first, last, weight = first[inside], last[inside], weight[inside]
+    around = last - first > n / 2
+    start, stop = np.where(around, last, first), np.where(around, first, last)
+    steps = np.bincount(start, weight, n) - np.bincount(stop, weight, n)
+    return np.maximum(np.cumsum(steps) + weight[around].sum(), 0)  # rounding leaves less than nothing
 
 
 def zip_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
