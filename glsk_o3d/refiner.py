@@ -11,7 +11,9 @@ from .refinement.axis_fit import fit_axis
 from .refinement.bridging import bridge_gaps
 from .refinement.clamp import clamp_to_points
 from .refinement.diagnostics import diagnose
+from .refinement.junctions import move_junctions
 from .refinement.loops import close_loops
+from .refinement.reattachment import reattach_limbs
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
 from .refinement.triangles import collapse_triangles
@@ -26,15 +28,16 @@ class Refiner(Filter[Skeleton]):
 
     1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
        the shortest, until there is no triangle.
-    2. Loops that open less than their tube is thick are zipped up, and spurs, branches whose points hardly leave the
-       part that they grow from, are pruned.
+    2. Loops that open less than their tube is thick are zipped up.
     3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
        corners.
     4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
        side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
     5. Weak loops are cut: those across which the surface hardly goes on somewhere, and narrow ones where the points
-       hardly say where the axis is; and spurs that this leaves.
-    6. Ends of different parts that point at each other across a gap of the scan are joined.
+       hardly say where the axis is.
+    6. Limbs that run beside another one inside its tube begin where they leave it. Spurs, branches whose points hardly
+       leave the limbs around them, where these go on to meet, are pruned, and junctions move to where limbs meet.
+    7. Ends of different parts that point at each other across a gap of the scan are joined.
 
     The first step is published; with all options 0 it is the only one.
 
@@ -73,8 +76,8 @@ class Refiner(Filter[Skeleton]):
         low=0,
     )
     spur: float = parameter(
-        1.3,
-        "Least reach of a branch's points from the branches it leaves over the distance of the surface there; others "
+        1.5,
+        "Least reach of a branch's points from the limbs that meet there over the distance of the surface; others "
         "are cut. 0 keeps all.",
         type="float",
         low=0,
@@ -114,8 +117,6 @@ class Refiner(Filter[Skeleton]):
         if self.opening:
             skeleton = close_loops(skeleton, self.opening)
         n_closed = n_loops - skeleton.n_loops
-        if self.spur:
-            skeleton = prune_spurs(skeleton, self.spur)
         if self.recentre:
             skeleton = clamp_to_points(skeleton)
         if self.spacing:
@@ -125,8 +126,12 @@ class Refiner(Filter[Skeleton]):
         if self.weak_loop_bonds or self.weak_loop_opening:
             skeleton = cut_weak_loops(skeleton, self.weak_loop_bonds, self.weak_loop_opening)
         n_cut = n_loops - skeleton.n_loops
-        if self.spur and n_cut:
+        if self.recentre:
+            skeleton = reattach_limbs(skeleton)
+        if self.spur:
             skeleton = prune_spurs(skeleton, self.spur)
+        if self.recentre:
+            skeleton = move_junctions(skeleton)
         n_edges = len(skeleton.edges)
         if self.bridge:
             skeleton = bridge_gaps(skeleton, self.bridge)
