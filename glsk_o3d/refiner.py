@@ -11,7 +11,7 @@ from .refinement.axis_fit import fit_axis
 from .refinement.bridging import bridge_gaps
 from .refinement.clamp import clamp_to_points
 from .refinement.diagnostics import diagnose
-from .refinement.junctions import move_junctions
+from .refinement.junctions import level_tips, move_junctions
 from .refinement.loops import close_loops
 from .refinement.reattachment import reattach_limbs
 from .refinement.spurs import prune_spurs
@@ -131,7 +131,7 @@ class Refiner(Filter[Skeleton]):
         if self.spur:
             skeleton = prune_spurs(skeleton, self.spur)
         if self.recentre:
-            skeleton = move_junctions(skeleton)
+            skeleton = level_tips(move_junctions(skeleton))
         n_edges = len(skeleton.edges)
         if self.bridge:
             skeleton = bridge_gaps(skeleton, self.bridge)

@@ -153,3 +153,19 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
             radii[limbs.paths[limb][moved]] = radius
             radii[junction] = max(radii[junction], radius)
     return replace(skeleton, vertices=vertices, radii=radii)
+
+
+def level_tips(skeleton: Skeleton) -> Skeleton:
+    """Give every leaf the radius that its branch has one radius back, or half-way if it is shorter.
+
+    A leaf owns few points, and those of the end that closes the tube: they say little about its radius.
+    """
+    radii = skeleton.radii.copy()
+    for branch in skeleton.branches:
+        along = arc_lengths(skeleton.vertices[branch])
+        own = skeleton.radii[branch]
+        back = min(np.median(own), along[-1] / 2)
+        for end, place in ((0, back), (-1, along[-1] - back)):
+            if skeleton.degree[branch[end]] == 1:
+                radii[branch[end]] = np.interp(place, along, own)
+    return replace(skeleton, radii=radii)

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
 from glsk_o3d.numerics.polylines import arc_lengths
-from glsk_o3d.refinement.junctions import Limbs, move_junctions
+from glsk_o3d.refinement.junctions import Limbs, level_tips, move_junctions
 from glsk_o3d.refinement.reattachment import reattach_limbs
 from glsk_o3d.refinement.spurs import prune_spurs
 
@@ -166,3 +166,14 @@ def test_graphs_without_junctions_stay():
     none = Skeleton([[0, 0, 0]], [], [1], [0], [[0, 0, 1]], [[0, 0, 1]])
     assert Limbs(none, joined=True).paths == []
     assert prune_spurs(none, 1.5) is none
+
+
+def test_tips_are_as_thick_as_their_branch():
+    """A cone from 0.1 to 0.2 whose leaves measured nonsense, one radius back on either side."""
+    raw = drawn([[(0, 0, 0), (1, 0, 0)]], [((0, 0, 0), (1, 0, 0))])
+    raw.radii[:] = 0.1 + 0.1 * raw.vertices[:, 0]
+    raw.radii[raw.leaves] = [0.7, 0.01]
+    found = level_tips(raw).radii
+    np.testing.assert_allclose(found[raw.leaves], [0.115, 0.185], atol=1e-3)
+    inner = np.setdiff1d(np.arange(len(found)), raw.leaves)
+    np.testing.assert_array_equal(found[inner], raw.radii[inner])
