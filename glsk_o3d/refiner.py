@@ -12,8 +12,13 @@ from .refinement.axis_fit import fit_axis
 from .refinement.bridging import bridge_gaps
 from .refinement.clamp import clamp_to_points
 from .refinement.diagnostics import diagnose
+<<<<<<< HEAD
 from .refinement.evidence import Evidence
+=======
+from .refinement.junctions import level_tips, move_junctions
+>>>>>>> junctions
 from .refinement.loops import close_loops
+from .refinement.reattachment import reattach_limbs
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
 from .refinement.triangles import collapse_triangles
@@ -21,7 +26,6 @@ from .report import Judgement
 from .skeleton import Skeleton
 
 CUTTING_ROUNDS = 3  # measured: after two nothing is left to cut
-FITTED_SPUR = 1.15  # fitted: the reach of a spur may be so much more where the axis was fitted
 
 
 @documented
@@ -31,15 +35,16 @@ class Refiner(Filter[Skeleton]):
 
     1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
        the shortest, until there is no triangle.
-    2. Loops that open less than their tube is thick are zipped up, and spurs, branches whose points hardly leave the
-       part that they grow from, are pruned.
+    2. Loops that open less than their tube is thick are zipped up.
     3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
        corners.
     4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
        side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
     5. Weak loops are cut: those across which the surface hardly goes on somewhere, and narrow ones where the points
-       hardly say where the axis is; and spurs that this leaves.
-    6. Ends of different parts that point at each other across a gap of the scan are joined.
+       hardly say where the axis is.
+    6. Limbs that run beside another one inside its tube begin where they leave it. Spurs, branches whose points hardly
+       leave the limbs around them, where these go on to meet, are pruned, and junctions move to where limbs meet.
+    7. Ends of different parts that point at each other across a gap of the scan are joined.
 
     The first step is published; with all options 0 it is the only one.
 
@@ -93,8 +98,8 @@ class Refiner(Filter[Skeleton]):
         high=1,
     )
     spur: float = parameter(
-        1.3,
-        "Least reach of a branch's points from the branches it leaves over the distance of the surface there; others "
+        1.5,
+        "Least reach of a branch's points from the limbs that meet there over the distance of the surface; others "
         "are cut. 0 keeps all.",
         type="float",
         low=0,
@@ -111,8 +116,6 @@ class Refiner(Filter[Skeleton]):
 
     def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
         skeleton = collapse_triangles(skeleton)
-        if self.spur:
-            skeleton = prune_spurs(skeleton, self.spur)
         if self.recentre:
             skeleton = clamp_to_points(skeleton)
         if self.spacing:
@@ -120,6 +123,12 @@ class Refiner(Filter[Skeleton]):
         skeleton = fit_axis(skeleton, self.recentre)
         if len(skeleton.edges) and (self.handle or self.air or self.bridge):
             skeleton = self._judge(skeleton)
+        if self.recentre:
+            skeleton = reattach_limbs(skeleton)
+        if self.spur:
+            skeleton = prune_spurs(skeleton, self.spur)
+        if self.recentre:
+            skeleton = level_tips(move_junctions(skeleton))
         report = skeleton.report
         for message in diagnose(skeleton):
             report = report.with_warning(message)
@@ -134,14 +143,14 @@ class Refiner(Filter[Skeleton]):
             if _changed(loops):
                 skeleton = self._refit(skeleton, 1)
         if self.spur:
-            skeleton = prune_spurs(skeleton, FITTED_SPUR * self.spur)
+            skeleton = prune_spurs(skeleton, self.spur)
         for _ in range(CUTTING_ROUNDS if self.air else 0):
             skeleton, cuts = cut_air(skeleton, evidence, skeleton.report.noise, self.air)
             found += cuts
             if not _changed(cuts):
                 break
             if self.spur:
-                skeleton = prune_spurs(skeleton, FITTED_SPUR * self.spur)
+                skeleton = prune_spurs(skeleton, self.spur)
         if self.bridge:
             skeleton, gaps = bridge_gaps(skeleton, evidence, self.bridge)
             found += gaps
@@ -152,8 +161,6 @@ class Refiner(Filter[Skeleton]):
                     found += loops
         if _changed(found):
             skeleton = self._refit(skeleton, 2)
-            if self.spur:
-                skeleton = prune_spurs(skeleton, FITTED_SPUR * self.spur)
         counts = {about: sum(it.about == about and it.changed for it in found) for about in ("loop", "air", "gap")}
         report = replace(
             skeleton.report,

@@ -90,8 +90,7 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
 
     The facts are: how wide it opens, the radius of the largest circle inside it over the distance of the surface, as a
     logarithm; the least winding number in that circle, over the median along the loop, since a handle is one if no
-    disc that spans it stays inside; that median, little where parts are too thin to have an inside; the least bonds
-    that cross it somewhere, over the points around a tube, as a logarithm; and the mean confidence.
+    disc that spans it stays inside; the least bonds that cross it somewhere, over the points around a tube, as a logarithm; and the mean confidence.
 
     Parameters
     ----------
@@ -113,8 +112,7 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
         crossing = crossings(cycle, len(surface), pairs, weight)
         facts = dict(
             opening=float(np.log(radius / tube + 0.1)),
-            winding=float(np.clip(hole / max(inside, LEAST_INSIDE), -0.5, 1.5)),
-            inside=float(np.clip(inside, 0, 1)),
+            winding=float(np.clip(hole / max(inside, LEAST_INSIDE), 0, 1.5)),
             bonds=float(np.log(crossing.min() * spacing / (2 * np.pi * tube) + 0.05)),
             confidence=float(np.nan_to_num(skeleton.confidence[cycle]).mean()),
         )

@@ -1,114 +1,103 @@
-"""Cut spurs that hardly leave the part they grow from."""
+"""Cut branches that hardly leave the parts they grow from."""
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
 
-from ..numerics.vectors import TINY, dot, norm
+from ..numerics.polylines import relative_distance
 from ..skeleton import Skeleton
-from .loops import surface_distance
+from .junctions import Limbs
 from .merging import merge_vertices
 
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
-SPUR_CHUNK = 2**20  # measured: pairs of a point and an edge at a time: memory stays flat
 
 
 def prune_spurs(skeleton: Skeleton, reach: float) -> Skeleton:
-    """Cut branches that end in a leaf and whose points reach no farther than the surface around what they grow from.
+    """Cut branches whose points reach no farther than the surface around the limbs that meet there.
 
     What counts is the points, not the curve: the contraction shortens stubs as thick as they are long, and lets thin
-    ones grow. And it is how far they leave the branches that meet them, not how far they are from the junction: along
-    a part they may be anywhere. Another branch with an end may be a spur, too, far from its points: it counts as no
-    thicker than the junction. A branch whose points have no say goes.
+    ones grow. And it is how far they leave the limbs that meet them, not how far they are from the junction: along
+    a part they may be anywhere. The limbs go on, straight, to where they meet, see `Limbs.meeting`: the contraction
+    draws them together in a sharp corner, and a spur into its tip is left. Another branch with an end may be a spur,
+    too, far from its points: it counts as no thicker than the junction. A branch whose points have no say goes.
+
+    A short branch between two junctions goes, too, and the two become one, if all limbs around meet in one place.
 
     Parameters
     ----------
     skeleton : Skeleton
     reach : float
-        Least distance of a branch's points (all but a tenth) from the other branches at its junction, over the distance
-        from these to the surface there. Of every junction the least first, until there is none.
+        Least distance of a branch's points (all but a tenth) from the limbs around it, over the distance from these to
+        the surface there. Of every junction the least first, until there is none.
 
     Returns
     -------
     Skeleton
-        Points of a cut spur belong to its junction.
+        Points of a cut branch belong to its junction.
     """
     while True:
-        surface, degree = surface_distance(skeleton), skeleton.degree
-        surface = np.where(surface > 0, surface, skeleton.radii)  # of vertices without points
-        supporting = skeleton.supporting_points
-        supporting = supporting[np.argsort(skeleton.vertex_of_point[supporting], kind="stable")]
-        stop = np.cumsum(np.bincount(skeleton.vertex_of_point[supporting], minlength=len(degree)))
-        start = np.concatenate([[0], stop[:-1]])
-        branches, at, worst = skeleton.branches, defaultdict(list), {}
-        ending = np.zeros(len(degree), bool)
-        for branch in branches:
-            at[branch[0]].append(branch)
-            at[branch[-1]].append(branch)
-            if 1 in degree[branch[[0, -1]]]:
-                ending[branch] = degree[branch] < 3
-        for branch in branches:
-            a, b = branch[0], branch[-1]
-            if sorted((degree[a] == 1, degree[b] == 1)) != [False, True]:
+        limbs, owned = Limbs(skeleton, joined=True), _Owned(skeleton)
+        ending = np.zeros(len(skeleton.vertices), bool)
+        ends, worst = [], {}
+        for branch in limbs.branches:
+            ends.append([v for v in dict.fromkeys(branch[[0, -1]].tolist()) if skeleton.degree[v] > 2])
+            if 1 in skeleton.degree[branch[[0, -1]]]:
+                ending[branch] = skeleton.degree[branch] < 3
+        for k, branch in enumerate(limbs.branches):
+            inner, leaf = limbs.inner[k], 1 in skeleton.degree[branch[[0, -1]]]
+            if not ends[k] or not (leaf or (inner and limbs.short[k])):
                 continue
-            junction, spur = (a, branch[1:]) if degree[b] == 1 else (b, branch[:-1])
-            points = skeleton.points[np.concatenate([supporting[start[v] : stop[v]] for v in spur])]
-            others = [other for other in at[junction] if other is not branch]
-            tubes = np.where(ending, np.minimum(surface, surface[junction]), surface)
-            far = (
-                np.quantile(relative_distance(points, skeleton.vertices, tubes, others), SPUR_QUANTILE)
-                if len(points)
-                else 0.0
-            )
-            if far < worst.get(junction, (reach,))[0]:
-                worst[junction] = (far, spur)
-        if not worst:
+            body = branch[~np.isin(branch, ends[k])]
+            far = _farthest(limbs, k, ends[k], owned.points(body), ending)
+            for v in ends[k]:
+                if far < worst.get(v, (reach,))[0]:
+                    worst[v] = (far, k, body)
+        cut = {k: body for _, k, body in worst.values() if all(v in worst and worst[v][1] == k for v in ends[k])}
+        if not cut:
             return skeleton
-        group, m = np.arange(len(skeleton.vertices)), len(skeleton.vertices)
-        for junction, (_, spur) in worst.items():
-            group[spur] = junction
-        stay = np.flatnonzero(group == np.arange(m))
+        group, vertices = np.arange(len(skeleton.vertices)), skeleton.vertices.copy()
+        for k, body in cut.items():
+            group[body] = group[ends[k]] = ends[k][0]
+            vertices[ends[k][0]] = vertices[ends[k]].mean(axis=0)
+        stay = np.unique(group)
         # a junction stays what it was
-        kept = {name: getattr(skeleton, name)[stay] for name in ("vertices", "radii", "confidence")}
+        kept = {"vertices": vertices[stay], "radii": skeleton.radii[stay], "confidence": skeleton.confidence[stay]}
         skeleton = replace(merge_vertices(skeleton, group), **kept)
 
 
-def relative_distance(
-    points: np.ndarray, vertices: np.ndarray, surface: np.ndarray, paths: list[np.ndarray]
-) -> np.ndarray:
-    """Distance from the edge of some paths from which it is least over that to the surface, linear along an edge.
+class _Owned:
+    """The points that each vertex owns."""
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-    vertices : (M, 3) float array
-    surface : (M,) float array
-        Distance from each vertex to the surface.
-    paths : list of (p,) int array
+    def __init__(self, skeleton: Skeleton) -> None:
+        supporting = skeleton.supporting_points
+        vertex = skeleton.vertex_of_point[supporting]
+        self._points = skeleton.points[supporting[np.argsort(vertex, kind="stable")]]
+        self._stop = np.cumsum(np.bincount(vertex, minlength=len(skeleton.vertices)))
 
-    Returns
-    -------
-    (n,) float array
-        Over the distance to the surface at the nearest place of that edge.
-    """
-    a, b = (np.concatenate([path[part] for path in paths]) for part in (slice(-1), slice(1, None)))
-    start, step = vertices[a], vertices[b] - vertices[a]
-    length, tiny = norm(step), TINY
-    direction = step / np.maximum(length, tiny)[:, None]
-    # relative to one of them: products of coordinates far from the origin would cancel
-    points, start = points - start[0], start - start[0]
-    least = max(np.finfo(float).eps * np.abs(points).max(), tiny)  # of a line, which has no thickness but roundings
-    found = np.empty(len(points))
-    rows = max(SPUR_CHUNK // len(a), 1)
-    for first in range(0, len(points), rows):
-        p = points[first : first + rows]
-        along = p @ direction.T - dot(start, direction)
-        squared = (p**2).sum(axis=1)[:, None] - 2 * p @ start.T + (start**2).sum(axis=1)
-        foot = np.clip(along, 0, length)
-        distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
-        there = surface[a] + foot / np.maximum(length, tiny) * (surface[b] - surface[a])
-        found[first : first + rows] = (distance / np.maximum(there, least)).min(axis=1)
-    return found
+    def points(self, vertices: np.ndarray) -> np.ndarray:
+        parts = [self._points[self._stop[v - 1] if v else 0 : self._stop[v]] for v in vertices.tolist()]
+        return np.concatenate(parts) if parts else np.empty((0, 3))
+
+
+def _farthest(limbs: Limbs, k: int, ends: list[int], points: np.ndarray, ending: np.ndarray) -> float:
+    """How far the points of branch k leave the limbs around it; infinitely far if it may not go."""
+    around = [i for v in {int(limbs.region[v]) for v in ends} for i in limbs.at[v] if limbs.branch[i] != k]
+    beside = [i for i in around if limbs.paths[i][0] in ends]
+    if len(ends) == 2:
+        around = beside
+        if any(set(limbs.paths[i][[0, -1]].tolist()) == set(ends) for i in beside):
+            return np.inf  # a loop would close
+    meeting = limbs.meeting(around, limbs.vertices[ends].mean(axis=0))
+    if len(ends) == 2 and not meeting.fits[meeting.say].all():
+        return np.inf
+    if len(points) == 0:
+        return 0.0
+    longer = np.flatnonzero(meeting.fits & ~limbs.short[[limbs.branch[i] for i in around]])
+    radius = limbs.radius[[limbs.branch[around[i]] for i in longer]]
+    surface = np.where(ending, np.minimum(limbs.surface, limbs.surface[ends].max()), limbs.surface)
+    vertices = np.concatenate([limbs.vertices, meeting.anchor[longer], meeting.foot[longer]])
+    more = len(limbs.vertices) + np.arange(2 * len(longer)).reshape(2, -1).T
+    paths = [*(limbs.paths[i] for i in beside), *more]
+    return np.quantile(relative_distance(points, vertices, np.r_[surface, radius, radius], paths), SPUR_QUANTILE)

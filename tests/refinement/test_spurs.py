@@ -8,7 +8,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
-from glsk_o3d.refinement.spurs import SPUR_QUANTILE, prune_spurs, relative_distance
+from glsk_o3d.numerics.polylines import relative_distance
+from glsk_o3d.refinement.spurs import SPUR_QUANTILE, prune_spurs
 
 N = 21  # vertices of the trunk
 PER = 60  # points of each: many, so that a cut spur does not change the thickness of its junction
@@ -148,7 +149,7 @@ def test_far_points_in_chunks(monkeypatch):
     rng = np.random.default_rng(0)
     points, vertices = rng.normal(size=(50, 3)), rng.normal(size=(8, 3))
     found = relative_distance(points, vertices, np.arange(8) + 1.0, [np.arange(8)])
-    monkeypatch.setattr("glsk_o3d.refinement.spurs.SPUR_CHUNK", 21)
+    monkeypatch.setattr("glsk_o3d.numerics.polylines.POLYLINE_CHUNK", 21)
     np.testing.assert_array_equal(relative_distance(points, vertices, np.arange(8) + 1.0, [np.arange(8)]), found)
 
 
@@ -187,10 +188,18 @@ def test_several_at_one_junction_and_in_any_numbering():
         assert gap.max() < 1e-12
 
 
-def test_loops_at_a_junction_and_bridges_are_no_spurs(ringed):
-    """A tiny ring on a stem, and a short link between two junctions: no leaf, no spur."""
+def test_loops_at_a_junction_are_no_spurs(ringed):
+    """A tiny ring on a stem stays; the stem, a short link between two junctions whose limbs all meet, does not."""
     tiny = [[0, 0, 0.02], [0.01, 0, 0.03], [0, 0, 0.04], [-0.01, 0, 0.03]]
     line = [[x, 0, 0] for x in (-1, 0, 1)]
     edges = [(0, 1), (1, 2), (1, 3), (3, 4), (4, 5), (5, 6), (3, 6)]
-    raw = ringed(line + tiny, edges)
+    skeleton = prune_spurs(ringed(line + tiny, edges), 0.8)
+    assert (skeleton.n_loops, skeleton.n_components) == (1, 1)
+    assert skeleton.edges.tolist() == [[0, 1], [1, 2], [1, 3], [1, 5], [3, 4], [4, 5]]
+
+
+def test_two_ways_between_two_junctions_stay(ringed):
+    """They are a loop: neither may go, however short."""
+    places = [[-1, 0, 0], [-0.02, 0, 0], [0, 0.01, 0], [0, -0.01, 0], [0.02, 0, 0], [1, 0, 0]]
+    raw = ringed(places, [(0, 1), (1, 2), (1, 3), (2, 4), (3, 4), (4, 5)])
     assert prune_spurs(raw, 0.8) is raw

@@ -1,0 +1,54 @@
+"""How far points are from polylines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .vectors import TINY, dot, norm
+
+POLYLINE_CHUNK = 2**20  # measured: pairs of a point and an edge at a time: memory stays flat
+
+
+def arc_lengths(path: np.ndarray) -> np.ndarray:
+    """Length along a path, (p, 3) float array, from its first place to every place, (p,) float array."""
+    return np.concatenate([[0], np.cumsum(norm(np.diff(path, axis=0)))])
+
+
+def relative_distance(
+    points: np.ndarray, vertices: np.ndarray, surface: np.ndarray, paths: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Distance from the edge of some paths from which it is least over that to the surface, linear along an edge.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    vertices : (M, 3) float array
+    surface : (M,) float array
+        Distance from each vertex to the surface.
+    paths : sequence of (p,) int array
+
+    Returns
+    -------
+    (n,) float array
+        Over the distance to the surface at the nearest place of that edge.
+    """
+    a, b = (np.concatenate([path[part] for path in paths]) for part in (slice(-1), slice(1, None)))
+    start, step = vertices[a], vertices[b] - vertices[a]
+    length, tiny = norm(step), TINY
+    direction = step / np.maximum(length, tiny)[:, None]
+    # relative to one of them: products of coordinates far from the origin would cancel
+    points, start = points - start[0], start - start[0]
+    least = max(np.finfo(float).eps * np.abs(points).max(), tiny)  # of a line, which has no thickness but roundings
+    found = np.empty(len(points))
+    rows = max(POLYLINE_CHUNK // len(a), 1)
+    for first in range(0, len(points), rows):
+        p = points[first : first + rows]
+        along = p @ direction.T - dot(start, direction)
+        squared = (p**2).sum(axis=1)[:, None] - 2 * p @ start.T + (start**2).sum(axis=1)
+        foot = np.clip(along, 0, length)
+        distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
+        there = surface[a] + foot / np.maximum(length, tiny) * (surface[b] - surface[a])
+        found[first : first + rows] = (distance / np.maximum(there, least)).min(axis=1)
+    return found
