@@ -12,11 +12,8 @@ from .refinement.axis_fit import fit_axis
 from .refinement.bridging import bridge_gaps
 from .refinement.clamp import clamp_to_points
 from .refinement.diagnostics import diagnose
-<<<<<<< HEAD
 from .refinement.evidence import Evidence
-=======
 from .refinement.junctions import level_tips, move_junctions
->>>>>>> junctions
 from .refinement.loops import close_loops
 from .refinement.reattachment import reattach_limbs
 from .refinement.spurs import prune_spurs

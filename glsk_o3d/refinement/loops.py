@@ -89,8 +89,9 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     """What speaks for and against that each of some loops is a handle.
 
     The facts are: how wide it opens, the radius of the largest circle inside it over the distance of the surface, as a
-    logarithm; the least winding number in that circle, over the median along the loop, since a handle is one if no
-    disc that spans it stays inside; the least bonds that cross it somewhere, over the points around a tube, as a logarithm; and the mean confidence.
+    logarithm; the least winding number in that circle, over the median along the loop, since a handle is one if no disc
+    that spans it stays inside; the least bonds that cross it somewhere, over the points around a tube, as a logarithm;
+    and the mean confidence.
 
     Parameters
     ----------
