@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 from ..numerics.vectors import TINY, dot, norm
 from ..report import Judgement
 from ..skeleton import Skeleton
-from .evidence import Evidence
+from .evidence import LEAST_INSIDE, Evidence
 from .scores import BRIDGE_WEIGHTS, probability
 
 # All fitted but where it says otherwise.
@@ -83,30 +83,43 @@ def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[in
     ends = list(_ends(skeleton))
     if not ends or not len(evidence.points):
         return
-    typical = max(float(np.median(evidence.winding(skeleton.vertices[skeleton.edges].mean(axis=1)))), TINY)
-    for end, travelled in zip(ends, _along(skeleton, [end.leaf for end in ends]), strict=True):
-        across = skeleton.vertices - end.place
-        away = np.maximum(norm(across), TINY)
-        cosine = across @ end.outward / away
-        free = skeleton.degree == 1
-        gap = away - np.where(free, 0, skeleton.radii)
-        aims = (gap < BRIDGE_REACH * end.radius) & (cosine > BRIDGE_COSINE) & (skeleton.degree > 0)
-        aims &= travelled > DETOUR * away + DETOUR_RADII * np.maximum(end.radius, skeleton.radii)
-        cost = gap + away * (1 - cosine) / 2
-        closed = _cap(end, evidence)
-        for kind, most in ((free, END_CHOICES), (~free, SIDE_CHOICES)):
-            some = np.flatnonzero(aims & kind)
-            for other in some[np.argsort(cost[some], kind="stable")[:most]].tolist():
-                winding = evidence.winding(end.place + BRIDGE_SAMPLES * across[other]).min() / typical
-                yield (
-                    (end.leaf, other),
-                    dict(
-                        winding=float(np.clip(winding, -0.5, 1.3)),
-                        sheets=float(np.log(_sheets(end, across[other], evidence) + 0.05)),
-                        straightness=float(cosine[other]),
-                        cap=float(np.log(closed + 0.1)),
-                    ),
-                )
+    typical = float(np.median(evidence.winding(skeleton.vertices[skeleton.edges].mean(axis=1))))
+    if typical < LEAST_INSIDE:
+        return  # parts too thin to have an inside, which could go on across a gap
+    found = [
+        (end, other, float(cosine))
+        for end, travelled in zip(ends, _along(skeleton, [end.leaf for end in ends]), strict=True)
+        for other, cosine in _aims(skeleton, end, travelled)
+    ]
+    if not found:
+        return
+    across = [skeleton.vertices[other] - end.place for end, other, _ in found]
+    samples = [end.place + BRIDGE_SAMPLES * way for (end, *_), way in zip(found, across, strict=True)]
+    winding = evidence.winding(np.concatenate(samples)).reshape(len(found), -1).min(axis=1) / typical
+    for (end, other, cosine), way, least in zip(found, across, winding, strict=True):
+        facts = dict(
+            winding=float(np.clip(least, -0.5, 1.3)),
+            sheets=float(np.log(_sheets(end, way, evidence) + 0.05)),
+            straightness=cosine,
+            cap=float(np.log(_cap(end, evidence) + 0.1)),
+        )
+        yield (end.leaf, other), facts
+
+
+def _aims(skeleton: Skeleton, end: _End, travelled: np.ndarray) -> Iterator[tuple[int, float]]:
+    """Vertices that an end points at across a gap, and the cosines: other ends, and the nearest place elsewhere."""
+    across = skeleton.vertices - end.place
+    away = np.maximum(norm(across), TINY)
+    cosine = across @ end.outward / away
+    free = skeleton.degree == 1
+    gap = away - np.where(free, 0, skeleton.radii)
+    aims = (gap < BRIDGE_REACH * end.radius) & (cosine > BRIDGE_COSINE) & (skeleton.degree > 0)
+    aims &= travelled > DETOUR * away + DETOUR_RADII * np.maximum(end.radius, skeleton.radii)
+    cost = gap + away * (1 - cosine) / 2
+    for kind, most in ((free, END_CHOICES), (~free, SIDE_CHOICES)):
+        some = np.flatnonzero(aims & kind)
+        for other in some[np.argsort(cost[some], kind="stable")[:most]].tolist():
+            yield other, cosine[other]
 
 
 def _along(skeleton: Skeleton, starts: list[int]) -> np.ndarray:

@@ -12,6 +12,9 @@ from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, w
 from ..skeleton import Skeleton
 from .axis_fit import incident_edges, nearest_on_edges
 
+# fitted: winding number below which an axis is in nothing; .5 on that of a tube seen from one side, .2 in sparse crowns
+LEAST_INSIDE = 0.4
+
 
 @dataclass(frozen=True, eq=False)
 class Evidence:

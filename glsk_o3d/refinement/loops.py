@@ -13,15 +13,15 @@ from ..numerics.groups import group_median
 from ..numerics.vectors import TINY, norm
 from ..report import Judgement
 from ..skeleton import Skeleton
-from .evidence import Evidence
+from .evidence import LEAST_INSIDE, Evidence
 from .merging import merge_vertices
 from .scores import HANDLE_WEIGHTS, probability
 from .triangles import collapse_triangles
 
 SHORTEST_LOOP = 3  # derived: a triangle has nothing to zip up
 WIDE_LOOP = 1.5  # fitted: opening of a loop that is more than two strands in one part
+WIDE_OPEN = 3.0  # fitted: opening beyond which it says no more: sparse crowns have wide false loops
 HOLE_SHARE = 0.6  # fitted: of the largest circle in a loop, the part of it that is asked
-LEAST_INSIDE = 0.2  # derived: winding number on an axis, of which next to nothing was seen
 DIRECTIONS = np.column_stack([f(np.arange(6) * np.pi / 3) for f in (np.cos, np.sin)])  # derived: six, evenly
 
 
@@ -59,7 +59,7 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
         cycles = minimum_cycle_basis(m, skeleton.edges, skeleton.edge_lengths)
         kept, pairs, cut, used = [], [], [], set()
         for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
-            chance = probability(HANDLE_WEIGHTS, loop.facts)
+            chance = probability(HANDLE_WEIGHTS, loop.facts) if loop.inside >= LEAST_INSIDE else 0.0
             false = chance < least and len(cycle) > SHORTEST_LOOP
             (judgements if false else kept).append(Judgement("loop", tuple(loop.centre.tolist()), chance, false))
             if not false:
@@ -81,6 +81,7 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
 
 class _Loop(NamedTuple):
     facts: dict[str, float]
+    inside: float  # median winding number along it
     centre: np.ndarray  # of its hole
     weakest: int  # position of the edge, from there to the next vertex, that the fewest bonds cross
 
@@ -90,8 +91,7 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
 
     The facts are: how wide it opens, the radius of the largest circle inside it over the distance of the surface, as a
     logarithm; the least winding number in that circle, over the median along the loop, since a handle is one if no disc
-    that spans it stays inside; the least bonds that cross it somewhere, over the points around a tube, as a logarithm;
-    and the mean confidence.
+    that spans it stays inside; and the mean confidence. A loop that has no inside itself is none.
 
     Parameters
     ----------
@@ -101,23 +101,30 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     """
     if not cycles:
         return []
-    surface, winding, found = surface_distance(skeleton), evidence.winding(skeleton.vertices), []
+    surface = surface_distance(skeleton)
     pairs, weight = evidence.bonds(skeleton)
-    spacing = np.sqrt(np.median(evidence.areas))
+    circles, holes = [], []
     for cycle in cycles:
         points = skeleton.vertices[cycle]
         centre, radius = inscribed_circle(points)
         axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][:2]
-        hole = evidence.winding(centre + HOLE_SHARE * radius * np.vstack([np.zeros(3), DIRECTIONS @ axes])).min()
-        inside, tube = float(np.median(winding[cycle])), max(float(np.median(surface[cycle])), TINY)
-        crossing = crossings(cycle, len(surface), pairs, weight)
+        circles.append((centre, radius))
+        holes.append(centre + HOLE_SHARE * radius * np.vstack([np.zeros(3), DIRECTIONS @ axes]))
+    around = np.unique(np.concatenate(cycles))
+    answers = evidence.winding(np.concatenate([*holes, skeleton.vertices[around]]))
+    hole = answers[: -len(around)].reshape(len(cycles), -1).min(axis=1)
+    winding = np.zeros(len(surface))
+    winding[around] = answers[-len(around) :]
+    found = []
+    for cycle, (centre, radius), least in zip(cycles, circles, hole, strict=True):
+        tube, inside = max(float(np.median(surface[cycle])), TINY), float(np.median(winding[cycle]))
         facts = dict(
-            opening=float(np.log(radius / tube + 0.1)),
-            winding=float(np.clip(hole / max(inside, LEAST_INSIDE), 0, 1.5)),
-            bonds=float(np.log(crossing.min() * spacing / (2 * np.pi * tube) + 0.05)),
+            opening=float(np.log(min(radius / tube, WIDE_OPEN) + 0.1)),
+            winding=float(np.clip(least / max(inside, LEAST_INSIDE), 0, 1.5)),
             confidence=float(np.nan_to_num(skeleton.confidence[cycle]).mean()),
         )
-        found.append(_Loop(facts, centre, int(np.argmin(crossing))))
+        weakest = int(np.argmin(crossings(cycle, len(surface), pairs, weight)))
+        found.append(_Loop(facts, inside, centre, weakest))
     return found
 
 

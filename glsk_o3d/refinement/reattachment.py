@@ -32,8 +32,8 @@ def reattach_limbs(skeleton: Skeleton) -> Skeleton:
     """Let limbs that run beside a thicker one, inside its tube, begin where their axis meets the axis of the other.
 
     The contraction draws a limb that leaves a part along it, and the limb's own curve goes on inside. The straight line
-    on from where it leaves says where it belongs. One limb after the other, that which shortens the skeleton most
-    first.
+    on from where it leaves says where it belongs. Those that shorten the skeleton most go first; a limb that has to do
+    with one of these waits for the next round.
 
     Returns
     -------
@@ -51,7 +51,14 @@ def reattach_limbs(skeleton: Skeleton) -> Skeleton:
         ]
         if not found:
             return skeleton
-        skeleton = _reattached(skeleton, max(found, key=lambda beside: beside.gain))
+        chosen: list[_Beside] = []
+        used: set[int] = set()
+        for beside in sorted(found, key=lambda beside: -beside.gain):
+            touched = {beside.first, *beside.inside.tolist(), *beside.other.tolist()}
+            if used.isdisjoint(touched):
+                chosen.append(beside)
+                used |= touched
+        skeleton = _reattached(skeleton, chosen)
 
 
 def _beside(limbs: Limbs, limb: int, other: int) -> _Beside | None:
@@ -78,15 +85,17 @@ def _beside(limbs: Limbs, limb: int, other: int) -> _Beside | None:
     return _Beside(gain, inside, int(path[len(inside)]), along_path, int(along_path[foot]))
 
 
-def _reattached(skeleton: Skeleton, beside: _Beside) -> Skeleton:
+def _reattached(skeleton: Skeleton, chosen: list[_Beside]) -> Skeleton:
     m = len(skeleton.vertices)
-    chain = np.append(beside.inside, beside.first)
-    old = np.sort(np.column_stack([chain[:-1], chain[1:]]), axis=1) @ [m, 1]
-    edges = skeleton.edges[~np.isin(skeleton.edges @ [m, 1], old)]
-    edges = np.unique(np.concatenate([edges, [sorted((beside.first, beside.foot))]]), axis=0)
-    _, nearest = cKDTree(skeleton.vertices[beside.other]).query(skeleton.vertices[beside.inside[1:]])
-    group = np.arange(m)
-    group[beside.inside[1:]] = beside.other[nearest]
+    group, gone, new = np.arange(m), [], []
+    for beside in chosen:
+        chain = np.append(beside.inside, beside.first)
+        gone.append(np.sort(np.column_stack([chain[:-1], chain[1:]]), axis=1) @ [m, 1])
+        new.append(sorted((beside.first, beside.foot)))
+        _, nearest = cKDTree(skeleton.vertices[beside.other]).query(skeleton.vertices[beside.inside[1:]])
+        group[beside.inside[1:]] = beside.other[nearest]
+    edges = skeleton.edges[~np.isin(skeleton.edges @ [m, 1], np.concatenate(gone))]
+    edges = np.unique(np.concatenate([edges, new]), axis=0)
     stay = np.unique(group)
     kept = {name: getattr(skeleton, name)[stay] for name in ("vertices", "radii", "confidence")}
     return replace(merge_vertices(replace(skeleton, edges=edges), group), **kept)
