@@ -91,7 +91,8 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
 
     The facts are: how wide it opens, the radius of the largest circle inside it over the distance of the surface, as a
     logarithm; the least winding number in that circle, over the median along the loop, since a handle is one if no disc
-    that spans it stays inside; and the mean confidence. A loop that has no inside itself is none.
+    that spans it stays inside; the least bonds that cross it somewhere, over their median, as a logarithm; and the mean
+    confidence. A loop that has no inside itself is none.
 
     Parameters
     ----------
@@ -118,13 +119,14 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     found = []
     for cycle, (centre, radius), least in zip(cycles, circles, hole, strict=True):
         tube, inside = max(float(np.median(surface[cycle])), TINY), float(np.median(winding[cycle]))
+        crossing = crossings(cycle, len(surface), pairs, weight)
         facts = dict(
             opening=float(np.log(min(radius / tube, WIDE_OPEN) + 0.1)),
             winding=float(np.clip(least / max(inside, LEAST_INSIDE), 0, 1.5)),
+            bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.01)),
             confidence=float(np.nan_to_num(skeleton.confidence[cycle]).mean()),
         )
-        weakest = int(np.argmin(crossings(cycle, len(surface), pairs, weight)))
-        found.append(_Loop(facts, inside, centre, weakest))
+        found.append(_Loop(facts, inside, centre, int(np.argmin(crossing))))
     return found
 
 

@@ -17,7 +17,7 @@ AIR_WEIGHTS = {
     "inner": 1.4,
     "length": -1.1,
 }
-HANDLE_WEIGHTS = {"constant": -4.2, "opening": 6.3, "winding": -2.9, "confidence": 3.8}
+HANDLE_WEIGHTS = {"constant": -5.6, "opening": 7.9, "winding": -3.4, "confidence": 10.0, "bonds": 0.7}
 BRIDGE_WEIGHTS = {"constant": -3.0, "winding": 4.8, "sheets": -1.0, "straightness": 1.3, "cap": -0.3}
 LIMB_WEIGHTS = {"constant": -2.5, "reach": 4.2}
 
