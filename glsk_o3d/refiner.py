@@ -14,7 +14,7 @@ from .refinement.clamp import clamp_to_points
 from .refinement.diagnostics import diagnose
 from .refinement.evidence import Evidence
 from .refinement.loops import close_loops
-from .refinement.spurs import prune_spurs
+from .refinement.spurs import judge_limbs, prune_spurs
 from .refinement.subdivision import subdivide_edges
 from .refinement.triangles import collapse_triangles
 from .report import Judgement
@@ -128,32 +128,12 @@ class Refiner(Filter[Skeleton]):
     def _judge(self, skeleton: Skeleton) -> Skeleton:
         """Close false loops, cut what crosses air, and bridge gaps; the axis is fitted anew where that changed."""
         evidence, found = Evidence.of(skeleton), []
-        if self.handle:
-            skeleton, loops = close_loops(skeleton, evidence, self.handle)
-            found += loops
-            if _changed(loops):
-                skeleton = self._refit(skeleton, 1)
-        if self.spur:
-            skeleton = prune_spurs(skeleton, FITTED_SPUR * self.spur)
-        for _ in range(CUTTING_ROUNDS if self.air else 0):
-            skeleton, cuts = cut_air(skeleton, evidence, skeleton.report.noise, self.air)
-            found += cuts
-            if not _changed(cuts):
-                break
-            if self.spur:
-                skeleton = prune_spurs(skeleton, FITTED_SPUR * self.spur)
-        if self.bridge:
-            skeleton, gaps = bridge_gaps(skeleton, evidence, self.bridge)
-            found += gaps
-            if _changed(gaps):
-                skeleton = self._refit(skeleton, 1)
-                if self.handle:
-                    skeleton, loops = close_loops(skeleton, evidence, self.handle)
-                    found += loops
+        for step in (self._close, self._cut, self._bridge):
+            skeleton, judgements = step(skeleton, evidence)
+            found += judgements
         if _changed(found):
-            skeleton = self._refit(skeleton, 2)
-            if self.spur:
-                skeleton = prune_spurs(skeleton, FITTED_SPUR * self.spur)
+            skeleton = self._prune(self._refit(skeleton, 2))
+        found += judge_limbs(skeleton)
         counts = {about: sum(it.about == about and it.changed for it in found) for about in ("loop", "air", "gap")}
         report = replace(
             skeleton.report,
@@ -163,6 +143,38 @@ class Refiner(Filter[Skeleton]):
             n_bridges=counts["gap"],
         )
         return replace(skeleton, report=report)
+
+    def _close(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
+        loops = []
+        if self.handle:
+            skeleton, loops = close_loops(skeleton, evidence, self.handle)
+            if _changed(loops):
+                skeleton = self._refit(skeleton, 1)
+        return self._prune(skeleton), loops
+
+    def _cut(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
+        found = []
+        for _ in range(CUTTING_ROUNDS if self.air else 0):
+            skeleton, cuts = cut_air(skeleton, evidence, skeleton.report.noise, self.air)
+            found += cuts
+            if not _changed(cuts):
+                break
+            skeleton = self._prune(skeleton)
+        return skeleton, found
+
+    def _bridge(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
+        if not self.bridge:
+            return skeleton, []
+        skeleton, found = bridge_gaps(skeleton, evidence, self.bridge)
+        if _changed(found):
+            skeleton = self._refit(skeleton, 1)
+            if self.handle:
+                skeleton, loops = close_loops(skeleton, evidence, self.handle)
+                found += loops
+        return skeleton, found
+
+    def _prune(self, skeleton: Skeleton) -> Skeleton:
+        return prune_spurs(skeleton, FITTED_SPUR * self.spur) if self.spur else skeleton
 
     def _refit(self, skeleton: Skeleton, passes: int) -> Skeleton:
         if self.spacing:

@@ -1,16 +1,19 @@
-"""Cut spurs that hardly leave the part they grow from."""
+"""Tell limbs from spurs, which hardly leave the part they grow from, and cut these."""
 
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from ..numerics.vectors import TINY, dot, norm
+from ..report import Judgement
 from ..skeleton import Skeleton
 from .loops import surface_distance
 from .merging import merge_vertices
+from .scores import LIMB_WEIGHTS, probability
 
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
 SPUR_CHUNK = 2**20  # measured: pairs of a point and an edge at a time: memory stays flat
@@ -37,34 +40,11 @@ def prune_spurs(skeleton: Skeleton, reach: float) -> Skeleton:
         Points of a cut spur belong to its junction.
     """
     while True:
-        surface, degree = surface_distance(skeleton), skeleton.degree
-        surface = np.where(surface > 0, surface, skeleton.radii)  # of vertices without points
-        supporting = skeleton.supporting_points
-        supporting = supporting[np.argsort(skeleton.vertex_of_point[supporting], kind="stable")]
-        stop = np.cumsum(np.bincount(skeleton.vertex_of_point[supporting], minlength=len(degree)))
-        start = np.concatenate([[0], stop[:-1]])
-        branches, at, worst = skeleton.branches, defaultdict(list), {}
-        ending = np.zeros(len(degree), bool)
-        for branch in branches:
-            at[branch[0]].append(branch)
-            at[branch[-1]].append(branch)
-            if 1 in degree[branch[[0, -1]]]:
-                ending[branch] = degree[branch] < 3
-        for branch in branches:
-            a, b = branch[0], branch[-1]
-            if sorted((degree[a] == 1, degree[b] == 1)) != [False, True]:
-                continue
-            junction, spur = (a, branch[1:]) if degree[b] == 1 else (b, branch[:-1])
-            points = skeleton.points[np.concatenate([supporting[start[v] : stop[v]] for v in spur])]
-            others = [other for other in at[junction] if other is not branch]
-            tubes = np.where(ending, np.minimum(surface, surface[junction]), surface)
-            far = (
-                np.quantile(relative_distance(points, skeleton.vertices, tubes, others), SPUR_QUANTILE)
-                if len(points)
-                else 0.0
-            )
+        worst: dict[int, tuple[float, np.ndarray]] = {}
+        for path, far in limb_reaches(skeleton):
+            junction = int(path[0])
             if far < worst.get(junction, (reach,))[0]:
-                worst[junction] = (far, spur)
+                worst[junction] = (far, path[1:])
         if not worst:
             return skeleton
         group, m = np.arange(len(skeleton.vertices)), len(skeleton.vertices)
@@ -74,6 +54,63 @@ def prune_spurs(skeleton: Skeleton, reach: float) -> Skeleton:
         # a junction stays what it was
         kept = {name: getattr(skeleton, name)[stay] for name in ("vertices", "radii", "confidence")}
         skeleton = replace(merge_vertices(skeleton, group), **kept)
+
+
+def judge_limbs(skeleton: Skeleton) -> list[Judgement]:
+    """How probably each branch that leaves a junction and has an end is a limb; at its end."""
+    return [
+        Judgement("limb", tuple(skeleton.vertices[path[-1]].tolist()), probability(LIMB_WEIGHTS, facts), False)
+        for path, facts in limb_facts(skeleton)
+    ]
+
+
+def limb_facts(skeleton: Skeleton) -> Iterator[tuple[np.ndarray, dict[str, float]]]:
+    """What speaks for every branch that leaves a junction and has an end: its reach, as a logarithm.
+
+    Yields
+    ------
+    path : (p,) int array
+        From the junction to the end.
+    facts : dict of str to float
+    """
+    for path, far in limb_reaches(skeleton):
+        yield path, dict(reach=float(np.log(far + 0.1)))
+
+
+def limb_reaches(skeleton: Skeleton) -> Iterator[tuple[np.ndarray, float]]:
+    """The reach, as `prune_spurs` defines it, of every branch that leaves a junction and has an end.
+
+    Yields
+    ------
+    path : (p,) int array
+        From the junction to the end.
+    reach : float
+        0 without points.
+    """
+    surface, degree = surface_distance(skeleton), skeleton.degree
+    surface = np.where(surface > 0, surface, skeleton.radii)  # of vertices without points
+    supporting = skeleton.supporting_points
+    supporting = supporting[np.argsort(skeleton.vertex_of_point[supporting], kind="stable")]
+    stop = np.cumsum(np.bincount(skeleton.vertex_of_point[supporting], minlength=len(degree)))
+    start = np.concatenate([[0], stop[:-1]])
+    branches, at = skeleton.branches, defaultdict(list)
+    ending = np.zeros(len(degree), bool)
+    for branch in branches:
+        at[branch[0]].append(branch)
+        at[branch[-1]].append(branch)
+        if 1 in degree[branch[[0, -1]]]:
+            ending[branch] = degree[branch] < 3
+    for branch in branches:
+        if sorted((degree[branch[[0, -1]]] == 1).tolist()) != [False, True]:
+            continue
+        path = branch if degree[branch[-1]] == 1 else branch[::-1]
+        points = skeleton.points[np.concatenate([supporting[start[v] : stop[v]] for v in path[1:]])]
+        others = [other for other in at[path[0]] if other is not branch]
+        tubes = np.where(ending, np.minimum(surface, surface[path[0]]), surface)
+        if not len(points):
+            yield path, 0.0
+            continue
+        yield path, float(np.quantile(relative_distance(points, skeleton.vertices, tubes, others), SPUR_QUANTILE))
 
 
 def relative_distance(
