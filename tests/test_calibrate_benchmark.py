@@ -73,10 +73,10 @@ class TestLabels:
         assert not placed.is_handle(np.array([0, 1, 2, 3, 2, 1]))
         assert not placed.is_handle(np.array([*range(10), *range(8, 0, -1)]))
 
-    def test_a_loop_over_parts_that_are_not_joined_is_none(self, parts):
+    def test_of_a_loop_over_parts_that_are_not_joined_nothing_is_said(self, parts):
         axis = tubes([[0, 0, 0], [1, 0, 0]], [[0, 0.3, 0], [1, 0.3, 0]])
         placed = parts.labels.Placed(axis, np.array([[0, 0, 0], [1, 0, 0], [1, 0.3, 0], [0, 0.3, 0]], float))
-        assert not placed.is_handle(np.arange(4))
+        assert placed.is_handle(np.arange(4)) is None
 
     def test_a_false_edge_between_parallel_tubes_crosses_air(self, parts):
         axis = tubes([[0, 0, 0], [2, 0, 0]], [[0, 0.3, 0], [2, 0.3, 0]])

@@ -48,10 +48,13 @@ class Placed:
         there = branch[max(k - NEAR, 0) : k + NEAR + 2]
         return bool(self.apart(there[:-1], there[1:]).any())
 
-    def is_handle(self, cycle: np.ndarray) -> bool:
-        """Whether the walk along the true axis that follows a loop goes round a loop of it, and not only to and fro."""
-        if not np.isfinite(self._along(cycle, np.roll(cycle, -1))).all():
-            return False
+    def is_handle(self, cycle: np.ndarray) -> bool | None:
+        """Whether the walk along the true axis that follows a loop goes round a loop of it, and not only to and fro.
+
+        None where the loop crosses air: it is no handle, but to zip it up would join what is apart.
+        """
+        if self.apart(cycle, np.roll(cycle, -1)).any():
+            return None
         flow: dict[tuple[int, int], int] = {}
         for a, b in zip(cycle.tolist(), np.roll(cycle, -1).tolist(), strict=True):
             start, here = int(self.place[a]), int(self.place[b])

@@ -55,7 +55,8 @@ def _loops(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tup
     if cycles:
         placed = Placed(truth, skeleton.vertices)
         for cycle, (facts, _) in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
-            yield "loop", facts, placed.is_handle(cycle)
+            if (is_so := placed.is_handle(cycle)) is not None:
+                yield "loop", facts, is_so
 
 
 def _branches(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:

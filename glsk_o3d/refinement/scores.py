@@ -8,18 +8,18 @@ import numpy as np
 
 # All fitted, by benchmarks/calibrate.py on random shapes as scanners see them; docs/method.md says what the facts are.
 AIR_WEIGHTS = {
-    "constant": -4.74,
-    "deficit": 3.47,
-    "surface": -0.91,
-    "straightness": -3.63,
-    "noise": 4.37,
-    "bonds": -0.76,
-    "inner": 1.67,
-    "length": -1.3,
+    "constant": -5.8,
+    "deficit": 3.3,
+    "surface": -1.0,
+    "straightness": -2.7,
+    "noise": 4.0,
+    "bonds": -0.8,
+    "inner": 1.4,
+    "length": -1.1,
 }
-HANDLE_WEIGHTS = {"constant": -4.49, "opening": 3.42, "winding": -2.1, "confidence": 5.79}
-BRIDGE_WEIGHTS = {"constant": -2.51, "winding": 4.18, "sheets": -0.67, "straightness": 0.6, "cap": -0.9}
-LIMB_WEIGHTS = {"constant": -6.0, "reach": 15.0}
+HANDLE_WEIGHTS = {"constant": -4.2, "opening": 6.3, "winding": -2.9, "confidence": 3.8}
+BRIDGE_WEIGHTS = {"constant": -3.0, "winding": 4.8, "sheets": -1.0, "straightness": 1.3, "cap": -0.3}
+LIMB_WEIGHTS = {"constant": -2.5, "reach": 4.2}
 
 
 def probability(weights: Mapping[str, float], facts: Mapping[str, float]) -> float:

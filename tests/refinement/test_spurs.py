@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
-from glsk_o3d.refinement.spurs import SPUR_QUANTILE, prune_spurs, relative_distance
+from glsk_o3d.refinement.spurs import SPUR_QUANTILE, judge_limbs, limb_reaches, prune_spurs, relative_distance
 
 N = 21  # vertices of the trunk
 PER = 60  # points of each: many, so that a cut spur does not change the thickness of its junction
@@ -194,3 +194,23 @@ def test_loops_at_a_junction_and_bridges_are_no_spurs(ringed):
     edges = [(0, 1), (1, 2), (1, 3), (3, 4), (4, 5), (5, 6), (3, 6)]
     raw = ringed(line + tiny, edges)
     assert prune_spurs(raw, 0.8) is raw
+
+
+def test_reach_is_that_of_the_points_over_the_surface():
+    skeleton = tree((5, 0.3), (12, 0.5))
+    found = {int(path[-1]): (int(path[0]), far) for path, far in limb_reaches(skeleton)}
+    assert sorted(found) == np.flatnonzero(skeleton.degree == 1).tolist()
+    for tip, junction, reach in ((N + 1, 5, 0.3), (N + 3, 12, 0.5)):
+        assert found[tip] == (junction, pytest.approx(reach / 0.1))
+
+
+def test_the_farther_a_limb_reaches_the_more_probable_it_is():
+    skeleton = tree((5, 0.17), (12, 0.5))
+    found = {it.place: it for it in judge_limbs(skeleton)}
+    assert {(it.about, it.changed) for it in found.values()} == {("limb", False)}
+    short, far = (found[tuple(skeleton.vertices[tip])].probability for tip in (N + 1, N + 3))
+    assert 0.2 < short < 0.8 < far < 1
+
+
+def test_a_part_with_two_ends_has_no_limbs():
+    assert judge_limbs(tree()) == []
