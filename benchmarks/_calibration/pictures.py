@@ -22,7 +22,7 @@ def draw_reliability(told_of: Mapping[str, tuple[np.ndarray, Answered]], folder:
         for count, mean, (often, low, high) in parts(*told_of[about]) if about in told_of else ():
             axes.vlines(mean, low, high, color=BLUE, linewidth=1.5)
             axes.plot(mean, often, "o", color=BLUE, markersize=5)
-            right = mean < 0.5
+            right = mean < 0.8  # of the dot, or there is no room
             style = dict(textcoords="offset points", fontsize=7, color=GREY, va="center")
             axes.annotate(str(count), (mean, often), (6 if right else -6, 0), ha="left" if right else "right", **style)
     figure.supxlabel("probability that was said", fontsize=9)
