@@ -14,7 +14,7 @@ from .refinement.clamp import clamp_to_points
 from .refinement.diagnostics import diagnose
 from .refinement.evidence import Evidence
 from .refinement.junctions import level_tips, move_junctions
-from .refinement.loops import close_loops
+from .refinement.loops import close_loops, zip_narrow_loops
 from .refinement.reattachment import reattach_limbs
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
@@ -113,6 +113,8 @@ class Refiner(Filter[Skeleton]):
 
     def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
         skeleton = collapse_triangles(skeleton)
+        if self.handle:
+            skeleton = zip_narrow_loops(skeleton)
         if self.recentre:
             skeleton = clamp_to_points(skeleton)
         if self.spacing:
@@ -122,11 +124,12 @@ class Refiner(Filter[Skeleton]):
             skeleton = self._judge(skeleton)
         if self.recentre:
             skeleton = reattach_limbs(skeleton)
+        limbs: list[Judgement] = []
         if self.spur:
-            skeleton = prune_spurs(skeleton, self.spur)
+            skeleton, limbs = prune_spurs(skeleton, self.spur)
         if self.recentre:
             skeleton = level_tips(move_junctions(skeleton))
-        report = skeleton.report
+        report = replace(skeleton.report, judgements=(*skeleton.report.judgements, *limbs))
         for message in diagnose(skeleton):
             report = report.with_warning(message)
         return replace(skeleton, report=report)
@@ -134,28 +137,9 @@ class Refiner(Filter[Skeleton]):
     def _judge(self, skeleton: Skeleton) -> Skeleton:
         """Close false loops, cut what crosses air, and bridge gaps; the axis is fitted anew where that changed."""
         evidence, found = Evidence.of(skeleton), []
-        if self.handle:
-            skeleton, loops = close_loops(skeleton, evidence, self.handle)
-            found += loops
-            if _changed(loops):
-                skeleton = self._refit(skeleton, 1)
-        if self.spur:
-            skeleton = prune_spurs(skeleton, self.spur)
-        for _ in range(CUTTING_ROUNDS if self.air else 0):
-            skeleton, cuts = cut_air(skeleton, evidence, skeleton.report.noise, self.air)
-            found += cuts
-            if not _changed(cuts):
-                break
-            if self.spur:
-                skeleton = prune_spurs(skeleton, self.spur)
-        if self.bridge:
-            skeleton, gaps = bridge_gaps(skeleton, evidence, self.bridge)
-            found += gaps
-            if _changed(gaps):
-                skeleton = self._refit(skeleton, 1)
-                if self.handle:
-                    skeleton, loops = close_loops(skeleton, evidence, self.handle)
-                    found += loops
+        for step in (self._close, self._cut, self._bridge):
+            skeleton, judgements = step(skeleton, evidence)
+            found += judgements
         if _changed(found):
             skeleton = self._refit(skeleton, 2)
         counts = {about: sum(it.about == about and it.changed for it in found) for about in ("loop", "air", "gap")}
@@ -167,6 +151,38 @@ class Refiner(Filter[Skeleton]):
             n_bridges=counts["gap"],
         )
         return replace(skeleton, report=report)
+
+    def _close(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
+        if not self.handle:
+            return self._prune(skeleton), []
+        skeleton, loops = close_loops(skeleton, evidence, self.handle)
+        if _changed(loops):
+            skeleton = self._refit(skeleton, 1)
+        return self._prune(skeleton), loops
+
+    def _cut(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
+        found: list[Judgement] = []
+        for _ in range(CUTTING_ROUNDS if self.air else 0):
+            skeleton, cuts = cut_air(skeleton, evidence, skeleton.report.noise, self.air)
+            found = [*(it for it in found if it.changed), *cuts]
+            if not _changed(cuts):
+                break
+            skeleton = self._prune(skeleton)
+        return skeleton, found
+
+    def _bridge(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
+        if not self.bridge:
+            return skeleton, []
+        skeleton, found = bridge_gaps(skeleton, evidence, self.bridge)
+        if _changed(found):
+            skeleton = self._refit(skeleton, 1)
+            if self.handle:
+                skeleton, loops = close_loops(skeleton, evidence, self.handle)
+                found += [it for it in loops if it.changed]
+        return skeleton, found
+
+    def _prune(self, skeleton: Skeleton) -> Skeleton:
+        return prune_spurs(skeleton, self.spur)[0] if self.spur else skeleton
 
     def _refit(self, skeleton: Skeleton, passes: int) -> Skeleton:
         if self.spacing:

@@ -20,14 +20,19 @@ def matching_f1(found, true, reach):
     """
     if len(found) == 0 or len(true) == 0:
         return float(len(found) == len(true))
+    return 2 * len(matched(found, true, reach)) / (len(found) + len(true))
+
+
+def matched(found, true, reach):
+    """The pairs of `matching_f1`, a list of (position in `found`, position in `true`)."""
     apart = cdist(found, true)
     apart[apart > reach] = np.inf
-    pairs = 0
-    while np.isfinite(apart.min()):
+    pairs = []
+    while np.isfinite(apart.min(initial=np.inf)):
         row, column = np.unravel_index(apart.argmin(), apart.shape)
         apart[row], apart[:, column] = np.inf, np.inf
-        pairs += 1
-    return 2 * pairs / (len(found) + len(true))
+        pairs.append((int(row), int(column)))
+    return pairs
 
 
 def merged_junctions(points, axis, axis_radius):

@@ -1,20 +1,25 @@
-"""Cut branches that hardly leave the parts they grow from."""
+"""Tell limbs from branches that hardly leave the parts they grow from, and cut these."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..numerics.polylines import relative_distance
+from ..report import Judgement
 from ..skeleton import Skeleton
 from .junctions import Limbs
 from .merging import merge_vertices
+from .scores import LIMB_WEIGHTS, probability
 
+SPUR_POINTS = 128  # measured: of a branch that are enough to say how far it reaches
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
 
 
-def prune_spurs(skeleton: Skeleton, reach: float) -> Skeleton:
+def prune_spurs(skeleton: Skeleton, reach: float) -> tuple[Skeleton, list[Judgement]]:
     """Cut branches whose points reach no farther than the surface around the limbs that meet there.
 
     What counts is the points, not the curve: the contraction shortens stubs as thick as they are long, and lets thin
@@ -36,35 +41,72 @@ def prune_spurs(skeleton: Skeleton, reach: float) -> Skeleton:
     -------
     Skeleton
         Points of a cut branch belong to its junction.
+    judgements : list of Judgement
+        How probably each branch left that leaves a junction and has an end is a limb; at its end.
     """
     while True:
-        limbs, owned = Limbs(skeleton, joined=True), _Owned(skeleton)
-        ending = np.zeros(len(skeleton.vertices), bool)
-        ends, worst = [], {}
-        for branch in limbs.branches:
-            ends.append([v for v in dict.fromkeys(branch[[0, -1]].tolist()) if skeleton.degree[v] > 2])
-            if 1 in skeleton.degree[branch[[0, -1]]]:
-                ending[branch] = skeleton.degree[branch] < 3
-        for k, branch in enumerate(limbs.branches):
-            inner, leaf = limbs.inner[k], 1 in skeleton.degree[branch[[0, -1]]]
-            if not ends[k] or not (leaf or (inner and limbs.short[k])):
-                continue
-            body = branch[~np.isin(branch, ends[k])]
-            far = _farthest(limbs, k, ends[k], owned.points(body), ending)
-            for v in ends[k]:
-                if far < worst.get(v, (reach,))[0]:
-                    worst[v] = (far, k, body)
-        cut = {k: body for _, k, body in worst.values() if all(v in worst and worst[v][1] == k for v in ends[k])}
-        if not cut:
-            return skeleton
+        worst: dict[int, tuple[float, int]] = {}
+        found = list(_reaches(skeleton))
+        for i, branch in enumerate(found):
+            for v in branch.ends:
+                if branch.reach < worst.get(v, (reach,))[0]:
+                    worst[v] = (branch.reach, i)
+        chosen = {i for _, i in worst.values() if all(v in worst and worst[v][1] == i for v in found[i].ends)}
+        if not chosen:
+            return skeleton, [_judged(skeleton, path, facts) for path, facts in _limb_facts(skeleton, found)]
         group, vertices = np.arange(len(skeleton.vertices)), skeleton.vertices.copy()
-        for k, body in cut.items():
-            group[body] = group[ends[k]] = ends[k][0]
-            vertices[ends[k][0]] = vertices[ends[k]].mean(axis=0)
+        for ends, body, _ in (found[i] for i in chosen):
+            group[body] = group[ends] = ends[0]
+            vertices[ends[0]] = vertices[ends].mean(axis=0)
         stay = np.unique(group)
         # a junction stays what it was
         kept = {"vertices": vertices[stay], "radii": skeleton.radii[stay], "confidence": skeleton.confidence[stay]}
         skeleton = replace(merge_vertices(skeleton, group), **kept)
+
+
+def limb_facts(skeleton: Skeleton) -> Iterator[tuple[np.ndarray, dict[str, float]]]:
+    """What speaks for every branch that leaves a junction and has an end: its reach, as a logarithm.
+
+    Yields
+    ------
+    path : (p,) int array
+        From the junction to the end.
+    facts : dict of str to float
+    """
+    return _limb_facts(skeleton, list(_reaches(skeleton)))
+
+
+def _limb_facts(skeleton: Skeleton, found: list[_Reach]) -> Iterator[tuple[np.ndarray, dict[str, float]]]:
+    for (junction, *_), body, far in found:
+        if (skeleton.degree[body] == 1).any():
+            path = body if skeleton.degree[body[-1]] == 1 else body[::-1]
+            yield np.append(junction, path), dict(reach=float(np.log(far + 0.1)))
+
+
+def _judged(skeleton: Skeleton, path: np.ndarray, facts: dict[str, float]) -> Judgement:
+    return Judgement("limb", tuple(skeleton.vertices[path[-1]].tolist()), probability(LIMB_WEIGHTS, facts), False)
+
+
+class _Reach(NamedTuple):
+    """How far the points of a branch that may go leave the limbs around it."""
+
+    ends: list[int]  # its junctions
+    body: np.ndarray  # its other vertices, in order
+    reach: float
+
+
+def _reaches(skeleton: Skeleton) -> Iterator[_Reach]:
+    limbs, owned = Limbs(skeleton, joined=True), _Owned(skeleton)
+    ending = np.zeros(len(skeleton.vertices), bool)
+    leaves = [1 in skeleton.degree[branch[[0, -1]]] for branch in limbs.branches]
+    for branch, leaf in zip(limbs.branches, leaves, strict=True):
+        if leaf:
+            ending[branch] = skeleton.degree[branch] < 3
+    for k, (branch, leaf) in enumerate(zip(limbs.branches, leaves, strict=True)):
+        ends = [v for v in dict.fromkeys(branch[[0, -1]].tolist()) if skeleton.degree[v] > 2]
+        if ends and (leaf or (limbs.inner[k] and limbs.short[k])):
+            body = branch[~np.isin(branch, ends)]
+            yield _Reach(ends, body, float(_farthest(limbs, k, ends, owned.points(body), ending)))
 
 
 class _Owned:
@@ -77,8 +119,10 @@ class _Owned:
         self._stop = np.cumsum(np.bincount(vertex, minlength=len(skeleton.vertices)))
 
     def points(self, vertices: np.ndarray) -> np.ndarray:
+        """Those of some vertices; of many every so-manieth."""
         parts = [self._points[self._stop[v - 1] if v else 0 : self._stop[v]] for v in vertices.tolist()]
-        return np.concatenate(parts) if parts else np.empty((0, 3))
+        found = np.concatenate(parts) if parts else np.empty((0, 3))
+        return found[:: len(found) // SPUR_POINTS + 1]
 
 
 def _farthest(limbs: Limbs, k: int, ends: list[int], points: np.ndarray, ending: np.ndarray) -> float:

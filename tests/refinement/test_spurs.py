@@ -8,8 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
-from glsk_o3d.numerics.polylines import relative_distance
-from glsk_o3d.refinement.spurs import SPUR_QUANTILE, prune_spurs
+from glsk_o3d.refinement.spurs import SPUR_QUANTILE, judge_limbs, limb_reaches, prune_spurs, relative_distance
 
 N = 21  # vertices of the trunk
 PER = 60  # points of each: many, so that a cut spur does not change the thickness of its junction
@@ -149,7 +148,7 @@ def test_far_points_in_chunks(monkeypatch):
     rng = np.random.default_rng(0)
     points, vertices = rng.normal(size=(50, 3)), rng.normal(size=(8, 3))
     found = relative_distance(points, vertices, np.arange(8) + 1.0, [np.arange(8)])
-    monkeypatch.setattr("glsk_o3d.numerics.polylines.POLYLINE_CHUNK", 21)
+    monkeypatch.setattr("glsk_o3d.refinement.spurs.SPUR_CHUNK", 21)
     np.testing.assert_array_equal(relative_distance(points, vertices, np.arange(8) + 1.0, [np.arange(8)]), found)
 
 
@@ -188,18 +187,30 @@ def test_several_at_one_junction_and_in_any_numbering():
         assert gap.max() < 1e-12
 
 
-def test_loops_at_a_junction_are_no_spurs(ringed):
-    """A tiny ring on a stem stays; the stem, a short link between two junctions whose limbs all meet, does not."""
+def test_loops_at_a_junction_and_bridges_are_no_spurs(ringed):
+    """A tiny ring on a stem, and a short link between two junctions: no leaf, no spur."""
     tiny = [[0, 0, 0.02], [0.01, 0, 0.03], [0, 0, 0.04], [-0.01, 0, 0.03]]
     line = [[x, 0, 0] for x in (-1, 0, 1)]
     edges = [(0, 1), (1, 2), (1, 3), (3, 4), (4, 5), (5, 6), (3, 6)]
-    skeleton = prune_spurs(ringed(line + tiny, edges), 0.8)
-    assert (skeleton.n_loops, skeleton.n_components) == (1, 1)
-    assert skeleton.edges.tolist() == [[0, 1], [1, 2], [1, 3], [1, 5], [3, 4], [4, 5]]
-
-
-def test_two_ways_between_two_junctions_stay(ringed):
-    """They are a loop: neither may go, however short."""
-    places = [[-1, 0, 0], [-0.02, 0, 0], [0, 0.01, 0], [0, -0.01, 0], [0.02, 0, 0], [1, 0, 0]]
-    raw = ringed(places, [(0, 1), (1, 2), (1, 3), (2, 4), (3, 4), (4, 5)])
+    raw = ringed(line + tiny, edges)
     assert prune_spurs(raw, 0.8) is raw
+
+
+def test_reach_is_that_of_the_points_over_the_surface():
+    skeleton = tree((5, 0.3), (12, 0.5))
+    found = {int(path[-1]): (int(path[0]), far) for path, far in limb_reaches(skeleton)}
+    assert sorted(found) == np.flatnonzero(skeleton.degree == 1).tolist()
+    for tip, junction, reach in ((N + 1, 5, 0.3), (N + 3, 12, 0.5)):
+        assert found[tip] == (junction, pytest.approx(reach / 0.1))
+
+
+def test_the_farther_a_limb_reaches_the_more_probable_it_is():
+    skeleton = tree((5, 0.17), (12, 0.5))
+    found = {it.place: it for it in judge_limbs(skeleton)}
+    assert {(it.about, it.changed) for it in found.values()} == {("limb", False)}
+    short, far = (found[tuple(skeleton.vertices[tip])].probability for tip in (N + 1, N + 3))
+    assert 0.2 < short < 0.8 < far < 1
+
+
+def test_a_part_with_two_ends_has_no_limbs():
+    assert judge_limbs(tree()) == []

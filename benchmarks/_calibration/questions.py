@@ -1,0 +1,80 @@
+"""What the refiner asks about a cloud with a known axis, and what is so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from _common.clouds import Case
+
+from glsk_o3d import Pipeline
+from glsk_o3d.analysis import Truth
+from glsk_o3d.analysis.matching import TIP_REACH, matched
+from glsk_o3d.numerics.cycles import minimum_cycle_basis
+from glsk_o3d.refinement.air import branch_facts
+from glsk_o3d.refinement.bridging import gap_facts
+from glsk_o3d.refinement.evidence import Evidence
+from glsk_o3d.refinement.loops import SHORTEST_LOOP, loop_facts
+from glsk_o3d.refinement.spurs import limb_facts
+from glsk_o3d.skeleton import Skeleton
+
+from .labels import Placed
+
+DIGITS = 4  # of a fact
+
+
+def questions(case: Case, pipeline: Pipeline) -> dict:
+    """Every question about a cloud: what it is `about`, the `facts`, and whether it `is_so`."""
+    points, truth = case.load()
+    found = [
+        dict(about=about, facts={name: round(value, DIGITS) for name, value in facts.items()}, is_so=is_so)
+        for about, facts, is_so in asked(points, truth, pipeline)
+    ]
+    return dict(questions=found)
+
+
+def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tuple[str, dict[str, float], bool]]:
+    """The questions in the order in which a pipeline's refiner asks them, each of the skeleton that it has then."""
+    *stages, refiner = pipeline.stages
+    skeleton = Pipeline(*stages, replace(refiner, handle=0, air=0, bridge=0))(points)
+    if not len(skeleton.edges):
+        return
+    fitted, evidence = skeleton, Evidence.of(skeleton)
+    yield from _loops(skeleton, evidence, truth)
+    skeleton, _ = refiner._close(skeleton, evidence)
+    yield from _branches(skeleton, evidence, truth)
+    skeleton, _ = refiner._cut(skeleton, evidence)
+    yield from _gaps(skeleton, evidence, truth)
+    yield from _limbs(refiner._judge(fitted), truth)
+
+
+def _loops(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
+    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+    cycles = [cycle for cycle in cycles if len(cycle) > SHORTEST_LOOP]
+    if cycles:
+        placed = Placed(truth, skeleton.vertices)
+        for cycle, (facts, _) in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
+            if (is_so := placed.is_handle(cycle)) is not None:
+                yield "loop", facts, is_so
+
+
+def _branches(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
+    placed = Placed(truth, skeleton.vertices)
+    for branch, facts, k, _ in branch_facts(skeleton, evidence, skeleton.report.noise):
+        yield "air", facts, placed.crosses_air(branch, k)
+
+
+def _gaps(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
+    placed = Placed(truth, skeleton.vertices)
+    for (leaf, other), facts in gap_facts(skeleton, evidence):
+        yield "gap", facts, bool(placed.joined(leaf, other))
+
+
+def _limbs(skeleton: Skeleton, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
+    leaves = np.flatnonzero(skeleton.degree == 1)
+    tips = np.flatnonzero(np.bincount(truth.edges.ravel(), minlength=len(truth.nodes)) == 1)
+    pairs = matched(skeleton.vertices[leaves], truth.nodes[tips], TIP_REACH * truth.radii[tips])
+    right = set(leaves[[leaf for leaf, _ in pairs]].tolist())
+    for path, facts in limb_facts(skeleton):
+        yield "limb", facts, int(path[-1]) in right

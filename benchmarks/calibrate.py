@@ -1,0 +1,104 @@
+"""Probabilities of the refiner's judgements: their weights fitted, and whether what they say is so as often.
+
+python benchmarks/calibrate.py check --builtin --variant clean_1024,noise2_1024
+
+The README beside this file says what each command shows.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from _calibration.fitting import WEIGHTS, by_question, fitted, packaged, said
+from _calibration.pictures import draw_reliability
+from _calibration.questions import questions
+from _calibration.reliability import tables, without_family
+from _common.clouds import cases
+from _common.command_line import Jobs, Markdown, Output, Own, Shapes, Variants, application
+from _common.results import read, save
+from _common.runs import run
+from _common.tables import fill, page_with, present
+
+from glsk_o3d.pipelines import default
+
+EVERY = "*_4096"
+Sources = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="DIR|JSON", exists=True, help="Folders of shapes, or questions that -o has written."),
+]
+
+app = application(__doc__)
+
+
+def rows_of(sources: list[Path] | None, own: bool, variant: str, shapes: str, jobs: int) -> list[dict]:
+    """The questions about every cloud, a row each; saved ones are not asked again."""
+    saved = [path for path in sources or () if path.is_file()]
+    rows = [row for path in saved for row in read(path)["rows"]]
+    if folders := [path for path in sources or () if path.is_dir()] or not saved:
+        found = cases(folders if sources else None, own, variant, shapes)
+        rows += run(questions, [(case.facts, (case, default())) for case in found], jobs)
+    for row in rows:
+        if "failure" in row:
+            typer.echo(f"{row['shape']} {row['variant']}: {row['failure']}", err=True)
+    return rows
+
+
+@app.command()
+def fit(
+    sources: Sources = None,
+    own: Own = False,
+    variant: Variants = EVERY,
+    shapes: Shapes = "",
+    jobs: Jobs = 2,
+    output: Output = None,
+) -> None:
+    """The weights with which the questions are answered best, as glsk_o3d/refinement/scores.py has them."""
+    rows = rows_of(sources, own, variant, shapes, jobs)
+    save(output, rows)
+    for about, answered in by_question(rows).items():
+        lines = [f'    "{name}": {weight:.2f},' for name, weight in fitted(answered).items()]
+        typer.echo("\n".join([f"{WEIGHTS[about]} = {{", *lines, "}"]))
+
+
+@app.command()
+def check(
+    sources: Sources = None,
+    own: Own = False,
+    variant: Variants = EVERY,
+    shapes: Shapes = "",
+    leave_family_out: Annotated[
+        bool,
+        typer.Option(help="Not the package's weights, but for each family those fitted to the others."),
+    ] = False,
+    learnt: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="JSON", exists=True, dir_okay=False, help="Fitted to these, else to the same."),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option(help="Put the first two tables into this page, a picture beside it.", callback=page_with("check")),
+    ] = None,
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Whether what has some probability is so as often."""
+    rows = rows_of(sources, own, variant, shapes, jobs)
+    save(output, rows)
+    found = by_question(rows)
+    if leave_family_out:
+        others = by_question(read(learnt)["rows"]) if learnt else found
+        told = {about: (without_family(it, others[about]), it) for about, it in found.items()}
+    else:
+        told = {about: (said(packaged(about), it), it) for about, it in found.items()}
+    shown = tables(told)
+    present(shown, markdown)
+    if page is not None:
+        fill(page, {"check": shown[:2]})
+        draw_reliability(told, page.parent / "images")
+
+
+if __name__ == "__main__":
+    app()
