@@ -15,6 +15,10 @@ from glsk_o3d.refinement.spurs import prune_spurs
 R = 0.1
 
 
+def pruned(skeleton, reach):
+    return prune_spurs(skeleton, reach)[0]
+
+
 def capsules(ends, per=3000):
     """Points on the surface of struts of radius R with round ends, but not inside another, (N, 3)."""
     rng, points = np.random.default_rng(0), []
@@ -75,7 +79,7 @@ def test_a_sharp_corner_has_no_spur(half):
     paths, struts, meet = webbed([-half, half])
     raw = drawn([*paths, [meet, [-R / 2, 0, 0]]], struts)
     assert len(raw.leaves) == 3
-    skeleton = prune_spurs(raw, 1.5)
+    skeleton = pruned(raw, 1.5)
     assert (len(skeleton.leaves), len(skeleton.junctions), skeleton.n_components) == (2, 0, 1)
 
 
@@ -84,7 +88,7 @@ def test_junctions_move_to_where_the_axes_meet(angles):
     """Y, three struts in a fan, T and four in a plane."""
     paths, struts, meet = webbed(angles)
     raw = drawn(paths, struts)
-    skeleton = move_junctions(prune_spurs(raw, 1.5))
+    skeleton = move_junctions(pruned(raw, 1.5))
     assert len(skeleton.junctions) == 1
     assert len(skeleton.leaves) == len(angles)
     place = skeleton.vertices[skeleton.junctions[0]]
@@ -102,7 +106,7 @@ def test_a_straight_line_keeps_its_side_branches():
     places = [(-1, 0, 0), (0, 0, 0), (0.5, 0, 0), (1, 0, 0)]
     paths = [*pairwise(places), *struts[1:]]
     raw = drawn(paths, struts)
-    skeleton = prune_spurs(raw, 1.5)
+    skeleton = pruned(raw, 1.5)
     assert skeleton is raw
     moved = move_junctions(skeleton)
     np.testing.assert_allclose(moved.vertices, raw.vertices, atol=0.1 * R)
@@ -117,7 +121,7 @@ def test_junctions_of_one_corner_become_one(apart, junctions):
     root = [a, a, b, b] if apart > 2 else [np.zeros(3)] * 4
     struts = [(r, r + end) for r, end in zip(root, ends, strict=True)] + [(a, b)]
     paths = [[start, r + 3 * R * end, r + end] for start, r, end in zip([a, a, b, b], root, ends, strict=True)]
-    skeleton = move_junctions(prune_spurs(drawn([*paths, [a, b]], struts), 1.5))
+    skeleton = move_junctions(pruned(drawn([*paths, [a, b]], struts), 1.5))
     assert len(skeleton.junctions) == junctions
     assert len(skeleton.leaves) == 4
 
@@ -145,7 +149,7 @@ def test_a_limb_beside_another_begins_where_it_leaves_it():
     aside = [(0, 0, 0), (0.05, R / 2, 0), (0.5, R / 2, 0), (0.5, 1, 0)]
     raw = drawn([[(-1, 0, 0), (0, 0, 0)], [(0, 0, 0), (1, 0, 0)], aside], struts)
     np.testing.assert_allclose(raw.vertices[raw.junctions], [[0, 0, 0]], atol=1e-12)
-    skeleton = move_junctions(prune_spurs(reattach_limbs(raw), 1.5))
+    skeleton = move_junctions(pruned(reattach_limbs(raw), 1.5))
     assert (len(skeleton.leaves), skeleton.n_components, skeleton.n_loops) == (3, 1, 0)
     np.testing.assert_allclose(skeleton.vertices[skeleton.junctions], [[0.5, 0, 0]], atol=0.5 * R)
     assert skeleton.length == pytest.approx(3, abs=R)
@@ -165,7 +169,7 @@ def test_graphs_without_junctions_stay():
     np.testing.assert_array_equal(move_junctions(raw).vertices, raw.vertices)
     none = Skeleton([[0, 0, 0]], [], [1], [0], [[0, 0, 1]], [[0, 0, 1]])
     assert Limbs(none, joined=True).paths == []
-    assert prune_spurs(none, 1.5) is none
+    assert pruned(none, 1.5) is none
 
 
 def test_tips_are_as_thick_as_their_branch():
