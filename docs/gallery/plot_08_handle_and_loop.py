@@ -46,5 +46,7 @@ left, middle, right = (figure.add_subplot(1, 3, place, projection="3d") for plac
 glsk.plot_skeleton(graph, left, line_width=1).set_title(f"raw graph: {graph.n_loops} loops")
 glsk.plot_skeleton(published, middle, line_width=1.5).set_title(f"without triangles: {published.n_loops}")
 glsk.plot_skeleton(skeleton, right, color=(0.6, 0.6, 0.6)).set_title(f"recommended: {skeleton.n_loops}")
-right.plot(*skeleton.vertices[[*loop.vertices, loop.vertices[0]]].T, color="crimson", linewidth=3, zorder=3, clip_on=False)
+right.plot(
+    *skeleton.vertices[[*loop.vertices, loop.vertices[0]]].T, color="crimson", linewidth=3, zorder=3, clip_on=False
+)
 plt.show()

@@ -58,7 +58,7 @@ def loops(skeleton: Skeleton) -> tuple[Loop, ...]:
     chances = np.full(len(cycles), np.nan)
     if cycles and len(skeleton.supporting_points):
         known = [bool(np.isfinite(skeleton.confidence[cycle]).any()) for cycle in cycles]
-        for i, (facts, _) in enumerate(loop_facts(skeleton, cycles, Evidence.of(skeleton))):
+        for i, (facts, *_) in enumerate(loop_facts(skeleton, cycles, Evidence.of(skeleton))):
             chances[i] = probability(HANDLE_WEIGHTS, facts) if known[i] else np.nan
     found = zip(cycles, openings, chances.tolist(), strict=True)
     return tuple(Loop(vertices, float(opening), chance) for vertices, opening, chance in found)

@@ -101,7 +101,9 @@ def piped():
     """
 
     def make(lines, tubes=None, radius=0.1, confidence=0.95, step=0.05, **options):
-        lines = [np.concatenate([it[:1], *(line(a, b, step)[1:] for a, b in pairwise(it))]) for it in map(_array, lines)]
+        lines = [
+            np.concatenate([it[:1], *(line(a, b, step)[1:] for a, b in pairwise(it))]) for it in map(_array, lines)
+        ]
         tubes = range(len(lines)) if tubes is None else tubes
         vertices, which = np.unique(np.concatenate(lines).round(9), axis=0, return_inverse=True)
         edges, first = set(), 0

@@ -48,7 +48,9 @@ def test_nothing_to_merge_changes_nothing(random_skeleton):
 
 
 def test_lone_vertices_go_and_their_points_to_the_nearest_that_stays(ringed):
-    raw = ringed([[0, 0, 0], [1, 0, 0], [9, 0, 0], [2, 0, 0], [-3, 0, 0]], [(0, 1), (1, 3)], radius=[1, 2, 3, 4, 5], per=2)
+    raw = ringed(
+        [[0, 0, 0], [1, 0, 0], [9, 0, 0], [2, 0, 0], [-3, 0, 0]], [(0, 1), (1, 3)], radius=[1, 2, 3, 4, 5], per=2
+    )
     raw = replace(raw, confidence=np.arange(5) / 10, vertex_of_point=np.array([0, 0, 1, 1, 2, 2, 3, -1, 4, 4]))
     skeleton = drop_lone_vertices(raw)
     np.testing.assert_array_equal(skeleton.vertices, raw.vertices[[0, 1, 3]])
