@@ -122,6 +122,7 @@ def test_bars_associate():
     assert pipeline != "pipeline"
 
 
+@pytest.mark.filterwarnings("ignore:uncertain topology:glsk_o3d.SkeletonWarning")
 def test_part_of_a_pipeline_gives_what_its_last_filter_gives():
     state = (RingBuilder() | Contractor(max_iterations=1))(POINTS)
     assert isinstance(state, Contraction)

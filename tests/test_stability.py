@@ -1,4 +1,4 @@
-"""The topology does not hang on roundings: points moved by next to nothing, or in another order, give the same graph."""
+"""The topology does not hang on roundings: points that move by next to nothing give the same graph."""
 
 import warnings
 

@@ -2,8 +2,8 @@
 A handle and its loop
 =====================
 
-A loop in a skeleton is real only if something can pass through it: no disc that spans it stays inside the object. This is
-how false loops are told from handles.
+A loop in a skeleton is real only if something can pass through it: no disc that spans it stays inside the object. This
+is how false loops are told from handles.
 """
 
 import matplotlib.pyplot as plt
@@ -32,8 +32,8 @@ for it in skeleton.report.judgements:
         print(it)
 
 # %%
-# What remains: the vertices of the loop, the radius of the largest circle inside it, and how probable it is that it is a
-# handle.
+# What remains: the vertices of the loop, the radius of the largest circle inside it, and how probable it is that it is
+# a handle.
 
 (loop,) = skeleton.loops
 print(f"{len(loop.vertices)} vertices, opening {loop.opening:.3f}, a handle with probability {loop.probability:.2f}")
