@@ -30,7 +30,7 @@ from .meshlab.meshset import MeshSet
 from .pipeline import Filter, Pipeline
 from .recipes import from_recipe, load_recipe, rerun, save_recipe, to_recipe
 from .refiner import Refiner
-from .report import IterationRecord, Report
+from .report import IterationRecord, Judgement, Report
 from .ring_builder import RingBuilder
 from .skeleton import Skeleton
 from .state import Contraction
@@ -58,6 +58,7 @@ __all__ = [
     "InvalidCloudError",
     "InvalidParameterError",
     "IterationRecord",
+    "Judgement",
     "LPRReducer",
     "MeshSet",
     "MissingPackageError",

@@ -37,11 +37,10 @@ class Refiner(Filter[Skeleton]):
        corners.
     4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
        side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
-    5. Weak loops are cut: those across which the surface hardly goes on somewhere, and narrow ones where the points
-       hardly say where the axis is.
+    5. The topology is judged by what the surface around the curve says: loops that are probably no handles are closed,
+       branches that probably cross air are cut, and gaps across which the object probably goes on are bridged.
     6. Limbs that run beside another one inside its tube begin where they leave it. Spurs, branches whose points hardly
        leave the limbs around them, where these go on to meet, are pruned, and junctions move to where limbs meet.
-    7. Ends of different parts that point at each other across a gap of the scan are joined.
 
     The first step is published; with all options 0 it is the only one.
 
@@ -49,7 +48,7 @@ class Refiner(Filter[Skeleton]):
     -----
     SkeletonWarning
         Where no curve skeleton is meaningful, sphere-like or sheet-like clouds, and where many points do not say where
-        the axis is; it names the region.
+        the axis is; it names the region. Where questions about the topology were close calls; it names the closest.
 
     Notes
     -----
@@ -112,6 +111,19 @@ class Refiner(Filter[Skeleton]):
     )
 
     def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
+        skeleton = self._fit(skeleton)
+        if len(skeleton.edges) and len(skeleton.supporting_points) and (self.handle or self.air or self.bridge):
+            skeleton = self._judge(skeleton)
+        skeleton, limbs = self._settle(skeleton)
+        if self.recentre:
+            skeleton = level_tips(move_junctions(skeleton))
+        report = replace(skeleton.report, judgements=(*skeleton.report.judgements, *limbs))
+        for message in diagnose(replace(skeleton, report=report)):
+            report = report.with_warning(message)
+        return replace(skeleton, report=report)
+
+    def _fit(self, skeleton: Skeleton) -> Skeleton:
+        """Make the graph one-dimensional and centre it."""
         skeleton = collapse_triangles(skeleton)
         if self.handle:
             skeleton = zip_narrow_loops(skeleton)
@@ -119,20 +131,13 @@ class Refiner(Filter[Skeleton]):
             skeleton = clamp_to_points(skeleton)
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
-        skeleton = fit_axis(skeleton, self.recentre)
-        if len(skeleton.edges) and (self.handle or self.air or self.bridge):
-            skeleton = self._judge(skeleton)
+        return fit_axis(skeleton, self.recentre)
+
+    def _settle(self, skeleton: Skeleton) -> tuple[Skeleton, list[Judgement]]:
+        """Let limbs begin where they leave others, and prune what is none."""
         if self.recentre:
             skeleton = reattach_limbs(skeleton)
-        limbs: list[Judgement] = []
-        if self.spur:
-            skeleton, limbs = prune_spurs(skeleton, self.spur)
-        if self.recentre:
-            skeleton = level_tips(move_junctions(skeleton))
-        report = replace(skeleton.report, judgements=(*skeleton.report.judgements, *limbs))
-        for message in diagnose(skeleton):
-            report = report.with_warning(message)
-        return replace(skeleton, report=report)
+        return prune_spurs(skeleton, self.spur) if self.spur else (skeleton, [])
 
     def _judge(self, skeleton: Skeleton) -> Skeleton:
         """Close false loops, cut what crosses air, and bridge gaps; the axis is fitted anew where that changed."""

@@ -66,6 +66,20 @@ class IterationRecord:
     seconds: float
 
 
+_OUTCOMES = {  # where the graph stayed as it was, and where it was changed
+    "air": ("branch kept", "branch cut"),
+    "loop": ("loop kept", "loop closed"),
+    "gap": ("gap left", "gap bridged"),
+    "limb": ("limb kept", "spur pruned"),
+}
+_QUESTIONS = {
+    "air": "the branch at ({}) crosses air",
+    "loop": "the loop at ({}) is a handle",
+    "gap": "the object goes on across the gap at ({})",
+    "limb": "the branch at ({}) is a limb",
+}
+
+
 @dataclass(frozen=True)
 class Judgement:
     """A question about the topology, and how it was answered.
@@ -88,6 +102,8 @@ class Judgement:
     >>> from glsk_o3d.samples import torus
     >>> [(it.about, it.changed) for it in skeletonize(torus(1000).points).report.judgements if it.about == "loop"]
     [('loop', False)]
+    >>> str(Judgement("loop", (0.0, 0.5, 2.0), 0.55, changed=False))
+    'the loop at (0, 0.5, 2) is a handle: 0.55, loop kept'
     """
 
     about: str
@@ -99,6 +115,19 @@ class Judgement:
     def is_uncertain(self) -> bool:
         """Whether the probability lies between a quarter and three quarters."""
         return 0.25 <= self.probability <= 0.75
+
+    @property
+    def outcome(self) -> str:
+        """What was done, in two words, such as ``"loop closed"`` or ``"gap left"``."""
+        return _OUTCOMES[self.about][self.changed]
+
+    @property
+    def question(self) -> str:
+        """What the probability is of, such as ``"the loop at (0, 0, 1) is a handle"``."""
+        return _QUESTIONS[self.about].format(", ".join(f"{c:.4g}" for c in self.place))
+
+    def __str__(self) -> str:
+        return f"{self.question}: {self.probability:.2f}, {self.outcome}"
 
 
 def _known(cls: type[Report] | type[IterationRecord] | type[Judgement], data: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pymeshlab
 
     from .analysis.branch_rows import BranchTable
+    from .analysis.loops import Loop
     from .io.colors import ColorChoice
 
 Root = int | Sequence[float] | np.ndarray | None
@@ -176,6 +177,16 @@ class Skeleton:
                     here = onward
                 paths.append(np.array(path))
         return tuple(paths)
+
+    @cached_property
+    def loops(self) -> tuple[Loop, ...]:
+        """Loops of a minimum cycle basis, each with its opening and the probability that it is a handle.
+
+        See `glsk_o3d.analysis.Loop`.
+        """
+        from .analysis.loops import loops
+
+        return loops(self)
 
     def segment(self, cloud: Any = None) -> np.ndarray:
         """Label every point with its branch, (N,) int64 array. See `glsk_o3d.analysis.segment`."""

@@ -237,14 +237,14 @@ class TestArithmetic:
 
     def test_ablation_is_sorted_by_what_is_lost(self, parts):
         rows = [row(), row(variant="noise1_512", error=0.3)]
-        for name, error, right in (("spurs cut", 0.1, True), ("denoising", 0.5, True), ("weak loops cut", 0.1, False)):
+        for name, error, right in (("spurs cut", 0.1, True), ("denoising", 0.5, True), ("air cut", 0.1, False)):
             rows += [row(pipeline=name, error=error), row(pipeline=name, variant="noise1_512", topology=right)]
         rows += [row(pipeline="cao2010"), row(pipeline="cao2010", variant="noise1_512")]
         ((_, header, lines),) = parts.ideas.ablation_tables(rows)
         assert header == ["", "clean_512 (1)", "noise1_512 (1)", "all (2)", "setting"]
         assert lines[0] == ["default", "0.100 / 1", "0.300 / 1", "0.200 / 2", ""]
         names = [line[0] for line in lines[1:]]
-        assert names == ["without denoising", "without weak loops cut", "without spurs cut", "cao2010"]
+        assert names == ["without denoising", "without air cut", "without spurs cut", "cao2010"]
         assert lines[1] == ["without denoising", "0.500 / 1", "0.100 / 1", "0.300 / 2", "`RingBuilder.denoise=0`"]
 
     def test_effects_go_behind_the_settings_of_a_page(self, parts, tmp_path):

@@ -122,6 +122,7 @@ def test_bars_associate():
     assert pipeline != "pipeline"
 
 
+@pytest.mark.filterwarnings("ignore:uncertain topology:glsk_o3d.SkeletonWarning")
 def test_part_of_a_pipeline_gives_what_its_last_filter_gives():
     state = (RingBuilder() | Contractor(max_iterations=1))(POINTS)
     assert isinstance(state, Contraction)
@@ -424,15 +425,16 @@ def test_thin_parts_side_by_side_stay_apart(gap, seed):
     assert not set(owner[0]) & set(owner[1])
 
 
-def test_parts_in_line_are_bridged_only_when_asked():
+def test_parts_in_line_are_bridged_where_their_ends_are_open():
     rod = samples.tube(2048).points
     parts = np.concatenate([rod, rod + [1.5, 0, 0]])  # round ends 0.3 apart, 3 radii
     assert skeletonize(parts).n_components == 2
-    asked = skeletonize(
-        parts,
-        glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector() | glsk.Refiner(bridge=8),
-    )
+    asked = skeletonize(parts, {"Refiner.bridge": 0.01})
     assert (asked.n_components, asked.report.n_bridges) == (1, 1)
+    unseen = np.abs(rod[:, 0]) > 0.15  # of one tube a stretch of 3 radii
+    joined = skeletonize(rod[unseen])
+    assert (joined.n_components, joined.n_loops, joined.report.n_bridges) == (1, 0, 1)
+    assert skeletonize(rod[unseen], bridge=0).n_components == 2
 
 
 # ---- equivariance, end to end

@@ -1,4 +1,4 @@
-"""Report and IterationRecord."""
+"""Report, IterationRecord and Judgement."""
 
 import dataclasses
 import json
@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from glsk_o3d import Contractor, Report, RingBuilder, SkeletonWarning, samples
+from glsk_o3d import Contractor, Judgement, Report, RingBuilder, SkeletonWarning, samples
 from glsk_o3d.pipeline import with_stage
 
 
@@ -56,6 +56,39 @@ def test_warnings_are_issued_and_kept():
     with pytest.warns(SkeletonWarning, match="second"):
         report = report.with_warning("second")
     assert report.warnings == ("first", "second")
+
+
+JUDGEMENTS = (
+    Judgement("loop", (0.0, 0.5, -2.0), 0.99, changed=False),
+    Judgement("air", (1.0, 2.0, 3.0), 0.7, changed=True),
+    Judgement("gap", (1 / 3, 0.0, 1e9), 0.45, changed=False),
+    Judgement("limb", (0.0, 0.0, 0.0), 0.01, changed=True),
+)
+
+
+def test_judgements_survive_json():
+    report = Report(judgements=JUDGEMENTS, n_cuts=1, noise=0.125)
+    again = Report.from_dict(json.loads(json.dumps(report.to_dict())))
+    assert again == report
+    assert isinstance(again.judgements[0].place, tuple)
+
+
+def test_close_calls_lie_between_a_quarter_and_three_quarters_the_closest_first():
+    assert Report(judgements=JUDGEMENTS).uncertain == (JUDGEMENTS[2], JUDGEMENTS[1])
+    assert Report().uncertain == ()
+    for probability, close in ((0.249, False), (0.25, True), (0.75, True), (0.751, False)):
+        assert Judgement("gap", (0.0, 0.0, 0.0), probability, changed=False).is_uncertain == close
+
+
+def test_judgements_in_words():
+    assert list(map(str, JUDGEMENTS)) == [
+        "the loop at (0, 0.5, -2) is a handle: 0.99, loop kept",
+        "the branch at (1, 2, 3) crosses air: 0.70, branch cut",
+        "the object goes on across the gap at (0.3333, 0, 1e+09): 0.45, gap left",
+        "the branch at (0, 0, 0) is a limb: 0.01, spur pruned",
+    ]
+    other = [dataclasses.replace(it, changed=not it.changed).outcome for it in JUDGEMENTS]
+    assert other == ["loop closed", "branch kept", "gap bridged", "limb kept"]
 
 
 def test_names_the_versions():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from _common.clouds import Case
@@ -37,16 +36,16 @@ def questions(case: Case, pipeline: Pipeline) -> dict:
 def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tuple[str, dict[str, float], bool]]:
     """The questions in the order in which a pipeline's refiner asks them, each of the skeleton that it has then."""
     *stages, refiner = pipeline.stages
-    skeleton = Pipeline(*stages, replace(refiner, handle=0, air=0, bridge=0))(points)
+    skeleton = fitted = refiner._fit(Pipeline(*stages)(points))
     if not len(skeleton.edges):
         return
-    fitted, evidence = skeleton, Evidence.of(skeleton)
+    evidence = Evidence.of(skeleton)
     yield from _loops(skeleton, evidence, truth)
     skeleton, _ = refiner._close(skeleton, evidence)
     yield from _branches(skeleton, evidence, truth)
     skeleton, _ = refiner._cut(skeleton, evidence)
     yield from _gaps(skeleton, evidence, truth)
-    yield from _limbs(refiner._judge(fitted), truth)
+    yield from _limbs(refiner._settle(refiner._judge(fitted))[0], truth)
 
 
 def _loops(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
@@ -54,7 +53,7 @@ def _loops(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tup
     cycles = [cycle for cycle in cycles if len(cycle) > SHORTEST_LOOP]
     if cycles:
         placed = Placed(truth, skeleton.vertices)
-        for cycle, (facts, _) in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
+        for cycle, (facts, *_) in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
             if (is_so := placed.is_handle(cycle)) is not None:
                 yield "loop", facts, is_so
 

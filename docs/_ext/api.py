@@ -6,7 +6,7 @@ from pathlib import Path
 
 TASKS = {
     "From a cloud to its skeleton": (
-        *("skeletonize", "Skeleton", "Report", "IterationRecord"),
+        *("skeletonize", "Skeleton", "Report", "IterationRecord", "Judgement"),
         "remove_redundant_points",
     ),
     "Filters and stopping rules": (

@@ -38,6 +38,7 @@ COMFORTS = {
     "skeleton.Skeleton._repr_html_": ("viewing.notebook",),
     "skeleton.Skeleton.annotate": ("io.annotation",),
     "skeleton.Skeleton.branch_table": ("analysis.branches",),
+    "skeleton.Skeleton.loops": ("analysis.loops",),
     "skeleton.Skeleton.save": ("io.skeletons",),
     "skeleton.Skeleton.segment": ("analysis.segmentation",),
     "skeleton.Skeleton.to_line_set": ("io.line_sets",),

@@ -1,12 +1,13 @@
 """What a skeleton says about its object, and how good it is: against a known axis, or its cloud alone."""
 
-from .assessment import Assessment, Loop, assess
+from .assessment import Assessment, LoopWidth, assess
 from .branch_rows import BranchTable
 from .branches import branch_table
 from .comparison import Comparison, compare
 from .curvature import curvature_torsion
 from .grasps import grasp_candidates
 from .grippers import GraspCandidates
+from .loops import Loop
 from .segmentation import segment
 from .truth import Truth
 
@@ -16,6 +17,7 @@ __all__ = [
     "Comparison",
     "GraspCandidates",
     "Loop",
+    "LoopWidth",
     "Truth",
     "assess",
     "branch_table",

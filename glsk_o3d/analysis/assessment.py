@@ -24,8 +24,8 @@ OPEN_ANGLE = 4 * np.pi / 3
 
 
 @dataclass(frozen=True)
-class Loop:
-    """A loop of a skeleton.
+class LoopWidth:
+    """How wide a loop of a skeleton opens.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Assessment:
         tube (1 without loops).
     components, clusters : int
         Connected parts of the skeleton, and of the cloud when every point is joined to its 15 nearest.
-    loops : tuple of Loop
+    loops : tuple of LoopWidth
         A minimum cycle basis of the skeleton, shortest first.
     edge_centredness : (E,) float array
         max(0, 1 - d / r) of the cross-section nearest to the middle of each edge, NaN in the empty ball of a junction.
@@ -113,7 +113,7 @@ class Assessment:
     topology: float
     components: int
     clusters: int
-    loops: tuple[Loop, ...]
+    loops: tuple[LoopWidth, ...]
     edge_centredness: np.ndarray = field(repr=False)
 
     @property
@@ -224,9 +224,9 @@ def _turning(skeleton, radius):
 
 def _loops(skeleton, radius):
     cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-    return tuple(
-        Loop(float(inscribed_circle(skeleton.vertices[cycle])[1]), float(np.median(radius[cycle]))) for cycle in cycles
-    )
+    openings = (inscribed_circle(skeleton.vertices[cycle])[1] for cycle in cycles)
+    widths = zip(openings, (np.median(radius[cycle]) for cycle in cycles), strict=True)
+    return tuple(LoopWidth(float(opening), float(tube_radius)) for opening, tube_radius in widths)
 
 
 def _neighbourhood(cloud):

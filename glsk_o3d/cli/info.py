@@ -100,6 +100,7 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
         "converged": report.converged,
         "stop_reason": report.stop_reason,
         "repeatable": _repeatable(report.recipe),
+        "uncertain": list(map(str, report.uncertain)),
         "warnings": list(report.warnings),
         "versions": report.versions,
     }

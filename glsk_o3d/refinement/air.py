@@ -85,7 +85,8 @@ def branch_facts(
     around, keys = _neighbours(skeleton), edges @ [m, 1]
     for branch in skeleton.branches:
         edge = np.searchsorted(keys, np.sort(np.column_stack([branch[:-1], branch[1:]]), axis=1) @ [m, 1])
-        radius = max(float(np.median(skeleton.radii[branch])), TINY)
+        # of a line, which has no thickness, what rounding leaves
+        radius = max(float(np.median(skeleton.radii[branch])), float(np.finfo(float).eps * length.sum()), TINY)
         end = np.cumsum(length[edge])
         start = end - length[edge]
         window = _Window((start + end) / 2, np.append(0, end), AIR_WINDOW * radius)

@@ -86,10 +86,12 @@ def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[in
     typical = float(np.median(evidence.winding(skeleton.vertices[skeleton.edges].mean(axis=1))))
     if typical < LEAST_INSIDE:
         return  # parts too thin to have an inside, which could go on across a gap
+    leaves = [end.leaf for end in ends]
+    along = _along(skeleton, leaves)
     found = [
         (end, other, float(cosine))
-        for end, travelled in zip(ends, _along(skeleton, [end.leaf for end in ends]), strict=True)
-        for other, cosine in _aims(skeleton, end, travelled)
+        for i, end in enumerate(ends)
+        for other, cosine in _aims(skeleton, end, along[i], leaves, along)
     ]
     if not found:
         return
@@ -106,7 +108,9 @@ def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[in
         yield (end.leaf, other), facts
 
 
-def _aims(skeleton: Skeleton, end: _End, travelled: np.ndarray) -> Iterator[tuple[int, float]]:
+def _aims(
+    skeleton: Skeleton, end: _End, travelled: np.ndarray, leaves: list[int], along: np.ndarray
+) -> Iterator[tuple[int, float]]:
     """Vertices that an end points at across a gap, and the cosines: other ends, and the nearest place elsewhere."""
     across = skeleton.vertices - end.place
     away = np.maximum(norm(across), TINY)
@@ -116,7 +120,9 @@ def _aims(skeleton: Skeleton, end: _End, travelled: np.ndarray) -> Iterator[tupl
     aims = (gap < BRIDGE_REACH * end.radius) & (cosine > BRIDGE_COSINE) & (skeleton.degree > 0)
     aims &= travelled > DETOUR * away + DETOUR_RADII * np.maximum(end.radius, skeleton.radii)
     cost = gap + away * (1 - cosine) / 2
-    for kind, most in ((free, END_CHOICES), (~free, SIDE_CHOICES)):
+    # what the way by an end leads to is behind it, and not asked for itself
+    behind = ((away[leaves][:, None] + along)[aims[leaves]] < DETOUR * away).any(axis=0)
+    for kind, most in ((free, END_CHOICES), (~free & ~behind, SIDE_CHOICES)):
         some = np.flatnonzero(aims & kind)
         for other in some[np.argsort(cost[some], kind="stable")[:most]].tolist():
             yield other, cosine[other]

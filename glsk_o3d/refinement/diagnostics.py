@@ -25,7 +25,8 @@ def diagnose(skeleton: Skeleton) -> list[str]:
 
     Sheet-like: the normals around a vertex have one direction. Sphere-like: the normal lines of a whole component meet
     in one point, or it is hardly longer than thick. All are scale-free and ask the cloud, not the skeleton. Of a cloud
-    that is neither, the parts with little confidence are named. No edges at all are a reason, too.
+    that is neither, the parts with little confidence are named, and the least certain question about the topology. No
+    edges at all are a reason, too.
     """
     supporting = skeleton.supporting_points
     if len(supporting) == 0:
@@ -72,7 +73,17 @@ def diagnose(skeleton: Skeleton) -> list[str]:
         ]
     if len(skeleton.edges) == 0:
         return ["no edges: every part became one vertex; is Connector.radius larger than the parts are long?"]
-    return _weak_region(skeleton, count)
+    return _weak_region(skeleton, count) + _close_calls(skeleton)
+
+
+def _close_calls(skeleton: Skeleton) -> list[str]:
+    close, n = skeleton.report.uncertain, len(skeleton.report.judgements)
+    if not close:
+        return []
+    return [
+        f"uncertain topology: {len(close)} of {n} questions were close calls, above all whether {close[0].question} "
+        f"(probability {close[0].probability:.2f})"
+    ]
 
 
 def _weak_region(skeleton: Skeleton, count: np.ndarray) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from html import escape
 from typing import TYPE_CHECKING
@@ -13,10 +14,10 @@ import numpy as np
 from ..io.colors import shades
 
 if TYPE_CHECKING:
-    from ..report import IterationRecord, Report
+    from ..report import IterationRecord, Judgement, Report
     from ..skeleton import Skeleton
 
-MOST_LISTED_BRANCHES = 12  # rows of the table
+MOST_LISTED_ROWS = 12  # of a table
 _SOLVE_COLUMNS = (  # heading, field of the record, format, whether there is no room for it on a narrow screen
     ("solve", "iteration", "d", False),
     ("points", "n_points", ",d", False),
@@ -89,6 +90,30 @@ def _threshold(recipe) -> float | None:
     return None
 
 
+def topology(report: Report) -> str:
+    """What was closed, cut and bridged, and what was kept or left by a narrow margin: the least certain first."""
+    if not report.judgements:
+        return ""
+    counts = Counter(it.outcome for it in report.judgements)
+    told = ", ".join(f"{outcome}: {n:,}" for outcome, n in sorted(counts.items()))
+    told = f"<h2>Topology</h2><p>{told}; {len(report.uncertain):,} of {len(report.judgements):,} close calls.</p>"
+    listed = sorted((it for it in report.judgements if it.changed or it.is_uncertain), key=_margin)
+    if not listed:
+        return told
+    heads = "<th>done</th><th>question</th><th>probability</th>"
+    rows = ""
+    for it in listed[:MOST_LISTED_ROWS]:
+        kind = ' class="uncertain"' if it.is_uncertain else ""
+        rows += f"<tr{kind}><td>{it.outcome}</td><td>{it.question}</td><td>{it.probability:.2f}</td></tr>"
+    rest = len(listed) - MOST_LISTED_ROWS
+    more = f'<p class="muted small">and {rest:,} clearer ones</p>' if rest > 0 else ""
+    return f"{told}{_table(heads, rows, 'topology')}{more}"
+
+
+def _margin(judgement: Judgement) -> float:
+    return abs(judgement.probability - 0.5)
+
+
 def branches(skeleton: Skeleton) -> str:
     """The longest branches, in the colours that they have in the view; numbered as in `Skeleton.branch_table`."""
     if len(skeleton.edges) == 0:
@@ -101,11 +126,11 @@ def branches(skeleton: Skeleton) -> str:
     heads = "<th>branch</th><th>kind</th>"
     heads += "".join(f"<th{_extra(hidden)}>{name.replace('_', ' ')}</th>" for name, _, hidden in columns)
     rows = ""
-    for row in table[:MOST_LISTED_BRANCHES]:
+    for row in table[:MOST_LISTED_ROWS]:
         swatch = f'<span class="swatch" style="background:{colors[row["branch"]]}"></span>'
         cells = "".join(f"<td{_extra(hidden)}>{_number(row[name], form)}</td>" for name, form, hidden in columns)
         rows += f"<tr><td>{swatch}{row['branch']}</td><td>{row['kind']}</td>{cells}<td>{row['points']:,}</td></tr>"
-    rest = len(table) - MOST_LISTED_BRANCHES
+    rest = len(table) - MOST_LISTED_ROWS
     more = f'<p class="muted small">and {rest:,} shorter ones</p>' if rest > 0 else ""
     return f"<h2>Longest branches</h2>{_table(heads + '<th>points</th>', rows, 'branches')}{more}"
 
@@ -132,7 +157,7 @@ def origin(report: Report) -> str:
         "distinct points": report.n_distinct,
         "contracted points": report.n_contracted,
         "loops closed": report.n_loops_closed,
-        "loops cut": report.n_loops_cut,
+        "branches cut in air": report.n_cuts,
         "gaps bridged": report.n_bridges,
     }
     numbers = {name: f"{n:,}" for name, n in counts.items()} if report.n_input else {}

@@ -94,9 +94,7 @@ def test_a_mesh_at_fault_is_not_held_against_the_cloud(invoke, write_scan, tmp_p
     result = invoke("crosscheck", "ring.ply", "-o", "r.json", "--json")
     assert json.loads(result.stdout)["verdict"] == "cannot tell"
     assert result.exit_code == 1
-    assert result.stderr.startswith(
-        "glsk: error: ring.ply: the check says nothing about the skeleton: the mesh does not"
-    )
+    assert "glsk: error: ring.ply: the check says nothing about the skeleton: the mesh does not" in result.stderr
     assert result.stderr.endswith("give a mesh of its surface with --mesh, or another --method\n")
     told = json.loads((tmp_path / "r.json").read_text())
     assert told["mesh"]["far"] > told["thresholds"]["far_or_open"]

@@ -1,11 +1,12 @@
 """`glsk info`: what is in a file."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from glsk_o3d import read_skeleton
+from glsk_o3d import Judgement, read_skeleton
 
 
 @pytest.fixture
@@ -84,6 +85,15 @@ def test_the_report_of_the_run(told, skeleton, invoke):
     table = invoke("info", "s.npz").stdout
     assert "Connector(radius='4%'" in table
     assert all(f"{each.explained:.4f}" in table for each in report.iterations)
+
+
+def test_close_calls_are_told(told, skeleton, invoke, tmp_path):
+    report = skeleton["s.json"].report
+    assert told("s.json")["uncertain"] == list(map(str, report.uncertain))
+    call = Judgement("gap", (1.0, 2.0, 3.0), 0.45, changed=False)
+    replace(skeleton["s.json"], report=replace(report, judgements=(call,))).save(tmp_path / "close.json")
+    assert told("close.json")["uncertain"] == [str(call)]
+    assert "gap left" in invoke("info", "close.json").stdout
 
 
 def test_a_run_with_a_filter_that_is_not_installed_cannot_be_repeated(told, skeleton, tmp_path):

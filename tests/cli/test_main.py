@@ -12,7 +12,9 @@ import pytest
 import glsk_o3d
 from glsk_o3d import read_cloud, read_skeleton
 
-SUMMARY = "points distinct vertices edges components loops leaves junctions length iterations stop seconds wrote"
+SUMMARY = (
+    "points distinct vertices edges components loops leaves junctions length bridges iterations stop seconds wrote"
+)
 
 
 def failed(run, code):

@@ -25,6 +25,7 @@ def script(tmp_path):
     return write
 
 
+@pytest.mark.filterwarnings("ignore:uncertain topology:glsk_o3d.SkeletonWarning")
 def test_a_script_of_ours_is_the_pipeline(invoke, scans, script, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     scan = scans / "sample.ply"

@@ -144,6 +144,7 @@ def test_json_is_all_there_is_on_stdout(invoke, scans):
     assert facts["files"] == ["s.ply"]
     assert len(facts["warnings"]) == result.stderr.count("glsk: warning: ")
     assert facts["components"] - facts["vertices"] + facts["edges"] == facts["loops"]
+    assert {"loops_closed", "cuts", "bridges", "uncertain"} <= set(facts)
 
 
 def test_names_are_printed_as_they_are(invoke, scans):

@@ -9,7 +9,13 @@ from scipy.spatial.transform import Rotation
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, plane_axes, principal
 from glsk_o3d.numerics.rings import star_rings
-from glsk_o3d.numerics.winding import orient_away, orient_by_curvature, point_areas, winding_number
+from glsk_o3d.numerics.winding import (
+    orient_by_curvature,
+    orient_by_votes,
+    orient_from_axis,
+    point_areas,
+    winding_number,
+)
 from glsk_o3d.samples import sheet, sphere, torus, tube
 
 X = np.eye(3)[0]
@@ -236,13 +242,30 @@ def test_normals_without_curvature_or_place_stay():
     _, normals = ball(20)
     _, neighbours = nearest_neighbours(normals, 8)
     np.testing.assert_array_equal(orient_by_curvature(normals, np.zeros((20, 3)), neighbours), normals)
-    np.testing.assert_array_equal(orient_away(normals, normals, normals), normals)
+    np.testing.assert_array_equal(orient_from_axis(normals, normals, normals, neighbours), normals)
+    np.testing.assert_array_equal(orient_by_votes(normals, np.zeros(20), neighbours), normals)
 
 
 def test_normals_turn_away_from_an_axis():
     points, normals = open_tube(200)
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (200, 1))
-    np.testing.assert_array_equal(orient_away(points, normals * signs, points[:, :1] * X), normals)
+    _, neighbours = nearest_neighbours(points, 9)
+    np.testing.assert_array_equal(orient_from_axis(points, normals * signs, points[:, :1] * X, neighbours), normals)
+
+
+def test_points_that_belong_to_no_axis_follow_their_neighbours():
+    """A tenth of a ball's points have an axis along the surface, or a little outside."""
+    points, normals = ball(500)
+    _, neighbours = nearest_neighbours(points, 9)
+    rng = np.random.default_rng(0)
+    axis = np.zeros((500, 3))
+    axis[:50] = points[:50] + 0.3 * np.cross(normals[:50], rng.normal(size=(50, 3))) + 0.1 * normals[:50]
+    order = rng.permutation(500)
+    points, normals, axis = points[order], normals[order], axis[order]
+    _, neighbours = nearest_neighbours(points, 9)
+    signs = rng.choice([-1.0, 1.0], (500, 1))
+    found = orient_from_axis(points, normals * signs, axis, neighbours)
+    np.testing.assert_array_equal(found, normals)
 
 
 def test_input_is_not_changed():
@@ -253,4 +276,4 @@ def test_input_is_not_changed():
         each.flags.writeable = False
     winding_number(*given)
     orient_by_curvature(normals, points, nearest_neighbours(points, 8)[1])
-    orient_away(points, normals, queries)
+    orient_from_axis(points, normals, queries, nearest_neighbours(points, 8)[1])

@@ -119,6 +119,7 @@ class Gather(Filter):
 """
 
 
+@pytest.mark.filterwarnings("ignore:uncertain topology:glsk_o3d.SkeletonWarning")
 def test_a_filter_that_iterates(install):
     install("glsk-gather", "1", ITERATING, "[glsk_o3d.filters]\nGather = glsk_gather:Gather\n")
     gather = catalogue()["Gather"]

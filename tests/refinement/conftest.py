@@ -1,5 +1,7 @@
 """Skeletons made by hand."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -48,5 +50,79 @@ def random_skeleton():
         points, normals = rng.uniform(size=(n, 3)), rng.normal(size=(n, 3))
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         return Skeleton(vertices, edges, rng.uniform(0.05, 0.2, m), owner, points, normals)
+
+    return make
+
+
+def pipe(path, radius=0.1, spacing=0.03, side=None, seed=0):
+    """Points of an open tube around a polyline, anywhere on it, and their outward normals; of one side, if it is given.
+
+    `spacing` is the root of the area of a point.
+    """
+    path, rng = np.asarray(path, float), np.random.default_rng(seed)
+    steps = np.diff(path, axis=0)
+    length = np.linalg.norm(steps, axis=1)
+    n = round(2 * np.pi * radius * length.sum() / spacing**2)
+    place = rng.uniform(0, length.sum(), n)
+    edge = np.minimum(np.searchsorted(np.cumsum(length), place), len(length) - 1)
+    share = (place - np.concatenate([[0], np.cumsum(length)])[edge]) / length[edge]
+    along = steps[edge] / length[edge, None]
+    out = rng.normal(size=(n, 3))
+    out -= np.einsum("ij,ij->i", out, along)[:, None] * along
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    points = path[edge] + share[:, None] * steps[edge] + radius * out
+    seen = out @ side > 0 if side is not None else np.full(n, True)
+    return points[seen], out[seen]
+
+
+def off_axis(points, path):
+    """Distance of points from a polyline."""
+    start, step = path[:-1], np.diff(path, axis=0)
+    t = np.einsum("pei,ei->pe", points[:, None] - start, step) / np.einsum("ei,ei->e", step, step)
+    foot = start + np.clip(t, 0, 1)[:, :, None] * step
+    return np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1)
+
+
+def _array(path):
+    return np.asarray(path, float)
+
+
+def line(start, stop, step=0.05):
+    """Vertices of a straight line, evenly."""
+    n = max(round(np.linalg.norm(stop - start) / step), 1)
+    return start + np.linspace(0, 1, n + 1)[:, None] * (stop - start)
+
+
+@pytest.fixture(scope="session")
+def piped():
+    """A skeleton in the axes of tubes: the vertices of the lines, those at one place once, and tubes around some lines.
+
+    Normals have either sign. Of a tube what is inside of another is left out.
+    """
+
+    def make(lines, tubes=None, radius=0.1, confidence=0.95, step=0.05, **options):
+        lines = [
+            np.concatenate([it[:1], *(line(a, b, step)[1:] for a, b in pairwise(it))]) for it in map(_array, lines)
+        ]
+        tubes = range(len(lines)) if tubes is None else tubes
+        vertices, which = np.unique(np.concatenate(lines).round(9), axis=0, return_inverse=True)
+        edges, first = set(), 0
+        for it in lines:
+            names = which.ravel()[first : first + len(it)].tolist()
+            edges |= {(min(a, b), max(a, b)) for a, b in pairwise(names)}
+            first += len(it)
+        points, normals = [], []
+        for k in tubes:
+            p, n = pipe(lines[k], radius, seed=k, **options)
+            free = np.all([off_axis(p, lines[other]) > 0.99 * radius for other in tubes if other != k], axis=0)
+            points.append(p[free] if len(tubes) > 1 else p)
+            normals.append(n[free] if len(tubes) > 1 else n)
+        points, normals = np.concatenate(points), np.concatenate(normals)
+        normals *= np.random.default_rng(0).choice([-1.0, 1.0], (len(points), 1))
+        owner = cKDTree(vertices).query(points)[1]
+        m = len(vertices)
+        return Skeleton(
+            vertices, sorted(edges), np.full(m, radius), owner, points, normals, confidence=np.full(m, confidence)
+        )
 
     return make

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import Skeleton
+from glsk_o3d import Judgement, Skeleton
 from glsk_o3d.refinement.diagnostics import LOW_CONFIDENCE, LOW_CONFIDENCE_SHARE, diagnose
 
 
@@ -162,3 +162,19 @@ def test_points_without_a_say_do_not_count():
     normals[:400] = np.nan
     assert diagnose(replace(skeleton, normals=normals)) == []
     assert diagnose(replace(skeleton, normals=np.full_like(normals, np.nan))) == []
+
+
+def test_names_the_closest_call():
+    calls = [
+        Judgement("loop", (0.0, 1.0, 2.0), 0.55, changed=False),
+        Judgement("air", (3.0, 4.0, 5.0), 0.7, changed=True),
+        Judgement("gap", (6.0, 7.0, 8.0), 0.9, changed=True),
+    ]
+    skeleton = skeleton_of(torus())
+    judged = replace(skeleton, report=replace(skeleton.report, judgements=tuple(calls)))
+    assert diagnose(judged) == [
+        "uncertain topology: 2 of 3 questions were close calls, above all whether the loop at (0, 1, 2) is a handle "
+        "(probability 0.55)"
+    ]
+    clear = replace(skeleton, report=replace(skeleton.report, judgements=(calls[2],)))
+    assert diagnose(skeleton) == diagnose(clear) == []

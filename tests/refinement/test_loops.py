@@ -1,4 +1,4 @@
-"""False loops are zipped up, true ones stay."""
+"""False loops are zipped up, handles stay."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -6,88 +6,113 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from glsk_o3d.refinement.loops import close_loops, surface_distance, zip_pairs
+from glsk_o3d.numerics.cycles import minimum_cycle_basis
+from glsk_o3d.refinement.evidence import Evidence
+from glsk_o3d.refinement.loops import close_loops, loop_facts, surface_distance, zip_pairs
+
+X, Y, Z = np.eye(3)
+LADDER = [[(-0.8, y, 0), (0, y, 0), (0.8, y, 0)] for y in (0, 0.5)] + [[(x, 0, 0), (x, 0.5, 0)] for x in (-0.8, 0, 0.8)]
+TORUS = [[(np.cos(t), np.sin(t), 0) for t in np.arange(25) * np.pi / 12]]
 
 
-def circle(n, radius=1.0, at=(0, 0, 0)):
-    angle = np.arange(n) * 2 * np.pi / n
-    return radius * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) + at
+def closed(skeleton, least=0.5):
+    return close_loops(skeleton, Evidence.of(skeleton), least)
 
 
-def ring_edges(n, first=0):
-    return [(first + i, first + (i + 1) % n) for i in range(n)]
+def strands(piped, gap=0.06, **options):
+    """A tube with two strands in it, that meet at both ends."""
+    axis = piped([[(-1, 0, 0), (1, 0, 0)]], **options)
+    n = len(axis.vertices)
+    inner = np.arange(5, n - 5)
+    vertices = np.concatenate([axis.vertices, axis.vertices[inner] - gap / 2 * Y])
+    vertices[inner] += gap / 2 * Y
+    chain = [4, *range(n, n + len(inner)), n - 5]
+    edges = np.concatenate([axis.edges, np.sort(list(pairwise(chain)), axis=1)])
+    edges = edges[np.lexsort(edges.T[::-1])]
+    owner = np.argmin(np.linalg.norm(axis.points[:, None] - vertices, axis=2), axis=1)
+    m = len(vertices)
+    return replace(
+        axis, vertices=vertices, edges=edges, radii=np.full(m, 0.1), confidence=np.full(m, 0.9), vertex_of_point=owner
+    )
 
 
-def strands(n=21, gap=0.03):
-    """Two parallel strands that meet at both ends: vertices of the loop in order."""
-    x = np.linspace(-1, 1, n)
-    sides = [np.column_stack([x, np.full(n, y), 0 * x]) for y in (gap, -gap)]
-    return np.concatenate([[[-1.1, 0, 0]], sides[0], [[1.1, 0, 0]], sides[1][::-1]])
+@pytest.mark.parametrize("side", [None, Z], ids=["whole", "one side"])
+@pytest.mark.parametrize(("lines", "loops"), [(LADDER, 2), (TORUS, 1)], ids=["ladder", "torus"])
+def test_handles_stay(piped, lines, loops, side):
+    raw = piped(lines, side=side)
+    skeleton, judgements = closed(raw)
+    assert skeleton is raw
+    assert [(it.about, it.changed) for it in judgements] == loops * [("loop", False)]
+    assert min(it.probability for it in judgements) > 0.9
+    if loops == 1:
+        np.testing.assert_allclose(judgements[0].place, 0, atol=0.05)
 
 
-def test_two_strands_in_one_tube_become_a_path(ringed):
-    vertices = strands()
-    skeleton = close_loops(ringed(vertices, ring_edges(len(vertices)), radius=0.1), 1)
-    assert skeleton.n_loops == 0
-    assert skeleton.n_components == 1
-    assert len(skeleton.leaves) == 2
-    assert len(skeleton.junctions) == 0
-    assert len(skeleton.vertices) == 23
-    np.testing.assert_allclose(skeleton.vertices[:, 1:], 0, atol=1e-12)
-    np.testing.assert_allclose(np.sort(skeleton.vertices[:, 0]), [-1.1, *np.linspace(-1, 1, 21), 1.1], atol=1e-12)
-    assert np.bincount(skeleton.vertex_of_point).tolist().count(24) == 21
+@pytest.mark.parametrize("side", [None, Z], ids=["whole", "one side"])
+def test_two_strands_in_one_tube_become_a_path(piped, side):
+    raw = strands(piped, side=side)
+    skeleton, judgements = closed(raw)
+    assert raw.n_loops == 1
+    assert (skeleton.n_loops, skeleton.n_components, len(skeleton.leaves), len(skeleton.junctions)) == (0, 1, 2, 0)
+    ((about, probability, changed),) = [(it.about, it.probability, it.changed) for it in judgements]
+    assert (about, changed) == ("loop", True)
+    assert probability < 0.25
+    np.testing.assert_allclose(skeleton.vertices[:, 1:], 0, atol=0.02)
+    assert (np.diff(np.sort(skeleton.vertices[:, 0])) < 0.06).all()
 
 
-def test_the_same_strands_around_a_gap_stay(ringed):
-    vertices = strands()
-    raw = ringed(vertices, ring_edges(len(vertices)), radius=0.02)
-    assert close_loops(raw, 1) is raw
+def test_a_least_probability_of_none_keeps_all(piped):
+    raw = strands(piped)
+    skeleton, (judgement,) = closed(raw, least=0)
+    assert skeleton is raw
+    assert not judgement.changed
 
 
-def test_true_and_false_loop_in_one_graph(ringed):
-    """A ring, and a stretch of it twice: joined at both ends, 0.04 apart."""
-    n = 48
-    ring = circle(n)
-    inner = ring[4:13] * 0.96
-    chain = [3, *range(n, n + 9), 13]
-    edges = ring_edges(n) + list(pairwise(chain))
-    raw = ringed(np.concatenate([ring, inner]), edges, radius=0.1)
+def test_true_and_false_loop_in_one_graph(piped):
+    """A ring, and a stretch of it twice."""
+    ring = piped(TORUS)
+    around = np.argsort(np.arctan2(ring.vertices[:, 1], ring.vertices[:, 0]))
+    m, stretch = len(ring.vertices), around[20:40]
+    chain = [around[19], *range(m, m + 20), around[40]]
+    vertices = np.concatenate([ring.vertices, 0.95 * ring.vertices[stretch]])
+    edges = np.concatenate([ring.edges, np.sort(list(pairwise(chain)), axis=1)])
+    owner = np.argmin(np.linalg.norm(ring.points[:, None] - vertices, axis=2), axis=1)
+    n = len(vertices)
+    raw = replace(
+        ring, vertices=vertices, edges=edges[np.lexsort(edges.T[::-1])], radii=np.full(n, 0.1),
+        confidence=np.full(n, 0.95), vertex_of_point=owner,
+    )  # fmt: skip
     assert raw.n_loops == 2
-    skeleton = close_loops(raw, 1)
-    assert skeleton.n_loops == 1
-    assert skeleton.n_components == 1
+    skeleton, judgements = closed(raw)
+    assert (skeleton.n_loops, skeleton.n_components) == (1, 1)
     assert (skeleton.degree == 2).all()
-    assert len(skeleton.vertices) == n
-    radius = np.linalg.norm(skeleton.vertices, axis=1)
-    np.testing.assert_allclose(radius, 1, atol=0.025)
-    np.testing.assert_allclose(np.sort(radius)[9:], 1, atol=1e-12)
+    assert sorted(it.changed for it in judgements) == [False, True]
+    np.testing.assert_allclose(np.linalg.norm(skeleton.vertices, axis=1), 1, atol=0.05)
 
 
-def test_separate_components_are_judged_apart(ringed):
-    big, small = circle(24), circle(8, 0.05, (3, 0, 0))
-    raw = ringed(np.concatenate([big, small]), ring_edges(24) + ring_edges(8, 24), radius=0.1)
-    skeleton = close_loops(raw, 1)
-    assert skeleton.n_components == 2
-    assert skeleton.n_loops == 1
-    left = skeleton.vertices[:, 0] < 2
-    np.testing.assert_allclose(np.linalg.norm(skeleton.vertices[left], axis=1), 1, atol=1e-12)
+def facts_of(skeleton):
+    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+    return loop_facts(skeleton, cycles, Evidence.of(skeleton))
 
 
-@pytest.mark.parametrize("opening", [0.5, 1.0, 2.0])
-@pytest.mark.parametrize(("share", "loops"), [(0.97, 0), (1.03, 1)])
-def test_opening_is_the_circle_inside_over_the_tube(ringed, opening, share, loops):
-    n = 60
-    inside = np.cos(np.pi / n)
-    tube = np.full(n, inside / (opening * share))
-    tube[:20] *= 10  # the median over the loop does not mind
-    skeleton = close_loops(ringed(circle(n), ring_edges(n), radius=tube), opening)
-    assert skeleton.n_loops == loops
+def test_the_facts_of_a_ring_and_of_two_strands(piped):
+    ((ring, centre, *_),) = facts_of(piped(TORUS, confidence=0.8))
+    assert ring["opening"] > np.log(3)
+    assert ring["winding"] == pytest.approx(0, abs=0.05)
+    assert ring["confidence"] == pytest.approx(0.8)
+    np.testing.assert_allclose(centre, 0, atol=0.05)
+    ((false, *_),) = facts_of(strands(piped))
+    assert false["opening"] < np.log(0.6)
+    assert false["winding"] == pytest.approx(1, abs=0.15)
 
 
-def test_zero_opening_keeps_all(ringed):
-    vertices = strands()
-    raw = ringed(vertices, ring_edges(len(vertices)), radius=10.0)
-    assert close_loops(raw, 0) is raw
+def test_what_nobody_measured_counts_as_no_confidence(piped):
+    ((facts, *_),) = facts_of(replace(piped(TORUS), confidence=np.empty(0)))
+    assert facts["confidence"] == 0
+
+
+def test_no_loops_no_facts(piped):
+    assert facts_of(piped([[(-1, 0, 0), (1, 0, 0)]])) == []
 
 
 def test_surface_distance_is_the_median_over_the_owned_supporting_points(ringed):

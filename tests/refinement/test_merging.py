@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glsk_o3d.refinement.merging import merge_vertices, support
+from glsk_o3d.refinement.merging import drop_lone_vertices, merge_vertices, support
 
 
 def test_support_counts_supporting_points_and_is_at_least_one(ringed):
@@ -45,3 +45,23 @@ def test_nothing_to_merge_changes_nothing(random_skeleton):
     np.testing.assert_allclose(skeleton.vertices, raw.vertices, rtol=1e-15)
     np.testing.assert_array_equal(skeleton.edges, raw.edges)
     np.testing.assert_array_equal(skeleton.vertex_of_point, raw.vertex_of_point)
+
+
+def test_lone_vertices_go_and_their_points_to_the_nearest_that_stays(ringed):
+    raw = ringed(
+        [[0, 0, 0], [1, 0, 0], [9, 0, 0], [2, 0, 0], [-3, 0, 0]], [(0, 1), (1, 3)], radius=[1, 2, 3, 4, 5], per=2
+    )
+    raw = replace(raw, confidence=np.arange(5) / 10, vertex_of_point=np.array([0, 0, 1, 1, 2, 2, 3, -1, 4, 4]))
+    skeleton = drop_lone_vertices(raw)
+    np.testing.assert_array_equal(skeleton.vertices, raw.vertices[[0, 1, 3]])
+    np.testing.assert_array_equal(skeleton.edges, [(0, 1), (1, 2)])
+    np.testing.assert_array_equal(skeleton.radii, [1, 2, 4])
+    np.testing.assert_array_equal(skeleton.confidence, [0, 0.1, 0.3])
+    np.testing.assert_array_equal(skeleton.vertex_of_point, [0, 0, 1, 1, 2, 2, 2, -1, 0, 0])
+
+
+def test_where_all_or_none_are_lone_nothing_is_dropped(ringed):
+    vertices = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
+    for edges in ([], [(0, 1), (1, 2)]):
+        raw = ringed(vertices, edges)
+        assert drop_lone_vertices(raw) is raw

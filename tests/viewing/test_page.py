@@ -11,7 +11,7 @@ import pytest
 
 import glsk_o3d as glsk
 from glsk_o3d import ContractionRecorder, Contractor, FileFormatError, InvalidParameterError, RingBuilder, save_report
-from glsk_o3d.report import IterationRecord
+from glsk_o3d.report import IterationRecord, Judgement, Report
 from glsk_o3d.samples import torus
 from glsk_o3d.viewing import html as sections
 from glsk_o3d.viewing.recorder import thinned
@@ -232,3 +232,41 @@ def test_round_tops(value, top):
 def test_warnings_once_each():
     assert sections.warnings(()) == ""
     assert sections.warnings(["<a>", "b", "<a>"]).count("<li>") == 2
+
+
+# ---------------------------------------------------------------------------------------------------------- topology
+
+
+def judged(*pairs):
+    return Report(
+        judgements=tuple(Judgement("gap", (float(i), 0.0, 0.0), p, changed) for i, (p, changed) in enumerate(pairs))
+    )
+
+
+def test_what_changed_and_close_calls_are_listed_the_closest_first():
+    text = sections.topology(judged((0.99, True), (0.01, False), (0.6, True), (0.45, False)))
+    assert "gap bridged: 2, gap left: 2; 2 of 4 close calls." in text
+    places = re.findall(r"the gap at \((\d), 0, 0\)", text)
+    assert places == ["3", "2", "0"]
+    assert re.findall(r'<tr class="uncertain"><td>(.*?)</td>', text) == ["gap left", "gap bridged"]
+
+
+def test_clear_answers_that_changed_nothing_are_only_counted():
+    assert sections.topology(Report()) == ""
+    text = sections.topology(judged((0.01, False), (0.02, False)))
+    assert "gap left: 2; 0 of 2 close calls." in text
+    assert "<table" not in text
+
+
+def test_the_list_of_judgements_is_short():
+    text = sections.topology(judged(*[(0.5, True)] * (sections.MOST_LISTED_ROWS + 3)))
+    assert text.count("<td>gap bridged</td>") == sections.MOST_LISTED_ROWS
+    assert "and 3 clearer ones" in text
+
+
+def test_the_page_tells_how_the_topology_was_judged(tree, tmp_path):
+    judgement = Judgement("loop", (1.0, 2.0, 3.0), 0.55, changed=False)
+    save_report(
+        dataclasses.replace(tree, report=dataclasses.replace(tree.report, judgements=(judgement,))), tmp_path / "r.html"
+    )
+    assert judgement.question in (tmp_path / "r.html").read_text("utf-8")
