@@ -96,7 +96,7 @@ def facts_of(skeleton):
 
 
 def test_the_facts_of_a_ring_and_of_two_strands(piped):
-    ((ring, centre, *_),) = facts_of(piped(TORUS, confidence=0.8))
+    ((ring, _, centre, _),) = facts_of(piped(TORUS, confidence=0.8))
     assert ring["opening"] > np.log(3)
     assert ring["winding"] == pytest.approx(0, abs=0.05)
     assert ring["confidence"] == pytest.approx(0.8)
