@@ -60,7 +60,8 @@ def branch_facts(
 
     The weakest place is where the winding number, averaged over one radius, is least. The facts are: by how much it is
     less than the median of all edges there, over their scatter; the area of surface along the edge, over that of a tube
-    and relative to the median of the skeleton; how straight the skeleton goes on beyond, at the better end, as a
+    and relative to that of the whole skeleton; the area that lies across it there, over the cross-section of a tube as
+    long as wide; how straight the skeleton goes on beyond, at the better end, as a
     cosine; the noise; the least bonds that cross the branch, over the points around a tube; whether both ends have
     other branches; and the length in radii. All but cosine, noise and ends as logarithms.
 
@@ -78,7 +79,10 @@ def branch_facts(
     winding = evidence.winding(vertices[edges].mean(axis=1))
     typical = np.median(winding)
     scatter = 1.4826 * np.median(np.abs(winding - typical)) + LEAST_SCATTER * abs(typical)
-    area, tube = evidence.surface_along(skeleton), 2 * np.pi * np.maximum(skeleton.radii[edges].mean(axis=1), TINY)
+    (area, facing), tube = (
+        evidence.surface_around(skeleton),
+        2 * np.pi * np.maximum(skeleton.radii[edges].mean(axis=1), TINY),
+    )
     seen = area.sum() / (tube * length).sum()
     spacing = np.sqrt(np.median(evidence.areas))
     pairs, weight = evidence.bonds(skeleton)
@@ -102,6 +106,7 @@ def branch_facts(
         facts = dict(
             deficit=np.log1p(max((typical - smooth[k]) / max(scatter, TINY), 0)),
             surface=np.log(max(shown / max(seen, TINY), 0) + 0.05),
+            sheets=np.log(window.mean(facing[edge])[k] / (np.pi * radius) + 0.05),
             straightness=_straightness(vertices, around, branch, k, radius),
             noise=noise,
             bonds=np.log(crossing + 0.05),

@@ -11,6 +11,7 @@ AIR_WEIGHTS = {
     "constant": -5.8,
     "deficit": 3.3,
     "surface": -1.0,
+    "sheets": 0.0,
     "straightness": -2.7,
     "noise": 4.0,
     "bonds": -0.8,
