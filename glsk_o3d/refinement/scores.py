@@ -8,19 +8,19 @@ import numpy as np
 
 # All fitted, by benchmarks/calibrate.py on random shapes as scanners see them; docs/method.md says what the facts are.
 AIR_WEIGHTS = {
-    "constant": -5.8,
-    "deficit": 3.3,
-    "surface": -1.0,
-    "sheets": 0.0,
-    "straightness": -2.7,
-    "noise": 4.0,
-    "bonds": -0.8,
-    "inner": 1.4,
-    "length": -1.1,
+    "constant": -3.2,
+    "deficit": 2.8,
+    "surface": -1.5,
+    "sheets": 0.5,
+    "straightness": -4.3,
+    "noise": 3.9,
+    "bonds": -0.9,
+    "inner": 1.6,
+    "length": -1.3,
 }
-HANDLE_WEIGHTS = {"constant": -5.6, "opening": 7.9, "winding": -3.4, "confidence": 10.0, "bonds": 0.7}
-BRIDGE_WEIGHTS = {"constant": -3.0, "winding": 4.8, "sheets": -1.0, "straightness": 1.3, "cap": -0.3}
-LIMB_WEIGHTS = {"constant": -2.5, "reach": 4.2}
+HANDLE_WEIGHTS = {"constant": 1.9, "opening": 3.5, "winding": -4.0, "bonds": 0.8, "confidence": 2.8}
+BRIDGE_WEIGHTS = {"constant": -3.5, "winding": 5.5, "sheets": -0.8, "straightness": 1.5, "cap": -0.5}
+LIMB_WEIGHTS = {"constant": -2.6, "reach": 4.9}
 
 
 def probability(weights: Mapping[str, float], facts: Mapping[str, float]) -> float:
