@@ -70,7 +70,9 @@ def check(
     shapes: Shapes = "",
     leave_family_out: Annotated[
         bool,
-        typer.Option(help="Not the package's weights, but for each family those fitted to the others."),
+        typer.Option(
+            "--leave-family-out", help="Not the package's weights, but for each family those fitted to the others."
+        ),
     ] = False,
     learnt: Annotated[
         Path | None,
@@ -78,7 +80,9 @@ def check(
     ] = None,
     page: Annotated[
         Path | None,
-        typer.Option(help="Put the first two tables into this page, a picture beside it.", callback=page_with("check")),
+        typer.Option(
+            "--page", help="Put the first two tables into this page, a picture beside it.", callback=page_with("check")
+        ),
     ] = None,
     jobs: Jobs = 2,
     output: Output = None,
