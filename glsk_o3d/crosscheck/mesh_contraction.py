@@ -16,6 +16,7 @@ from ..interop.packages import require
 from ..lpr_reducer import LPRReducer
 from ..numerics.cotangent import WEIGHT_CAP
 from ..numerics.mesh_rings import mesh_rings
+from ..refiner import Refiner
 from ..report import Report
 from ..state import at_rest
 
@@ -140,7 +141,8 @@ def mesh_skeleton(state, vertices, faces, pipeline):
     state, vertices, faces
         As of `mesh_state`.
     pipeline : Pipeline
-        Its Contractor lends the parameters; reductions are left out, what follows is as it is.
+        Its Contractor lends the parameters; reductions are left out, and gaps of the mesh stay gaps; what follows is as
+        it is.
 
     Returns
     -------
@@ -160,6 +162,8 @@ def mesh_skeleton(state, vertices, faces, pipeline):
         warnings.simplefilter("ignore", SkeletonWarning)
         flow = MeshContractor(faces, stages[0])(flow)
         for stage in stages[1:]:
+            if isinstance(stage, Refiner):
+                stage = replace(stage, bridge=0)
             if not isinstance(stage, LPRReducer):
                 flow = stage(flow)
     return flow

@@ -22,10 +22,10 @@ def _write_scan(path: Path, points) -> Path:
 
 @pytest.fixture(scope="session")
 def scans(tmp_path_factory) -> Path:
-    """A folder with scans of 1000 points each; nothing may be written into it."""
+    """A folder with scans of 1000 or 1100 points each; nothing may be written into it."""
     folder = tmp_path_factory.mktemp("scans")
     points = sample_object(1000).points
-    _write_scan(folder / "sample.ply", points)
+    _write_scan(folder / "sample.ply", sample_object(1100).points)
     _write_scan(folder / "ring.ply", torus(1000).points)
     _write_scan(folder / "ball.ply", sphere(1000).points)
     points[[3, 8]] = [[np.nan, 0, 0], [0, np.inf, 0]]

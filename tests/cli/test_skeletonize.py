@@ -74,7 +74,7 @@ def test_loops_and_formats_without(invoke, scans, tmp_path):
 
 def test_a_report(invoke, write_scan, scans, tmp_path):
     name = "<b>'&.ply"
-    write_scan(tmp_path / name, samples.sample_object(1000).points)
+    write_scan(tmp_path / name, samples.sample_object(1200).points)
     result = invoke("skeletonize", name, "--report", "r.html")
     assert (result.exit_code, result.stderr) == (0, "")
     assert "wrote r.html\n" in result.stdout
@@ -123,7 +123,7 @@ def test_verbose(invoke, scans):
     level = logging.getLogger("glsk_o3d").level
     result = invoke("skeletonize", scans / "sample.ply", "-o", "s.ply", "--verbose")
     assert "glsk: Connector took" in result.stderr
-    assert "glsk: solve 1: 1000 points" in result.stderr
+    assert "glsk: solve 1: 1100 points" in result.stderr
     assert "ring" in result.stderr
     assert "merged" not in result.stdout
     assert logging.getLogger("glsk_o3d").level == level

@@ -50,7 +50,7 @@ def test_a_scan(invoke, scans, shown):
     assert invoke("view", scans / "sample.ply").exit_code == 0
     ((skeleton, cloud, _),) = shown
     assert len(skeleton.vertices) == 0
-    assert len(cloud.points) == len(skeleton.points) == 1000
+    assert len(cloud.points) == len(skeleton.points) == 1100
 
 
 def test_files_instead_of_a_window(invoke, scans, skeleton_file, shown, tmp_path):

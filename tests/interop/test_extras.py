@@ -107,7 +107,7 @@ COMMAND = "from glsk_o3d.cli.main import app; app(sys.argv[1:])"
 
 
 def test_the_demo_leaves_out_its_picture(bare, tmp_path):
-    done = bare(COMMAND, "demo", "-n", "1000")
+    done = bare(COMMAND, "demo", "-n", "1200")
     assert done.returncode == 0
     assert done.stderr.count("\n") == 1
     assert "no skeleton.png: " in done.stderr

@@ -173,7 +173,7 @@ def test_names_the_closest_call():
     skeleton = skeleton_of(torus())
     judged = replace(skeleton, report=replace(skeleton.report, judgements=tuple(calls)))
     assert diagnose(judged) == [
-        "uncertain topology: 2 of 3 questions were close calls, above all whether the loop at (0, 1, 2) is a handle "
+        "uncertain topology: 1 of 3 questions were close calls, above all whether the loop at (0, 1, 2) is a handle "
         "(probability 0.55)"
     ]
     clear = replace(skeleton, report=replace(skeleton.report, judgements=(calls[2],)))
