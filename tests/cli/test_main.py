@@ -12,9 +12,7 @@ import pytest
 import glsk_o3d
 from glsk_o3d import read_cloud, read_skeleton
 
-SUMMARY = (
-    "points distinct vertices edges components loops leaves junctions length iterations stop seconds wrote"
-)
+SUMMARY = "points distinct vertices edges components loops leaves junctions length iterations stop seconds wrote"
 
 
 def failed(run, code):
