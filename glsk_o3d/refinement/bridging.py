@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, dot, norm
 from ..report import Judgement
 from ..skeleton import Skeleton
@@ -167,6 +168,6 @@ def _ends(skeleton: Skeleton) -> Iterator[_End]:
 
 def _outward(path: np.ndarray, back: float) -> np.ndarray:
     """Unit vector from the place so far back along a path to its start."""
-    travelled = np.cumsum(norm(np.diff(path, axis=0)))
+    travelled = arc_lengths(path)[1:]
     way = path[0] - path[min(int(np.searchsorted(travelled, back)), len(travelled) - 1) + 1]
     return way / max(np.linalg.norm(way), TINY)

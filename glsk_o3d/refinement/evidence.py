@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
-from ..numerics.vectors import dot
+from ..numerics.vectors import TINY, dot
 from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton
 from .axis_fit import incident_edges, nearest_on_edges
@@ -64,7 +64,7 @@ class Evidence:
         edge, _ = _nearest_edges(skeleton, self.supporting)
         some = np.flatnonzero(edge >= 0)
         edge, ends = edge[some], skeleton.vertices[skeleton.edges]
-        way = (ends[:, 1] - ends[:, 0]) / np.maximum(skeleton.edge_lengths, np.finfo(float).tiny)[:, None]
+        way = (ends[:, 1] - ends[:, 0]) / np.maximum(skeleton.edge_lengths, TINY)[:, None]
         area, facing = self.areas[some], dot(self.normals[some], way[edge]) ** 2
         along, across = (np.bincount(edge, area * share, len(skeleton.edges)) for share in (1 - facing, facing))
         return along, across

@@ -10,6 +10,7 @@ import numpy as np
 from ..numerics.components import component_labels
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, opens_wider
 from ..numerics.groups import group_median
+from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, norm
 from ..report import Judgement
 from ..skeleton import Skeleton
@@ -49,13 +50,17 @@ def zip_narrow_loops(skeleton: Skeleton) -> Skeleton:
         Without triangles.
     """
     while True:
-        m, surface = len(skeleton.vertices), surface_distance(skeleton)
-        cycles = minimum_cycle_basis(m, skeleton.edges, skeleton.edge_lengths)
+        surface = surface_distance(skeleton)
+        cycles = minimum_cycle_basis(len(surface), skeleton.edges, skeleton.edge_lengths)
         narrow = [cycle for cycle in cycles if not opens_wider(skeleton.vertices[cycle], np.median(surface[cycle]))]
         if not narrow:
             return skeleton
-        pairs = np.concatenate([zip_pairs(skeleton.vertices[cycle], cycle) for cycle in narrow])
-        skeleton = collapse_triangles(merge_vertices(skeleton, component_labels(m, pairs)))
+        skeleton = _zipped(skeleton, narrow)
+
+
+def _zipped(skeleton: Skeleton, cycles: list[np.ndarray]) -> Skeleton:
+    pairs = np.concatenate([zip_pairs(skeleton.vertices[cycle], cycle) for cycle in cycles])
+    return collapse_triangles(merge_vertices(skeleton, component_labels(len(skeleton.vertices), pairs)))
 
 
 def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
@@ -80,9 +85,8 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     """
     judgements: list[Judgement] = []
     while True:
-        m = len(skeleton.vertices)
-        cycles = minimum_cycle_basis(m, skeleton.edges, skeleton.edge_lengths)
-        kept, pairs, cut, used = [], [], [], set()
+        cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+        kept, narrow, cut, used = [], [], [], set()
         for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
             chance = probability(HANDLE_WEIGHTS, loop.facts) if loop.inside >= LEAST_INSIDE else 0.0
             false = chance < least and len(cycle) > SHORTEST_LOOP
@@ -90,18 +94,17 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
             if not false:
                 continue
             if loop.facts["opening"] < np.log(WIDE_LOOP):
-                pairs.append(zip_pairs(skeleton.vertices[cycle], cycle))
+                narrow.append(cycle)
             elif used.isdisjoint(cycle.tolist()):  # two cuts in what two loops share would tear a piece out of it
                 cut.append(sorted((cycle[loop.weakest], cycle[(loop.weakest + 1) % len(cycle)])))
                 used.update(cycle.tolist())
-        if not pairs and not cut:
+        if not narrow and not cut:
             return skeleton, judgements + kept
         if cut:
             gone = (skeleton.edges[:, None] == np.array(cut)).all(axis=2).any(axis=1)
             skeleton = replace(skeleton, edges=skeleton.edges[~gone])
-        if pairs:
-            group = component_labels(m, np.concatenate(pairs))
-            skeleton = collapse_triangles(merge_vertices(skeleton, group))
+        if narrow:
+            skeleton = _zipped(skeleton, narrow)
 
 
 class _Loop(NamedTuple):
@@ -207,7 +210,7 @@ def zip_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
     ]
     along = []
     for side in sides:
-        travelled = np.concatenate([[0], np.cumsum(norm(np.diff(points[side], axis=0)))])
+        travelled = arc_lengths(points[side])
         along.append(travelled / travelled[-1])
     nearest = np.abs(along[0][:, None] - along[1][None])
     pairs = [(i, int(np.argmin(nearest[i]))) for i in range(1, len(sides[0]) - 1)]
