@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from heapq import heappop, heappush
 
 import numpy as np
 
-from ..numerics.vectors import TINY, norm
+from ..numerics.vectors import TINY
 from ..report import Judgement
 from ..skeleton import Skeleton
 from .evidence import Evidence
@@ -15,7 +16,7 @@ from .merging import drop_lone_vertices
 from .scores import AIR_WEIGHTS, probability
 
 AIR_WINDOW = 1.0  # derived: radii of a branch along which evidence is averaged; a false edge is two radii long or more
-BEYOND_WINDOW = 3.0  # fitted: radii beyond an edge, from one on, in which the skeleton should go on straight
+BEYOND_REACH = 3.0  # fitted: radii beyond an edge over which the skeleton should go on straight, but the first third
 CROSSING_HOPS = 6  # fitted: edges around a branch whose vertices count to the side where they are
 LOW_WINDING = 0.5  # derived: between inside and outside; edges next to the cut one go, too, where it is less
 LEAST_SCATTER = 0.05  # fitted: of winding numbers along a skeleton
@@ -173,27 +174,33 @@ def _straightness(
     way = way / max(np.linalg.norm(way), TINY)
     best = []
     for here, came, sign in ((int(branch[k + 1]), int(branch[k]), 1), (int(branch[k]), int(branch[k + 1]), -1)):
-        ways = _beyond(vertices, around, here, came, radius, BEYOND_WINDOW * radius)
+        ways = _beyond(vertices, around, here, came, BEYOND_REACH * radius)
         best.append(max((sign * float(way @ onward) for onward in ways), default=1.0))
     return max(best)
 
 
 def _beyond(
-    vertices: np.ndarray, around: list[list[tuple[int, float]]], start: int, came: int, near: float, far: float
+    vertices: np.ndarray, around: list[list[tuple[int, float]]], start: int, came: int, reach: float
 ) -> list[np.ndarray]:
-    """Directions in which a graph goes on from a vertex, between two distances along it."""
-    found, stack = [], [(start, came, 0.0, -1)]
-    visited = {came}
-    while stack:
-        here, before, travelled, first = stack.pop()
-        visited.add(here)
-        if first < 0 and travelled >= near:
-            first = here
-        onward = [(v, travelled + length) for v, length in around[here] if v != before and v not in visited]
-        if travelled < far and onward:
-            stack.extend((v, here, there, first) for v, there in onward)
-        elif first >= 0 and first != here:
-            found.append(vertices[here] - vertices[first])
-        elif here != start:
-            found.append(vertices[here] - vertices[start])
-    return [way / max(float(norm(way[None])[0]), TINY) for way in found]
+    """Directions in which a graph goes on from a vertex, along all its shortest ways: over their last two thirds."""
+    before: dict[int, int] = {came: -1}
+    travelled: dict[int, float] = {}
+    heap = [(0.0, start, -1)]
+    while heap:
+        far, here, origin = heappop(heap)
+        if here in before:
+            continue
+        before[here], travelled[here] = origin, far
+        if far < reach:
+            for onward, length in around[here]:
+                heappush(heap, (far + length, onward, here))
+    found = []
+    for tip in travelled.keys() - before.values() - {start}:
+        path = [tip]
+        while path[-1] != start:
+            path.append(before[path[-1]])
+        along, places = [travelled[v] for v in reversed(path)], vertices[path[::-1]]
+        stop = min(along[-1], reach)
+        first, last = (np.array([np.interp(s, along, x) for x in places.T]) for s in (stop / 3, stop))
+        found.append((last - first) / max(float(np.linalg.norm(last - first)), TINY))
+    return found
