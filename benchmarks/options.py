@@ -38,10 +38,10 @@ CLOUDS = {
 
 ANIMALS = [name for name in CLOUDS if name.startswith("animal") and "1024" not in name]
 SPURS = {
-    "0": "Refiner.spur=0",
+    "0": "Refiner.limb=0",
     "1.3, the default": "",
-    "2": "Refiner.spur=2",
-    "3": "Refiner.spur=3",
+    "2": "Refiner.limb=2",
+    "3": "Refiner.limb=3",
     "1.3, with `RingBuilder.k=24`": "RingBuilder.k=24",
 }
 RADII = [name for name in CLOUDS if "y_j" in name or "animal" in name]
@@ -91,7 +91,7 @@ def tables(rows: list[dict]) -> dict[str, Tables]:
         pairs = [(mean(cloud, it, "vertices", digits=0), mean(cloud, it, "error", digits=3)) for it in SPACING.values()]
         spacing.append([cloud, *map(", ".join, pairs)])
     return {
-        "spurs": [("ends too many or too few, in each draw", ["`Refiner.spur`", *ANIMALS], spurs)],
+        "spurs": [("ends too many or too few, in each draw", ["`Refiner.limb`", *ANIMALS], spurs)],
         "radii": [("mean error of the radii over the true one, and distance of the true ends in radii", header, radii)],
         "spacing": [("vertices, and mean error of the curve in radii", ["cloud", *SPACING], spacing)],
     }

@@ -10,19 +10,16 @@ from .pipeline import Filter, Watch
 from .refinement.air import cut_air
 from .refinement.axis_fit import fit_axis
 from .refinement.bridging import bridge_gaps
-from .refinement.clamp import clamp_to_points
 from .refinement.diagnostics import diagnose
 from .refinement.evidence import Evidence
 from .refinement.junctions import level_tips, move_junctions
-from .refinement.loops import close_loops, zip_narrow_loops
+from .refinement.loops import close_loops
 from .refinement.reattachment import reattach_limbs
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
 from .refinement.triangles import collapse_triangles
 from .report import Judgement
 from .skeleton import Skeleton
-
-CUTTING_ROUNDS = 3  # measured: after two nothing is left to cut
 
 
 @documented
@@ -32,15 +29,14 @@ class Refiner(Filter[Skeleton]):
 
     1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
        the shortest, until there is no triangle.
-    2. Loops that open less than their tube is thick are zipped up.
-    3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
-       corners.
-    4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
+    2. Edges are subdivided, so that chords do not cut corners.
+    3. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
        side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
-    5. The topology is judged by what the surface around the curve says: loops that are probably no handles are closed,
-       branches that probably cross air are cut, and gaps across which the object probably goes on are bridged.
-    6. Limbs that run beside another one inside its tube begin where they leave it. Spurs, branches whose points hardly
-       leave the limbs around them, where these go on to meet, are pruned, and junctions move to where limbs meet.
+    4. The topology is judged by what the surface around the curve says: loops that are probably no handles are closed;
+       limbs that run beside another one inside its tube begin where they leave it, and branches that are probably no
+       limbs are pruned; branches that probably cross air are cut, and gaps across which the object probably goes on are
+       bridged.
+    5. Junctions move to where limbs meet.
 
     The first step is published; with all options 0 it is the only one.
 
@@ -64,7 +60,7 @@ class Refiner(Filter[Skeleton]):
     >>> from glsk_o3d import Connector, Contractor, RingBuilder
     >>> from glsk_o3d.samples import torus
     >>> raw = (RingBuilder() | Contractor() | Connector())(torus(1000).points)
-    >>> refined = Refiner(spur=2)(raw)
+    >>> refined = Refiner(limb=0.6)(raw)
     >>> refined.n_loops, len(refined.leaves)
     (1, 0)
     """
@@ -74,7 +70,7 @@ class Refiner(Filter[Skeleton]):
 
     handle: float = parameter(
         0.5,
-        "Least probability that a loop is a handle of the object; others are zipped up. 0 keeps all.",
+        "Least probability that a loop is a handle of the object; others are closed. 0 keeps all.",
         type="float",
         low=0,
         high=1,
@@ -93,12 +89,12 @@ class Refiner(Filter[Skeleton]):
         low=0,
         high=1,
     )
-    spur: float = parameter(
-        1.5,
-        "Least reach of a branch's points from the limbs that meet there over the distance of the surface; others "
-        "are cut. 0 keeps all.",
+    limb: float = parameter(
+        0.5,
+        "Least probability that a branch is a limb of the object; others, spurs, are pruned. 0 keeps all.",
         type="float",
         low=0,
+        high=1,
     )
     spacing: float = parameter(
         0.5,
@@ -112,88 +108,75 @@ class Refiner(Filter[Skeleton]):
 
     def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
         skeleton = self._fit(skeleton)
-        if len(skeleton.edges) and len(skeleton.supporting_points) and (self.handle or self.air or self.bridge):
+        if len(skeleton.edges) and len(skeleton.supporting_points) and self._asks:
             skeleton = self._judge(skeleton)
-        skeleton, limbs = self._settle(skeleton)
         if self.recentre:
             skeleton = level_tips(move_junctions(skeleton))
-        report = replace(skeleton.report, judgements=(*skeleton.report.judgements, *limbs))
-        for message in diagnose(replace(skeleton, report=report)):
+        report = skeleton.report
+        for message in diagnose(skeleton):
             report = report.with_warning(message)
         return replace(skeleton, report=report)
 
     def _fit(self, skeleton: Skeleton) -> Skeleton:
         """Make the graph one-dimensional and centre it."""
         skeleton = collapse_triangles(skeleton)
-        if self.handle:
-            skeleton = zip_narrow_loops(skeleton)
-        if self.recentre:
-            skeleton = clamp_to_points(skeleton)
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
         return fit_axis(skeleton, self.recentre)
 
-    def _settle(self, skeleton: Skeleton) -> tuple[Skeleton, list[Judgement]]:
-        """Let limbs begin where they leave others, and prune what is none."""
-        if self.recentre:
-            skeleton = reattach_limbs(skeleton)
-        return prune_spurs(skeleton, self.spur) if self.spur else (skeleton, [])
+    @property
+    def _asks(self) -> bool:
+        return bool(self.handle or self.limb or self.air or self.bridge)
 
     def _judge(self, skeleton: Skeleton) -> Skeleton:
-        """Close false loops, cut what crosses air, and bridge gaps; the axis is fitted anew where that changed."""
-        evidence, found = Evidence.of(skeleton), []
-        for step in (self._close, self._cut, self._bridge):
-            skeleton, judgements = step(skeleton, evidence)
-            found += judgements
-        if _changed(found):
-            skeleton = self._refit(skeleton, 2)
-        counts = {about: sum(it.about == about and it.changed for it in found) for about in ("loop", "air", "gap")}
+        """Close false loops, prune spurs, cut what crosses air, bridge gaps; fit the axis anew where that changed."""
+        evidence = Evidence.of(skeleton)
+        skeleton, loops = self._close(skeleton, evidence)
+        skeleton, limbs = self._settle(skeleton)
+        skeleton, cuts = self._cut(skeleton, evidence)
+        skeleton, gaps = self._bridge(skeleton, evidence)
+        if _changed([*cuts, *gaps]):
+            skeleton, left = self._settle(self._refit(skeleton))
+            limbs = [*filter(_is_changed, limbs), *left]
+            if self.handle:
+                loops = [*filter(_is_changed, loops), *close_loops(skeleton, evidence, 0)[1]]
+        closed, cut, bridged = (sum(map(_is_changed, found)) for found in (loops, cuts, gaps))
         report = replace(
             skeleton.report,
-            judgements=tuple(found),
-            n_loops_closed=counts["loop"],
-            n_cuts=counts["air"],
-            n_bridges=counts["gap"],
+            judgements=(*loops, *cuts, *gaps, *limbs),
+            n_loops_closed=closed,
+            n_cuts=cut,
+            n_bridges=bridged,
         )
         return replace(skeleton, report=report)
 
     def _close(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
         if not self.handle:
-            return self._prune(skeleton), []
+            return skeleton, []
         skeleton, loops = close_loops(skeleton, evidence, self.handle)
-        if _changed(loops):
-            skeleton = self._refit(skeleton, 1)
-        return self._prune(skeleton), loops
+        return (self._refit(skeleton) if _changed(loops) else skeleton), loops
+
+    def _settle(self, skeleton: Skeleton) -> tuple[Skeleton, list[Judgement]]:
+        """Let limbs begin where they leave others, and prune what is none."""
+        if self.recentre:
+            skeleton = reattach_limbs(skeleton)
+        return prune_spurs(skeleton, self.limb) if self.limb else (skeleton, [])
 
     def _cut(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
-        found: list[Judgement] = []
-        for _ in range(CUTTING_ROUNDS if self.air else 0):
-            skeleton, cuts = cut_air(skeleton, evidence, skeleton.report.noise, self.air)
-            found = [*(it for it in found if it.changed), *cuts]
-            if not _changed(cuts):
-                break
-            skeleton = self._prune(skeleton)
-        return skeleton, found
+        return cut_air(skeleton, evidence, skeleton.report.noise, self.air) if self.air else (skeleton, [])
 
     def _bridge(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
-        if not self.bridge:
-            return skeleton, []
-        skeleton, found = bridge_gaps(skeleton, evidence, self.bridge)
-        if _changed(found):
-            skeleton = self._refit(skeleton, 1)
-            if self.handle:
-                skeleton, loops = close_loops(skeleton, evidence, self.handle)
-                found += [it for it in loops if it.changed]
-        return skeleton, found
+        return bridge_gaps(skeleton, evidence, self.bridge) if self.bridge else (skeleton, [])
 
-    def _prune(self, skeleton: Skeleton) -> Skeleton:
-        return prune_spurs(skeleton, self.spur)[0] if self.spur else skeleton
-
-    def _refit(self, skeleton: Skeleton, passes: int) -> Skeleton:
+    def _refit(self, skeleton: Skeleton) -> Skeleton:
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
-        return fit_axis(skeleton, min(passes, self.recentre))
+        return fit_axis(skeleton, min(2, self.recentre))
+
+
+def _is_changed(judgement: Judgement) -> bool:
+    return judgement.changed
 
 
 def _changed(judgements: list[Judgement]) -> bool:
-    return any(it.changed for it in judgements)
+    return any(map(_is_changed, judgements))

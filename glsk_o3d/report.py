@@ -94,7 +94,7 @@ class Judgement:
     probability : float
         That it is so.
     changed : bool
-        Whether the graph was changed: the stretch cut, the loop zipped up, the gap bridged, the branch pruned.
+        Whether the graph was changed: the branch cut there, the loop closed, the gap bridged, the branch pruned.
 
     Examples
     --------
@@ -166,7 +166,7 @@ class Report:
     noise : float
         Mean share of noise of the neighbourhoods, from 0 to 1.
     n_loops_closed, n_cuts, n_bridges : int
-        Loops that were zipped up because they are probably no handles, branches that were cut because they probably
+        Loops that were closed because they are probably no handles, branches that were cut because they probably
         cross air, and gaps that were bridged.
     judgements : tuple of Judgement
         What was asked about the topology, with probabilities, and what was done.

@@ -251,10 +251,10 @@ class TestArithmetic:
         rows = [row(), row(variant="noise1_512", error=0.3)]
         rows += [row(pipeline="denoising"), row(pipeline="denoising", variant="noise1_512", error=0.5, topology=False)]
         page = tmp_path / "page.md"
-        page.write_text("| a | 1 before<br>`RingBuilder.denoise=0`: ? |\n| b | `Refiner.spur=0`: old |\n")
+        page.write_text("| a | 1 before<br>`RingBuilder.denoise=0`: ? |\n| b | `Refiner.limb=0`: old |\n")
         parts.ideas.write_effects(page, rows)
         told = "0.200 / 2 → 0.300 / 1; noise1_512: 0.300 / 1 → 0.500 / 0"
-        expected = f"| a | 1 before<br>`RingBuilder.denoise=0`: {told} |\n| b | `Refiner.spur=0`: old |\n"
+        expected = f"| a | 1 before<br>`RingBuilder.denoise=0`: {told} |\n| b | `Refiner.limb=0`: old |\n"
         assert page.read_text() == expected
         parts.ideas.write_effects(page, rows)
         assert page.read_text() == expected
@@ -324,16 +324,16 @@ class TestCommands:
 
     def test_ablation_writes_into_a_page(self, call, tmp_path):
         page = tmp_path / "page.md"
-        page.write_text("| `Refiner.spur=0`:  |")
+        page.write_text("| `Refiner.limb=0`:  |")
         few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--idea", "spurs cut", "--jobs", 0)
         call("ablation", *few, "--page", page)
         assert re.fullmatch(
-            r"\| `Refiner.spur=0`: 0.\d+ / 1 → 0.\d+ / 1; clean_512: 0.\d+ / 1 → .* \|", page.read_text()
+            r"\| `Refiner.limb=0`: 0.\d+ / 1 → 0.\d+ / 1; clean_512: 0.\d+ / 1 → .* \|", page.read_text()
         )
 
     def test_settings(self, call, tmp_path):
         few = ("--builtin", "--shapes", "torus", "--pipeline", "default", "--jobs", 0, "-o", tmp_path / "out.json")
-        settings = ("--set", "Contractor.max_iterations=1", "--set", "Refiner.spur=0")
+        settings = ("--set", "Contractor.max_iterations=1", "--set", "Refiner.limb=0")
         printed = call("truth", *few, "--variant", "clean_512,clean_300", *settings, "--markdown")
         rows = json.loads((tmp_path / "out.json").read_text())["rows"]
         assert [row["solves"] for row in rows] == [1, 1]

@@ -36,7 +36,7 @@ IDEAS = {
     "false loops closed": "Refiner.handle=0",
     "air cut": "Refiner.air=0",
     "gaps bridged": "Refiner.bridge=0",
-    "spurs cut": "Refiner.spur=0",
+    "spurs cut": "Refiner.limb=0",
     "edges subdivided": "Refiner.spacing=0",
     "fit to the axis": "Refiner.recentre=0",
 }

@@ -13,8 +13,9 @@ from glsk_o3d.analysis.matching import TIP_REACH, matched
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
 from glsk_o3d.refinement.air import branch_facts
 from glsk_o3d.refinement.bridging import gap_facts
-from glsk_o3d.refinement.evidence import Evidence
-from glsk_o3d.refinement.loops import SHORTEST_LOOP, loop_facts
+from glsk_o3d.refinement.evidence import LEAST_INSIDE, Evidence
+from glsk_o3d.refinement.loops import loop_facts
+from glsk_o3d.refinement.reattachment import reattach_limbs
 from glsk_o3d.refinement.spurs import limb_facts
 from glsk_o3d.skeleton import Skeleton
 
@@ -36,31 +37,32 @@ def questions(case: Case, pipeline: Pipeline) -> dict:
 def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tuple[str, dict[str, float], bool]]:
     """The questions in the order in which a pipeline's refiner asks them, each of the skeleton that it has then."""
     *stages, refiner = pipeline.stages
-    skeleton = fitted = refiner._fit(Pipeline(*stages)(points))
+    skeleton = refiner._fit(Pipeline(*stages)(points))
     if not len(skeleton.edges):
         return
     evidence = Evidence.of(skeleton)
     yield from _loops(skeleton, evidence, truth)
     skeleton, _ = refiner._close(skeleton, evidence)
+    yield from _limbs(reattach_limbs(skeleton), truth)
+    skeleton, _ = refiner._settle(skeleton)
     yield from _branches(skeleton, evidence, truth)
     skeleton, _ = refiner._cut(skeleton, evidence)
     yield from _gaps(skeleton, evidence, truth)
-    yield from _limbs(refiner._settle(refiner._judge(fitted))[0], truth)
 
 
 def _loops(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
     cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-    cycles = [cycle for cycle in cycles if len(cycle) > SHORTEST_LOOP]
     if cycles:
         placed = Placed(truth, skeleton.vertices)
-        for cycle, (facts, *_) in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
-            if (is_so := placed.is_handle(cycle)) is not None:
-                yield "loop", facts, is_so
+        for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
+            is_so = placed.is_handle(cycle)
+            if is_so is not None and loop.inside >= LEAST_INSIDE:
+                yield "loop", loop.facts, is_so
 
 
 def _branches(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
     placed = Placed(truth, skeleton.vertices)
-    for branch, facts, k, _ in branch_facts(skeleton, evidence, skeleton.report.noise):
+    for branch, k, facts in branch_facts(skeleton, evidence, skeleton.report.noise):
         yield "air", facts, placed.crosses_air(branch, k)
 
 
@@ -75,5 +77,5 @@ def _limbs(skeleton: Skeleton, truth: Truth) -> Iterator[tuple[str, dict[str, fl
     tips = np.flatnonzero(np.bincount(truth.edges.ravel(), minlength=len(truth.nodes)) == 1)
     pairs = matched(skeleton.vertices[leaves], truth.nodes[tips], TIP_REACH * truth.radii[tips])
     right = set(leaves[[leaf for leaf, _ in pairs]].tolist())
-    for path, facts in limb_facts(skeleton):
-        yield "limb", facts, int(path[-1]) in right
+    for leaf, facts in limb_facts(skeleton):
+        yield "limb", facts, leaf in right

@@ -19,7 +19,7 @@ graph = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.
 # as published. Larger ones are left. The recommended refinement asks of each how probable it is that it is a handle,
 # and closes the others.
 
-published = glsk.Refiner(handle=0, air=0, bridge=0, spur=0, spacing=0, recentre=0)(graph)
+published = glsk.Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(graph)
 skeleton = glsk.Refiner()(graph)
 for name, each in (("raw graph", graph), ("without triangles", published), ("recommended", skeleton)):
     print(f"{name:17} {each.n_loops:4} loops")

@@ -9,7 +9,6 @@ import numpy as np
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..refinement.evidence import Evidence
 from ..refinement.loops import loop_facts
-from ..refinement.scores import HANDLE_WEIGHTS, probability
 from ..skeleton import Skeleton
 
 
@@ -58,7 +57,7 @@ def loops(skeleton: Skeleton) -> tuple[Loop, ...]:
     chances = np.full(len(cycles), np.nan)
     if cycles and len(skeleton.supporting_points):
         known = [bool(np.isfinite(skeleton.confidence[cycle]).any()) for cycle in cycles]
-        for i, (facts, *_) in enumerate(loop_facts(skeleton, cycles, Evidence.of(skeleton))):
-            chances[i] = probability(HANDLE_WEIGHTS, facts) if known[i] else np.nan
-    found = zip(cycles, openings, chances.tolist(), strict=True)
-    return tuple(Loop(vertices, float(opening), chance) for vertices, opening, chance in found)
+        found = loop_facts(skeleton, cycles, Evidence.of(skeleton))
+        chances = np.where(known, [loop.probability for loop in found], np.nan)
+    rows = zip(cycles, openings, chances.tolist(), strict=True)
+    return tuple(Loop(vertices, float(opening), chance) for vertices, opening, chance in rows)

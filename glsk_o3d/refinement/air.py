@@ -12,13 +12,13 @@ from ..numerics.vectors import TINY
 from ..report import Judgement
 from ..skeleton import Skeleton
 from .evidence import Evidence
+from .loops import crossings
 from .merging import drop_lone_vertices
 from .scores import AIR_WEIGHTS, probability
 
 AIR_WINDOW = 1.0  # derived: radii of a branch along which evidence is averaged; a false edge is two radii long or more
 BEYOND_REACH = 3.0  # fitted: radii beyond an edge over which the skeleton should go on straight, but the first third
 CROSSING_HOPS = 6  # fitted: edges around a branch whose vertices count to the side where they are
-LOW_WINDING = 0.5  # derived: between inside and outside; edges next to the cut one go, too, where it is less
 LEAST_SCATTER = 0.05  # fitted: of winding numbers along a skeleton
 
 
@@ -42,79 +42,83 @@ def cut_air(skeleton: Skeleton, evidence: Evidence, noise: float, least: float) 
         One for each branch.
     """
     judgements, gone = [], []
-    for branch, facts, place, stretch in branch_facts(skeleton, evidence, noise):
-        chance = probability(AIR_WEIGHTS, facts)
-        middle = skeleton.vertices[branch[place : place + 2]].mean(axis=0)
+    for branch, place, facts in branch_facts(skeleton, evidence, noise):
+        weakest, chance = branch[place : place + 2], probability(AIR_WEIGHTS, facts)
+        middle = skeleton.vertices[weakest].mean(axis=0)
         judgements.append(Judgement("air", tuple(middle.tolist()), chance, chance >= least))
         if chance >= least:
-            gone.append(stretch)
+            gone.append(np.sort(weakest))
     if not gone:
         return skeleton, judgements
-    edges = np.delete(skeleton.edges, np.concatenate(gone), axis=0)
-    return drop_lone_vertices(replace(skeleton, edges=edges)), judgements
+    left = (skeleton.edges[:, None] != np.array(gone)).any(axis=2).all(axis=1)
+    return drop_lone_vertices(replace(skeleton, edges=skeleton.edges[left])), judgements
 
 
 def branch_facts(
     skeleton: Skeleton, evidence: Evidence, noise: float
-) -> Iterator[tuple[np.ndarray, dict[str, float], int, np.ndarray]]:
+) -> Iterator[tuple[np.ndarray, int, dict[str, float]]]:
     """What the evidence says about the weakest place of every branch.
 
-    The weakest place is where the winding number, averaged over one radius, is least. The facts are: by how much it is
-    less than the median of all edges there, over their scatter; the area of surface along the edge, over that of a tube
-    and relative to that of the whole skeleton; the area that lies across it there, over the cross-section of a tube as
-    long as wide; how straight the skeleton goes on beyond, at the better end, as a
-    cosine; the noise; the least bonds that cross the branch, over the points around a tube; whether both ends have
-    other branches; and the length in radii. All but cosine, noise and ends as logarithms.
+    The weakest place is where the winding number, averaged over a window of one radius, is least. The facts, of which
+    all but straightness, noise and inner are logarithms, are
+
+    - deficit: by how much it is less than the median over all edges, in units of their scatter;
+    - surface: area along the window, over that of a tube, and this over the same of the whole skeleton;
+    - sheets: area across the window, over the cross-section of a tube, pi r^2 for a length of r;
+    - straightness: cosine between the edge and how the skeleton goes on beyond, at the better end;
+    - noise: of the cloud;
+    - bonds: the least that cross the branch, over the points around a tube, 2 pi r over their spacing;
+    - inner: whether both ends have other branches;
+    - length: in radii.
 
     Yields
     ------
     branch : (p,) int array
-    facts : dict of str to float
+        A ring begins where its winding number is greatest.
     place : int
         Position in the branch of the first end of the weakest edge.
-    stretch : int array
-        The weakest edge, and those beside it that the winding number puts outside, too.
+    facts : dict of str to float
     """
     vertices, edges, m = skeleton.vertices, skeleton.edges, len(skeleton.vertices)
     length = np.maximum(skeleton.edge_lengths, TINY)
     winding = evidence.winding(vertices[edges].mean(axis=1))
     typical = np.median(winding)
     scatter = 1.4826 * np.median(np.abs(winding - typical)) + LEAST_SCATTER * abs(typical)
-    (area, facing), tube = (
-        evidence.surface_around(skeleton),
-        2 * np.pi * np.maximum(skeleton.radii[edges].mean(axis=1), TINY),
-    )
-    seen = area.sum() / (tube * length).sum()
+    along, across = evidence.surface_around(skeleton)
+    tubes = 2 * np.pi * np.maximum(skeleton.radii[edges].mean(axis=1), TINY) @ length
+    seen = max(along.sum() / tubes, TINY)
     spacing = np.sqrt(np.median(evidence.areas))
     pairs, weight = evidence.bonds(skeleton)
     around, keys = _neighbours(skeleton), edges @ [m, 1]
+
+    def numbers(path: np.ndarray) -> np.ndarray:
+        return np.searchsorted(keys, np.sort(np.column_stack([path[:-1], path[1:]]), axis=1) @ [m, 1])
+
     for branch in skeleton.branches:
-        edge = np.searchsorted(keys, np.sort(np.column_stack([branch[:-1], branch[1:]]), axis=1) @ [m, 1])
+        if branch[0] == branch[-1]:
+            ring = np.roll(branch[:-1], -int(np.argmax(winding[numbers(branch)])))
+            branch, crossing = np.append(ring, ring[0]), float(crossings(ring, m, pairs, weight).min()) / 2
+        else:
+            crossing = _crossing(branch, around, m, pairs, weight)
+        edge = numbers(branch)
         # of a line, which has no thickness, what rounding leaves
         radius = max(float(np.median(skeleton.radii[branch])), float(np.finfo(float).eps * length.sum()), TINY)
         end = np.cumsum(length[edge])
-        start = end - length[edge]
-        window = _Window((start + end) / 2, np.append(0, end), AIR_WINDOW * radius)
+        window = _Window(end - length[edge] / 2, np.append(0, end), AIR_WINDOW * radius)
         smooth = window.mean(winding[edge] * length[edge])
         k = int(np.argmin(smooth))
-        low, high = k, k
-        while low > 0 and winding[edge[low - 1]] < LOW_WINDING * typical:
-            low -= 1
-        while high < len(edge) - 1 and winding[edge[high + 1]] < LOW_WINDING * typical:
-            high += 1
-        shown = window.mean(area[edge])[k] / (2 * np.pi * radius)
-        crossing = _crossing(branch, around, m, pairs, weight) * spacing / (2 * np.pi * radius)
+        surface = window.mean(along[edge])[k] / (2 * np.pi * radius)
         facts = dict(
             deficit=np.log1p(max((typical - smooth[k]) / max(scatter, TINY), 0)),
-            surface=np.log(max(shown / max(seen, TINY), 0) + 0.05),
-            sheets=np.log(window.mean(facing[edge])[k] / (np.pi * radius) + 0.05),
+            surface=np.log(max(surface / seen, 0) + 0.05),
+            sheets=np.log(window.mean(across[edge])[k] / (np.pi * radius) + 0.05),
             straightness=_straightness(vertices, around, branch, k, radius),
             noise=noise,
-            bonds=np.log(crossing + 0.05),
+            bonds=np.log(crossing * spacing / (2 * np.pi * radius) + 0.05),
             inner=float((skeleton.degree[branch[[0, -1]]] > 1).all()),
             length=np.log(end[-1] / radius + 0.1),
         )
-        yield branch, facts, k, edge[low : high + 1]
+        yield branch, k, facts
 
 
 class _Window:

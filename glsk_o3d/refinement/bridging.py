@@ -26,7 +26,6 @@ DETOUR_RADII = 3.0  # and that many radii more
 BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
 SHEET_WIDTH = 0.7  # radii around a bridge in which a sheet of points lies across it
 CAP_BACK, CAP_AHEAD, CAP_WIDTH = 1.0, 2.5, 1.6  # radii around an end in which its cap is
-END_CHOICES, SIDE_CHOICES = 2, 1  # derived: other ends and other places that are asked, the nearest
 
 
 class _End(NamedTuple):
@@ -112,7 +111,7 @@ def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[in
 def _aims(
     skeleton: Skeleton, end: _End, travelled: np.ndarray, leaves: list[int], along: np.ndarray
 ) -> Iterator[tuple[int, float]]:
-    """Vertices that an end points at across a gap, and the cosines: other ends, and the nearest place elsewhere."""
+    """Vertices that an end points at across a gap, and cosines: the nearest other end, and the nearest place else."""
     across = skeleton.vertices - end.place
     away = np.maximum(norm(across), TINY)
     cosine = across @ end.outward / away
@@ -123,9 +122,10 @@ def _aims(
     cost = gap + away * (1 - cosine) / 2
     # what the way by an end leads to is behind it, and not asked for itself
     behind = ((away[leaves][:, None] + along)[aims[leaves]] < DETOUR * away).any(axis=0)
-    for kind, most in ((free, END_CHOICES), (~free & ~behind, SIDE_CHOICES)):
+    for kind in (free, ~free & ~behind):
         some = np.flatnonzero(aims & kind)
-        for other in some[np.argsort(cost[some], kind="stable")[:most]].tolist():
+        if len(some):
+            other = int(some[np.argmin(cost[some])])
             yield other, cosine[other]
 
 

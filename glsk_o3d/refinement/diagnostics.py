@@ -16,7 +16,6 @@ BALL_SPREAD = 0.5
 # length of the evenly filled box with a part's spread, over the median distance to the surface; balls have 2 to 3
 STUB_LENGTH = 3.3
 MAJORITY = 0.5  # derived: of the points, from which on a cloud is called what they are
-CLOSE_CALL = 0.1  # derived: from an even chance at most, of what may turn out otherwise with the next scan
 LOW_CONFIDENCE = 0.1  # below which a vertex is not to be trusted
 LOW_CONFIDENCE_SHARE = 0.25  # of the points around such vertices that is worth a warning
 
@@ -78,13 +77,13 @@ def diagnose(skeleton: Skeleton) -> list[str]:
 
 
 def _close_calls(skeleton: Skeleton) -> list[str]:
-    close, n = skeleton.report.uncertain, len(skeleton.report.judgements)
-    close = tuple(it for it in close if it.about != "limb" and abs(it.probability - 0.5) < CLOSE_CALL)
+    close = [it for it in skeleton.report.uncertain if it.about != "limb"]
     if not close:
         return []
+    asked = sum(it.about != "limb" for it in skeleton.report.judgements)
     return [
-        f"uncertain topology: {len(close)} of {n} questions were close calls, above all whether {close[0].question} "
-        f"(probability {close[0].probability:.2f})"
+        f"uncertain topology: {len(close)} of {asked} questions about loops, air and gaps were close calls, above all "
+        f"whether {close[0].question} (probability {close[0].probability:.2f})"
     ]
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..numerics.components import component_labels
-from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, opens_wider
+from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..numerics.groups import group_median
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, norm
@@ -19,7 +19,6 @@ from .merging import merge_vertices
 from .scores import HANDLE_WEIGHTS, probability
 from .triangles import collapse_triangles
 
-SHORTEST_LOOP = 3  # derived: a triangle has nothing to zip up
 WIDE_LOOP = 1.5  # fitted: opening of a loop that is more than two strands in one part
 WIDE_OPEN = 3.0  # fitted: opening beyond which it says no more: sparse crowns have wide false loops
 HOLE_SHARE = 0.6  # fitted: of the largest circle in a loop, the part of it that is asked
@@ -32,30 +31,6 @@ def surface_distance(skeleton: Skeleton) -> np.ndarray:
     vertex = skeleton.vertex_of_point[supporting]
     distance = norm(skeleton.points[supporting] - skeleton.vertices[vertex])
     return group_median(distance, vertex, len(skeleton.vertices))
-
-
-def zip_narrow_loops(skeleton: Skeleton) -> Skeleton:
-    """Zip up the loops that open less than their tube is thick, before there is a fit: they lie inside one part.
-
-    The opening of a loop is the radius of the largest circle inside it; the tube's is the median over the loop of the
-    distance from its vertices to the surface. All such loops of a minimum cycle basis go at once, until there are none.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-
-    Returns
-    -------
-    Skeleton
-        Without triangles.
-    """
-    while True:
-        surface = surface_distance(skeleton)
-        cycles = minimum_cycle_basis(len(surface), skeleton.edges, skeleton.edge_lengths)
-        narrow = [cycle for cycle in cycles if not opens_wider(skeleton.vertices[cycle], np.median(surface[cycle]))]
-        if not narrow:
-            return skeleton
-        skeleton = _zipped(skeleton, narrow)
 
 
 def _zipped(skeleton: Skeleton, cycles: list[np.ndarray]) -> Skeleton:
@@ -88,9 +63,9 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
         kept, narrow, cut, used = [], [], [], set()
         for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
-            chance = probability(HANDLE_WEIGHTS, loop.facts) if loop.inside >= LEAST_INSIDE else 0.0
-            false = chance < least and len(cycle) > SHORTEST_LOOP
-            (judgements if false else kept).append(Judgement("loop", tuple(loop.centre.tolist()), chance, false))
+            false = loop.probability < least
+            where = tuple(loop.centre.tolist())
+            (judgements if false else kept).append(Judgement("loop", where, loop.probability, false))
             if not false:
                 continue
             if loop.facts["opening"] < np.log(WIDE_LOOP):
@@ -107,20 +82,27 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
             skeleton = _zipped(skeleton, narrow)
 
 
-class _Loop(NamedTuple):
+class LoopEvidence(NamedTuple):
+    """What speaks for and against that a loop is a handle."""
+
     facts: dict[str, float]
     inside: float  # median winding number along it
     centre: np.ndarray  # of its hole
     weakest: int  # position of the edge, from there to the next vertex, that the fewest bonds cross
 
+    @property
+    def probability(self) -> float:
+        """That it is one; a loop that has no inside itself is none."""
+        return probability(HANDLE_WEIGHTS, self.facts) if self.inside >= LEAST_INSIDE else 0.0
 
-def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[_Loop]:
+
+def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
     """What speaks for and against that each of some loops is a handle.
 
     The facts are: how wide it opens, the radius of the largest circle inside it over the distance of the surface, as a
     logarithm; the least winding number in that circle, over the median along the loop, since a handle is one if no disc
     that spans it stays inside; the least bonds that cross it somewhere, over their median, as a logarithm; and the mean
-    confidence. A loop that has no inside itself is none.
+    confidence.
 
     Parameters
     ----------
@@ -154,7 +136,7 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
             bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.01)),
             confidence=float(np.nan_to_num(skeleton.confidence[cycle]).mean()),
         )
-        found.append(_Loop(facts, inside, centre, int(np.argmin(crossing))))
+        found.append(LoopEvidence(facts, inside, centre, int(np.argmin(crossing))))
     return found
 
 
@@ -215,4 +197,4 @@ def zip_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
     nearest = np.abs(along[0][:, None] - along[1][None])
     pairs = [(i, int(np.argmin(nearest[i]))) for i in range(1, len(sides[0]) - 1)]
     pairs += [(int(np.argmin(nearest[:, j])), j) for j in range(1, len(sides[1]) - 1)]
-    return np.array([(labels[sides[0][i]], labels[sides[1][j]]) for i, j in pairs])
+    return np.array([(labels[sides[0][i]], labels[sides[1][j]]) for i, j in pairs], int).reshape(-1, 2)

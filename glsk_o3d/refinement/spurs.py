@@ -19,8 +19,8 @@ SPUR_POINTS = 128  # measured: of a branch that are enough to say how far it rea
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
 
 
-def prune_spurs(skeleton: Skeleton, reach: float) -> tuple[Skeleton, list[Judgement]]:
-    """Cut branches whose points reach no farther than the surface around the limbs that meet there.
+def prune_spurs(skeleton: Skeleton, least: float) -> tuple[Skeleton, list[Judgement]]:
+    """Cut branches whose points hardly reach farther than the surface around the limbs that meet there.
 
     What counts is the points, not the curve: the contraction shortens stubs as thick as they are long, and lets thin
     ones grow. And it is how far they leave the limbs that meet them, not how far they are from the junction: along
@@ -33,30 +33,38 @@ def prune_spurs(skeleton: Skeleton, reach: float) -> tuple[Skeleton, list[Judgem
     Parameters
     ----------
     skeleton : Skeleton
-    reach : float
-        Least distance of a branch's points (all but a tenth) from the limbs around it, over the distance from these to
-        the surface there. Of every junction the least first, until there is none.
+    least : float
+        Probability of a limb below which a branch is cut. Of every junction the least probable first, until there is
+        none.
 
     Returns
     -------
     Skeleton
         Points of a cut branch belong to its junction.
     judgements : list of Judgement
-        How probably each branch left that leaves a junction and has an end is a limb; at its end.
+        One for each branch that leaves a junction and has an end, cut or left; at its end.
     """
+    judgements: list[Judgement] = []
     while True:
         worst: dict[int, tuple[float, int]] = {}
         found = list(_reaches(skeleton))
         for i, branch in enumerate(found):
             for v in branch.ends:
-                if branch.reach < worst.get(v, (reach,))[0]:
-                    worst[v] = (branch.reach, i)
+                if branch.probability < worst.get(v, (least,))[0]:
+                    worst[v] = (branch.probability, i)
         chosen = {i for _, i in worst.values() if all(v in worst and worst[v][1] == i for v in found[i].ends)}
+        some = [found[i] for i in chosen] if chosen else found
+        judgements += [
+            Judgement("limb", tuple(skeleton.vertices[branch.tip].tolist()), branch.probability, bool(chosen))
+            for branch in some
+            if branch.tip is not None
+        ]
         if not chosen:
-            return skeleton, [_judged(skeleton, path, facts) for path, facts in _limb_facts(skeleton, found)]
+            return skeleton, judgements
         group, vertices = np.arange(len(skeleton.vertices)), skeleton.vertices.copy()
-        for ends, body, _ in (found[i] for i in chosen):
-            group[body] = group[ends] = ends[0]
+        for branch in some:
+            ends = branch.ends
+            group[branch.body] = group[ends] = ends[0]
             vertices[ends[0]] = vertices[ends].mean(axis=0)
         stay = np.unique(group)
         # a junction stays what it was
@@ -64,35 +72,35 @@ def prune_spurs(skeleton: Skeleton, reach: float) -> tuple[Skeleton, list[Judgem
         skeleton = replace(merge_vertices(skeleton, group), **kept)
 
 
-def limb_facts(skeleton: Skeleton) -> Iterator[tuple[np.ndarray, dict[str, float]]]:
+def limb_facts(skeleton: Skeleton) -> Iterator[tuple[int, dict[str, float]]]:
     """What speaks for every branch that leaves a junction and has an end: its reach, as a logarithm.
+
+    The reach is the distance of the branch's points (all but a tenth) from the limbs around it, over the distance from
+    these to the surface there.
 
     Yields
     ------
-    path : (p,) int array
-        From the junction to the end.
+    leaf : int
     facts : dict of str to float
     """
-    return _limb_facts(skeleton, list(_reaches(skeleton)))
-
-
-def _limb_facts(skeleton: Skeleton, found: list[_Reach]) -> Iterator[tuple[np.ndarray, dict[str, float]]]:
-    for (junction, *_), body, far in found:
-        if (skeleton.degree[body] == 1).any():
-            path = body if skeleton.degree[body[-1]] == 1 else body[::-1]
-            yield np.append(junction, path), dict(reach=float(np.log(far + 0.1)))
-
-
-def _judged(skeleton: Skeleton, path: np.ndarray, facts: dict[str, float]) -> Judgement:
-    return Judgement("limb", tuple(skeleton.vertices[path[-1]].tolist()), probability(LIMB_WEIGHTS, facts), False)
+    return ((branch.tip, branch.facts) for branch in _reaches(skeleton) if branch.tip is not None)
 
 
 class _Reach(NamedTuple):
     """How far the points of a branch that may go leave the limbs around it."""
 
     ends: list[int]  # its junctions
-    body: np.ndarray  # its other vertices, in order
+    body: np.ndarray  # its other vertices
+    tip: int | None
     reach: float
+
+    @property
+    def facts(self) -> dict[str, float]:
+        return dict(reach=float(np.log(self.reach + 0.1)))
+
+    @property
+    def probability(self) -> float:
+        return probability(LIMB_WEIGHTS, self.facts)
 
 
 def _reaches(skeleton: Skeleton) -> Iterator[_Reach]:
@@ -106,7 +114,8 @@ def _reaches(skeleton: Skeleton) -> Iterator[_Reach]:
         ends = [v for v in dict.fromkeys(branch[[0, -1]].tolist()) if skeleton.degree[v] > 2]
         if ends and (leaf or (limbs.inner[k] and limbs.short[k])):
             body = branch[~np.isin(branch, ends)]
-            yield _Reach(ends, body, float(_farthest(limbs, k, ends, owned.points(body), ending)))
+            tip = next((v for v in branch[[0, -1]].tolist() if skeleton.degree[v] == 1), None)
+            yield _Reach(ends, body, tip, float(_farthest(limbs, k, ends, owned.points(body), ending)))
 
 
 class _Owned:

@@ -491,7 +491,7 @@ def test_old_results_load_but_have_no_recipe(tmp_path):
 
 def test_results_that_do_not_start_from_a_cloud(tmp_path):
     skeletonize(POINTS).save(tmp_path / "s.ply")
-    refined = Refiner(handle=0, air=0, bridge=0, spur=0, spacing=0, recentre=0)(glsk.read_skeleton(tmp_path / "s.ply"))
+    refined = Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(glsk.read_skeleton(tmp_path / "s.ply"))
     with pytest.raises(RecipeError):
         rerun(refined)
 
