@@ -15,7 +15,7 @@ from _common.results import pick, save
 from _common.runs import run
 from _common.tables import Tables, fill, number, page_with, present
 
-from glsk_o3d import samples
+from glsk_o3d import Refiner, samples
 from glsk_o3d.analysis import compare
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.pipelines import default
@@ -39,10 +39,10 @@ CLOUDS = {
 ANIMALS = [name for name in CLOUDS if name.startswith("animal") and "1024" not in name]
 SPURS = {
     "0": "Refiner.limb=0",
-    "1.3, the default": "",
-    "2": "Refiner.limb=2",
-    "3": "Refiner.limb=3",
-    "1.3, with `RingBuilder.k=24`": "RingBuilder.k=24",
+    f"{Refiner().limb}, the default": "",
+    "0.8": "Refiner.limb=0.8",
+    "0.95": "Refiner.limb=0.95",
+    "the default, with `RingBuilder.k=24`": "RingBuilder.k=24",
 }
 RADII = [name for name in CLOUDS if "y_j" in name or "animal" in name]
 NEIGHBOURS = {"`default`": "", "`k=24`": "RingBuilder.k=24", "`k=32`": "RingBuilder.k=32"}

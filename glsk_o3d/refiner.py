@@ -134,13 +134,16 @@ class Refiner(Filter[Skeleton]):
         skeleton, loops = self._close(skeleton, evidence)
         skeleton, limbs = self._settle(skeleton)
         skeleton, cuts = self._cut(skeleton, evidence)
+        if _changed(cuts):
+            limbs, (skeleton, more) = _of_changes(limbs), self._prune(skeleton)
+            limbs += more
         skeleton, gaps = self._bridge(skeleton, evidence)
         if _changed([*cuts, *gaps]):
-            skeleton, left = self._settle(self._refit(skeleton))
-            limbs = [*filter(_is_changed, limbs), *left]
+            limbs, (skeleton, more) = _of_changes(limbs), self._settle(self._refit(skeleton))
+            limbs += more
             if self.handle:
-                loops = [*filter(_is_changed, loops), *close_loops(skeleton, evidence, 0)[1]]
-        closed, cut, bridged = (sum(map(_is_changed, found)) for found in (loops, cuts, gaps))
+                loops = _of_changes(loops) + close_loops(skeleton, evidence, 0)[1]
+        closed, cut, bridged = (len(_of_changes(found)) for found in (loops, cuts, gaps))
         report = replace(
             skeleton.report,
             judgements=(*loops, *cuts, *gaps, *limbs),
@@ -160,6 +163,9 @@ class Refiner(Filter[Skeleton]):
         """Let limbs begin where they leave others, and prune what is none."""
         if self.recentre:
             skeleton = reattach_limbs(skeleton)
+        return self._prune(skeleton)
+
+    def _prune(self, skeleton: Skeleton) -> tuple[Skeleton, list[Judgement]]:
         return prune_spurs(skeleton, self.limb) if self.limb else (skeleton, [])
 
     def _cut(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
@@ -174,9 +180,9 @@ class Refiner(Filter[Skeleton]):
         return fit_axis(skeleton, min(2, self.recentre))
 
 
-def _is_changed(judgement: Judgement) -> bool:
-    return judgement.changed
+def _of_changes(judgements: list[Judgement]) -> list[Judgement]:
+    return [it for it in judgements if it.changed]
 
 
 def _changed(judgements: list[Judgement]) -> bool:
-    return any(map(_is_changed, judgements))
+    return bool(_of_changes(judgements))

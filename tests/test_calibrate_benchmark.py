@@ -186,3 +186,20 @@ class TestCommands:
     @pytest.mark.parametrize("wrong", [("nowhere",), ("--page", "nowhere.md"), ("--from", "nowhere.json")])
     def test_what_is_not_there_is_said(self, call, wrong):
         call("check", *wrong, code=2)
+
+
+def test_asks_what_the_refiner_asks(parts):
+    """Of the same skeletons: what a clean cloud is asked has the probabilities that the report has."""
+    cloud, pipeline = y_junction(1200), default()
+    truth = Truth(cloud.nodes, cloud.edges, cloud.radii)
+    told = {"loop": "HANDLE_WEIGHTS", "air": "AIR_WEIGHTS", "gap": "BRIDGE_WEIGHTS", "limb": "LIMB_WEIGHTS"}
+    asked = [
+        (about, scores.probability(getattr(scores, told[about]), facts))
+        for about, facts, _ in parts.questions.asked(
+            cloud.points, Truth(cloud.nodes, cloud.edges, cloud.radii), pipeline
+        )
+    ]
+    report = pipeline(cloud.points).report
+    found = [(it.about, it.probability) for it in report.judgements]
+    assert len(found) >= 6
+    assert sorted(asked) == sorted(found)

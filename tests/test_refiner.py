@@ -212,3 +212,22 @@ def test_graph_without_a_cloud(name):
     bare = replace(around_torus(), points=(), normals=(), vertex_of_point=())
     skeleton = refined(bare, VARIANTS[name])
     assert skeleton.n_loops == 1
+
+
+def test_limbs_without_a_cloud_stay():
+    """Nobody knows how far they reach."""
+    places = [[0, 0, 0], *(length * np.array(way) for way in ([1, 0, 0], [0, 1, 0], [0, 0, 1]) for length in (1, 2))]
+    edges = [(0, 1), (1, 2), (0, 3), (3, 4), (0, 5), (5, 6)]
+    skeleton = Refiner()(Skeleton(places, edges, np.full(7, 0.1), (), (), ()))
+    assert (len(skeleton.leaves), len(skeleton.junctions)) == (3, 1)
+
+
+def test_the_only_branch_may_go():
+    """Nothing is left to ask about then."""
+    rng = np.random.default_rng(0)
+    angle = rng.uniform(0, 2 * np.pi, 400)
+    normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
+    points = 0.1 * normals + rng.uniform(-1, 1, (400, 1)) * np.eye(3)[0]
+    skeleton = Skeleton([[-1, 0, 0], [1, 0, 0]], [(0, 1)], [0.1, 0.1], np.arange(len(points)) % 2, points, normals)
+    with pytest.warns(SkeletonWarning):
+        assert len(Refiner(air=1e-12, spacing=0)(skeleton).edges) == 0

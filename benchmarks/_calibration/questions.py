@@ -46,7 +46,7 @@ def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tupl
     yield from _limbs(reattach_limbs(skeleton), truth)
     skeleton, _ = refiner._settle(skeleton)
     yield from _branches(skeleton, evidence, truth)
-    skeleton, _ = refiner._cut(skeleton, evidence)
+    skeleton, _ = refiner._prune(refiner._cut(skeleton, evidence)[0])
     yield from _gaps(skeleton, evidence, truth)
 
 

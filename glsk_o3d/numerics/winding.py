@@ -38,31 +38,6 @@ def orient_by_votes(normals: np.ndarray, votes: np.ndarray, neighbours: np.ndarr
     return normals * np.where(votes < 0, -1.0, 1.0)[:, None]
 
 
-def orient_by_curvature(normals: np.ndarray, curvature: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """Turn normals outward before there is an axis: against the curvature vector, which points inward where it bulges.
-
-    A point's vote is the cosine between its normal and its curvature vector, little where the surface is flat. Unlike
-    `orient_normals`, which joins all points by a tree, this needs neither a closed surface nor a farthest point, and no
-    wrong turn is handed on; but it needs the Laplacian, and it turns a wide hollow, such as the inside of a bowl, the
-    wrong way.
-
-    Parameters
-    ----------
-    normals : (n, 3) float array
-        Unit vectors; their signs do not matter.
-    curvature : (n, 3) float array
-        Laplacian coordinates, ``L @ points`` with `cotangent_laplacian`.
-    neighbours : (n, k) int array
-        As from `nearest_neighbours`; 16 are enough.
-
-    Returns
-    -------
-    (n, 3) float array
-    """
-    votes = -dot(normals, curvature) / np.maximum(norm(curvature), TINY)
-    return orient_by_votes(normals, votes, neighbours)
-
-
 def orient_from_axis(
     points: np.ndarray, normals: np.ndarray, axis_points: np.ndarray, neighbours: np.ndarray
 ) -> np.ndarray:

@@ -64,7 +64,6 @@ def branch_facts(
 
     - deficit: by how much it is less than the median over all edges, in units of their scatter;
     - surface: area along the window, over that of a tube, and this over the same of the whole skeleton;
-    - sheets: area across the window, over the cross-section of a tube, pi r^2 for a length of r;
     - straightness: cosine between the edge and how the skeleton goes on beyond, at the better end;
     - noise: of the cloud;
     - bonds: the least that cross the branch, over the points around a tube, 2 pi r over their spacing;
@@ -84,7 +83,7 @@ def branch_facts(
     winding = evidence.winding(vertices[edges].mean(axis=1))
     typical = np.median(winding)
     scatter = 1.4826 * np.median(np.abs(winding - typical)) + LEAST_SCATTER * abs(typical)
-    along, across = evidence.surface_around(skeleton)
+    along = evidence.surface_around(skeleton)
     tubes = 2 * np.pi * np.maximum(skeleton.radii[edges].mean(axis=1), TINY) @ length
     seen = max(along.sum() / tubes, TINY)
     spacing = np.sqrt(np.median(evidence.areas))
@@ -111,7 +110,6 @@ def branch_facts(
         facts = dict(
             deficit=np.log1p(max((typical - smooth[k]) / max(scatter, TINY), 0)),
             surface=np.log(max(surface / seen, 0) + 0.05),
-            sheets=np.log(window.mean(across[edge])[k] / (np.pi * radius) + 0.05),
             straightness=_straightness(vertices, around, branch, k, radius),
             noise=noise,
             bonds=np.log(crossing * spacing / (2 * np.pi * radius) + 0.05),

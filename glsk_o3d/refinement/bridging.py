@@ -24,7 +24,6 @@ BRIDGE_LOOK_BACK = 3.0  # radii to look back along a branch for its direction
 DETOUR = 2.0  # least way along the skeleton over that across the gap; less would make a loop of nothing
 DETOUR_RADII = 3.0  # and that many radii more
 BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
-SHEET_WIDTH = 0.7  # radii around a bridge in which a sheet of points lies across it
 CAP_BACK, CAP_AHEAD, CAP_WIDTH = 1.0, 2.5, 1.6  # radii around an end in which its cap is
 
 
@@ -70,10 +69,9 @@ def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
 def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:
     """What speaks for and against a bridge, for every end and the places that it points at.
 
-    The facts are: the least winding number along the bridge, over the median on the skeleton; the area of surface that
-    lies across it, whichever way it faces, over the bridge's cross-section, as a logarithm; the cosine between bridge
-    and end; and how far the end is closed: the flux of its outward normals through its cross-section, 1 for a cap and 0
-    for a tube cut open, as a logarithm.
+    The facts are: the least winding number along the bridge, over the median on the skeleton; the cosine between
+    bridge and end; and how far the end is closed: the flux of its outward normals through its cross-section, 1 for a
+    cap and 0 for a tube cut open, as a logarithm.
 
     Yields
     ------
@@ -98,10 +96,9 @@ def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[in
     across = [skeleton.vertices[other] - end.place for end, other, _ in found]
     samples = [end.place + BRIDGE_SAMPLES * way for (end, *_), way in zip(found, across, strict=True)]
     winding = evidence.winding(np.concatenate(samples)).reshape(len(found), -1).min(axis=1) / typical
-    for (end, other, cosine), way, least in zip(found, across, winding, strict=True):
+    for (end, other, cosine), least in zip(found, winding, strict=True):
         facts = dict(
             winding=float(np.clip(least, -0.5, 1.3)),
-            sheets=float(np.log(_sheets(end, way, evidence) + 0.05)),
             straightness=cosine,
             cap=float(np.log(_cap(end, evidence) + 0.1)),
         )
@@ -145,15 +142,6 @@ def _cap(end: _End, evidence: Evidence) -> float:
     near &= beside < (CAP_WIDTH * end.radius) ** 2
     facing = np.maximum(evidence.normals[near] @ end.outward, 0)
     return float(evidence.areas[near] @ facing / (np.pi * end.radius**2))
-
-
-def _sheets(end: _End, across: np.ndarray, evidence: Evidence) -> float:
-    """Area of the surface across a bridge, over the bridge's cross-section."""
-    length = max(float(np.linalg.norm(across)), TINY)
-    way, offset, radius = across / length, evidence.points - end.place, SHEET_WIDTH * end.radius
-    ahead = offset @ way
-    near = (ahead > 0) & (ahead < length) & (dot(offset, offset) - ahead**2 < radius**2)
-    return float(evidence.areas[near] @ np.abs(evidence.normals[near] @ way) / (np.pi * radius**2))
 
 
 def _ends(skeleton: Skeleton) -> Iterator[_End]:

@@ -55,19 +55,18 @@ class Evidence:
         """Winding number of the surface around each place, (m,) float array from (m, 3): near 1 inside, 0 outside."""
         return winding_number(self.points, self.normals, self.areas, queries)
 
-    def surface_around(self, skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
-        """Area of the surface around every edge: that along it, and that across it, two (E,) float arrays.
+    def surface_around(self, skeleton: Skeleton) -> np.ndarray:
+        """Area of the surface along every edge, (E,) float array.
 
-        Points belong to the nearest of the edges at their vertex. Along it each counts by how upright its normal stands
-        on the edge, sin^2: all of a tube of which it is the axis. The rest, cos^2, lies across.
+        Points belong to the nearest of the edges at their vertex, and count by how upright their normals stand on it,
+        sin^2: all of a tube of which it is the axis, and nothing of a sheet across it.
         """
         edge, _ = _nearest_edges(skeleton, self.supporting)
         some = np.flatnonzero(edge >= 0)
         edge, ends = edge[some], skeleton.vertices[skeleton.edges]
         way = (ends[:, 1] - ends[:, 0]) / np.maximum(skeleton.edge_lengths, TINY)[:, None]
-        area, facing = self.areas[some], dot(self.normals[some], way[edge]) ** 2
-        along, across = (np.bincount(edge, area * share, len(skeleton.edges)) for share in (1 - facing, facing))
-        return along, across
+        upright = 1 - dot(self.normals[some], way[edge]) ** 2
+        return np.bincount(edge, self.areas[some] * upright, len(skeleton.edges))
 
     def bonds(self, skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
         """How far the surface goes on from vertex to vertex.

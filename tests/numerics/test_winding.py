@@ -6,17 +6,14 @@ import pytest
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d.numerics.cotangent import cotangent_laplacian
-from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, plane_axes, principal
-from glsk_o3d.numerics.rings import star_rings
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.winding import (
-    orient_by_curvature,
     orient_by_votes,
     orient_from_axis,
     point_areas,
     winding_number,
 )
-from glsk_o3d.samples import sheet, sphere, torus, tube
+from glsk_o3d.samples import torus
 
 X = np.eye(3)[0]
 
@@ -50,15 +47,6 @@ def areas_of(points):
 
 def field(points, normals, queries):
     return winding_number(points, normals, areas_of(points), np.atleast_2d(queries))
-
-
-def oriented(points, signs=None):
-    """Normals and neighbours of a cloud, estimated, and its normals oriented by its own Laplacian."""
-    _, neighbours = nearest_neighbours(points, 16)
-    _, normals = principal(points, neighbours)
-    rings = star_rings(points, np.arange(len(points)), neighbours[:, 1:], plane_axes(normals))
-    normals = normals if signs is None else normals * signs[:, None]
-    return orient_by_curvature(normals, cotangent_laplacian(points, rings) @ points, neighbours)
 
 
 # --------------------------------------------------------------------------------------------------------------- field
@@ -209,39 +197,9 @@ def test_areas_of_some_of_the_points():
     np.testing.assert_array_equal(point_areas(points, neighbours[50:60]), point_areas(points, neighbours)[50:60])
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_estimated_normals_turn_outward(seed):
-    signs = np.random.default_rng(seed).choice([-1.0, 1.0], 3000)
-    for points, outward in (ball(3000, seed=seed), ring(3000, seed), open_tube(3000, seed=seed)):
-        assert (np.einsum("ij,ij->i", oriented(points, signs), outward) > 0).all()
-    points, outward = open_tube(3000, half=True, seed=seed)
-    # at the rims alone rings are open, and their Laplacian points along the surface
-    assert (np.einsum("ij,ij->i", oriented(points, signs), outward) > 0).mean() > 0.99
-
-
-def test_a_bent_sheet_is_turned_as_a_whole():
-    points = sheet(3000, bend=90).points
-    _, neighbours = nearest_neighbours(points, 8)
-    turned = oriented(points, np.random.default_rng(0).choice([-1.0, 1.0], 3000))
-    assert (np.einsum("ni,nki->nk", turned, turned[neighbours]) > 0).mean() > 0.99
-
-
-def test_noise_turns_few():
-    cloud = tube(3000, noise=0.005)
-    away = cloud.points - cloud.points.clip(-0.4, 0.4) * X
-    assert (np.einsum("ij,ij->i", oriented(cloud.points), away) > 0).mean() > 0.95
-
-
-def test_signs_given_do_not_matter():
-    points = sphere(500).points
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], 500)
-    np.testing.assert_array_equal(oriented(points, signs), oriented(points))
-
-
-def test_normals_without_curvature_or_place_stay():
+def test_normals_without_votes_stay():
     _, normals = ball(20)
     _, neighbours = nearest_neighbours(normals, 8)
-    np.testing.assert_array_equal(orient_by_curvature(normals, np.zeros((20, 3)), neighbours), normals)
     np.testing.assert_array_equal(orient_from_axis(normals, normals, normals, neighbours), normals)
     np.testing.assert_array_equal(orient_by_votes(normals, np.zeros(20), neighbours), normals)
 
@@ -275,5 +233,4 @@ def test_input_is_not_changed():
     for each in given:
         each.flags.writeable = False
     winding_number(*given)
-    orient_by_curvature(normals, points, nearest_neighbours(points, 8)[1])
     orient_from_axis(points, normals, queries, nearest_neighbours(points, 8)[1])

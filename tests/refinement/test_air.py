@@ -7,6 +7,8 @@ import pytest
 
 from glsk_o3d.refinement.air import branch_facts, cut_air
 from glsk_o3d.refinement.evidence import Evidence
+from glsk_o3d.refinement.spurs import prune_spurs
+from glsk_o3d.samples import torus
 
 X, Y, Z = np.eye(3)
 RAILS = [[(-1, 0, 0), (0, 0, 0), (1, 0, 0)], [(-1, 0.5, 0), (0, 0.5, 0), (1, 0.5, 0)]]
@@ -28,7 +30,8 @@ def test_an_edge_between_two_tubes_is_cut(piped, noise):
     assert (false.about, len(judgements)) == ("air", 5)
     assert false.probability > 0.5
     np.testing.assert_allclose(false.place, [0, 0.25, 0], atol=0.16)
-    # what stays lies in the tubes, and has all points
+    # what stays lies in the tubes, but for stubs, and has all points
+    skeleton, _ = prune_spurs(skeleton, 0.5)
     off_axis = np.minimum(np.abs(skeleton.vertices[:, 1]), np.abs(skeleton.vertices[:, 1] - 0.5))
     assert off_axis.max() < 0.16
     assert skeleton.vertex_of_point.min() >= 0
@@ -80,17 +83,50 @@ def test_goes_with_the_cloud(piped):
 def test_the_facts_of_a_false_edge(piped):
     raw = piped(ACROSS, tubes=[0, 1])
     found = {}
-    for branch, facts, place, stretch in branch_facts(raw, Evidence.of(raw), 0.25):
+    for branch, place, facts in branch_facts(raw, Evidence.of(raw), 0.25):
         ends = raw.vertices[branch[[0, -1]]]
         across = abs(ends[1, 1] - ends[0, 1]) > 0.4
         found[across] = facts
         assert 0 <= place < len(branch) - 1
-        assert len(stretch) >= 1
         assert facts["noise"] == 0.25
     assert found[True]["deficit"] > found[False]["deficit"] + 1
     assert found[True]["surface"] == pytest.approx(np.log(0.05), abs=0.5)
     assert found[True]["bonds"] == pytest.approx(np.log(0.05), abs=0.5)
-    assert found[True]["straightness"] < 0.9
-    assert found[True]["inner"], not found[False]["inner"]
+    assert found[True]["straightness"] == pytest.approx(0.15 / np.hypot(0.15, 0.05))  # turns after 2.5 of 3 radii
+    assert (found[True]["inner"], found[False]["inner"]) == (1, 0)
     assert found[True]["length"] == pytest.approx(np.log(5.1), abs=1e-6)
     assert found[False]["straightness"] == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("turn", [0, 7, 13])
+def test_a_ring_has_no_seam(around, turn):
+    """Its weakest place is where its points are fewest, and bonds cross all of it, whichever vertex is the first."""
+    cloud = torus(4000)
+    angle = np.arctan2(*cloud.points[:, 1::-1].T)
+    thinned = (np.abs(angle - 1) > 0.2) | (np.arange(4000) % 8 == 0)
+    points = cloud.points[thinned]
+    axis = 0.4 * points * [1, 1, 0] / np.linalg.norm(points[:, :2], axis=1, keepdims=True)
+    way = 2 * np.pi * (np.arange(20) + turn) / 20
+    vertices = 0.4 * np.column_stack([np.cos(way), np.sin(way), 0 * way])
+    raw = around(vertices, [tuple(sorted((i, (i + 1) % 20))) for i in range(20)], points, (points - axis) / 0.1)
+    raw = replace(raw, edges=np.unique(raw.edges, axis=0))
+    ((branch, place, facts),) = branch_facts(raw, Evidence.of(raw), 0.0)
+    middle = raw.vertices[branch[place : place + 2]].mean(axis=0)
+    np.testing.assert_allclose(np.arctan2(middle[1], middle[0]), 1, atol=0.3)
+    assert facts["bonds"] > -1
+    ((_, _, other),) = branch_facts(around_again(raw), Evidence.of(around_again(raw)), 0.0)
+    assert other == pytest.approx(facts, abs=1e-3)
+
+
+def around_again(skeleton):
+    """The same with its vertices numbered from elsewhere."""
+    m = len(skeleton.vertices)
+    new = (np.arange(m) + 5) % m
+    order = np.argsort(new)
+    return replace(
+        skeleton,
+        vertices=skeleton.vertices[order],
+        radii=skeleton.radii[order],
+        edges=np.unique(np.sort(new[skeleton.edges], axis=1), axis=0),
+        vertex_of_point=new[skeleton.vertex_of_point],
+    )

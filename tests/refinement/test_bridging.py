@@ -122,8 +122,6 @@ def test_the_facts_of_a_gap(piped):
     seen = facts(piped(LIMB))
     ends = facts(capped(piped(LIMB), (-0.15 * X, X), (0.15 * X, -X)))
     assert seen["straightness"] == pytest.approx(1)
-    assert seen["sheets"] == pytest.approx(np.log(0.05), abs=0.3)
-    assert ends["sheets"] > seen["sheets"] + 1.5
     assert seen["cap"] < np.log(0.4)
     assert ends["cap"] == pytest.approx(np.log(1.1), abs=0.3)
 

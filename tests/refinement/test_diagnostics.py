@@ -169,12 +169,13 @@ def test_names_the_closest_call():
         Judgement("loop", (0.0, 1.0, 2.0), 0.55, changed=False),
         Judgement("air", (3.0, 4.0, 5.0), 0.7, changed=True),
         Judgement("gap", (6.0, 7.0, 8.0), 0.9, changed=True),
+        Judgement("limb", (6.0, 7.0, 8.0), 0.5, changed=False),
     ]
     skeleton = skeleton_of(torus())
     judged = replace(skeleton, report=replace(skeleton.report, judgements=tuple(calls)))
     assert diagnose(judged) == [
-        "uncertain topology: 1 of 3 questions were close calls, above all whether the loop at (0, 1, 2) is a handle "
-        "(probability 0.55)"
+        "uncertain topology: 2 of 3 questions about loops, air and gaps were close calls, above all whether the loop "
+        "at (0, 1, 2) is a handle (probability 0.55)"
     ]
-    clear = replace(skeleton, report=replace(skeleton.report, judgements=(calls[2],)))
+    clear = replace(skeleton, report=replace(skeleton.report, judgements=tuple(calls[2:])))
     assert diagnose(skeleton) == diagnose(clear) == []

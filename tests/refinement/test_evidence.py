@@ -64,16 +64,15 @@ def test_areas_are_those_of_the_surface(piped):
     skeleton = piped(TUBE)
     evidence = Evidence.of(skeleton)
     assert evidence.areas.sum() == pytest.approx(2 * np.pi * 0.1 * 2, rel=0.15)
-    along, across = evidence.surface_around(skeleton)
-    assert across.sum() < 0.1 * along.sum()
+    along = evidence.surface_around(skeleton)
     inner = np.abs(skeleton.vertices[skeleton.edges].mean(axis=1)[:, 0]) < 0.8
-    assert (along + across).sum() == pytest.approx(evidence.areas.sum())
+    assert along.sum() == pytest.approx(evidence.areas.sum(), rel=0.1)
     np.testing.assert_allclose(along[inner], 2 * np.pi * 0.1 * 0.05, rtol=0.5)
 
 
 def test_hardly_any_surface_has_a_false_edge_for_its_axis(piped):
     skeleton = piped(ACROSS, tubes=[0, 1])
-    along, _ = Evidence.of(skeleton).surface_around(skeleton)
+    along = Evidence.of(skeleton).surface_around(skeleton)
     middle = skeleton.vertices[skeleton.edges].mean(axis=1)
     across = (middle[:, 1] > 0.1) & (middle[:, 1] < 0.4)
     assert across.sum() == 6

@@ -10,13 +10,15 @@ from glsk_o3d import Skeleton
 from glsk_o3d.numerics.polylines import arc_lengths
 from glsk_o3d.refinement.junctions import Limbs, level_tips, move_junctions
 from glsk_o3d.refinement.reattachment import reattach_limbs
+from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from glsk_o3d.refinement.spurs import prune_spurs
 
 R = 0.1
 
 
 def pruned(skeleton, reach):
-    return prune_spurs(skeleton, reach)[0]
+    """Without the branches that reach less far."""
+    return prune_spurs(skeleton, probability(LIMB_WEIGHTS, {"reach": np.log(reach + 0.1)}))[0]
 
 
 def capsules(ends, per=3000):

@@ -31,12 +31,14 @@ def test_extreme_facts_overflow_nothing(a, limit):
 @pytest.mark.parametrize(
     ("name", "more", "less"),
     [
-        ("AIR_WEIGHTS", {"deficit", "noise", "inner"}, {"surface", "straightness", "bonds"}),
-        ("HANDLE_WEIGHTS", {"opening", "confidence"}, {"winding"}),
-        ("BRIDGE_WEIGHTS", {"winding", "straightness"}, {"sheets", "cap"}),
+        ("AIR_WEIGHTS", {"deficit", "noise", "inner"}, {"surface", "straightness", "bonds", "length"}),
+        ("HANDLE_WEIGHTS", {"opening", "bonds", "confidence"}, {"winding"}),
+        ("BRIDGE_WEIGHTS", {"winding", "straightness"}, {"cap"}),
+        ("LIMB_WEIGHTS", {"reach"}, set()),
     ],
 )
 def test_every_fact_speaks_the_way_it_should(name, more, less):
     weights = getattr(scores, name)
+    assert weights.keys() == {"constant", *more, *less}
     assert all(weights[fact] > 0 for fact in more)
     assert all(weights[fact] < 0 for fact in less)

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
 from glsk_o3d.numerics.polylines import relative_distance
+from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from glsk_o3d.refinement.spurs import SPUR_QUANTILE, limb_facts, prune_spurs
 
 N = 21  # vertices of the trunk
@@ -16,7 +17,8 @@ PER = 60  # points of each: many, so that a cut spur does not change the thickne
 
 
 def pruned(skeleton, reach):
-    return prune_spurs(skeleton, reach)[0]
+    """Without the branches that reach less far."""
+    return prune_spurs(skeleton, probability(LIMB_WEIGHTS, {"reach": np.log(reach + 0.1)}))[0]
 
 
 def directions(n, seed=0):
@@ -210,11 +212,20 @@ def test_two_ways_between_two_junctions_stay(ringed):
 
 
 def test_reach_is_that_of_the_points_over_the_surface():
-    skeleton = tree((5, 0.3), (12, 0.5))
-    found = {int(path[-1]): (int(path[0]), np.exp(facts["reach"]) - 0.1) for path, facts in limb_facts(skeleton)}
+    found = {leaf: np.exp(facts["reach"]) - 0.1 for leaf, facts in limb_facts(tree((5, 0.3), (12, 0.5)))}
     assert set(found) >= {N + 1, N + 3}
-    for tip, junction, reach in ((N + 1, 5, 0.3), (N + 3, 12, 0.5)):
-        assert found[tip] == (junction, pytest.approx(reach / 0.1, rel=0.15))
+    for tip, reach in ((N + 1, 0.3), (N + 3, 0.5)):
+        assert found[tip] == pytest.approx(reach / 0.1, rel=0.15)
+
+
+def test_what_is_pruned_was_judged():
+    raw = tree((5, 0.05), (12, 0.5))
+    skeleton, limbs = prune_spurs(raw, 0.5)
+    gone = [it for it in limbs if it.changed]
+    assert len(raw.leaves) - len(skeleton.leaves) == len(gone) == 1
+    assert gone[0].place == tuple(raw.vertices[N + 1].tolist())
+    assert gone[0].probability < 0.5
+    assert all(it.probability >= 0.5 for it in limbs if not it.changed)
 
 
 def test_the_farther_a_limb_reaches_the_more_probable_it_is():
