@@ -13,7 +13,7 @@ from .refinement.bridging import bridge_gaps
 from .refinement.diagnostics import diagnose
 from .refinement.evidence import Evidence
 from .refinement.junctions import level_tips, move_junctions
-from .refinement.loops import close_loops
+from .refinement.loops import close_loops, zip_narrow_loops
 from .refinement.reattachment import reattach_limbs
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
@@ -29,14 +29,15 @@ class Refiner(Filter[Skeleton]):
 
     1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
        the shortest, until there is no triangle.
-    2. Edges are subdivided, so that chords do not cut corners.
-    3. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
+    2. Loops that open less than their tube is thick, two strands in one part, are zipped up.
+    3. Edges are subdivided, so that chords do not cut corners.
+    4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
        side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
-    4. The topology is judged by what the surface around the curve says: loops that are probably no handles are closed;
+    5. The topology is judged by what the surface around the curve says: loops that are probably no handles are closed;
        limbs that run beside another one inside its tube begin where they leave it, and branches that are probably no
        limbs are pruned; branches that probably cross air are cut, and gaps across which the object probably goes on are
        bridged.
-    5. Junctions move to where limbs meet.
+    6. Junctions move to where limbs meet.
 
     The first step is published; with all options 0 it is the only one.
 
@@ -120,6 +121,8 @@ class Refiner(Filter[Skeleton]):
     def _fit(self, skeleton: Skeleton) -> Skeleton:
         """Make the graph one-dimensional and centre it."""
         skeleton = collapse_triangles(skeleton)
+        if self.handle:
+            skeleton = zip_narrow_loops(skeleton)
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
         return fit_axis(skeleton, self.recentre)
@@ -139,10 +142,9 @@ class Refiner(Filter[Skeleton]):
             limbs += more
         skeleton, gaps = self._bridge(skeleton, evidence)
         if _changed([*cuts, *gaps]):
-            limbs, (skeleton, more) = _of_changes(limbs), self._settle(self._refit(skeleton))
-            limbs += more
-            if self.handle:
-                loops = _of_changes(loops) + close_loops(skeleton, evidence, 0)[1]
+            loops, (skeleton, again) = _of_changes(loops), self._close(self._refit(skeleton), evidence)
+            limbs, (skeleton, more) = _of_changes(limbs), self._settle(skeleton)
+            loops, limbs = loops + again, limbs + more
         closed, cut, bridged = (len(_of_changes(found)) for found in (loops, cuts, gaps))
         report = replace(
             skeleton.report,

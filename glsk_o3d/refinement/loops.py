@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..numerics.components import component_labels
-from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
+from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, opens_wider
 from ..numerics.groups import group_median
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, norm
@@ -31,6 +31,30 @@ def surface_distance(skeleton: Skeleton) -> np.ndarray:
     vertex = skeleton.vertex_of_point[supporting]
     distance = norm(skeleton.points[supporting] - skeleton.vertices[vertex])
     return group_median(distance, vertex, len(skeleton.vertices))
+
+
+def zip_narrow_loops(skeleton: Skeleton) -> Skeleton:
+    """Zip up the loops that open less than their tube is thick, before there is a fit: they lie inside one part.
+
+    The opening of a loop is the radius of the largest circle inside it; the tube's is the median over the loop of the
+    distance from its vertices to the surface. All such loops of a minimum cycle basis go at once, until there are none.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    Skeleton
+        Without triangles.
+    """
+    while True:
+        surface = surface_distance(skeleton)
+        cycles = minimum_cycle_basis(len(surface), skeleton.edges, skeleton.edge_lengths)
+        narrow = [cycle for cycle in cycles if not opens_wider(skeleton.vertices[cycle], np.median(surface[cycle]))]
+        if not narrow:
+            return skeleton
+        skeleton = _zipped(skeleton, narrow)
 
 
 def _zipped(skeleton: Skeleton, cycles: list[np.ndarray]) -> Skeleton:
