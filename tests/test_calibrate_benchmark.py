@@ -195,9 +195,7 @@ def test_asks_what_the_refiner_asks(parts):
     told = {"loop": "HANDLE_WEIGHTS", "air": "AIR_WEIGHTS", "gap": "BRIDGE_WEIGHTS", "limb": "LIMB_WEIGHTS"}
     asked = [
         (about, scores.probability(getattr(scores, told[about]), facts))
-        for about, facts, _ in parts.questions.asked(
-            cloud.points, Truth(cloud.nodes, cloud.edges, cloud.radii), pipeline
-        )
+        for about, facts, _ in parts.questions.asked(cloud.points, truth, pipeline)
     ]
     report = pipeline(cloud.points).report
     found = [(it.about, it.probability) for it in report.judgements]

@@ -8,18 +8,18 @@ import numpy as np
 
 # All fitted, by benchmarks/calibrate.py on random shapes as scanners see them; docs/method.md says what the facts are.
 AIR_WEIGHTS = {
-    "constant": -4.1,
-    "deficit": 2.9,
+    "constant": -2.9,
+    "deficit": 2.6,
     "surface": -1.1,
-    "straightness": -3.2,
-    "noise": 3.5,
-    "bonds": -0.8,
-    "inner": 2.4,
-    "length": -1.5,
+    "straightness": -4.7,
+    "noise": 4.0,
+    "bonds": -0.9,
+    "inner": 1.7,
+    "length": -1.3,
 }
-HANDLE_WEIGHTS = {"constant": -2.1, "opening": 6.2, "winding": -3.3, "bonds": 0.6, "confidence": 3.5}
-BRIDGE_WEIGHTS = {"constant": -3.3, "winding": 4.6, "straightness": 2.6, "cap": -0.7}
-LIMB_WEIGHTS = {"constant": -2.4, "reach": 4.4}
+HANDLE_WEIGHTS = {"constant": 3.4, "opening": 3.3, "winding": -4.1, "bonds": 0.9, "confidence": 2.0}
+BRIDGE_WEIGHTS = {"constant": -3.7, "winding": 5.8, "straightness": 2.5, "cap": -0.7}
+LIMB_WEIGHTS = {"constant": -2.5, "reach": 4.4}
 
 
 def probability(weights: Mapping[str, float], facts: Mapping[str, float]) -> float:

@@ -8,7 +8,7 @@ import pytest
 
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
 from glsk_o3d.refinement.evidence import Evidence
-from glsk_o3d.refinement.loops import close_loops, loop_facts, surface_distance, zip_pairs
+from glsk_o3d.refinement.loops import close_loops, loop_facts, surface_distance, zip_narrow_loops, zip_pairs
 
 X, Y, Z = np.eye(3)
 LADDER = [[(-0.8, y, 0), (0, y, 0), (0.8, y, 0)] for y in (0, 0.5)] + [[(x, 0, 0), (x, 0.5, 0)] for x in (-0.8, 0, 0.8)]
@@ -59,6 +59,29 @@ def test_two_strands_in_one_tube_become_a_path(piped, side):
     assert probability < 0.25
     np.testing.assert_allclose(skeleton.vertices[:, 1:], 0, atol=0.02)
     assert (np.diff(np.sort(skeleton.vertices[:, 0])) < 0.06).all()
+
+
+@pytest.mark.parametrize(("gap", "zipped"), [(0.06, True), (0.12, True), (0.24, False)])
+def test_raw_loops_are_zipped_that_open_less_than_their_tube_is_thick(piped, gap, zipped):
+    """The largest circle between two strands has half their distance for its radius."""
+    raw = strands(piped, gap=gap)
+    reach = np.median(surface_distance(raw))
+    assert (gap / 2 < reach) == zipped
+    assert zip_narrow_loops(raw).n_loops == (0 if zipped else 1)
+
+
+def test_a_wide_loop_is_cut_where_fewest_bonds_cross(piped):
+    """A ring of which an eighth is in air, joined by hand."""
+    angle = np.arange(4, 29) * np.pi / 16
+    arc = [(np.cos(t), np.sin(t), 0) for t in angle]
+    raw = piped([arc])
+    ends = np.argsort(raw.vertices @ X)[-2:]
+    raw = replace(raw, edges=np.unique(np.concatenate([raw.edges, [np.sort(ends)]]), axis=0))
+    assert raw.n_loops == 1
+    skeleton, (judgement,) = closed(raw, least=1.01)
+    assert judgement.changed
+    assert (skeleton.n_loops, skeleton.n_components) == (0, 1)
+    assert sorted(skeleton.leaves.tolist()) == sorted(ends.tolist())
 
 
 def test_a_least_probability_of_none_keeps_all(piped):
