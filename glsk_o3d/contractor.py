@@ -59,6 +59,14 @@ class Contractor(Filter[Contraction]):
     reducer: Callable[[Contraction], Contraction] | None = parameter(
         None, "Merges redundant points after each solve; None keeps them all.", type="reducer?"
     )
+    reduce_above: int = parameter(
+        500,
+        "The reducer works only while more points are left: below, a pass costs more than it saves, and thin parts "
+        "lose the points that say where they are. 0 as published.",
+        type="int",
+        unit="points",
+        low=0,
+    )
     stop: StopRule = parameter(ExplainedScore(), "Decides after each solve whether to stop.", type="stop")
     max_iterations: int = parameter(10, "Most solves.", type="int", unit="solves", low=1)
     initial_contraction: float = parameter(
@@ -101,7 +109,7 @@ class Contractor(Filter[Contraction]):
                 return _finished(state, f"solve {len(state.report.iterations) + 1} {REFUSED}: {problem}")
             state = _record(state, **facts, seconds=time.perf_counter() - start)
             reason = self.stop(state.report.iterations)
-            if reason is None and reducer is not None:
+            if reason is None and reducer is not None and len(state) > self.reduce_above:
                 n = len(state)
                 state = _within(reducer(state), state.report)
                 if len(state) == n:

@@ -153,6 +153,7 @@ def remove_redundant_points(
     rings = RingBuilder(thin_to="all", outlier_factor=0, denoise=0) if rings is None else rings
     contractor = Contractor(
         reducer=LPRReducer() if reducer is None else reducer,
+        reduce_above=0,
         max_iterations=int(passes),
         stop=lambda iterations: None,
     )

@@ -46,6 +46,7 @@ def wen2024() -> Pipeline[Skeleton]:
         RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
         | Contractor(
             reducer=LPRReducer(conserve_mass=False, order="index", mend_rings=False),
+            reduce_above=0,
             stop=ExplainedScore(threshold=0.02),
             min_attraction=0,
             line_hold=1,

@@ -180,7 +180,7 @@ def test_explained_score(points, score):
 
 
 def test_records_follow_their_definitions(built):
-    filter = Contractor(reducer=LPRReducer(), stop=never, max_iterations=4)
+    filter = Contractor(reducer=LPRReducer(), reduce_above=0, stop=never, max_iterations=4)
     state = filter(built)
     records = state.report.iterations
     assert [record.iteration for record in records] == [1, 2, 3, 4]
@@ -224,7 +224,7 @@ def test_running_out_of_iterations_is_no_convergence(built):
 
 def test_reducing_ends_after_a_pass_without_a_merge(built):
     idle = Mock(side_effect=lambda state: state)
-    Contractor(reducer=idle, stop=never, max_iterations=4)(built)
+    Contractor(reducer=idle, reduce_above=0, stop=never, max_iterations=4)(built)
     assert idle.call_count == 1
 
 
@@ -242,7 +242,7 @@ def test_progress_is_told_once_per_solve(built, answer):
         told.append(record)
         return answer
 
-    filter = Contractor(reducer=LPRReducer(), stop=ExplainedScore())
+    filter = Contractor(reducer=LPRReducer(), reduce_above=0, stop=ExplainedScore())
     report = filter(built, on_iteration=listen).report
     assert tuple(told) == report.iterations
     assert [record.iteration for record in told] == list(range(1, len(told) + 1))
@@ -433,6 +433,14 @@ def test_attraction_has_a_floor_and_a_cap(built, monkeypatch, floor):
 def test_presets_hold_nothing_and_have_no_floor():
     for filter in (CAO, WEN):
         assert (filter.min_attraction, filter.retries, filter.line_hold) == (0, 0, 1)
+    assert WEN.reduce_above == 0
+
+
+@pytest.mark.parametrize("above", [0, 150, 250, 400, 1000])
+def test_reducer_rests_when_few_are_left(built, above):
+    filter = Contractor(reducer=LPRReducer(), reduce_above=above, stop=never, max_iterations=5)
+    for record in filter(built).report.iterations:
+        assert (record.n_merged > 0) == (record.n_points > above)
 
 
 # ---- what is a line already
@@ -516,7 +524,7 @@ def test_lines_are_held_from_the_second_solve_on(built, monkeypatch, hold, floor
 def test_held_lines_keep_their_bends():
     """Contraction that goes on and on shrinks a ring, unless what has become a line is held."""
     built = RingBuilder()(samples.torus(n=1000).points)
-    filter = Contractor(reducer=LPRReducer(), stop=never, max_iterations=8)
+    filter = Contractor(reducer=LPRReducer(), reduce_above=0, stop=never, max_iterations=8)
 
     def ring(hold):
         x = replace(filter, line_hold=hold)(built).contracted

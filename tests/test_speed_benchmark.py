@@ -224,7 +224,8 @@ class TestArithmetic:
             ahead, contractor = found[key]
             rings, same = getattr(pipelines, name)().stages[:2]
             assert ahead.stages == (rings,)
-            for field in vars(same):
+            aside = ("reduce_above",) if contractor.reducer is None else ()  # says nothing without a reducer
+            for field in set(vars(same)) - {*aside}:
                 assert getattr(contractor, field) == getattr(same, field), (name, field)
 
     def test_ratios_are_paired(self, parts):

@@ -23,6 +23,7 @@ IDEAS = {
     "mass of merged points": "LPRReducer.conserve_mass=false",
     "cheapest merges first": "LPRReducer.order=index",
     "mended rings": "LPRReducer.mend_rings=false",
+    "reduction that stops": "Contractor.reduce_above=0",
     "stop by score": "Contractor.stop=RingSizeRatio",
     "stop at 3 %": "ExplainedScore.threshold=0.02",
     "last solve kept": "Contractor.keep_last=false",

@@ -13,7 +13,7 @@ from glsk_o3d.analysis.matching import TIP_REACH, matched
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
 from glsk_o3d.refinement.air import branch_facts
 from glsk_o3d.refinement.bridging import gap_facts
-from glsk_o3d.refinement.evidence import LEAST_INSIDE, Evidence
+from glsk_o3d.refinement.evidence import Evidence
 from glsk_o3d.refinement.loops import loop_facts
 from glsk_o3d.refinement.reattachment import reattach_limbs
 from glsk_o3d.refinement.spurs import limb_facts
@@ -55,8 +55,7 @@ def _loops(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tup
     if cycles:
         placed = Placed(truth, skeleton.vertices)
         for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
-            is_so = placed.is_handle(cycle)
-            if is_so is not None and loop.inside >= LEAST_INSIDE:
+            if (is_so := placed.is_handle(cycle)) is not None:  # also without an inside: of false ones there are few
                 yield "loop", loop.facts, is_so
 
 

@@ -17,7 +17,7 @@ AIR_WEIGHTS = {
     "inner": 1.7,
     "length": -1.3,
 }
-HANDLE_WEIGHTS = {"constant": 3.4, "opening": 3.3, "winding": -4.1, "bonds": 0.9, "confidence": 2.0}
+HANDLE_WEIGHTS = {"constant": 1.9, "opening": 3.5, "winding": -4.0, "bonds": 0.8, "confidence": 2.8}
 BRIDGE_WEIGHTS = {"constant": -3.7, "winding": 5.8, "straightness": 2.5, "cap": -0.7}
 LIMB_WEIGHTS = {"constant": -2.5, "reach": 4.4}
 
