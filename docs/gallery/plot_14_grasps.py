@@ -17,7 +17,7 @@ import glsk_o3d as glsk
 from glsk_o3d.analysis import grasp_candidates
 from glsk_o3d.samples import sauropod
 
-cloud = sauropod(8192, noise=0.001).points
+cloud = sauropod(8192, noise=0.002).points
 skeleton = glsk.skeletonize(cloud)
 
 # %%

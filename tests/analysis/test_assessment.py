@@ -184,8 +184,9 @@ def test_skeletons_that_are_none(pipe, vertices, edges, message, curve):
             measure(curve(vertices, edges))
 
 
-def test_the_example_in_the_documentation(root, capsys):
+def test_the_example_in_the_documentation(root, capsys, tmp_path, monkeypatch):
     (code,) = re.findall(r"```python\n(.*?)```", (root / "docs" / "evaluation.md").read_text(), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
     exec(compile(code, "docs/evaluation.md", "exec"), {})
     promised = re.findall(r"# prints (.*)", code)
     assert capsys.readouterr().out.splitlines() == promised
