@@ -395,5 +395,5 @@ def test_the_input_is_not_changed(ring):
 
 
 def test_a_real_scan(shared_dir):
-    found = cross_check(read_cloud(shared_dir / "data" / "omni_dumbbell.ply"))
+    found = cross_check(read_cloud(shared_dir / "data" / "simplejoint.ply"))
     assert (found.verdict, found.skeletons.loops) == ("agrees", (0, 0))
