@@ -45,7 +45,8 @@ class Refiner(Filter[Skeleton]):
     -----
     SkeletonWarning
         Where no curve skeleton is meaningful, sphere-like or sheet-like clouds, and where many points do not say where
-        the axis is; it names the region. Where questions about the topology were close calls; it names the closest.
+        the axis is; it names the region. Where questions about loops, air or gaps were close calls; it names the
+        closest.
 
     Notes
     -----
@@ -109,7 +110,8 @@ class Refiner(Filter[Skeleton]):
 
     def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
         skeleton = self._fit(skeleton)
-        if len(skeleton.edges) and len(skeleton.supporting_points) and self._asks:
+        asks = self.handle or self.limb or self.air or self.bridge
+        if len(skeleton.edges) and len(skeleton.supporting_points) and (asks or self.recentre):
             skeleton = self._judge(skeleton)
         if self.recentre:
             skeleton = level_tips(move_junctions(skeleton))
@@ -127,12 +129,8 @@ class Refiner(Filter[Skeleton]):
             skeleton = subdivide_edges(skeleton, self.spacing)
         return fit_axis(skeleton, self.recentre)
 
-    @property
-    def _asks(self) -> bool:
-        return bool(self.handle or self.limb or self.air or self.bridge)
-
     def _judge(self, skeleton: Skeleton) -> Skeleton:
-        """Close false loops, prune spurs, cut what crosses air, bridge gaps; fit the axis anew where that changed."""
+        """Close false loops, prune spurs, cut what crosses air, bridge gaps; then ask for loops and limbs anew."""
         evidence = Evidence.of(skeleton)
         skeleton, loops = self._close(skeleton, evidence)
         skeleton, limbs = self._settle(skeleton)

@@ -87,7 +87,7 @@ class Judgement:
     Attributes
     ----------
     about : {"air", "loop", "gap", "limb"}
-        Whether a stretch of a branch crosses air, a loop is a handle, a gap is bridged by the object, or a branch is a
+        Whether a branch crosses air, a loop is a handle, a gap is bridged by the object, or a branch is a
         limb and no spur.
     place : (x, y, z)
         In the cloud's units.

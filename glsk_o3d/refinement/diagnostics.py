@@ -25,8 +25,8 @@ def diagnose(skeleton: Skeleton) -> list[str]:
 
     Sheet-like: the normals around a vertex have one direction. Sphere-like: the normal lines of a whole component meet
     in one point, or it is hardly longer than thick. All are scale-free and ask the cloud, not the skeleton. Of a cloud
-    that is neither, the parts with little confidence are named, and the least certain question about the topology. No
-    edges at all are a reason, too.
+    that is neither, the parts with little confidence are named, and the least certain question about loops, air and
+    gaps. No edges at all are a reason, too.
     """
     supporting = skeleton.supporting_points
     if len(supporting) == 0:

@@ -210,6 +210,8 @@ def zip_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     first, last = np.unravel_index(np.argmax(distance), distance.shape)
     n = len(points)
+    if first == last:  # all in one place
+        return np.column_stack([np.repeat(labels[:1], n - 1), labels[1:]])
     sides = [
         np.arange(first, first + (last - first) % n + 1) % n,
         np.arange(first, first - (first - last) % n - 1, -1) % n,
@@ -221,4 +223,4 @@ def zip_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
     nearest = np.abs(along[0][:, None] - along[1][None])
     pairs = [(i, int(np.argmin(nearest[i]))) for i in range(1, len(sides[0]) - 1)]
     pairs += [(int(np.argmin(nearest[:, j])), j) for j in range(1, len(sides[1]) - 1)]
-    return np.array([(labels[sides[0][i]], labels[sides[1][j]]) for i, j in pairs], int).reshape(-1, 2)
+    return np.array([(labels[sides[0][i]], labels[sides[1][j]]) for i, j in pairs])

@@ -165,6 +165,10 @@ def test_zip_pairs_of_uneven_sides(turn):
     assert {frozenset(pair) for pair in pairs.tolist()} == {frozenset({0, 1}), frozenset({2, 5}), frozenset({3, 4})}
 
 
+def test_zip_pairs_of_a_loop_in_one_place():
+    assert zip_pairs(np.zeros((4, 3)), np.arange(4)).tolist() == [[0, 1], [0, 2], [0, 3]]
+
+
 def test_every_inner_vertex_is_in_a_pair():
     rng = np.random.default_rng(0)
     for n in range(4, 20):
