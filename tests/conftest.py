@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import tomlkit
 from hypothesis import HealthCheck, settings
+from typer.testing import CliRunner
 
 from glsk_o3d.recipes.plugins import forget_plugins
 from glsk_o3d.report import IterationRecord, Report
@@ -68,6 +69,18 @@ def benchmark(root):
                 del sys.modules[new]
 
     return imported
+
+
+@pytest.fixture
+def call(tool):
+    """Run a command of the benchmark that a test's module calls `tool`; gives what it printed."""
+
+    def run(*arguments, code=0):
+        result = CliRunner().invoke(tool.app, [*map(str, arguments)])
+        assert result.exit_code == code, result.output
+        return result.output
+
+    return run
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from scipy import stats
 from scipy.spatial import cKDTree
-from typer.testing import CliRunner
 
 from glsk_o3d import pipelines
 from glsk_o3d.analysis import compare
@@ -35,18 +34,6 @@ def parts(tool):
     made_of = {"_accuracy", "_common"}
     found = ((name.split("."), module) for name, module in sys.modules.items())
     return SimpleNamespace(**{name[1]: module for name, module in found if name[0] in made_of and name[1:]})
-
-
-@pytest.fixture
-def call(tool):
-    """Run a command; gives what it printed."""
-
-    def run(*arguments, code=0):
-        result = CliRunner().invoke(tool.app, [*map(str, arguments)])
-        assert result.exit_code == code, result.output
-        return result.output
-
-    return run
 
 
 def row(shape="torus", variant="clean_512", pipeline="default", **values):

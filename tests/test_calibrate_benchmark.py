@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.special import expit
-from typer.testing import CliRunner
 
 from glsk_o3d.analysis import Truth
 from glsk_o3d.pipelines import default
@@ -28,18 +27,6 @@ def parts(tool):
     """The modules that it is made of, by their names."""
     found = ((name.split("."), module) for name, module in sys.modules.items())
     return SimpleNamespace(**{name[1]: module for name, module in found if name[0] == "_calibration" and name[1:]})
-
-
-@pytest.fixture
-def call(tool):
-    """Run a command; gives what it printed."""
-
-    def run(*arguments, code=0):
-        result = CliRunner().invoke(tool.app, [*map(str, arguments)])
-        assert result.exit_code == code, result.output
-        return result.output
-
-    return run
 
 
 def ring(n, turn=0.0):

@@ -10,7 +10,6 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from glsk_o3d import LPRReducer, Skeleton, contractor, numerics, pipelines
 from glsk_o3d.numerics.cores import cores
@@ -37,16 +36,10 @@ def stopwatch(parts):
 
 
 @pytest.fixture
-def call(tool, parts, monkeypatch):
+def call(call, parts, monkeypatch):
     """Run a command, small clouds only as often as asked for; gives what it printed."""
     monkeypatch.setattr(parts.timing, "LEAST", 0.0)
-
-    def run(*arguments, code=0):
-        result = CliRunner().invoke(tool.app, [*map(str, arguments)])
-        assert result.exit_code == code, result.output
-        return result.output
-
-    return run
+    return call
 
 
 @pytest.fixture

@@ -16,6 +16,11 @@ def arc_lengths(path: np.ndarray) -> np.ndarray:
     return np.concatenate([[0], np.cumsum(norm(np.diff(path, axis=0)))])
 
 
+def place_at(path: np.ndarray, lengths: np.ndarray, length: float) -> np.ndarray:
+    """The place so far along a path, (p, 3) float array with its `arc_lengths`; (3,) float array."""
+    return np.array([np.interp(length, lengths, x) for x in path.T])
+
+
 def relative_distance(
     points: np.ndarray, vertices: np.ndarray, surface: np.ndarray, paths: Sequence[np.ndarray]
 ) -> np.ndarray:

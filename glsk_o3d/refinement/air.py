@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from heapq import heappop, heappush
 
 import numpy as np
 
+from ..numerics.polylines import place_at
 from ..numerics.vectors import TINY
 from ..report import Judgement
 from ..skeleton import Skeleton
 from .evidence import Evidence
 from .loops import crossings
-from .merging import drop_lone_vertices
+from .merging import drop_edges, drop_lone_vertices
 from .scores import AIR_WEIGHTS, probability
 
 AIR_WINDOW = 1.0  # derived: radii of a branch along which evidence is averaged; a false edge is two radii long or more
@@ -47,11 +47,10 @@ def cut_air(skeleton: Skeleton, evidence: Evidence, noise: float, least: float) 
         middle = skeleton.vertices[weakest].mean(axis=0)
         judgements.append(Judgement("air", tuple(middle.tolist()), chance, chance >= least))
         if chance >= least:
-            gone.append(np.sort(weakest))
+            gone.append(sorted(weakest.tolist()))
     if not gone:
         return skeleton, judgements
-    left = (skeleton.edges[:, None] != np.array(gone)).any(axis=2).all(axis=1)
-    return drop_lone_vertices(replace(skeleton, edges=skeleton.edges[left])), judgements
+    return drop_lone_vertices(drop_edges(skeleton, gone)), judgements
 
 
 def branch_facts(
@@ -201,8 +200,8 @@ def _beyond(
         path = [tip]
         while path[-1] != start:
             path.append(before[path[-1]])
-        along, places = [travelled[v] for v in reversed(path)], vertices[path[::-1]]
+        along, places = np.array([travelled[v] for v in reversed(path)]), vertices[path[::-1]]
         stop = min(along[-1], reach)
-        first, last = (np.array([np.interp(s, along, x) for x in places.T]) for s in (stop / 3, stop))
+        first, last = place_at(places, along, stop / 3), place_at(places, along, stop)
         found.append((last - first) / max(float(np.linalg.norm(last - first)), TINY))
     return found

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..numerics.components import component_labels
-from ..numerics.polylines import arc_lengths, relative_distance
+from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
 from .loops import surface_distance
@@ -98,7 +98,7 @@ class Limbs:
             inside = np.flatnonzero(relative_distance(near, self.vertices, self.surface, others) <= AXIS_LEAVES)
             start = min(along[inside[-1] + 1], half) if len(inside) else start
         stop = min(start + AXIS_LENGTH * radius, along[-1])
-        anchor, back = (np.array([np.interp(s, along, x) for x in places.T]) for s in (start, stop))
+        anchor, back = place_at(places, along, start), place_at(places, along, stop)
         return anchor, (anchor - back) / max(np.linalg.norm(anchor - back), TINY), start
 
     def meeting(self, limbs: list[int], near: np.ndarray) -> Meeting:

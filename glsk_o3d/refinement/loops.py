@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from ..numerics.vectors import TINY, norm
 from ..report import Judgement
 from ..skeleton import Skeleton
 from .evidence import LEAST_INSIDE, Evidence
-from .merging import merge_vertices
+from .merging import drop_edges, merge_vertices
 from .scores import HANDLE_WEIGHTS, probability
 from .triangles import collapse_triangles
 
@@ -100,8 +99,7 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
         if not narrow and not cut:
             return skeleton, judgements + kept
         if cut:
-            gone = (skeleton.edges[:, None] == np.array(cut)).all(axis=2).any(axis=1)
-            skeleton = replace(skeleton, edges=skeleton.edges[~gone])
+            skeleton = drop_edges(skeleton, cut)
         if narrow:
             skeleton = _zipped(skeleton, narrow)
 

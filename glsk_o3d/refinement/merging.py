@@ -50,6 +50,12 @@ def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
     )
 
 
+def drop_edges(skeleton: Skeleton, gone: list[list[int]]) -> Skeleton:
+    """Drop some edges, each named by its two vertices, the lower first; vertices stay."""
+    dropped = (skeleton.edges[:, None] == np.array(gone)).all(axis=2).any(axis=1)
+    return replace(skeleton, edges=skeleton.edges[~dropped])
+
+
 def drop_lone_vertices(skeleton: Skeleton) -> Skeleton:
     """Drop vertices without edges, unless there is nothing else; their points go to the nearest vertex left."""
     left = np.flatnonzero(skeleton.degree > 0)
