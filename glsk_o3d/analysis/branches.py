@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InvalidParameterError
+from ..numerics.polylines import place_at
 from .branch_rows import BranchTable
 from .curvature import curvature_torsion
 from .growth import axes, grow
@@ -149,5 +150,4 @@ def _heading(curve, radius):
     along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
     reach = along[-1]
     near, far = np.minimum(np.multiply(HEADING_SPAN, radius), [reach / 2, reach]) if radius > 0 else (0, reach / 4)
-    a, b = (np.array([np.interp(place, along, column) for column in curve.T]) for place in (near, far))
-    return b - a
+    return place_at(curve, along, far) - place_at(curve, along, near)

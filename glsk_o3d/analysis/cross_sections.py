@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..numerics.groups import group_median, group_sum
 from ..numerics.neighbourhoods import plane_axes
+from ..numerics.polylines import place_at
 
 # All fitted; what an arc has is derived.
 POINTS_PER_SECTION, MOST_SECTIONS = 24, 1000  # points on average, and sections of a skeleton at most
@@ -100,7 +101,7 @@ def _cut(vertices, branches, n_points, shortest):
             continue
         pieces = max(1, round(travelled[-1] / step))
         at = np.linspace(0, travelled[-1], 2 * pieces + 1)
-        curve = np.stack([np.interp(at, travelled, column) for column in vertices[path].T], axis=1)
+        curve = place_at(vertices[path], travelled, at)
         middles.append(curve[1::2])
         cuts.append(curve[2::2] - curve[:-1:2])
         lengths.append(np.full(pieces, travelled[-1] / pieces))

@@ -16,9 +16,9 @@ def arc_lengths(path: np.ndarray) -> np.ndarray:
     return np.concatenate([[0], np.cumsum(norm(np.diff(path, axis=0)))])
 
 
-def place_at(path: np.ndarray, lengths: np.ndarray, length: float) -> np.ndarray:
-    """The place so far along a path, (p, 3) float array with its `arc_lengths`; (3,) float array."""
-    return np.array([np.interp(length, lengths, x) for x in path.T])
+def place_at(path: np.ndarray, lengths: np.ndarray, length: float | np.ndarray) -> np.ndarray:
+    """The place so far along a path, (p, 3) float array with its `arc_lengths`; (3,), or (k, 3) for k lengths."""
+    return np.stack([np.interp(length, lengths, x) for x in path.T], axis=-1)
 
 
 def relative_distance(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..numerics.groups import group_sum
@@ -50,9 +51,9 @@ def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
     )
 
 
-def drop_edges(skeleton: Skeleton, gone: list[list[int]]) -> Skeleton:
+def drop_edges(skeleton: Skeleton, gone: ArrayLike) -> Skeleton:
     """Drop some edges, each named by its two vertices, the lower first; vertices stay."""
-    dropped = (skeleton.edges[:, None] == np.array(gone)).all(axis=2).any(axis=1)
+    dropped = (skeleton.edges[:, None] == np.asarray(gone)).all(axis=2).any(axis=1)
     return replace(skeleton, edges=skeleton.edges[~dropped])
 
 

@@ -12,7 +12,7 @@ from ..numerics.polylines import arc_lengths, relative_distance
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
 from .junctions import AXIS_LEAVES, Limbs
-from .merging import merge_vertices
+from .merging import drop_edges, merge_vertices
 
 # derived: how far from its junction, in radii of the other, a limb's axis passes at least: a tube's width
 REATTACH_FROM = 2.0
@@ -86,16 +86,15 @@ def _beside(limbs: Limbs, limb: int, other: int) -> _Beside | None:
 
 
 def _reattached(skeleton: Skeleton, chosen: list[_Beside]) -> Skeleton:
-    m = len(skeleton.vertices)
-    group, gone, new = np.arange(m), [], []
+    group, gone, new = np.arange(len(skeleton.vertices)), [], []
     for beside in chosen:
         chain = np.append(beside.inside, beside.first)
-        gone.append(np.sort(np.column_stack([chain[:-1], chain[1:]]), axis=1) @ [m, 1])
+        gone.append(np.sort(np.column_stack([chain[:-1], chain[1:]]), axis=1))
         new.append(sorted((beside.first, beside.foot)))
         _, nearest = cKDTree(skeleton.vertices[beside.other]).query(skeleton.vertices[beside.inside[1:]])
         group[beside.inside[1:]] = beside.other[nearest]
-    edges = skeleton.edges[~np.isin(skeleton.edges @ [m, 1], np.concatenate(gone))]
-    edges = np.unique(np.concatenate([edges, new]), axis=0)
+    left = drop_edges(skeleton, np.concatenate(gone)).edges
+    edges = np.unique(np.concatenate([left, new]), axis=0)
     stay = np.unique(group)
     kept = {name: getattr(skeleton, name)[stay] for name in ("vertices", "radii", "confidence")}
     return replace(merge_vertices(replace(skeleton, edges=edges), group), **kept)
