@@ -13,7 +13,7 @@ from .errors import InvalidParameterError
 
 _Class = TypeVar("_Class", bound=type)
 
-TYPES = ("int", "float", "bool", "length", "choice", "reducer", "stop")
+TYPES = ("int", "float", "bool", "length", "point", "choice", "reducer", "stop")
 """What a parameter may be; with a trailing ``?`` also None."""
 
 
@@ -35,9 +35,9 @@ def parameter(
     default : object
     doc : str
         One sentence; it appears in the class's docstring and in ``glsk filters``.
-    type : {"int", "float", "bool", "length", "choice", "reducer", "stop"}
+    type : {"int", "float", "bool", "length", "point", "choice", "reducer", "stop"}
         A length is a float in the cloud's units or a string such as ``"2%"`` of the diagonal of the box that
-        `RingBuilder.frame` names. A trailing ``?`` allows None.
+        `RingBuilder.frame` names, a point a string such as ``"0.5,0,2"``. A trailing ``?`` allows None.
     unit : str
     low, high : float, optional
         Inclusive limits (`low` is exclusive with `open_low`); for a length in percent they limit nothing.
@@ -168,6 +168,9 @@ def problem_with(value: Any, facts: Any) -> str | None:
         return None if isinstance(value, bool) else "must be True or False"
     if kind == "choice":
         return f"must be one of {', '.join(map(repr, facts['choices']))}"
+    if kind == "point":
+        words = f"{', '.join(map(repr, facts['choices']))} or " if facts["choices"] else ""
+        return None if isinstance(value, str) and _numbers(value) else f"must be {words}a point such as '0.5,0,2'"
     if kind in ("reducer", "stop"):
         usable = callable(value) and not isinstance(value, type)
         return None if usable else f"must be a {kind}: an instance, not a class or a name"
@@ -186,6 +189,36 @@ def problem_with(value: Any, facts: Any) -> str | None:
     if high is not None and value > high:
         return f"must be at most {high}"
     return None
+
+
+def _numbers(text: str) -> tuple[float, ...] | None:
+    try:
+        numbers = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        return None
+    return numbers if len(numbers) == 3 and all(map(math.isfinite, numbers)) else None
+
+
+def resolve_point(text: str) -> tuple[float, ...]:
+    """A point written as ``"x,y,z"``.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    (x, y, z)
+
+    Examples
+    --------
+    >>> resolve_point("0.5,0,2")
+    (0.5, 0.0, 2.0)
+    """
+    numbers = _numbers(text)
+    if numbers is None:
+        raise InvalidParameterError(f"point {text!r}: must be three numbers such as '0.5,0,2'")
+    return numbers
 
 
 def _percent(text: str) -> float | None:

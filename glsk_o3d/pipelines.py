@@ -1,4 +1,4 @@
-"""The named pipelines: the paper's baseline, the paper, and what we recommend."""
+"""The named pipelines: the paper's baseline, the paper, what we recommend, and that for trees."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def cao2010() -> Pipeline[Skeleton]:
         RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
         | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0, line_hold=1, keep_last=False, retries=0)
         | Connector(radius="2%", thickness=0, links="nearest", min_support=0)
-        | Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)
+        | Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0, surface=0)
     )
 
 
@@ -54,7 +54,7 @@ def wen2024() -> Pipeline[Skeleton]:
             retries=0,
         )
         | Connector(radius="2%", thickness=0, links="nearest", min_support=0)
-        | Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)
+        | Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0, surface=0)
     )
 
 
@@ -70,7 +70,33 @@ def default() -> Pipeline[Skeleton]:
     return RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore()) | Connector() | Refiner()
 
 
-PIPELINES: dict[str, Callable[[], Pipeline[Skeleton]]] = {"default": default, "wen2024": wen2024, "cao2010": cao2010}
+def tree() -> Pipeline[Skeleton]:
+    """One rooted tree without loops, for trees and plants: that of `default`, with its gaps joined and its loops closed.
+
+    It assumes that all points are of one plant that stands upright in z; another root is
+    ``tree().with_options({"Refiner.root": "y"})``. What is there besides, ground, a pot, a neighbour, is best cut away.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import y_junction
+    >>> grown = tree()(y_junction(1000).points)
+    >>> grown.n_components, grown.n_loops, grown.degree[0]
+    (1, 0, 1)
+    """
+    return (
+        RingBuilder()
+        | Contractor(reducer=LPRReducer(), stop=ExplainedScore())
+        | Connector()
+        | Refiner(handle=1, root="z")
+    )
+
+
+PIPELINES: dict[str, Callable[[], Pipeline[Skeleton]]] = {
+    "default": default,
+    "tree": tree,
+    "wen2024": wen2024,
+    "cao2010": cao2010,
+}
 
 BUILTIN: dict[str, type[Parameters]] = {
     cls.__name__: cls

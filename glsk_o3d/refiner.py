@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .refinement.air import cut_air
@@ -17,6 +19,7 @@ from .refinement.loops import close_loops, zip_narrow_loops
 from .refinement.reattachment import reattach_limbs
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
+from .refinement.tracing import trace
 from .refinement.triangles import collapse_triangles
 from .report import Judgement
 from .skeleton import Skeleton
@@ -38,6 +41,10 @@ class Refiner(Filter[Skeleton]):
        limbs are pruned; branches that probably cross air are cut, and gaps across which the object probably goes on are
        bridged.
     6. Junctions move to where limbs meet.
+    7. Where the cloud shows no surface, parts thinner than its points are far apart, what the steps before made of them
+       is replaced by shortest paths through the points.
+    8. With a `root`, all is made one tree that grows from there: gaps are joined where they are narrowest, and loops
+       are cut. Vertex 0 is the root, and every edge leads from parent to child.
 
     The first step is published; with all options 0 it is the only one.
 
@@ -108,6 +115,27 @@ class Refiner(Filter[Skeleton]):
         3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", type="int", unit="passes", low=0
     )
 
+    surface: float = parameter(
+        0.65,
+        "Least share of the points of a region that must show a surface; where fewer do, parts are traced along shortest "
+        "paths through the points. 0 traces none.",
+        type="float",
+        low=0,
+        high=1,
+    )
+    root: str | None = parameter(
+        None,
+        "Where a tree grows from: the lowest place along an axis, the end that is thickest, or the place nearest to a "
+        "point; the skeleton is then one tree, whatever the gaps. None keeps parts and loops.",
+        type="point?",
+        choices=("x", "-x", "y", "-y", "z", "-z", "thickest"),
+    )
+
+    def __post_init__(self) -> None:
+        # as plain text it can be compared, printed and written to files
+        if not isinstance(self.root, str) and np.shape(self.root) == (3,):
+            object.__setattr__(self, "root", ",".join(repr(float(c)) for c in np.asarray(self.root)))
+
     def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
         skeleton = self._fit(skeleton)
         asks = self.handle or self.limb or self.air or self.bridge
@@ -115,6 +143,8 @@ class Refiner(Filter[Skeleton]):
             skeleton = self._judge(skeleton)
         if self.recentre:
             skeleton = level_tips(move_junctions(skeleton))
+        if self.surface or self.root is not None:
+            skeleton = trace(skeleton, self.surface, self.root)
         report = skeleton.report
         for message in diagnose(skeleton):
             report = report.with_warning(message)

@@ -9,10 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Any, TypeAlias
 
 from .errors import SkeletonWarning
 from .interop.verbosity import QUIET, open3d_is
+
+Place: TypeAlias = tuple[float, float, float]
 
 STOPPED_BY_CALLER = "stopped by the caller"
 REFUSED = "refused, last sound state kept"
@@ -107,7 +109,7 @@ class Judgement:
     """
 
     about: str
-    place: tuple[float, float, float]
+    place: Place
     probability: float
     changed: bool
 
@@ -168,6 +170,12 @@ class Report:
     n_loops_closed, n_cuts, n_bridges : int
         Loops that were closed because they are probably no handles, branches that were cut because they probably
         cross air, and gaps that were bridged.
+    n_traced : int
+        Input points around which there is no surface, whose parts were traced along shortest paths.
+    joined : tuple of ((x, y, z), (x, y, z))
+        Ends of the gaps that were joined there, or to make one tree, in the cloud's units.
+    root : (x, y, z) or None
+        Where a tree grows from.
     judgements : tuple of Judgement
         What was asked about the topology, with probabilities, and what was done.
     stages : tuple of str
@@ -205,6 +213,9 @@ class Report:
     n_loops_closed: int = 0
     n_cuts: int = 0
     n_bridges: int = 0
+    n_traced: int = 0
+    joined: tuple[tuple[Place, Place], ...] = ()
+    root: Place | None = None
     judgements: tuple[Judgement, ...] = ()
     stages: tuple[str, ...] = ()
     recipe: dict[str, Any] = field(default_factory=dict)
@@ -245,6 +256,8 @@ class Report:
             Judgement(**(_known(Judgement, found) | {"place": tuple(found["place"])}))
             for found in values.get("judgements", ())
         )
+        values["joined"] = tuple((tuple(start), tuple(stop)) for start, stop in values.get("joined", ()))
+        values["root"] = None if values.get("root") is None else tuple(values["root"])
         for name in ("stages", "warnings"):
             values[name] = tuple(values.get(name, ()))
         return cls(**values)

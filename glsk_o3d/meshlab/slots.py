@@ -54,7 +54,7 @@ class Slot:
     @property
     def types(self) -> tuple[str, ...]:
         """The types that it may have in a script; the first is written."""
-        worded = {"choice": ("RichEnum",), **dict.fromkeys(PARTS, ())}
+        worded = {"choice": ("RichEnum",), **dict.fromkeys(("point", *PARTS), ())}
         if self.kind in worded:
             return ("RichString", *worded[self.kind])
         if self.name == "layer":
@@ -64,7 +64,7 @@ class Slot:
 
     def python_type(self) -> str:
         """Its type as MeshLab's listings print it."""
-        name = {"length": "PercentageValue", "choice": "str", **dict.fromkeys(PARTS, "str")}.get(self.kind, self.kind)
+        name = {"length": "PercentageValue", **dict.fromkeys(("choice", "point", *PARTS), "str")}.get(self.kind, self.kind)
         return f"{name} or str" if self.words and name != "str" else name
 
     def checked(self, value: Any) -> Any:

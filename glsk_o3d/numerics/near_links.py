@@ -1,0 +1,164 @@
+"""The graph of near points: what hangs together where no surface says so, and how it goes on from place to place."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix, identity
+from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
+from scipy.spatial import cKDTree
+
+from .components import component_labels
+from .groups import group_sum
+from .neighbourhoods import nearest_neighbours, row_medians
+from .vectors import TINY, dot, norm
+
+LINK_NEIGHBOURS = 20  # fitted: nearest points that a point may be linked with
+LINK_SPACINGS = 2.0  # fitted: longest link over the local spacing; twigs that pass each other are mostly farther apart
+SPACING_NEIGHBOUR = 3  # fitted: which of the nearest points is as far away as the spacing
+
+
+def linked(places: np.ndarray, ends: np.ndarray) -> csr_matrix:
+    """Links between places, (n, 3) float array, given by their ends, (e, 2) int array: (n, n) matrix of their lengths.
+
+    Symmetric; a link counts once however often it is given. Those of no length stay links, and a place has none with
+    itself.
+    """
+    n, ends = len(places), ends[ends[:, 0] != ends[:, 1]]
+    links = csr_matrix(coo_matrix((np.ones(2 * len(ends)), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n)))
+    row = np.repeat(np.arange(n), np.diff(links.indptr))
+    links.data = np.maximum(norm(places[row] - places[links.indices]), TINY)
+    return links
+
+
+def near_links(points: np.ndarray) -> csr_matrix:
+    """Links of every point with its nearest ones, none longer than twice the spacing around either end.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+
+    Returns
+    -------
+    (n, n) symmetric csr_matrix
+        Lengths.
+    """
+    n = len(points)
+    if n == 0:
+        return linked(points, np.empty((0, 2), int))
+    distance, neighbour = nearest_neighbours(points, min(LINK_NEIGHBOURS + 1, n))
+    spacing = row_medians(distance[:, min(SPACING_NEIGHBOUR, n - 1)][neighbour])
+    near = distance <= LINK_SPACINGS * np.minimum(spacing[:, None], spacing[neighbour])
+    row, column = np.nonzero(near)
+    return linked(points, np.column_stack([row, neighbour[row, column]]))
+
+
+def link_growth(links: csr_matrix) -> np.ndarray:
+    """Points within two links of every point over those within one, (n,) float array.
+
+    5/3 along a curve, 25/9 on a surface, 125/27 where points fill space; mean over the links of every point, twice.
+    """
+    step = csr_matrix(links + identity(links.shape[0]))
+    step.data[:] = 1
+    one, two = np.diff(step.indptr), np.diff((step @ step).indptr)
+    growth = two / one
+    for _ in range(2):
+        growth = (step @ growth) / one
+    return growth
+
+
+def join_pieces(
+    places: np.ndarray, links: csr_matrix, longest: np.ndarray
+) -> tuple[csr_matrix, np.ndarray]:
+    """Join the connected pieces of a graph where they are nearest to each other, until they are one.
+
+    Parameters
+    ----------
+    places : (n, 3) float array
+    links : (n, n) symmetric csr_matrix
+        Lengths, as from `linked`.
+    longest : (n,) float array
+        Longest link to add at either end; if not infinite there may be several pieces left.
+
+    Returns
+    -------
+    links : (n, n) symmetric csr_matrix
+    added : (a, 2) int array
+        The ends of the links that were added; no loop is closed by them.
+    """
+    n, k = len(places), min(LINK_NEIGHBOURS + 1, len(places))
+    added = np.empty((0, 2), int)
+    piece = connected_components(links, directed=False)[1]
+    distance, neighbour = nearest_neighbours(places, k)
+    while piece.max() > 0:
+        row, column = np.nonzero(piece[neighbour] != piece[:, None])
+        ends, length = np.column_stack([row, neighbour[row, column]]), distance[row, column]
+        lost = np.setdiff1d(piece, piece[row])  # pieces that see nothing but themselves
+        some = [_nearest_other(places, piece, each) for each in lost[lost != np.bincount(piece).argmax()]]
+        ends = np.concatenate([ends, *(pair[None] for pair in some)])
+        length = norm(places[ends[:, 0]] - places[ends[:, 1]])
+        fresh = ends[_spanning(piece, ends, length)]
+        fresh = fresh[norm(places[fresh[:, 0]] - places[fresh[:, 1]]) <= longest[fresh].max(axis=1)]
+        if len(fresh) == 0:
+            break
+        added = np.concatenate([added, fresh])
+        piece = component_labels(int(piece.max()) + 1, piece[fresh])[piece]
+    row, column = links.nonzero()
+    return linked(places, np.concatenate([np.column_stack([row, column]), added])), added
+
+
+def _nearest_other(places: np.ndarray, piece: np.ndarray, each: int) -> np.ndarray:
+    inside, others = np.flatnonzero(piece == each), np.flatnonzero(piece != each)
+    distance, found = cKDTree(places[others]).query(places[inside])
+    return np.array([inside[distance.argmin()], others[found[distance.argmin()]]])
+
+
+def _spanning(piece: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Of links between pieces those of a minimum spanning tree."""
+    m = int(piece.max()) + 1
+    low, high = np.sort(piece[ends], axis=1).T
+    order = np.lexsort((length, high, low))
+    pair = (low * m + high)[order]
+    first = order[np.append(True, pair[1:] != pair[:-1])]  # the shortest of each two pieces
+    between = coo_matrix((np.maximum(length[first], TINY), (low[first], high[first])), shape=(m, m))
+    tree = minimum_spanning_tree(csr_matrix(between)).tocoo()
+    return first[np.isin(low[first] * m + high[first], tree.row.astype(int) * m + tree.col)]
+
+
+def slices(
+    points: np.ndarray, links: csr_matrix, distance: np.ndarray, width: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the slice of a part is centred that every point is in the middle of, and how wide it is.
+
+    Slices are connected pieces of what lies between two geodesic distances (Verroust and Lazarus 2000, "Extracting
+    skeletal curves from 3D scattered data"), twice, the second time half a width farther on.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    links : (n, n) symmetric csr_matrix
+    distance : (n,) float array
+        Geodesic distance from the root.
+    width : float
+        Of a slice.
+
+    Returns
+    -------
+    centre : (n, 3) float array
+    spread : (n,) float array
+        Root mean square distance from the centre.
+    """
+    n = len(points)
+    row, column = links.nonzero()
+    centre, spread, off = np.empty((n, 3)), np.empty(n), np.full(n, np.inf)
+    for shift in (0, 0.5):
+        place = distance / width + shift
+        inside = np.floor(place[row]) == np.floor(place[column])
+        piece = component_labels(n, np.column_stack([row[inside], column[inside]]))
+        size = np.bincount(piece)
+        mean = group_sum(points, piece, len(size)) / size[:, None]
+        square = points - mean[piece]
+        wide = np.sqrt(np.bincount(piece, dot(square, square)) / size)
+        nearer = np.abs(place % 1 - 0.5) < off
+        off[nearer] = np.abs(place % 1 - 0.5)[nearer]
+        centre[nearer], spread[nearer] = mean[piece[nearer]], wide[piece[nearer]]
+    return centre, spread

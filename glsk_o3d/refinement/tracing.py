@@ -1,0 +1,302 @@
+"""Trace parts without a surface along shortest paths through their points, and make a tree of a skeleton."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import breadth_first_order, connected_components, dijkstra, minimum_spanning_tree
+from scipy.spatial import cKDTree
+
+from ..numerics.components import component_labels
+from ..numerics.groups import group_sum
+from ..numerics.near_links import join_pieces, linked, near_links, slices
+from ..numerics.neighbourhoods import nearest_neighbours
+from ..numerics.vectors import TINY, dot, norm
+from ..parameters import resolve_point
+from ..preparation.sampling import sample_cloud
+from ..skeleton import Skeleton
+from .axis_fit import incident_edges, nearest_on_edges
+from .thin_parts import without_surface
+
+# All fitted, on trees whose twigs are thinner than their points are far apart.
+TRACED_POINTS = 25000  # points that larger clouds are traced by, about
+SCALE_NEIGHBOUR = 8  # the nearest point whose median distance is the scale s of the cloud
+SLICE_WIDTH = 0.5  # of geodesic distance, over s
+COVER_SCALES = 1.2  # radius around a path in which points need no path of their own, over s
+COVER_SPREADS = 1.5  # the same over the spread of the slice there
+COVER_RADII = 1.3  # the same over the radius of a part with a surface
+JOIN_SCALES = 6.0  # longest gap that is none, over s
+LEAST_PIECE = 3  # points farther than that from all others, of which fewer are no part
+SMOOTHING_PASSES = 2  # in which every vertex of a path becomes the mean of itself and its neighbours
+MEETING_SCALES, MEETING_COSINE = 2.0, 0.5  # how near over s, and how straight ahead of each other, two tips meet
+ROOT_SHARE = 0.05  # of all, in the piece that has the root, at least
+
+
+def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
+    """Replace what has no surface by shortest paths through its points; with a root make one tree of everything.
+
+    Points are linked with near ones (`near_links`), and with the vertices of parts that have a surface. From a root a
+    shortest path leads to every point; those of the farthest points, each until it meets one before, are the parts,
+    and cover the points around (Sato et al. 2000, TEASAR). The vertices of a path lie in the middle of slices of
+    geodesic distance.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    surface : float
+        Least share of the points of a region that must show a surface, see `without_surface`; 0 traces none.
+    root : str or None
+        Where a tree grows from, as `Refiner.root` says.
+
+    Returns
+    -------
+    Skeleton
+        Traced vertices have the spread of their points for a radius, and no confidence. Of a tree, vertex 0 is the
+        root, and the first vertex of an edge is nearer to it.
+    """
+    cloud, m = _Cloud.of(skeleton), len(skeleton.vertices)
+    thin = np.zeros(m, bool)
+    if surface and m and len(cloud.points):
+        thin = without_surface(skeleton, cloud.vertex, cloud.normals, lambda: cloud.links, surface)
+    if m == 0 or (root is None and not thin.any()):
+        return skeleton
+    mixed, joined = _Mixed.of(skeleton, cloud, thin).joined(anywhere=root is not None)
+    paths = _Paths(mixed, mixed.roots() if root is None else mixed.root(skeleton, root))
+    traced = _assembled(skeleton, mixed, paths, tree=root is not None)
+    vertex = skeleton.vertex_of_point
+    report = replace(
+        skeleton.report,
+        n_traced=int(np.count_nonzero(thin[vertex] & (vertex >= 0))),
+        joined=tuple(tuple(tuple(place) for place in gap) for gap in mixed.places[joined].tolist()),
+    )
+    if root is not None:
+        traced = _from_root(traced, paths.index[paths.roots[0]])
+        report = replace(report, root=tuple(traced.vertices[0].tolist()))
+    return replace(traced, report=report)
+
+
+@dataclass(frozen=True, eq=False)
+class _Cloud:
+    """The points that say where thin parts are, and their vertices."""
+
+    points: np.ndarray
+    vertex: np.ndarray
+    normals: np.ndarray
+
+    @classmethod
+    def of(cls, skeleton: Skeleton) -> _Cloud:
+        some = np.flatnonzero(skeleton.vertex_of_point >= 0)
+        if len(some):
+            some = some[sample_cloud(skeleton.points[some], TRACED_POINTS).kept]
+        return cls(skeleton.points[some], skeleton.vertex_of_point[some], skeleton.normals[some])
+
+    @cached_property
+    def links(self) -> csr_matrix:
+        return near_links(self.points)
+
+    @cached_property
+    def away(self) -> np.ndarray:
+        """Distances to the nearest points, from the point itself to that of the scale."""
+        return nearest_neighbours(self.points, min(SCALE_NEIGHBOUR + 1, len(self.points)))[0]
+
+
+@dataclass(frozen=True, eq=False)
+class _Mixed:
+    """A graph of points where there is no surface, and after them of vertices where there is one."""
+
+    n: int  # points
+    places: np.ndarray
+    links: csr_matrix
+    edges: np.ndarray  # those between vertices
+    vertices: np.ndarray  # of the skeleton
+    radius: np.ndarray  # of the vertices; 0 of points
+    scale: float
+
+    @classmethod
+    def of(cls, skeleton: Skeleton, cloud: _Cloud, thin: np.ndarray) -> _Mixed:
+        some, scale = np.empty(0, int), 0.0
+        if thin.any():
+            scale = float(np.median(cloud.away[:, -1]))
+            piece = connected_components(cloud.links, directed=False)[1]
+            floats = cloud.away[:, min(LEAST_PIECE - 1, cloud.away.shape[1] - 1)] > JOIN_SCALES * scale
+            floats &= (np.bincount(piece) < LEAST_PIECE)[piece]
+            some = np.flatnonzero(thin[cloud.vertex] & ~floats)
+        thick, n = np.flatnonzero(~thin), len(some)
+        index = np.full(len(thin), -1)
+        index[thick] = n + np.arange(len(thick))
+        edges = index[skeleton.edges]
+        ends = edges = edges[(edges >= 0).all(axis=1)]
+        if n:
+            node = index[cloud.vertex]
+            node[some] = np.arange(n)
+            near = node[np.column_stack(cloud.links.nonzero())]
+            ends = np.concatenate([edges, near[(near >= 0).all(axis=1) & (near < n).any(axis=1)]])
+        places = np.concatenate([cloud.points[some], skeleton.vertices[thick]])
+        radius = np.concatenate([np.zeros(n), skeleton.radii[thick]])
+        return cls(n, places, linked(places, ends), edges, thick, radius, scale)
+
+    def joined(self, anywhere: bool) -> tuple[_Mixed, np.ndarray]:
+        """Its pieces joined, anywhere or only where at least one is without a surface and near; and the new links."""
+        reach = np.full(len(self.places), np.inf if anywhere else JOIN_SCALES * self.scale)
+        reach[self.n :] = np.inf if anywhere else 0
+        links, added = join_pieces(self.places, self.links, reach)
+        return replace(self, links=links), added
+
+    def roots(self) -> np.ndarray:
+        """Of every piece the thickest vertex, or else the point at one end."""
+        piece = connected_components(self.links, directed=False)[1]
+        _, first = np.unique(piece, return_index=True)
+        order = np.lexsort((dijkstra(self.links, indices=first, min_only=True), self.radius, piece))
+        return order[np.append(piece[order][1:] != piece[order][:-1], True)]
+
+    def root(self, skeleton: Skeleton, which: str) -> np.ndarray:
+        """The one that is asked for, (1,) int array."""
+        if which in ("x", "-x", "y", "-y", "z", "-z"):
+            # nothing that lies about under a tree
+            piece = connected_components(self.links, directed=False)[1]
+            height = self.places[:, "xyz".index(which[-1])] * (-1 if which[0] == "-" else 1)
+            return np.array([height.argmin()])
+        if which == "thickest":
+            ends = skeleton.leaves if len(skeleton.leaves) else np.arange(len(skeleton.vertices))
+            place = skeleton.vertices[ends[skeleton.radii[ends].argmax()]]
+        else:
+            place = np.array(resolve_point(which))
+        return np.array([norm(self.places - place).argmin()])
+
+
+class _Paths:
+    """Shortest paths from tips to the roots, each until it meets one before."""
+
+    def __init__(self, mixed: _Mixed, roots: np.ndarray) -> None:
+        n, size, scale = mixed.n, len(mixed.places), mixed.scale
+        self.mixed, self.roots, self.steps = mixed, roots, []
+        self._distance, self._before, _ = dijkstra(
+            mixed.links, indices=roots, return_predecessors=True, min_only=True
+        )
+        self.centre, spread = mixed.places.copy(), np.zeros(size)
+        self.centre[:n], spread[:n] = slices(
+            mixed.places[:n], mixed.links[:n, :n], self._distance[:n], SLICE_WIDTH * scale
+        )
+        self._reach = np.maximum(COVER_SCALES * scale, COVER_SPREADS * spread)
+        self._reach[n:] = COVER_RADII * mixed.radius[n:]
+        self._tree = cKDTree(mixed.places)
+        self._inside, self._covered = np.zeros(size, bool), np.arange(size) >= n
+        self._inside[roots] = True
+        self._cover(roots)
+        self._take_surfaces()
+        for tip in np.argsort(-self._distance[:n]).tolist():
+            if not self._covered[tip]:
+                self._cover(self._trace(tip))
+        self.index = np.cumsum(self._inside) - 1
+        self.nodes = np.flatnonzero(self._inside)
+
+    def _take_surfaces(self) -> None:
+        """What has a surface is there, and is only asked how it hangs together."""
+        n = self.mixed.n
+        nodes = np.arange(n, len(self._covered))
+        part = component_labels(len(nodes), self.mixed.edges - n)
+        order = np.lexsort((self._distance[n:], part))
+        entries = nodes[order[np.append(True, np.diff(part[order]) > 0)[: len(order)]]]
+        for entry in entries[np.argsort(self._distance[entries])].tolist():
+            self._cover(self._trace(entry))
+            self._inside[nodes[part == part[entry - n]]] = True
+        self._cover(nodes)
+
+    def _trace(self, tip: int) -> list[int]:
+        path = [tip]
+        while not self._inside[path[-1]]:
+            path.append(int(self._before[path[-1]]))
+        self.steps += zip(path, path[1:], strict=False)
+        self._inside[path] = True
+        return path
+
+    def _cover(self, path: np.ndarray | list[int]) -> None:
+        for found in self._tree.query_ball_point(self.centre[path], self._reach[path]):
+            self._covered[found] = True
+
+
+def _assembled(skeleton: Skeleton, mixed: _Mixed, paths: _Paths, tree: bool) -> Skeleton:
+    """The paths and what has a surface as one skeleton; points go to the nearest vertex, or stay where theirs stays."""
+    nodes, edges = paths.nodes, mixed.edges
+    if tree:  # of a loop its longest edge goes
+        edges = np.column_stack(minimum_spanning_tree(linked(mixed.places, edges)).nonzero())
+    edges = paths.index[np.concatenate([edges, np.array(paths.steps, int).reshape(-1, 2)])]
+    degree, point = np.bincount(edges.ravel(), minlength=len(nodes)), nodes < mixed.n
+    inner = (point & (degree > 1))[:, None]
+    vertices = np.where(inner, paths.centre[nodes], mixed.places[nodes])
+    ends, others = np.concatenate([edges, edges[:, ::-1]]).T
+    for _ in range(SMOOTHING_PASSES):
+        around = vertices + group_sum(vertices[others], ends, len(nodes))
+        vertices = np.where(inner, around / (1 + degree)[:, None], vertices)
+    if not tree:
+        edges = np.concatenate([edges, _meetings(vertices, edges, point & (degree == 1), mixed.scale)])
+    index = np.full(len(skeleton.vertices), -1)
+    index[mixed.vertices] = paths.index[mixed.n :]
+    owner = skeleton.vertex_of_point
+    vertex = np.where(owner >= 0, index[owner], -1)
+    free = np.flatnonzero((owner >= 0) & (vertex < 0))
+    vertex[free] = cKDTree(vertices).query(skeleton.points[free])[1]
+    radii, confidence = np.zeros((2, len(nodes)))
+    stays = mixed.vertices[nodes[~point] - mixed.n]
+    radii[~point], confidence[~point] = skeleton.radii[stays], skeleton.confidence[stays]
+    edges = np.unique(np.sort(edges, axis=1), axis=0)
+    traced = replace(
+        skeleton, vertices=vertices, edges=edges, radii=radii, confidence=confidence, vertex_of_point=vertex
+    )
+    return replace(traced, radii=np.where(point, spread_around(traced), radii)) if point.any() else traced
+
+
+def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: float) -> np.ndarray:
+    """Tips that run into each other, (k, 2) int array: where the shortest paths around a loop do."""
+    tips = np.flatnonzero(tips)
+    beside = np.empty(len(vertices), int)
+    beside[edges.ravel()] = edges[:, ::-1].ravel()
+    ahead = _unit(vertices[tips] - vertices[beside[tips]])
+    a, b = cKDTree(vertices[tips]).query_pairs(MEETING_SCALES * scale, output_type="ndarray").T
+    gap = vertices[tips[b]] - vertices[tips[a]]
+    straight = np.minimum(dot(ahead[a], _unit(gap)), -dot(ahead[b], _unit(gap)))
+    found: list[int] = []
+    for k in np.argsort(norm(gap)).tolist():
+        if straight[k] > MEETING_COSINE and not {a[k], b[k]} & set(found):
+            found += [a[k], b[k]]
+    return tips[found].reshape(-1, 2)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(norm(vectors), TINY)[:, None]
+
+
+def spread_around(skeleton: Skeleton) -> np.ndarray:
+    """Root mean square distance from the curve to the points around every vertex and its neighbours, (M,) float array.
+
+    Of points on a tube its radius, however few they are, or noisy.
+    """
+    m, edges = len(skeleton.vertices), skeleton.edges
+    some = np.flatnonzero(skeleton.vertex_of_point >= 0)
+    vertex, points = skeleton.vertex_of_point[some], skeleton.points[some]
+    edge, t = nearest_on_edges(skeleton.vertices, edges, incident_edges(edges, m)[vertex], points)
+    start, stop = skeleton.vertices[edges[edge]].transpose(1, 0, 2)
+    offset = points - start - t[:, None] * (stop - start)
+    total = group_sum(np.column_stack([dot(offset, offset), np.ones(len(some))]), vertex, m)
+    ends, others = np.concatenate([edges, edges[:, ::-1]]).T
+    total += group_sum(total[others], ends, m)
+    return np.sqrt(total[:, 0] / np.maximum(total[:, 1], 1))
+
+
+def _from_root(skeleton: Skeleton, root: int) -> Skeleton:
+    """The same tree with its vertices numbered from the root outwards."""
+    links = linked(skeleton.vertices, skeleton.edges)
+    order = breadth_first_order(links, root, directed=False, return_predecessors=False)
+    index = np.argsort(order)
+    edges, vertex = np.sort(index[skeleton.edges], axis=1), skeleton.vertex_of_point
+    return replace(
+        skeleton,
+        vertices=skeleton.vertices[order],
+        edges=edges[np.lexsort((edges[:, 1], edges[:, 0]))],
+        radii=skeleton.radii[order],
+        confidence=skeleton.confidence[order],
+        vertex_of_point=np.where(vertex >= 0, index[vertex], -1),
+    )
