@@ -71,7 +71,7 @@ def default() -> Pipeline[Skeleton]:
 
 
 def tree() -> Pipeline[Skeleton]:
-    """One rooted tree without loops, for trees and plants: that of `default`, with its gaps joined and its loops closed.
+    """One rooted tree, for trees and plants: what `default` makes, with gaps joined and loops closed.
 
     It assumes that all points are of one plant that stands upright in z; another root is
     ``tree().with_options({"Refiner.root": "y"})``. What is there besides, ground, a pot, a neighbour, is best cut away.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -117,13 +117,13 @@ class Refiner(Filter[Skeleton]):
 
     surface: float = parameter(
         0.65,
-        "Least share of the points of a region that must show a surface; where fewer do, parts are traced along shortest "
-        "paths through the points. 0 traces none.",
+        "Least share of the points of a region that must show a surface; where fewer do, parts are traced along "
+        "shortest paths through the points. 0 traces none.",
         type="float",
         low=0,
         high=1,
     )
-    root: str | None = parameter(
+    root: str | Any = parameter(
         None,
         "Where a tree grows from: the lowest place along an axis, the end that is thickest, or the place nearest to a "
         "point; the skeleton is then one tree, whatever the gaps. None keeps parts and loops.",
@@ -133,7 +133,7 @@ class Refiner(Filter[Skeleton]):
 
     def __post_init__(self) -> None:
         # as plain text it can be compared, printed and written to files
-        if not isinstance(self.root, str) and np.shape(self.root) == (3,):
+        if not isinstance(self.root, str | None) and np.shape(self.root) == (3,):
             object.__setattr__(self, "root", ",".join(repr(float(c)) for c in np.asarray(self.root)))
 
     def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:

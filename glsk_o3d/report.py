@@ -174,8 +174,8 @@ class Report:
         Input points around which there is no surface, whose parts were traced along shortest paths.
     joined : tuple of ((x, y, z), (x, y, z))
         Ends of the gaps that were joined there, or to make one tree, in the cloud's units.
-    root : (x, y, z) or None
-        Where a tree grows from.
+    root : (x, y, z) or ()
+        Where a tree grows from; empty if none was asked for.
     judgements : tuple of Judgement
         What was asked about the topology, with probabilities, and what was done.
     stages : tuple of str
@@ -215,7 +215,7 @@ class Report:
     n_bridges: int = 0
     n_traced: int = 0
     joined: tuple[tuple[Place, Place], ...] = ()
-    root: Place | None = None
+    root: Place | tuple[()] = ()
     judgements: tuple[Judgement, ...] = ()
     stages: tuple[str, ...] = ()
     recipe: dict[str, Any] = field(default_factory=dict)
@@ -257,7 +257,6 @@ class Report:
             for found in values.get("judgements", ())
         )
         values["joined"] = tuple((tuple(start), tuple(stop)) for start, stop in values.get("joined", ()))
-        values["root"] = None if values.get("root") is None else tuple(values["root"])
-        for name in ("stages", "warnings"):
+        for name in ("stages", "warnings", "root"):
             values[name] = tuple(values.get(name, ()))
         return cls(**values)

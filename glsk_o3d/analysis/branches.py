@@ -29,8 +29,9 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     skeleton : Skeleton
     root : int or (x, y, z), optional
         A vertex, or a point whose nearest vertex it is. Its branch, or all that meet there, are those of level 0 in its
-        component. In other components, and by default, it is the branch with the most volume (the longest one, where
-        radii are unknown), with its free or thicker end for a start.
+        component. By default that is where the tree was made to grow from, if it was. In other components, and else, it
+        is the branch with the most volume (the longest one, where radii are unknown), with its free or thicker end for
+        a start.
 
     Returns
     -------
@@ -52,6 +53,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     m = len(skeleton.vertices)
     if m == 0:
         raise InvalidParameterError("the skeleton is empty: it has no branches to measure")
+    root = skeleton.report.root or None if root is None else root
     chosen = None if root is None else _root_vertex(skeleton, root)
     paths = [*skeleton.branches, *np.flatnonzero(skeleton.degree == 0)[:, None]]
     steps = [np.linalg.norm(np.diff(skeleton.vertices[path], axis=0), axis=1) for path in paths]

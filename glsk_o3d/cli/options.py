@@ -30,7 +30,7 @@ PipelineName = Annotated[
     typer.Option(
         "--pipeline",
         metavar="NAME",
-        help="One of default, wen2024 and cao2010, or a plugin's; 'glsk filters' says what they are.",
+        help="One of default, tree, wen2024 and cao2010, or a plugin's; 'glsk filters' says what they are.",
     ),
 ]
 Recipe = Annotated[

@@ -64,7 +64,9 @@ class Slot:
 
     def python_type(self) -> str:
         """Its type as MeshLab's listings print it."""
-        name = {"length": "PercentageValue", **dict.fromkeys(("choice", "point", *PARTS), "str")}.get(self.kind, self.kind)
+        name = {"length": "PercentageValue", **dict.fromkeys(("choice", "point", *PARTS), "str")}.get(
+            self.kind, self.kind
+        )
         return f"{name} or str" if self.words and name != "str" else name
 
     def checked(self, value: Any) -> Any:

@@ -66,9 +66,7 @@ def link_growth(links: csr_matrix) -> np.ndarray:
     return growth
 
 
-def join_pieces(
-    places: np.ndarray, links: csr_matrix, longest: np.ndarray
-) -> tuple[csr_matrix, np.ndarray]:
+def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> tuple[csr_matrix, np.ndarray]:
     """Join the connected pieces of a graph where they are nearest to each other, until they are one.
 
     Parameters
@@ -85,13 +83,12 @@ def join_pieces(
     added : (a, 2) int array
         The ends of the links that were added; no loop is closed by them.
     """
-    n, k = len(places), min(LINK_NEIGHBOURS + 1, len(places))
     added = np.empty((0, 2), int)
     piece = connected_components(links, directed=False)[1]
-    distance, neighbour = nearest_neighbours(places, k)
+    _, neighbour = nearest_neighbours(places, min(LINK_NEIGHBOURS + 1, len(places)))
     while piece.max() > 0:
         row, column = np.nonzero(piece[neighbour] != piece[:, None])
-        ends, length = np.column_stack([row, neighbour[row, column]]), distance[row, column]
+        ends = np.column_stack([row, neighbour[row, column]])
         lost = np.setdiff1d(piece, piece[row])  # pieces that see nothing but themselves
         some = [_nearest_other(places, piece, each) for each in lost[lost != np.bincount(piece).argmax()]]
         ends = np.concatenate([ends, *(pair[None] for pair in some)])
@@ -124,9 +121,7 @@ def _spanning(piece: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.nda
     return first[np.isin(low[first] * m + high[first], tree.row.astype(int) * m + tree.col)]
 
 
-def slices(
-    points: np.ndarray, links: csr_matrix, distance: np.ndarray, width: float
-) -> tuple[np.ndarray, np.ndarray]:
+def slices(points: np.ndarray, links: csr_matrix, distance: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
     """Where the slice of a part is centred that every point is in the middle of, and how wide it is.
 
     Slices are connected pieces of what lies between two geodesic distances (Verroust and Lazarus 2000, "Extracting

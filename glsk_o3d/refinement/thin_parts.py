@@ -2,59 +2,103 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
 from ..numerics.components import component_labels
 from ..numerics.eigen import largest_eigenvalue
-from ..numerics.near_links import link_growth
+from ..numerics.groups import group_sum
+from ..numerics.near_links import link_growth, near_links
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import COLUMNS, ROWS, TINY
+from ..preparation.sampling import sample_cloud
 from ..skeleton import Skeleton
+from .diagnostics import SHEET_SHARE
 
-SURFACE_GROWTH = 25 / 9  # derived: growth of links on a surface; noise that fills space has more
-CURVE_GROWTH = 20 / 9  # derived: half way to that along a curve
-# All fitted.
-SHY = 0.3  # confidence below which the normals around a vertex do not say where the axis is
-SHEET = 0.9  # share of one direction among the normals of a sheet
-REGION_POINTS = 1200  # around a vertex, of which a share must show a surface
-REGION_VERTICES = 400  # in which these are looked for
-FIRM = 0.6  # confidence of a stretch that is a surface, whatever is around it
-FIRM_LENGTH = 4.0  # and its length over its radius
+SCALE_NEIGHBOUR = 8  # fitted: the nearest point whose distance is the scale of a point
+TRACED_POINTS = 25000  # measured: points that larger clouds are traced by, about
+LEAST_POINTS = 64  # fitted: of which fewer say nothing about where there is no surface
+SURFACE_GROWTH = 2.5  # measured: growth of links on a surface; noise that fills space has more, a curve 1.7
+SHEET_GROWTH = 2.2  # fitted: growth of links that a sheet surely has
+SHY = 0.4  # fitted: confidence below which the normals around a vertex do not say where the axis is
+REGION_POINTS = 1200  # fitted: points around a vertex of which a share must show a surface
+REGION_VERTICES = 400  # measured: vertices in which these are looked for
+FIRM, FIRM_LENGTH = 0.6, 4.0  # fitted: confidence, and length over radius, of a stretch that surely has a surface
 
 
-def without_surface(
-    skeleton: Skeleton, vertex: np.ndarray, normals: np.ndarray, links: Callable[[], csr_matrix], least: float
-) -> np.ndarray:
+@dataclass(frozen=True, eq=False)
+class SpacedPoints:
+    """The distinct points that belong to a skeleton, or a sample of very many, and how far they are apart."""
+
+    skeleton: Skeleton
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """Which input points they are."""
+        points, some = self.skeleton.points, np.flatnonzero(self.skeleton.vertex_of_point >= 0)
+        if len(some):
+            some = some[sample_cloud(points[some], TRACED_POINTS).kept]
+        return some[np.sort(np.unique(points[some], axis=0, return_index=True)[1])]
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Where they are."""
+        return self.skeleton.points[self.rows]
+
+    @property
+    def vertex(self) -> np.ndarray:
+        """The vertex of each."""
+        return self.skeleton.vertex_of_point[self.rows]
+
+    @property
+    def normals(self) -> np.ndarray:
+        """The normal of each, NaN where there is none."""
+        return self.skeleton.normals[self.rows]
+
+    @cached_property
+    def links(self) -> csr_matrix:
+        """Of near points."""
+        return near_links(self.points)
+
+    @cached_property
+    def away(self) -> np.ndarray:
+        """Distances to the nearest points, from the point itself to the one that gives the scale."""
+        return nearest_neighbours(self.points, min(SCALE_NEIGHBOUR + 1, len(self.points)))[0]
+
+    @property
+    def scale(self) -> np.ndarray:
+        """The distance to the eighth nearest point."""
+        return self.away[:, -1]
+
+
+def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     """Vertices around which the cloud shows no surface, (M,) bool array.
 
     There the normals do not agree on an axis. Nor do they where noise has tilted them; but it fills space, and from
     link to link there are more points than on a surface. Nor do they on a sheet; but there they agree with each other,
-    and there are more points than along a curve. That is not sure of one vertex alone, and holds at every junction; but
-    where it holds for a share of the points of a region, it is so.
+    and there are more points than along a curve. That is not sure of one vertex alone, and holds at many a junction;
+    but where it holds for a share of the points of a region, it is so.
 
     Parameters
     ----------
-    skeleton : Skeleton
-        With the confidence of `fit_axis`; where it is unknown there is a surface.
-    vertex : (n,) int array
-        Of every point.
-    normals : (n, 3) float array
-        NaN where there is none.
-    links : callable
-        Gives the links between near points; only called if the normals leave a doubt.
+    cloud : SpacedPoints
+        Of a skeleton with the confidence of `fit_axis`; where it is unknown there is a surface.
     least : float
         Share of the points in the region around a vertex that must show a surface.
     """
-    m = len(skeleton.vertices)
-    count, thin = np.bincount(vertex, minlength=m), skeleton.confidence < SHY
-    if not (_share_around(skeleton.vertices, count, thin) > 1 - least).any():
+    skeleton, m = cloud.skeleton, len(cloud.skeleton.vertices)
+    owner = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0]
+    count, thin = np.bincount(owner, minlength=m) / max(len(owner) / TRACED_POINTS, 1), skeleton.confidence < SHY
+    if len(owner) < LEAST_POINTS or not (_share_around(skeleton.vertices, count, thin) > 1 - least).any():
         return np.zeros(m, bool)
-    facts = link_growth(links()), one_direction(normals, links())
-    growth, flat = (np.bincount(vertex, fact, m) / np.maximum(count, 1) for fact in facts)
-    thin &= growth < np.where(flat < SHEET, SURFACE_GROWTH, CURVE_GROWTH)
+    vertex = cloud.vertex
+    count = np.bincount(vertex, minlength=m)
+    facts = np.column_stack([link_growth(cloud.links), one_direction(cloud.normals, cloud.links)])
+    growth, flat = (group_sum(facts, vertex, m) / np.maximum(count, 1)[:, None]).T
+    thin &= growth < np.where(flat < SHEET_SHARE, SURFACE_GROWTH, SHEET_GROWTH)
     return (_share_around(skeleton.vertices, count, thin) > 1 - least) & ~_firm(skeleton)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -12,18 +12,14 @@ from scipy.spatial import cKDTree
 
 from ..numerics.components import component_labels
 from ..numerics.groups import group_sum
-from ..numerics.near_links import join_pieces, linked, near_links, slices
-from ..numerics.neighbourhoods import nearest_neighbours
+from ..numerics.near_links import join_pieces, linked, slices
 from ..numerics.vectors import TINY, dot, norm
 from ..parameters import resolve_point
-from ..preparation.sampling import sample_cloud
 from ..skeleton import Skeleton
 from .axis_fit import incident_edges, nearest_on_edges
-from .thin_parts import without_surface
+from .thin_parts import SpacedPoints, without_surface
 
-# All fitted, on trees whose twigs are thinner than their points are far apart.
-TRACED_POINTS = 25000  # points that larger clouds are traced by, about
-SCALE_NEIGHBOUR = 8  # the nearest point whose median distance is the scale s of the cloud
+# All fitted, on trees whose twigs are thinner than their points are far apart; s is the median scale of the points.
 SLICE_WIDTH = 0.5  # of geodesic distance, over s
 COVER_SCALES = 1.2  # radius around a path in which points need no path of their own, over s
 COVER_SPREADS = 1.5  # the same over the spread of the slice there
@@ -32,7 +28,6 @@ JOIN_SCALES = 6.0  # longest gap that is none, over s
 LEAST_PIECE = 3  # points farther than that from all others, of which fewer are no part
 SMOOTHING_PASSES = 2  # in which every vertex of a path becomes the mean of itself and its neighbours
 MEETING_SCALES, MEETING_COSINE = 2.0, 0.5  # how near over s, and how straight ahead of each other, two tips meet
-ROOT_SHARE = 0.05  # of all, in the piece that has the root, at least
 
 
 def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
@@ -57,10 +52,10 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
         Traced vertices have the spread of their points for a radius, and no confidence. Of a tree, vertex 0 is the
         root, and the first vertex of an edge is nearer to it.
     """
-    cloud, m = _Cloud.of(skeleton), len(skeleton.vertices)
+    cloud, m = SpacedPoints(skeleton), len(skeleton.vertices)
     thin = np.zeros(m, bool)
-    if surface and m and len(cloud.points):
-        thin = without_surface(skeleton, cloud.vertex, cloud.normals, lambda: cloud.links, surface)
+    if surface and m:
+        thin = without_surface(cloud, surface)
     if m == 0 or (root is None and not thin.any()):
         return skeleton
     mixed, joined = _Mixed.of(skeleton, cloud, thin).joined(anywhere=root is not None)
@@ -70,37 +65,12 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     report = replace(
         skeleton.report,
         n_traced=int(np.count_nonzero(thin[vertex] & (vertex >= 0))),
-        joined=tuple(tuple(tuple(place) for place in gap) for gap in mixed.places[joined].tolist()),
+        joined=tuple((tuple(a), tuple(b)) for a, b in mixed.places[joined].tolist()),
     )
     if root is not None:
         traced = _from_root(traced, paths.index[paths.roots[0]])
         report = replace(report, root=tuple(traced.vertices[0].tolist()))
     return replace(traced, report=report)
-
-
-@dataclass(frozen=True, eq=False)
-class _Cloud:
-    """The points that say where thin parts are, and their vertices."""
-
-    points: np.ndarray
-    vertex: np.ndarray
-    normals: np.ndarray
-
-    @classmethod
-    def of(cls, skeleton: Skeleton) -> _Cloud:
-        some = np.flatnonzero(skeleton.vertex_of_point >= 0)
-        if len(some):
-            some = some[sample_cloud(skeleton.points[some], TRACED_POINTS).kept]
-        return cls(skeleton.points[some], skeleton.vertex_of_point[some], skeleton.normals[some])
-
-    @cached_property
-    def links(self) -> csr_matrix:
-        return near_links(self.points)
-
-    @cached_property
-    def away(self) -> np.ndarray:
-        """Distances to the nearest points, from the point itself to that of the scale."""
-        return nearest_neighbours(self.points, min(SCALE_NEIGHBOUR + 1, len(self.points)))[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +86,10 @@ class _Mixed:
     scale: float
 
     @classmethod
-    def of(cls, skeleton: Skeleton, cloud: _Cloud, thin: np.ndarray) -> _Mixed:
+    def of(cls, skeleton: Skeleton, cloud: SpacedPoints, thin: np.ndarray) -> _Mixed:
         some, scale = np.empty(0, int), 0.0
         if thin.any():
-            scale = float(np.median(cloud.away[:, -1]))
+            scale = float(np.median(cloud.scale))
             piece = connected_components(cloud.links, directed=False)[1]
             floats = cloud.away[:, min(LEAST_PIECE - 1, cloud.away.shape[1] - 1)] > JOIN_SCALES * scale
             floats &= (np.bincount(piece) < LEAST_PIECE)[piece]
@@ -155,8 +125,6 @@ class _Mixed:
     def root(self, skeleton: Skeleton, which: str) -> np.ndarray:
         """The one that is asked for, (1,) int array."""
         if which in ("x", "-x", "y", "-y", "z", "-z"):
-            # nothing that lies about under a tree
-            piece = connected_components(self.links, directed=False)[1]
             height = self.places[:, "xyz".index(which[-1])] * (-1 if which[0] == "-" else 1)
             return np.array([height.argmin()])
         if which == "thickest":
@@ -173,9 +141,7 @@ class _Paths:
     def __init__(self, mixed: _Mixed, roots: np.ndarray) -> None:
         n, size, scale = mixed.n, len(mixed.places), mixed.scale
         self.mixed, self.roots, self.steps = mixed, roots, []
-        self._distance, self._before, _ = dijkstra(
-            mixed.links, indices=roots, return_predecessors=True, min_only=True
-        )
+        self._distance, self._before, _ = dijkstra(mixed.links, indices=roots, return_predecessors=True, min_only=True)
         self.centre, spread = mixed.places.copy(), np.zeros(size)
         self.centre[:n], spread[:n] = slices(
             mixed.places[:n], mixed.links[:n, :n], self._distance[:n], SLICE_WIDTH * scale
@@ -209,7 +175,7 @@ class _Paths:
         path = [tip]
         while not self._inside[path[-1]]:
             path.append(int(self._before[path[-1]]))
-        self.steps += zip(path, path[1:], strict=False)
+        self.steps += pairwise(path)
         self._inside[path] = True
         return path
 
@@ -246,7 +212,9 @@ def _assembled(skeleton: Skeleton, mixed: _Mixed, paths: _Paths, tree: bool) -> 
     traced = replace(
         skeleton, vertices=vertices, edges=edges, radii=radii, confidence=confidence, vertex_of_point=vertex
     )
-    return replace(traced, radii=np.where(point, spread_around(traced), radii)) if point.any() else traced
+    if point.any() and len(edges):
+        traced = replace(traced, radii=np.where(point, spread_around(traced), radii))
+    return traced
 
 
 def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: float) -> np.ndarray:

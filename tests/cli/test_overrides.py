@@ -41,6 +41,8 @@ def values(facts):
     elif kind == "length":
         percent = st.floats(0.001, 100).map(lambda x: (f"{x:.6f}%", f"{x:.6f}%"))
         plain = percent | st.floats(low, high, exclude_min=True).map(lambda x: (repr(x), x))
+    elif kind == "point":
+        plain = st.just(("0.5,0,-2e3", "0.5,0,-2e3"))
     elif kind == "bool":
         plain = st.sampled_from([("true", True), ("no", False), ("1", True), ("OFF", False)])
     elif kind != "choice":

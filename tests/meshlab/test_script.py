@@ -88,7 +88,8 @@ BROKEN = {
     ),
     "no such choice": (
         _ours('  <Param type="RichString" name="pipeline" value="cao2001"/>'),
-        f"s.mlx, line 4: filter '{SKELETON}': parameter 'pipeline': must be one of 'default', 'wen2024', 'cao2010'",
+        f"s.mlx, line 4: filter '{SKELETON}': parameter 'pipeline': must be one of "
+        "'default', 'tree', 'wen2024', 'cao2010'",
     ),
     "enum out of range": (
         _script(

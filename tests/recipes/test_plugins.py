@@ -336,7 +336,7 @@ BROKEN_FILTERS = {
     ),
     "strange type": (
         HEAD + "class Thing(Filter):\n    a: int = parameter(3, 'A.', type='strange')\n    _run = print",
-        "its parameter 'a' has a type that is none of int, float, bool, length, choice, reducer, stop",
+        "its parameter 'a' has a type that is none of int, float, bool, length, point, choice, reducer, stop",
     ),
     "class as type": (
         HEAD + "class Thing(Filter):\n    a: int = parameter(3, 'A.', type=int)\n    _run = print",

@@ -53,6 +53,9 @@ def values(facts):
         "int": integers,
         "float": numbers | integers,
         "length": numbers | st.floats(0.001, 100).map(lambda share: f"{share:.6f}%"),
+        "point": st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 3).map(
+            lambda xyz: "{},{},{}".format(*xyz)
+        ),
         "bool": st.booleans(),
         "stop": st.deferred(lambda: parts(ExplainedScore) | parts(RingSizeRatio)),
         "reducer": st.deferred(lambda: parts(LPRReducer)),
@@ -241,7 +244,7 @@ WRONG = {
         **HEAD,
         "pipeline": [{"filter": "Contractor", "reducer": {"unwritten": "a function"}}],
     },
-    ("extends", "default, wen2024, cao2010"): {**HEAD, "extends": "best"},
+    ("extends", "default, tree, wen2024, cao2010"): {**HEAD, "extends": "best"},
     ("set", "'extends'"): {
         **HEAD,
         "pipeline": [GOOD],

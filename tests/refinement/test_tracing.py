@@ -1,0 +1,183 @@
+"""Parts without a surface are traced, those with one stay; with a root everything is one tree."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import glsk_o3d as glsk
+from glsk_o3d import InvalidParameterError, Refiner, pipelines, samples
+from glsk_o3d.refinement.thin_parts import SpacedPoints, one_direction, without_surface
+
+RNG = np.random.default_rng(3)
+ROOT, FORK = np.zeros(3), np.array([0, 0, 1.0])
+TWIGS = [(ROOT, FORK), *((FORK, FORK + [np.cos(t), np.sin(t), 1]) for t in (0, 2.1, 4.2))]
+
+
+def scattered(lines, n, thick=0.005):
+    """Points around lines, evenly along them."""
+    length = np.array([np.linalg.norm(b - a) for a, b in lines])
+    line = RNG.choice(len(lines), n, p=length / length.sum())
+    start, stop = (np.array([each[i] for each in lines])[line] for i in (0, 1))
+    return start + RNG.random((n, 1)) * (stop - start) + thick * RNG.normal(size=(n, 3))
+
+
+def tube(n, radius=0.15, height=1.0):
+    t, z = RNG.random((2, n))
+    return np.column_stack([radius * np.cos(2 * np.pi * t), radius * np.sin(2 * np.pi * t), height * (z - 1)])
+
+
+@pytest.fixture(scope="module")
+def sparse():
+    return scattered(TWIGS, 500)
+
+
+@pytest.fixture(scope="module")
+def grown(sparse):
+    return pipelines.tree()(sparse)
+
+
+def distance(points, lines):
+    found = [np.full(len(points), np.inf)]
+    for a, b in lines:
+        t = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+        found.append(np.linalg.norm(points - a - t[:, None] * (b - a), axis=1))
+    return np.min(found, axis=0)
+
+
+def test_twigs_that_are_lines_of_points(grown):
+    assert (grown.n_components, grown.n_loops, len(grown.leaves), len(grown.junctions)) == (1, 0, 4, 1)
+    assert distance(grown.vertices, TWIGS).max() < 0.02
+    assert grown.report.n_traced == 500
+    tips = np.array([ROOT, *(stop for _, stop in TWIGS[1:])])
+    assert np.linalg.norm(tips[:, None] - grown.vertices[grown.leaves], axis=2).min(axis=1).max() < 0.03
+
+
+def test_their_radius_is_their_spread_and_their_confidence_says_so(grown):
+    assert (grown.confidence == 0).all()
+    assert 0.5 < np.median(grown.radii) / (np.sqrt(2) * 0.005) < 1.2
+
+
+def test_a_tree_grows_from_vertex_0_along_its_edges(grown):
+    np.testing.assert_allclose(grown.vertices[0], ROOT, atol=0.03)
+    assert grown.report.root == tuple(grown.vertices[0])
+    assert (grown.edges[:, 0] < grown.edges[:, 1]).all()
+    np.testing.assert_array_equal(np.sort(grown.edges[:, 1]), np.arange(1, len(grown.vertices)))  # a parent each
+    table = grown.branch_table()
+    assert sorted(table.level.tolist()) == [0, 1, 1, 1]
+    np.testing.assert_allclose(table.start_point[table.level == 0][0], ROOT, atol=0.03)
+
+
+@pytest.mark.parametrize(
+    ("root", "place"),
+    [
+        ("z", ROOT),
+        ("-x", TWIGS[1][1]),
+        ("2,0,2", TWIGS[1][1]),
+        ((2, 0, 2), TWIGS[1][1]),
+        (np.float32([2, 0, 2]), TWIGS[1][1]),
+    ],
+)
+def test_roots(sparse, root, place):
+    skeleton = pipelines.tree().with_options({"Refiner.root": root})(sparse)
+    np.testing.assert_allclose(skeleton.vertices[0], place, atol=0.05)
+    assert (skeleton.n_components, skeleton.n_loops) == (1, 0)
+
+
+def test_the_thickest_end():
+    skeleton = pipelines.tree().with_options({"Refiner.root": "thickest"})(samples.y_junction(2000).points)
+    first = skeleton.leaves[np.argmax(skeleton.radii[skeleton.leaves])]
+    assert first == 0
+
+
+@pytest.mark.parametrize("root", ["up", "1,2", "1,2,nan", 3, (1, 2)])
+def test_no_root(root):
+    with pytest.raises(InvalidParameterError, match="a point such as"):
+        Refiner(root=root).check()
+
+
+def test_a_point_is_kept_as_text_that_a_recipe_can_hold():
+    assert Refiner(root=(0.1, 2, np.float32(3))) == Refiner(root="0.1,2.0,3.0")
+
+
+def test_gaps_are_joined_and_told(sparse):
+    away = distance(sparse, TWIGS[1:2]) + 10 * (np.abs(sparse[:, 2] - 1.5) > 0.15)
+    broken = sparse[away > 0.05]
+    skeleton = pipelines.tree()(broken)
+    assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 0, 4)
+    longest = max(skeleton.report.joined, key=lambda gap: np.linalg.norm(np.subtract(*gap)))
+    np.testing.assert_allclose(np.mean(longest, axis=0), [0.5, 0, 1.5], atol=0.1)
+    assert len(pipelines.default()(broken).report.joined) <= len(skeleton.report.joined)
+
+
+def test_a_ring_of_points_stays_a_loop():
+    t = 2 * np.pi * RNG.random(400)
+    ring = glsk.skeletonize(np.column_stack([np.cos(t), np.sin(t), 0 * t]))
+    assert (ring.n_loops, len(ring.leaves)) == (1, 0)
+    assert abs(ring.length - 2 * np.pi) < 0.1
+    tree = pipelines.tree().with_options({"Refiner.root": "x"})(ring.points)
+    assert (tree.n_components, tree.n_loops, len(tree.leaves)) == (1, 0, 2)
+
+
+def test_a_trunk_with_a_surface_stays_what_it_was():
+    cloud = np.concatenate([tube(1500), scattered([(ROOT, FORK), *TWIGS[1:]], 700)])
+    before = pipelines.default().with_options({"Refiner.surface": 0})(cloud)
+    skeleton = pipelines.tree()(cloud)
+    assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 0, 4)
+    trunk, twigs = skeleton.vertices[:, 2] < -0.3, skeleton.vertices[:, 2] > 0.2
+    assert (skeleton.confidence[trunk] > 0.6).all()
+    assert (skeleton.confidence[twigs] == 0).all()
+    np.testing.assert_allclose(skeleton.radii[trunk], 0.15, rtol=0.1)
+    assert distance(skeleton.vertices[twigs], TWIGS).max() < 0.03
+    kept = {tuple(place) for place in before.vertices[before.vertices[:, 2] < -0.3].tolist()}
+    assert kept == {tuple(place) for place in skeleton.vertices[trunk].tolist()}
+
+
+def test_what_floats_far_away_is_no_part(sparse):
+    stray = np.concatenate([sparse, [[4, 4, 4], [-4, 4, 0]]])
+    skeleton = pipelines.tree()(stray)
+    assert len(skeleton.leaves) == 4
+    assert (skeleton.vertex_of_point >= 0).all()
+
+
+@pytest.mark.parametrize(
+    "cloud",
+    [
+        samples.torus(2000).points,
+        samples.y_junction(600).points,
+        np.column_stack([RNG.random((2000, 2)), np.zeros(2000)]),
+        np.column_stack([RNG.random((500, 2)) * [1, 0.2], 0.01 * RNG.normal(size=500)]),
+        RNG.random((2000, 3)),
+    ],
+    ids=["torus", "y", "sheet", "noisy strip", "filled"],
+)
+def test_surfaces_sheets_and_clouds_are_not_traced(cloud):
+    assert pipelines.default()(cloud).report.n_traced == 0
+
+
+def test_nothing_is_traced_without_a_say(sparse):
+    fitted = pipelines.default().with_options({"Refiner.surface": 0})(sparse)
+    assert not without_surface(SpacedPoints(fitted), 0.0).any()
+    unknown = replace(fitted, confidence=np.full(len(fitted.vertices), np.nan))
+    assert not without_surface(SpacedPoints(unknown), 0.65).any()
+    assert without_surface(SpacedPoints(fitted), 0.65).all()
+
+
+def test_normals_of_a_tube_and_of_a_plane():
+    cloud = SpacedPoints(glsk.skeletonize(tube(2000)))
+    assert abs(np.median(one_direction(cloud.normals, cloud.links)) - 0.9) < 0.1  # of a small piece of it
+    flat = np.tile([0, 0, 1.0], (len(cloud.points), 1))
+    np.testing.assert_allclose(one_direction(flat, cloud.links), 1)
+    np.testing.assert_allclose(one_direction(np.full_like(flat, np.nan), cloud.links), 0)
+
+
+def test_without_points_a_graph_becomes_a_tree():
+    square = glsk.Skeleton(
+        [[0, 0, 0], [1, 0, 0], [1, 0, 1.1], [0, 0, 1], [0, 0, 3]], [(0, 1), (1, 2), (2, 3), (0, 3)], np.ones(5),
+        np.empty(0, int), np.empty((0, 3)), np.empty((0, 3)),
+    )  # fmt: skip
+    tree = Refiner(root="z", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(square)
+    assert (tree.n_components, tree.n_loops, len(tree.vertices)) == (1, 0, 5)
+    assert tree.report.joined == (((0.0, 0.0, 3.0), (0.0, 0.0, 1.0)),) or tree.report.joined == (
+        ((0.0, 0.0, 1.0), (0.0, 0.0, 3.0)),
+    )
