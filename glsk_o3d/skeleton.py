@@ -39,19 +39,21 @@ class Skeleton:
         Pairs i < j, sorted, each once.
     radii : (M,) float64 array
         Local radius: the median distance from the vertex to the tangent planes of the points it owns, or, where
-        noise has tilted these, from the fitted curve to the points; on the axis of a tube the tube's radius.
+        noise has tilted these, from the fitted curve to the points; on the axis of a tube the tube's radius. Where
+        there is no surface, how far the points scatter around the curve.
     vertex_of_point : (N,) int64 array
         For every input point the vertex it belongs to; -1 only for points that were dropped as not finite.
     points : (N, 3) float64 array
         The input points, in the order they came in.
     normals : (N, 3) float64 array
         Unit normals estimated from the neighbourhoods, up to their sign; NaN for points that have no say, because they
-        were dropped as not finite, set aside as outliers, or left out of the sample of a large cloud.
+        were dropped as not finite, set aside as outliers, or left out of the sample of a large cloud, and where there
+        is no surface.
     report : Report
         What the run did.
     confidence : (M,) float64 array
         How well its points support each vertex, from 0 to 1: the share of what they say about where the axis is that
-        they agree on, less where they are few. NaN where nobody has measured it.
+        they agree on, less where they are few; 0 where there is no surface. NaN where nobody has measured it.
 
     Examples
     --------

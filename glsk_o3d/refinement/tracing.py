@@ -49,8 +49,8 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     Returns
     -------
     Skeleton
-        Traced vertices have the spread of their points for a radius, and no confidence. Of a tree, vertex 0 is the
-        root, and the first vertex of an edge is nearer to it.
+        Traced vertices have the spread of their points for a radius, and no confidence; their points have no normals
+        any more. Of a tree, vertex 0 is the root, and the first vertex of an edge is nearer to it.
     """
     cloud, m = SpacedPoints(skeleton), len(skeleton.vertices)
     thin = np.zeros(m, bool)
@@ -61,16 +61,16 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     mixed, joined = _Mixed.of(skeleton, cloud, thin).joined(anywhere=root is not None)
     paths = _Paths(mixed, mixed.roots() if root is None else mixed.root(skeleton, root))
     traced = _assembled(skeleton, mixed, paths, tree=root is not None)
-    vertex = skeleton.vertex_of_point
+    loose = thin[skeleton.vertex_of_point] & (skeleton.vertex_of_point >= 0)
     report = replace(
         skeleton.report,
-        n_traced=int(np.count_nonzero(thin[vertex] & (vertex >= 0))),
+        n_traced=int(loose.sum()),
         joined=tuple((tuple(a), tuple(b)) for a, b in mixed.places[joined].tolist()),
     )
     if root is not None:
         traced = _from_root(traced, paths.index[paths.roots[0]])
         report = replace(report, root=tuple(traced.vertices[0].tolist()))
-    return replace(traced, report=report)
+    return replace(traced, normals=np.where(loose[:, None], np.nan, skeleton.normals), report=report)
 
 
 @dataclass(frozen=True, eq=False)
