@@ -80,8 +80,8 @@ def tree() -> Pipeline[Skeleton]:
     --------
     >>> from glsk_o3d.samples import y_junction
     >>> grown = tree()(y_junction(1000).points)
-    >>> grown.n_components, grown.n_loops, grown.degree[0]
-    (1, 0, 1)
+    >>> grown.n_components, grown.n_loops, len(grown.leaves)
+    (1, 0, 3)
     """
     return (
         RingBuilder()

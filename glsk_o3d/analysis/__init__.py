@@ -5,6 +5,7 @@ from .branch_rows import BranchTable
 from .branches import branch_table
 from .comparison import Comparison, compare
 from .curvature import curvature_torsion
+from .forestry import Cylinders, TreeMeasures, cylinders, tree_measures
 from .grasps import grasp_candidates
 from .grippers import GraspCandidates
 from .loops import Loop
@@ -15,14 +16,18 @@ __all__ = [
     "Assessment",
     "BranchTable",
     "Comparison",
+    "Cylinders",
     "GraspCandidates",
     "Loop",
     "LoopWidth",
+    "TreeMeasures",
     "Truth",
     "assess",
     "branch_table",
     "compare",
     "curvature_torsion",
+    "cylinders",
     "grasp_candidates",
     "segment",
+    "tree_measures",
 ]

@@ -1,16 +1,14 @@
-"""A row of measures per branch: to read, to iterate over, to write."""
+"""A row of measures per branch."""
 
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..interop.atomic import write_csv
+from .rows import Rows
 
 PRINTED_ROWS = 20  # at most; fitted to a screen
 PRINTED_COLUMNS = {  # format, of the columns that are read by people
@@ -32,7 +30,7 @@ PRINTED_COLUMNS = {  # format, of the columns that are read by people
 
 
 @dataclass(frozen=True, eq=False)
-class BranchTable:
+class BranchTable(Rows, row="branch"):
     """One row per branch: those of `Skeleton.branches` in their order, then the vertices without edges.
 
     Lengths are in the cloud's units. Means are along the curve. NaN where something is unknown or means nothing.
@@ -103,25 +101,6 @@ class BranchTable:
     axis: np.ndarray
     order: np.ndarray
 
-    def __len__(self):
-        return len(self.kind)
-
-    def _columns(self) -> dict[str, list]:
-        columns: dict[str, list] = {"branch": list(range(len(self)))}
-        for field in fields(self):
-            array = getattr(self, field.name)
-            if array.ndim == 1:
-                columns[field.name] = array.tolist()
-            else:
-                name = field.name.removesuffix("_point")
-                columns |= {f"{name}_{axis}": column.tolist() for axis, column in zip("xyz", array.T, strict=True)}
-        return columns
-
-    def __iter__(self) -> Iterator[dict[str, Any]]:
-        columns = self._columns()
-        for row in zip(*columns.values(), strict=True):
-            yield dict(zip(columns, row, strict=True))
-
     def __repr__(self):
         return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
 
@@ -138,24 +117,6 @@ class BranchTable:
             for row in rows
         )
         return "\n".join([f"{self!r}: lengths in the cloud's units, angles in degrees", *map(str.rstrip, lines)])
-
-    def to_csv(self, path: str | os.PathLike) -> None:
-        """Write the table as CSV: a line of names, then a line per branch.
-
-        NaN and infinity are left empty, as JSON has null for both.
-
-        Parameters
-        ----------
-        path : path-like
-            Appears complete or not at all.
-
-        Raises
-        ------
-        OSError
-            The folder does not exist, or the file cannot be written.
-        """
-        rows = (("" if isinstance(v, float) and not math.isfinite(v) else v for v in row.values()) for row in self)
-        write_csv(path, [*self._columns()], rows)
 
 
 def cell(row: dict[str, Any], name: str) -> str:

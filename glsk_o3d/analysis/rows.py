@@ -1,0 +1,62 @@
+"""Tables of arrays with a row per thing: to read, to iterate over, to write."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import Any, ClassVar
+
+from ..interop.atomic import write_csv
+
+
+class Rows:
+    """Base of dataclasses whose fields are arrays with a row per thing.
+
+    Iteration gives a dict of plain numbers and strings per row, the number of the row first; points, in fields whose
+    names end in ``_point``, become three columns without it.
+    """
+
+    _row: ClassVar[str]
+
+    def __init_subclass__(cls, row: str) -> None:
+        super().__init_subclass__()
+        cls._row = row
+
+    def __len__(self) -> int:
+        return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
+
+    def _columns(self) -> dict[str, list]:
+        columns: dict[str, list] = {self._row: list(range(len(self)))}
+        for field in fields(self):  # type: ignore[arg-type]
+            array = getattr(self, field.name)
+            if array.ndim == 1:
+                columns[field.name] = array.tolist()
+            else:
+                name = field.name.removesuffix("_point")
+                columns |= {f"{name}_{axis}": column.tolist() for axis, column in zip("xyz", array.T, strict=True)}
+        return columns
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        columns = self._columns()
+        for row in zip(*columns.values(), strict=True):
+            yield dict(zip(columns, row, strict=True))
+
+    def to_csv(self, path: str | os.PathLike) -> None:
+        """Write the table as CSV: a line of names, then a line per row.
+
+        NaN and infinity are left empty, as JSON has null for both.
+
+        Parameters
+        ----------
+        path : path-like
+            Appears complete or not at all.
+
+        Raises
+        ------
+        OSError
+            The folder does not exist, or the file cannot be written.
+        """
+        rows = (("" if isinstance(v, float) and not math.isfinite(v) else v for v in row.values()) for row in self)
+        write_csv(path, [*self._columns()], rows)

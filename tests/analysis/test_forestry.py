@@ -1,0 +1,118 @@
+"""Cylinders and measures of trees against tubes with known volumes."""
+
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from glsk_o3d import InvalidParameterError, Report, Skeleton, pipelines, samples
+from glsk_o3d.analysis import cylinders, tree_measures
+
+Z = np.array([0, 0, 1.0])
+THICK, THIN, HEIGHT = 0.1, 0.05, 2.0
+VOLUME = np.pi * THICK**2 * (HEIGHT - THICK / 3), np.pi * THIN**2 * (1 - THICK - THIN / 3)
+
+
+def lateral(start, way, length, radius, n, rng):
+    """Points on a tube with a round cap at its far end."""
+    way = way / np.linalg.norm(way)
+    across = np.linalg.svd(way[None])[2][1:]
+    cap = radius / (length + radius)  # the share of a hemisphere's area
+    along, turn = length * rng.random(n), 2 * np.pi * rng.random(n)
+    rise = np.where(rng.random(n) < cap, rng.random(n), 0)
+    along = np.where(rise > 0, length - radius + radius * rise, along * (length - radius) / length)
+    wide = radius * np.sqrt(1 - rise**2)[:, None]
+    return start + along[:, None] * way + wide * (np.cos(turn)[:, None] * across[0] + np.sin(turn)[:, None] * across[1])
+
+
+@pytest.fixture(scope="module", params=[0.0, 0.005], ids=["clean", "noisy"])
+def tree(request):
+    """A stem of two metres, and a branch to one side at half its height."""
+    rng = np.random.default_rng(5)
+    stem, branch = lateral(0 * Z, Z, HEIGHT, THICK, 6000, rng), lateral(Z, np.array([1, 0, 0]), 1.0, THIN, 1500, rng)
+    branch = branch[np.hypot(branch[:, 0], branch[:, 1]) > THICK]
+    stem = stem[np.hypot(stem[:, 1], stem[:, 2] - 1) * (stem[:, 0] > 0) + (stem[:, 0] <= 0) > THIN]
+    points = np.concatenate([stem, branch])
+    return pipelines.tree()(points + request.param * rng.normal(size=points.shape))
+
+
+def by_hand(radius=0.5, edges=((0, 1), (1, 2), (1, 3))):
+    places = np.array([[0, 0, 0], [0, 0, 10], [0, 0, 20], [10, 0, 10]], float)
+    return Skeleton(places, edges, np.full(4, radius), np.empty(0, int), np.empty((0, 3)), np.empty((0, 3)))
+
+
+def test_volume_surface_and_length_by_order(tree):
+    measures = tree_measures(tree)
+    np.testing.assert_allclose(measures.volume, VOLUME, rtol=0.08)
+    np.testing.assert_allclose(measures.length, [HEIGHT - THICK / 3, 1 - THICK - THIN / 3], rtol=0.05)
+    np.testing.assert_allclose(measures.area[0], 2 * np.pi * THICK * HEIGHT, rtol=0.08)
+
+
+def test_stem_height_and_crown(tree):
+    measures = tree_measures(tree)
+    assert abs(measures.stem_diameter - 2 * THICK) < 0.01
+    assert abs(measures.height - HEIGHT) < 0.04
+    assert abs(measures.crown_base - 1) < 0.05
+    assert abs(measures.crown_width - (1 - THICK)) < 0.05
+    assert measures.crown_area < 0.02  # one branch has none
+    assert measures.traced == 0
+
+
+def test_units_and_directions(tree):
+    metres, millimetres = asdict(tree_measures(tree)), asdict(tree_measures(tree, unit=0.001))
+    assert np.isnan(millimetres["stem_diameter"])  # a tree of two millimetres
+    for name, power in (("height", 1), ("crown_width", 1), ("length", 1), ("area", 2), ("volume", 3)):
+        np.testing.assert_allclose(np.multiply(millimetres[name], 1000**power), metres[name])
+    assert tree_measures(tree, up="-z").height < 0.01
+    assert tree_measures(tree, root=(0, 0, 2), up="-z").height > 1.9
+
+
+def test_cylinders_grow_from_each_other(tree):
+    table = cylinders(tree)
+    assert (table.parent < np.arange(len(table))).all()
+    assert (table.parent < 0).sum() == 1
+    inner = np.flatnonzero(table.parent >= 0)
+    same = inner[table.order[inner] == table.order[table.parent[inner]]]
+    np.testing.assert_allclose(table.start_point[same], table.end_point[table.parent[same]], atol=1e-9)
+    assert set(table.order.tolist()) == {0, 1}
+    np.testing.assert_allclose(table.volume, np.pi * table.radius**2 * table.length)
+
+
+def test_by_hand():
+    table = cylinders(by_hand(), root=0)
+    assert table.order.tolist() == 10 * [0] + 5 * [1]
+    np.testing.assert_allclose(table.volume[:10].sum(), np.pi * 0.25 * 20)
+    np.testing.assert_allclose(table.length[10:].sum(), 9.5)  # from the surface of the stem on
+    np.testing.assert_allclose(table.start_point[10], [0.5, 0, 10])
+    assert table.parent.tolist() == [-1, *range(9), 4, *range(10, 14)]
+    measures = tree_measures(by_hand(), root=0)
+    assert (measures.height, measures.stem_diameter, measures.crown_base) == (20, 1, 10)
+    assert measures.crown_width == 9.5
+
+
+def test_rows_and_csv(tmp_path):
+    table = cylinders(by_hand(), root=0)
+    first = next(iter(table))
+    assert list(first)[:5] == ["cylinder", "start_x", "start_y", "start_z", "end_x"]
+    table.to_csv(tmp_path / "c.csv")
+    assert len((tmp_path / "c.csv").read_text().splitlines()) == 1 + len(table)
+
+
+def test_the_root_is_the_one_that_the_tree_was_grown_from():
+    skeleton = by_hand()
+    rooted = Skeleton(**{**vars(skeleton), "report": Report(root=(0.0, 0.0, 20.0))})
+    assert cylinders(rooted).start_point[0].tolist() == [0, 0, 20]
+
+
+@pytest.mark.parametrize("options", [{"up": "w"}, {"up": "zz"}, {"up": "--z"}, {"unit": 0}, {"unit": np.nan}])
+def test_wrong_options(options):
+    with pytest.raises(InvalidParameterError, match=r"up = |unit = "):
+        tree_measures(by_hand(), **options)
+
+
+def test_loops_and_lone_points_have_none():
+    ring = pipelines.default()(samples.torus(1000).points)
+    with pytest.raises(InvalidParameterError, match="1 loops"):
+        cylinders(ring)
+    with pytest.raises(InvalidParameterError, match="no branches"):
+        cylinders(by_hand(edges=()))
