@@ -124,7 +124,7 @@ def _spanning(piece: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.nda
 def slices(points: np.ndarray, links: csr_matrix, distance: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
     """Where the slice of a part is centred that every point is in the middle of, and how wide it is.
 
-    Slices are connected pieces of what lies between two geodesic distances (Verroust and Lazarus 2000, "Extracting
+    Slices are connected pieces of what lies between two geodesic distances (Verroust and Lazarus 1999, "Extracting
     skeletal curves from 3D scattered data"), twice, the second time half a width farther on.
 
     Parameters

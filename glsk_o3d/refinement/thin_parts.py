@@ -20,6 +20,7 @@ from .diagnostics import SHEET_SHARE
 
 SCALE_NEIGHBOUR = 8  # fitted: the nearest point whose distance is the scale of a point
 TRACED_POINTS = 25000  # measured: points that larger clouds are traced by, about
+SAME_PLACE = 1e-6  # derived: share of the cloud's extent below which points are not apart
 LEAST_POINTS = 64  # fitted: of which fewer say nothing about where there is no surface
 SURFACE_GROWTH = 2.5  # measured: growth of links on a surface; noise that fills space has more, a curve 1.7
 SHEET_GROWTH = 2.2  # fitted: growth of links that a sheet surely has
@@ -41,7 +42,9 @@ class SpacedPoints:
         points, some = self.skeleton.points, np.flatnonzero(self.skeleton.vertex_of_point >= 0)
         if len(some):
             some = some[sample_cloud(points[some], TRACED_POINTS).kept]
-        return some[np.sort(np.unique(points[some], axis=0, return_index=True)[1])]
+        wide = np.ptp(points[some], axis=0).max() if len(some) else 0.0
+        cells = np.rint(points[some] / max(SAME_PLACE * wide, TINY))
+        return some[np.sort(np.unique(cells, axis=0, return_index=True)[1])]
 
     @cached_property
     def points(self) -> np.ndarray:
@@ -92,7 +95,8 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     skeleton, m = cloud.skeleton, len(cloud.skeleton.vertices)
     owner = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0]
     count, thin = np.bincount(owner, minlength=m) / max(len(owner) / TRACED_POINTS, 1), skeleton.confidence < SHY
-    if len(owner) < LEAST_POINTS or not (_share_around(skeleton.vertices, count, thin) > 1 - least).any():
+    enough = (1 - least) * min(REGION_POINTS, count.sum())  # for one region
+    if count[thin].sum() <= enough or len(cloud.rows) < LEAST_POINTS:
         return np.zeros(m, bool)
     vertex = cloud.vertex
     count = np.bincount(vertex, minlength=m)

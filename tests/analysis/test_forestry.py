@@ -51,7 +51,7 @@ def test_volume_surface_and_length_by_order(tree):
 def test_stem_height_and_crown(tree):
     measures = tree_measures(tree)
     assert abs(measures.stem_diameter - 2 * THICK) < 0.01
-    assert abs(measures.height - HEIGHT) < 0.04
+    assert abs(measures.height - HEIGHT) < 0.05
     assert abs(measures.crown_base - 1) < 0.05
     assert abs(measures.crown_width - (1 - THICK)) < 0.05
     assert measures.crown_area < 0.02  # one branch has none
@@ -63,7 +63,7 @@ def test_units_and_directions(tree):
     assert np.isnan(millimetres["stem_diameter"])  # a tree of two millimetres
     for name, power in (("height", 1), ("crown_width", 1), ("length", 1), ("area", 2), ("volume", 3)):
         np.testing.assert_allclose(np.multiply(millimetres[name], 1000**power), metres[name])
-    assert tree_measures(tree, up="-z").height < 0.01
+    assert tree_measures(tree, up="-z").height < 0.06
     assert tree_measures(tree, root=(0, 0, 2), up="-z").height > 1.9
 
 
