@@ -203,7 +203,7 @@ class Skeleton:
         return branch_table(self, root)
 
     def annotate(self, cloud: Any = None, *, color: ColorChoice | None = None) -> Any:
-        """A copy of a cloud with the attributes ``skeleton_vertex``, ``branch`` and ``radius``.
+        """A copy of a cloud that says of every point where it belongs, and how thick it is there.
 
         See `glsk_o3d.io.annotation.annotate`.
         """

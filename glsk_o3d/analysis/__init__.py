@@ -10,6 +10,7 @@ from .grasps import grasp_candidates
 from .grippers import GraspCandidates
 from .loops import Loop
 from .segmentation import segment
+from .thickness import thickness
 from .truth import Truth
 
 __all__ = [
@@ -29,5 +30,6 @@ __all__ = [
     "cylinders",
     "grasp_candidates",
     "segment",
+    "thickness",
     "tree_measures",
 ]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.segmentation import branch_of_point, label_of_nearest, vertex_of_cloud
+from ..analysis.thickness import thickness
 from ..interop.clouds import cloud_points, open3d_class
 from ..interop.packages import import_open3d
 from .colors import ColorChoice, shades
@@ -24,9 +25,11 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
 
     - ``skeleton_vertex`` (N, 1) int32: the vertex it belongs to, as in `Skeleton.vertex_of_point`;
     - ``branch`` (N, 1) int32: the row of `Skeleton.branch_table`, as from `Skeleton.segment`;
-    - ``radius`` (N, 1), of the type of the positions: the radius of the vertex.
+    - ``radius`` and ``confidence`` (N, 1), of the type of the positions: those of the vertex;
+    - ``thickness`` (N, 1), of that type: the radius over how far the points are apart, see
+      `glsk_o3d.analysis.thickness`.
 
-    Points that are not finite have -1, -1 and NaN. Attributes of these names are replaced.
+    Points that are not finite have -1 or NaN. Attributes of these names are replaced.
 
     Parameters
     ----------
@@ -60,7 +63,9 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     geometry, put = _copy(points if cloud is None else cloud)
     put("skeleton_vertex", vertex[:, None], "int32")
     put("branch", branch[:, None], "int32")
-    put("radius", np.where(vertex >= 0, skeleton.radii[vertex], np.nan)[:, None])
+    for name, values in (("radius", skeleton.radii), ("confidence", skeleton.confidence)):
+        put(name, np.where(vertex >= 0, values[vertex], np.nan)[:, None])
+    put("thickness", thickness(skeleton, cloud)[:, None])
     if color is not None:
         put("colors", np.round(255 * shades(skeleton, color, branch, vertex)), "uint8")
     return geometry

@@ -53,8 +53,9 @@ def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton, state)
     annotated = held(skeleton.annotate(cloud))
     kind = cloud.point.positions.numpy().dtype
     assert_equal({name: annotated[name] for name in before}, before)
-    assert annotated.keys() - before.keys() == {"skeleton_vertex", "branch", "radius"}
-    for name, dtype in (("skeleton_vertex", np.int32), ("branch", np.int32), ("radius", kind)):
+    assert annotated.keys() - before.keys() == {"skeleton_vertex", "branch", "radius", "confidence", "thickness"}
+    floats = dict.fromkeys(("radius", "confidence", "thickness"), kind)
+    for name, dtype in {"skeleton_vertex": np.int32, "branch": np.int32, **floats}.items():
         assert annotated[name].dtype == dtype
         assert annotated[name].shape == (800, 1)
     np.testing.assert_array_equal(annotated["skeleton_vertex"][:, 0], skeleton.vertex_of_point)
