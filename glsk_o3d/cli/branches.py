@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .console import print_json, print_table
-from .options import Json, Quiet, Verbose
-from .reporting import WrongUsage, reporting
+from .options import Json, Quiet, Root, Verbose, root_place
+from .reporting import reporting
 
 if TYPE_CHECKING:
     from ..analysis import BranchTable
@@ -23,15 +23,7 @@ def branches(
         Path | None,
         typer.Option("--output", "-o", metavar="CSV", help="Write the whole table, with ends, curvature and torsion."),
     ] = None,
-    root: Annotated[
-        str | None,
-        typer.Option(
-            "--root",
-            metavar="VERTEX|X,Y,Z",
-            help="Where the skeleton grows from: the number of a vertex, or a point near one. By default, its part "
-            "with the most volume.",
-        ),
-    ] = None,
+    root: Root = None,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -48,7 +40,7 @@ def branches(
         from .outputs import check_findings
 
         check_findings([(output, ".csv", "table is CSV")], skeleton)
-        place = _root(root)
+        place = root_place(root)
         curve = read_skeleton(skeleton)
         if len(curve.vertices) == 0:
             raise FileFormatError(f"{skeleton}: the skeleton is empty: it has no branches to measure")
@@ -61,15 +53,6 @@ def branches(
             _print(table)
             if output is not None:
                 typer.echo(f"wrote {output}")
-
-
-def _root(text: str | None) -> int | list[float] | None:
-    if text is None:
-        return None
-    try:
-        return [float(word) for word in text.split(",")] if "," in text else int(text)
-    except ValueError:
-        raise WrongUsage(f"--root {text}: write the number of a vertex, or a point as x,y,z") from None
 
 
 def _print(table: BranchTable) -> None:

@@ -21,6 +21,7 @@ from .info import info
 from .rerun import rerun
 from .run import run
 from .skeletonize import skeletonize
+from .tree import tree
 from .view import view
 
 EPILOG = (
@@ -35,7 +36,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (skeletonize, batch, run, rerun, evaluate, crosscheck, branches, view, demo, filters, info):
+for command in (skeletonize, batch, run, rerun, evaluate, crosscheck, branches, tree, view, demo, filters, info):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
 
 

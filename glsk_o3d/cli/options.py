@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from .reporting import WrongUsage
+
 Output = Annotated[
     list[Path] | None,
     typer.Option(
@@ -47,6 +49,25 @@ Settings = Annotated[
     ),
 ]
 DropInvalid = Annotated[bool, typer.Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")]
+Root = Annotated[
+    str | None,
+    typer.Option(
+        "--root",
+        metavar="VERTEX|X,Y,Z",
+        help="Where the skeleton grows from: the number of a vertex, or a point near one. By default, where the "
+        "pipeline 'tree' made it grow from, or else its part with the most volume.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout instead of tables.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors (and JSON, if asked for).")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print each iteration, the log, and tracebacks.")]
+
+
+def root_place(text: str | None) -> int | list[float] | None:
+    """What ``--root`` says: a vertex or a point; WrongUsage for anything else."""
+    if text is None:
+        return None
+    try:
+        return [float(word) for word in text.split(",")] if "," in text else int(text)
+    except ValueError:
+        raise WrongUsage(f"--root {text}: write the number of a vertex, or a point as x,y,z") from None

@@ -1,0 +1,76 @@
+"""``glsk tree``: what foresters read of the skeleton of a tree."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .console import print_json, print_table
+from .options import Json, Quiet, Root, Verbose, root_place
+from .reporting import reporting
+
+if TYPE_CHECKING:
+    from ..analysis import TreeMeasures
+
+WORDS = {
+    "height": ("height", "m"),
+    "stem_diameter": ("stem diameter at 1.3 m", "m"),
+    "crown_base": ("lowest branch", "m"),
+    "crown_width": ("crown width", "m"),
+    "crown_area": ("crown area from above", "m2"),
+    "traced": ("share of the volume without a surface", ""),
+}
+
+
+def tree(
+    skeleton: Annotated[
+        Path, typer.Argument(metavar="SKELETON", help="Of a tree, with radii: 'glsk skeletonize --pipeline tree'.")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="CSV", help="Write the cylinders, in the file's units.")
+    ] = None,
+    root: Root = None,
+    up: Annotated[str, typer.Option(metavar="AXIS", help="What points up: x, y, z, -x, -y or -z.")] = "z",
+    unit: Annotated[float, typer.Option(metavar="METRES", help="Of one unit of the file: 0.001 for millimetres.")] = 1,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Measure a tree: height, stem diameter, crown, and length, surface and volume by order.
+
+    Orders count from the stem, 0. Where there was no surface, radii are the scatter of the points, and volumes an upper
+    bound.
+    """
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..analysis.forestry import cylinders, tree_measures
+        from ..io.skeletons import read_skeleton
+        from .outputs import check_findings
+
+        check_findings([(output, ".csv", "table is CSV")], skeleton)
+        place, curve = root_place(root), read_skeleton(skeleton)
+        measures = tree_measures(curve, place, up=up, unit=unit)
+        if output is not None:
+            cylinders(curve, place).to_csv(output)
+        if as_json:
+            print_json({"skeleton": str(skeleton), **asdict(measures)})
+        elif not quiet:
+            _print(measures)
+            if output is not None:
+                typer.echo(f"wrote {output}")
+
+
+def _print(measures: TreeMeasures) -> None:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    for name, (words, unit) in WORDS.items():
+        typer.echo(f"{words}: {getattr(measures, name):.4g} {unit}".rstrip())
+    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
+    for name in ("order", "length m", "surface m2", "volume m3"):
+        shown.add_column(name, justify="right")
+    for order, values in enumerate(zip(measures.length, measures.area, measures.volume, strict=True)):
+        shown.add_row(str(order), *(f"{value:.4g}" for value in values))
+    print_table(shown, whole=True)
