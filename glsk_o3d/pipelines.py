@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from .connector import Connector
 from .contractor import Contractor
@@ -70,11 +71,15 @@ def default() -> Pipeline[Skeleton]:
     return RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore()) | Connector() | Refiner()
 
 
-def tree() -> Pipeline[Skeleton]:
+def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
     """One rooted tree, for trees and plants: what `default` makes, with gaps joined and loops closed.
 
-    It assumes that all points are of one plant that stands upright in z; another root is
-    ``tree().with_options({"Refiner.root": "y"})``. What is there besides, ground, a pot, a neighbour, is best cut away.
+    It assumes that all points are of one plant. What is there besides, ground, a pot, a neighbour, is best cut away.
+
+    Parameters
+    ----------
+    root : str or (x, y, z)
+        See `Refiner.root`; by default the lowest place in z.
 
     Examples
     --------
@@ -87,7 +92,7 @@ def tree() -> Pipeline[Skeleton]:
         RingBuilder()
         | Contractor(reducer=LPRReducer(), stop=ExplainedScore())
         | Connector()
-        | Refiner(handle=1, root="z")
+        | Refiner(handle=1, root=root)
     )
 
 

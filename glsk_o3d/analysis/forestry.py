@@ -99,7 +99,7 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     --------
     >>> from glsk_o3d import pipelines
     >>> from glsk_o3d.samples import tube
-    >>> stem = pipelines.tree().with_options({"Refiner.root": "x"})(tube(2000, length=1, radius=0.1).points)
+    >>> stem = pipelines.tree("x")(tube(2000, length=1, radius=0.1).points)
     >>> table = cylinders(stem)
     >>> bool(abs(table.volume.sum() / (np.pi * 0.1**2 * (1 + 0.4 / 3)) - 1) < 0.05)  # it has round ends
     True
@@ -231,7 +231,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str = "z", unit: float
     --------
     >>> from glsk_o3d import pipelines
     >>> from glsk_o3d.samples import tube
-    >>> stem = pipelines.tree().with_options({"Refiner.root": "x"})(tube(2000, length=2, radius=0.1).points)
+    >>> stem = pipelines.tree("x")(tube(2000, length=2, radius=0.1).points)
     >>> abs(tree_measures(stem, up="x").stem_diameter - 0.2) < 0.01
     True
     """

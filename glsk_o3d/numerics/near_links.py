@@ -57,8 +57,7 @@ def link_growth(links: csr_matrix) -> np.ndarray:
 
     5/3 along a curve, 25/9 on a surface, 125/27 where points fill space; mean over the links of every point, twice.
     """
-    step = csr_matrix(links + identity(links.shape[0]))
-    step.data[:] = 1
+    step = _steps(links)
     one, two = np.diff(step.indptr), np.diff((step @ step).indptr)
     growth = two / one
     for _ in range(2):
@@ -68,6 +67,8 @@ def link_growth(links: csr_matrix) -> np.ndarray:
 
 def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> tuple[csr_matrix, np.ndarray]:
     """Join the connected pieces of a graph where they are nearest to each other, until they are one.
+
+    A gap that neither end points across counts twice.
 
     Parameters
     ----------
@@ -86,21 +87,40 @@ def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> t
     added = np.empty((0, 2), int)
     piece = connected_components(links, directed=False)[1]
     _, neighbour = nearest_neighbours(places, min(LINK_NEIGHBOURS + 1, len(places)))
+    outward = _outward(places, links)
     while piece.max() > 0:
         row, column = np.nonzero(piece[neighbour] != piece[:, None])
         ends = np.column_stack([row, neighbour[row, column]])
         lost = np.setdiff1d(piece, piece[row])  # pieces that see nothing but themselves
         some = [_nearest_other(places, piece, each) for each in lost[lost != np.bincount(piece).argmax()]]
         ends = np.concatenate([ends, *(pair[None] for pair in some)])
-        length = norm(places[ends[:, 0]] - places[ends[:, 1]])
-        fresh = ends[_spanning(piece, ends, length)]
-        fresh = fresh[norm(places[fresh[:, 0]] - places[fresh[:, 1]]) <= longest[fresh].max(axis=1)]
+        way = places[ends[:, 1]] - places[ends[:, 0]]
+        length = norm(way)
+        ahead = np.maximum(dot(outward[ends[:, 0]], way), -dot(outward[ends[:, 1]], way)) / np.maximum(length, TINY)
+        chosen = _spanning(piece, ends, length * (2 - np.maximum(ahead, 0)))
+        fresh = ends[chosen[length[chosen] <= longest[ends[chosen]].max(axis=1)]]
         if len(fresh) == 0:
             break
         added = np.concatenate([added, fresh])
         piece = component_labels(int(piece.max()) + 1, piece[fresh])[piece]
     row, column = links.nonzero()
     return linked(places, np.concatenate([np.column_stack([row, column]), added])), added
+
+
+def _outward(places: np.ndarray, links: csr_matrix) -> np.ndarray:
+    """Unit vectors from the mean of what is within two links of every place to it: where it goes on if it is an end."""
+    step = _steps(links)
+    near = step @ step
+    near.data[:] = 1
+    out = places - (near @ places) / np.diff(near.indptr)[:, None]
+    return out / np.maximum(norm(out), TINY)[:, None]
+
+
+def _steps(links: csr_matrix) -> csr_matrix:
+    """1 for every place itself and those that it is linked with."""
+    step = csr_matrix(links + identity(links.shape[0]))
+    step.data[:] = 1
+    return step
 
 
 def _nearest_other(places: np.ndarray, piece: np.ndarray, each: int) -> np.ndarray:

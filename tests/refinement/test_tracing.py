@@ -89,13 +89,13 @@ def test_nothing_is_wrong_with_that(sparse):
     ],
 )
 def test_roots(sparse, root, place):
-    skeleton = pipelines.tree().with_options({"Refiner.root": root})(sparse)
+    skeleton = pipelines.tree(root)(sparse)
     np.testing.assert_allclose(skeleton.vertices[0], place, atol=0.05)
     assert (skeleton.n_components, skeleton.n_loops) == (1, 0)
 
 
 def test_the_thickest_end():
-    skeleton = pipelines.tree().with_options({"Refiner.root": "thickest"})(samples.y_junction(2000).points)
+    skeleton = pipelines.tree("thickest")(samples.y_junction(2000).points)
     first = skeleton.leaves[np.argmax(skeleton.radii[skeleton.leaves])]
     assert first == 0
 
@@ -125,7 +125,7 @@ def test_a_ring_of_points_stays_a_loop():
     ring = glsk.skeletonize(np.column_stack([np.cos(t), np.sin(t), 0 * t]))
     assert (ring.n_loops, len(ring.leaves)) == (1, 0)
     assert abs(ring.length - 2 * np.pi) < 0.1
-    tree = pipelines.tree().with_options({"Refiner.root": "x"})(ring.points)
+    tree = pipelines.tree("x")(ring.points)
     assert (tree.n_components, tree.n_loops, len(tree.leaves)) == (1, 0, 2)
 
 
