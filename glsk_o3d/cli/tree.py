@@ -39,9 +39,9 @@ def tree(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Measure a tree: height, stem diameter, crown, and length, surface and volume by order.
+    """Measure a tree: height, stem, crown, volume by order.
 
-    Orders count from the stem, 0. Where there was no surface, radii are the scatter of the points, and volumes an upper
+    Length and surface, too. Orders count from the stem, 0. Where there was no surface, radii are the scatter of the points, and volumes an upper
     bound.
     """
     with reporting(quiet=quiet, verbose=verbose):
