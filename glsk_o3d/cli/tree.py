@@ -41,8 +41,8 @@ def tree(
 ) -> None:
     """Measure a tree: height, stem, crown, volume by order.
 
-    Length and surface, too. Orders count from the stem, 0. Where there was no surface, radii are the scatter of the points, and volumes an upper
-    bound.
+    Length and surface, too. Orders count from the stem, 0. Where there was no surface, radii are the scatter of the
+    points, and volumes an upper bound.
     """
     with reporting(quiet=quiet, verbose=verbose):
         from ..analysis.forestry import cylinders, tree_measures
