@@ -79,7 +79,7 @@ def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
     Parameters
     ----------
     root : str or (x, y, z)
-        See `Refiner.root`; by default the lowest place in z.
+        As the option ``root`` of `Refiner`; by default the lowest place in z.
 
     Examples
     --------
