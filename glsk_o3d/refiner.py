@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from .numerics.vectors import AXES
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .refinement.air import cut_air
@@ -128,7 +129,7 @@ class Refiner(Filter[Skeleton]):
         "Where a tree grows from: the lowest place along an axis, the end that is thickest, or the place nearest to a "
         "point; the skeleton is then one tree, whatever the gaps. None keeps parts and loops.",
         type="point?",
-        choices=("x", "-x", "y", "-y", "z", "-z", "thickest"),
+        choices=(*AXES, "thickest"),
     )
 
     def __post_init__(self) -> None:

@@ -11,7 +11,7 @@ from scipy.spatial.distance import pdist
 
 from ..errors import InvalidParameterError
 from ..numerics.polylines import arc_lengths, place_at
-from ..numerics.vectors import TINY
+from ..numerics.vectors import AXES, TINY, along_axis
 from .branches import branch_table
 from .rows import Rows
 
@@ -235,23 +235,22 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str = "z", unit: float
     >>> abs(tree_measures(stem, up="x").stem_diameter - 0.2) < 0.01
     True
     """
-    if up.removeprefix("-") not in ("x", "y", "z"):
+    if up not in AXES:
         raise InvalidParameterError(f"up = {up!r}: must be 'x', 'y' or 'z', with a minus where that points down")
     if not unit > 0:
         raise InvalidParameterError(f"unit = {unit}: must be metres, above 0")
     pieces = cylinders(skeleton, root)
-    axis, sign = "xyz".index(up[-1]), -1 if up[0] == "-" else 1
-    ground = pieces.start_point[0, axis]
+    ground = pieces.start_point[0]
 
     def height(places: np.ndarray) -> np.ndarray:
-        return unit * sign * (places[:, axis] - ground)
+        return unit * along_axis(places - ground, up)
 
     stem = pieces.order == 0
     bottom, top = height(pieces.start_point), height(pieces.end_point)
     breast = np.flatnonzero(stem & (bottom <= BREAST_HEIGHT) & (top >= BREAST_HEIGHT))
     leaving = bottom[(pieces.order == 1) & stem[pieces.parent]]
-    crown = unit * np.delete(np.concatenate([pieces.start_point[~stem], pieces.end_point[~stem]]), axis, axis=1)
-    width, area = _extent(crown)
+    crown = unit * np.concatenate([pieces.start_point[~stem], pieces.end_point[~stem]])
+    width, area = _extent(np.delete(crown, "xyz".index(up[-1]), axis=1))
 
     def by_order(values: np.ndarray, power: int) -> tuple[float, ...]:
         return tuple((unit**power * np.bincount(pieces.order, values)).tolist())

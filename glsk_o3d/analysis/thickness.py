@@ -46,7 +46,11 @@ def thickness(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
     >>> bool(np.median(dense) > 2 * np.median(sparse) > 1)
     True
     """
-    points, vertex = vertex_of_cloud(skeleton, cloud)
+    return thickness_of_points(skeleton, *vertex_of_cloud(skeleton, cloud))
+
+
+def thickness_of_points(skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
+    """The same for points, (N, 3) float array, whose vertices are known, (N,) int array."""
     some = np.flatnonzero(vertex >= 0)
     found = np.full(len(points), np.nan)
     if len(some):

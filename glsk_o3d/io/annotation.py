@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.segmentation import branch_of_point, label_of_nearest, vertex_of_cloud
-from ..analysis.thickness import thickness
+from ..analysis.thickness import thickness_of_points
 from ..interop.clouds import cloud_points, open3d_class
 from ..interop.packages import import_open3d
 from .colors import ColorChoice, shades
@@ -65,7 +65,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     put("branch", branch[:, None], "int32")
     for name, values in (("radius", skeleton.radii), ("confidence", skeleton.confidence)):
         put(name, np.where(vertex >= 0, values[vertex], np.nan)[:, None])
-    put("thickness", thickness(skeleton, cloud)[:, None])
+    put("thickness", thickness_of_points(skeleton, points, vertex)[:, None])
     if color is not None:
         put("colors", np.round(255 * shades(skeleton, color, branch, vertex)), "uint8")
     return geometry

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .vectors import TINY, norm
+from .vectors import TINY, unit
 
 # measured: distance of two eigenvalues over their spread, below which the closed form is not exact enough
 EIGENVALUES_APART = 1e-3
@@ -79,7 +79,7 @@ def _direction(shape: np.ndarray, value: np.ndarray, which: int) -> np.ndarray:
     longest = np.argmax(diagonal, axis=0)
     line = np.arange(len(longest))
     vectors = adjugate.T[line[:, None], np.array(_SQUARE)[longest]]
-    vectors /= np.maximum(norm(vectors), TINY)[:, None]
+    vectors = unit(vectors)
     # its trace is the product of the distances to the two other eigenvalues
     dim = np.flatnonzero(diagonal.sum(axis=0) < 3 * EIGENVALUES_APART)
     if len(dim):

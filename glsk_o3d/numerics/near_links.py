@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from .components import component_labels
 from .groups import group_sum
 from .neighbourhoods import nearest_neighbours, row_medians
-from .vectors import TINY, dot, norm
+from .vectors import TINY, dot, norm, unit
 
 LINK_NEIGHBOURS = 20  # fitted: nearest points that a point may be linked with
 LINK_SPACINGS = 2.0  # fitted: longest link over the local spacing; twigs that pass each other are mostly farther apart
@@ -112,8 +112,7 @@ def _outward(places: np.ndarray, links: csr_matrix) -> np.ndarray:
     step = _steps(links)
     near = step @ step
     near.data[:] = 1
-    out = places - (near @ places) / np.diff(near.indptr)[:, None]
-    return out / np.maximum(norm(out), TINY)[:, None]
+    return unit(places - (near @ places) / np.diff(near.indptr)[:, None])
 
 
 def _steps(links: csr_matrix) -> csr_matrix:

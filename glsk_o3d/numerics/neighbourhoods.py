@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from .cores import threads
 from .eigen import principal_parts
-from .vectors import PAIRS, TINY, dot, norm
+from .vectors import PAIRS, TINY, dot, unit
 
 THREAD_POINTS = 4096  # measured: points whose neighbours are worth a thread
 SCATTER_CHUNK = 4096  # measured: rows at a time: the (3, rows, k) work array then stays in the cache
@@ -180,8 +180,7 @@ def uprightness(points: np.ndarray, normals: np.ndarray, p: np.ndarray, q: np.nd
     (m,) float array
         1 where a surface goes on from one point to the other, 0 where two surfaces face each other.
     """
-    line = points[q] - points[p]
-    line /= np.maximum(norm(line)[:, None], TINY)
+    line = unit(points[q] - points[p])
     at_p, at_q = (np.maximum(1 - dot(normals[end], line) ** 2, 0) for end in (p, q))
     return at_p * at_q
 

@@ -7,6 +7,8 @@ import numpy as np
 TINY = np.finfo(float).tiny  # derived: what a divisor is at least
 PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # derived: the entries of a symmetric 3 x 3 matrix
 ROWS, COLUMNS = np.array(PAIRS).T
+AXES = ("x", "-x", "y", "-y", "z", "-z")
+"""Directions that point along an axis, or against it, in words."""
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -18,3 +20,13 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def norm(a: np.ndarray) -> np.ndarray:
     """Length of each row of `a`, (n, 3) float array: (n,) float array."""
     return np.sqrt(dot(a, a))
+
+
+def unit(a: np.ndarray) -> np.ndarray:
+    """Each row of `a`, (n, 3) float array, over its length; rows of zeros stay."""
+    return a / np.maximum(norm(a), TINY)[:, None]
+
+
+def along_axis(a: np.ndarray, axis: str) -> np.ndarray:
+    """How far each row of `a`, (n, 3) float array, is in a direction of `AXES`: (n,) float array."""
+    return a[:, "xyz".index(axis[-1])] * (-1 if axis[0] == "-" else 1)

@@ -11,7 +11,7 @@ from scipy.sparse import bsr_array, csc_array
 from ..numerics.groups import group_median, group_sum
 from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
-from ..numerics.vectors import COLUMNS, ROWS, TINY, dot, norm
+from ..numerics.vectors import COLUMNS, ROWS, TINY, dot, norm, unit
 from ..skeleton import Skeleton
 
 # All fitted, on the shapes with known axes.
@@ -157,7 +157,7 @@ def _nearest(x: np.ndarray, ends: np.ndarray, around: np.ndarray, p: np.ndarray,
     edge, t = nearest_on_edges(x, ends, around, p)
     share = np.column_stack([1 - t, t])
     start, way = x[ends[:, 0]], x[ends[:, 1]] - x[ends[:, 0]]
-    tangent = way / np.maximum(norm(way)[:, None], TINY)
+    tangent = unit(way)
     along = tangent.take(edge, axis=0)
     across = np.cross(n, along)
     offset = start.take(edge, axis=0) + t[:, None] * way.take(edge, axis=0) - p

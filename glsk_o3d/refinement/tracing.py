@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ..numerics.components import component_labels
 from ..numerics.groups import group_sum
 from ..numerics.near_links import join_pieces, linked, slices
-from ..numerics.vectors import TINY, dot, norm
+from ..numerics.vectors import AXES, along_axis, dot, norm, unit
 from ..parameters import resolve_point
 from ..skeleton import Skeleton
 from .axis_fit import incident_edges, nearest_on_edges
@@ -124,9 +124,8 @@ class _Mixed:
 
     def root(self, skeleton: Skeleton, which: str) -> np.ndarray:
         """The one that is asked for, (1,) int array."""
-        if which in ("x", "-x", "y", "-y", "z", "-z"):
-            height = self.places[:, "xyz".index(which[-1])] * (-1 if which[0] == "-" else 1)
-            return np.array([height.argmin()])
+        if which in AXES:
+            return np.array([along_axis(self.places, which).argmin()])
         if which == "thickest":
             ends = skeleton.leaves if len(skeleton.leaves) else np.arange(len(skeleton.vertices))
             place = skeleton.vertices[ends[skeleton.radii[ends].argmax()]]
@@ -222,19 +221,15 @@ def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: 
     tips = np.flatnonzero(tips)
     beside = np.empty(len(vertices), int)
     beside[edges.ravel()] = edges[:, ::-1].ravel()
-    ahead = _unit(vertices[tips] - vertices[beside[tips]])
+    ahead = unit(vertices[tips] - vertices[beside[tips]])
     a, b = cKDTree(vertices[tips]).query_pairs(MEETING_SCALES * scale, output_type="ndarray").T
     gap = vertices[tips[b]] - vertices[tips[a]]
-    straight = np.minimum(dot(ahead[a], _unit(gap)), -dot(ahead[b], _unit(gap)))
+    straight = np.minimum(dot(ahead[a], unit(gap)), -dot(ahead[b], unit(gap)))
     found: list[int] = []
     for k in np.argsort(norm(gap)).tolist():
         if straight[k] > MEETING_COSINE and not {a[k], b[k]} & set(found):
             found += [a[k], b[k]]
     return tips[found].reshape(-1, 2)
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(norm(vectors), TINY)[:, None]
 
 
 def spread_around(skeleton: Skeleton) -> np.ndarray:

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from glsk_o3d import Skeleton
 from glsk_o3d.cli.main import app
-from glsk_o3d.samples import sample_object, sphere, torus
+from glsk_o3d.samples import sample_object, sphere, torus, y_junction
 
 
 def _write_scan(path: Path, points) -> Path:
@@ -87,3 +88,11 @@ def refused(invoke, tmp_path):
         return result.stderr.removeprefix("glsk: error: ").rstrip()
 
     return run
+
+
+@pytest.fixture
+def y(tmp_path) -> str:
+    """The name of a file in the folder of the test with the skeleton of a Y, without points."""
+    sample = y_junction(100)
+    Skeleton(sample.nodes, sample.edges, sample.radii, (), (), ()).save(tmp_path / "y.ply")
+    return "y.ply"

@@ -8,13 +8,6 @@ import pytest
 from glsk_o3d import Skeleton, read_skeleton, samples
 
 
-@pytest.fixture
-def y(tmp_path):
-    sample = samples.y_junction(100)
-    Skeleton(sample.nodes, sample.edges, sample.radii, (), (), ()).save(tmp_path / "y.ply")
-    return "y.ply"
-
-
 def test_table_file_and_json_agree(invoke, tmp_path, y):
     result = invoke("branches", y, "-o", "y.csv")
     assert result.exit_code == 0

@@ -10,13 +10,6 @@ from glsk_o3d import Skeleton, read_skeleton, samples
 from glsk_o3d.analysis import cylinders, tree_measures
 
 
-@pytest.fixture
-def y(tmp_path):
-    sample = samples.y_junction(100)
-    Skeleton(sample.nodes, sample.edges, sample.radii, (), (), ()).save(tmp_path / "y.ply")
-    return "y.ply"
-
-
 def test_lines_file_and_json_agree(invoke, tmp_path, y):
     result = invoke("tree", y, "-o", "c.csv")
     assert (result.exit_code, result.stderr) == (0, "")
