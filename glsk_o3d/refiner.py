@@ -18,6 +18,7 @@ from .refinement.evidence import Evidence
 from .refinement.junctions import level_tips, move_junctions
 from .refinement.loops import close_loops, zip_narrow_loops
 from .refinement.reattachment import reattach_limbs
+from .refinement.runaways import recall_runaways
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
 from .refinement.tracing import trace
@@ -34,7 +35,8 @@ class Refiner(Filter[Skeleton]):
     1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
        the shortest, until there is no triangle.
     2. Loops that open less than their tube is thick, two strands in one part, are zipped up.
-    3. Edges are subdivided, so that chords do not cut corners.
+    3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
+       corners.
     4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
        side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
     5. The topology is judged by what the surface around the curve says: loops that are probably no handles are closed;
@@ -156,6 +158,8 @@ class Refiner(Filter[Skeleton]):
         skeleton = collapse_triangles(skeleton)
         if self.handle:
             skeleton = zip_narrow_loops(skeleton)
+        if self.recentre:
+            skeleton = recall_runaways(skeleton)
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
         return fit_axis(skeleton, self.recentre)
