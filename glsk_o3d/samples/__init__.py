@@ -1,7 +1,8 @@
 """Sample clouds with exactly known axes, made from formulas: to try things on, to test with, to draw.
 
 Most shapes are unions of tapered capsules (the convex hull of two balls), so a shape *is* its axis: nodes, edges, and a
-radius at every node. All clouds are uniform by area, reproducible through `seed`, and about one unit in size.
+radius at every node. All clouds are uniform by area, reproducible through `seed`, and, but for the tree, about one unit
+in size.
 
 Examples
 --------
@@ -17,6 +18,7 @@ from .sample import Sample
 from .sauropod import TWO_CAMERAS, sauropod
 from .shapes import helix, sheet, sphere, tube, y_junction
 from .tori import torus, two_rings
+from .trees import tree
 
 __all__ = [
     "SAMPLES",
@@ -29,6 +31,7 @@ __all__ = [
     "signed_distance",
     "sphere",
     "torus",
+    "tree",
     "tube",
     "two_rings",
     "y_junction",

@@ -9,9 +9,10 @@ from .sample import Sample
 from .sauropod import sauropod
 from .shapes import helix, sheet, sphere, tube, y_junction
 from .tori import torus, two_rings
+from .trees import tree
 
 SAMPLES: dict[str, Callable[..., Sample]] = {
-    shape.__name__: shape for shape in (sauropod, tube, torus, helix, y_junction, two_rings, sphere, sheet)
+    shape.__name__: shape for shape in (sauropod, tube, torus, helix, y_junction, two_rings, tree, sphere, sheet)
 }
 """Every sample by its name; each takes at least ``n``, ``noise`` and ``seed``."""
 

@@ -12,7 +12,7 @@ from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.samples import SAMPLES, sample_object, signed_distance
 from glsk_o3d.samples.capsules import union_sample, visible
 
-UNIONS = ("sauropod", "tube", "y_junction")
+UNIONS = ("sauropod", "tube", "y_junction", "tree")
 
 
 def components_loops_leaves(sample):
@@ -49,7 +49,7 @@ class TestEverySample:
 
     def test_is_about_one_unit_large(self, name):
         size = np.ptp(SAMPLES[name](n=2000).points, axis=0).max()
-        assert 0.5 < size < 2
+        assert 0.5 < (size / 4 if name == "tree" else size) < 2  # a tree is in metres
 
     def test_noise_has_the_size_asked_for(self, name):
         clean, noisy = (SAMPLES[name](n=4000, noise=noise, seed=1).points for noise in (0, 0.01))
@@ -71,6 +71,7 @@ class TestEverySample:
         ("helix", 1, 0, 2),
         ("y_junction", 1, 0, 3),
         ("two_rings", 2, 2, 0),
+        ("tree", 1, 0, 17),
         ("sphere", 1, 0, 0),
         ("sheet", 0, 0, 0),
     ],
