@@ -5,7 +5,10 @@ None is needed by the package. What they need is in peers.txt, and is imported w
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -14,6 +17,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import open3d as o3d
+import typer
 from scipy.spatial import cKDTree
 
 from glsk_o3d import samples
@@ -71,9 +75,9 @@ def poisson(points: np.ndarray) -> Mesh:
 # ------------------------------------------------------------------------------------------------------- the tools
 
 
-def ours(name: str, points: np.ndarray) -> Graph:
+def ours(name: str, points: np.ndarray, options: Mapping[str, object] | None = None) -> Graph:
     """A pipeline of this package."""
-    skeleton = named_pipeline(name)(points)
+    skeleton = named_pipeline(name).with_options(options or {})(points)
     return skeleton.vertices, skeleton.edges
 
 
@@ -88,15 +92,15 @@ def pc_skeletor(points: np.ndarray) -> Graph:
     return np.array([graph.nodes[i]["pos"] for i in range(len(graph))]), np.array(graph.edges)
 
 
-def separators_of_points(points: np.ndarray) -> Graph:
-    """PyGEL3D's multi-scale local separators, of a graph that joins each point to its 30 nearest."""
+def separators_of_points(points: np.ndarray, neighbours: int = 30) -> Graph:
+    """PyGEL3D's multi-scale local separators, of a graph that joins each point to its nearest."""
     from pygel3d import graph
 
     kept = np.asarray(without_outliers(points).points)
     joined = graph.Graph()
     for point in kept:
         joined.add_node(point)
-    for first, *others in cKDTree(kept).query(kept, 31)[1].tolist():
+    for first, *others in cKDTree(kept).query(kept, neighbours + 1)[1].tolist():
         for other in others:
             joined.connect_nodes(first, other)
     return _separators(joined)
@@ -187,7 +191,7 @@ class Peer:
 
     def warm_up(self) -> None:
         """Import and compile what is needed, so that it is not timed."""
-        few = samples.tube(256).points
+        few = samples.tree(1024, forks=1).points
         self.make(wrap(few, 10.0) if "wrap" in self.takes else SURFACES[self.takes](few))
 
     def versions(self) -> dict[str, str | None]:
@@ -217,3 +221,49 @@ PEERS = {
     "thinning": Peer("scikit-image, voxels", ("scikit-image", "skan", *WRAP), "wrap", thinning),
     "thinning-poisson": Peer("scikit-image, voxels", ("scikit-image", "skan"), "Poisson", thinning),
 }
+
+
+# ------------------------------------------------------------------------------------------------------- running them
+
+
+def installed(known: Mapping[str, Peer], names: str) -> dict[str, Peer]:
+    """The tools of these names, with commas; for no names all that are installed, and what is left out is said."""
+    wanted = names.split(",") if names else list(known)
+    if unknown := [name for name in wanted if name not in known]:
+        raise typer.BadParameter(f"no tool {', '.join(unknown)}: there are {', '.join(known)}")
+    there = {name: known[name] for name in wanted if None not in known[name].versions().values()}
+    if absent := [name for name in wanted if name not in there]:
+        said = f"not installed: {', '.join(absent)}; 'make peers' installs and runs all"
+        if names:
+            raise typer.BadParameter(said)
+        typer.echo(said, err=True)
+    return there
+
+
+def versions(tools: Iterable[Peer]) -> str:
+    """A line with the packages of other tools."""
+    found = {name: it for tool in tools for name, it in tool.versions().items()}
+    return ", ".join(f"{name} {it}" for name, it in found.items())
+
+
+def one_thread() -> None:
+    """For what does not read what `run` sets."""
+    os.environ.update(NUMBA_NUM_THREADS="1", RAYON_NUM_THREADS="1")
+
+
+@contextmanager
+def silence() -> Iterator[None]:
+    """Let nothing be printed, not even by what is written in C++."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = {stream: os.dup(stream) for stream in (1, 2)}
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        for stream in kept:
+            os.dup2(nowhere, stream)
+        yield
+    finally:
+        for stream, copy in kept.items():
+            os.dup2(copy, stream)
+            os.close(copy)
+        os.close(nowhere)

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -24,7 +23,7 @@ from _common.command_line import Folder, Jobs, Markdown, Output, Own, Shapes, Va
 from _common.results import machine, pick, save, summary
 from _common.runs import run
 from _common.tables import Tables, fill, markdown_table, number, page_with, present
-from _peers import PEERS, Peer
+from _peers import PEERS, Peer, installed, one_thread, silence, versions
 
 from glsk_o3d import plot_skeleton
 from glsk_o3d.analysis import compare
@@ -35,7 +34,6 @@ from glsk_o3d.skeleton import Skeleton
 EVERY = "clean_4096,noise1_4096,scan2_4096,outliers_4096"
 DRAWN = Case("sauropod", "scan2_4096")
 DRAWN_BY = ("default", "pc-skeletor", "pygel-points", "cgal", "skeletor-contraction", "thinning-poisson")
-THREADS = ("NUMBA_NUM_THREADS", "RAYON_NUM_THREADS")  # beside those that `run` sets
 
 
 # ---------------------------------------------------------------------------------------------------------------- runs
@@ -72,38 +70,6 @@ def measured(known: list[dict], found: list[Case], peers: dict[str, Peer], keep:
     return sorted(rows, key=lambda row: order.index(row["tool"]))
 
 
-@contextmanager
-def silence() -> Iterator[None]:
-    """Let nothing be printed, not even by what is written in C++."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    kept = {stream: os.dup(stream) for stream in (1, 2)}
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        for stream in kept:
-            os.dup2(nowhere, stream)
-        yield
-    finally:
-        for stream, copy in kept.items():
-            os.dup2(copy, stream)
-            os.close(copy)
-        os.close(nowhere)
-
-
-def chosen(names: str) -> dict[str, Peer]:
-    """The tools of these names, with commas; for no names all that are installed, and what is left out is said."""
-    wanted = names.split(",") if names else list(PEERS)
-    if unknown := [name for name in wanted if name not in PEERS]:
-        raise typer.BadParameter(f"no tool {', '.join(unknown)}: there are {', '.join(PEERS)}")
-    there = {name: PEERS[name] for name in wanted if None not in PEERS[name].versions().values()}
-    if absent := [name for name in wanted if name not in there]:
-        said = f"not installed: {', '.join(absent)}; 'make peers' installs and runs all"
-        if names:
-            raise typer.BadParameter(said)
-        typer.echo(said, err=True)
-    return there
-
-
 # -------------------------------------------------------------------------------------------------------------- tables
 
 
@@ -135,12 +101,6 @@ def tables(rows: list[dict]) -> Tables:
 def failed(rows: list[dict]) -> str:
     """Which failed, and how."""
     return ", ".join(f"{row['shape']} ({row['failure']})" for row in rows if "failure" in row)
-
-
-def versions(tools: Iterable[str]) -> str:
-    """A line with the packages of other tools."""
-    found = {name: it for tool in tools for name, it in PEERS[tool].versions().items()}
-    return ", ".join(f"{name} {it}" for name, it in found.items())
 
 
 # ------------------------------------------------------------------------------------------------------------- picture
@@ -209,11 +169,10 @@ def main(
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
-    peers = chosen(tool)
+    peers = installed(PEERS, tool)
     found = cases(folder, own, variant, shapes)
-    where = f"{machine()} {versions(peers)}."  # now, since writing the page changes the working tree
-    for name in THREADS:
-        os.environ[name] = "1"
+    where = f"{machine()} {versions(peers.values())}."  # now, since writing the page changes the working tree
+    one_thread()
     known = [row for path in earlier or () for row in json.loads(path.read_text(encoding="utf-8"))["rows"]]
     options = dict(processes=jobs, fresh=True, limit=limit or None)
     # kept as far as it has come: what is stopped can go on with --from

@@ -16,7 +16,7 @@ HALF_TUBE_REACH = (2 / np.pi) / np.sqrt(1 - (2 / np.pi) ** 2)
 
 
 def recall_runaways(skeleton: Skeleton) -> Skeleton:
-    """Pull vertices no farther from the mean of their points than half a tube's axis is: thin tips run away in late solves.
+    """Pull vertices as near to the mean of their points as half a tube's axis is: thin tips run away in late solves.
 
     Parameters
     ----------

@@ -26,10 +26,10 @@ def tree(
     seed: int = 0,
     cameras: np.ndarray | None = None,
 ) -> Sample:
-    """A tree drawn at random: a trunk that forks in two, and forks again, and each limb tapers to half its cross-section.
+    """A tree drawn at random: a trunk that forks in two and forks again, each limb tapering to half its cross-section.
 
-    Points are uniform by area. Twigs are ``2 * radius / 2 ** ((forks + 1) / 2)`` thick at their tips; where that is less
-    than points are apart, as with 5 forks and 4096 points, twigs have no surface and are no more than rows of points.
+    Points are uniform by area. Tips are ``2 * radius / 2 ** ((forks + 1) / 2)`` thick; where that is less than points are
+    apart, as with 5 forks and 4096 points, twigs have no surface and are no more than rows of points.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def tree(
 
 
 def _grown(forks, length, radius, rng):
-    """Nodes, edges and radii, order by order; a limb is drawn many times, and the one farthest from all others grows."""
+    """Nodes, edges and radii, order by order; of many limbs drawn the one farthest from all others grows."""
     nodes, edges, radii = np.zeros((1, 3)), [], np.array([radius])
     tips = [(0, np.array([0.0, 0.0, 1.0]))]
     for order in range(forks + 1):

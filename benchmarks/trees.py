@@ -1,0 +1,80 @@
+"""Trees: skeletons of sparse ones beside those of other tools, volumes and diameters, and what large ones cost.
+
+The README beside this file says what each command shows.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated
+
+import typer
+from _common.command_line import Folder, Jobs, Markdown, Output, application
+from _common.results import machine, save
+from _common.runs import run
+from _common.tables import present
+from _peers import installed, one_thread, versions
+from _trees import curves as sparse
+from _trees import large as big
+from _trees import measures as solid
+from _trees.clouds import sparse_trees
+from _trees.tools import TOOLS
+
+app = application(__doc__)
+Trees = Annotated[int, typer.Option("--trees", min=1, help="How many built-in trees.")]
+
+
+@app.command()
+def curves(
+    folder: Folder = None,
+    up: Annotated[str, typer.Option("--up", help="Axis of a folder's trees that points up: x, y or z.")] = "z",
+    trees: Trees = 5,
+    tool: Annotated[str, typer.Option("--tool", metavar="NAMES", help="With commas; else all installed.")] = "",
+    limit: Annotated[float, typer.Option("--limit", help="Seconds for a skeleton, imports included.")] = 120.0,
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Skeletons of sparse trees against their axes: built-in trees, or those of a folder."""
+    if up not in "xyz":
+        raise typer.BadParameter(f"--up {up}: there are x, y and z")
+    tools = installed(TOOLS, tool)
+    found = sparse_trees(folder, up, trees)
+    if not found:
+        raise typer.BadParameter(f"there is no NAME.npz in {folder}")
+    where = f"{machine()} {versions(tools.values())}."
+    one_thread()
+    work = [(dict(tool=name, **it.facts), (it, made)) for name, made in tools.items() for it in found]
+    rows = run(sparse.measure, work, jobs, fresh=True, limit=limit)
+    save(output, rows)
+    present(sparse.tables(rows), markdown, where)
+
+
+@app.command()
+def measures(trees: Trees = 20, jobs: Jobs = 2, output: Output = None, markdown: Markdown = False) -> None:
+    """Volume, diameter and height of trees with a surface, whole and scanned by a lidar."""
+    work = [(dict(condition=it, tree=seed), (seed, it)) for it in ("clean", "lidar") for seed in range(trees)]
+    rows = run(solid.measure, work, jobs)
+    save(output, rows)
+    present(solid.tables(rows), markdown, machine())
+
+
+@app.command()
+def large(
+    sizes: Annotated[str, typer.Option("--sizes", metavar="N,N", help="Points.")] = "100000,1000000",
+    forks: Annotated[int, typer.Option("--forks", min=1, max=8, help="Of the tree, from foot to tip.")] = 6,
+    jobs: Jobs = 1,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Time and memory of lidar scans of one tree, with and without tracing."""
+    wanted = [int(it) for it in sizes.split(",")]
+    work = [(dict(n=n, pipeline=name), (n, name, forks)) for n in wanted for name in big.PIPELINES]
+    rows = run(big.once, work, min(jobs, 1), fresh=True)
+    save(output, rows)
+    present(big.tables(rows), markdown, machine())
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("MPLBACKEND", "Agg")
+    app()
