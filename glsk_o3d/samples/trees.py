@@ -28,8 +28,8 @@ def tree(
 ) -> Sample:
     """A tree drawn at random: a trunk that forks in two and forks again, each limb tapering to half its cross-section.
 
-    Points are uniform by area. Tips are ``2 * radius / 2 ** ((forks + 1) / 2)`` thick; where that is less than points are
-    apart, as with 5 forks and 4096 points, twigs have no surface and are no more than rows of points.
+    Points are uniform by area. Tips are ``2 * radius / 2 ** ((forks + 1) / 2)`` thick; where points are farther
+    apart than that, as with 5 forks and 4096 points, twigs have no surface and are no more than rows of points.
 
     Parameters
     ----------
