@@ -140,8 +140,8 @@ def _spanning(piece: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.nda
     return first[np.isin(low[first] * m + high[first], tree.row.astype(int) * m + tree.col)]
 
 
-def slices(points: np.ndarray, links: csr_matrix, distance: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where the slice of a part is centred that every point is in the middle of, and how wide it is.
+def slice_centres(points: np.ndarray, links: csr_matrix, distance: np.ndarray, width: float) -> np.ndarray:
+    """Where the slice of a part is centred that every point is in the middle of.
 
     Slices are connected pieces of what lies between two geodesic distances (Verroust and Lazarus 1999, "Extracting
     skeletal curves from 3D scattered data"), twice, the second time half a width farther on.
@@ -157,22 +157,17 @@ def slices(points: np.ndarray, links: csr_matrix, distance: np.ndarray, width: f
 
     Returns
     -------
-    centre : (n, 3) float array
-    spread : (n,) float array
-        Root mean square distance from the centre.
+    (n, 3) float array
     """
     n = len(points)
     row, column = links.nonzero()
-    centre, spread, off = np.empty((n, 3)), np.empty(n), np.full(n, np.inf)
+    centre, off = np.empty((n, 3)), np.full(n, np.inf)
     for shift in (0, 0.5):
         place = distance / width + shift
         inside = np.floor(place[row]) == np.floor(place[column])
         piece = component_labels(n, np.column_stack([row[inside], column[inside]]))
-        size = np.bincount(piece)
-        mean = group_sum(points, piece, len(size)) / size[:, None]
-        square = points - mean[piece]
-        wide = np.sqrt(np.bincount(piece, dot(square, square)) / size)
+        mean = group_sum(points, piece, piece.max(initial=-1) + 1) / np.bincount(piece)[:, None]
         nearer = np.abs(place % 1 - 0.5) < off
         off[nearer] = np.abs(place % 1 - 0.5)[nearer]
-        centre[nearer], spread[nearer] = mean[piece[nearer]], wide[piece[nearer]]
-    return centre, spread
+        centre[nearer] = mean[piece[nearer]]
+    return centre

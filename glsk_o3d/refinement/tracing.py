@@ -12,17 +12,17 @@ from scipy.spatial import cKDTree
 
 from ..numerics.components import component_labels
 from ..numerics.groups import group_sum
-from ..numerics.near_links import join_pieces, linked, slices
+from ..numerics.near_links import join_pieces, linked, slice_centres
 from ..numerics.vectors import AXES, along_axis, dot, norm, unit
 from ..parameters import resolve_point
 from ..skeleton import Skeleton
-from .axis_fit import incident_edges, nearest_on_edges
+from .spread import spread_around
+from .strays import drop_strays
 from .thin_parts import SpacedPoints, without_surface
 
 # All fitted, on trees whose twigs are thinner than their points are far apart; s is the median scale of the points.
 SLICE_WIDTH = 0.5  # of geodesic distance, over s
 COVER_SCALES = 1.2  # radius around a path in which points need no path of their own, over s
-COVER_SPREADS = 1.5  # the same over the spread of the slice there
 COVER_RADII = 1.3  # the same over the radius of a part with a surface
 JOIN_SCALES = 6.0  # longest gap that is none, over s
 LEAST_PIECE = 3  # points farther than that from all others, of which fewer are no part
@@ -70,6 +70,8 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     if root is not None:
         traced = _from_root(traced, paths.index[paths.roots[0]])
         report = replace(report, root=tuple(traced.vertices[0].tolist()))
+    if thin.any():
+        traced = drop_strays(traced, COVER_RADII, None if root is None else 0)
     return replace(traced, normals=np.where(loose[:, None], np.nan, skeleton.normals), report=report)
 
 
@@ -141,12 +143,9 @@ class _Paths:
         n, size, scale = mixed.n, len(mixed.places), mixed.scale
         self.mixed, self.roots, self.steps = mixed, roots, []
         self._distance, self._before, _ = dijkstra(mixed.links, indices=roots, return_predecessors=True, min_only=True)
-        self.centre, spread = mixed.places.copy(), np.zeros(size)
-        self.centre[:n], spread[:n] = slices(
-            mixed.places[:n], mixed.links[:n, :n], self._distance[:n], SLICE_WIDTH * scale
-        )
-        self._reach = np.maximum(COVER_SCALES * scale, COVER_SPREADS * spread)
-        self._reach[n:] = COVER_RADII * mixed.radius[n:]
+        self.centre = mixed.places.copy()
+        self.centre[:n] = slice_centres(mixed.places[:n], mixed.links[:n, :n], self._distance[:n], SLICE_WIDTH * scale)
+        self._reach = np.maximum(COVER_SCALES * scale, COVER_RADII * mixed.radius)
         self._tree = cKDTree(mixed.places)
         self._inside, self._covered = np.zeros(size, bool), np.arange(size) >= n
         self._inside[roots] = True
@@ -230,23 +229,6 @@ def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: 
         if straight[k] > MEETING_COSINE and not {a[k], b[k]} & set(found):
             found += [a[k], b[k]]
     return tips[found].reshape(-1, 2)
-
-
-def spread_around(skeleton: Skeleton) -> np.ndarray:
-    """Root mean square distance from the curve to the points around every vertex and its neighbours, (M,) float array.
-
-    Of points on a tube its radius, however few they are, or noisy.
-    """
-    m, edges = len(skeleton.vertices), skeleton.edges
-    some = np.flatnonzero(skeleton.vertex_of_point >= 0)
-    vertex, points = skeleton.vertex_of_point[some], skeleton.points[some]
-    edge, t = nearest_on_edges(skeleton.vertices, edges, incident_edges(edges, m)[vertex], points)
-    start, stop = skeleton.vertices[edges[edge]].transpose(1, 0, 2)
-    offset = points - start - t[:, None] * (stop - start)
-    total = group_sum(np.column_stack([dot(offset, offset), np.ones(len(some))]), vertex, m)
-    ends, others = np.concatenate([edges, edges[:, ::-1]]).T
-    total += group_sum(total[others], ends, m)
-    return np.sqrt(total[:, 0] / np.maximum(total[:, 1], 1))
 
 
 def _from_root(skeleton: Skeleton, root: int) -> Skeleton:

@@ -1,0 +1,69 @@
+"""Drop traced twigs that are no more than the scatter of the points around what they grow from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..skeleton import Skeleton
+from .merging import merge_vertices
+from .spread import spread_around
+
+
+def drop_strays(skeleton: Skeleton, radii: float, root: int | None = None) -> Skeleton:
+    """Drop twigs whose tip is as near to the rest as points scatter there.
+
+    Of N points that scatter normally around a curve, with a root mean square distance of r, one is expected to be
+    farther off than ``r sqrt(ln N)``.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Traced vertices have no confidence, and the spread of their points for a radius. Only they are dropped.
+    radii : float
+        How far a tip must be from a part that has a surface, over its radius.
+    root : int, optional
+        A vertex that stays.
+
+    Returns
+    -------
+    Skeleton
+        Vertices left keep their order. Points of a twig belong to the vertex that it grew from.
+    """
+    scatter = np.sqrt(np.log(max(len(skeleton.supporting_points), 1)))
+    while True:
+        traced = skeleton.confidence == 0
+        forks, tips, twigs = _twigs(skeleton, traced, root)
+        if not twigs:
+            return skeleton
+        rest = np.setdiff1d(np.arange(len(traced)), np.concatenate(twigs))
+        away, nearest = cKDTree(skeleton.vertices[rest]).query(skeleton.vertices[tips])
+        beside = rest[nearest]
+        beyond = away - np.where(traced[beside], scatter, radii) * skeleton.radii[beside]
+        order = np.argsort(beyond)
+        # of each fork the least, since the others may be what is left of the limb
+        order = order[np.unique(forks[order], return_index=True)[1]]
+        chosen = order[beyond[order] < 0].tolist()
+        if not chosen:
+            return skeleton
+        group = np.arange(len(traced))
+        for twig in chosen:
+            group[twigs[twig]] = forks[twig]
+        stay = np.unique(group)
+        kept = {name: getattr(skeleton, name)[stay] for name in ("vertices", "radii", "confidence")}
+        skeleton = replace(merge_vertices(skeleton, group), **kept)
+        skeleton = replace(skeleton, radii=np.where(traced[stay], spread_around(skeleton), skeleton.radii))
+
+
+def _twigs(skeleton, traced, root):
+    """Of traced branches that end the junction that they leave, their tip, and their vertices but for the junction."""
+    found = []
+    for path in skeleton.branches:
+        path = path[::-1] if skeleton.degree[path[0]] == 1 else path
+        if skeleton.degree[path[0]] > 2 and skeleton.degree[path[-1]] == 1 and traced[path[1:]].all():
+            found.append(path)
+    found = [path for path in found if path[-1] != root]
+    forks, tips = np.array([(path[0], path[-1]) for path in found], int).reshape(-1, 2).T
+    return forks, tips, [path[1:] for path in found]
