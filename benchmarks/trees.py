@@ -6,13 +6,15 @@ The README beside this file says what each command shows.
 from __future__ import annotations
 
 import os
+from functools import partial
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from _common.command_line import Folder, Jobs, Markdown, Output, application
 from _common.results import machine, save
 from _common.runs import run
-from _common.tables import present
+from _common.tables import Tables, fill, markdown_table, page_with, present
 from _peers import installed, one_thread, versions
 from _trees import curves as sparse
 from _trees import large as big
@@ -22,6 +24,7 @@ from _trees.tools import TOOLS
 
 app = application(__doc__)
 Trees = Annotated[int, typer.Option("--trees", min=1, help="How many built-in trees.")]
+Page = partial(typer.Option, "--page", metavar="MD", help="Put the first table into this page.")
 
 
 @app.command()
@@ -32,6 +35,7 @@ def curves(
     tool: Annotated[str, typer.Option("--tool", metavar="NAMES", help="With commas; else all installed.")] = "",
     limit: Annotated[float, typer.Option("--limit", help="Seconds for a skeleton, imports included.")] = 120.0,
     jobs: Jobs = 2,
+    page: Annotated[Path | None, Page(callback=page_with("trees", "trees of a folder"))] = None,
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
@@ -47,16 +51,23 @@ def curves(
     work = [(dict(tool=name, **it.facts), (it, made)) for name, made in tools.items() for it in found]
     rows = run(sparse.measure, work, jobs, fresh=True, limit=limit)
     save(output, rows)
-    present(sparse.tables(rows), markdown, where)
+    told("trees of a folder" if folder else "trees", sparse.tables(rows), where, page, markdown)
 
 
 @app.command()
-def measures(trees: Trees = 20, jobs: Jobs = 2, output: Output = None, markdown: Markdown = False) -> None:
+def measures(
+    trees: Trees = 20,
+    jobs: Jobs = 2,
+    page: Annotated[Path | None, Page(callback=page_with("measures"))] = None,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
     """Volume, diameter and height of trees with a surface, whole and scanned by a lidar."""
+    where = machine()
     work = [(dict(condition=it, tree=seed), (seed, it)) for it in ("clean", "lidar") for seed in range(trees)]
     rows = run(solid.measure, work, jobs)
     save(output, rows)
-    present(solid.tables(rows), markdown, machine())
+    told("measures", solid.tables(rows), where, page, markdown)
 
 
 @app.command()
@@ -64,15 +75,24 @@ def large(
     sizes: Annotated[str, typer.Option("--sizes", metavar="N,N", help="Points.")] = "100000,1000000",
     forks: Annotated[int, typer.Option("--forks", min=1, max=8, help="Of the tree, from foot to tip.")] = 6,
     jobs: Jobs = 1,
+    page: Annotated[Path | None, Page(callback=page_with("large"))] = None,
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
     """Time and memory of lidar scans of one tree, with and without tracing."""
+    where = machine()
     wanted = [int(it) for it in sizes.split(",")]
     work = [(dict(n=n, pipeline=name), (n, name, forks)) for n in wanted for name in big.PIPELINES]
     rows = run(big.once, work, min(jobs, 1), fresh=True)
     save(output, rows)
-    present(big.tables(rows), markdown, machine())
+    told("large", big.tables(rows), where, page, markdown)
+
+
+def told(name: str, tables: Tables, where: str, page: Path | None, markdown: bool) -> None:
+    """Print tables, and put the first of them into a page."""
+    present(tables, markdown, where)
+    if page is not None:
+        fill(page, {name: "\n".join([where, "", markdown_table(*tables[0])])})
 
 
 if __name__ == "__main__":

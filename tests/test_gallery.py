@@ -40,4 +40,4 @@ def test_runs(script, tmp_path, monkeypatch, capsys):
 
 def test_there_is_one_for_each_subject():
     titles = [path.read_text().splitlines()[1] for path in sorted(GALLERY.glob("plot_*.py"))]
-    assert len(titles) == len(set(titles)) == 15
+    assert len(titles) == len(set(titles)) == 16

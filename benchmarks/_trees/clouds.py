@@ -10,7 +10,7 @@ import numpy as np
 from glsk_o3d import samples
 
 CONDITIONS = ("clean", "noise", "missing", "uneven")
-SPARSE = dict(n=4096, forks=6)  # twigs are 0.6 spacings thick
+SPARSE = dict(n=4096, forks=6)  # tips are 0.4 spacings thick
 SOLID = dict(n=16384, forks=4)  # twigs are 3 spacings thick
 GAPS = 12  # of a cloud with missing data
 CAMERAS = np.array([[20.0, 2.0, 1.7], [-11.0, 17.0, 1.7], [-9.0, -18.0, 1.7]])  # a scanner's three places around a tree
@@ -74,7 +74,7 @@ def solid(seed: int, condition: str) -> samples.Sample:
     return samples.Sample(seen.points + noise, seen.nodes, seen.edges, seen.radii, seen.name)
 
 
-def volume(tree: samples.Sample, n: int = 2_000_000) -> float:
+def volume(tree: samples.Sample, n: int = 1_000_000) -> float:
     """Of the union of its tapered capsules: of each the part that is inside no earlier one, by points in its box."""
     rng, total = np.random.default_rng(0), 0.0
     low = (tree.nodes - tree.radii[:, None])[tree.edges].min(axis=1)

@@ -8,38 +8,15 @@ A trunk that a scanner saw as a surface, and twigs that it saw as rows of points
 import warnings
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 import glsk_o3d as glsk
+from glsk_o3d import samples
 
 # %%
-# A tree in metres. Each limb forks into three thinner ones; points lie evenly on the surface of the trunk, and
-# along twigs there are thirty a metre.
+# A tree in metres. Points are as far apart everywhere: many around the trunk, but twigs are thinner than that.
 
-rng = np.random.default_rng(4)
-limbs = []
-
-
-def grow(start, heading, length, radius, forks):
-    """A limb, and what grows from its end."""
-    end = start + length * heading
-    limbs.append((start, end, radius))
-    for _ in range(forks and 3):
-        onward = heading + rng.normal(size=3) * 0.45 + [0, 0, 0.1]
-        grow(end, onward / np.linalg.norm(onward), 0.72 * length, 0.5 * radius, forks - 1)
-
-
-grow(np.zeros(3), np.array([0, 0, 1.0]), 2.0, 0.15, 4)
-parts = []
-for start, end, radius in limbs:
-    length = np.linalg.norm(end - start)
-    n = int(np.clip(9000 * length * radius, 30 * length, None))
-    along = (end - start) / length
-    across = np.linalg.svd(along[None])[2][1:]
-    t, turn = length * rng.random((n, 1)), 2 * np.pi * rng.random((n, 1))
-    parts.append(start + t * along + radius * (np.cos(turn) * across[0] + np.sin(turn) * across[1]))
-cloud = np.concatenate(parts)
-print(f"{len(cloud)} points, {len(limbs)} limbs")
+cloud = samples.tree(4096, forks=6, seed=4).points
+print(f"{len(cloud)} points, {2**6} tips")
 
 # %%
 # ``default`` and ``tree`` trace the twigs along shortest paths; without that they are drawn together.

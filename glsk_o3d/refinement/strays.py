@@ -57,7 +57,7 @@ def drop_strays(skeleton: Skeleton, radii: float, root: int | None = None) -> Sk
         skeleton = replace(skeleton, radii=np.where(traced[stay], spread_around(skeleton), skeleton.radii))
 
 
-def _twigs(skeleton, traced, root):
+def _twigs(skeleton: Skeleton, traced: np.ndarray, root: int | None) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Of traced branches that end the junction that they leave, their tip, and their vertices but for the junction."""
     found = []
     for path in skeleton.branches:
