@@ -19,7 +19,7 @@ from ..skeleton import Skeleton
 from .diagnostics import SHEET_SHARE
 
 SCALE_NEIGHBOUR = 8  # fitted: the nearest point whose distance is the scale of a point
-TRACED_POINTS = 25000  # measured: points that larger clouds are traced by, about
+TRACED_POINTS = 100_000  # measured: points that larger clouds are traced by, about; with fewer, thick parts look thin
 SAME_PLACE = 1e-6  # derived: share of the cloud's extent below which points are not apart
 LEAST_POINTS = 64  # fitted: of which fewer say nothing about where there is no surface
 SURFACE_GROWTH = 2.5  # measured: growth of links on a surface; noise that fills space has more, a curve 1.7

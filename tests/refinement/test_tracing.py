@@ -165,6 +165,14 @@ def test_surfaces_sheets_and_clouds_are_not_traced(cloud):
     assert pipelines.default()(cloud).report.n_traced == 0
 
 
+def test_a_large_cloud_has_the_surface_that_its_points_show():
+    """Of a sample of a few ten thousand the twigs would look thinner than their points are apart."""
+    drawn = samples.tree(60_000, forks=6, seed=1, noise=0.0005)
+    found = pipelines.default()(drawn.points)
+    assert found.report.n_traced == 0
+    assert len(found.leaves) == 2**6 + 1
+
+
 def test_nothing_is_traced_without_a_say(sparse):
     fitted = pipelines.default().with_options({"Refiner.surface": 0})(sparse)
     assert not without_surface(SpacedPoints(fitted), 0.0).any()
