@@ -17,7 +17,7 @@ ROWS = (
     {"cross-check": ("crosscheck",), "batches": ("batch",), "MeshLab": ("meshlab",)},
     {"pictures and windows": ("viewing",)},
     {"files": ("io",), "driver": ("driver",)},
-    {"analysis": ("analysis",), "recipes and plugins": ("recipes",)},
+    {"analysis": ("analysis", "editing"), "recipes and plugins": ("recipes",)},
     {"named pipelines": ("pipelines",)},
     {"filters": ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "stopping")},
     {"refinement": ("refinement",), "pipeline": ("pipeline",)},

@@ -51,6 +51,25 @@ def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
     )
 
 
+def merge_into(skeleton: Skeleton, into: np.ndarray) -> Skeleton:
+    """Merge vertices into others, which stay where and what they are.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    into : (M,) int array
+        The vertex that each becomes part of; itself if it stays.
+
+    Returns
+    -------
+    Skeleton
+        Vertices that stay keep their order. Points of merged vertices belong to the one that stays.
+    """
+    stay = np.unique(into)
+    kept = {name: getattr(skeleton, name)[stay] for name in ("vertices", "radii", "confidence")}
+    return replace(merge_vertices(skeleton, into), **kept)
+
+
 def drop_edges(skeleton: Skeleton, gone: ArrayLike) -> Skeleton:
     """Drop some edges, each named by its two vertices, the lower first; vertices stay."""
     dropped = (skeleton.edges[:, None] == np.asarray(gone)).all(axis=2).any(axis=1)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..skeleton import Skeleton
-from .merging import merge_vertices
+from .merging import merge_into
 from .spread import spread_around
 
 
@@ -51,10 +51,9 @@ def drop_strays(skeleton: Skeleton, radii: float, root: int | None = None) -> Sk
         group = np.arange(len(traced))
         for twig in chosen:
             group[twigs[twig]] = forks[twig]
-        stay = np.unique(group)
-        kept = {name: getattr(skeleton, name)[stay] for name in ("vertices", "radii", "confidence")}
-        skeleton = replace(merge_vertices(skeleton, group), **kept)
-        skeleton = replace(skeleton, radii=np.where(traced[stay], spread_around(skeleton), skeleton.radii))
+        skeleton = merge_into(skeleton, group)
+        spread = spread_around(skeleton)
+        skeleton = replace(skeleton, radii=np.where(skeleton.confidence == 0, spread, skeleton.radii))
 
 
 def _twigs(skeleton: Skeleton, traced: np.ndarray, root: int | None) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:

@@ -7,15 +7,15 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import breadth_first_order, connected_components, dijkstra, minimum_spanning_tree
+from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
 from ..numerics.components import component_labels
 from ..numerics.groups import group_sum
 from ..numerics.near_links import join_pieces, linked, slice_centres
-from ..numerics.vectors import AXES, along_axis, dot, norm, unit
-from ..parameters import resolve_point
+from ..numerics.vectors import dot, norm, unit
 from ..skeleton import Skeleton
+from .rooted import numbered_from, root_among
 from .spread import spread_around
 from .strays import drop_strays
 from .thin_parts import SpacedPoints, without_surface
@@ -59,7 +59,8 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     if m == 0 or (root is None and not thin.any()):
         return skeleton
     mixed, joined = _Mixed.of(skeleton, cloud, thin).joined(anywhere=root is not None)
-    paths = _Paths(mixed, mixed.roots() if root is None else mixed.root(skeleton, root))
+    roots = mixed.roots() if root is None else np.array([root_among(mixed.places, skeleton, root)])
+    paths = _Paths(mixed, roots)
     traced = _assembled(skeleton, mixed, paths, tree=root is not None)
     loose = thin[skeleton.vertex_of_point] & (skeleton.vertex_of_point >= 0)
     report = replace(
@@ -68,7 +69,7 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
         joined=tuple((tuple(a), tuple(b)) for a, b in mixed.places[joined].tolist()),
     )
     if root is not None:
-        traced = _from_root(traced, paths.index[paths.roots[0]])
+        traced = numbered_from(traced, paths.index[roots[0]])
         report = replace(report, root=tuple(traced.vertices[0].tolist()))
     if thin.any():
         traced = drop_strays(traced, COVER_RADII, None if root is None else 0)
@@ -123,17 +124,6 @@ class _Mixed:
         _, first = np.unique(piece, return_index=True)
         order = np.lexsort((dijkstra(self.links, indices=first, min_only=True), self.radius, piece))
         return order[np.append(piece[order][1:] != piece[order][:-1], True)]
-
-    def root(self, skeleton: Skeleton, which: str) -> np.ndarray:
-        """The one that is asked for, (1,) int array."""
-        if which in AXES:
-            return np.array([along_axis(self.places, which).argmin()])
-        if which == "thickest":
-            ends = skeleton.leaves if len(skeleton.leaves) else np.arange(len(skeleton.vertices))
-            place = skeleton.vertices[ends[skeleton.radii[ends].argmax()]]
-        else:
-            place = np.array(resolve_point(which))
-        return np.array([norm(self.places - place).argmin()])
 
 
 class _Paths:
@@ -229,19 +219,3 @@ def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: 
         if straight[k] > MEETING_COSINE and not {a[k], b[k]} & set(found):
             found += [a[k], b[k]]
     return tips[found].reshape(-1, 2)
-
-
-def _from_root(skeleton: Skeleton, root: int) -> Skeleton:
-    """The same tree with its vertices numbered from the root outwards."""
-    links = linked(skeleton.vertices, skeleton.edges)
-    order = breadth_first_order(links, root, directed=False, return_predecessors=False)
-    index = np.argsort(order)
-    edges, vertex = np.sort(index[skeleton.edges], axis=1), skeleton.vertex_of_point
-    return replace(
-        skeleton,
-        vertices=skeleton.vertices[order],
-        edges=edges[np.lexsort((edges[:, 1], edges[:, 0]))],
-        radii=skeleton.radii[order],
-        confidence=skeleton.confidence[order],
-        vertex_of_point=np.where(vertex >= 0, index[vertex], -1),
-    )

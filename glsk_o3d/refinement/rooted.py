@@ -1,0 +1,85 @@
+"""Where a tree grows from, and its vertices in the order in which they grow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse.csgraph import breadth_first_order
+
+from ..errors import InvalidParameterError
+from ..numerics.near_links import linked
+from ..numerics.vectors import AXES, along_axis, norm
+from ..parameters import resolve_point
+from ..skeleton import Skeleton
+
+
+def root_among(places: np.ndarray, skeleton: Skeleton, which: str | int | Sequence[float] | np.ndarray) -> int:
+    """Which of some places a tree grows from.
+
+    Parameters
+    ----------
+    places : (n, 3) float array
+    skeleton : Skeleton
+        Of which the thickest end is taken.
+    which : str, int or (x, y, z)
+        ``"x"`` to ``"-z"``, ``"thickest"``, a point (also as ``"x,y,z"``), or the number of a place.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    InvalidParameterError
+        There is no such root.
+    """
+    if isinstance(which, int | np.integer) and not isinstance(which, bool):
+        if not 0 <= which < len(places):
+            raise InvalidParameterError(f"root = {which}: there are vertices 0 to {len(places) - 1}")
+        return int(which)
+    if isinstance(which, str) and which in AXES:
+        return int(along_axis(places, which).argmin())
+    if isinstance(which, str) and which == "thickest":
+        ends = skeleton.leaves if len(skeleton.leaves) else np.arange(len(skeleton.vertices))
+        place = skeleton.vertices[ends[skeleton.radii[ends].argmax()]]
+    else:
+        place = np.asarray(resolve_point(which) if isinstance(which, str) else which, float)
+        if place.shape != (3,) or not np.isfinite(place).all():
+            raise InvalidParameterError(
+                f"root = {which!r}: must be an axis, x to -z, 'thickest', a vertex, or a point (x, y, z)"
+            )
+    return int(norm(places - place).argmin())
+
+
+def numbered_from(skeleton: Skeleton, root: int) -> Skeleton:
+    """The same forest with its vertices numbered from the root outwards.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Without loops.
+    root : int
+
+    Returns
+    -------
+    Skeleton
+        The first vertex of every edge is nearer to the root. Other components follow, each from its vertex nearest to
+        the root.
+    """
+    links, part = linked(skeleton.vertices, skeleton.edges), skeleton.component_of_vertex
+    nearest = np.argsort(norm(skeleton.vertices - skeleton.vertices[root]), kind="stable")
+    starts = nearest[np.sort(np.unique(part[nearest], return_index=True)[1])].tolist()
+    starts[0] = root  # of several vertices in one place
+    order = np.concatenate([breadth_first_order(links, at, False, return_predecessors=False) for at in starts])
+    index = np.argsort(order)
+    edges, vertex = np.sort(index[skeleton.edges], axis=1), skeleton.vertex_of_point
+    return replace(
+        skeleton,
+        vertices=skeleton.vertices[order],
+        edges=edges[np.lexsort((edges[:, 1], edges[:, 0]))],
+        radii=skeleton.radii[order],
+        confidence=skeleton.confidence[order],
+        vertex_of_point=np.where(vertex >= 0, index[vertex], -1),
+    )
