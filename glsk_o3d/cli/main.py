@@ -15,6 +15,7 @@ from .batch import batch
 from .branches import branches
 from .crosscheck import crosscheck
 from .demo import demo
+from .edit import convert, edit
 from .evaluate import evaluate
 from .filters import filters
 from .info import info
@@ -36,7 +37,22 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (skeletonize, batch, run, rerun, evaluate, crosscheck, branches, tree, view, demo, filters, info):
+for command in (
+    skeletonize,
+    batch,
+    run,
+    rerun,
+    evaluate,
+    crosscheck,
+    branches,
+    tree,
+    edit,
+    convert,
+    view,
+    demo,
+    filters,
+    info,
+):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
 
 

@@ -86,8 +86,8 @@ def reroot(skeleton: Skeleton, root: str | int | tuple[float, float, float]) -> 
     skeleton : Skeleton
         Without loops.
     root : str, int or (x, y, z)
-        ``"x"`` to ``"-z"`` for the vertex that is lowest along this axis, ``"thickest"`` for the thickest end, a vertex,
-        or the vertex nearest to a point.
+        ``"x"`` to ``"-z"`` for the vertex that is lowest along this axis, ``"thickest"`` for the thickest end, a
+        vertex, or the vertex nearest to a point.
 
     Returns
     -------

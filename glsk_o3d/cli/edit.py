@@ -1,0 +1,131 @@
+"""``glsk edit`` and ``glsk convert``: skeletons from file to file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import CutLoops, Output, Quiet, Verbose
+from .reporting import WrongUsage, reporting
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
+
+Source = Annotated[Path, typer.Argument(metavar="SKELETON", help="In any format that 'glsk skeletonize' writes.")]
+
+
+def edit(
+    skeleton: Source,
+    output: Output = None,
+    largest: Annotated[bool, typer.Option("--largest", help="Keep the longest connected component alone.")] = False,
+    cut_loops: Annotated[bool, typer.Option("--cut-loops", help="Drop an edge of every loop, and say where.")] = False,
+    root: Annotated[
+        str | None,
+        typer.Option(
+            "--root",
+            metavar="ROOT",
+            help="Number vertices from a root outwards: x to -z for the lowest along an axis, thickest, the number of "
+            "a vertex, or x,y,z.",
+        ),
+    ] = None,
+    prune_order: Annotated[
+        int | None, typer.Option("--prune-order", metavar="N", min=0, help="Drop branches of a higher order than this.")
+    ] = None,
+    prune_length: Annotated[
+        float, typer.Option("--prune-length", metavar="LENGTH", min=0, help="Drop shorter branches that end.")
+    ] = 0,
+    prune_radius: Annotated[
+        float, typer.Option("--prune-radius", metavar="RADIUS", min=0, help="Drop thinner branches that end.")
+    ] = 0,
+    smooth: Annotated[int, typer.Option("--smooth", metavar="PASSES", min=0, help="Smooth the branches.")] = 0,
+    tolerance: Annotated[
+        float | None,
+        typer.Option("--simplify", metavar="TOLERANCE", min=0, help="Drop vertices that leave the curve as near."),
+    ] = None,
+    vertices: Annotated[
+        int | None, typer.Option("--vertices", metavar="N", min=1, help="Keep so many vertices, if the graph allows.")
+    ] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Shorten, thin out, smooth or reroot a skeleton.
+
+    What is asked for is done in the order of the options. Lengths are in the units of the file. Orders count from the
+    root, the stem is 0.
+    """
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..io.skeletons import read_skeleton
+        from .outputs import check_outputs
+
+        if tolerance is not None and vertices is not None:
+            raise WrongUsage("--simplify and --vertices: choose one of them")
+        check_outputs(output or [], skeleton=skeleton)
+        found, told = _graph(read_skeleton(skeleton), largest, cut_loops, root)
+        pruning = dict(length=prune_length, radius=prune_radius, order=prune_order)
+        found, more = _curves(found, pruning, smooth, tolerance, vertices)
+        _write(found, output or [], [*told, *more], quiet)
+
+
+def convert(
+    skeleton: Source,
+    output: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Other formats, by their endings.")],
+    cut_loops: CutLoops = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Write a skeleton in another format."""
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..io.skeletons import read_skeleton
+        from .outputs import check_outputs
+
+        check_outputs(output, skeleton=skeleton)
+        _write(read_skeleton(skeleton), output, [], quiet, cut_loops)
+
+
+def _graph(skeleton: Skeleton, largest: bool, cut: bool, root: str | None) -> tuple[Skeleton, list[str]]:
+    from .. import editing
+
+    told = []
+    if largest:
+        told.append(f"kept one of {skeleton.n_components} components")
+        skeleton = editing.largest_component(skeleton)
+    if cut:
+        skeleton, ends = editing.cut_loops(skeleton)
+        told += [f"cut a loop at {_place(pair.mean(axis=0))}" for pair in ends]
+    if root is not None:
+        skeleton = editing.reroot(skeleton, int(root) if root.isdecimal() else root)
+        told.append(f"grows from {_place(skeleton.vertices[0])}")
+    return skeleton, told
+
+
+def _curves(
+    skeleton: Skeleton, pruning: dict, smooth: int, tolerance: float | None, vertices: int | None
+) -> tuple[Skeleton, list[str]]:
+    from .. import editing
+
+    told = []
+    if pruning["order"] is not None or pruning["length"] or pruning["radius"]:
+        ends, skeleton = len(skeleton.leaves), editing.prune(skeleton, **pruning)
+        told.append(f"pruned {ends - len(skeleton.leaves)} of {ends} ends")
+    if smooth:
+        skeleton = editing.smooth(skeleton, passes=smooth)
+    if tolerance is not None or vertices is not None:
+        before, skeleton = len(skeleton.vertices), editing.simplify(skeleton, tolerance=tolerance, n=vertices)
+        told.append(f"kept {len(skeleton.vertices)} of {before} vertices")
+    return skeleton, told
+
+
+def _write(skeleton: Skeleton, outputs: list[Path], told: list[str], quiet: bool, cut_loops: bool = False) -> None:
+    from .outputs import write
+    from .running import tell_files
+
+    written, problems = write(skeleton, outputs, None, title="", cut_loops=cut_loops, update=lambda text: None)
+    for line in told if not quiet else ():
+        typer.echo(line)
+    tell_files(written, problems, quiet=quiet)
+
+
+def _place(point) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in point.tolist()) + ")"
