@@ -2,6 +2,7 @@
 from . import analysis as analysis
 from . import batch as batch
 from . import crosscheck as crosscheck
+from . import editing as editing
 from . import pipelines as pipelines
 from .connector import Connector
 from .contractor import Contractor

@@ -28,6 +28,7 @@ PACKAGES = {
     "glsk_o3d": "The package",
     "glsk_o3d.pipelines": "Named pipelines",
     "glsk_o3d.analysis": "Analysis",
+    "glsk_o3d.editing": "After the skeleton",
     "glsk_o3d.crosscheck": "Cross-check",
     "glsk_o3d.batch": "Batches",
     "glsk_o3d.samples": "Sample clouds",
