@@ -74,7 +74,6 @@ def measures(
 def large(
     sizes: Annotated[str, typer.Option("--sizes", metavar="N,N", help="Points.")] = "100000,1000000",
     forks: Annotated[int, typer.Option("--forks", min=1, max=8, help="Of the tree, from foot to tip.")] = 6,
-    jobs: Jobs = 1,
     page: Annotated[Path | None, Page(callback=page_with("large"))] = None,
     output: Output = None,
     markdown: Markdown = False,
@@ -83,7 +82,7 @@ def large(
     where = machine()
     wanted = [int(it) for it in sizes.split(",")]
     work = [(dict(n=n, pipeline=name), (n, name, forks)) for n in wanted for name in big.PIPELINES]
-    rows = run(big.once, work, min(jobs, 1), fresh=True)
+    rows = run(big.once, work, 1, fresh=True)
     save(output, rows)
     told("large", big.tables(rows), where, page, markdown)
 

@@ -4,6 +4,7 @@ from . import batch as batch
 from . import crosscheck as crosscheck
 from . import editing as editing
 from . import pipelines as pipelines
+from . import samples as samples
 from .connector import Connector
 from .contractor import Contractor
 from .driver import remove_redundant_points, skeletonize

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -136,8 +137,11 @@ class Refiner(Filter[Skeleton]):
 
     def __post_init__(self) -> None:
         # as plain text it can be compared, printed and written to files
-        if not isinstance(self.root, str | None) and np.shape(self.root) == (3,):
-            object.__setattr__(self, "root", ",".join(repr(float(c)) for c in np.asarray(self.root)))
+        if not isinstance(self.root, str | None):
+            with suppress(TypeError, ValueError):  # what is no point is found when the filter is checked
+                point = np.asarray(self.root, float)
+                if point.shape == (3,):
+                    object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))
 
     def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
         skeleton = self._fit(skeleton)

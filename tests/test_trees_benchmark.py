@@ -133,6 +133,6 @@ class TestCommands:
         assert "clean: stem diameter" in out
 
     def test_large(self, call):
-        out = call("large", "--sizes", "3000", "--forks", 2, "--jobs", 0)
+        out = call("large", "--sizes", "3000", "--forks", 2)
         assert all(name in out for name in ("default, untraced", "tree"))
         assert "failure" not in out

@@ -88,9 +88,7 @@ def tables(rows: list[dict]) -> Tables:
 def mean(rows: list[dict]) -> dict[str, float]:
     """Over the trees that gave a skeleton."""
     good = [row for row in rows if "failure" not in row]
-    return {
-        key: fmean(row[key] for row in good) if good else float("nan") for key in (*MEASURED, "components", "loops")
-    }
+    return {key: fmean(row[key] for row in good) if good else float("nan") for key in MEASURED}
 
 
 def failed(rows: list[dict]) -> str:

@@ -26,7 +26,7 @@ def measure(seed: int, condition: str) -> dict[str, float]:
     true = dict(
         volume=(cylinders(skeleton).volume.sum(), volume(drawn)),
         stem_diameter=(found.stem_diameter, stem),
-        height=(found.height, np.ptp(drawn.points[:, 2])),
+        height=(found.height, (drawn.nodes[:, 2] + drawn.radii).max() - (drawn.nodes[:, 2] - drawn.radii).min()),
         radius=(np.median(skeleton.radii / drawn.radii[nearest]), 1.0),
     )
     return {name: float(mine / known - 1) for name, (mine, known) in true.items()}

@@ -65,7 +65,7 @@ def _swept(k):
 TOOLS: dict[str, Peer] = {
     "tree": Peer("`tree`", (), "points", partial(ours, "tree")),
     "default": PEERS["default"],
-    "surface": Peer(
+    "untraced": Peer(
         "`default`, `Refiner.surface=0`", (), "points", partial(ours, "default", options={"Refiner.surface": 0})
     ),
     "cao2010": PEERS["cao2010"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import pdist
 
-from ..errors import InvalidParameterError
+from ..errors import InvalidParameterError, SkeletonWarning
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import AXES, TINY, along_axis
 from .branches import branch_table
@@ -17,6 +18,7 @@ from .rows import Rows
 
 PIECE_LENGTH = 4.0  # derived: radii; the chord of a bend as sharp as that is 3 % too short
 TIP_QUANTILE = 0.95  # fitted: share of the points at a tip that its cylinder reaches
+OUTSIDE = 3.0  # fitted: radii aside of a tip, from which on points do not say how far it reaches
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
 RADIUS_SAMPLES = 8  # derived: places along a cylinder at which its radius is taken, evenly
 
@@ -84,7 +86,8 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     ----------
     skeleton : Skeleton
     root : int or (x, y, z), optional
-        See `branch_table`.
+        By default `report.root`, where the pipeline `tree` made it grow from; in a file that lacks that, vertex 0 if
+        vertices are numbered from there outwards; else see `branch_table`.
 
     Returns
     -------
@@ -93,7 +96,8 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     Raises
     ------
     InvalidParameterError
-        The skeleton is empty, has loops or no branches, or the root is neither a vertex nor a point.
+        The skeleton is empty, in parts, or has loops, no branches or no radii; or the root is neither a vertex nor a
+        point.
 
     Examples
     --------
@@ -108,7 +112,14 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
         raise InvalidParameterError(
             f"the skeleton has {skeleton.n_loops} loops: cylinders are of trees; see pipelines.tree()"
         )
-    table, beyond = branch_table(skeleton, root), _beyond_tips(skeleton)
+    if skeleton.n_components > 1:
+        raise InvalidParameterError(
+            f"the skeleton has {skeleton.n_components} components: cylinders are of one tree; see pipelines.tree() and "
+            "editing.largest_component()"
+        )
+    if not np.isfinite(skeleton.radii).all():
+        raise InvalidParameterError("the skeleton has no radii: a file of a format without them was read")
+    table, beyond = branch_table(skeleton, _root(skeleton, root)), _beyond_tips(skeleton)
     paths = [*skeleton.branches, *np.flatnonzero(skeleton.degree == 0)[:, None]]
     last = np.full(len(table), -1)
     rows: list[tuple] = []
@@ -137,6 +148,13 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     return Cylinders(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
+def _root(skeleton: Any, root: Any) -> Any:
+    """As given, or the vertex from which all are numbered outwards: each other one has one neighbour before it."""
+    later = np.sort(skeleton.edges[:, 1])
+    outwards = np.array_equal(later, np.arange(1, len(skeleton.vertices)))
+    return 0 if root is None and not skeleton.report.root and outwards else root
+
+
 def _beyond_tips(skeleton: Any) -> dict[int, float]:
     """How far the part goes on beyond every tip of the curve, by its points, as a cylinder with the volume of a cap."""
     owner, ends = skeleton.vertex_of_point, np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
@@ -148,7 +166,10 @@ def _beyond_tips(skeleton: Any) -> dict[int, float]:
         points = skeleton.points[np.concatenate([order[first[v] : stop[v]] for v in (tip, beside)])]
         way = skeleton.vertices[tip] - skeleton.vertices[beside]
         if len(points) and way.any():
-            reach = np.quantile((points - skeleton.vertices[tip]) @ (way / np.linalg.norm(way)), TIP_QUANTILE)
+            offset, ahead = points - skeleton.vertices[tip], way / np.linalg.norm(way)
+            along = offset @ ahead
+            aside = np.linalg.norm(offset - along[:, None] * ahead, axis=1)
+            reach = np.quantile(along[aside <= max(OUTSIDE * skeleton.radii[beside], aside.min())], TIP_QUANTILE)
             beyond[tip] = max(float(reach - skeleton.radii[beside] / 3), 0.0)
     return beyond
 
@@ -170,19 +191,20 @@ class TreeMeasures:
     Attributes
     ----------
     height : float
-        Of the highest point above the foot of the stem.
+        Of the highest end of a branch above the foot of the stem.
     stem_diameter : float
-        1.3 m above its foot; NaN if it is not so high.
+        1.3 m above its foot; NaN where the axis of order 0 does not reach so high.
     crown_base : float
         Height at which the lowest branch leaves the stem; NaN without one.
     crown_width : float
-        Largest horizontal distance of two points of branches.
+        Largest horizontal distance of two points of the crown: of branches, and of the stem above the lowest one.
     crown_area : float
-        Of the convex hull of the branches as seen from above.
+        Of the convex hull of the crown as seen from above.
     length, area, volume : tuple of float
         Of the axes, lateral surface and volume of each order, the stem first; see `Cylinders`.
     traced : float
-        Share of the volume where there was no surface to measure.
+        Share of the volume that has confidence 0: twigs without a surface, leaves, and what noise has spoilt. NaN if
+        confidences are not known.
 
     Examples
     --------
@@ -227,6 +249,11 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str = "z", unit: float
     InvalidParameterError
         See `cylinders`; or `up` is no axis, or `unit` is not positive.
 
+    Warns
+    -----
+    SkeletonWarning
+        The root is in the upper half of the tree.
+
     Examples
     --------
     >>> from glsk_o3d import pipelines
@@ -247,16 +274,27 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str = "z", unit: float
 
     stem = pieces.order == 0
     bottom, top = height(pieces.start_point), height(pieces.end_point)
+    low, high = min(bottom.min(), top.min()), max(bottom.max(), top.max())
+    ground_height = -low / max(high - low, TINY)
     breast = np.flatnonzero(stem & (bottom <= BREAST_HEIGHT) & (top >= BREAST_HEIGHT))
     leaving = bottom[(pieces.order == 1) & stem[pieces.parent]]
-    crown = unit * np.concatenate([pieces.start_point[~stem], pieces.end_point[~stem]])
+    crowning = ~stem | (bottom > leaving.min(initial=np.inf))
+    crown = unit * np.concatenate([pieces.start_point[crowning], pieces.end_point[crowning]])
     width, area = _extent(np.delete(crown, "xyz".index(up[-1]), axis=1))
+
+    known, total = np.isfinite(pieces.confidence), pieces.volume.sum()
+    if ground_height > 0.5:
+        warnings.warn(
+            f"the tree grows from {100 * ground_height:.0f} % of its height along {up}: does {up} point up?",
+            SkeletonWarning,
+            stacklevel=2,
+        )
 
     def by_order(values: np.ndarray, power: int) -> tuple[float, ...]:
         return tuple((unit**power * np.bincount(pieces.order, values)).tolist())
 
     return TreeMeasures(
-        height=float(np.nanmax(np.concatenate([height(skeleton.points), top]))),
+        height=float(high),
         stem_diameter=float(2 * unit * pieces.radius[breast[0]]) if len(breast) else np.nan,
         crown_base=float(leaving.min()) if len(leaving) else np.nan,
         crown_width=width,
@@ -264,7 +302,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str = "z", unit: float
         length=by_order(pieces.length, 1),
         area=by_order(pieces.area, 2),
         volume=by_order(pieces.volume, 3),
-        traced=float(pieces.volume[pieces.confidence == 0].sum() / pieces.volume.sum()),
+        traced=float(np.where(known, pieces.volume * (pieces.confidence == 0), np.nan).sum() / max(total, TINY)),
     )
 
 

@@ -22,6 +22,8 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
         "loops_closed": report.n_loops_closed,
         "cuts": report.n_cuts,
         "bridges": report.n_bridges,
+        "traced": report.n_traced,
+        "joined": len(report.joined),
         "uncertain": len(report.uncertain),
         "iterations": len(report.iterations),
         "converged": report.converged,

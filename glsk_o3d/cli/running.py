@@ -69,7 +69,7 @@ def print_results(
         if facts["sampled"] in (0, facts["points"] - facts["dropped"]):
             hidden["sampled"] = None
         hidden["loops_closed"] = None  # most clouds have some, true ones are hardly ever among them
-        hidden |= {name: None for name in ("outliers", "cuts", "bridges") if not facts[name]}
+        hidden |= {name: None for name in ("outliers", "cuts", "bridges", "traced", "joined") if not facts[name]}
         hidden["uncertain"] = "\n".join(map(str, skeleton.report.uncertain)) or None
         if facts["contracted"] == facts["distinct"]:
             hidden["contracted"] = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -21,7 +22,7 @@ WORDS = {
     "crown_base": ("lowest branch", "m"),
     "crown_width": ("crown width", "m"),
     "crown_area": ("crown area from above", "m2"),
-    "traced": ("share of the volume without a surface", ""),
+    "traced": ("share of the volume with confidence 0", ""),
 }
 
 
@@ -42,7 +43,7 @@ def tree(
     """Measure a tree: height, stem, crown, volume by order.
 
     Length and surface, too. Orders count from the stem, 0. Where there was no surface, radii are the scatter of the
-    points, and volumes an upper bound.
+    points, and volumes no more than a guess. JSON and npz files say where the tree grows from.
     """
     with reporting(quiet=quiet, verbose=verbose):
         from ..analysis.forestry import cylinders, tree_measures
@@ -67,10 +68,13 @@ def _print(measures: TreeMeasures) -> None:
     from rich.table import Table
 
     for name, (words, unit) in WORDS.items():
-        typer.echo(f"{words}: {getattr(measures, name):.4g} {unit}".rstrip())
+        value = getattr(measures, name)
+        typer.echo(f"{words}: " + (f"{value:.4g} {unit}".rstrip() if math.isfinite(value) else "not known"))
     shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
     for name in ("order", "length m", "surface m2", "volume m3"):
         shown.add_column(name, justify="right")
     for order, values in enumerate(zip(measures.length, measures.area, measures.volume, strict=True)):
         shown.add_row(str(order), *(f"{value:.4g}" for value in values))
+    sums = (sum(values) for values in (measures.length, measures.area, measures.volume))
+    shown.add_row("all", *(f"{value:.4g}" for value in sums))
     print_table(shown, whole=True)

@@ -57,7 +57,7 @@ def link_growth(links: csr_matrix) -> np.ndarray:
 
     5/3 along a curve, 25/9 on a surface, 125/27 where points fill space; mean over the links of every point, twice.
     """
-    step = _steps(links)
+    step = steps(links)
     one, two = np.diff(step.indptr), np.diff((step @ step).indptr)
     growth = two / one
     for _ in range(2):
@@ -96,11 +96,12 @@ def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> t
         ends = np.concatenate([ends, *(pair[None] for pair in some)])
         way = places[ends[:, 1]] - places[ends[:, 0]]
         length = norm(way)
-        ahead = np.maximum(dot(outward[ends[:, 0]], way), -dot(outward[ends[:, 1]], way)) / np.maximum(length, TINY)
-        chosen = _spanning(piece, ends, length * (2 - np.maximum(ahead, 0)))
-        fresh = ends[chosen[length[chosen] <= longest[ends[chosen]].max(axis=1)]]
-        if len(fresh) == 0:
+        near = length <= longest[ends].max(axis=1)
+        ends, way, length = ends[near], way[near], length[near]
+        if len(ends) == 0:
             break
+        ahead = np.maximum(dot(outward[ends[:, 0]], way), -dot(outward[ends[:, 1]], way)) / np.maximum(length, TINY)
+        fresh = ends[_spanning(piece, ends, length * (2 - np.maximum(ahead, 0)))]
         added = np.concatenate([added, fresh])
         piece = component_labels(int(piece.max()) + 1, piece[fresh])[piece]
     row, column = links.nonzero()
@@ -109,13 +110,13 @@ def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> t
 
 def _outward(places: np.ndarray, links: csr_matrix) -> np.ndarray:
     """Unit vectors from the mean of what is within two links of every place to it: where it goes on if it is an end."""
-    step = _steps(links)
+    step = steps(links)
     near = step @ step
     near.data[:] = 1
     return unit(places - (near @ places) / np.diff(near.indptr)[:, None])
 
 
-def _steps(links: csr_matrix) -> csr_matrix:
+def steps(links: csr_matrix) -> csr_matrix:
     """1 for every place itself and those that it is linked with."""
     step = csr_matrix(links + identity(links.shape[0]))
     step.data[:] = 1

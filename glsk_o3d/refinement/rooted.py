@@ -14,17 +14,20 @@ from ..numerics.vectors import AXES, along_axis, norm
 from ..parameters import resolve_point
 from ..skeleton import Skeleton
 
+Where = str | int | Sequence[float] | np.ndarray
 
-def root_among(places: np.ndarray, skeleton: Skeleton, which: str | int | Sequence[float] | np.ndarray) -> int:
+
+def root_among(places: np.ndarray, skeleton: Skeleton, which: Where, thick: np.ndarray | None = None) -> int:
     """Which of some places a tree grows from.
 
     Parameters
     ----------
     places : (n, 3) float array
     skeleton : Skeleton
-        Of which the thickest end is taken.
     which : str, int or (x, y, z)
         ``"x"`` to ``"-z"``, ``"thickest"``, a point (also as ``"x,y,z"``), or the number of a place.
+    thick : (k,) int array, optional
+        Ends of the skeleton of which the thickest is taken; if there are none, of all.
 
     Returns
     -------
@@ -42,7 +45,8 @@ def root_among(places: np.ndarray, skeleton: Skeleton, which: str | int | Sequen
     if isinstance(which, str) and which in AXES:
         return int(along_axis(places, which).argmin())
     if isinstance(which, str) and which == "thickest":
-        ends = skeleton.leaves if len(skeleton.leaves) else np.arange(len(skeleton.vertices))
+        choices = (thick if thick is not None else (), skeleton.leaves, np.arange(len(skeleton.vertices)))
+        ends = next(each for each in choices if len(each))
         place = skeleton.vertices[ends[skeleton.radii[ends].argmax()]]
     else:
         place = np.asarray(resolve_point(which) if isinstance(which, str) else which, float)

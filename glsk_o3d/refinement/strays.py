@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,16 +13,19 @@ from .merging import merge_into
 from .spread import spread_around
 
 
-def drop_strays(skeleton: Skeleton, radii: float, root: int | None = None) -> Skeleton:
+def drop_strays(
+    skeleton: Skeleton, traced: np.ndarray, radii: float, root: int | None = None
+) -> tuple[Skeleton, np.ndarray]:
     """Drop twigs whose tip is as near to the rest as points scatter there.
 
-    Of N points that scatter normally around a curve, with a root mean square distance of r, one is expected to be
-    farther off than ``r sqrt(ln N)``.
+    Of N points that scatter normally around a curve, with a median distance of r, one is expected to be farther off
+    than ``r sqrt(log2 N)``.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Traced vertices have no confidence, and the spread of their points for a radius. Only they are dropped.
+    traced : (M,) bool array
+        Vertices whose radius is the spread of their points. Only they are dropped.
     radii : float
         How far a tip must be from a part that has a surface, over its radius.
     root : int, optional
@@ -30,14 +34,16 @@ def drop_strays(skeleton: Skeleton, radii: float, root: int | None = None) -> Sk
     Returns
     -------
     Skeleton
-        Vertices left keep their order. Points of a twig belong to the vertex that it grew from.
+        Points of a twig belong to the vertex that it grew from.
+    stays : (M',) int array
+        The vertices that are left, in their order.
     """
-    scatter = np.sqrt(np.log(max(len(skeleton.supporting_points), 1)))
+    stays = np.arange(len(skeleton.vertices))
+    scatter = math.sqrt(math.log2(max(int((skeleton.vertex_of_point >= 0).sum()), 1)))
     while True:
-        traced = skeleton.confidence == 0
         forks, tips, twigs = _twigs(skeleton, traced, root)
         if not twigs:
-            return skeleton
+            return skeleton, stays
         rest = np.setdiff1d(np.arange(len(traced)), np.concatenate(twigs))
         away, nearest = cKDTree(skeleton.vertices[rest]).query(skeleton.vertices[tips])
         beside = rest[nearest]
@@ -47,13 +53,13 @@ def drop_strays(skeleton: Skeleton, radii: float, root: int | None = None) -> Sk
         order = order[np.unique(forks[order], return_index=True)[1]]
         chosen = order[beyond[order] < 0].tolist()
         if not chosen:
-            return skeleton
+            return skeleton, stays
         group = np.arange(len(traced))
         for twig in chosen:
             group[twigs[twig]] = forks[twig]
-        skeleton = merge_into(skeleton, group)
-        spread = spread_around(skeleton)
-        skeleton = replace(skeleton, radii=np.where(skeleton.confidence == 0, spread, skeleton.radii))
+        left = np.unique(group)
+        skeleton, traced, stays = merge_into(skeleton, group), traced[left], stays[left]
+        skeleton = replace(skeleton, radii=np.where(traced, spread_around(skeleton), skeleton.radii))
 
 
 def _twigs(skeleton: Skeleton, traced: np.ndarray, root: int | None) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
@@ -63,6 +69,6 @@ def _twigs(skeleton: Skeleton, traced: np.ndarray, root: int | None) -> tuple[np
         path = path[::-1] if skeleton.degree[path[0]] == 1 else path
         if skeleton.degree[path[0]] > 2 and skeleton.degree[path[-1]] == 1 and traced[path[1:]].all():
             found.append(path)
-    found = [path for path in found if path[-1] != root]
+    found = [path for path in found if root not in path[1:]]
     forks, tips = np.array([(path[0], path[-1]) for path in found], int).reshape(-1, 2).T
     return forks, tips, [path[1:] for path in found]

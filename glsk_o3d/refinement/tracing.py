@@ -25,7 +25,7 @@ SLICE_WIDTH = 0.5  # of geodesic distance, over s
 COVER_SCALES = 1.2  # radius around a path in which points need no path of their own, over s
 COVER_RADII = 1.3  # the same over the radius of a part with a surface
 JOIN_SCALES = 6.0  # longest gap that is none, over s
-LEAST_PIECE = 3  # points farther than that from all others, of which fewer are no part
+LEAST_PIECE = 3  # smaller groups of points, farther than that from all others, are left out
 SMOOTHING_PASSES = 2  # in which every vertex of a path becomes the mean of itself and its neighbours
 MEETING_SCALES, MEETING_COSINE = 2.0, 0.5  # how near over s, and how straight ahead of each other, two tips meet
 
@@ -49,8 +49,8 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     Returns
     -------
     Skeleton
-        Traced vertices have the spread of their points for a radius, and no confidence; their points have no normals
-        any more. Of a tree, vertex 0 is the root, and the first vertex of an edge is nearer to it.
+        Traced vertices have the spread of their points for a radius, and confidence 0; their points have no normals any
+        more. Of a tree, vertex 0 is the root, and the first vertex of an edge is nearer to it.
     """
     cloud, m = SpacedPoints(skeleton), len(skeleton.vertices)
     thin = np.zeros(m, bool)
@@ -59,9 +59,15 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     if m == 0 or (root is None and not thin.any()):
         return skeleton
     mixed, joined = _Mixed.of(skeleton, cloud, thin).joined(anywhere=root is not None)
-    roots = mixed.roots() if root is None else np.array([root_among(mixed.places, skeleton, root)])
+    ends = skeleton.leaves[~thin[skeleton.leaves]]
+    roots = mixed.roots() if root is None else np.array([root_among(mixed.places, skeleton, root, ends)])
     paths = _Paths(mixed, roots)
     traced = _assembled(skeleton, mixed, paths, tree=root is not None)
+    if thin.any():
+        kept = None if root is None else paths.index[roots[0]]
+        traced, stays = drop_strays(traced, paths.nodes < mixed.n, COVER_RADII, kept)
+    else:
+        stays = np.arange(len(paths.nodes))
     loose = thin[skeleton.vertex_of_point] & (skeleton.vertex_of_point >= 0)
     report = replace(
         skeleton.report,
@@ -69,10 +75,8 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
         joined=tuple((tuple(a), tuple(b)) for a, b in mixed.places[joined].tolist()),
     )
     if root is not None:
-        traced = numbered_from(traced, paths.index[roots[0]])
+        traced = numbered_from(traced, int(np.searchsorted(stays, paths.index[roots[0]])))
         report = replace(report, root=tuple(traced.vertices[0].tolist()))
-    if thin.any():
-        traced = drop_strays(traced, COVER_RADII, None if root is None else 0)
     return replace(traced, normals=np.where(loose[:, None], np.nan, skeleton.normals), report=report)
 
 

@@ -159,6 +159,8 @@ def origin(report: Report) -> str:
         "loops closed": report.n_loops_closed,
         "branches cut in air": report.n_cuts,
         "gaps bridged": report.n_bridges,
+        "traced, no surface": report.n_traced,
+        "gaps joined": len(report.joined),
     }
     numbers = {name: f"{n:,}" for name, n in counts.items()} if report.n_input else {}
     numbers |= {f"{name}, seconds": f"{seconds:.3f}" for name, seconds in report.seconds.items()}
