@@ -79,8 +79,8 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     """Cylinders along the branches of a skeleton, each about four radii long.
 
     A branch that leaves its parent begins a radius of the parent away, so that nothing counts twice; the one that goes
-    straight on begins at the junction. Free ends reach as far as their points do, less a third of the radius: a round
-    cap has the volume of so much less of a cylinder.
+    straight on begins at the junction. Free ends reach as far as their points do, but for the root less a third of the
+    radius: a round cap has the volume of so much less of a cylinder.
 
     Parameters
     ----------
@@ -124,14 +124,17 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     last = np.full(len(table), -1)
     rows: list[tuple] = []
     for row in np.argsort(table.level, kind="stable").tolist():
+        if len(paths[row]) < 2:
+            continue
         path = paths[row] if paths[row][0] == table.start[row] else paths[row][::-1]
         before = int(table.parent[row])
         last[row] = last[before] if before >= 0 else -1
         along = arc_lengths(skeleton.vertices[path])
         leaves_parent = before >= 0 and table.order[row] > table.order[before]
+        # a stem is cut off flat, other ends are round: such a cap has the volume of a cylinder two thirds shorter
         start = table.end_radius[before] if leaves_parent else -beyond.get(int(path[0]), 0.0)
-        stop = along[-1] + beyond.get(int(path[-1]), 0.0)
-        if stop <= start or len(path) < 2:
+        stop = along[-1] + max(beyond.get(int(path[-1]), 0.0) - skeleton.radii[path[-2]] / 3, 0.0)
+        if stop <= start:
             continue
         pieces = max(round((stop - start) / (PIECE_LENGTH * max(table.mean_radius[row], 1e-3 * stop))), 1)
         ends = np.linspace(start, stop, pieces + 1)
@@ -156,7 +159,7 @@ def _root(skeleton: Any, root: Any) -> Any:
 
 
 def _beyond_tips(skeleton: Any) -> dict[int, float]:
-    """How far the part goes on beyond every tip of the curve, by its points, as a cylinder with the volume of a cap."""
+    """How far the part goes on beyond every tip of the curve, by its points."""
     owner, ends = skeleton.vertex_of_point, np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
     ends = ends[skeleton.degree[ends[:, 0]] == 1]
     order = np.argsort(owner, kind="stable")
@@ -170,8 +173,18 @@ def _beyond_tips(skeleton: Any) -> dict[int, float]:
             along = offset @ ahead
             aside = np.linalg.norm(offset - along[:, None] * ahead, axis=1)
             reach = np.quantile(along[aside <= max(OUTSIDE * skeleton.radii[beside], aside.min())], TIP_QUANTILE)
-            beyond[tip] = max(float(reach - skeleton.radii[beside] / 3), 0.0)
+            beyond[tip] = max(float(reach), 0.0)
     return beyond
+
+
+def _beside(skeleton: Any) -> np.ndarray:
+    """Points that are no farther from their vertex than where others are."""
+    owner, longest = skeleton.vertex_of_point, np.zeros(len(skeleton.vertices))
+    for ends in skeleton.edges.T:
+        np.maximum.at(longest, ends, skeleton.edge_lengths)
+    some = np.flatnonzero(owner >= 0)
+    away = np.linalg.norm(skeleton.points[some] - skeleton.vertices[owner[some]], axis=1)
+    return skeleton.points[some[away <= (OUTSIDE * skeleton.radii + longest)[owner[some]]]]
 
 
 def _place_beyond(curve: np.ndarray, along: np.ndarray, lengths: np.ndarray) -> np.ndarray:
@@ -191,7 +204,7 @@ class TreeMeasures:
     Attributes
     ----------
     height : float
-        Of the highest end of a branch above the foot of the stem.
+        Of the highest point above the foot of the stem; points farther than three radii from the curve do not count.
     stem_diameter : float
         1.3 m above its foot; NaN where the axis of order 0 does not reach so high.
     crown_base : float
@@ -294,7 +307,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str = "z", unit: float
         return tuple((unit**power * np.bincount(pieces.order, values)).tolist())
 
     return TreeMeasures(
-        height=float(high),
+        height=float(max(high, height(_beside(skeleton)).max(initial=high))),
         stem_diameter=float(2 * unit * pieces.radius[breast[0]]) if len(breast) else np.nan,
         crown_base=float(leaving.min()) if len(leaving) else np.nan,
         crown_width=width,

@@ -11,10 +11,10 @@ from glsk_o3d.analysis import cylinders, tree_measures
 
 
 def test_lines_file_and_json_agree(invoke, tmp_path, y):
-    result = invoke("tree", y, "-o", "c.csv")
+    result = invoke("tree", y, "-o", "c.csv", "--root", "0,0,-0.5")
     assert (result.exit_code, result.stderr) == (0, "")
     skeleton = read_skeleton(tmp_path / y)
-    measures, table = tree_measures(skeleton), cylinders(skeleton)
+    measures, table = tree_measures(skeleton, (0, 0, -0.5)), cylinders(skeleton, (0, 0, -0.5))
     lines = result.stdout.splitlines()
     assert lines[0] == f"height: {measures.height:.4g} m"
     assert lines[-1] == "wrote c.csv"
@@ -23,7 +23,7 @@ def test_lines_file_and_json_agree(invoke, tmp_path, y):
     np.testing.assert_allclose([float(row[3]) for row in told], measures.volume, rtol=1e-3)
     with (tmp_path / "c.csv").open(newline="") as stream:
         assert [int(row["parent"]) for row in csv.DictReader(stream)] == table.parent.tolist()
-    facts = json.loads(invoke("tree", y, "--json").stdout)
+    facts = json.loads(invoke("tree", y, "--json", "--root", "0,0,-0.5").stdout)
     assert facts["volume"] == list(measures.volume)
     assert facts["stem_diameter"] is None  # it is not so high
     assert invoke("tree", y, "-q").stdout == ""

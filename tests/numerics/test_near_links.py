@@ -76,3 +76,12 @@ def test_a_gap_ahead_is_joined_before_a_narrower_one_to_the_side():
     _, added = join_pieces(lines, near_links(lines), np.full(120, np.inf))
     assert [39, 40] in np.sort(added).tolist()
     assert (np.abs(lines[added[:, 0], 1] - lines[added[:, 1], 1]) > 4).sum() == 1
+
+
+def test_a_join_within_reach_is_made_where_a_shorter_one_is_not():
+    """Two long pieces with no reach are nearer to each other than to a third one that has some."""
+    lines = np.concatenate([LINE, LINE + [0, 5, 0], LINE + [0, 2.5, 5.45]])
+    reach = np.repeat([0.0, 0.0, 7.0], 40)
+    links, added = join_pieces(lines, near_links(lines), reach)
+    assert connected_components(links)[0] == 1
+    assert len(added) == 2

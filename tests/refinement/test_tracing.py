@@ -100,7 +100,13 @@ def test_the_thickest_end():
     assert first == 0
 
 
-@pytest.mark.parametrize("root", ["up", "1,2", "1,2,nan", 3, (1, 2)])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_thickest_end_of_a_sparse_tree_is_that_of_the_trunk(seed):
+    skeleton = pipelines.tree("thickest")(samples.tree(4096, forks=6, seed=seed).points)
+    assert np.linalg.norm(skeleton.vertices[0]) < 0.15
+
+
+@pytest.mark.parametrize("root", ["up", "1,2", "1,2,nan", 3, (1, 2), ("a", "b", "c"), [[1], [2, 3], 4]])
 def test_no_root(root):
     with pytest.raises(InvalidParameterError, match="a point such as"):
         Refiner(root=root).check()
@@ -148,6 +154,7 @@ def test_what_floats_far_away_is_no_part(sparse):
     skeleton = pipelines.tree()(stray)
     assert len(skeleton.leaves) == 3
     assert (skeleton.vertex_of_point >= 0).all()
+    assert skeleton.radii.max() < 0.02
 
 
 @pytest.mark.parametrize(
