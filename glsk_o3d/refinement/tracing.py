@@ -24,7 +24,7 @@ from .thin_parts import SpacedPoints, without_surface
 SLICE_WIDTH = 0.5  # of geodesic distance, over s
 COVER_SCALES = 1.2  # radius around a path in which points need no path of their own, over s
 COVER_RADII = 1.3  # the same over the radius of a part with a surface
-JOIN_SCALES = 6.0  # longest gap that is none, over s
+JOIN_SCALES = 8.0  # longest gap that is none, over s
 LEAST_PIECE = 3  # smaller groups of points, farther than that from all others, are left out
 SMOOTHING_PASSES = 2  # in which every vertex of a path becomes the mean of itself and its neighbours
 MEETING_SCALES, MEETING_COSINE = 2.0, 0.5  # how near over s, and how straight ahead of each other, two tips meet
