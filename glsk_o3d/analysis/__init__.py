@@ -5,12 +5,13 @@ from .branch_rows import BranchTable
 from .branches import branch_table
 from .comparison import Comparison, compare
 from .curvature import curvature_torsion
-from .forestry import Cylinders, TreeMeasures, cylinders, tree_measures
+from .forestry import TreeMeasures, tree_measures
 from .grasps import grasp_candidates
 from .grippers import GraspCandidates
 from .loops import Loop
 from .segmentation import segment
 from .thickness import thickness
+from .tree_cylinders import Cylinders, cylinders
 from .truth import Truth
 
 __all__ = [

@@ -46,7 +46,7 @@ def tree(
     points, and volumes no more than a guess. JSON and npz files say where the tree grows from.
     """
     with reporting(quiet=quiet, verbose=verbose):
-        from ..analysis.forestry import cylinders, tree_measures
+        from ..analysis import cylinders, tree_measures
         from ..io.skeletons import read_skeleton
         from .outputs import check_findings
 
