@@ -27,7 +27,7 @@ COVER_RADII = 1.3  # the same over the radius of a part with a surface
 JOIN_SCALES = 8.0  # longest gap that is none, over s
 LEAST_PIECE = 3  # smaller groups of points, farther than that from all others, are left out
 SMOOTHING_PASSES = 2  # in which every vertex of a path becomes the mean of itself and its neighbours
-MEETING_SCALES, MEETING_COSINE = 2.0, 0.5  # how near over s, and how straight ahead of each other, two tips meet
+MEETING_SCALES, MEETING_COSINE = 2.0, 0.8  # how near over s, and how straight ahead of each other, two tips meet
 
 
 def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
