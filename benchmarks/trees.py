@@ -8,8 +8,10 @@ from __future__ import annotations
 import os
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
+import numpy as np
 import typer
 from _common.command_line import Folder, Jobs, Markdown, Output, application
 from _common.results import machine, save
@@ -73,16 +75,19 @@ def measures(
 @app.command()
 def large(
     sizes: Annotated[str, typer.Option("--sizes", metavar="N,N", help="Points.")] = "100000,1000000",
-    forks: Annotated[int, typer.Option("--forks", min=1, max=8, help="Of the tree, from foot to tip.")] = 6,
+    forks: Annotated[int, typer.Option("--forks", min=1, max=8, help="Of the tree, from foot to tip.")] = 4,
     page: Annotated[Path | None, Page(callback=page_with("large"))] = None,
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
     """Time and memory of lidar scans of one tree, with and without tracing."""
     where = machine()
-    wanted = [int(it) for it in sizes.split(",")]
-    work = [(dict(n=n, pipeline=name), (n, name, forks)) for n in wanted for name in big.PIPELINES]
-    rows = run(big.once, work, 1, fresh=True)
+    rows = []
+    for n in map(int, sizes.split(",")):
+        with TemporaryDirectory() as folder:
+            path = Path(folder, "scan.npy")
+            np.save(path, big.scan(n, forks))
+            rows += run(big.once, [(dict(n=n, pipeline=name), (path, name)) for name in big.PIPELINES], 1, fresh=True)
     save(output, rows)
     told("large", big.tables(rows), where, page, markdown)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
+import numpy as np
 from _common.tables import Tables, short
 from _speed.stopwatch import MB, peak, reset_peak, resident
 
@@ -16,9 +18,14 @@ NOISE = 0.001  # share of the diagonal, 7 mm
 PIPELINES = {"default, untraced": ("default", {"Refiner.surface": 0}), "default": ("default", {}), "tree": ("tree", {})}
 
 
-def once(n: int, pipeline: str, forks: int) -> dict:
-    """One run on a lidar scan of so many points, to be made in a fresh process."""
-    points = samples.tree(n, forks=forks, seed=1, noise=NOISE, cameras=CAMERAS).points
+def scan(n: int, forks: int) -> np.ndarray:
+    """So many points of one tree, as a lidar sees it from three places."""
+    return samples.tree(n, forks=forks, seed=1, noise=NOISE, cameras=CAMERAS).points
+
+
+def once(path: Path, pipeline: str) -> dict:
+    """One run on a saved scan, to be made in a fresh process."""
+    points = np.load(path)
     name, options = PIPELINES[pipeline]
     chosen = named_pipeline(name).with_options(options)
     reset_peak()
