@@ -34,7 +34,7 @@ from glsk_o3d import samples
 
 PIPELINES = ("default", "wen2024", "cao2010")
 ARRAYS = ("vertices", "edges", "radii", "vertex_of_point")
-SAMPLES = ("tube", "y_junction", "torus", "two_rings", "helix", "sauropod", "sphere", "sheet")
+SAMPLES = ("tube", "y_junction", "torus", "two_rings", "helix", "sauropod", "tree", "sphere", "sheet")
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 Digests = dict[str, dict[str, dict[str, str]]]  # by group, cloud and pipeline
