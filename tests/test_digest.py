@@ -42,7 +42,7 @@ def test_every_sample_and_pipeline_has_one(made):
 def test_identical(call, made):
     code, printed = call("compare", made)
     assert code == 0
-    assert printed.split()[-5:] == ["samples", "8", "8", "8", "8"]
+    assert printed.split()[-5:] == ["samples", "9", "9", "9", "9"]
 
 
 def test_what_differs_is_said(call, made, tmp_path):
@@ -59,7 +59,7 @@ def test_what_differs_is_said(call, made, tmp_path):
     lines = [line.strip() for line in printed.splitlines()]
     assert [line.split() for line in lines if line.startswith(("data", "samples"))] == [
         ["data", "1", "0", "0", "0"],
-        ["samples", "8", "7", "6", "7"],
+        ["samples", "9", "8", "7", "8"],
     ]
     differs = [line for line in lines if line.startswith("differs: ")]
     assert len(differs) == 7

@@ -425,7 +425,9 @@ def test_thin_parts_side_by_side_stay_apart(gap, seed):
     assert not set(owner[0]) & set(owner[1])
 
 
-@pytest.mark.filterwarnings("ignore:uncertain topology:glsk_o3d.SkeletonWarning")  # a stretch of 3 radii is a close call
+@pytest.mark.filterwarnings(
+    "ignore:uncertain topology:glsk_o3d.SkeletonWarning"
+)  # a stretch of 3 radii is a close call
 def test_parts_in_line_are_bridged_where_their_ends_are_open():
     rod = samples.tube(2048).points
     parts = np.concatenate([rod, rod + [1.5, 0, 0]])  # round ends 0.3 apart, 3 radii
