@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-import time
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -23,13 +21,11 @@ from _common.command_line import Folder, Jobs, Markdown, Output, Own, Shapes, Va
 from _common.results import machine, pick, save, summary
 from _common.runs import run
 from _common.tables import Tables, fill, markdown_table, number, page_with, present
-from _peers import PEERS, Peer, installed, one_thread, silence, versions
+from _peers import PEERS, Peer, installed, one_thread, versions
 
 from glsk_o3d import plot_skeleton
 from glsk_o3d.analysis import compare
-from glsk_o3d.analysis.graph import simple_edges
 from glsk_o3d.interop.atomic import write_atomically
-from glsk_o3d.skeleton import Skeleton
 
 EVERY = "clean_4096,noise1_4096,scan2_4096,outliers_4096"
 DRAWN = Case("sauropod", "scan2_4096")
@@ -42,14 +38,8 @@ DRAWN_BY = ("default", "pc-skeletor", "pygel-points", "cgal", "skeletor-contract
 def measure(case: Case, peer: Peer, drawn: bool = False) -> dict:
     """One skeleton against its axis, and the skeleton too if it is to be drawn."""
     points, truth = case.load()
-    with silence():
-        with suppress(Exception):
-            peer.warm_up()
-        start = time.process_time()
-        vertices, edges = peer(points)
-        cpu = time.process_time() - start
-    skeleton = Skeleton(vertices, simple_edges(edges), np.full(len(vertices), np.nan), (), (), ())
-    found = dict(cpu=cpu, vertices=len(vertices)) | compare(skeleton, truth).as_dict()
+    skeleton, cpu = peer.timed(points)
+    found = dict(cpu=cpu, vertices=len(skeleton.vertices)) | compare(skeleton, truth).as_dict()
     return found | dict(skeleton=skeleton) if drawn else found
 
 

@@ -65,14 +65,14 @@ class TestClouds:
 class TestScores:
     def test_an_axis_is_itself(self, parts):
         drawn = samples.tree(500, forks=3)
-        axis = parts.curves.curve(drawn.nodes, drawn.edges)
+        axis = parts.curves.skeleton_of(drawn.nodes, drawn.edges)
         found = parts.curves.score(drawn.points, axis, axis)
         assert found == dict(f1=1, precision=1, recall=1, accuracy=0, completeness=0, tips=1, components=1, loops=0)
 
     def test_half_of_a_line(self, parts):
         """Its diagonal is 1: all of the half is right, and half of the line is there."""
-        whole = parts.curves.curve(np.array([[0, 0, 0], [1.0, 0, 0]]), np.array([[0, 1]]))
-        half = parts.curves.curve(np.array([[0, 0, 0], [0.5, 0, 0]]), np.array([[0, 1]]))
+        whole = parts.curves.skeleton_of(np.array([[0, 0, 0], [1.0, 0, 0]]), np.array([[0, 1]]))
+        half = parts.curves.skeleton_of(np.array([[0, 0, 0], [0.5, 0, 0]]), np.array([[0, 1]]))
         found = parts.curves.score(np.array([[0, 0, 0], [1.0, 0, 0]]), whole, half)
         assert found["precision"] == 1
         assert found["recall"] == pytest.approx(0.51, abs=0.003)
@@ -82,8 +82,8 @@ class TestScores:
 class TestTools:
     def test_level_sets_make_one_tree(self, parts):
         points, nodes, edges = parts.clouds.builtin(0, "clean")
-        axis = parts.curves.curve(nodes, edges)
-        found = parts.curves.score(points, axis, parts.curves.curve(*parts.tools.level_sets(points)))
+        axis = parts.curves.skeleton_of(nodes, edges)
+        found = parts.curves.score(points, axis, parts.curves.skeleton_of(*parts.tools.level_sets(points)))
         assert (found["components"], found["loops"]) == (1, 0)
         assert found["f1"] > 0.9
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import time
-from contextlib import suppress
 from statistics import fmean
 
 import numpy as np
 from _common.results import pick
 from _common.tables import Tables, number
-from _peers import Peer, silence
+from _peers import Peer, skeleton_of
 
 from glsk_o3d.analysis.curves import distances
-from glsk_o3d.analysis.graph import simple_edges
 from glsk_o3d.skeleton import Skeleton
 
 from .clouds import SparseTree
@@ -43,19 +40,8 @@ def score(points: np.ndarray, axis: Skeleton, found: Skeleton) -> dict[str, floa
 def measure(tree: SparseTree, tool: Peer) -> dict:
     """One skeleton against its axis."""
     points, nodes, edges = tree.load()
-    with silence():
-        with suppress(Exception):
-            tool.warm_up()
-        start = time.process_time()
-        vertices, links = tool(points)
-        cpu = time.process_time() - start
-    axis, found = curve(nodes, edges), curve(vertices, links)
-    return dict(cpu=cpu, points=len(points)) | score(points, axis, found)
-
-
-def curve(vertices: np.ndarray, edges: np.ndarray) -> Skeleton:
-    """A graph as a skeleton without points."""
-    return Skeleton(vertices, simple_edges(edges), np.full(len(vertices), np.nan), (), (), ())
+    found, cpu = tool.timed(points)
+    return dict(cpu=cpu, points=len(points)) | score(points, skeleton_of(nodes, edges), found)
 
 
 def tables(rows: list[dict]) -> Tables:

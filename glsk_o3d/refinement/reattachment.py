@@ -12,7 +12,7 @@ from ..numerics.polylines import arc_lengths, relative_distance
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
 from .junctions import AXIS_LEAVES, Limbs
-from .merging import drop_edges, merge_vertices
+from .merging import drop_edges, merge_into
 
 # derived: how far from its junction, in radii of the other, a limb's axis passes at least: a tube's width
 REATTACH_FROM = 2.0
@@ -95,6 +95,4 @@ def _reattached(skeleton: Skeleton, chosen: list[_Beside]) -> Skeleton:
         group[beside.inside[1:]] = beside.other[nearest]
     left = drop_edges(skeleton, np.concatenate(gone)).edges
     edges = np.unique(np.concatenate([left, new]), axis=0)
-    stay = np.unique(group)
-    kept = {name: getattr(skeleton, name)[stay] for name in ("vertices", "radii", "confidence")}
-    return replace(merge_vertices(replace(skeleton, edges=edges), group), **kept)
+    return merge_into(replace(skeleton, edges=edges), group)

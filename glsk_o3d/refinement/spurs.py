@@ -12,7 +12,7 @@ from ..numerics.polylines import relative_distance
 from ..report import Judgement
 from ..skeleton import Skeleton
 from .junctions import Limbs
-from .merging import merge_vertices
+from .merging import merge_into
 from .scores import LIMB_WEIGHTS, probability
 
 SPUR_POINTS = 128  # measured: of a branch that are enough to say how far it reaches
@@ -66,10 +66,7 @@ def prune_spurs(skeleton: Skeleton, least: float) -> tuple[Skeleton, list[Judgem
             ends = branch.ends
             group[branch.body] = group[ends] = ends[0]
             vertices[ends[0]] = vertices[ends].mean(axis=0)
-        stay = np.unique(group)
-        # a junction stays what it was
-        kept = {"vertices": vertices[stay], "radii": skeleton.radii[stay], "confidence": skeleton.confidence[stay]}
-        skeleton = replace(merge_vertices(skeleton, group), **kept)
+        skeleton = merge_into(replace(skeleton, vertices=vertices), group)
 
 
 def limb_facts(skeleton: Skeleton) -> Iterator[tuple[int, dict[str, float]]]:
