@@ -25,7 +25,7 @@ from .errors import (
 from .interop.clouds import Cloud
 from .io.annotation import annotate_contraction
 from .io.axes import read_truth
-from .io.scans import read_cloud
+from .io.scans import read_cloud, read_tensor_cloud
 from .io.skeletons import read_skeleton, save_skeleton
 from .lpr_reducer import LPRReducer
 from .meshlab.meshset import MeshSet
@@ -85,6 +85,7 @@ __all__ = [
     "plot_skeleton",
     "read_cloud",
     "read_skeleton",
+    "read_tensor_cloud",
     "read_truth",
     "remove_redundant_points",
     "rerun",

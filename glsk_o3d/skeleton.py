@@ -282,8 +282,15 @@ class Skeleton:
 
         return to_pymeshlab(self)
 
-    def save(self, path: str | PathLike[str], *, cut_loops: bool = False, format: str | None = None) -> None:
+    def save(
+        self,
+        path: str | PathLike[str],
+        *,
+        cut_loops: bool = False,
+        root: str | Root = None,
+        format: str | None = None,
+    ) -> None:
         """Write the skeleton to a file; the ending chooses the format. See `glsk_o3d.save_skeleton`."""
         from .io.skeletons import save_skeleton
 
-        save_skeleton(self, path, cut_loops=cut_loops, format=format)
+        save_skeleton(self, path, cut_loops=cut_loops, root=root, format=format)

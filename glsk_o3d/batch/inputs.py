@@ -6,19 +6,61 @@ import glob
 import os
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
-from ..errors import InvalidParameterError
-from ..io.paths import CLOUD_ENDINGS, MESH_ENDINGS
+from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
+from ..io.paths import SCAN_ENDINGS
+from ..io.scans import read_scan
+from ..io.selection import labels
+from ..io.text_tables import holds_points
 
-INPUT_ENDINGS = CLOUD_ENDINGS + MESH_ENDINGS
+LISTS = (".txt", ".csv")  # what they are, their endings do not say
 RESERVED_STEMS = ("ledger", "recipe")
 """Names of files that a batch itself writes into the output folder."""
 
 
+class Source(NamedTuple):
+    """A cloud: a file, or the points in it for which a condition holds.
+
+    Attributes
+    ----------
+    path : Path
+    where : str
+        Empty for all points.
+    """
+
+    path: Path
+    where: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.path} where {self.where}" if self.where else str(self.path)
+
+
+@dataclass
+class Inputs:
+    """What a batch takes, by the names that the results are to have, and what it leaves out.
+
+    Attributes
+    ----------
+    named : dict of str to Source
+    left_out : dict of str to str
+        Files that were looked at and are not taken, with the reason.
+    """
+
+    named: dict[str, Source] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)
+
+
 def find_inputs(
-    inputs: Iterable[str | os.PathLike], out_dir: str | os.PathLike, *, recursive: bool = False
-) -> dict[str, Path]:
+    inputs: Iterable[str | os.PathLike],
+    out_dir: str | os.PathLike,
+    *,
+    recursive: bool = False,
+    by: str | None = None,
+    where: str | None = None,
+) -> Inputs:
     """The clouds that are meant, by the names that their results are to have.
 
     Parameters
@@ -29,15 +71,19 @@ def find_inputs(
         The output folder. Nothing in it counts as an input, where it lies below a folder or pattern.
     recursive : bool
         Take also the clouds in the sub-folders of folders.
+    by : str, optional
+        Take the points of a file apart by an attribute, such as ``"treeID"``: one source for each of its values.
+    where : str, optional
+        Of values of `by` take only those of points for which this holds.
 
     Returns
     -------
-    dict of str to Path
+    Inputs
         Absolute paths in the order of their names. A name is the path from the folder that was given, from the part
         of a pattern without wildcards, or from the folder of a list (the whole path, where a list names what is not
         below); of a file that was given, its own name. It has no ending and ``/`` between folders; the ending stays
         where names would be equal without it. A file that is meant twice has the first of its names. Whether single
-        files of a list are there shows when they are read.
+        files of a list are there shows when they are read. With `by` a hyphen and the value follow.
 
     Raises
     ------
@@ -48,22 +94,40 @@ def find_inputs(
     """
     out = os.path.abspath(out_dir)
     roots: dict[str, str] = {}
+    found = Inputs()
     for given in inputs:
-        for root, path in _meant(os.fspath(given), out, recursive):
+        for root, path in _meant(os.fspath(given), out, recursive, found.left_out):
             roots.setdefault(path, root)
     if not roots:
         raise InvalidParameterError("there is no input: give a folder, a glob pattern, a list (.txt) or clouds")
-    return _named(roots)
+    for name, path in _named(roots).items():
+        found.named |= {name: Source(path)} if by is None else _apart(name, path, by, where, found.left_out)
+    if not found.named:
+        raise InvalidParameterError(f"by = {by!r}: no input has this attribute; 'glsk info' lists what each has")
+    return found
 
 
-def _meant(given: str, out: str, recursive: bool) -> Iterator[tuple[str, str]]:
+def _apart(name: str, path: Path, by: str, where: str | None, left_out: dict[str, str]) -> dict[str, Source]:
+    """A source for every value of an attribute."""
+    try:
+        scan = read_scan(path, where)
+    except (FileFormatError, InvalidCloudError, OSError):
+        return {name: Source(path)}  # the worker will say what is wrong
+    if by not in scan.attributes:
+        left_out[str(path)] = f"its points have no {by}; they have {', '.join(scan.attributes) or 'only coordinates'}"
+        return {}
+    values = labels(scan, by).tolist()
+    return {f"{name}-{value:.10g}": Source(path, f"{by} == {value!r}") for value in values if value == value}
+
+
+def _meant(given: str, out: str, recursive: bool, left_out: dict[str, str]) -> Iterator[tuple[str, str]]:
     """Absolute paths, each with the folder from which its name counts."""
     absolute = os.path.abspath(given)
     if os.path.isdir(given):
         found = _walk(absolute, recursive)
         none = f"{given}: no cloud in this folder" + " (sub-folders are taken with recursive)" * (not recursive)
-        yield from ((absolute, path) for path in _clouds(found, absolute, out, none))
-    elif os.path.lexists(given) and given.lower().endswith(".txt"):
+        yield from ((absolute, path) for path in _clouds(found, absolute, out, none, left_out))
+    elif os.path.lexists(given) and given.lower().endswith(".txt") and not holds_points(Path(given)):
         here = os.path.dirname(absolute)
         for path in _listed(given):
             yield here if path.startswith(os.path.join(here, "")) else Path(path).anchor, path
@@ -74,7 +138,7 @@ def _meant(given: str, out: str, recursive: bool) -> Iterator[tuple[str, str]]:
         while glob.has_magic(root):
             root = os.path.dirname(root)
         found = map(os.path.abspath, glob.iglob(given, recursive=True))
-        yield from ((root, path) for path in _clouds(found, root, out, f"{given}: no cloud matches"))
+        yield from ((root, path) for path in _clouds(found, root, out, f"{given}: no cloud matches", left_out))
     else:
         raise FileNotFoundError(f"{given}: no such file or folder")
 
@@ -85,21 +149,25 @@ def _walk(folder: str, recursive: bool) -> Iterator[str]:
         yield from (os.path.join(here, name) for name in files if not name.startswith("."))
 
 
-def _clouds(paths: Iterable[str], root: str, out: str, none: str) -> list[str]:
-    """Those with an ending that is read; what a batch wrote is left out."""
+def _clouds(paths: Iterable[str], root: str, out: str, none: str, left_out: dict[str, str]) -> list[str]:
+    """Those with an ending that is read; of the others it is said why not, but not of what a batch wrote."""
     if out == root:
         raise InvalidParameterError(f"{out}: the clouds are in this folder: give the results one of their own")
     inside = out.startswith(os.path.join(root, ""))
-    found = [
-        path
-        for path in paths
-        if path.lower().endswith(INPUT_ENDINGS)
-        and os.path.isfile(path)
-        and not (inside and path.startswith(os.path.join(out, "")))
-    ]
+    files = [path for path in paths if os.path.isfile(path) and not (inside and path.startswith(os.path.join(out, "")))]
+    why = {path: _why_not(path) for path in files}
+    left_out.update({path: reason for path, reason in why.items() if reason})
+    found = [path for path in files if not why[path]]
     if not found:
-        raise FileNotFoundError(f"{none}; known endings are {', '.join(INPUT_ENDINGS)}")
+        raise FileNotFoundError(f"{none}; known endings are {', '.join(SCAN_ENDINGS)}")
     return found
+
+
+def _why_not(path: str) -> str:
+    """Why a file is no cloud, empty if it may be one."""
+    if not path.lower().endswith(SCAN_ENDINGS):
+        return f"no cloud by its ending, {os.path.splitext(path)[1] or 'none'}"
+    return "no cloud by its first lines" if path.lower().endswith(LISTS) and not holds_points(Path(path)) else ""
 
 
 def _listed(path: str) -> list[str]:
@@ -112,7 +180,7 @@ def _listed(path: str) -> list[str]:
         )
         raise FileNotFoundError(
             f"{path}: read as a list of files, a path per line from the working folder, and {what}; "
-            "if it is a point cloud, rename it to .xyz"
+            "it is no point cloud, either: none of its first lines has three numbers"
         )
     return list(map(os.path.abspath, lines))
 

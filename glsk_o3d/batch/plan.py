@@ -7,13 +7,15 @@ import json
 import os
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from ..driver import as_pipeline
 from ..errors import FileFormatError, InvalidParameterError
 from ..interop.packages import require_for
+from ..io.selection import parsed
 from ..io.skeletons import skeleton_ending
 from ..pipeline import Filter, Pipeline
 from ..recipes import to_recipe
@@ -68,6 +70,8 @@ class Plan:
         One per input, in the order of their names.
     ledger : Ledger
         As it is in the folder.
+    left_out : dict of str to str
+        Files in the folders and patterns that are not taken, with the reason.
 
     Examples
     --------
@@ -84,6 +88,7 @@ class Plan:
     parameters: str
     tasks: tuple[Task, ...]
     ledger: Ledger
+    left_out: dict[str, str] = field(default_factory=dict)
 
     @property
     def todo(self) -> list[Task]:
@@ -105,6 +110,8 @@ def plan_batch(
     preview: bool = False,
     cut_loops: bool = False,
     recursive: bool = False,
+    where: str | None = None,
+    by: str | None = None,
     force: bool = False,
 ) -> Plan:
     """Find out what a batch would do. Nothing is written.
@@ -125,6 +132,10 @@ def plan_batch(
         Cut loops open for formats that hold only trees.
     recursive : bool
         Take also the clouds in sub-folders.
+    where : str, optional
+        Take only points for which this holds; see `glsk_o3d.read_cloud`.
+    by : str, optional
+        One skeleton for each value of this attribute of the points, such as ``"treeID"``.
     force : bool
         Do everything anew.
 
@@ -162,28 +173,41 @@ def plan_batch(
         raise InvalidParameterError("there is nothing to write: give a format")
     for ending in endings:
         require_for(ending)
+    if where is not None:
+        parsed(where)
     given = [inputs] if isinstance(inputs, str | os.PathLike) else list(inputs)
     out = Path(os.path.abspath(out_dir))
-    found = find_inputs(given, out, recursive=recursive)
-    sources = {str(path) for path in found.values()}
-    told = {"recipe": recipe, "cut_loops": cut_loops} if cut_loops else recipe
+    inputs_found = find_inputs(given, out, recursive=recursive, by=by, where=where)
+    found = inputs_found.named
+    sources = {text for source in found.values() for text in (str(source), str(source.path))}
+    more = {**({"cut_loops": True} if cut_loops else {}), **({"where": where} if where else {})}
+    told = {"recipe": recipe, **more} if more else recipe
     parameters = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
     ledger, tasks = Ledger(out), []
     results = {name + ending for name in found for ending in endings}
     names = {row["input"]: name for name, row in ledger.rows.items()}
     listed = {output for row in ledger.rows.values() for output in row.get("outputs", ())}
-    for name, path in found.items():
+    for name, source in found.items():
         outputs = tuple(name + ending for ending in endings)
         for output in outputs:
             if str(out / output) in sources:
                 raise InvalidParameterError(f"{out / output}: is an input: give the results another folder")
         row = ledger.rows.get(name, {})
-        before = names.get(str(path), name)  # otherwise its old results would be nobody's
+        before = names.get(str(source), name)  # otherwise its old results would be nobody's
         stale = {each for each in row.get("outputs", ()) if _is_of(name, each)}
         stale |= {each for each in ledger.rows.get(before, {}).get("outputs", ()) if _is_of(before, each)} - results
         foreign = tuple(each for each in outputs if each not in listed and os.path.lexists(out / each))
-        job = Job(name, str(path), str(out), outputs, recipe, cut_loops, tuple(sorted(stale)), foreign)
+        told = " and ".join(f"({part})" for part in (where, source.where) if part)
+        paths = name, str(source.path), str(out), outputs
+        job = Job(*paths, recipe, cut_loops, tuple(sorted(stale)), foreign, str(source), told)
         tasks.append(Task(job, ASKED_FOR if force else _why(job, row, parameters)))
+    compared = _compared(tasks, ledger.rows)
+    _check_results(out, ledger, compared, sources)
+    return Plan(out, recipe, parameters, compared, ledger, inputs_found.left_out)
+
+
+def _check_results(out: Path, ledger: Ledger, tasks: Sequence[Task], sources: set[str]) -> None:
+    """Raise InvalidParameterError where a result would replace what no batch has made, or another input's result."""
     if not ledger.path.exists():
         strange = [each for task in tasks for each in task.job.foreign]
         strange += [each for each in (ledger.table.name, RECIPE_FILE) if os.path.lexists(out / each)]
@@ -192,16 +216,14 @@ def plan_batch(
                 f"{out / strange[0]}: is not the result of a batch, since there is no ledger here: give the results "
                 "another folder, or remove it"
             )
-    compared = _compared(tasks, ledger.rows)
-    for task in compared:
+    for task in tasks:
         row = ledger.rows.get(task.job.name, {})
-        theirs = row.get("input", task.job.path)
+        theirs = row.get("input", task.job.source)
         if task.why != UP_TO_DATE and row.get("outputs") and theirs not in sources and os.path.exists(theirs):
             raise InvalidParameterError(
-                f"{task.job.path}: its results, {task.job.name}, would replace those of {theirs}: give another folder "
-                "for them"
+                f"{task.job.source}: its results, {task.job.name}, would replace those of {theirs}: give another "
+                "folder for them"
             )
-    return Plan(out, recipe, parameters, compared, ledger)
 
 
 def _why(job: Job, row: Row, parameters: str) -> str:
@@ -226,11 +248,13 @@ def _is_of(name: str, output: str) -> bool:
 def _compared(tasks: list[Task], rows: dict[str, Row]) -> tuple[Task, ...]:
     """The tasks, after a look at the inputs that seem done."""
 
+    hashed = lru_cache(maxsize=None)(file_hash)  # of many clouds in one file
+
     def look(task: Task) -> Task:
         if task.why != UP_TO_DATE:
             return task
         try:
-            same = file_hash(task.job.path) == rows[task.job.name].get("input_hash")
+            same = hashed(task.job.path) == rows[task.job.name].get("input_hash")
         except OSError:  # gone, or not to be read: the worker will say so
             same = False
         return task if same else Task(task.job, INPUT_CHANGED)

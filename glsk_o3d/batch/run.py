@@ -171,9 +171,9 @@ def _make_room(plan: Plan) -> None:
     """Mark what is no longer true in the ledger, and make the folders: a worker's own would be where nobody looks."""
     rows = plan.ledger.rows
     for task in plan.tasks:
-        name, path = task.job.name, task.job.path
-        if task.why == UP_TO_DATE and rows[name]["input"] != path:  # the same bytes somewhere else
-            rows[name] = rows.pop(name) | {"input": path}
+        name, source = task.job.name, task.job.source
+        if task.why == UP_TO_DATE and rows[name]["input"] != source:  # the same bytes somewhere else
+            rows[name] = rows.pop(name) | {"input": source}
         elif task.why != UP_TO_DATE and rows.get(name, {}).get("status") == DONE:
             rows[name]["status"] = STALE
     plan.ledger.rewrite()
@@ -191,7 +191,7 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
         running[workers.submit(work, task.job)] = task
 
     def enter(task, row):
-        row = {"parameters": plan.parameters} | row | {"name": task.job.name, "input": task.job.path}
+        row = {"parameters": plan.parameters} | row | {"name": task.job.name, "input": task.job.source}
         row = {name: row[name] for name in LEDGER_COLUMNS if name in row}
         plan.ledger.add(row)
         if on_result is not None:

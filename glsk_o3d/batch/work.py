@@ -47,6 +47,10 @@ class Job:
         Outputs of an earlier batch, from `out_dir`, which are no longer true.
     foreign : tuple of str
         Outputs that were there before, and of which no ledger knows whose they are: replaced perhaps, never removed.
+    source : str
+        What the ledger calls the cloud: its path, and which of its points are meant if it is one of many in a file.
+    where : str
+        The points to take; empty for all.
     """
 
     name: str
@@ -57,6 +61,8 @@ class Job:
     cut_loops: bool = False
     stale: tuple[str, ...] = ()
     foreign: tuple[str, ...] = ()
+    source: str = ""
+    where: str = ""
 
 
 def work(job: Job) -> Row:
@@ -99,7 +105,7 @@ def clear(job: Job, written: Iterable[str] = ()) -> None:
 
 def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
 
-    skeleton = from_recipe(job.recipe)(read_cloud(job.path))
+    skeleton = from_recipe(job.recipe)(read_cloud(job.path, where=job.where or None))
     messages += skeleton.report.warnings
     facts = summary(skeleton, 0.0).items()
     row |= {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in facts}

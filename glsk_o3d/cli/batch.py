@@ -9,11 +9,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json, print_rows, progress, say
-from .options import CutLoops, DropInvalid, Json, PipelineName, Quiet, Recipe, Settings, Verbose
+from .options import (
+    SKELETON_ENDINGS,
+    CutLoops,
+    DropInvalid,
+    Json,
+    PipelineName,
+    Quiet,
+    Recipe,
+    Settings,
+    Verbose,
+    Where,
+)
 from .reporting import WrongUsage, reporting, said_here
 
 if TYPE_CHECKING:
     from ..batch import Plan
+
+SHOWN_NAMES = 5  # fitted: that fit on a line
 
 
 def batch(
@@ -30,9 +43,7 @@ def batch(
     ],
     formats: Annotated[
         str,
-        typer.Option(
-            "--format", metavar="NAMES", help="With commas: ply, obj, json, npz, swc, graphml, cgal, polylines.txt."
-        ),
+        typer.Option("--format", metavar="NAMES", help=f"With commas: {', '.join(SKELETON_ENDINGS)}."),
     ] = "ply",
     preview: Annotated[bool, typer.Option("--preview", help="Also draw each cloud with its skeleton (png).")] = False,
     recursive: Annotated[bool, typer.Option("--recursive", "-r", help="Take also the sub-folders of folders.")] = False,
@@ -53,6 +64,11 @@ def batch(
             help="Work on a Dask cluster: tcp://host:port, or the file that its scheduler wrote. Its workers need the "
             "same files by the same paths.",
         ),
+    ] = None,
+    where: Where = None,
+    by: Annotated[
+        str | None,
+        typer.Option("--by", metavar="ATTRIBUTE", help="One skeleton for each value of it, such as treeID."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Do also what is done already.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be done, and why.")] = False,
@@ -80,6 +96,8 @@ def batch(
             preview=preview,
             cut_loops=cut_loops,
             recursive=recursive,
+            where=where,
+            by=by,
             force=force,
         )
         if dry_run:
@@ -108,7 +126,7 @@ def batch(
                 for row in result.rows.values()
                 if row["status"] == "failed"
             ]
-            print_json({**told, "failures": failures})
+            print_json({**told, "failures": failures, "left_out": watch.left_out})
         elif not quiet:
             print_rows(told)
         if result.failed:
@@ -122,9 +140,12 @@ class _Watch:
     def __init__(self, update, quiet: bool, verbose: bool):
         self._update, self._quiet, self._verbose = update, quiet, verbose
         self._done = self._failed = self._total = 0
+        self.left_out: dict[str, str] = {}
 
     def begin(self, plan: Plan) -> None:
-        self._start, self._total = time.perf_counter(), len(plan.todo)
+        self._start, self._total, self.left_out = time.perf_counter(), len(plan.todo), plan.left_out
+        if not self._quiet:
+            tell_left_out(plan.left_out)
         self._update("starting", 0, self._total)
 
     def step(self, row: dict[str, Any]) -> None:
@@ -140,9 +161,26 @@ class _Watch:
 
 def _print_plan(plan: Plan, as_json: bool, quiet: bool) -> None:
     if as_json:
-        tasks = [{"input": task.job.path, "why": task.why, "outputs": task.job.outputs} for task in plan.tasks]
-        print_json({"todo": len(plan.todo), "skipped": plan.skipped, "output": str(plan.out_dir), "tasks": tasks})
+        tasks = [{"input": task.job.source, "why": task.why, "outputs": task.job.outputs} for task in plan.tasks]
+        print_json(
+            {
+                "todo": len(plan.todo),
+                "skipped": plan.skipped,
+                "output": str(plan.out_dir),
+                "tasks": tasks,
+                "left_out": plan.left_out,
+            }
+        )
     elif not quiet:
         for task in plan.todo:
-            typer.echo(f"{task.job.path} ({task.why}) -> {', '.join(task.job.outputs)}")
+            typer.echo(f"{task.job.source} ({task.why}) -> {', '.join(task.job.outputs)}")
         typer.echo(f"{len(plan.todo)} to do, {plan.skipped} to skip")
+        tell_left_out(plan.left_out)
+
+
+def tell_left_out(left_out: dict[str, str]) -> None:
+    """Say which files are not taken, and why: the reason once, with the names of the first files."""
+    for reason in dict.fromkeys(left_out.values()):
+        files = [Path(path).name for path, why in left_out.items() if why == reason]
+        named = ", ".join(sorted(files)[:SHOWN_NAMES]) + ", ..." * (len(files) > SHOWN_NAMES)
+        say("info", f"left out {len(files)}: {reason} ({named})")

@@ -1,25 +1,34 @@
-"""``glsk info``: what is in a file."""
+"""``glsk info``: what is in a file, and which files can be read."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .console import print_iterations, print_json, print_rows
-from .options import Json, Quiet, Verbose
+from .options import Json, Quiet, Verbose, Where
 from .reporting import holding_interrupts, reporting
 
 if TYPE_CHECKING:
+    from ..io.scanned import Scan
     from ..skeleton import Skeleton
+
+FEW_VALUES = 12  # fitted: that an attribute may have for all of them to be listed
+EXTENT_DIGITS = 6  # fitted: of coordinates, counted from the size of the cloud and not from the origin
 
 
 def info(
     file: Annotated[
-        Path,
-        typer.Argument(metavar="FILE", help="A cloud, a mesh or a skeleton, in any format that is read or written."),
-    ],
+        Path | None,
+        typer.Argument(
+            metavar="[FILE]",
+            help="A cloud, a mesh or a skeleton. Without one: the formats that are read and written.",
+        ),
+    ] = None,
+    where: Where = None,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -29,34 +38,60 @@ def info(
         from ..io.scans import read_scan
         from ..io.skeletons import holds_skeleton, read_skeleton
 
+        if file is None:
+            _formats(as_json)
+            return
         if holds_skeleton(file):
             skeleton = read_skeleton(file)
             told = skeleton_facts(skeleton)
             records = skeleton.report.iterations
         else:
             with holding_interrupts():
-                cloud, triangles = read_scan(file)
-            told, records = cloud_facts(cloud, len(triangles)), ()
+                scan = read_scan(file, where)
+            told, records = cloud_facts(scan), ()
         if as_json:
             iterations = {"iterations": skeleton.report.to_dict()["iterations"]} if records else {}
             print_json({"file": str(file), **told, **iterations})
             return
         if quiet:
             return
-        print_rows({name: _words(value) for name, value in told.items()}, title=str(file))
+        print_rows({name: _words(value, name) for name, value in _in_words(told).items()}, title=str(file))
         if records:
             print_iterations(records)
 
 
-def cloud_facts(cloud: Any, triangles: int = 0) -> dict[str, Any]:
-    """What there is to know about a cloud, or the vertices of so many triangles, before skeletonising it.
+def _formats(as_json: bool) -> None:
+    """Print the endings that are read and written, and what is missing for some."""
+    from ..errors import MissingPackageError
+    from ..interop.packages import require_for
+    from ..io.paths import CLOUD_ENDINGS, MESH_ENDINGS
+    from ..io.skeletons import FORMATS, READABLE
+
+    kinds = {"clouds": CLOUD_ENDINGS, "meshes": MESH_ENDINGS, "skeletons": READABLE}
+    lacking = {}
+    for ending in (ending for endings in kinds.values() for ending in endings):
+        try:
+            require_for(ending)
+        except MissingPackageError as error:
+            lacking[ending] = str(error)
+    written = [ending for ending in FORMATS if ending not in READABLE]
+    if as_json:
+        print_json({**kinds, "only_written": written, "lacking": lacking})
+        return
+    rows: dict[str, Any] = {f"{kind} read": " ".join(endings) for kind, endings in kinds.items()}
+    rows |= {"only written": " ".join(written), "lacking": "\n".join(map(": ".join, lacking.items())) or None}
+    print_rows(rows)
+
+
+def cloud_facts(scan: Scan) -> dict[str, Any]:
+    """What there is to know about a cloud, or the vertices of a mesh, before skeletonising it.
 
     Lengths are in the cloud's units; the spacing is the median distance of a point to the nearest other one.
     """
     import numpy as np
     from scipy.spatial import KDTree
 
-    points = np.asarray(cloud.points)
+    points = scan.positions
     finite = points[np.isfinite(points).all(axis=1)]
     distinct = np.unique(finite, axis=0)
     low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (np.full(3, np.nan),) * 2
@@ -66,16 +101,31 @@ def cloud_facts(cloud: Any, triangles: int = 0) -> dict[str, Any]:
     return {
         "kind": "cloud",
         "points": len(points),
-        "triangles": triangles or None,
+        "triangles": len(scan.triangles) or None,
         "not_finite": len(points) - len(finite),
         "duplicates": len(finite) - len(distinct),
         "lowest": low.tolist(),
         "highest": high.tolist(),
         "diagonal": float(np.linalg.norm(high - low)),
         "median_spacing": float(spacing),
-        "colours": cloud.has_colors(),
-        "normals": cloud.has_normals(),
+        "colours": scan.colors is not None,
+        "normals": scan.normals is not None,
+        "attributes": {name: _attribute(values) for name, values in scan.attributes.items()} or None,
     }
+
+
+def _attribute(values: Any) -> dict[str, Any]:
+    """The range of an attribute, and how many points have each of its values if these are few."""
+    import numpy as np
+
+    known = values[np.isfinite(values)] if values.dtype.kind == "f" else values
+    distinct, counts = np.unique(known, return_counts=True)
+    told: dict[str, Any] = {"distinct": len(distinct)}
+    if len(distinct):
+        told |= {"lowest": distinct[0].item(), "highest": distinct[-1].item()}
+    if len(distinct) <= FEW_VALUES:
+        told["counts"] = {f"{value:.10g}": n for value, n in zip(distinct.tolist(), counts.tolist(), strict=True)}
+    return told
 
 
 def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
@@ -117,10 +167,30 @@ def _repeatable(recipe) -> bool:
         return False
 
 
-def _words(value):
+def _in_words(told: dict[str, Any]) -> dict[str, Any]:
+    """Facts as the table shows them: coordinates with as many digits as the size of the cloud asks for."""
+    told = dict(told)
+    if told["kind"] == "cloud":
+        diagonal = told["diagonal"]
+        fine = math.isfinite(diagonal) and diagonal > 0
+        decimals = max(EXTENT_DIGITS - math.ceil(math.log10(diagonal)), 0) if fine else EXTENT_DIGITS
+        for name in ("lowest", "highest"):
+            told[name] = "  ".join(f"{item:.{decimals}f}" for item in told[name])
+        told["attributes"] = {name: _range(facts) for name, facts in (told["attributes"] or {}).items()} or None
+    return told
+
+
+def _range(facts: dict[str, Any]) -> str:
+    if "counts" in facts:
+        return ", ".join(f"{value} ({n} points)" for value, n in facts["counts"].items()) or "unknown"
+    return f"{facts['lowest']:.10g} to {facts['highest']:.10g}, {facts['distinct']} values"
+
+
+def _words(value: Any, name: str) -> Any:
     """A value as the table shows it."""
     if isinstance(value, dict):
-        return ", ".join(f"{name} {text}" for name, text in value.items())
+        apart = "\n" if name == "attributes" else ", "
+        return apart.join(f"{name} {text}" for name, text in value.items())
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list):

@@ -9,14 +9,24 @@ import typer
 
 from .reporting import WrongUsage
 
+SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "graphml", "cgal", "polylines.txt", "vtp", "dxf", "glb"]
+"""Endings of skeletons; written out, since the table of formats is slow to import."""
+
+Where = Annotated[
+    str | None,
+    typer.Option(
+        "--where",
+        metavar="CONDITION",
+        help="Take only points for which this holds, such as 'classification == 5'; 'glsk info' lists what a file has.",
+    ),
+]
 Output = Annotated[
     list[Path] | None,
     typer.Option(
         "--output",
         "-o",
         metavar="FILE",
-        help="Where to write the skeleton: ply, obj, json, npz, swc, graphml, cgal or polylines.txt, by the ending; "
-        "may be repeated.",
+        help=f"Where to write the skeleton: {', '.join(SKELETON_ENDINGS)}, by the ending; may be repeated.",
     ),
 ]
 Preview = Annotated[Path | None, typer.Option("--preview", metavar="PNG", help="Also draw cloud and skeleton.")]
@@ -26,7 +36,9 @@ ReportPage = Annotated[
         "--report", metavar="HTML", help="Also write a page to look at: turn, zoom, watch the contraction, read."
     ),
 ]
-CutLoops = Annotated[bool, typer.Option("--cut-loops", help="Cut loops open for formats that hold only trees (swc).")]
+CutLoops = Annotated[
+    bool, typer.Option("--cut-loops", help="Cut loops open for formats that hold only trees (swc, glb).")
+]
 PipelineName = Annotated[
     str,
     typer.Option(

@@ -21,6 +21,7 @@ from .options import (
     ReportPage,
     Settings,
     Verbose,
+    Where,
 )
 from .reporting import holding_interrupts, reporting
 
@@ -29,7 +30,8 @@ def skeletonize(
     scan: Annotated[
         Path,
         typer.Argument(
-            metavar="SCAN", help="The cloud: ply, pcd, xyz, xyzn, xyzrgb, pts; or a mesh: off, obj, stl, gltf, glb."
+            metavar="SCAN",
+            help="The cloud: ply, pcd, csv, txt, asc, xyz, pts, las, laz, e57; or a mesh: off, obj, stl, gltf, glb.",
         ),
     ],
     output: Output = None,
@@ -38,6 +40,7 @@ def skeletonize(
     pipeline: PipelineName = "default",
     recipe: Recipe = None,
     settings: Settings = None,
+    where: Where = None,
     save_recipe: Annotated[
         Path | None,
         typer.Option("--save-recipe", metavar="FILE", help="Also write the pipeline as run to a json or toml file."),
@@ -74,7 +77,7 @@ def skeletonize(
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")
             with holding_interrupts():
-                cloud = read_cloud(scan)
+                cloud = read_cloud(scan, where=where)
             skeleton, seconds = run(chosen, cloud, update, recorder)
             written, problems = write(
                 skeleton,

@@ -27,7 +27,13 @@ _DEBIAN = {  # shared library -> Debian package, where the one does not follow f
     "libc++": "libc++1",
     "libc++abi": "libc++abi1",
 }
-_WRITERS = {".html": "matplotlib", ".png": "matplotlib"}
+_NEEDED = {  # ending of a file -> modules that read or write it
+    ".html": ("matplotlib",),
+    ".png": ("matplotlib",),
+    ".las": ("laspy",),
+    ".laz": ("laspy", "lazrs"),
+    ".e57": ("pye57",),
+}
 
 
 def require(package: str, install: str | None = None) -> Any:
@@ -66,9 +72,9 @@ def require(package: str, install: str | None = None) -> Any:
 
 
 def require_for(ending: str) -> None:
-    """MissingPackageError if files with an ending are written by a package that is not installed."""
-    if ending.lower() in _WRITERS:
-        require(_WRITERS[ending.lower()])
+    """MissingPackageError if files with an ending are read or written by a package that is not installed."""
+    for package in _NEEDED.get(ending.lower(), ()):
+        require(package)
 
 
 def _asked_for(package: str) -> tuple[str, str]:

@@ -8,10 +8,13 @@ from pathlib import Path
 
 from ..errors import FileFormatError
 
-CLOUD_ENDINGS = (".ply", ".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts")
+TEXT_ENDINGS = (".xyz", ".xyzn", ".xyzrgb", ".pts", ".csv", ".txt", ".asc")
+"""Clouds as text."""
+CLOUD_ENDINGS = (".ply", ".pcd", *TEXT_ENDINGS, ".las", ".laz", ".e57")
 """Files that `read_cloud` reads as clouds."""
 MESH_ENDINGS = (".off", ".obj", ".stl", ".gltf", ".glb")
 """Files that `read_cloud` reads as meshes, to take their vertices."""
+SCAN_ENDINGS = CLOUD_ENDINGS + MESH_ENDINGS
 
 
 def existing_file(path: str | os.PathLike) -> Path:

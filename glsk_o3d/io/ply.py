@@ -1,6 +1,7 @@
-"""PLY: keeps vertices and edges to the last bit, and the radii as the property ``radius``; loses all else.
+"""PLY: keeps vertices and edges to the last bit, and the radii as ``radius`` and ``quality``; loses all else.
 
-Open3D's ``read_line_set`` and MeshLab open it. Scans are PLY files, too: a skeleton is one that has edges.
+Open3D's ``read_line_set`` and MeshLab open it; by quality MeshLab colours. Scans are PLY files, too: a skeleton is one
+that has edges.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ def holds_lines(stream: BinaryIO) -> bool:
 
 def write(skeleton: Skeleton) -> bytes:
     """The content of a PLY file."""
-    vertices = np.column_stack([skeleton.vertices, skeleton.radii]).astype("<f8")
+    vertices = np.column_stack([skeleton.vertices, skeleton.radii, skeleton.radii]).astype("<f8")
     header = f"""ply
 format binary_little_endian 1.0
 comment curve skeleton written by glsk-o3d
@@ -108,6 +109,7 @@ property double x
 property double y
 property double z
 property double radius
+property double quality
 element edge {len(skeleton.edges)}
 property int vertex1
 property int vertex2

@@ -9,39 +9,49 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError
+from ..errors import FileFormatError, MissingPackageError
 from ..interop.packages import import_open3d
 from ..interop.verbosity import following_open3d
+from . import e57, las, text_tables
 from .completeness import check_complete
-from .paths import CLOUD_ENDINGS, MESH_ENDINGS, existing_file, unknown_ending
+from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unknown_ending
 from .ply import ply_elements
+from .scanned import NO_TRIANGLES, NoPoints, Scan, attribute_name, unit_colors
+from .selection import select
 from .skeletons import holds_skeleton, read_skeleton
 
 _log = logging.getLogger(__name__)
 
 
-def read_cloud(path: str | os.PathLike) -> Any:
-    """Read a point cloud, or the vertices of a mesh, with Open3D.
+def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
+    """Read a point cloud, or the vertices of a mesh.
 
     Open3D returns an empty cloud for a file that it cannot read and uninitialised points for one that breaks off; here
-    both are errors.
+    both are errors. All coordinates keep their full digits.
 
     Parameters
     ----------
     path : path-like
-        PLY, PCD, XYZ, XYZN, XYZRGB or PTS (with the line that says how many points follow); or a mesh with triangles as
-        OFF, OBJ, STL, glTF or GLB. In the XYZ family, lines that hold no point are skipped and logged.
+        PLY, PCD, CSV, TXT, ASC, XYZ, XYZN, XYZRGB, PTS; LAS and LAZ (extra ``las``), E57 (extra ``e57``); or a mesh
+        with triangles as OFF, OBJ, STL, glTF or GLB. In text, lines that hold no point are skipped and logged.
+    where : str, optional
+        Only points for which this holds, such as ``"classification == 5"``; see `glsk_o3d.io.selection.select`.
 
     Returns
     -------
     open3d.geometry.PointCloud
-        With the normals and colours that the file has. STL repeats a vertex for every triangle around it.
+        With the normals and colours that the file has; for all else that it says of its points see
+        `read_tensor_cloud`. STL repeats a vertex for every triangle around it.
 
     Raises
     ------
     FileNotFoundError
     FileFormatError
         A folder, a skeleton, an unknown ending, or a file that is empty, damaged, broken off, or without points.
+    InvalidParameterError
+        `where` is no condition, or names what the points do not have.
+    InvalidCloudError
+        It holds for no point.
     MissingPackageError
 
     Notes
@@ -53,39 +63,69 @@ def read_cloud(path: str | os.PathLike) -> Any:
     --------
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
-    ...     path = Path(folder, "scan.xyz")
-    ...     _ = path.write_text("0 0 0\\n0 0 1\\n0 1 1\\n")
-    ...     len(read_cloud(path).points)
-    3
+    ...     path = Path(folder, "scan.csv")
+    ...     _ = path.write_text("x,y,z,label\\n0,0,0,1\\n0,0,1,2\\n0,1,1,2\\n")
+    ...     len(read_cloud(path).points), len(read_cloud(path, where="label == 2").points)
+    (3, 2)
     """
-    cloud, _ = read_scan(path)
-    return cloud
+    return read_scan(path, where).to_legacy()
 
 
-def read_scan(path: str | os.PathLike) -> tuple[Any, np.ndarray]:
-    """Read a cloud as `read_cloud` does, and the triangles between its points, (T, 3) int array, if it is a mesh."""
+def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
+    """Read a cloud as `read_cloud` does, with everything that the file says of its points.
+
+    Parameters
+    ----------
+    path : path-like
+    where : str, optional
+        As for `read_cloud`.
+
+    Returns
+    -------
+    open3d.t.geometry.PointCloud
+        Positions are float64. Attributes have the names of the file, such as ``intensity`` and ``classification``;
+        what cannot stand in an expression is an underscore. `Skeleton.annotate` keeps them.
+
+    Raises
+    ------
+    FileNotFoundError
+    FileFormatError
+    InvalidParameterError
+    InvalidCloudError
+    MissingPackageError
+        As from `read_cloud`.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder, "scan.csv")
+    ...     _ = path.write_text("x,y,z,label\\n0,0,0,1\\n0,0,1,2\\n0,1,1,2\\n")
+    ...     read_tensor_cloud(path).point.label.flatten().numpy()
+    array([1, 2, 2], dtype=int32)
+    """
+    return read_scan(path, where).to_tensor()
+
+
+def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
+    """Read all that `read_tensor_cloud` does, and the triangles between the points of a mesh if all are taken."""
     path = check_scan(path)
     ending = path.suffix.lower()
-    if _is_skeleton(path):
+    if holds_skeleton(path) if ending in SCAN_ENDINGS else _is_skeleton(path):
         raise FileFormatError(f"{path}: is a skeleton, not a scan")
-    if ending not in CLOUD_ENDINGS + MESH_ENDINGS:
-        raise unknown_ending(path, CLOUD_ENDINGS + MESH_ENDINGS)
-    lines = _count_lines(path) if ending.startswith(".xyz") else 0
-    cloud, mesh = _read_with_open3d(path, ending)
-    if not cloud.has_points():
+    if ending not in SCAN_ENDINGS:
+        raise unknown_ending(path, SCAN_ENDINGS)
+    scan = _read(path, ending)
+    if len(scan) == 0:
         raise FileFormatError(f"{path}: no points could be read: it is damaged, empty, or not a {ending} file")
-    if lines > len(cloud.points):
-        with following_open3d():
-            _log.warning("%s: %d of %d lines hold no point and were skipped", path, lines - len(cloud.points), lines)
-    triangles = np.asarray(mesh.triangles)
-    if _coarse(np.asarray(mesh.vertices), triangles):
+    if _coarse(scan.positions, scan.triangles):
         with following_open3d():
             _log.warning(
                 "%s: the %d vertices of this mesh are far apart, and only vertices count as points: sample its surface "
                 "first, for example with Open3D's sample_points_uniformly",
-                *(path, len(cloud.points)),
+                *(path, len(scan)),
             )
-    return cloud, triangles
+    return scan if where is None else select(scan, where)
 
 
 def check_scan(path: str | os.PathLike) -> Path:
@@ -99,9 +139,7 @@ def check_scan(path: str | os.PathLike) -> Path:
 
 
 def _is_skeleton(path: Path) -> bool:
-    """Whether a file is a skeleton: for endings that scans do not have, whether it can be read as one."""
-    if path.suffix.lower() in CLOUD_ENDINGS + MESH_ENDINGS:
-        return holds_skeleton(path)
+    """Whether a file with an ending that scans do not have can be read as a skeleton."""
     try:
         read_skeleton(path)
     except FileFormatError:
@@ -109,27 +147,46 @@ def _is_skeleton(path: Path) -> bool:
     return True
 
 
-def _count_lines(path: Path) -> int:
-    """The lines of a text file that are neither empty nor comments."""
-    with path.open("rb") as stream:
-        return sum(1 for line in stream if line.strip() and not line.lstrip().startswith(b"#"))
-
-
-def _read_with_open3d(path: Path, ending: str) -> tuple[Any, Any]:
-    """The points that a file holds as a cloud, and its mesh, empty if it has no triangles."""
-    o3d = import_open3d()
+def _read(path: Path, ending: str) -> Scan:
+    """The points of a file, none if it has none; FileFormatError where it is damaged."""
     try:
-        with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-            mesh = o3d.geometry.TriangleMesh()
-            if ending in MESH_ENDINGS or (ending == ".ply" and "face" in ply_elements(path)):
-                mesh = o3d.io.read_triangle_mesh(str(path))
-            if ending in CLOUD_ENDINGS and not mesh.has_triangles():
-                return o3d.io.read_point_cloud(str(path), format=ending[1:]), mesh
-            cloud = o3d.geometry.PointCloud(mesh.vertices)
-            cloud.normals, cloud.colors = mesh.vertex_normals, mesh.vertex_colors
-            return cloud, mesh
-    except Exception as error:  # std::bad_alloc, undecodable text
-        raise FileFormatError(f"{path}: Open3D cannot read it: {error}") from error
+        if ending in _CLOUD_READERS:
+            return _CLOUD_READERS[ending](path)
+        return _read_mesh(path) if ending in MESH_ENDINGS else _read_with_open3d(path, ending)
+    except MissingPackageError:
+        raise
+    except NoPoints as error:
+        raise FileFormatError(f"{path}: no points could be read: {error}") from None
+    except Exception as error:  # whatever a parser raises on a hostile file, std::bad_alloc
+        raise FileFormatError(f"{path}: not a valid {ending} cloud: {error}") from error
+
+
+def _read_with_open3d(path: Path, ending: str) -> Scan:
+    """A PLY or PCD file, by Open3D's tensor reader: its other one knows no attributes, and garbles doubles in PCD."""
+    o3d = import_open3d()
+    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+        point = o3d.t.io.read_point_cloud(str(path), format=ending[1:]).point
+    known = {name: point[name].numpy() for name in point}
+    positions = np.ascontiguousarray(known.pop("positions", np.empty((0, 3))), float)
+    colors, normals = known.pop("colors", None), known.pop("normals", None)
+    attributes: dict[str, np.ndarray] = {}
+    for name, values in known.items():
+        if values.shape[1:] == (1,):
+            attributes[attribute_name(name, attributes)] = values[:, 0]
+    triangles = _read_mesh(path).triangles if ending == ".ply" and "face" in ply_elements(path) else NO_TRIANGLES
+    return Scan(positions, None if colors is None else unit_colors(colors), normals, attributes, triangles)
+
+
+def _read_mesh(path: Path) -> Scan:
+    o3d = import_open3d()
+    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+        mesh = o3d.io.read_triangle_mesh(str(path))
+    colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
+    normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
+    return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))
+
+
+_CLOUD_READERS = {**dict.fromkeys(TEXT_ENDINGS, text_tables.read), ".las": las.read, ".laz": las.read, ".e57": e57.read}
 
 
 def _coarse(vertices: np.ndarray, triangles: np.ndarray) -> bool:

@@ -1,47 +1,69 @@
 """Skeletons to files and back: the table of formats.
 
-A format is a module with ``write(skeleton) -> bytes``, ``read(data: bytes) -> Skeleton`` and a line in `FORMATS`.
+A format is a module with ``write(skeleton) -> bytes``, perhaps ``read(data: bytes) -> Skeleton``, and a line in
+`FORMATS`.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple
 
 from ..errors import FileFormatError, MissingPackageError
 from ..interop.atomic import write_atomically
+from ..refinement.rooted import Where
 from ..skeleton import Skeleton
-from . import graphml, json, npz, obj, ply, polylines, swc
+from . import dxf, gltf, graphml, json, npz, obj, ply, polylines, swc, vtp
+from .forests import as_forest
 from .graphs import NoEdges
-from .paths import CLOUD_ENDINGS, MESH_ENDINGS, existing_file, unknown_ending
+from .paths import SCAN_ENDINGS, existing_file, unknown_ending
 
 
-class Format(Protocol):
-    """What `FORMATS` holds: a module that writes skeletons as bytes and reads them."""
+class Format(NamedTuple):
+    """How skeletons are written to a kind of file, and read from it.
 
-    def write(self, skeleton: Skeleton) -> bytes:
-        """The content of a file."""
+    Attributes
+    ----------
+    write : callable
+        The content of a file, as bytes.
+    read : callable, optional
+        The skeleton in the content of a file; any error means that it is damaged. None for what is only written.
+    trees : bool
+        It holds trees only: `write` gets what `glsk_o3d.io.forests.as_forest` makes.
+    """
 
-    def read(self, data: bytes) -> Skeleton:
-        """The skeleton in the content of a file; any error means that it is damaged."""
+    write: Callable[[Skeleton], bytes]
+    read: Callable[[bytes], Skeleton] | None = None
+    trees: bool = False
 
 
 FORMATS: dict[str, Format] = {
-    ".ply": ply,
-    ".obj": obj,
-    ".json": json,
-    ".npz": npz,
-    ".swc": swc,
-    ".graphml": graphml,
-    ".cgal": polylines,
-    ".polylines.txt": polylines,
+    ".ply": Format(ply.write, ply.read),
+    ".obj": Format(obj.write, obj.read),
+    ".json": Format(json.write, json.read),
+    ".npz": Format(npz.write, npz.read),
+    ".swc": Format(swc.write, swc.read, trees=True),
+    ".graphml": Format(graphml.write, graphml.read),
+    ".cgal": Format(polylines.write, polylines.read),
+    ".polylines.txt": Format(polylines.write, polylines.read),
+    ".vtp": Format(vtp.write),
+    ".dxf": Format(dxf.write),
+    ".glb": Format(gltf.write, trees=True),
 }
 """The formats of skeletons by the ending of the file."""
+READABLE = tuple(ending for ending, format in FORMATS.items() if format.read is not None)
+"""Endings of files that `read_skeleton` reads."""
 
 
 def save_skeleton(
-    skeleton: Skeleton, path: str | os.PathLike, *, cut_loops: bool = False, format: str | None = None
+    skeleton: Skeleton,
+    path: str | os.PathLike,
+    *,
+    cut_loops: bool = False,
+    root: Where | None = None,
+    format: str | None = None,
 ) -> None:
     """Write a skeleton to a file; the ending chooses the format.
 
@@ -49,29 +71,39 @@ def save_skeleton(
     ending                holds                                           opens in
     ===================== =============================================== =======================================
     .json, .npz           everything, to the last bit                     `read_skeleton`
-    .ply                  vertices, edges, the property ``radius``        Open3D (``read_line_set``), MeshLab
+    .ply                  vertices, edges, radii                          Open3D (``read_line_set``), MeshLab
     .obj                  vertices, edges as ``l`` lines; no radii        MeshLab, Blender, CloudCompare
-    .swc                  trees only, with radii; vertices renumbered     neuron and plant tools
+    .swc                  trees, with radii                               neuron and plant tools
     .graphml              x, y, z, radius of nodes, length of edges       networkx, Gephi, Cytoscape
     .cgal, .polylines.txt a line per branch: count, x y z, ...; no radii  CGAL
+    .vtp                  vertices, branches, radii, confidence           ParaView, Slicer, vmtk
+    .dxf                  branches as 3D polylines; no radii              CAD, CloudCompare, GIS
+    .glb                  trees, as an armature with a skin of tubes      Blender
     ===================== =============================================== =======================================
 
-    Numbers keep their full precision. The file appears complete or not at all; on an error an existing file stays as
-    it was. Open3D's ``read_line_set`` gives an empty line set for a PLY file without edges.
+    Those after CGAL's are only written, not read. Numbers keep their full precision, but in glTF, which has float32.
+    The file appears complete or not at all; on an error an existing file stays as it was. Open3D's ``read_line_set``
+    gives an empty line set for a PLY file without edges.
 
     Parameters
     ----------
     skeleton : Skeleton
     path : path-like
     cut_loops : bool
-        For SWC: drop one edge per loop, keeping the spanning forest of least length, instead of refusing.
+        For formats that hold only trees: drop one edge per loop, keeping the spanning forest of least length, instead
+        of refusing.
+    root : str, int or (x, y, z), optional
+        For the same formats: where the tree grows from, as for `glsk_o3d.editing.reroot`; the vertices are numbered
+        from there. By default that of `Skeleton.branch_table`.
     format : str, optional
         The ending of another format than that of `path`, with or without its dot.
 
     Raises
     ------
     FileFormatError
-        The ending is unknown, or the skeleton has loops and the format is SWC.
+        The ending is unknown, or the skeleton has loops, or lacks what the format needs.
+    InvalidParameterError
+        There is no such root.
     FileNotFoundError
         The folder does not exist.
     OSError
@@ -90,7 +122,7 @@ def save_skeleton(
     """
     path = Path(path)
     chosen = FORMATS[skeleton_ending(path, format)]
-    data = swc.write(skeleton, cut_loops) if chosen is swc else chosen.write(skeleton)
+    data = chosen.write(as_forest(skeleton, cut_loops, root) if chosen.trees else skeleton)
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
 
 
@@ -130,9 +162,12 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     """
     path = existing_file(path)
     ending = skeleton_ending(path, format)
+    read = FORMATS[ending].read
+    if read is None:
+        raise FileFormatError(f"{path}: {ending} is only written; read are {', '.join(READABLE)}")
     data = path.read_bytes()
     try:
-        return FORMATS[ending].read(data)
+        return read(data)
     except MissingPackageError:
         raise
     except NoEdges:
@@ -147,14 +182,17 @@ def holds_skeleton(path: str | os.PathLike) -> bool:
     False also for what does not exist or is unknown: reading it as a cloud says so.
     """
     path = Path(path)
-    ending = path.suffix.lower()
-    if not path.is_file() or ending not in _HOLDS_LINES:
-        return path.is_file() and ending not in CLOUD_ENDINGS + MESH_ENDINGS
+    name = path.name.lower()
+    if not path.is_file() or (name.endswith(SCAN_ENDINGS) and not name.endswith((*_HOLDS_LINES, *_OWN))):
+        return False
+    if not name.endswith(tuple(_HOLDS_LINES)):
+        return True
     with path.open("rb") as stream:
-        return _HOLDS_LINES[ending](stream)
+        return _HOLDS_LINES[path.suffix.lower()](stream)
 
 
 _HOLDS_LINES = {".ply": ply.holds_lines, ".obj": obj.holds_lines}  # formats that scans have, too
+_OWN = tuple(ending for ending in FORMATS if ending.count(".") == 2)
 
 
 def skeleton_ending(path: Path, format: str | None = None) -> str:

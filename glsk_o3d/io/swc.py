@@ -1,40 +1,38 @@
-"""SWC: keeps vertices, edges and radii of trees, renumbered from the root outwards; holds no loops, loses all else.
+"""SWC: keeps vertices, edges and radii of trees, numbered from the root outwards; holds no loops, loses all else.
 
-Tools for neurons and plants open it.
+Tools for neurons and plants open it; many compute in float32. Where that would lose digits, as in coordinates of a map,
+a shift of whole units is taken off and noted in the header, ``# global_shift: x y z``; reading adds it again.
 """
 
 from __future__ import annotations
 
+import logging
+import re
+
 import numpy as np
 
-from ..errors import FileFormatError
 from ..skeleton import Skeleton
+from .forests import global_shift, parents
 from .graphs import graph_skeleton
 from .text import line, text, words_by_line
 
+_log = logging.getLogger(__name__)
 
-def write(skeleton: Skeleton, cut_loops: bool = False) -> bytes:
-    """The content of an SWC file; FileFormatError if the skeleton has loops.
+_SHIFT = re.compile(r"#\s*global_shift:\s*(\S+)\s+(\S+)\s+(\S+)")
 
-    With `cut_loops` one edge per loop is dropped instead, keeping the spanning forest of least length.
-    """
-    if skeleton.n_loops and not cut_loops:
-        raise FileFormatError(
-            f"SWC holds trees only and the skeleton has {skeleton.n_loops} loop(s): "
-            "pass cut_loops=True to drop an edge of each, or choose another format"
-        )
-    import networkx
 
-    graph = networkx.Graph()
-    graph.add_nodes_from(range(len(skeleton.vertices)))
-    graph.add_weighted_edges_from(zip(*skeleton.edges.T.tolist(), skeleton.edge_lengths.tolist(), strict=True))
-    forest = networkx.minimum_spanning_tree(graph)
-    order = list(networkx.dfs_preorder_nodes(forest))
-    number = {vertex: i for i, vertex in enumerate(order, 1)}
-    parent = {child: number[vertex] for vertex, child in networkx.dfs_edges(forest)}
-    table = np.column_stack([skeleton.vertices, skeleton.radii]).tolist()
-    rows = [line(number[vertex], 0, *table[vertex], parent.get(vertex, -1)) for vertex in order]
-    return text(["# curve skeleton written by glsk-o3d: id type x y z radius parent", *rows])
+def write(forest: Skeleton) -> bytes:
+    """The content of an SWC file of a skeleton that is numbered from its roots outwards."""
+    shift = global_shift(forest)
+    header = ["# curve skeleton written by glsk-o3d: id type x y z radius parent"]
+    if shift.any():
+        _log.warning("coordinates are written less a global shift of %s, since float32 would lose digits", shift)
+        header.append(line("# global_shift:", *shift.tolist()))
+    parent = parents(forest)
+    number = np.where(parent >= 0, parent + 1, -1).tolist()
+    table = np.column_stack([forest.vertices - shift, forest.radii]).tolist()
+    rows = [line(i, 0, *row, before) for i, (row, before) in enumerate(zip(table, number, strict=True), 1)]
+    return text([*header, *rows])
 
 
 def read(data: bytes) -> Skeleton:
@@ -48,4 +46,6 @@ def read(data: bytes) -> Skeleton:
     place = np.searchsorted(names[order], parents[child]).clip(max=len(names) - 1)
     if (names[order][place] != parents[child]).any() or len(np.unique(names)) < len(names):
         raise ValueError("a parent is not there, or two rows have one id")
-    return graph_skeleton(table[:, 2:5], np.column_stack([child, order[place]]), table[:, 5])
+    shift = _SHIFT.search(data.decode())
+    origin = [float(word) for word in shift.groups()] if shift else 0.0
+    return graph_skeleton(table[:, 2:5] + origin, np.column_stack([child, order[place]]), table[:, 5])

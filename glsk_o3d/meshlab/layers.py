@@ -96,7 +96,8 @@ class Layer:
                 scalars=None if np.isnan(drawing.radii).all() else drawing.radii,
                 label=path.name,
             )
-        cloud, faces = read_scan(path)  # knows best what may be wrong with the file
+        scan = read_scan(path)  # knows best what may be wrong with the file
+        cloud, faces = scan.to_legacy(), scan.triangles
         points, normals, colors = cloud.points, cloud.normals, cloud.colors
         if ending == ".stl":
             mesh = o3d.geometry.TriangleMesh(points, o3d.utility.Vector3iVector(faces))
@@ -104,7 +105,7 @@ class Layer:
             mesh.remove_duplicated_vertices()
             points, normals, faces = mesh.vertices, mesh.vertex_normals, np.array(mesh.triangles)
         if "quality" in held.get("vertex", ()):
-            scalars = o3d.t.io.read_point_cloud(str(path)).point["quality"].numpy().ravel().astype(float)
+            scalars = scan.attributes["quality"].astype(float)
         return cls(
             cloud_points(points),
             faces=faces if len(faces) else None,

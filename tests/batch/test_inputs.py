@@ -2,11 +2,13 @@
 
 import os
 from itertools import chain
+from pathlib import Path
 
 import pytest
 
 from glsk_o3d import InvalidParameterError
-from glsk_o3d.batch.inputs import INPUT_ENDINGS, find_inputs
+from glsk_o3d.batch.inputs import find_inputs
+from glsk_o3d.io.paths import SCAN_ENDINGS
 
 
 @pytest.fixture(autouse=True)
@@ -26,8 +28,8 @@ def touch(here):
 
 
 def names(*inputs, out="out", **options):
-    found = find_inputs(inputs, out, **options)
-    assert all(path.is_absolute() for path in found.values())
+    found = find_inputs(inputs, out, **options).named
+    assert all(source.path.is_absolute() for source in found.values())
     return list(found)
 
 
@@ -37,9 +39,10 @@ def test_a_folder(touch):
     assert names("in", recursive=True) == ["a", "b", "sub/c"]
 
 
-@pytest.mark.parametrize("ending", INPUT_ENDINGS)
+@pytest.mark.parametrize("ending", SCAN_ENDINGS)
 def test_every_ending_that_is_read(touch, ending):
     touch(f"in/a{ending}")
+    Path(f"in/a{ending}").write_text("1 2 3\n")
     assert names("in") == ["a"]
 
 
@@ -55,15 +58,49 @@ def test_a_list(touch, here):
     (here / "list.txt").write_bytes(b"\xef\xbb\xbf# mine\r\nin/a.ply\r\n\r\n  in/sub/b.ply\nin/gone.ply")
     assert names("list.txt") == ["in/a", "in/gone", "in/sub/b"]
     (here / "list.txt").write_text("# nothing\n")
-    with pytest.raises(FileNotFoundError, match=r"list\.txt: read as a list of files.* and it names none; if it is a"):
+    with pytest.raises(FileNotFoundError, match=r"list\.txt: read as a list.* and it names none; it is no point cloud"):
         names("list.txt")
 
 
-@pytest.mark.parametrize("first", [b"0.25 1 -3", b"x,y,z", b"\0\xff\xfe", b"gone.ply"])
+def test_a_text_that_is_a_cloud(here):
+    (here / "in").mkdir()
+    for name in ("scan.txt", "scan.csv", "in/other.txt"):
+        (here / name).write_text("x,y,z\n" + "1,2,3\n" * 9)
+    (here / "in" / "README.txt").write_text("Three scans of a tree, of 2026")
+    (here / "in" / "lengths.csv").write_text("branch,length,radius\n1,2,3\n")
+    assert names("scan.txt", "scan.csv", "in") == ["other", "scan.csv", "scan.txt"]
+    assert find_inputs(["in"], "out").left_out == {
+        str(here / "in" / name): "no cloud by its first lines" for name in ("README.txt", "lengths.csv")
+    }
+
+
+def test_what_a_folder_holds_beside_clouds_is_left_out_with_the_reason(touch, here):
+    touch("in/a.ply", "in/notes.md", "in/Makefile", "in/.hidden", "in/out/b.md")
+    assert find_inputs(["in"], "in/out", recursive=True).left_out == {
+        str(here / "in" / "notes.md"): "no cloud by its ending, .md",
+        str(here / "in" / "Makefile"): "no cloud by its ending, none",
+    }
+
+
+def test_the_points_of_a_file_taken_apart(here):
+    (here / "forest.csv").write_text("x,y,z,tree\n" + "".join(f"{i},0,0,{i % 3}\n" for i in range(9)))
+    (here / "bare.xyz").write_text("1 2 3\n")
+    (here / "broken.ply").write_text("ply\n")
+    found = find_inputs(["forest.csv", "bare.xyz", "broken.ply"], "out", by="tree")
+    assert {name: source.where for name, source in found.named.items()} == {
+        **{f"forest-{i}": f"tree == {i}" for i in range(3)},
+        "broken": "",  # what is wrong with it shows when it is read
+    }
+    assert found.left_out == {str(here / "bare.xyz"): "its points have no tree; they have only coordinates"}
+    with pytest.raises(InvalidParameterError, match="by = 'trees': no input has this attribute"):
+        find_inputs(["forest.csv"], "out", by="trees")
+
+
+@pytest.mark.parametrize("first", [b"0.25 1", b"x,y,z", b"\0\xff\xfe", b"gone.ply"])
 def test_a_text_that_is_no_list(here, first):
-    (here / "list.txt").write_bytes(first + b"\n1 2 3" * 99)
+    (here / "list.txt").write_bytes(first + b"\nsome words" * 99)
     with pytest.raises(
-        FileNotFoundError, match=r"as a list of files, a path per line .* none of 100 lines .* to \.xyz$"
+        FileNotFoundError, match=r"as a list of files, a path per line .* none of 100 lines .* no point cloud, either"
     ) as e:
         names("list.txt")
     assert repr(os.fsdecode(first)) in str(e.value)

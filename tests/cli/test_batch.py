@@ -4,6 +4,7 @@ import io
 import json
 import re
 
+import numpy as np
 import pytest
 
 from glsk_o3d import read_skeleton
@@ -166,3 +167,32 @@ def test_progress_tells_how_many_and_how_long(monkeypatch):
     assert re.search(
         r"3 scans/s, 1 failed .* 7/10 left: -?\S+", re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
     )
+
+
+def test_one_skeleton_per_tree_of_a_plot(invoke, tmp_path):
+    from glsk_o3d.samples import torus
+
+    rings = np.concatenate([torus(300).points + [3 * i, 0, 0] for i in range(3)])
+    table = np.column_stack([rings, np.repeat([0, 7, 9], 300), np.arange(900) % 2])
+    (tmp_path / "in").mkdir()
+    np.savetxt(tmp_path / "in" / "plot.csv", table, delimiter=",", header="x,y,z,treeID,return", comments="")
+    (tmp_path / "in" / "README.md").touch()
+    words = ["batch", "in", "-o", "out", "--by", "treeID", "--where", "treeID > 0", "--json"]
+    told = json.loads(invoke(*words).stdout)
+    assert (told["done"], told["failed"]) == (2, 0)
+    assert told["left_out"] == {str(tmp_path / "in" / "README.md"): "no cloud by its ending, .md"}
+    assert read_skeleton("out/plot-9.ply").vertices[:, 0].min() > 5
+    rows = [json.loads(line) for line in (tmp_path / "out" / "ledger.jsonl").read_text().splitlines()]
+    assert sorted((row["name"], row["points"]) for row in rows) == [("plot-7", 300), ("plot-9", 300)]
+    assert {row["input"] for row in rows} == {f"{tmp_path}/in/plot.csv where treeID == {i}" for i in (7, 9)}
+    assert json.loads(invoke(*words).stdout)["skipped"] == 2
+    half = json.loads(invoke(*words[:-2], "treeID > 0 and return_ == 1", "--json").stdout)
+    assert (half["done"], half["skipped"]) == (2, 0)  # other points are another result
+
+
+def test_it_says_what_it_left_out(invoke, folder):
+    for name in "abcdefg":
+        (folder / f"{name}.md").touch()
+    said = invoke("batch", "in", "-o", "out", "--dry-run").stderr
+    assert "left out 7: no cloud by its ending, .md (a.md, b.md, c.md, d.md, e.md, ...)" in said
+    assert not invoke("batch", "in", "-o", "out", "--dry-run", "--quiet").stderr

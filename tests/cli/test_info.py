@@ -1,6 +1,7 @@
 """`glsk info`: what is in a file."""
 
 import json
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -132,3 +133,39 @@ def test_refuses(invoke, tmp_path, name, content, message):
     assert result.stderr.startswith(f"glsk: error: {message}")
     assert result.stderr.count("\n") == 1
     assert result.stdout == ""
+
+
+def test_coordinates_of_a_map_keep_their_digits(invoke, told, tmp_path):
+    corner = np.array([471234.5678, 5612345.6789, 123.4567])
+    np.savetxt(tmp_path / "far.xyz", corner + np.eye(3), fmt="%.4f")
+    assert told("far.xyz")["lowest"] == corner.tolist()
+    assert "471234.56780  5612345.67890  123.45670" in invoke("info", "far.xyz").stdout
+
+
+def test_attributes_and_conditions_on_them(invoke, told, refused, tmp_path):
+    rows = [f"{i},{i * i},0,{i % 3},{i / 7}" for i in range(30)]
+    (tmp_path / "c.csv").write_text("\n".join(["x,y,z,Tree ID,intensity", *rows]))
+    facts = told("c.csv")["attributes"]
+    assert facts["Tree_ID"] == {"distinct": 3, "lowest": 0, "highest": 2, "counts": {"0": 10, "1": 10, "2": 10}}
+    assert facts["intensity"] == {"distinct": 30, "lowest": 0.0, "highest": 29 / 7}
+    text = invoke("info", "c.csv").stdout
+    assert "Tree_ID 0 (10 points), 1 (10 points), 2 (10 points)" in text
+    assert "intensity 0 to 4.142857143, 30 values" in text
+    assert json.loads(invoke("info", "c.csv", "--where", "Tree_ID == 2 and x > 4", "--json").stdout)["points"] == 9
+    assert "did you mean 'Tree_ID'" in refused(2, "info", "c.csv", "--where", "treeid == 2")
+    assert refused(1, "info", "c.csv", "--where", "x > 99") == "there is no point with x > 99"
+
+
+def test_without_a_file_it_lists_what_can_be_read(invoke):
+    told = json.loads(invoke("info", "--json").stdout)
+    assert {".las", ".laz", ".e57", ".csv", ".ply"} <= set(told["clouds"])
+    assert ".swc" in told["skeletons"]
+    assert ".vtp" in told["only_written"]
+    text = invoke("info").stdout
+    assert all(ending in text for endings in told.values() for ending in endings)
+
+
+def test_without_a_package_it_says_which_files_cannot_be_read(invoke, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pye57", None)
+    assert list(json.loads(invoke("info", "--json").stdout)["lacking"]) == [".e57"]
+    assert ".e57: pye57 cannot be imported: pip install" in " ".join(invoke("info").stdout.split())

@@ -1,0 +1,55 @@
+"""How a surface follows the bones of a skeleton."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..refinement.axis_fit import nearest_on_edges
+
+if TYPE_CHECKING:
+    from ..skeleton import Skeleton
+
+
+def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which bones move each point, and how much, for linear blend skinning.
+
+    Each edge is a bone with its joint at the end that is nearer to the root. A point goes with the edge nearest to it
+    among those of its vertex. Over the first half of an edge its motion fades in, from that of the bone before it: so
+    the motion is continuous along the curve and at junctions.
+
+    Parameters
+    ----------
+    forest : Skeleton
+        Without loops, numbered from its roots outwards.
+    points : (N, 3) float array
+    vertex : (N,) int array
+        The vertex of each point, as `Skeleton.vertex_of_point`.
+
+    Returns
+    -------
+    bones : (N, 2) int array
+        Rows of `forest.edges`: the one before and its own; twice the same where nothing comes before.
+    weights : (N, 2) float array
+        Not negative, with the sum 1.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Skeleton
+    >>> line = Skeleton([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1], [1, 2]], [1, 1, 1], (), (), ())
+    >>> bones, weights = skin_weights(line, np.array([[1.25, 0.5, 0]]), np.array([1]))
+    >>> bones.tolist(), weights.tolist()
+    ([[0, 1]], [[0.5, 0.5]])
+    """
+    edges = forest.edges
+    before = np.full(len(forest.vertices), -1)  # the edge that leads to each vertex
+    before[edges[:, 1]] = np.arange(len(edges))
+    order = np.argsort(edges.ravel(), kind="stable")
+    first = np.searchsorted(edges.ravel()[order], np.arange(len(forest.vertices)))
+    column = np.arange(forest.degree.max(initial=1))
+    around = np.where(column < forest.degree[:, None], order[(first[:, None] + column) % max(len(order), 1)] // 2, -1)
+    bone, along = nearest_on_edges(forest.vertices, edges, around[vertex], points)
+    parent = before[edges[bone, 0]]
+    own = np.where(parent >= 0, np.minimum(2 * along, 1), 1)
+    return np.column_stack([np.where(parent >= 0, parent, bone), bone]), np.column_stack([1 - own, own])

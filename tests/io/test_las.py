@@ -1,0 +1,114 @@
+"""LAS and LAZ as laspy writes them, E57 as pye57 does."""
+
+import numpy as np
+import pytest
+
+from glsk_o3d import read_cloud, read_tensor_cloud
+from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.scans import read_scan
+
+PLACES = np.array([[471234.5678, 5612345.6789, 123.4567], [471235.5, 5612346.25, 130.0], [471236.0, 5612347.0, 131.5]])
+
+
+@pytest.fixture
+def las(tmp_path):
+    laspy = pytest.importorskip("laspy")
+
+    def write(name="c.las", version="1.4", point_format=7, **dimensions):
+        header = laspy.LasHeader(point_format=point_format, version=version)
+        header.offsets, header.scales = np.floor(PLACES.min(axis=0)), [1e-4] * 3
+        if "treeID" in dimensions:
+            header.add_extra_dim(laspy.ExtraBytesParams("treeID", type="uint32"))
+        data = laspy.LasData(header)
+        data.x, data.y, data.z = PLACES.T
+        for key, values in dimensions.items():
+            data[key] = values
+        data.write(tmp_path / name)
+        return tmp_path / name
+
+    return write
+
+
+@pytest.mark.parametrize("name", ["c.las", "c.laz", "C.LAZ"])
+@pytest.mark.parametrize(("version", "point_format"), [("1.2", 3), ("1.3", 1), ("1.4", 6), ("1.4", 7)])
+def test_coordinates_keep_their_digits_and_attributes_survive(las, name, version, point_format):
+    if name.lower().endswith("laz"):
+        pytest.importorskip("lazrs")
+    path = las(name, version, point_format, classification=[2, 5, 5], intensity=[7, 65535, 0], treeID=[0, 4, 9])
+    scan = read_scan(path)
+    np.testing.assert_allclose(scan.positions, PLACES, rtol=0, atol=1e-9)
+    assert {key: values.tolist() for key, values in scan.attributes.items()} == {
+        "intensity": [7, 65535, 0],
+        "classification": [2, 5, 5],
+        "treeID": [0, 4, 9],
+    }
+    assert scan.colors is None
+    np.testing.assert_allclose(np.asarray(read_cloud(path, where="treeID > 0 and z < 131").points), PLACES[1:2])
+
+
+@pytest.mark.parametrize(("top", "scale"), [(65535, 65535), (255, 255), (1, 255)])
+def test_colours_of_sixteen_bits_and_of_eight(las, top, scale):
+    cloud = read_cloud(las(red=[0, top, 0], green=[top] * 3, blue=[0, 0, 0]))
+    np.testing.assert_allclose(np.asarray(cloud.colors), np.array([[0, 1, 0], [1, 1, 0], [0, 1, 0]]) * top / scale)
+
+
+def test_attributes_survive_a_skeleton_and_a_file(las, tmp_path):
+    import open3d as o3d
+
+    from glsk_o3d import Skeleton
+
+    cloud = read_tensor_cloud(las(classification=[2, 5, 5]))
+    line = Skeleton(PLACES[:2], [[0, 1]], [1, 1], [0, 1, 1], PLACES, np.ones((3, 3)))
+    o3d.t.io.write_point_cloud(str(tmp_path / "marked.ply"), line.annotate(cloud))
+    back = read_tensor_cloud(tmp_path / "marked.ply")
+    assert back.point.classification.flatten().numpy().tolist() == [2, 5, 5]
+    assert back.point.branch.flatten().numpy().tolist() == [0, 0, 0]
+    np.testing.assert_allclose(back.point.positions.numpy(), PLACES, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["c.las", "c.laz", "c.e57"])
+def test_damaged_files(las, e57, tmp_path, name):
+    path = e57(PLACES) if name == "c.e57" else las(name)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(FileFormatError, match=rf"{name}: (not a valid|no points could be read)"):
+        read_cloud(path)
+
+
+def test_a_file_that_breaks_off(las):
+    path = las()
+    path.write_bytes(path.read_bytes()[:-72])
+    with pytest.raises(FileFormatError, match=r"c\.las.*promises 3 points and holds 1: it breaks off"):
+        read_cloud(path)
+
+
+@pytest.fixture
+def e57(tmp_path):
+    pye57 = pytest.importorskip("pye57")
+
+    def write(*scans, turn=(1, 0, 0, 0), place=(0, 0, 0), **fields):
+        file = pye57.E57(str(tmp_path / "c.e57"), mode="w")
+        for points in scans:
+            columns = dict(zip(("cartesianX", "cartesianY", "cartesianZ"), points.T.copy(), strict=True))
+            file.write_scan_raw(columns | fields, rotation=np.array(turn, float), translation=np.array(place, float))
+        file.close()
+        return tmp_path / "c.e57"
+
+    return write
+
+
+def test_e57_scans_stand_where_their_poses_put_them(e57):
+    near = np.array([[1.0, 0, 0], [0, 2.5, 0], [0, 0, 3]])
+    half = np.sqrt(0.5)
+    scan = read_scan(e57(near, near + 1, turn=(half, 0, 0, half), place=PLACES[0]))  # a quarter turn about z
+    turned = np.array([[0, 1, 0], [-2.5, 0, 0], [0, 0, 3]])
+    expected = np.concatenate([turned, turned + [-1, 1, 1]]) + PLACES[0]
+    np.testing.assert_allclose(scan.positions, expected, rtol=0, atol=1e-8)
+    assert scan.attributes["scan"].tolist() == [0, 0, 0, 1, 1, 1]
+
+
+def test_e57_has_colours_and_intensity(e57):
+    grey = np.array([0, 51, 255])
+    colors = dict.fromkeys(("colorRed", "colorGreen", "colorBlue"), grey)
+    scan = read_scan(e57(np.eye(3), **colors, intensity=np.array([0.0, 0.25, 1.0])))
+    np.testing.assert_allclose(scan.colors, np.tile(grey[:, None] / 255, 3))
+    np.testing.assert_allclose(scan.attributes["intensity"], [0, 0.25, 1])
