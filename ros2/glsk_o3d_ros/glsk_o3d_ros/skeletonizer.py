@@ -1,0 +1,85 @@
+"""From a cloud to the messages about its skeleton: what the node and the script for bags have in common."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning
+from glsk_o3d.analysis import grasp_candidates
+from glsk_o3d.cli.overrides import override
+from glsk_o3d.driver import as_pipeline
+
+from .messages import Make, frames_of, markers_of, points_of, poses_of
+
+
+@dataclass(frozen=True)
+class Results:
+    """What is published about a cloud, the skeleton itself, and what was warned of."""
+
+    markers: Any
+    poses: Any
+    skeleton: Skeleton
+    warnings: tuple[str, ...]
+
+
+class Skeletonizer:
+    """Makes the messages about clouds, one by one.
+
+    Parameters
+    ----------
+    make : callable
+        See `glsk_o3d_ros.messages.Make`.
+    pipeline : str
+        Name of a pipeline, or path of a recipe.
+    settings : iterable of str
+        Parameters that are to differ: ``"Connector.radius=2%"``. Empty ones are left out.
+    min_points : int
+        Fewest points with finite coordinates that are worked on.
+    opening : float
+        Widest opening of a gripper, in the cloud's units; 0 for none.
+
+    Raises
+    ------
+    GlskError
+        The pipeline, its recipe, a setting or the opening is wrong.
+    """
+
+    def __init__(
+        self,
+        make: Make,
+        pipeline: str = "default",
+        settings: Iterable[str] = (),
+        min_points: int = 100,
+        opening: float = 0.0,
+    ) -> None:
+        if not opening >= 0:
+            raise InvalidParameterError(f"opening = {opening}: must be 0, for no grasps, or more")
+        self.make, self.min_points, self.opening = make, min_points, opening
+        self.pipeline = override(as_pipeline(pipeline), filter(None, settings), name=pipeline)
+
+    def __call__(self, cloud: Any) -> Results:
+        """The messages about a ``sensor_msgs/msg/PointCloud2``, in its frame and with its stamp.
+
+        Poses are the grasps, best first, if there is an opening, or else the frames along the skeleton. GlskError if
+        the cloud cannot be skeletonised.
+        """
+        points = points_of(cloud)
+        points = points[np.isfinite(points).all(axis=1)]
+        if len(points) < self.min_points:
+            raise InvalidCloudError(f"the cloud has {len(points)} finite points, and min_points is {self.min_points}")
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("ignore")
+            warnings.simplefilter("always", SkeletonWarning)
+            skeleton = self.pipeline(points)
+            frames = grasp_candidates(skeleton, self.opening).poses if self.opening else frames_of(skeleton)
+        return Results(
+            markers_of(skeleton, cloud.header, self.make),
+            poses_of(frames, cloud.header, self.make),
+            skeleton,
+            tuple(str(warning.message) for warning in said),
+        )

@@ -1,0 +1,208 @@
+"""Clouds of messages as arrays, skeletons as messages; messages are those of rosbags, as they come out of CDR."""
+
+import math
+import struct
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from glsk_o3d_ros.messages import cloud_of, frames_of, markers_of, points_of, poses_of
+from scipy.spatial.transform import Rotation
+
+from glsk_o3d import InvalidCloudError, pipelines, samples
+from glsk_o3d.editing import reroot
+
+CLOUD, MARKERS, POSES = (
+    "sensor_msgs/msg/PointCloud2",
+    "visualization_msgs/msg/MarkerArray",
+    "geometry_msgs/msg/PoseArray",
+)
+
+
+@pytest.fixture
+def packed(make_message, header):
+    """A cloud of points, byte by byte: fields are (name, offset, datatype)."""
+
+    def pack(points, fields, step, *, height=1, padding=0, big=False, **changes):
+        points = np.asarray(points, float)
+        width = len(points) // height
+        row = width * step + padding
+        data = bytearray(b"\xa5" * (height * row))
+        for i, point in enumerate(points):
+            for axis, value in zip("xyz", point, strict=True):
+                for name, offset, datatype in fields:
+                    if name == axis:
+                        place = i // width * row + i % width * step + offset
+                        struct.pack_into(("<>"[big]) + ("d" if datatype == 8 else "f"), data, place, value)
+        fields = [
+            make_message("sensor_msgs/msg/PointField", name=name, offset=offset, datatype=datatype, count=1)
+            for name, offset, datatype in fields
+        ]
+        facts = dict(header=header, height=height, width=width, fields=fields, is_bigendian=big, point_step=step)
+        facts |= dict(row_step=row, data=np.frombuffer(data, np.uint8), is_dense=False)
+        return make_message(CLOUD, **(facts | changes))
+
+    return pack
+
+
+PLAIN = [("x", 0, 7), ("y", 4, 7), ("z", 8, 7)]
+CAMERA = [("rgb", 16, 7), ("z", 8, 7), ("x", 0, 7), ("y", 4, 7)]
+MIXED = [("intensity", 0, 2), ("y", 1, 8), ("x", 13, 7), ("z", 19, 8)]
+
+
+@pytest.mark.parametrize("big", [False, True])
+@pytest.mark.parametrize(("height", "padding"), [(1, 0), (3, 0), (3, 5)])
+@pytest.mark.parametrize(("fields", "step"), [(PLAIN, 12), (CAMERA, 32), (MIXED, 29)])
+def test_points_of_any_layout(packed, sent, fields, step, height, padding, big):
+    points = np.random.default_rng(1).integers(-999, 999, (12, 3)) / 64  # exact in FLOAT32
+    points[4] = np.nan
+    points[7, 1] = np.inf
+    found = points_of(sent(packed(points, fields, step, height=height, padding=padding, big=big), CLOUD))
+    assert found.dtype == np.float64
+    np.testing.assert_array_equal(found, points)
+
+
+def test_data_as_rclpy_and_others_have_it(packed):
+    points = np.arange(12.0).reshape(4, 3)
+    cloud = packed(points, PLAIN, 12)
+    for data in (cloud.data.tobytes(), memoryview(cloud.data), bytearray(cloud.data)):
+        np.testing.assert_array_equal(points_of(replace_data(cloud, data)), points)
+
+
+def replace_data(cloud, data):
+    return SimpleNamespace(**{name: getattr(cloud, name) for name in vars(cloud) if name != "data"}, data=data)
+
+
+def test_a_single_row_needs_no_row_step(packed):
+    points = np.ones((4, 3))
+    np.testing.assert_array_equal(points_of(packed(points, PLAIN, 12, row_step=0)), points)
+    assert points_of(packed(np.empty((0, 3)), PLAIN, 12)).shape == (0, 3)
+
+
+@pytest.mark.parametrize(
+    ("fields", "changes", "message"),
+    [
+        ([("x", 0, 7), ("y", 4, 7)], {}, "no field z: its fields are x, y"),
+        ([], {}, "no field x: its fields are none"),
+        ([("x", 0, 7), ("y", 4, 5), ("z", 8, 7)], {}, r"y has the datatype 5: it must be FLOAT32 \(7\) or FLOAT64"),
+        (PLAIN, dict(point_step=10), "sizes do not fit"),
+        (PLAIN, dict(width=9), "sizes do not fit .*: 2 x 9 points, point_step 12, row_step 24, 48 bytes"),
+        (PLAIN, dict(row_step=12), "rows overlap"),
+        (PLAIN, dict(row_step=1000), "sizes do not fit"),
+        (PLAIN, dict(data=np.zeros(3, np.uint8)), "sizes do not fit .* 3 bytes"),
+    ],
+)
+def test_clouds_that_cannot_be_read_say_why(packed, fields, changes, message):
+    with pytest.raises(InvalidCloudError, match=message):
+        points_of(packed(np.zeros((4, 3)), fields, 12, height=2, **changes))
+
+
+def test_points_there_and_back(make_message, header, sent):
+    points = np.random.default_rng(2).normal(size=(50, 3)).astype(np.float32).astype(float)
+    cloud = sent(cloud_of(points, header, make_message), CLOUD)
+    np.testing.assert_array_equal(points_of(cloud), points)
+    assert (cloud.width, cloud.height, cloud.is_dense, cloud.header) == (50, 1, True, header)
+    assert not cloud_of([[0, 0, math.nan]], header, make_message).is_dense
+
+
+# ------------------------------------------------------------------------------------------------------------- markers
+
+
+def test_markers_show_edges_vertices_and_junctions(skeleton, make_message, header, sent, rows):
+    markers = sent(markers_of(skeleton, header, make_message), MARKERS).markers
+    first, *shown = markers
+    assert (first.action, first.ns, first.points) == (3, "", [])  # without a namespace it deletes all
+    assert all(marker.header == header and marker.action == 0 for marker in shown)
+    assert all((marker.pose.orientation.w, marker.pose.position.x) == (1, 0) for marker in markers)
+    found = {marker.ns: rows(marker.points) for marker in shown}
+    expected = {
+        "edges": skeleton.vertices[skeleton.edges].reshape(-1, 3),
+        "vertices": skeleton.vertices[skeleton.degree < 3],
+        "junctions": skeleton.vertices[skeleton.junctions],
+    }
+    assert list(found) == [name for name, places in expected.items() if len(places)]
+    for name, places in found.items():
+        np.testing.assert_array_equal(places, expected[name])
+    assert [marker.type for marker in shown] == [5 if marker.ns == "edges" else 7 for marker in shown]
+    for marker in shown:
+        assert len(marker.colors) == len(marker.points)
+        assert all(color.a == 1 for color in marker.colors)
+        assert marker.scale.x == marker.scale.y == marker.scale.z > 0
+
+
+def test_every_branch_has_a_colour_of_its_own(tree, make_message, header):
+    edges, vertices = markers_of(tree, header, make_message).markers[1:3]
+    color_of = {}
+    for i, edge in enumerate(tree.edges):
+        (row,) = [row for row, path in enumerate(tree.branches) if set(edge) <= set(path)]
+        color_of.setdefault(row, set()).update((c.r, c.g, c.b) for c in edges.colors[2 * i : 2 * i + 2])
+    assert [len(colors) for colors in color_of.values()] == [1, 1, 1]
+    assert len(set.union(*color_of.values())) == 3
+    assert {(c.r, c.g, c.b) for c in vertices.colors} == set.union(*color_of.values())
+
+
+def test_lines_are_as_wide_as_a_fifth_of_the_median_radius(tree, make_message, header):
+    def widths(radii):
+        markers = markers_of(replace(tree, radii=radii), header, make_message).markers
+        return [marker.scale.x for marker in markers[1:]]
+
+    assert widths([1, 2, 2, 2, 3, np.nan]) == pytest.approx([0.4, 0.8, 1.6])
+    assert widths(np.full(6, np.nan)) == pytest.approx([0.01, 0.02, 0.04])
+
+
+# --------------------------------------------------------------------------------------------------------------- poses
+
+
+def test_frames_are_right_handed_and_level(skeleton):
+    frames = frames_of(skeleton)
+    turns = frames[:, :3, :3]
+    np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), np.tile(np.eye(3), (len(turns), 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(turns), 1)
+    np.testing.assert_array_equal(frames[:, :3, 3], skeleton.vertices)
+    assert (frames[:, 2, 1] == 0).all()  # y is level
+    assert (frames[:, 2, 2] >= 0).all()  # z is up
+
+
+def test_x_is_along_the_curve(make):
+    line = make(np.array([[0, 0, 0], [1, 1, 0], [2, 2, 0], [3, 3, 0.0]]), [[0, 1], [1, 2], [2, 3]])
+    half = math.sqrt(0.5)
+    np.testing.assert_allclose(frames_of(line)[:, :3, 0], np.tile([half, half, 0], (4, 1)))
+    np.testing.assert_allclose(frames_of(line)[:, :3, 1], np.tile([-half, half, 0], (4, 1)))
+    upright = replace(line, vertices=line.vertices[:, [2, 2, 0]])
+    np.testing.assert_allclose(frames_of(upright)[:, :3, :3], np.tile([[0, 0, -1], [0, 1, 0], [1, 0, 0]], (4, 1, 1)))
+    bent = make(np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.0]]), [[0, 1], [1, 2]])
+    np.testing.assert_allclose(frames_of(bent)[:, :3, 0], [[1, 0, 0], [half, half, 0], [0, 1, 0]])
+
+
+def test_around_a_ring_x_is_its_tangent(make):
+    angle = np.arange(12) * np.pi / 6
+    ring = make(np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]), [*([i, i + 1] for i in range(11)), [0, 11]])
+    tangent = np.column_stack([-np.sin(angle), np.cos(angle), 0 * angle])
+    np.testing.assert_allclose(frames_of(ring)[:, :3, 0], tangent, atol=1e-12)
+
+
+def test_a_junction_follows_its_longest_branch_and_a_dot_is_not_turned(make, dot):
+    fork = make(np.array([[0, 0, 0], [1, 0, 0], [0, 5, 0], [0, 0, -2.0]]), [[0, 1], [0, 2], [0, 3]])
+    np.testing.assert_allclose(frames_of(fork)[0, :3, 0], [0, 1, 0])
+    np.testing.assert_array_equal(frames_of(dot)[0, :3, :3], np.eye(3))
+
+
+def test_in_a_tree_x_leads_away_from_the_root():
+    tree = reroot(pipelines.tree()(samples.tree(4000, forks=2, seed=3).points), "z")
+    assert len(tree.junctions)
+    into = np.full(len(tree.vertices), -1)
+    into[tree.edges[:, 1]] = tree.edges[:, 0]
+    inner = np.flatnonzero(tree.degree <= 2)[1:]
+    step = tree.vertices[inner] - tree.vertices[into[inner]]
+    assert ((step * frames_of(tree)[inner, :3, 0]).sum(axis=1) > 0).all()
+
+
+def test_poses_are_the_frames(skeleton, make_message, header, sent, rows):
+    frames = frames_of(skeleton)
+    message = sent(poses_of(frames, header, make_message), POSES)
+    assert message.header == header
+    np.testing.assert_array_equal(rows(pose.position for pose in message.poses), skeleton.vertices)
+    turns = [[q.x, q.y, q.z, q.w] for q in (pose.orientation for pose in message.poses)]
+    np.testing.assert_allclose(Rotation.from_quat(turns).as_matrix(), frames[:, :3, :3], atol=1e-12)
+    assert sent(poses_of(np.empty((0, 4, 4)), header, make_message), POSES).poses == []

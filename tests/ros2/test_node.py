@@ -1,0 +1,233 @@
+"""The node, with an rclpy that is none: from a cloud that comes in to what it publishes; and bags, offline."""
+
+import numpy as np
+import pytest
+from glsk_o3d_ros import bag
+from glsk_o3d_ros.messages import cloud_of
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin, Writer
+from scipy.spatial.transform import Rotation
+
+import glsk_o3d as glsk
+from glsk_o3d import samples
+from glsk_o3d.analysis import grasp_candidates
+
+CLOUD = "sensor_msgs/msg/PointCloud2"
+SECOND = 10**9
+
+
+@pytest.fixture(scope="module")
+def points():
+    """A tube with noise, 600 points as floats of 32 bits."""
+    return samples.tube(600, length=2.0, radius=0.2, noise=0.002).points.astype(np.float32).astype(float)
+
+
+@pytest.fixture
+def cloud(points, header, make_message):
+    holes = np.concatenate([points[:100], np.full((7, 3), np.nan), points[100:]])
+    return cloud_of(holes, header, make_message)
+
+
+@pytest.fixture
+def expected(points):
+    return glsk.skeletonize(points)
+
+
+def line_ends(markers, rows):
+    (edges,) = [marker for marker in markers.markers if marker.ns == "edges"]
+    return rows(edges.points)
+
+
+def test_a_cloud_comes_in_and_markers_and_poses_go_out(ros, cloud, expected, header, sent, rows):
+    node = ros.node()
+    node.on_cloud(cloud)
+    (there, markers), (topic, poses) = node.published
+    assert (there, topic) == ("~/markers", "~/poses")
+    markers, poses = sent(markers, bag.RESULTS["markers"]), sent(poses, bag.RESULTS["poses"])
+    np.testing.assert_array_equal(line_ends(markers, rows), expected.vertices[expected.edges].reshape(-1, 3))
+    np.testing.assert_array_equal(rows(pose.position for pose in poses.poses), expected.vertices)
+    assert poses.header == header
+    assert {marker.header.frame_id for marker in markers.markers} == {"camera"}
+    assert node.logged == []
+
+
+def test_what_the_node_subscribes_to(ros):
+    topics = {topic: (of.__msgtype__, qos) for topic, (of, qos) in ros.node().topics.items()}
+    assert topics == {
+        "~/input": (CLOUD, dict(depth=1, reliability="best effort")),
+        "~/markers": (bag.RESULTS["markers"], dict(depth=1, durability="kept")),
+        "~/poses": (bag.RESULTS["poses"], dict(depth=1, durability="kept")),
+    }
+
+
+def test_parameters_choose_pipeline_and_settings(ros, cloud, points, tmp_path, rows):
+    other = glsk.skeletonize(points, "tree", k=20)
+    node = ros.node(pipeline="tree", set=["k=20"])
+    node.on_cloud(cloud)
+    np.testing.assert_array_equal(line_ends(node.published[0][1], rows), other.vertices[other.edges].reshape(-1, 3))
+    glsk.save_recipe(glsk.pipelines.tree().with_options(k=20), tmp_path / "mine.toml")
+    same = ros.node(pipeline=str(tmp_path / "mine.toml"))
+    same.on_cloud(cloud)
+    np.testing.assert_array_equal(line_ends(same.published[0][1], rows), line_ends(node.published[0][1], rows))
+
+
+def test_with_an_opening_poses_are_grasps(ros, cloud, expected, rows):
+    node = ros.node(opening=0.6)
+    node.on_cloud(cloud)
+    grasps = grasp_candidates(expected, 0.6)
+    assert len(grasps) > 8
+    poses = node.published[1][1].poses
+    np.testing.assert_array_equal(rows(pose.position for pose in poses), grasps.positions)
+    turns = Rotation.from_quat([[q.x, q.y, q.z, q.w] for q in (pose.orientation for pose in poses)]).as_matrix()
+    np.testing.assert_allclose(turns[:, :, 0], grasps.closing, atol=1e-12)
+    np.testing.assert_allclose(turns[:, :, 2], grasps.approach, atol=1e-12)
+
+
+def test_without_a_grasp_the_markers_go_out_with_a_warning(ros, cloud):
+    node = ros.node(opening=0.1)
+    node.on_cloud(cloud)
+    (_, markers), (_, poses) = node.published
+    assert len(markers.markers) >= 3
+    assert poses.poses == []
+    (warning,) = node.logged
+    assert "too wide" in warning
+
+
+def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, make_message, monkeypatch):
+    node = ros.node()
+    node.on_cloud(make_message(CLOUD, header=header))
+    node.on_cloud(cloud_of(np.full((500, 3), np.nan), header, make_message))
+    node.on_cloud(cloud_of(np.eye(3), header, make_message))
+    assert node.logged == [
+        "cloud left out: the cloud has no field x: its fields are none",
+        "cloud left out: the cloud has 0 finite points, and min_points is 100",
+        "cloud left out: the cloud has 3 finite points, and min_points is 100",
+    ]
+    assert node.published == []
+    node.on_cloud(cloud)
+    assert len(node.published) == 2
+    with monkeypatch.context() as patch:  # an error that nobody has foreseen
+        patch.setattr(node, "skeletonizer", lambda cloud: 1 / 0)
+        node.on_cloud(cloud)
+    assert node.logged[3:] == ["cloud left out: division by zero"]
+
+
+def test_fewer_points_by_parameter(ros, header, make_message):
+    node = ros.node(min_points=700)
+    node.on_cloud(cloud_of(samples.tube(600).points, header, make_message))
+    assert node.logged == ["cloud left out: the cloud has 600 finite points, and min_points is 700"]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        (dict(pipeline="defualt"), "did you mean 'default'"),
+        (dict(set=["k=no"]), "k = 'no'"),
+        (dict(opening=-1.0), r"opening = -1.0: must be 0, for no grasps, or more"),
+        (dict(opening=float("nan")), "opening = nan"),
+    ],
+)
+def test_wrong_parameters_end_the_node_at_once(ros, parameters, message):
+    with pytest.raises(glsk.InvalidParameterError, match=message):
+        ros.node(**parameters)
+    from glsk_o3d_ros.node import main
+
+    with pytest.raises(SystemExit, match=message):
+        main()
+    assert ros.rclpy.told == ["init", "shutdown"]
+
+
+def test_main_runs_the_node_until_it_is_stopped(ros, monkeypatch):
+    ros.node()
+    from glsk_o3d_ros.node import main
+
+    main()
+    assert ros.rclpy.told == ["init", "skeletonize_node", "shutdown"]
+
+    def stop(node):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ros.rclpy, "spin", stop)
+    main()
+    assert ros.rclpy.told[3:] == ["init", "shutdown"]
+
+
+# ---------------------------------------------------------------------------------------------------------------- bags
+
+
+@pytest.fixture(params=[StoragePlugin.SQLITE3, StoragePlugin.MCAP], ids=["sqlite3", "mcap"])
+def recorded(request, types, cloud, make_message, header, tmp_path):
+    """A bag: a cloud, one that is too small, and the cloud again, a second apart; and another topic."""
+    few = cloud_of(np.eye(3), header, make_message)
+    with Writer(tmp_path / "in", version=9, storage_plugin=request.param) as writer:
+        clouds = writer.add_connection("/points", CLOUD, typestore=types)
+        other = writer.add_connection("/frame", "std_msgs/msg/Header", typestore=types)
+        writer.write(other, 0, types.serialize_cdr(header, "std_msgs/msg/Header"))
+        for i, message in enumerate([cloud, few, cloud], 1):
+            writer.write(clouds, i * SECOND, types.serialize_cdr(message, CLOUD))
+    return tmp_path / "in"
+
+
+def messages(path, types):
+    """Time, topic and message of all in a bag."""
+    with AnyReader([path]) as reader:
+        return [
+            (time, connection.topic, types.deserialize_cdr(data, connection.msgtype))
+            for connection, time, data in reader.messages()
+        ]
+
+
+def test_a_bag_through_the_node_and_back_into_a_bag(ros, recorded, types, tmp_path, expected, rows):
+    node = ros.node()
+    for _, topic, message in messages(recorded, types):
+        if topic == "/points":
+            node.on_cloud(message)
+    assert len(node.logged) == 1
+    with Writer(tmp_path / "out", version=9) as writer:
+        out = {
+            topic: writer.add_connection(topic.replace("~", "/skeletonize_node"), of.__msgtype__, typestore=types)
+            for topic, (of, _) in node.topics.items()
+            if topic != "~/input"
+        }
+        for time, (topic, message) in enumerate(node.published):
+            writer.write(out[topic], time, types.serialize_cdr(message, out[topic].msgtype))
+    found = messages(tmp_path / "out", types)
+    assert [topic for _, topic, _ in found] == ["/skeletonize_node/markers", "/skeletonize_node/poses"] * 2
+    for _, _, markers in found[::2]:
+        np.testing.assert_array_equal(line_ends(markers, rows), expected.vertices[expected.edges].reshape(-1, 3))
+
+
+def test_the_script_does_what_the_node_does(recorded, types, tmp_path, expected, header, rows, capsys):
+    bag.main([str(recorded), str(tmp_path / "out"), "--topic", "/points"])
+    said = capsys.readouterr()
+    assert said.out == f"2 clouds skeletonised: {tmp_path / 'out'}\n"
+    assert said.err == f"cloud at {2 * SECOND} left out: the cloud has 3 finite points, and min_points is 100\n"
+    found = messages(tmp_path / "out", types)
+    assert [(time, topic) for time, topic, _ in found] == [
+        (time * SECOND, f"/skeletonize_node/{name}") for time in (1, 3) for name in ("markers", "poses")
+    ]
+    for (_, _, markers), (_, _, poses) in zip(found[::2], found[1::2], strict=True):
+        np.testing.assert_array_equal(line_ends(markers, rows), expected.vertices[expected.edges].reshape(-1, 3))
+        np.testing.assert_array_equal(rows(pose.position for pose in poses.poses), expected.vertices)
+        assert (poses.header.frame_id, poses.header.stamp.sec) == (header.frame_id, header.stamp.sec)
+
+
+def test_options_of_the_script(recorded, types, tmp_path, points, rows):
+    words = ["--topic", "/points", "--pipeline", "tree", "--set", "k=20", "--opening", "0.6", "--min-points", "3"]
+    with pytest.raises(SystemExit, match="opening = -1"):
+        bag.main([str(recorded), str(tmp_path / "no"), *words, "--opening", "-1"])
+    bag.main([str(recorded), str(tmp_path / "out"), *words])
+    other = glsk.skeletonize(points, "tree", k=20)
+    found = messages(tmp_path / "out", types)
+    np.testing.assert_array_equal(line_ends(found[0][2], rows), other.vertices[other.edges].reshape(-1, 3))
+    assert len(found[1][2].poses) == len(grasp_candidates(other, 0.6))
+
+
+def test_what_the_script_cannot_do(recorded, tmp_path):
+    with pytest.raises(SystemExit, match="has no clouds on /frame; there are some on /points"):
+        bag.main([str(recorded), str(tmp_path / "out"), "--topic", "/frame"])
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(SystemExit, match="exists already"):
+        bag.main([str(recorded), str(recorded), "--topic", "/points"])
+    with pytest.raises(SystemExit, match="nowhere"):
+        bag.main(["nowhere", str(tmp_path / "out"), "--topic", "/points"])
