@@ -57,7 +57,7 @@ class Slot:
         worded = {"choice": ("RichEnum",), **dict.fromkeys(("point", *PARTS), ())}
         if self.kind in worded:
             return ("RichString", *worded[self.kind])
-        if self.name == "layer":
+        if self.name in ("layer", "mesh"):
             return ("RichMesh", "RichInt")
         plain = {"bool": ("RichBool",), "int": ("RichInt",), "float": FLOAT, "length": LENGTH}[self.kind]
         return (*plain, "RichString") if self.words else plain

@@ -538,7 +538,7 @@ def test_steps_of_a_session_say_which_filter_failed(meshes):
     meshes.meshing_remove_duplicate_vertices()
     with pytest.raises(ScriptError, match=r"^filter 'Generate One Rings \(GLSkeleton\)': there is no layer"):
         _emptied(meshes).apply_filter_script()
-    meshes._steps = meshes._steps[1:]
+    meshes._script.steps = meshes._script.steps[1:]
     with pytest.raises(ScriptError, match=r"^filter 'Remove Duplicate Vertices': "):
         _emptied(meshes).apply_filter_script()
 
