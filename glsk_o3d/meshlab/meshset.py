@@ -27,9 +27,9 @@ class MeshSet(LayeredMeshSet):
     goes on from there; on any other layer the vertices are the cloud, and whatever must run first is run with its
     defaults.
 
-    Lengths are ``pymeshlab.PercentageValue`` (of the diagonal of the box that has the spread of the points, unless the
-    parameter ``frame`` is ``"box"``) or ``pymeshlab.PureValue`` (in the units of the cloud); a float and a string such
-    as ``"2%"`` are understood too.
+    Lengths are ``pymeshlab.PercentageValue``, as MeshLab's own of the diagonal of the layer's bounding box, or
+    ``pymeshlab.PureValue``, in the units of the cloud; a float and a string such as ``"2%"`` are understood too. What
+    is not given is as elsewhere in this package, of the box that `RingBuilder.frame` names: ``"1% of the frame"``.
 
     Raises
     ------
