@@ -85,7 +85,7 @@ def _act(meshes, name, layer):
             if there:
                 meshes.set_current_mesh(*chosen)
         elif name == "distance":
-            if there:
+            if there and all(meshes.mesh(number).vertex_number() for number in chosen):  # else MeshLab crashes
                 meshes.compute_scalar_by_distance_from_another_mesh_per_vertex(
                     measuremesh=chosen[0], refmesh=chosen[-1], signeddist=False
                 )
