@@ -84,7 +84,7 @@ class Recording:
     def add(self, step: Step, on: int | None = None) -> None:
         """Add a filter that has run, after a change to the layer `on` if there is one."""
         steps = [step] if on is None else [change_of_layer(on), step]
-        self.steps += [each.renumbered(lambda layer: self._number(layer, step.call.name)) for each in steps]
+        self.steps += [_renumbered(each, lambda layer: self._number(layer, step.call.name)) for each in steps]
 
     def _number(self, layer: int, name: str) -> int:
         assert self._numbers is not None
@@ -103,14 +103,27 @@ class Recording:
         return "\n".join(told)
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write the script; ScriptError if it needs a layer that no filter of it made and that was not there first."""
+        """Write the script; ScriptError if it needs a layer that was not there at first and that no filter made."""
         if self._lost is not None:
             name, layer = self._lost
             raise ScriptError(
-                f"{path}: filter {name!r} acted on layer {layer}, which was added between the filters, and a script "
+                f"{path}: filter {name!r} needs layer {layer}, which was added between the filters, and a script "
                 "cannot add it: add all layers first, or begin a new script with clear_filter_script"
             )
         write_script(path, [step.call for step in self.steps])
+
+
+def _renumbered(step: Step, number: Callable[[int], int]) -> Step:
+    """A step with other numbers for the layers that it names; -1, the current one, stays."""
+    values, params = dict(step.values), []
+    for key, value in values.items():
+        if key in ("layer", "mesh") if not step.needs_pymeshlab else builtin.is_layer(key, value):
+            values[key] = number(value) if value >= 0 else value
+    for param in step.call.params:
+        if param.type == "RichMesh" and (value := int(param.attributes["value"])) >= 0:
+            param = replace(param, attributes={**param.attributes, "value": str(number(value))})
+        params.append(param)
+    return replace(step, values=values, call=replace(step.call, params=tuple(params)))
 
 
 def exact_digits(step: Step, values: Mapping[str, Any]) -> Step:

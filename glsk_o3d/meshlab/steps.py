@@ -19,7 +19,7 @@ from .slots import Slot, facts_of
 from .verbs import Verb, verbs
 
 CHANGE_LAYER = "Change the current layer"
-"""What MeshLab called this filter until 2016, which it had for scripts; later ones have none."""
+"""A filter of MeshLab 2016, which had it for scripts; today's has none."""
 _CHANGED = {"mesh": Slot("mesh", facts_of("The layer to go on with.", "int", low=0))}
 
 
@@ -59,18 +59,6 @@ class Step:
         """Whether it is a filter of MeshLab's own."""
         return self.verb is None and self.goes_to is None
 
-    def renumbered(self, number: Callable[[int], int]) -> Step:
-        """The same with other numbers for the layers that it names; -1, the current one, stays."""
-        values, params = dict(self.values), []
-        for key, value in values.items():
-            if (self.needs_pymeshlab and builtin.is_layer(key, value)) or key in ("layer", "mesh"):
-                values[key] = number(value) if value >= 0 else value
-        for param in self.call.params:
-            if param.type == "RichMesh" and (value := int(param.attributes["value"])) >= 0:
-                param = replace(param, attributes={**param.attributes, "value": str(number(value))})
-            params.append(param)
-        return replace(self, values=values, call=replace(self.call, params=tuple(params)))
-
     @contextmanager
     def named_in_errors(self) -> Iterator[None]:
         """Say in every error of ours where in the script it happened."""
@@ -108,7 +96,16 @@ def step(verb: Verb, values: Mapping[str, Any]) -> Step:
 
 
 def change_of_layer(number: int) -> Step:
-    """What makes another layer the current one."""
+    """What makes another layer the current one.
+
+    Parameters
+    ----------
+    number : int
+
+    Returns
+    -------
+    Step
+    """
     return Step(
         "set_current_mesh", {"mesh": number}, Call(CHANGE_LAYER, (Param("mesh", "RichMesh", {"value": str(number)}),))
     )
@@ -145,7 +142,23 @@ def read_steps(path: str | os.PathLike) -> list[Step]:
 
 
 def meshlabs_own(calls: Sequence[Call], path: str | os.PathLike) -> list[Call]:
-    """The filters of a script that need pymeshlab; ScriptError if it has one that nobody knows."""
+    """The filters of a script that need pymeshlab.
+
+    Parameters
+    ----------
+    calls : sequence of Call
+    path : path-like
+        The script, for messages.
+
+    Returns
+    -------
+    list of Call
+
+    Raises
+    ------
+    ScriptError
+        It has a filter that nobody knows.
+    """
     ours = {CHANGE_LAYER, *(verb.title for verb in verbs().values())}
     foreign = [call for call in calls if call.name not in ours]
     for call in foreign:
