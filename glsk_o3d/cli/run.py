@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..errors import MissingPackageError
 from .console import print_json, print_table, progress
 from .options import CutLoops, Json, Quiet, Verbose
 from .reporting import WrongUsage, holding_interrupts, reporting
@@ -29,8 +30,8 @@ def run(
             "--output",
             "-o",
             metavar="FILE",
-            help="Where to write the last layer: a skeleton as in 'glsk skeletonize', points as ply, pcd or xyz, a "
-            "mesh as ply, obj, off or stl; may be repeated.",
+            help="Where to write the layer that is the current one at the end, as a rule the last: a skeleton as in "
+            "'glsk skeletonize', points as ply, pcd or xyz, a mesh as ply, obj, off or stl; may be repeated.",
         ),
     ] = None,
     listed: Annotated[bool, typer.Option("--list", help="List the scripts that come with the package.")] = False,
@@ -41,7 +42,8 @@ def run(
 ) -> None:
     """Run a MeshLab filter script, with MeshLab's filters and ours.
 
-    The whole script is checked before anything is run. Filters of MeshLab's own need pymeshlab.
+    The whole script is checked before anything is run. Filters of MeshLab's own need pymeshlab; --list tells of which
+    scripts that is so.
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
         from ..meshlab.layers import Layer, check_ending
@@ -62,13 +64,13 @@ def run(
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")
             with holding_interrupts():
-                if all(step.verb for step in steps):
-                    layers: Any = PlainLayers(Layer.read(scan))
-                else:
+                if any(step.needs_pymeshlab for step in steps):
                     from ..meshlab.meshset import MeshSet
 
-                    layers = MeshSet()
+                    layers: Any = MeshSet()
                     layers.load_scan(scan)
+                else:
+                    layers = PlainLayers(Layer.read(scan))
             results = []
             for i, step in enumerate(steps, 1):
                 doing = f"{i} of {len(steps)}: {step.call.name}"
@@ -115,16 +117,21 @@ def _said(value: Any) -> str:
 def _list(as_json: bool) -> None:
     from rich.table import Table
 
-    from ..meshlab.script import comment
-    from ..meshlab.steps import scripts
+    from ..interop.packages import require
+    from ..meshlab.script import comment, read_script
+    from ..meshlab.steps import meshlabs_own, scripts
 
-    told = {name: comment(path) for name, path in scripts().items()}
+    told = [(name, bool(meshlabs_own(read_script(path), path)), comment(path)) for name, path in scripts().items()]
     if as_json:
-        print_json([{"name": name, "doc": doc} for name, doc in told.items()])
+        print_json([dict(zip(("name", "needs_pymeshlab", "doc"), each, strict=True)) for each in told])
         return
     table = Table.grid(padding=(0, 2))
     table.add_column(no_wrap=True)
     table.add_column()
-    for name, doc in told.items():
-        table.add_row(name, doc)
+    for name, needs, doc in told:
+        table.add_row(name + "\n  needs pymeshlab" * needs, doc)
     print_table(table)
+    try:
+        require("pymeshlab")
+    except MissingPackageError as error:
+        typer.echo(f"\n{error}")

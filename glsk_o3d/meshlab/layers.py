@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -120,6 +121,12 @@ class Layer:
         none = np.empty((0, 2), int)
         mine, its = (none if layer.edges is None else layer.edges for layer in (self, other))
         return np.array_equal(self.vertices, other.vertices) and np.array_equal(mine, its)
+
+    @property
+    def diagonal(self) -> float:
+        """That of the axis-aligned bounding box of the finite vertices, 0 if there are none."""
+        finite = self.vertices[np.isfinite(self.vertices).all(axis=1)]
+        return math.hypot(*np.ptp(finite, axis=0)) if len(finite) else 0.0
 
     def summary(self) -> dict[str, Any]:
         """The layer in a few numbers, as MeshLab's filters return them."""

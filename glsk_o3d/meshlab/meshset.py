@@ -12,8 +12,9 @@ import numpy as np
 from ..errors import GlskError, InvalidParameterError, did_you_mean
 from . import builtin
 from .meshset_layers import LayeredMeshSet, pymeshlab
-from .script import Param, read_script, write_script
-from .steps import Step, exact_digits, read_steps, step
+from .recording import Recording, exact_digits
+from .script import read_script
+from .steps import Step, read_steps, step
 from .verbs import Verb, verbs
 
 
@@ -26,9 +27,9 @@ class MeshSet(LayeredMeshSet):
     goes on from there; on any other layer the vertices are the cloud, and whatever must run first is run with its
     defaults.
 
-    Lengths are ``pymeshlab.PercentageValue`` (of the diagonal of the box that has the spread of the points, unless the
-    parameter ``frame`` is ``"box"``) or ``pymeshlab.PureValue`` (in the units of the cloud); a float and a string such
-    as ``"2%"`` are understood too.
+    Lengths are ``pymeshlab.PercentageValue``, as MeshLab's own of the diagonal of the layer's bounding box, or
+    ``pymeshlab.PureValue``, in the units of the cloud; a float and a string such as ``"2%"`` are understood too. What
+    is not given is as elsewhere in this package, of the box that `RingBuilder.frame` names: ``"1% of the frame"``.
 
     Raises
     ------
@@ -48,7 +49,7 @@ class MeshSet(LayeredMeshSet):
 
     def __init__(self, *args: Any, **kwargs: Any):
         super().__init__(*args, **kwargs)
-        self._steps: list[Step] = []
+        self._script = Recording()
 
     # ----------------------------------------------------------------------------------------------------- filters
 
@@ -76,15 +77,23 @@ class MeshSet(LayeredMeshSet):
         pymeshlab.PyMeshLabException
             A filter of MeshLab's failed.
         """
-        if filter_name in verbs():
-            done = step(verbs()[filter_name], _plain_lengths(params))
-            result = self._run_ours(done)
-        elif filter_name in pymeshlab.filter_list():
-            done, result = self._run_theirs(filter_name, params)
-        else:
-            raise InvalidParameterError(did_you_mean(str(filter_name), self.filter_list(), "filter"))
-        self._steps.append(done)
+        with self._script.following(self._numbers) as moved_to:
+            if filter_name in verbs():
+                params = _plain_lengths(params)
+                if moved_to is not None and params.get("layer", -1) == -1:
+                    params["layer"] = moved_to
+                done = step(verbs()[filter_name], params)
+                result, moved_to = self._run_ours(done), None
+            elif filter_name in pymeshlab.filter_list():
+                done, result = self._run_theirs(filter_name, params)
+            else:
+                raise InvalidParameterError(did_you_mean(str(filter_name), self.filter_list(), "filter"))
+            self._script.add(done, moved_to)
         return result
+
+    def _numbers(self) -> tuple[list[int], int]:
+        """Those of all layers, and of the current one; -1 where there is none."""
+        return sorted(mesh.id() for mesh in self), self.current_mesh_id() if self.mesh_number() else -1
 
     def apply_step(self, step: Step, on_iteration: Callable[..., Any] | None = None) -> dict[str, Any]:
         """Run a filter of a script without adding it to the current script.
@@ -107,6 +116,11 @@ class MeshSet(LayeredMeshSet):
         with step.named_in_errors():
             if step.verb is not None:
                 return self._run_ours(step, on_iteration)
+            if step.goes_to is not None:
+                if not self.mesh_id_exists(step.goes_to):
+                    raise InvalidParameterError(f"mesh = {step.goes_to}: there is no such layer")
+                self.set_current_mesh(step.goes_to)
+                return {"layer": step.goes_to}
             try:
                 return self._run_theirs(step.name, step.values)[1]
             except Exception as error:  # pymeshlab's have no base of their own
@@ -205,33 +219,43 @@ class MeshSet(LayeredMeshSet):
         FileNotFoundError, FileFormatError, ScriptError
             See `glsk_o3d.meshlab.steps.read_steps`.
         """
-        self._steps = read_steps(filter_script_name)
+        self._script.load(read_steps(filter_script_name))
 
     def apply_filter_script(self) -> None:
         """Run the filters of the current script, in order, from the current layer on."""
-        for each in list(self._steps):
-            self.apply_step(each)
+        self._script.rerun()
+        for each in self._script.steps:
+            with self._script.following(self._numbers):
+                self.apply_step(each)
 
     def save_filter_script(self, filter_script_name: str | os.PathLike) -> None:
         """Write the current script: what was loaded, and what was applied since. Our lengths in percent stay so.
 
+        A filter that acted on another layer than the one that the filter before left does so again.
+
         Parameters
         ----------
         filter_script_name : path-like
+
+        Raises
+        ------
+        ScriptError
+            A filter acted on a layer that was added after the first filter, which no script can do.
         """
-        write_script(filter_script_name, [each.call for each in self._steps])
+        self._script.save(filter_script_name)
 
     def clear_filter_script(self) -> None:
         """Make the current script empty."""
-        self._steps = []
+        self._script.clear()
+
+    def clear(self) -> None:
+        """Remove all layers. The current script stays."""
+        super().clear()
+        self._script.forget_layers()
 
     def print_filter_script(self) -> None:
         """Print the filters of the current script with their parameters."""
-        print(f"Filter Script Size : {len(self._steps)}\n")
-        for i, each in enumerate(self._steps):
-            print(f"{i}: {each.name}")
-            for param in each.call.params:
-                print(f"\t{param.name} : {param.type} = {_shown(param)}")
+        print(self._script)
 
 
 def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
@@ -254,12 +278,6 @@ def _described(verb: Verb) -> Iterator[str]:
         said += f" ({', '.join(slot.words)})" if slot.words else ""
         default = values.get(slot.name, "as the pipeline has it")
         yield f"\t{slot.name} : {slot.python_type()} = {default}{said}\n\t\t{slot.facts['doc']}"
-
-
-def _shown(param: Param) -> str:
-    told = ("name", "type", "tooltip", "description")
-    values = {key: value for key, value in param.attributes.items() if key not in told}
-    return values.get("value", ", ".join(values.values()))
 
 
 def _method(name: str, verb: Verb):

@@ -15,6 +15,8 @@ from ..recipes.catalogue import catalogue, serves
 from .script import FLOAT, LENGTH, Param
 
 PARTS = ("reducer", "stop")
+OF_FRAME = " of the frame"
+"""What follows a percentage that is as everywhere else in this package, of the box that RingBuilder's `frame` names."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +59,10 @@ class Slot:
         worded = {"choice": ("RichEnum",), **dict.fromkeys(("point", *PARTS), ())}
         if self.kind in worded:
             return ("RichString", *worded[self.kind])
-        if self.name == "layer":
+        if self.name in ("layer", "mesh"):
             return ("RichMesh", "RichInt")
         plain = {"bool": ("RichBool",), "int": ("RichInt",), "float": FLOAT, "length": LENGTH}[self.kind]
-        return (*plain, "RichString") if self.words else plain
+        return (*plain, "RichString") if self.words or self.kind == "length" else plain
 
     def python_type(self) -> str:
         """Its type as MeshLab's listings print it."""
@@ -75,6 +77,8 @@ class Slot:
             value = value.item()
         if value == "none" and "none" in self.words:
             return None
+        if self.kind == "length" and isinstance(value, str):
+            value = value.removesuffix(OF_FRAME)
         if self.kind == "choice" and type(value) is int:
             if not 0 <= value < len(self.words):
                 raise ValueError(f"must be one of {', '.join(map(repr, self.words))}, or its number from 0")
@@ -88,6 +92,10 @@ class Slot:
             raise ValueError(wrong)
         return value
 
+    def is_of_box(self, value: Any) -> bool:
+        """Whether a value is a percentage as MeshLab's are: of the bounding box of the layer."""
+        return self.kind == "length" and isinstance(value, str) and value.rstrip().endswith("%")
+
     def read(self, param: Param) -> Any:
         """The value of a parameter in a script, checked but not resolved; ValueError if it is wrong."""
         param.check_type(self.types)
@@ -100,7 +108,7 @@ class Slot:
         kind = self.types[0]
         if isinstance(value, Parameters | None):
             value, kind = "none" if value is None else type(value).__name__, "RichString"
-        elif isinstance(value, str) and self.kind == "int":
+        elif isinstance(value, str) and (self.kind == "int" or value.endswith(OF_FRAME)):
             kind = "RichString"
         text = str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else repr(value)
         return Param(self.name, kind, {"value": text})

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import GlskError, InvalidParameterError, MissingPackageError, ScriptError, did_you_mean
+from ..interop.packages import require
 from . import builtin
 from .layers import Layer
-from .script import VECTORS, Call, read_script
+from .script import Call, Param, read_script
+from .slots import Slot, facts_of
 from .verbs import Verb, verbs
+
+CHANGE_LAYER = "Change the current layer"
+"""A filter of MeshLab 2016, which had it for scripts; today's has none."""
+_CHANGED = {"mesh": Slot("mesh", facts_of("The layer to go on with.", "int", low=0))}
 
 
 @dataclass(frozen=True)
@@ -43,8 +46,18 @@ class Step:
 
     @property
     def verb(self) -> Verb | None:
-        """None for MeshLab's own filters."""
+        """None for MeshLab's own filters, and where the layer is changed."""
         return verbs().get(self.name)
+
+    @property
+    def goes_to(self) -> int | None:
+        """The layer that becomes the current one, where that is all."""
+        return self.values["mesh"] if self.call.name == CHANGE_LAYER else None
+
+    @property
+    def needs_pymeshlab(self) -> bool:
+        """Whether it is a filter of MeshLab's own."""
+        return self.verb is None and self.goes_to is None
 
     @contextmanager
     def named_in_errors(self) -> Iterator[None]:
@@ -82,6 +95,22 @@ def step(verb: Verb, values: Mapping[str, Any]) -> Step:
     return Step(verb.name, dict(values), Call(verb.title, params))
 
 
+def change_of_layer(number: int) -> Step:
+    """What makes another layer the current one.
+
+    Parameters
+    ----------
+    number : int
+
+    Returns
+    -------
+    Step
+    """
+    return Step(
+        "set_current_mesh", {"mesh": number}, Call(CHANGE_LAYER, (Param("mesh", "RichMesh", {"value": str(number)}),))
+    )
+
+
 def read_steps(path: str | os.PathLike) -> list[Step]:
     """Read a filter script and check all of it.
 
@@ -100,40 +129,89 @@ def read_steps(path: str | os.PathLike) -> list[Step]:
         It is malformed, or a filter, parameter, type or value is wrong; the message names file, line, filter and the
         nearest valid name.
     MissingPackageError
-        It has filters of MeshLab's, and pymeshlab is not there to check and run them.
+        It has filters of MeshLab's, and pymeshlab is not there to check and run them; the message names all of them.
     """
-    return [_step(call, f"{path}, line {call.line}", path) for call in read_script(path)]
+    calls = read_script(path)
+    foreign = meshlabs_own(calls, path)
+    if foreign:
+        try:
+            require("pymeshlab")
+        except MissingPackageError as error:
+            raise MissingPackageError(f"{path}: {_listed(foreign)}: {error}", name=error.name) from error
+    return [_step(call, path) for call in calls]
 
 
-def _step(call: Call, place: str, path) -> Step:
-    ours = {verb.title: verb for verb in verbs().values()}
-    theirs = builtin.names()
-    if call.name in ours:
-        verb, values = ours[call.name], {}
-        for param in call.params:
-            try:
-                if param.name not in verb.slots:
-                    raise ValueError(did_you_mean(param.name, verb.slots, "parameter"))
-                values[param.name] = verb.slots[param.name].read(param)
-            except ValueError as error:
-                known = f"parameter {param.name!r}: " if param.name in verb.slots else ""
-                raise ScriptError(f"{path}, line {param.line}: filter {call.name!r}: {known}{error}") from None
+def meshlabs_own(calls: Sequence[Call], path: str | os.PathLike) -> list[Call]:
+    """The filters of a script that need pymeshlab.
+
+    Parameters
+    ----------
+    calls : sequence of Call
+    path : path-like
+        The script, for messages.
+
+    Returns
+    -------
+    list of Call
+
+    Raises
+    ------
+    ScriptError
+        It has a filter that nobody knows.
+    """
+    ours = {CHANGE_LAYER, *(verb.title for verb in verbs().values())}
+    foreign = [call for call in calls if call.name not in ours]
+    for call in foreign:
+        if call.name not in builtin.names():
+            known = [*ours, *builtin.names()]
+            raise ScriptError(f"{path}, line {call.line}: {did_you_mean(call.name, known, 'filter')}")
+    return foreign
+
+
+def _listed(calls: Sequence[Call]) -> str:
+    """Such as "'Select None' (lines 3, 9) and 'Close Holes' (line 5) are filters of MeshLab's own"."""
+    lines: dict[str, list[str]] = {}
+    for call in calls:
+        lines.setdefault(call.name, []).append(str(call.line))
+    told = [f"{name!r} (line{'s' * (len(at) > 1)} {', '.join(at)})" for name, at in lines.items()]
+    told = [", ".join(told[:-1]), told[-1]] if len(told) > 1 else told
+    return " and ".join(told) + (" are filters of MeshLab's own" if len(lines) > 1 else " is a filter of MeshLab's own")
+
+
+def _step(call: Call, path) -> Step:
+    place = f"{path}, line {call.line}"
+    verb = next((verb for verb in verbs().values() if verb.title == call.name), None)
+    if verb is not None:
+        values = _values(verb.slots, call, path)
         try:
             verb.plan(values)
         except InvalidParameterError as error:
             raise ScriptError(f"{place}: filter {call.name!r}: {error}") from None
         return Step(verb.name, values, call, place)
-    if call.name not in theirs:
-        raise ScriptError(f"{place}: {did_you_mean(call.name, [*ours, *theirs], 'filter')}")
+    if call.name == CHANGE_LAYER:
+        values = _values(_CHANGED, call, path)
+        if not values:
+            raise ScriptError(f"{place}: filter {call.name!r}: its parameter 'mesh' is not there: which layer?")
+        return replace(change_of_layer(values["mesh"]), place=place)
+    name = builtin.names()[call.name]
     try:
-        return Step(theirs[call.name], builtin.arguments(theirs[call.name], call.params), call, place)
-    except MissingPackageError as error:
-        raise MissingPackageError(
-            f"{place}: filter {call.name!r} is MeshLab's own: {error}", name=error.name
-        ) from error
+        return Step(name, builtin.arguments(name, call.params), call, place)
     except ValueError as error:
         message, line = error.args
         raise ScriptError(f"{path}, line {line or call.line}: filter {call.name!r}: {message}") from None
+
+
+def _values(slots: Mapping[str, Slot], call: Call, path) -> dict[str, Any]:
+    values = {}
+    for param in call.params:
+        try:
+            if param.name not in slots:
+                raise ValueError(did_you_mean(param.name, slots, "parameter"))
+            values[param.name] = slots[param.name].read(param)
+        except ValueError as error:
+            known = f"parameter {param.name!r}: " if param.name in slots else ""
+            raise ScriptError(f"{path}, line {param.line}: filter {call.name!r}: {known}{error}") from None
+    return values
 
 
 def scripts() -> dict[str, Path]:
@@ -183,62 +261,33 @@ class PlainLayers:
     """
 
     def __init__(self, layer: Layer):
-        self.layers = [layer]
+        self.layers, self.current = [layer], 0
 
     def layer(self, number: int = -1) -> Layer:
-        """A layer, the last one by default."""
+        """A layer, the current one by default."""
         if number >= len(self.layers):
             raise InvalidParameterError(f"layer = {number}: there are {len(self.layers)}, counted from 0")
-        return self.layers[number]
+        return self.layers[self.current if number == -1 else number]
 
     def apply_step(self, step: Step, on_iteration: Callable[..., Any] | None = None) -> dict[str, Any]:
-        """Run a filter of ours; its result becomes the last layer.
+        """Run a filter of ours, whose result becomes the current layer, or make another layer the current one.
 
         Returns
         -------
         dict
             The result in a few numbers.
         """
-        assert step.verb is not None
         with step.named_in_errors():
+            if step.goes_to is not None:
+                self.layer(step.goes_to)
+                self.current = step.goes_to
+                return {"layer": self.current}
+            assert step.verb is not None
             layer = self.layer(step.values.get("layer", -1))
             self.layers.append(step.verb.run(layer, step.values, on_iteration))
-        return {"layer": len(self.layers) - 1, **self.layers[-1].summary()}
+        self.current = len(self.layers) - 1
+        return {"layer": self.current, **self.layer().summary()}
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write the last layer. See ``Layer.save``."""
+        """Write the current layer. See ``Layer.save``."""
         self.layer().save(path, **options)
-
-
-def exact_digits(step: Step, values: Mapping[str, Any]) -> Step:
-    """A step of MeshLab's with the numbers that it was run with, where MeshLab itself writes six digits of them.
-
-    Parameters
-    ----------
-    step : Step
-    values : mapping of str to object
-        By pymeshlab's names. MeshLab's numbers and vectors are float32, its matrices float64. What differs by more than
-        the digits lost stays as MeshLab wrote it.
-
-    Returns
-    -------
-    Step
-    """
-
-    def exact(param):
-        value = values.get(builtin.keyword(param.name, values) or "")
-        names = VECTORS.get(param.type, ("value",))
-        if not isinstance(value, float | np.ndarray) or np.size(value) != len(names):
-            return param
-        numbers = dict(zip(names, map(float, np.ravel(value)), strict=True))
-        if not all(math.isclose(float(param.attributes[key]), number, rel_tol=1e-5) for key, number in numbers.items()):
-            return param
-        return replace(param, attributes={**param.attributes, **{key: _digits(n) for key, n in numbers.items()}})
-
-    return replace(step, call=replace(step.call, params=tuple(map(exact, step.call.params))))
-
-
-def _digits(number: float) -> str:
-    """The shortest text that is exactly the number, for float32 in float32."""
-    short = np.float32(number)
-    return str(short) if float(short) == number else repr(number)

@@ -21,13 +21,14 @@ from ..errors import InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.clouds import Cloud
 from ..io.colors import shades
 from ..lpr_reducer import LPRReducer
+from ..parameters import resolve_length
 from ..pipeline import Filter, Pipeline, parts
 from ..recipes.catalogue import catalogue, known_pipelines, named_pipeline, serves
 from ..ring_builder import RingBuilder
 from ..skeleton import Skeleton
 from ..state import Contraction
 from .layers import Layer
-from .slots import PARTS, Slot, facts_of, slots_of
+from .slots import OF_FRAME, PARTS, Slot, facts_of, slots_of
 
 _NAMES = {
     "RingBuilder": "generate_one_rings",
@@ -105,7 +106,10 @@ class Verb:
             raise InvalidParameterError(f"{options.get(option, option)}{colon}{why}") from None
 
     def values(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """All parameters that matter, the given ones and the defaults of the others."""
+        """All parameters that matter, the given ones and the defaults of the others.
+
+        A percentage that was not given is as the filter has it, and says so: ``"1% of the frame"``.
+        """
         pipeline = self.plan(given)
         found: dict[str, Any] = {}
         for slot in self.slots.values():
@@ -114,8 +118,18 @@ class Verb:
             for part in parts(pipeline):
                 if type(part) is slot.owner:
                     value = getattr(part, slot.field)
+                    if slot.is_of_box(value) and not slot.is_of_box(given.get(slot.name)):
+                        value += OF_FRAME
                     found[slot.name] = slot.written(value).attributes["value"] if slot.kind in PARTS else value
         return found
+
+    def plan_for(self, layer: Layer, given: Mapping[str, Any]) -> Pipeline:
+        """As `plan`; percentages are lengths: of the diagonal of the layer's bounding box."""
+        pipeline, diagonal = self.plan(given), layer.diagonal
+        percent = {name: value for name, value in given.items() if self.slots[name].is_of_box(value)}
+        if not (percent and diagonal):  # a layer without extent is refused in better words
+            return pipeline
+        return self.plan({**given, **{name: resolve_length(value, diagonal) for name, value in percent.items()}})
 
     def run(self, layer: Layer, given: Mapping[str, Any], on_iteration: Callable[..., Any] | None = None) -> Layer:
         """Run on a layer.
@@ -125,7 +139,7 @@ class Verb:
         layer : Layer
             A cloud, a mesh (its vertices are the cloud), or what another of our filters made.
         given : mapping of str to object
-            Parameters that differ from the defaults.
+            Parameters that differ from the defaults. Percentages are of the diagonal of the layer's bounding box.
         on_iteration : callable, optional
             As in `glsk_o3d.skeletonize`.
 
@@ -137,7 +151,7 @@ class Verb:
         ------
         InvalidParameterError, InvalidCloudError
         """
-        pipeline = self.plan(given)
+        pipeline = self.plan_for(layer, given)
         return self.shown(pipeline(_cloud(layer), on_iteration=on_iteration), layer)
 
     def shown(self, result: Any, source: Layer) -> Layer:
@@ -160,7 +174,7 @@ class FilterVerb(Verb):
         return Pipeline(*(found or [self.filter()]))
 
     def run(self, layer, given, on_iteration=None):
-        pipeline = self.plan(given)
+        pipeline = self.plan_for(layer, given)
         if self.filter.consumes is not Cloud and isinstance(layer.flow, self.filter.consumes):
             return self.shown(pipeline(layer.flow, on_iteration=on_iteration), _plain(layer))
         pipeline = Pipeline(*self.before(), *pipeline.stages)
@@ -195,7 +209,7 @@ class SegmentVerb(Verb):
         return "points or mesh"
 
     def run(self, layer, given, on_iteration=None):
-        pipeline = self.plan(given)
+        pipeline = self.plan_for(layer, given)
         if isinstance(layer.flow, Skeleton):
             skeleton, layer = layer.flow, _plain(layer)
         else:

@@ -37,7 +37,8 @@ def test_a_script_of_ours_is_the_pipeline(invoke, scans, script, tmp_path, monke
     assert result.stdout.startswith("1. Generate Curve Skeleton (GLSkeleton): layer 1, vertices ")
     assert result.stdout.endswith("wrote s.json\nwrote s.ply\n")
     contractor = glsk_o3d.Contractor(reducer=glsk_o3d.LPRReducer())
-    pipeline = glsk_o3d.RingBuilder() | contractor | glsk_o3d.Connector(radius="2%") | glsk_o3d.Refiner()
+    radius = 0.02 * Layer.read(scan).diagonal
+    pipeline = glsk_o3d.RingBuilder() | contractor | glsk_o3d.Connector(radius=radius) | glsk_o3d.Refiner()
     expected = pipeline(read_cloud(scan))
     back = read_skeleton(tmp_path / "s.json")
     np.testing.assert_array_equal(back.vertices, expected.vertices)
@@ -139,10 +140,15 @@ def test_scans_that_meshlab_cannot_read(refused, tmp_path, scans):
 def test_the_list_says_what_each_script_does(invoke):
     result = invoke("run", "--list", "--json")
     assert result.exit_code == 0
-    told = {each["name"]: each["doc"] for each in json.loads(result.stdout)}
+    told = {each["name"]: each for each in json.loads(result.stdout)}
     assert set(told) == set(scripts()) >= {"glskeleton", "cao2010", "scan_cleanup", "scan_cleanup_then_skeleton"}
-    assert all(len(doc) > 40 for doc in told.values())
-    assert "scan_cleanup" in invoke("run", "--list").stdout
+    assert all(len(each["doc"]) > 40 for each in told.values())
+    needing = {"mesh_crosscheck", "scan_cleanup", "scan_cleanup_then_skeleton"}
+    assert {name for name, each in told.items() if each["needs_pymeshlab"]} == needing
+    lines = invoke("run", "--list").stdout.splitlines()
+    names = [line.split()[0] for line in lines if line and line[0] != " "]
+    marked = [lines[i - 1].split()[0] for i, line in enumerate(lines) if line.startswith("  needs pymeshlab")]
+    assert (names, set(marked)) == (list(told), needing)
 
 
 def _mesh(path):

@@ -1,6 +1,7 @@
 """An installation without the extras: what works all the same, and that everything else names its extra."""
 
 import json
+import re
 import subprocess
 import sys
 from importlib.metadata import PackageNotFoundError
@@ -133,6 +134,44 @@ def test_the_command_asks_before_the_work(bare, tmp_path, words, extra):
     assert done.stderr.endswith(f'pip install "glsk-o3d[{extra}]"\n')
     assert done.stderr.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["scan.xyz"]
+
+
+SCAN = """
+from glsk_o3d.meshlab.layers import Layer
+from glsk_o3d.samples import torus
+Layer.of(torus(600).points).save("scan.ply")
+"""
+PYMESHLAB = 'pymeshlab cannot be imported: pip install "glsk-o3d[meshlab]"\n'
+
+
+def meshlabs_own(script):
+    """The filters of a script that are not ours, each with its lines."""
+    found = {}
+    for i, line in enumerate(script.read_text().splitlines(), 1):
+        title = re.search(r'<filter name="([^"]+)"', line)
+        if title and "(GLSkeleton)" not in title[1]:
+            found.setdefault(title[1], []).append(str(i))
+    return {title: ", ".join(lines) for title, lines in found.items()}
+
+
+def test_every_filter_script_runs_or_says_at_once_what_it_needs(bare, tmp_path, root):
+    done = bare(SCAN + COMMAND, "run", "--list")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.endswith(PYMESHLAB)
+    refused = set()
+    for script in sorted((root / "filters").glob("*.mlx")):
+        done = bare(COMMAND, "run", script.stem, "scan.ply", "-o", f"{script.stem}.ply")
+        needs = meshlabs_own(script)
+        assert (tmp_path / f"{script.stem}.ply").exists() == (not needs) == (done.returncode == 0)
+        if needs:
+            refused.add(script.stem)
+            assert done.stderr.startswith(f"glsk: error: {script}: ")
+            assert done.stderr.endswith(f" are filters of MeshLab's own: {PYMESHLAB}")
+            assert done.stderr.count("\n") == 1
+            assert dict(re.findall(r"'([^']+)' \(lines? ([\d, ]+)\)", done.stderr)) == needs
+            blind = bare(COMMAND, "run", script.stem, "nowhere.ply", "-o", "s.ply")
+            assert blind.stderr == done.stderr  # the scan was not looked at
+    assert refused == {"mesh_crosscheck", "scan_cleanup", "scan_cleanup_then_skeleton"}
 
 
 def flat(key, optional):

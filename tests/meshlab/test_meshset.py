@@ -69,8 +69,10 @@ def _by_hand(points):
     rest.add_mesh(pymeshlab.Mesh(once.points[once.point_of_survivor]))
     rest.compute_selection_point_cloud_outliers(propthreshold=0.9, knearest=16)
     rest.meshing_remove_selected_vertices()
+    kept = rest.current_mesh().vertex_matrix()
     contract = glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer())
-    return (contract | glsk.Connector(radius="2%") | glsk.Refiner(recentre=2))(rest.current_mesh().vertex_matrix())
+    radius = 0.02 * rest.current_mesh().bounding_box().diagonal()
+    return (contract | glsk.Connector(radius=radius) | glsk.Refiner(recentre=2))(kept)
 
 
 def test_a_mixed_script_does_what_its_filters_do_by_hand(points, meshes, tmp_path):
@@ -139,7 +141,11 @@ def test_our_lengths_fit_every_scale(meshes, points, tmp_path):
 
 
 def test_lengths_in_all_words(meshes, points):
-    lengths = {"2.3%": ("2.3%", pymeshlab.PercentageValue(2.3)), 0.1: (0.1, np.float64(0.1), pymeshlab.PureValue(0.1))}
+    lengths = {
+        0.023 * meshes.current_mesh().bounding_box().diagonal(): ("2.3%", pymeshlab.PercentageValue(2.3)),
+        "2.3%": ("2.3% of the frame",),
+        0.1: (0.1, np.float64(0.1), pymeshlab.PureValue(0.1)),
+    }
     contract = glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer())
     for plain, words in lengths.items():
         expected = (contract | glsk.Connector(radius=plain) | glsk.Refiner())(points)
@@ -292,7 +298,7 @@ def test_listings_have_both_kinds(capfd, meshes):
     meshes.print_filter_list()
     assert capfd.readouterr().out.split() == names
     meshes.print_filter_parameter_list("generate_skeleton_graph_glsk")
-    assert "\tradius : PercentageValue = 1% [above: 0]\n" in capfd.readouterr().out
+    assert "\tradius : PercentageValue = 1% of the frame [above: 0]\n" in capfd.readouterr().out
     with pytest.raises(InvalidParameterError, match="did you mean 'generate_skeleton_graph_glsk'"):
         meshes.print_filter_parameter_list("generate_skeleton_graf_glsk")
     meshes.search("curve skeleton")
@@ -538,7 +544,7 @@ def test_steps_of_a_session_say_which_filter_failed(meshes):
     meshes.meshing_remove_duplicate_vertices()
     with pytest.raises(ScriptError, match=r"^filter 'Generate One Rings \(GLSkeleton\)': there is no layer"):
         _emptied(meshes).apply_filter_script()
-    meshes._steps = meshes._steps[1:]
+    meshes._script.steps = meshes._script.steps[1:]
     with pytest.raises(ScriptError, match=r"^filter 'Remove Duplicate Vertices': "):
         _emptied(meshes).apply_filter_script()
 

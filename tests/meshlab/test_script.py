@@ -207,7 +207,7 @@ def test_meshlab_filters_without_pymeshlab(tmp_path, monkeypatch):
     with pytest.raises(MissingPackageError) as caught:
         read_steps("s.mlx")
     assert str(caught.value) == (
-        "s.mlx, line 3: filter 'Select Outliers' is MeshLab's own: pymeshlab cannot be imported: "
+        "s.mlx: 'Select Outliers' (line 3) is a filter of MeshLab's own: pymeshlab cannot be imported: "
         'pip install "glsk-o3d[meshlab]"'
     )
     (tmp_path / "s.mlx").write_text(_ours('  <Param type="RichInt" name="ringbuilder_k" value="12"/>'))
