@@ -1,6 +1,6 @@
 """MTG, the multiscale tree graphs of plant modellers: keeps places, radii and axes of trees; loses all else.
 
-The syntax is that of AMAPmod (Godin et al. 1999), FORM-A: a plant is decomposed into nodes, a line each. ``<`` goes on
+The model is that of Godin and Caraglio (1998), the syntax that of AMAPmod, FORM-A: a plant is decomposed into nodes, a line each. ``<`` goes on
 along an axis, ``+`` branches off one column further right, and ``^`` continues what is above it in its column.
 """
 
