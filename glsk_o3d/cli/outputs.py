@@ -73,7 +73,7 @@ def check_findings(files: Iterable[tuple[Path | None, str | tuple[str, ...], str
         if path is None:
             continue
         if not path.name.lower().endswith(ending):
-            known = ending if isinstance(ending, str) else ", ".join(ending)
+            known = ending if isinstance(ending, str) else " or ".join(ending)
             raise WrongUsage(f"{path}: the {what} and its name ends in {known}")
         if os.path.realpath(path) in taken:
             raise WrongUsage(f"{path}: is an input: choose another name")

@@ -1,7 +1,8 @@
 """MTG, the multiscale tree graphs of plant modellers: keeps places, radii and axes of trees; loses all else.
 
-The model is that of Godin and Caraglio (1998), the syntax that of AMAPmod, FORM-A: a plant is decomposed into nodes, a line each. ``<`` goes on
-along an axis, ``+`` branches off one column further right, and ``^`` continues what is above it in its column.
+The model is that of Godin and Caraglio (1998), the syntax that of AMAPmod, FORM-A: a plant is decomposed into nodes, a
+line each. ``<`` goes on along an axis, ``+`` branches off one column further right, and ``^`` continues what is above
+it in its column.
 """
 
 from __future__ import annotations

@@ -94,7 +94,7 @@ def test_a_tree_taller_than_any_is_in_doubt(invoke, tmp_path, y):
         (2, ["y.ply", "--unit", "yard"], "unit = 'yard': must be metres"),
         (2, ["ring.json"], "1 loops: cylinders are of trees; cut them with 'glsk edit --cut-loops', or make one with"),
         (2, ["two.json"], "2 components: cylinders are of one tree; keep one with 'glsk edit --largest', or join them"),
-        (2, ["y.ply", "-o", "c.xlsx"], "its name ends in .qsm.csv, .mat, .txt, .csv"),
+        (2, ["y.ply", "-o", "c.xlsx"], "its name ends in .qsm.csv or .mat or .txt or .csv"),
     ],
 )
 def test_refuses(invoke, tmp_path, y, code, words, message):
