@@ -75,9 +75,10 @@ $(VENV)/.installed-demo: pyproject.toml | $(BIN)/python
 	@$(PIP) install --editable '.[pictures]'
 	@touch $@
 
-$(VENV)/.installed-test: pyproject.toml | $(BIN)/python
+$(VENV)/.installed-test: pyproject.toml tests/readers.txt | $(BIN)/python
 	@echo "Installing glsk-o3d and what its tests need into $(VENV); the first time this takes a minute or more"
 	@$(PIP) install --editable '.[test,lint]'
+	@$(PIP) install --no-deps -r tests/readers.txt
 	@touch $@ $(VENV)/.installed-demo
 
 $(VENV)/.installed-docs: pyproject.toml | $(BIN)/python

@@ -25,6 +25,7 @@ from .errors import (
 from .interop.clouds import Cloud
 from .io.annotation import annotate_contraction
 from .io.axes import read_truth
+from .io.cylinders import save_cylinders
 from .io.scans import read_cloud, read_tensor_cloud
 from .io.skeletons import read_skeleton, save_skeleton
 from .lpr_reducer import LPRReducer
@@ -90,6 +91,7 @@ __all__ = [
     "remove_redundant_points",
     "rerun",
     "save_assessment",
+    "save_cylinders",
     "save_preview",
     "save_recipe",
     "save_report",

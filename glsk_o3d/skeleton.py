@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .analysis.loops import Loop
     from .io.colors import ColorChoice
 
-Root = int | Sequence[float] | np.ndarray | None
+Root = int | str | Sequence[float] | np.ndarray | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +216,7 @@ class Skeleton:
 
         Parameters
         ----------
-        root : int or (x, y, z), optional
+        root : str, int or (x, y, z), optional
             See `branch_table`.
 
         Returns

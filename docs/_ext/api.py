@@ -15,7 +15,7 @@ TASKS = {
     ),
     "Pipelines, and what runs in them": ("Pipeline", "Filter", "Cloud", "Contraction", "annotate_contraction"),
     "Pipelines as files": ("to_recipe", "from_recipe", "save_recipe", "load_recipe", "rerun"),
-    "Reading and writing": ("read_cloud", "read_skeleton", "save_skeleton", "read_truth"),
+    "Reading and writing": ("read_cloud", "read_skeleton", "save_skeleton", "save_cylinders", "read_truth"),
     "Looking": ("plot_skeleton", "save_preview", "save_report", "save_assessment", "ContractionRecorder"),
     "In MeshLab's way": ("MeshSet",),
     "Errors and warnings": (

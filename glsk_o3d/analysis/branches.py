@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InvalidParameterError
 from ..numerics.polylines import place_at
+from ..refinement.rooted import root_among
 from .branch_rows import BranchTable
 from .curvature import curvature_torsion
 from .growth import axes, grow
@@ -27,11 +28,12 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     Parameters
     ----------
     skeleton : Skeleton
-    root : int or (x, y, z), optional
-        A vertex, or a point whose nearest vertex it is. Its branch, or all that meet there, are those of level 0 in its
-        component. By default that is where the tree was made to grow from, if it was. In other components, and else, it
-        is the branch with the most volume (the longest one, where radii are unknown), with its free or thicker end for
-        a start.
+    root : str, int or (x, y, z), optional
+        As of `editing.reroot`: ``"x"`` to ``"-z"`` for the vertex that is lowest along this axis, ``"thickest"`` for
+        the thickest end, a vertex, or a point whose nearest vertex it is. Its branch, or all that meet there, are those
+        of level 0 in its component. By default that is where the tree was made to grow from, if it was. In other
+        components, and else, it is the branch with the most volume (the longest one, where radii are unknown), with its
+        free or thicker end for a start.
 
     Returns
     -------
@@ -40,7 +42,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     Raises
     ------
     InvalidParameterError
-        The skeleton is empty, or the root is neither a vertex nor a point.
+        The skeleton is empty, or there is no such root.
 
     Examples
     --------
@@ -54,7 +56,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     if m == 0:
         raise InvalidParameterError("the skeleton is empty: it has no branches to measure")
     root = skeleton.report.root or None if root is None else root
-    chosen = None if root is None else _root_vertex(skeleton, root)
+    chosen = None if root is None else root_among(skeleton.vertices, skeleton, root)
     paths = [*skeleton.branches, *np.flatnonzero(skeleton.degree == 0)[:, None]]
     steps = [np.linalg.norm(np.diff(skeleton.vertices[path], axis=0), axis=1) for path in paths]
     length = np.array([step.sum() for step in steps])
@@ -97,21 +99,6 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         axis=axis,
         order=order,
     )
-
-
-def _root_vertex(skeleton, root) -> int:
-    m = len(skeleton.vertices)
-    if isinstance(root, (int, np.integer)) and not isinstance(root, bool):
-        if not 0 <= root < m:
-            raise InvalidParameterError(f"root = {root}: there are vertices 0 to {m - 1}")
-        return int(root)
-    try:
-        point = np.asarray(root, float)
-    except (TypeError, ValueError):
-        point = np.empty(0)
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise InvalidParameterError(f"root = {root!r}: must be the number of a vertex or a point (x, y, z)")
-    return int(np.argmin(np.linalg.norm(skeleton.vertices - point, axis=1)))
 
 
 def _mean(values, weights):

@@ -15,6 +15,8 @@ from ..numerics.vectors import AXES, TINY, along_axis
 from .tree_cylinders import OUTSIDE, cylinders
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
+TALLEST_TREE = 116.07  # published: metres, Hyperion, the tallest tree known, as measured in 2019
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}  # derived: of the international inch and foot
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,12 @@ class TreeMeasures:
     traced : float
         Share of the volume that has confidence 0: twigs without a surface, leaves, and what noise has spoilt. NaN if
         confidences are not known.
+    root : (x, y, z)
+        The foot of the stem, from which heights count, in the cloud's units.
+    up : str
+        The axis that was taken to point up.
+    unit : float
+        Metres of one unit of the cloud.
 
     Examples
     --------
@@ -57,21 +65,25 @@ class TreeMeasures:
     area: tuple[float, ...]
     volume: tuple[float, ...]
     traced: float
+    root: tuple[float, float, float]
+    up: str
+    unit: float
 
 
-def tree_measures(skeleton: Any, root: Any = None, *, up: str = "z", unit: float = 1.0) -> TreeMeasures:
+def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, unit: float | str = 1.0) -> TreeMeasures:
     """Measure a tree as foresters do.
 
     Parameters
     ----------
     skeleton : Skeleton
         One tree, as from `glsk_o3d.pipelines.tree`.
-    root : int or (x, y, z), optional
-        See `branch_table`.
-    up : {"x", "y", "z", "-x", "-y", "-z"}
-        Axis that points up.
-    unit : float
-        Metres of one unit of the cloud: 0.001 for millimetres.
+    root : str, int or (x, y, z), optional
+        See `cylinders`.
+    up : {"x", "y", "z", "-x", "-y", "-z"}, optional
+        Axis that points up. By default that along which the tree was made to grow, by `root` here or in the pipeline
+        `tree`; else ``"z"``.
+    unit : float or {"m", "cm", "mm", "in", "ft"}
+        One unit of the cloud, in metres or by its name.
 
     Returns
     -------
@@ -80,25 +92,24 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str = "z", unit: float
     Raises
     ------
     InvalidParameterError
-        See `cylinders`; or `up` is no axis, or `unit` is not positive.
+        See `cylinders`; or `up` is no axis, or `unit` is neither positive nor one of these.
 
     Warns
     -----
     SkeletonWarning
-        The root is in the upper half of the tree.
+        The root is in the upper half of the tree, or the tree is taller than any: units are hardly as said.
 
     Examples
     --------
     >>> from glsk_o3d import pipelines
     >>> from glsk_o3d.samples import tube
     >>> stem = pipelines.tree("x")(tube(2000, length=2, radius=0.1).points)
-    >>> abs(tree_measures(stem, up="x").stem_diameter - 0.2) < 0.01
+    >>> abs(tree_measures(stem).stem_diameter - 0.2) < 0.01  # up is x, as in the pipeline
     True
     """
+    up, unit = _upward(skeleton, root) if up is None else up, metres(unit)
     if up not in AXES:
         raise InvalidParameterError(f"up = {up!r}: must be 'x', 'y' or 'z', with a minus where that points down")
-    if not unit > 0:
-        raise InvalidParameterError(f"unit = {unit}: must be metres, above 0")
     pieces = cylinders(skeleton, root)
     ground = pieces.start_point[0]
 
@@ -122,12 +133,20 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str = "z", unit: float
             SkeletonWarning,
             stacklevel=2,
         )
+    tallest = float(max(high, height(_beside(skeleton)).max(initial=high)))
+    if tallest > TALLEST_TREE:
+        warnings.warn(
+            f"the tree is {tallest:.4g} m high, and none is known above {TALLEST_TREE:.0f} m: is a unit of the cloud "
+            f"{unit:g} m? pass unit=, such as 'mm'",
+            SkeletonWarning,
+            stacklevel=2,
+        )
 
     def by_order(values: np.ndarray, power: int) -> tuple[float, ...]:
         return tuple((unit**power * np.bincount(pieces.order, values)).tolist())
 
     return TreeMeasures(
-        height=float(max(high, height(_beside(skeleton)).max(initial=high))),
+        height=tallest,
         stem_diameter=float(2 * unit * pieces.radius[breast[0]]) if len(breast) else np.nan,
         crown_base=float(leaving.min()) if len(leaving) else np.nan,
         crown_width=width,
@@ -136,7 +155,48 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str = "z", unit: float
         area=by_order(pieces.area, 2),
         volume=by_order(pieces.volume, 3),
         traced=float(np.where(known, pieces.volume * (pieces.confidence == 0), np.nan).sum() / max(total, TINY)),
+        root=tuple(ground.tolist()),
+        up=up,
+        unit=unit,
     )
+
+
+def metres(unit: float | str) -> float:
+    """A unit of length in metres.
+
+    Parameters
+    ----------
+    unit : float or {"m", "cm", "mm", "in", "ft"}
+        As it is, or by its name.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    InvalidParameterError
+        It is neither positive nor one of these.
+
+    Examples
+    --------
+    >>> metres("mm"), metres(0.5)
+    (0.001, 0.5)
+    """
+    try:
+        value = METRES[unit] if isinstance(unit, str) and unit in METRES else float(unit)
+    except (TypeError, ValueError):
+        value = np.nan
+    if not 0 < value < np.inf:
+        raise InvalidParameterError(f"unit = {unit!r}: must be metres, above 0, or one of {', '.join(METRES)}")
+    return value
+
+
+def _upward(skeleton: Any, root: Any) -> str:
+    """The axis along which a tree was made to grow: by a root that is one, or by the Refiner that made it."""
+    steps = skeleton.report.recipe.get("pipeline", ())
+    asked = [root, *(step.get("root") for step in reversed(steps) if isinstance(step, dict))]
+    return next((axis for axis in asked if isinstance(axis, str) and axis in AXES), "z")
 
 
 def _beside(skeleton: Any) -> np.ndarray:

@@ -23,7 +23,8 @@ RADIUS_SAMPLES = 8  # derived: places along a cylinder at which its radius is ta
 class Cylinders(Rows, row="cylinder"):
     """One row per cylinder, from the root outwards along each branch.
 
-    Lengths are in the cloud's units.
+    Lengths are in the cloud's units. Rows and CSV also have ``diameter``, ``area`` and ``volume``: in the cloud's
+    units, their square and their cube.
 
     Attributes
     ----------
@@ -61,6 +62,11 @@ class Cylinders(Rows, row="cylinder"):
     confidence: np.ndarray
 
     @property
+    def diameter(self) -> np.ndarray:
+        """Of each, in the cloud's units."""
+        return 2 * self.radius
+
+    @property
     def volume(self) -> np.ndarray:
         """Of each, in the cube of the cloud's units."""
         return np.pi * self.radius**2 * self.length
@@ -69,6 +75,10 @@ class Cylinders(Rows, row="cylinder"):
     def area(self) -> np.ndarray:
         """Of the lateral surface of each, in the square of the cloud's units."""
         return 2 * np.pi * self.radius * self.length
+
+    def _columns(self) -> dict[str, list]:
+        derived = {"diameter": self.diameter, "area": self.area, "volume": self.volume}
+        return super()._columns() | {name: values.tolist() for name, values in derived.items()}
 
 
 def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
@@ -81,9 +91,9 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     Parameters
     ----------
     skeleton : Skeleton
-    root : int or (x, y, z), optional
-        By default `report.root`, where the pipeline `tree` made it grow from; in a file that lacks that, vertex 0 if
-        vertices are numbered from there outwards; else see `branch_table`.
+    root : str, int or (x, y, z), optional
+        See `branch_table`. By default `report.root`, where the pipeline `tree` made it grow from; in a file that lacks
+        that, vertex 0 if vertices are numbered from there outwards; else the branch with the most volume.
 
     Returns
     -------
@@ -92,8 +102,7 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     Raises
     ------
     InvalidParameterError
-        The skeleton is empty, in parts, or has loops, no branches or no radii; or the root is neither a vertex nor a
-        point.
+        The skeleton is empty, in parts, or has loops, no branches or no radii; or there is no such root.
 
     Examples
     --------

@@ -21,7 +21,12 @@ def branches(
     ],
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="CSV", help="Write the whole table, with ends, curvature and torsion."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="CSV",
+            help="Write the whole table, with ends, curvature and torsion, instead of printing it.",
+        ),
     ] = None,
     root: Root = None,
     as_json: Json = False,
@@ -49,10 +54,11 @@ def branches(
             table.to_csv(output)
         if as_json:
             print_json({"skeleton": str(skeleton), "branches": list(table)})
-        elif not quiet:
+        elif not quiet and output is None:
             _print(table)
-            if output is not None:
-                typer.echo(f"wrote {output}")
+        elif not quiet:
+            typer.echo(f"{len(table)} branches, {table.order.max() + 1} orders, length {table.length.sum():.4g}")
+            typer.echo(f"wrote {output}, in the units of {skeleton.name}")
 
 
 def _print(table: BranchTable) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import CutLoops, Output, Quiet, Verbose
+from .options import CutLoops, Output, Quiet, Verbose, root_place
 from .reporting import WrongUsage, reporting
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def edit(
         if tolerance is not None and vertices is not None:
             raise WrongUsage("--simplify and --vertices: choose one of them")
         check_outputs(output or [], skeleton=skeleton)
-        found, told = _graph(read_skeleton(skeleton), largest, cut_loops, root)
+        found, told = _graph(read_skeleton(skeleton), largest, cut_loops, root_place(root))
         pruning = dict(length=prune_length, radius=prune_radius, order=prune_order)
         found, more = _curves(found, pruning, smooth, tolerance, vertices)
         _write(found, output or [], [*told, *more], quiet)
@@ -84,7 +84,7 @@ def convert(
         _write(read_skeleton(skeleton), output, [], quiet, cut_loops)
 
 
-def _graph(skeleton: Skeleton, largest: bool, cut: bool, root: str | None) -> tuple[Skeleton, list[str]]:
+def _graph(skeleton: Skeleton, largest: bool, cut: bool, root: int | str | None) -> tuple[Skeleton, list[str]]:
     from .. import editing
 
     told = []
@@ -95,7 +95,7 @@ def _graph(skeleton: Skeleton, largest: bool, cut: bool, root: str | None) -> tu
         skeleton, ends = editing.cut_loops(skeleton)
         told += [f"cut a loop at {_place(pair.mean(axis=0))}" for pair in ends]
     if root is not None:
-        skeleton = editing.reroot(skeleton, int(root) if root.isdecimal() else root)
+        skeleton = editing.reroot(skeleton, root)
         told.append(f"grows from {_place(skeleton.vertices[0])}")
     return skeleton, told
 

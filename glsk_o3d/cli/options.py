@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .reporting import WrongUsage
-
-SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "graphml", "cgal", "polylines.txt", "vtp", "dxf", "glb"]
+SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "graphml", "cgal", "polylines.txt"]
+SKELETON_ENDINGS += ["vtp", "dxf", "glb", "mtg", "plant.csv", "urdf"]
 """Endings of skeletons; written out, since the table of formats is slow to import."""
 
 Where = Annotated[
@@ -65,9 +64,10 @@ Root = Annotated[
     str | None,
     typer.Option(
         "--root",
-        metavar="VERTEX|X,Y,Z",
-        help="Where the skeleton grows from: the number of a vertex, or a point near one. By default, where the "
-        "pipeline 'tree' made it grow from, or else its part with the most volume.",
+        metavar="ROOT",
+        help="Where the skeleton grows from: x to -z for the lowest along an axis, thickest, the number of a vertex, "
+        "or a point near one, x,y,z. By default, where it was made to grow from, or else its part with the most "
+        "volume.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout instead of tables.")]
@@ -75,11 +75,6 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but er
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print each iteration, the log, and tracebacks.")]
 
 
-def root_place(text: str | None) -> int | list[float] | None:
-    """What ``--root`` says: a vertex or a point; WrongUsage for anything else."""
-    if text is None:
-        return None
-    try:
-        return [float(word) for word in text.split(",")] if "," in text else int(text)
-    except ValueError:
-        raise WrongUsage(f"--root {text}: write the number of a vertex, or a point as x,y,z") from None
+def root_place(text: str | None) -> int | str | None:
+    """What ``--root`` says, as `refinement.rooted.root_among` takes it: the number of a vertex, or words."""
+    return int(text) if text is not None and text.isdecimal() else text

@@ -62,9 +62,9 @@ def check_outputs(
         check_writable(path)
 
 
-def check_findings(files: Iterable[tuple[Path | None, str, str]], *inputs: Path | None) -> None:
-    """Find out before computing whether what is found can be written; `files` come with ending and what they are, or
-    None.
+def check_findings(files: Iterable[tuple[Path | None, str | tuple[str, ...], str]], *inputs: Path | None) -> None:
+    """Find out before computing whether what is found can be written; `files`, or None, come with their ending, or all
+    that they may have, and what they are.
 
     WrongUsage for a wrong ending, or an input; OSError where a folder is missing, or a file cannot be written.
     """
@@ -72,8 +72,9 @@ def check_findings(files: Iterable[tuple[Path | None, str, str]], *inputs: Path 
     for path, ending, what in files:
         if path is None:
             continue
-        if path.suffix.lower() != ending:
-            raise WrongUsage(f"{path}: the {what} and its name ends in {ending}")
+        if not path.name.lower().endswith(ending):
+            known = ending if isinstance(ending, str) else " or ".join(ending)
+            raise WrongUsage(f"{path}: the {what} and its name ends in {known}")
         if os.path.realpath(path) in taken:
             raise WrongUsage(f"{path}: is an input: choose another name")
         check_writable(path)

@@ -26,6 +26,13 @@ _SAID_HERE = {
     "must be None or a whole number": "must be 0 (no limit) or a whole number",
     "make one with glsk_o3d.skeletonize": "run 'glsk skeletonize' first",
     "pass cut_loops=True to drop": "add --cut-loops to drop",
+    "cylinders are of trees; see pipelines.tree()": "cylinders are of trees; cut them with 'glsk edit --cut-loops', or "
+    "make one with 'glsk skeletonize --pipeline tree'",
+    "see pipelines.tree() and editing.largest_component()": "keep one with 'glsk edit --largest', or join them with "
+    "'glsk skeletonize --pipeline tree'",
+    "only trees have a root; see cut_loops()": "only trees have a root: add --cut-loops",
+    "keep one with editing.largest_component()": "keep one with 'glsk edit --largest'",
+    "pass unit=, such as 'mm'": "say --unit, such as --unit mm",
     "taken with recursive": "taken with --recursive",
     "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
 }

@@ -41,6 +41,15 @@ def skeletonize(
     recipe: Recipe = None,
     settings: Settings = None,
     where: Where = None,
+    root: Annotated[
+        str | None,
+        typer.Option(
+            "--root",
+            metavar="ROOT",
+            help="Make one tree that grows from there: x to -z for the lowest along an axis, thickest, or a point, "
+            "x,y,z. Short for --set Refiner.root=ROOT.",
+        ),
+    ] = None,
     save_recipe: Annotated[
         Path | None,
         typer.Option("--save-recipe", metavar="FILE", help="Also write the pipeline as run to a json or toml file."),
@@ -65,7 +74,8 @@ def skeletonize(
         from .overrides import choose
         from .running import print_results, run
 
-        chosen = choose(pipeline, recipe, settings or [], drop_invalid)
+        rooted = [f"Refiner.root={root}"] if root is not None else []
+        chosen = choose(pipeline, recipe, [*(settings or []), *rooted], drop_invalid)
         outputs = output or []
         others = {}
         if save_recipe is not None:

@@ -31,11 +31,27 @@ def tree(
         Path, typer.Argument(metavar="SKELETON", help="Of a tree, with radii: 'glsk skeletonize --pipeline tree'.")
     ],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="CSV", help="Write the cylinders, in the file's units.")
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Write the cylinders: csv in the file's units; in metres qsm.csv for rTwig, mat for TreeQSM, txt for "
+            "treetools.",
+        ),
     ] = None,
     root: Root = None,
-    up: Annotated[str, typer.Option(metavar="AXIS", help="What points up: x, y, z, -x, -y or -z.")] = "z",
-    unit: Annotated[float, typer.Option(metavar="METRES", help="Of one unit of the file: 0.001 for millimetres.")] = 1,
+    up: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXIS",
+            help="What points up: x, y, z, -x, -y or -z. By default the axis that the tree was made to grow along, "
+            "or z.",
+        ),
+    ] = None,
+    unit: Annotated[
+        str, typer.Option(metavar="UNIT", help="One unit of the file: m, cm, mm, in or ft, or its metres.")
+    ] = "m",
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -43,24 +59,29 @@ def tree(
     """Measure a tree: height, stem, crown, volume by order.
 
     Length and surface, too. Orders count from the stem, 0. Where there was no surface, radii are the scatter of the
-    points, and volumes no more than a guess. JSON and npz files say where the tree grows from.
+    points, and volumes no more than a guess. JSON and npz files say where the tree grows from. All is in metres if
+    --unit says what a unit of the file is; only a csv file of cylinders is in the units of the file.
     """
     with reporting(quiet=quiet, verbose=verbose):
         from ..analysis import cylinders, tree_measures
+        from ..analysis.forestry import metres
+        from ..io.cylinders import ENDINGS, cylinders_ending, save_cylinders
         from ..io.skeletons import read_skeleton
         from .outputs import check_findings
 
-        check_findings([(output, ".csv", "table is CSV")], skeleton)
+        check_findings([(output, ENDINGS, "file is a table of cylinders")], skeleton)
+        metres(unit)
         place, curve = root_place(root), read_skeleton(skeleton)
         measures = tree_measures(curve, place, up=up, unit=unit)
         if output is not None:
-            cylinders(curve, place).to_csv(output)
+            save_cylinders(cylinders(curve, place), output, unit)
         if as_json:
             print_json({"skeleton": str(skeleton), **asdict(measures)})
         elif not quiet:
             _print(measures)
             if output is not None:
-                typer.echo(f"wrote {output}")
+                told = f"the units of {skeleton.name}" if cylinders_ending(output) == ".csv" else "metres"
+                typer.echo(f"wrote {output}, in {told}")
 
 
 def _print(measures: TreeMeasures) -> None:

@@ -33,7 +33,7 @@ def prune(
         Least mean radius of a branch, in the same way.
     order : int, optional
         Highest order that stays, as `branch_table` counts: 0 for the stem alone.
-    root : int or (x, y, z), optional
+    root : str, int or (x, y, z), optional
         Where orders count from, see `branch_table`.
 
     Returns

@@ -15,7 +15,7 @@ from ..errors import FileFormatError, MissingPackageError
 from ..interop.atomic import write_atomically
 from ..refinement.rooted import Where
 from ..skeleton import Skeleton
-from . import dxf, gltf, graphml, json, npz, obj, ply, polylines, swc, vtp
+from . import dxf, gltf, graphml, json, mtg, npz, obj, plant_csv, ply, polylines, swc, urdf, vtp
 from .forests import as_forest
 from .graphs import NoEdges
 from .paths import SCAN_ENDINGS, existing_file, unknown_ending
@@ -51,6 +51,9 @@ FORMATS: dict[str, Format] = {
     ".vtp": Format(vtp.write),
     ".dxf": Format(dxf.write),
     ".glb": Format(gltf.write, trees=True),
+    ".mtg": Format(mtg.write, trees=True),
+    ".plant.csv": Format(plant_csv.write, trees=True),
+    ".urdf": Format(urdf.write, trees=True),
 }
 """The formats of skeletons by the ending of the file."""
 READABLE = tuple(ending for ending, format in FORMATS.items() if format.read is not None)
@@ -79,6 +82,9 @@ def save_skeleton(
     .vtp                  vertices, branches, radii, confidence           ParaView, Slicer, vmtk
     .dxf                  branches as 3D polylines; no radii              CAD, CloudCompare, GIS
     .glb                  trees, as an armature with a skin of tubes      Blender
+    .mtg                  plants: a node per vertex, axes, with radii     OpenAlea, TomatoWUR
+    .plant.csv            one plant: node, parent, ``<`` or ``+``, radii  TomatoWUR
+    .urdf                 trees, as a robot of cylinders and balls        ROS, simulators
     ===================== =============================================== =======================================
 
     Those after CGAL's are only written, not read. Numbers keep their full precision, but in glTF, which has float32.

@@ -25,7 +25,8 @@ def root_among(places: np.ndarray, skeleton: Skeleton, which: Where, thick: np.n
     places : (n, 3) float array
     skeleton : Skeleton
     which : str, int or (x, y, z)
-        ``"x"`` to ``"-z"``, ``"thickest"``, a point (also as ``"x,y,z"``), or the number of a place.
+        ``"x"`` to ``"-z"`` for the lowest along this axis, ``"thickest"``, a point (also as ``"x,y,z"``), or the number
+        of a place.
     thick : (k,) int array, optional
         Ends of the skeleton of which the thickest is taken; if there are none, of all.
 
@@ -36,7 +37,7 @@ def root_among(places: np.ndarray, skeleton: Skeleton, which: Where, thick: np.n
     Raises
     ------
     InvalidParameterError
-        There is no such root.
+        There is no such root; or it is the thickest, and radii are not known.
     """
     if isinstance(which, int | np.integer) and not isinstance(which, bool):
         if not 0 <= which < len(places):
@@ -47,9 +48,14 @@ def root_among(places: np.ndarray, skeleton: Skeleton, which: Where, thick: np.n
     if isinstance(which, str) and which == "thickest":
         choices = (thick if thick is not None else (), skeleton.leaves, np.arange(len(skeleton.vertices)))
         ends = next(each for each in choices if len(each))
+        if np.isnan(skeleton.radii[ends]).any():
+            raise InvalidParameterError("root = 'thickest': the skeleton has no radii, as of a format without them")
         place = skeleton.vertices[ends[skeleton.radii[ends].argmax()]]
     else:
-        place = np.asarray(resolve_point(which) if isinstance(which, str) else which, float)
+        try:
+            place = np.asarray(resolve_point(which) if isinstance(which, str) else which, float)
+        except (InvalidParameterError, TypeError, ValueError):
+            place = np.empty(0)
         if place.shape != (3,) or not np.isfinite(place).all():
             raise InvalidParameterError(
                 f"root = {which!r}: must be an axis, x to -z, 'thickest', a vertex, or a point (x, y, z)"

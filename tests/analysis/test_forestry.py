@@ -68,6 +68,13 @@ def test_units_and_directions(tree):
     assert tree_measures(tree, root=(0, 0, 2), up="-z").height > 1.9
 
 
+def test_up_is_the_axis_of_the_root(tree):
+    assert (tree_measures(tree).up, tree_measures(tree, "x").up) == ("z", "x")
+    assert tree_measures(by_hand(), (0, 0, 20), up="-z").root == (0, 0, 20)
+    sideways = pipelines.tree("-x")(samples.tube(1000).points)
+    assert tree_measures(sideways).up == "-x"
+
+
 def test_cylinders_grow_from_each_other(tree):
     table = cylinders(tree)
     assert (table.parent < np.arange(len(table))).all()
@@ -105,7 +112,9 @@ def test_the_root_is_the_one_that_the_tree_was_grown_from():
     assert cylinders(rooted).start_point[0].tolist() == [0, 0, 20]
 
 
-@pytest.mark.parametrize("options", [{"up": "w"}, {"up": "zz"}, {"up": "--z"}, {"unit": 0}, {"unit": np.nan}])
+@pytest.mark.parametrize(
+    "options", [{"up": "w"}, {"up": "zz"}, {"up": "--z"}, {"unit": 0}, {"unit": np.nan}, {"unit": None}]
+)
 def test_wrong_options(options):
     with pytest.raises(InvalidParameterError, match=r"up = |unit = "):
         tree_measures(by_hand(), **options)

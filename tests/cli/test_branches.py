@@ -12,8 +12,8 @@ def test_table_file_and_json_agree(invoke, tmp_path, y):
     result = invoke("branches", y, "-o", "y.csv")
     assert result.exit_code == 0
     assert result.stderr == ""
-    lines = result.stdout.splitlines()
-    assert lines[-1] == "wrote y.csv"
+    assert result.stdout.splitlines() == ["3 branches, 2 orders, length 1.5", "wrote y.csv, in the units of y.ply"]
+    lines = invoke("branches", y).stdout.splitlines()
     rows = list(read_skeleton(tmp_path / y).branch_table())
     with (tmp_path / "y.csv").open(newline="") as stream:
         assert [row["kind"] for row in csv.DictReader(stream)] == [row["kind"] for row in rows]
@@ -41,7 +41,9 @@ def test_a_closed_branch_in_json_and_csv(invoke, tmp_path):
     assert {name for name in row if row[name] is None} == {name for name in line if line[name] == ""}
 
 
-@pytest.mark.parametrize(("root", "start"), [("2", 2), ("-0.3,0,0.4", 2), ("0.4, 0, 1", 3)])
+@pytest.mark.parametrize(
+    ("root", "start"), [("2", 2), ("-0.3,0,0.4", 2), ("0.4, 0, 1", 3), ("z", 1), ("x", 2), ("-x", 3)]
+)
 def test_root(invoke, y, root, start):
     facts = json.loads(invoke("branches", y, "--json", "--root", root).stdout)
     assert [row["start"] for row in facts["branches"] if row["level"] == 0] == [start]
@@ -50,8 +52,8 @@ def test_root(invoke, y, root, start):
 @pytest.mark.parametrize(
     ("code", "words", "message"),
     [
-        (2, ["y.ply", "--root", "trunk"], "--root trunk: write the number of a vertex, or a point"),
-        (2, ["y.ply", "--root", "1,2"], "root = [1.0, 2.0]: must be the number of a vertex or a point"),
+        (2, ["y.ply", "--root", "trunk"], "root = 'trunk': must be an axis, x to -z, 'thickest', a vertex, or a point"),
+        (2, ["y.ply", "--root", "1,2"], "root = '1,2': must be an axis, x to -z, 'thickest', a vertex, or a point"),
         (2, ["y.ply", "--root", "4"], "root = 4: there are vertices 0 to 3"),
         (2, ["y.ply", "-o", "y.txt"], "y.txt: the table is CSV"),
         (1, ["y.ply", "-o", "no/y.csv"], "no: no such folder"),

@@ -55,6 +55,11 @@ def test_refuses(invoke, file, tmp_path, words, code):
     assert not (tmp_path / "new.ply").exists()
 
 
+def test_says_what_to_add_where_a_root_needs_a_tree(invoke, file, tmp_path):
+    told = invoke("edit", file, "-o", tmp_path / "new.ply", "--root", "x").stderr
+    assert " ".join(told.split()).endswith("1 loops: only trees have a root: add --cut-loops")
+
+
 def test_refuses_to_write_over_what_it_reads_or_nowhere(invoke, file):
     assert invoke("edit", file, "-o", file).exit_code == 2
     assert invoke("edit", file).exit_code == 2

@@ -183,7 +183,7 @@ def test_one_file_that_cannot_be_written_does_not_cost_the_others(invoke, scans,
     result = invoke(*words)
     assert result.exit_code == 1
     assert result.stdout.endswith("\nwrote 2.json\n")
-    assert "glsk: error: 1.swc: SWC holds trees only" in result.stderr
+    assert "glsk: error: 1.swc: this format holds trees only" in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["2.json"]
     assert json.loads(invoke(*words, "--json").stdout)["files"] == ["2.json"]
     assert invoke(*words, "--cut-loops").exit_code == 0

@@ -100,6 +100,16 @@ def test_every_named_pipeline(invoke, scans, tmp_path, name):
     assert set(report.stages) >= {repr(stage) for stage in PIPELINES[name]().stages}
 
 
+def test_a_root_makes_one_tree(invoke, scans, tmp_path):
+    result = invoke("skeletonize", scans / "ring.ply", "-o", "r.json", "--root", "-x")
+    assert result.exit_code == 0, result.stderr
+    tree = read_skeleton(tmp_path / "r.json")
+    assert (tree.n_loops, tree.n_components) == (0, 1)
+    assert tree.vertices[0].tolist() == list(tree.report.root)
+    assert tree.vertices[0, 0] == tree.vertices[:, 0].max()
+    assert tree.report.recipe["pipeline"][-1]["root"] == "-x"
+
+
 def test_the_help_names_every_pipeline():
     assert all(name in PipelineName.__metadata__[0].help for name in PIPELINES)
 

@@ -205,10 +205,14 @@ class TestGraphs:
         np.testing.assert_array_equal(left.edges, [[0, 1], [2, 3]])
         np.testing.assert_array_equal(left.vertex_of_point, [3, 2, 0, 1, 4])
 
-    @pytest.mark.parametrize("root", ["w", 9999, -1, (1, 2), "1,2", (np.nan, 0, 0), True])
+    @pytest.mark.parametrize("root", ["w", 9999, -1, (1, 2), "1,2", (np.nan, 0, 0), True, ("a", "b", "c"), [[]]])
     def test_refuses_roots_that_are_none(self, grown, root):
         with pytest.raises(InvalidParameterError):
             reroot(grown, root)
+
+    def test_none_is_the_thickest_where_radii_are_unknown(self):
+        with pytest.raises(InvalidParameterError, match="no radii"):
+            reroot(replace(graph(np.eye(3), [[0, 1], [1, 2]]), radii=np.full(3, np.nan)), "thickest")
 
     def test_refuses_loops_and_nothing(self, ring):
         with pytest.raises(InvalidParameterError, match="loops"):
