@@ -26,6 +26,7 @@ from .interop.clouds import Cloud
 from .io.annotation import annotate_contraction
 from .io.axes import read_truth
 from .io.cylinders import save_cylinders
+from .io.formats.gltf import save_rig
 from .io.scans import read_cloud, read_tensor_cloud
 from .io.skeletons import read_skeleton, save_skeleton
 from .lpr_reducer import LPRReducer
@@ -95,6 +96,7 @@ __all__ = [
     "save_preview",
     "save_recipe",
     "save_report",
+    "save_rig",
     "save_skeleton",
     "skeletonize",
     "to_recipe",

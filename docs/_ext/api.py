@@ -15,7 +15,10 @@ TASKS = {
     ),
     "Pipelines, and what runs in them": ("Pipeline", "Filter", "Cloud", "Contraction", "annotate_contraction"),
     "Pipelines as files": ("to_recipe", "from_recipe", "save_recipe", "load_recipe", "rerun"),
-    "Reading and writing": ("read_cloud", "read_skeleton", "save_skeleton", "save_cylinders", "read_truth"),
+    "Reading and writing": (
+        *("read_cloud", "read_tensor_cloud", "read_skeleton", "read_truth"),
+        *("save_skeleton", "save_cylinders", "save_rig"),
+    ),
     "Looking": ("plot_skeleton", "save_preview", "save_report", "save_assessment", "ContractionRecorder"),
     "In MeshLab's way": ("MeshSet",),
     "Errors and warnings": (
@@ -36,6 +39,7 @@ PACKAGES = {
 """What users import from."""
 MODULES = {
     "glsk_o3d.io.annotation": "Attributes on clouds",
+    "glsk_o3d.io.clouds.selection": "Some of the points",
     "glsk_o3d.io.tubes": "Tubes",
     "glsk_o3d.io.colors": "Colours",
     "glsk_o3d.parameters": "Making filters",

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
+from ..io.clouds.selection import labels
+from ..io.clouds.text_tables import holds_points
 from ..io.paths import SCAN_ENDINGS
 from ..io.scans import read_scan
-from ..io.selection import labels
-from ..io.text_tables import holds_points
 
 LISTS = (".txt", ".csv")  # what they are, their endings do not say
 RESERVED_STEMS = ("ledger", "recipe")

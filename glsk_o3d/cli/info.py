@@ -13,7 +13,7 @@ from .options import Json, Quiet, Verbose, Where
 from .reporting import holding_interrupts, reporting
 
 if TYPE_CHECKING:
-    from ..io.scanned import Scan
+    from ..io.clouds.scanned import Scan
     from ..skeleton import Skeleton
 
 FEW_VALUES = 12  # fitted: that an attribute may have for all of them to be listed

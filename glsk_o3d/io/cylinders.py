@@ -10,7 +10,7 @@ from pathlib import Path
 from ..analysis.forestry import metres
 from ..analysis.tree_cylinders import Cylinders
 from ..interop.atomic import write_atomically
-from . import treeqsm, treetools
+from .formats import treeqsm, treetools
 from .paths import unknown_ending
 
 IN_METRES: dict[str, Callable[[Cylinders], bytes]] = {

@@ -12,12 +12,12 @@ import numpy as np
 from ..errors import FileFormatError, MissingPackageError
 from ..interop.packages import import_open3d
 from ..interop.verbosity import following_open3d
-from . import e57, las, text_tables
-from .completeness import check_complete
+from .clouds import e57, las, text_tables
+from .clouds.completeness import check_complete
+from .clouds.scanned import NO_TRIANGLES, NoPoints, Scan, attribute_name, unit_colors
+from .clouds.selection import select
+from .formats.ply import ply_elements
 from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unknown_ending
-from .ply import ply_elements
-from .scanned import NO_TRIANGLES, NoPoints, Scan, attribute_name, unit_colors
-from .selection import select
 from .skeletons import holds_skeleton, read_skeleton
 
 _log = logging.getLogger(__name__)
@@ -35,7 +35,7 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
         PLY, PCD, CSV, TXT, ASC, XYZ, XYZN, XYZRGB, PTS; LAS and LAZ (extra ``las``), E57 (extra ``e57``); or a mesh
         with triangles as OFF, OBJ, STL, glTF or GLB. In text, lines that hold no point are skipped and logged.
     where : str, optional
-        Only points for which this holds, such as ``"classification == 5"``; see `glsk_o3d.io.selection.select`.
+        Only points for which this holds, such as ``"classification == 5"``; see `glsk_o3d.io.clouds.selection.select`.
 
     Returns
     -------

@@ -15,9 +15,9 @@ from ..errors import FileFormatError, MissingPackageError
 from ..interop.atomic import write_atomically
 from ..refinement.rooted import Where
 from ..skeleton import Skeleton
-from . import dxf, gltf, graphml, json, mtg, npz, obj, plant_csv, ply, polylines, swc, urdf, vtp
-from .forests import as_forest
-from .graphs import NoEdges
+from .formats import dxf, gltf, graphml, json, mtg, npz, obj, plant_csv, ply, polylines, swc, urdf, vtp
+from .formats.forests import as_forest
+from .formats.graphs import NoEdges
 from .paths import SCAN_ENDINGS, existing_file, unknown_ending
 
 
@@ -31,7 +31,7 @@ class Format(NamedTuple):
     read : callable, optional
         The skeleton in the content of a file; any error means that it is damaged. None for what is only written.
     trees : bool
-        It holds trees only: `write` gets what `glsk_o3d.io.forests.as_forest` makes.
+        It holds trees only: `write` gets what `glsk_o3d.io.formats.forests.as_forest` makes.
     """
 
     write: Callable[[Skeleton], bytes]

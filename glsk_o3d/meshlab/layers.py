@@ -14,8 +14,8 @@ from ..errors import FileFormatError
 from ..interop.atomic import write_atomically
 from ..interop.clouds import cloud_points
 from ..interop.packages import import_open3d, require
-from ..io.graphs import graph_skeleton
-from ..io.ply import ply_elements
+from ..io.formats.graphs import graph_skeleton
+from ..io.formats.ply import ply_elements
 from ..io.scans import check_scan, read_scan
 from ..io.skeletons import read_skeleton, save_skeleton, skeleton_ending
 from ..skeleton import Skeleton

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from networkx.algorithms.isomorphism import categorical_node_match
 
-from glsk_o3d.io.fields import ARRAYS, dumps
+from glsk_o3d.io.formats.fields import ARRAYS, dumps
 
 
 @pytest.fixture(scope="session")

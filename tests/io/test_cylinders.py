@@ -11,8 +11,8 @@ from scipy.io import loadmat
 
 from glsk_o3d import FileFormatError, InvalidParameterError, pipelines, samples
 from glsk_o3d.analysis import Cylinders, cylinders
-from glsk_o3d.io import treeqsm, treetools
 from glsk_o3d.io.cylinders import save_cylinders, scaled
+from glsk_o3d.io.formats import treeqsm, treetools
 
 TREEINFO_ADDS = {"volume", "diameter", "length", "strength", "min_strength", "dominance", "angle", "children", "branch"}
 TREEINFO_ADDS |= {"branch_order", "extension", "pos_in_branch", "segment_length", "branch_angle"}

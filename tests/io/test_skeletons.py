@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io import swc
-from glsk_o3d.io.forests import as_forest
+from glsk_o3d.io.formats import swc
+from glsk_o3d.io.formats.forests import as_forest
 from glsk_o3d.io.skeletons import FORMATS, READABLE, holds_skeleton, read_skeleton, save_skeleton
 from glsk_o3d.report import Report
 from glsk_o3d.skeleton import Skeleton

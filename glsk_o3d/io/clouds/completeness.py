@@ -1,0 +1,100 @@
+"""Whether a scan holds the points that its header promises.
+
+Where a PLY, PCD or PTS file breaks off, or has text for numbers, Open3D returns uninitialised memory for the rest.
+"""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from ...errors import FileFormatError
+from ..formats.ply import read_header
+
+
+class Promise(NamedTuple):
+    """What a header says of the points after it.
+
+    Attributes
+    ----------
+    points : int
+        How many there are.
+    columns : int
+        The numbers of each.
+    skip : int
+        Lines or bytes ahead of them.
+    size : int
+        Bytes of each; 0 for text.
+    """
+
+    points: int
+    columns: int
+    skip: int
+    size: int
+
+
+def check_complete(path: Path) -> None:
+    """Raise FileFormatError unless a file holds the points that it promises; other formats promise nothing.
+
+    It may also be damaged, or OSError where it may not be read.
+    """
+    with path.open("rb") as stream:  # whatever the format: where it may not be read, this says so
+        read_promise = _PROMISES.get(path.suffix.lower())
+        if read_promise is None:
+            return
+        try:
+            promise = read_promise(stream)
+            if promise is None:
+                return
+            found = _count_points(stream, promise, path.stat().st_size)
+        except (ValueError, KeyError, IndexError) as error:
+            raise FileFormatError(f"{path}: not a valid {path.suffix} file: {error}") from error
+    if found < promise.points:
+        raise FileFormatError(f"{path}: promises {promise.points} points and holds {max(found, 0)}: it breaks off")
+
+
+def _count_points(stream: BinaryIO, promise: Promise, file_size: int) -> int:
+    """The points that follow the header, counted no further than promised if they are text."""
+    if promise.size:
+        return (file_size - stream.tell() - promise.skip) // promise.size
+    lines = islice((line for line in stream if line.strip()), promise.skip, promise.skip + promise.points)
+    return sum(len([float(word) for word in line.split()[: promise.columns]]) == promise.columns for line in lines)
+
+
+# Each reads a header; None where only Open3D can tell.
+
+
+def _ply(stream: BinaryIO) -> Promise | None:
+    order, elements = read_header(stream)
+    here = [element.name for element in elements].index("vertex")
+    *before, vertex = elements[: here + 1]
+    if any(element.has_lists for element in elements[: here + 1]):
+        return None
+    skip = sum(element.rows * (element.dtype(order).itemsize if order else 1) for element in before)
+    return Promise(vertex.rows, len(vertex.properties), skip, vertex.dtype(order).itemsize if order else 0)
+
+
+def _pcd(stream: BinaryIO) -> Promise | None:
+    header: dict[str, list[str]] = {}
+    while "DATA" not in header:
+        line = stream.readline()
+        if not line:
+            raise ValueError("its header has no DATA")
+        key, *values = line.decode("ascii", "replace").split() or ["#"]
+        header[key] = values
+    if header["DATA"] not in (["ascii"], ["binary"]):
+        return None
+    counts = [int(count) for count in header.get("COUNT", ["1"] * len(header["FIELDS"]))]
+    size = sum(int(size) * count for size, count in zip(header["SIZE"], counts, strict=True))
+    return Promise(int(header["POINTS"][0]), sum(counts), 0, size if header["DATA"] == ["binary"] else 0)
+
+
+def _pts(stream: BinaryIO) -> Promise:
+    line = stream.readline(64)
+    if not line.strip().isdigit():
+        raise ValueError("its first line is not the number of points")
+    return Promise(int(line), 3, 0, 0)
+
+
+_PROMISES = {".ply": _ply, ".pcd": _pcd, ".pts": _pts}

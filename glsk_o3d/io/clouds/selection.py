@@ -1,0 +1,109 @@
+"""Which points of a scan: ``classification == 5 and z > 2``."""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Callable, Mapping
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from ...errors import InvalidCloudError, InvalidParameterError, did_you_mean
+from .scanned import Scan
+
+_COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.In: np.isin,
+    ast.NotIn: lambda values, among: ~np.isin(values, among),
+}
+_JOINS = {ast.And: np.logical_and, ast.Or: np.logical_or}
+
+
+def select(scan: Scan, where: str) -> Scan:
+    """The points of a scan for which a condition holds.
+
+    Parameters
+    ----------
+    scan : Scan
+    where : str
+        Comparisons of attributes, ``x``, ``y`` and ``z`` with numbers or with each other, joined by ``and``, ``or`` and
+        ``not``: ``classification == 5 and not 0 < z < 2``, ``treeID in (3, 4)``.
+
+    Returns
+    -------
+    Scan
+
+    Raises
+    ------
+    InvalidParameterError
+        It is no such condition, or names what the points do not have.
+    InvalidCloudError
+        It holds for no point.
+
+    Examples
+    --------
+    >>> scan = Scan(np.eye(3), attributes={"label": np.array([7, 8, 8])})
+    >>> select(scan, "label == 8 and z < 0.5").positions
+    array([[0., 1., 0.]])
+    """
+    try:
+        chosen = np.asarray(_value(parsed(where), scan.columns))
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InvalidParameterError):
+            raise
+        raise InvalidParameterError(f"where = {where!r}: cannot be compared: {error}") from None
+    if chosen.shape != (len(scan),) or chosen.dtype != bool:
+        raise InvalidParameterError(f"where = {where!r}: is no condition on points: write such as 'label == 5'")
+    if not chosen.any():
+        raise InvalidCloudError(f"there is no point with {where}")
+    return scan[chosen]
+
+
+def parsed(where: str) -> ast.expr:
+    """A condition as a tree; InvalidParameterError if it is none, or an attribute is called as a word of Python is."""
+    try:
+        return ast.parse(where.strip(), mode="eval").body
+    except SyntaxError as error:
+        raise InvalidParameterError(
+            f"where = {where!r}: {error.msg}: write such as 'classification == 5', and class_ for class"
+        ) from None
+
+
+def labels(scan: Scan, name: str) -> np.ndarray:
+    """The distinct values of an attribute, sorted; InvalidParameterError if the points do not have it."""
+    return np.unique(_column(name, scan.attributes))
+
+
+def _column(name: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    if name not in columns:
+        raise InvalidParameterError(did_you_mean(name, columns, "attribute of the points"))
+    return columns[name]
+
+
+def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
+    """What a part of an expression comes to; nothing but the grammar of `select` is let through."""
+    match node:
+        case ast.BoolOp(op=op, values=parts):
+            return reduce(_JOINS[type(op)], [_value(part, columns) for part in parts])
+        case ast.UnaryOp(op=ast.Not(), operand=part):
+            return np.logical_not(_value(part, columns))
+        case ast.UnaryOp(op=ast.USub(), operand=part):
+            return -_value(part, columns)
+        case ast.Compare(left=left, ops=ops, comparators=rest) if all(type(op) in _COMPARISONS for op in ops):
+            sides = [_value(part, columns) for part in (left, *rest)]
+            pairs = zip(ops, sides, sides[1:], strict=False)
+            return reduce(np.logical_and, [_COMPARISONS[type(op)](a, b) for op, a, b in pairs])
+        case ast.Tuple(elts=parts) | ast.List(elts=parts) | ast.Set(elts=parts):
+            return [_value(part, columns) for part in parts]
+        case ast.Constant(value=int() | float() as number):
+            return number
+        case ast.Name(id=name):
+            return _column(name, columns)
+    raise InvalidParameterError(f"{ast.unparse(node)!r} is not understood: compare attributes with numbers")

@@ -1,0 +1,195 @@
+"""Clouds as text: x, y and z in columns, with or without a line of names; colours, normals and all else are kept.
+
+CSV, TXT, ASC, PTS and the XYZ family: the columns are parted by spaces, tabs, commas or semicolons, numbers may have a
+decimal comma, and lines ahead of the first three numbers are a header. Without names the columns after z are colours if
+three are whole numbers up to 255, normals if they have the length 1.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import re
+from collections.abc import Sequence
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple, TextIO
+
+import numpy as np
+
+from ...interop.verbosity import following_open3d
+from .scanned import COLOR_CHANNELS, NoPoints, Scan, attribute_name, unit_colors
+
+_log = logging.getLogger(__name__)
+
+HEADER_LINES = 100  # fitted to nothing: longer headers are those of other files
+UNIT_SLACK = 0.01  # measured: normals in text have two digits at the least
+_ROLES = {
+    **dict.fromkeys(("x", "easting"), "x"),
+    **dict.fromkeys(("y", "northing"), "y"),
+    **dict.fromkeys(("z", "height", "elevation", "altitude"), "z"),
+    **dict.fromkeys(("r", "red", "rf"), "red"),
+    **dict.fromkeys(("g", "green", "gf"), "green"),
+    **dict.fromkeys(("b", "blue", "bf"), "blue"),
+    **{name: name for name in ("nx", "ny", "nz")},
+    **{f"{word}{mark}{axis}": f"n{axis}" for word in ("normal", "n") for mark in ("_", "") for axis in "xyz"},
+}
+_NORMALS = ["nx", "ny", "nz"]
+_BY_ENDING = {
+    ".xyzn": [*"xyz", *_NORMALS],
+    ".xyzrgb": [*"xyz", *COLOR_CHANNELS],
+    ".pts": [*"xyz", "intensity", *COLOR_CHANNELS],
+}
+
+
+class Layout(NamedTuple):
+    """How a file of text is laid out.
+
+    Attributes
+    ----------
+    skip : int
+        Lines of the header.
+    delimiter : str or None
+        None for any white space.
+    decimal_comma : bool
+    names : list of str
+        Of the columns, empty where the file has none.
+    columns : list of int
+        Those with numbers, by the first line that has three.
+    """
+
+    skip: int
+    delimiter: str | None
+    decimal_comma: bool
+    names: list[str]
+    columns: list[int]
+
+
+def holds_points(path: Path) -> bool:
+    """Whether a file of text looks like a cloud: a line has three numbers, and columns with names have x, y and z."""
+    try:
+        with path.open(encoding="utf-8-sig", errors="strict") as stream:
+            layout = _layout(stream)
+    except (NoPoints, UnicodeError, OSError):
+        return False
+    return not layout.names or {"x", "y", "z"} <= set(map(_role, layout.names))
+
+
+def read(path: Path) -> Scan:
+    """The points of a file of text; NoPoints if there is none. Lines that hold no point are skipped and logged."""
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:
+        layout = _layout(stream)
+        stream.seek(0)
+        rows = _rows(stream, layout, path)
+    names = [layout.names[column] for column in layout.columns] if layout.names else []
+    roles = [_role(name) for name in names] or _guess(rows, path.suffix.lower())
+    if not {"x", "y", "z"} <= set(roles):
+        raise NoPoints(f"none of its columns is called x, y or z: they are {', '.join(layout.names)}")
+
+    def together(wanted: Sequence[str]) -> np.ndarray | None:
+        return rows[:, [roles.index(role) for role in wanted]] if set(wanted) <= set(roles) else None
+
+    positions, colors, normals = rows[:, list(map(roles.index, "xyz"))], together(COLOR_CHANNELS), together(_NORMALS)
+    used = {*"xyz", *(COLOR_CHANNELS if colors is not None else ()), *(_NORMALS if normals is not None else ())}
+    attributes: dict[str, np.ndarray] = {}
+    for i, role in enumerate(roles):
+        if role not in used or i != roles.index(role):
+            given = names[i] if names else role or f"column_{layout.columns[i] + 1}"
+            attributes[attribute_name(given, attributes)] = _whole(rows[:, i])
+    return Scan(positions, None if colors is None else unit_colors(colors), normals, attributes)
+
+
+def _layout(stream: TextIO) -> Layout:
+    names: list[str] = []
+    for skip, line in enumerate(islice(stream, HEADER_LINES)):
+        comment = re.match(r"\s*(#|//|%)", line)
+        words, delimiter, decimal_comma = _parted(line[comment.end() :] if comment else line)
+        columns = [] if comment else [i for i, word in enumerate(words) if _is_number(word)]
+        if len(columns) >= 3:
+            names = names if len(names) == len(words) else []
+            return Layout(skip, delimiter, decimal_comma, names, columns)
+        if len(words) >= 3 and sum(map(_is_number, words)) < len(words) / 2:
+            names = [word.strip().strip("\"'") for word in words]
+    raise NoPoints("no line of its beginning has three numbers")
+
+
+def _parted(line: str) -> tuple[list[str], str | None, bool]:
+    """The words of a line, what parts them, and whether they have a decimal comma."""
+    line = line.strip()
+    delimiter = ";" if ";" in line else "," if "," in line else None
+    words = [word.strip() for word in line.split(delimiter if delimiter == ";" else None)]
+    if "," in line and len(words) >= 3 and all(re.fullmatch(r"[-+]?\d*(,\d+)?([eE][-+]?\d+)?", word) for word in words):
+        return [word.replace(",", ".") for word in words], delimiter if delimiter == ";" else None, True
+    return [word.strip() for word in line.split(delimiter)], delimiter, False
+
+
+def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
+    """The numbers, (N, C) float array; cells without a number are NaN, but rows without a place are left out."""
+    lines = islice(stream, layout.skip, None)
+    source = io.StringIO("".join(lines).replace(",", ".")) if layout.decimal_comma else stream
+    comments = ["#", "//", "%"]
+    try:
+        skip = 0 if layout.decimal_comma else layout.skip
+        return np.loadtxt(
+            source, delimiter=layout.delimiter, comments=comments, skiprows=skip, usecols=layout.columns, ndmin=2
+        )
+    except ValueError:  # some line is not like the others
+        stream.seek(0)
+    found, lost = [], 0
+    for line in islice(stream, layout.skip, None):
+        text = re.split(r"#|//|%", line, maxsplit=1)[0].strip()
+        if not text:
+            continue
+        words = (text.replace(",", ".") if layout.decimal_comma else text).split(layout.delimiter)
+        row = [_number(words[i]) if i < len(words) else np.nan for i in layout.columns]
+        if len([True for i in layout.columns[:3] if i < len(words) and _is_number(words[i])]) == 3:
+            found.append(row)
+        else:
+            lost += 1
+    if lost:
+        with following_open3d():
+            _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(found))
+    return np.array(found, float).reshape(-1, len(layout.columns))
+
+
+def _guess(rows: np.ndarray, ending: str) -> list[str]:
+    """What the columns of a file without names are; empty for those of which nothing is known."""
+    n = rows.shape[1]
+    known = _BY_ENDING.get(ending, [])
+    if ending == ".pts" and n == 6:
+        known = [*"xyz", *COLOR_CHANNELS]
+    roles = [*(known[:n] or "xyz")]
+    roles += [""] * (n - len(roles))
+    for start in (3, 4) if not known else ():
+        three = rows[:, start : start + 3]
+        if three.shape[1] == 3 and "red" not in roles and "nx" not in roles:
+            if (three == np.round(three)).all() and three.min() >= 0 and 1 < three.max() <= 255:
+                roles[start : start + 3] = COLOR_CHANNELS
+            elif (np.abs(np.linalg.norm(three, axis=1) - 1) < UNIT_SLACK).all():
+                roles[start : start + 3] = _NORMALS
+    return roles
+
+
+def _role(name: str) -> str:
+    """What a column is, by its name; a unit in brackets does not matter."""
+    word = re.sub(r"[\[(].*", "", name).strip().lower()
+    return _ROLES.get(word, name)
+
+
+def _whole(values: np.ndarray) -> np.ndarray:
+    """As integers, where they all are."""
+    with np.errstate(invalid="ignore"):
+        whole = np.isfinite(values).all() and (np.abs(values) < 2**31).all() and (values == np.round(values)).all()
+    return values.astype(np.int64) if whole else values
+
+
+def _number(word: str) -> float:
+    return float(word) if _is_number(word) else np.nan
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return "_" not in word

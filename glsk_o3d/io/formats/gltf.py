@@ -1,0 +1,197 @@
+"""glTF 2.0, binary: keeps trees, as an armature with a bone per edge, and a surface, or points, that it moves.
+
+Blender and other programs for animation open it. Bones are called by their branch. Radii are in the surface only, and
+numbers are float32, as glTF's are; of coordinates as on a map the large part is a shift of the whole.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any
+
+import numpy as np
+
+from ...analysis.segmentation import branch_of_edge, vertex_of_cloud
+from ...analysis.skinning import skin_weights
+from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
+from ...interop.atomic import check_ending, write_atomically
+from ...interop.clouds import cloud_points, open3d_class
+from ...refinement.rooted import Where
+from ...skeleton import Skeleton
+from .forests import as_forest, global_shift, parents
+
+MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
+COMPONENT_TYPES = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
+POINTS_MODE, TRIANGLES_MODE = 0, 4  # published: glTF 2.0, 5.24
+UPRIGHT = {"z": [-(0.5**0.5), 0.0, 0.0, 0.5**0.5], "y": [0.0, 0.0, 0.0, 1.0]}  # derived: turns up into glTF's y
+
+
+def save_rig(
+    skeleton: Skeleton,
+    path: str | os.PathLike,
+    mesh: Any = None,
+    *,
+    cut_loops: bool = False,
+    root: Where | None = None,
+    up: str = "z",
+) -> None:
+    """Write a mesh or a cloud with a skeleton's armature that moves it, as a binary glTF file.
+
+    Each edge is a bone. Its joint is at the end that is nearer to the root, so that every branch turns by itself. The
+    weights are those of `glsk_o3d.analysis.skinning.skin_weights`.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    path : path-like
+        Ends in ``.glb``.
+    mesh : triangle mesh or cloud, optional
+        Of Open3D, or anything that carries points. By default the skeleton's tubes, or if it has no radii, its points.
+    cut_loops : bool
+        Cut loops of the skeleton open instead of refusing them; the surface stays whole.
+    root : str, int or (x, y, z), optional
+        Which joint moves all others; as for `glsk_o3d.editing.reroot`.
+    up : {"z", "y"}
+        Which axis of the data points up. In glTF y does; programs turn it into what is theirs.
+
+    Raises
+    ------
+    FileFormatError
+        The skeleton has loops, or no edges; or the ending is another.
+    InvalidCloudError
+    InvalidParameterError
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import sauropod
+    >>> body = skeletonize(sauropod(4096).points)
+    >>> with TemporaryDirectory() as folder:
+    ...     save_rig(body, f"{folder}/animal.glb", cut_loops=True, root="thickest")
+    """
+    check_ending(path, "rig is binary glTF", ".glb")
+    if up not in UPRIGHT:
+        raise InvalidParameterError(f"up = {up!r}: must be one of {', '.join(UPRIGHT)}")
+    data = _content(as_forest(skeleton, cut_loops, root), _surface(skeleton) if mesh is None else mesh, up)
+    write_atomically(path, lambda temporary: temporary.write_bytes(data))
+
+
+def write(forest: Skeleton) -> bytes:
+    """The content of a GLB file: the tubes of a skeleton that is numbered from its roots outwards, and its armature."""
+    return _content(forest, _surface(forest), "z")
+
+
+def _surface(skeleton: Skeleton) -> Any:
+    known = np.isfinite(skeleton.radii).all() or len(skeleton.points) == 0
+    return skeleton.to_tubes((1, 1, 1)) if known else skeleton.points[skeleton.vertex_of_point >= 0]
+
+
+def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
+    if len(forest.edges) == 0:
+        raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
+    points, triangles = cloud_points(mesh), _triangles(mesh)
+    if not np.isfinite(points).all():
+        raise InvalidCloudError("the surface has points that are not finite: drop them first")
+    origin = global_shift(forest)
+    buffer = _Buffer()
+    nodes, heads = _bones(forest, origin)
+    bones, weights = skin_weights(forest, points, vertex_of_cloud(forest, points)[1])
+    inverse = np.tile(np.eye(4), (len(heads), 1, 1))
+    inverse[:, :3, 3] = -heads
+    attributes = {
+        "POSITION": buffer.add(points - origin, "f4", "VEC3", bounds=True),
+        "JOINTS_0": buffer.add(np.pad(bones, ((0, 0), (0, 2))) * (np.pad(weights, ((0, 0), (0, 2))) > 0), "u2", "VEC4"),
+        "WEIGHTS_0": buffer.add(np.pad(weights, ((0, 0), (0, 2))), "f4", "VEC4"),
+    }
+    primitive: dict[str, Any] = {"attributes": attributes, "mode": POINTS_MODE}
+    if len(triangles):
+        primitive |= {"indices": buffer.add(triangles.reshape(-1), "u4", "SCALAR"), "mode": TRIANGLES_MODE}
+    place = {"translation": _upright(origin, up), "rotation": UPRIGHT[up]}
+    roots = [i for i, edge in enumerate(forest.edges[:, 0]) if parents(forest)[edge] < 0]
+    n = len(nodes)
+    tree = {
+        "asset": {"version": "2.0", "generator": "glsk-o3d"},
+        "scene": 0,
+        "scenes": [{"nodes": [n, n + 1]}],
+        "nodes": [*nodes, {"name": "armature", "children": roots, **place}, {"name": "surface", "mesh": 0, "skin": 0}],
+        "meshes": [{"primitives": [primitive]}],
+        "skins": [
+            {
+                "joints": list(range(n)),
+                "skeleton": n,
+                "inverseBindMatrices": buffer.add(inverse.transpose(0, 2, 1).reshape(-1, 16), "f4", "MAT4"),
+            }
+        ],
+        **buffer.described(),
+    }
+    return _binary(tree, buffer.data)
+
+
+def _upright(place: np.ndarray, up: str) -> list[float]:
+    """A place of the data in glTF's axes."""
+    x, y, z = place.tolist()
+    return [x, z, -y] if up == "z" else [x, y, z]
+
+
+def _triangles(mesh: Any) -> np.ndarray:
+    name, tensor = open3d_class(mesh)
+    if name != "TriangleMesh":
+        return np.empty((0, 3), int)
+    return mesh.triangle.indices.cpu().numpy() if tensor else np.asarray(mesh.triangles)
+
+
+def _bones(forest: Skeleton, origin: np.ndarray) -> tuple[list[dict[str, Any]], np.ndarray]:
+    """The joints, one per edge, each placed from the one before it; and where they are from the origin."""
+    edges, branch = forest.edges, branch_of_edge(forest)
+    heads = forest.vertices[edges[:, 0]] - origin
+    before = np.full(len(forest.vertices), -1)
+    before[edges[:, 1]] = np.arange(len(edges))
+    parent = before[edges[:, 0]]
+    moved = np.where((parent >= 0)[:, None], heads - heads[parent], heads)
+    count: dict[int, int] = {}
+    nodes: list[dict[str, Any]] = []
+    for label, place in zip(branch.tolist(), moved.tolist(), strict=True):
+        count[label] = count.get(label, -1) + 1
+        nodes.append({"name": f"branch_{label}.{count[label]:03d}", "translation": place})
+    for child, bone in enumerate(parent.tolist()):
+        if bone >= 0:
+            nodes[bone].setdefault("children", []).append(child)
+    return nodes, heads
+
+
+class _Buffer:
+    """Arrays one after another, and what glTF says of each."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def add(self, values: np.ndarray, kind: str, shape: str, *, bounds: bool = False) -> int:
+        """The number by which an array is known."""
+        array = np.ascontiguousarray(values, f"<{kind}")
+        self.data += bytes(-len(self.data) % 4)
+        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": array.nbytes})
+        facts = {"bufferView": len(self.views) - 1, "componentType": COMPONENT_TYPES[kind], "count": len(array)}
+        limits = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if bounds else {}
+        self.accessors.append({**facts, "type": shape, **limits})
+        self.data += array.tobytes()
+        return len(self.accessors) - 1
+
+    def described(self) -> dict[str, Any]:
+        """The part of the file's tree that says what is where."""
+        return {"accessors": self.accessors, "bufferViews": self.views, "buffers": [{"byteLength": len(self.data)}]}
+
+
+def _binary(tree: dict[str, Any], data: bytearray) -> bytes:
+    """A tree and its buffer as the chunks of a binary file."""
+    text = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    body = bytes(data) + bytes(-len(data) % 4)
+    chunks = b"".join(
+        len(chunk).to_bytes(4, "little") + kind.to_bytes(4, "little") + chunk
+        for kind, chunk in ((JSON_CHUNK, text), (BINARY_CHUNK, body))
+    )
+    return b"".join(n.to_bytes(4, "little") for n in (MAGIC, 2, 12 + len(chunks))) + chunks

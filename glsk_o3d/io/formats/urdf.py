@@ -1,0 +1,117 @@
+"""URDF: a tree as a robot model of capsules; keeps vertices, edges and radii, loses all else, and is not read back.
+
+Planning scenes, RViz and simulators open it. URDF knows no capsule: a link is a cylinder along an edge, and a ball at
+the vertex that it leads to. Lengths are taken as metres, as URDF has them.
+"""
+
+from __future__ import annotations
+
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+
+from ...errors import FileFormatError
+from ...numerics.vectors import norm
+from ...skeleton import Skeleton
+from .text import line
+
+URDF_DENSITY = 1000.0  # published: of water, in kg/m³; fresh wood and most plants are near it
+
+
+def write(skeleton: Skeleton) -> bytes:
+    """The content of a URDF file.
+
+    Vertex i has ``link_i``, on the fixed joint ``joint_i``; the links of roots stand on the link ``base``, at the
+    origin of the cloud. A link's frame is where it can bend: at the vertex that it comes from, of a root at the vertex
+    itself. Frames are not turned, and each is placed relative to the one before, so that a large offset of the whole
+    cloud is in the joints of the roots alone. Both visual and collision are the ball of the vertex and the cylinder
+    that leads to it, as thick as its ends on average; what has no size is left out. Masses are those of solid cylinders
+    of `URDF_DENSITY`, of a root that of its ball.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        A forest whose edges lead away from its roots, from the smaller to the larger vertex, as of
+        `glsk_o3d.editing.reroot`; with radii.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    FileFormatError
+        A vertex has two smaller neighbours, as in loops; or coordinates or radii are not known.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Skeleton
+    >>> stick = Skeleton([[0, 0, 0], [0, 0, 1]], [[0, 1]], [0.1, 0.1], (), (), ())
+    >>> [row.strip() for row in write(stick).decode().splitlines() if "<link" in row]
+    ['<link name="base" />', '<link name="link_0">', '<link name="link_1">']
+    """
+    _check(skeleton)
+    vertices, radii = skeleton.vertices, skeleton.radii
+    parent = np.arange(len(vertices))
+    parent[skeleton.edges[:, 1]] = skeleton.edges[:, 0]
+    root = parent == np.arange(len(vertices))
+    frame = vertices[parent]
+    steps = frame - np.where(root[:, None], 0.0, frame[parent])
+    span = vertices - frame
+    length, thickness = norm(span), (radii + radii[parent]) / 2
+    mass, across, along = _solids(length, thickness, root)  # a root has no cylinder
+    # a cylinder lies along z: tilt it about y, then turn it about z
+    turn = np.column_stack(
+        [0 * length, np.arctan2(np.hypot(*span.T[:2]), span[:, 2]), np.arctan2(span[:, 1], span[:, 0])]
+    )
+
+    robot = Element("robot", name="skeleton")
+    SubElement(robot, "link", name="base")
+    for i in range(len(vertices)):
+        link = SubElement(robot, "link", name=f"link_{i}")
+        if mass[i] > 0:
+            inertial = SubElement(link, "inertial")
+            SubElement(inertial, "origin", xyz=line(*span[i] / 2), rpy=line(*turn[i]))
+            SubElement(inertial, "mass", value=line(mass[i]))
+            moments = dict(ixx=across[i], ixy=0.0, ixz=0.0, iyy=across[i], iyz=0.0, izz=along[i])
+            SubElement(inertial, "inertia", {name: line(value) for name, value in moments.items()})
+        for use in ("visual", "collision"):
+            if length[i] > 0 and thickness[i] > 0:
+                _shape(link, use, "cylinder", span[i] / 2, turn[i], radius=thickness[i], length=length[i])
+            if radii[i] > 0:
+                _shape(link, use, "sphere", span[i], np.zeros(3), radius=radii[i])
+        joint = SubElement(robot, "joint", name=f"joint_{i}", type="fixed")
+        SubElement(joint, "origin", xyz=line(*steps[i]))
+        SubElement(joint, "parent", link="base" if root[i] else f"link_{parent[i]}")
+        SubElement(joint, "child", link=f"link_{i}")
+    indent(robot)
+    return tostring(robot, encoding="utf-8", xml_declaration=True) + b"\n"
+
+
+def _check(skeleton: Skeleton) -> None:
+    if skeleton.n_loops or len(np.unique(skeleton.edges[:, 1])) < len(skeleton.edges):
+        what = (
+            f"the skeleton has {skeleton.n_loops} loop(s)" if skeleton.n_loops else "the edges do not lead from a root"
+        )
+        raise FileFormatError(f"URDF holds trees only and {what}: see glsk_o3d.editing.cut_loops and reroot")
+    if not np.isfinite(skeleton.vertices).all():
+        raise FileFormatError("URDF needs finite coordinates, and some vertices have none")
+    unknown = np.count_nonzero(~np.isfinite(skeleton.radii))
+    if unknown:
+        raise FileFormatError(
+            f"URDF needs radii, and {unknown} of {len(skeleton.radii)} vertices have none: "
+            "read the skeleton from a format that holds them, such as .json or .ply, or skeletonise the cloud again"
+        )
+
+
+def _solids(length: np.ndarray, radius: np.ndarray, ball: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Masses of cylinders, or of balls where `ball` says so, and their moments of inertia across and along the axis."""
+    mass = URDF_DENSITY * np.pi * radius**2 * np.where(ball, radius * 4 / 3, length)
+    along = mass * radius**2 * np.where(ball, 2 / 5, 1 / 2)
+    return mass, np.where(ball, along, along / 2 + mass * length**2 / 12), along
+
+
+def _shape(link: Element, use: str, kind: str, place: np.ndarray, turn: np.ndarray, **size: float) -> None:
+    element = SubElement(link, use)
+    SubElement(element, "origin", xyz=line(*place), rpy=line(*turn))
+    SubElement(SubElement(element, "geometry"), kind, {name: line(value) for name, value in size.items()})

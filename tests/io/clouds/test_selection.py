@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from glsk_o3d.errors import InvalidCloudError, InvalidParameterError
+from glsk_o3d.io.clouds.scanned import Scan
+from glsk_o3d.io.clouds.selection import labels, select
+
+N = np.arange(20)
+SCAN = Scan(N[:, None] * [1.0, 2, 3], attributes={"label": N % 3, "intensity": N / 4})
+ATOMS = st.sampled_from(
+    ["label == 1", "label != 2", "x < 7", "y >= 12", "2 < x <= 9", "label in (0, 2)", "label not in [1]", "z > -3.5"]
+)
+
+
+@given(st.recursive(ATOMS, lambda some: st.one_of(
+    st.tuples(some, st.sampled_from(["and", "or"]), some).map(lambda parts: "({} {} {})".format(*parts)),
+    some.map("not ({})".format),
+)))  # fmt: skip
+def test_it_means_what_python_means(where):
+    rows = [dict(x=i, y=2 * i, z=3 * i, label=i % 3, intensity=i / 4) for i in N.tolist()]
+    expected = [i for i, row in enumerate(rows) if eval(where, {}, row)]
+    if expected:
+        np.testing.assert_array_equal(select(SCAN, where).positions, SCAN.positions[expected])
+    else:
+        with pytest.raises(InvalidCloudError, match="no point with"):
+            select(SCAN, where)
+
+
+@pytest.mark.parametrize(
+    ("where", "why"),
+    [
+        ("lable == 1", "did you mean 'label'"),
+        ("class == 1", "write such as"),
+        ("label = 1", "write such as"),
+        ("label", "is no condition"),
+        ("1 == 1", "is no condition"),
+        ("label + 1 == 2", "'label . 1' is not understood"),
+        ("__import__('os').system('true') == 0", "is not understood"),
+        ("x.__class__ == 1", "is not understood"),
+        ("label == 'oak'", "is not understood"),
+        ("", "write such as"),
+    ],
+)
+def test_what_is_no_condition(where, why):
+    with pytest.raises(InvalidParameterError, match=why):
+        select(SCAN, where)
+
+
+def test_all_that_is_known_is_selected():
+    scan = Scan(SCAN.positions, SCAN.positions / 60, SCAN.positions, SCAN.attributes, np.array([[0, 1, 2]]))
+    some = select(scan, "label == 1")
+    assert len(some) == len(some.colors) == len(some.normals) == len(some.attributes["intensity"]) == 7
+    assert len(some.triangles) == 0
+
+
+def test_labels():
+    assert labels(SCAN, "label").tolist() == [0, 1, 2]
+    with pytest.raises(InvalidParameterError, match="did you mean 'label'"):
+        labels(SCAN, "labels")

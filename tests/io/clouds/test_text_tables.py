@@ -1,0 +1,112 @@
+"""Clouds as text, as other programs write them."""
+
+import numpy as np
+import pytest
+
+from glsk_o3d import read_cloud, read_tensor_cloud
+from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.clouds.text_tables import holds_points
+from glsk_o3d.io.scans import read_scan
+
+XYZ = [[1.5, 2, 3], [4, 5.25, 6]]
+
+ROWS = ["1.5 2 3 255 0 51 0.5 0 0 1", "4 5.25 6 0 255 0 7 0 1 0"]
+LAYOUTS = {  # the ending, the line of names, what parts the numbers, the decimal mark and the end of a line
+    "CloudCompare": (".asc", "//X Y Z R G B Scalar_field Nx Ny Nz\n2", " ", ".", "\n"),
+    "CloudCompare, csv": (".csv", "//X,Y,Z,R,G,B,Scalar field,Nx,Ny,Nz", ",", ".", "\n"),
+    "pandas": (".csv", "x,y,z,red,green,blue,Scalar field,nx,ny,nz", ",", ".", "\n"),
+    "R, quoted": (".csv", '"X","Y","Z","R","G","B","Scalar field","nx","ny","nz"', ",", ".", "\n"),
+    "a German Excel": (".csv", "\ufeffx [m];y [m];z [m];r;g;b;Scalar field;nx;ny;nz", ";", ",", "\r\n"),
+    "a map": (
+        ".txt",
+        "easting\tnorthing\theight\tred\tgreen\tblue\tScalar_field\tnx\tny\tnz",
+        "\t",
+        ".",
+        "\n",
+    ),
+    "spaces and commas": (".txt", "x y z r g b Scalar_field nx ny nz", " ", ",", "\n"),
+}
+
+
+@pytest.mark.parametrize("program", LAYOUTS)
+def test_named_columns(tmp_path, program):
+    ending, names, apart, mark, end = LAYOUTS[program]
+    name = f"c{ending}"
+    lines = [names, *(row.replace(".", mark).replace(" ", apart) for row in ROWS)]
+    (tmp_path / name).write_bytes((end.join(lines) + end).encode())
+    scan = read_scan(tmp_path / name)
+    np.testing.assert_array_equal(scan.positions, XYZ)
+    np.testing.assert_allclose(scan.colors, [[1, 0, 0.2], [0, 1, 0]])
+    np.testing.assert_array_equal(scan.normals, [[0, 0, 1], [0, 1, 0]])
+    assert {key: values.tolist() for key, values in scan.attributes.items()} == {"Scalar_field": [0.5, 7]}
+    assert holds_points(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("name", "line", "colors", "normals", "attributes"),
+    [
+        ("c.xyz", "1 2 3", None, None, {}),
+        ("c.xyz", "1, 2, 3", None, None, {}),
+        ("c.xyz", "1 2 3 255 51 0", [1, 0.2, 0], None, {}),
+        ("c.xyz", "1 2 3 0.0 0.6 0.8", None, [0, 0.6, 0.8], {}),
+        ("c.xyz", "1 2 3 7.5", None, None, {"column_4": 7.5}),
+        ("c.txt", "1 2 3 -905 255 51 0", [1, 0.2, 0], None, {"column_4": -905}),
+        ("c.txt", "1 2 3 255 51 0 7.5", [1, 0.2, 0], None, {"column_7": 7.5}),
+        ("c.txt", "1 2 3 255 51 0 0 0 1", [1, 0.2, 0], None, {"column_7": 0, "column_8": 0, "column_9": 1}),
+        ("c.xyzn", "1 2 3 0 3 4", None, [0, 3, 4], {}),
+        ("c.xyzrgb", "1 2 3 0.25 1 0", [0.25, 1, 0], None, {}),
+        ("c.pts", "1 2 3 -905 255 51 0", [1, 0.2, 0], None, {"intensity": -905}),
+        ("c.pts", "1 2 3 255 51 0", [1, 0.2, 0], None, {}),
+        ("c.pts", "1 2 3 -905", None, None, {"intensity": -905}),
+        ("c.txt", "P1 1 2 3", None, None, {}),
+    ],
+)
+def test_columns_without_names(tmp_path, name, line, colors, normals, attributes):
+    (tmp_path / name).write_text(("3\n" if name == "c.pts" else "") + f"{line}\n" * 3)
+    scan = read_scan(tmp_path / name)
+    np.testing.assert_array_equal(scan.positions, [[1, 2, 3]] * 3)
+    for found, expected in ((scan.colors, colors), (scan.normals, normals)):
+        assert (found is None) == (expected is None)
+        if expected is not None:
+            np.testing.assert_allclose(found, [expected] * 3)
+    assert {key: values[0] for key, values in scan.attributes.items()} == attributes
+
+
+def test_all_digits_stay(tmp_path):
+    place = [471234.56789012345, 5612345.678901234, 1234.5678901234567]
+    for name, text in (("c.csv", "{!r},{!r},{!r}\n"), ("c.xyz", "{!r} {!r} {!r}\n"), ("c.pts", "1\n{!r} {!r} {!r}\n")):
+        (tmp_path / name).write_text(text.format(*place))
+        np.testing.assert_array_equal(np.asarray(read_cloud(tmp_path / name).points), [place])
+
+
+def test_lines_that_are_not_like_the_others(tmp_path, caplog):
+    (tmp_path / "c.csv").write_text("x,y,z,label\n1,2,3,4\n\n# pause\n5,6\n7,8,9,\n1,2,oak,4\n10,11,12,13,14\n")
+    scan = read_scan(tmp_path / "c.csv")
+    np.testing.assert_array_equal(scan.positions, [[1, 2, 3], [7, 8, 9], [10, 11, 12]])
+    np.testing.assert_array_equal(scan.attributes["label"], [4, np.nan, 13])
+    assert "c.csv: 2 of 5 lines hold no point" in caplog.text
+
+
+def test_attributes_become_those_of_a_tensor_cloud(tmp_path):
+    (tmp_path / "c.csv").write_text("x,y,z,Tree ID,x,7,class\n1,2,3,4,5.5,6,oak\n4,5,6,7,8.5,9,ash\n")
+    point = read_tensor_cloud(tmp_path / "c.csv").point
+    assert {key: point[key].numpy().ravel().tolist() for key in point if key != "positions"} == {
+        "Tree_ID": [4, 7],
+        "x_2": [5.5, 8.5],
+        "column_7": [6, 9],
+    }
+    assert str(point.Tree_ID.dtype) == "Int32"
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("these are\nwords alone, and no more\n", "no line of its beginning has three numbers"),
+        ("length,radius,angle\n1,2,3\n", "none of its columns is called x, y or z: they are length, radius, angle"),
+    ],
+)
+def test_text_that_is_no_cloud(tmp_path, text, why):
+    (tmp_path / "c.csv").write_text(text)
+    assert not holds_points(tmp_path / "c.csv")
+    with pytest.raises(FileFormatError, match=rf"c\.csv: no points could be read: {why}"):
+        read_cloud(tmp_path / "c.csv")

@@ -1,0 +1,154 @@
+"""A rig: what a glTF library finds in it, and that turning a bone moves what hangs on it and nothing else."""
+
+import json
+
+import numpy as np
+import pytest
+
+from glsk_o3d import Skeleton
+from glsk_o3d.analysis.skinning import skin_weights
+from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
+from glsk_o3d.io.formats.forests import as_forest
+from glsk_o3d.io.formats.gltf import save_rig
+
+KINDS = {5121: "u1", 5123: "u2", 5125: "u4", 5126: "f4"}
+WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+
+def accessor(file, number):
+    found = file.accessors[number]
+    view = file.bufferViews[found.bufferView]
+    data = file.binary_blob()[view.byteOffset : view.byteOffset + view.byteLength]
+    return np.frombuffer(data, f"<{KINDS[found.componentType]}").reshape(found.count, WIDTHS[found.type])
+
+
+def world(file, turned=None):
+    """Matrices of all nodes, one of which may be turned by an angle about its own x."""
+    found = {}
+
+    def visit(number, above):
+        node, here = file.nodes[number], np.eye(4)
+        here[:3, 3] = node.translation or 0
+        if node.rotation:
+            x, y, z, w = node.rotation
+            here[:3, :3] = np.array(
+                [
+                    [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                    [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                    [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+                ]
+            )
+        if turned is not None and turned[0] == number:
+            c, s = np.cos(turned[1]), np.sin(turned[1])
+            here[:3, :3] = here[:3, :3] @ [[1, 0, 0], [0, c, -s], [0, s, c]]
+        found[number] = above @ here
+        for child in node.children or ():
+            visit(child, found[number])
+
+    for root in file.scenes[file.scene].nodes:
+        visit(root, np.eye(4))
+    return found
+
+
+def skinned(file, turned=None):
+    """Where the skin puts the surface, as glTF 2.0, 3.7.3.3 has it."""
+    matrices, skin, attributes = world(file, turned), file.skins[0], file.meshes[0].primitives[0].attributes
+    inverse = accessor(file, skin.inverseBindMatrices).reshape(-1, 4, 4).transpose(0, 2, 1)
+    moves = np.stack([matrices[joint] for joint in skin.joints]) @ inverse
+    place = np.pad(accessor(file, attributes.POSITION), ((0, 0), (0, 1)), constant_values=1)
+    weights, joints = accessor(file, attributes.WEIGHTS_0), accessor(file, attributes.JOINTS_0)
+    return np.einsum("nk,nkij,nj->ni", weights, moves[joints], place)[:, :3]
+
+
+@pytest.fixture
+def rig(tmp_path):
+    library = pytest.importorskip("pygltflib")
+
+    def make(skeleton, mesh=None, **options):
+        save_rig(skeleton, tmp_path / "r.glb", mesh, cut_loops=True, **options)
+        return library.GLTF2().load(str(tmp_path / "r.glb"))
+
+    return make
+
+
+@pytest.mark.parametrize("offset", [0.0, 4e6])
+@pytest.mark.parametrize("up", ["z", "y"])
+def test_at_rest_everything_is_where_it_was(tree, rig, up, offset):
+    cloud = np.random.default_rng(3).normal(size=(40, 3))
+    moved = Skeleton(tree.vertices + offset, tree.edges, tree.radii, (), (), ())
+    file = rig(moved, cloud + offset, up=up)
+    turn = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]] if up == "z" else np.eye(3))
+    np.testing.assert_allclose(skinned(file), (cloud + offset) @ turn.T, rtol=0, atol=1e-5)
+    forest = as_forest(moved, True, None)
+    heads = np.array([world(file)[joint][:3, 3] for joint in file.skins[0].joints])
+    np.testing.assert_allclose(heads, forest.vertices[forest.edges[:, 0]] @ turn.T, rtol=0, atol=1e-5)
+
+
+def test_turning_a_bone_moves_what_hangs_on_it_and_nothing_else(rig):
+    fork = Skeleton([[0, 0, 0], [0, 0, 1], [0, 1, 2], [0, -1, 2]], [[0, 1], [1, 2], [1, 3]], [0.1] * 4, (), (), ())
+    cloud = np.array([[0, 0, 0.2], [0, 0, 0.9], [0, 0.9, 1.9], [0, -0.9, 1.9], [0, 0.25, 1.25]])
+    file = rig(fork, cloud, up="y", root=0)
+    bones = {tuple(np.round(world(file)[joint][:3, 3], 6)): joint for joint in file.skins[0].joints}
+    assert len(bones) == 2  # two bones have their joints at the fork
+    along_y = next(joint for joint in file.skins[0].joints if (world(file)[joint][:3, 3] == [0, 0, 1]).all())
+    before, after = skinned(file), skinned(file, (along_y, np.pi))
+    moved = np.linalg.norm(after - before, axis=1)
+    np.testing.assert_allclose(moved[[0, 1]], 0, atol=1e-6)
+    assert sorted(moved[[2, 3]] > 0.1) == [False, True]
+    (tip,) = (i for i in (2, 3) if moved[i] > 0.1)
+    np.testing.assert_allclose(after[tip], [0, -cloud[tip, 1], 2 - cloud[tip, 2]], atol=1e-6)
+
+
+def test_weights_are_continuous_along_the_curve_and_sum_to_one(tree):
+    forest = as_forest(tree, True, None)
+    ends = forest.vertices[forest.edges]
+    share = np.linspace(0, 1, 101)[:, None, None]
+    place = (1 - share) * ends[:, 0] + share * ends[:, 1]
+    nearer = np.where(share[..., 0] < 0.5, *forest.edges.T)
+    for edge in range(len(forest.edges)):
+        bones, weights = skin_weights(forest, place[:, edge], nearer[:, edge])
+        np.testing.assert_allclose(weights.sum(axis=1), 1)
+        dense = np.zeros((len(share), len(forest.edges)))
+        np.add.at(dense, (np.arange(len(share))[:, None], bones), weights)
+        assert np.abs(np.diff(dense, axis=0)).max() < 0.021  # twice a hundredth of an edge
+
+
+def test_a_mesh_keeps_its_triangles_and_a_cloud_has_none(tree, rig):
+    import open3d as o3d
+
+    mesh = o3d.geometry.TriangleMesh.create_octahedron()
+    for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
+        part = rig(tree, given).meshes[0].primitives[0]
+        assert part.mode == 4
+        file = rig(tree, given)
+        np.testing.assert_array_equal(accessor(file, part.indices).reshape(-1, 3), np.asarray(mesh.triangles))
+    assert rig(tree, np.asarray(mesh.vertices)).meshes[0].primitives[0].mode == 0
+
+
+def test_without_radii_the_points_are_the_surface(rig):
+    line = Skeleton([[0, 0, 0], [1, 0, 0]], [[0, 1]], [np.nan] * 2, [0, 1], [[0, 1, 0], [1, 1, 0]], np.ones((2, 3)))
+    file = rig(line, up="y")
+    np.testing.assert_allclose(skinned(file), line.points)
+
+
+def test_what_cannot_be_rigged(tree, make, tmp_path):
+    path = tmp_path / "r.glb"
+    with pytest.raises(FileFormatError, match="no edges"):
+        save_rig(make([[0, 0, 0]], []), path)
+    with pytest.raises(InvalidParameterError, match="up = 'x'"):
+        save_rig(tree, path, up="x")
+    with pytest.raises(InvalidCloudError, match="not finite"):
+        save_rig(tree, path, [[np.nan, 0, 0]])
+    with pytest.raises(FileFormatError, match=r"\.glb"):
+        save_rig(tree, tmp_path / "r.fbx")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_file_is_binary_gltf(tree, tmp_path):
+    tree.save(tmp_path / "s.glb")
+    data = (tmp_path / "s.glb").read_bytes()
+    assert data[:4] == b"glTF"
+    assert int.from_bytes(data[8:12], "little") == len(data)
+    length = int.from_bytes(data[12:16], "little")
+    names = [node["name"] for node in json.loads(data[20 : 20 + length])["nodes"]]
+    assert len(set(names)) == len(names) == len(tree.edges) + 2

@@ -1,0 +1,202 @@
+"""Plants as MTG and as node lists of TomatoWUR: by hand, and as their own readers have them."""
+
+import csv
+import importlib
+import io
+import sys
+import warnings
+from unittest.mock import MagicMock
+
+import numpy as np
+import pytest
+
+from glsk_o3d import FileFormatError, Skeleton, editing, pipelines, samples
+from glsk_o3d.io.formats import mtg, plant_csv
+from glsk_o3d.io.formats.plant_axes import plant_axes
+
+HEAD = """\
+CODE:\tFORM-A
+
+CLASSES:
+SYMBOL\tSCALE\tDECOMPOSITION\tINDEXATION\tDEFINITION
+$\t0\tFREE\tFREE\tIMPLICIT
+P\t1\tCONNECTED\tFREE\tIMPLICIT
+N\t2\tNONE\tFREE\tEXPLICIT
+
+DESCRIPTION:
+LEFT\tRIGHT\tRELTYPE\tMAX
+N\tN\t+\t?
+N\tN\t<\t1
+
+FEATURES:
+NAME\tTYPE
+XX\tREAL
+YY\tREAL
+ZZ\tREAL
+radius\tREAL
+
+MTG:
+"""
+
+
+def graph(places, edges, radii=0.1):
+    return Skeleton(places, edges, np.full(len(places), radii, float), (), (), ())
+
+
+def two_branches():
+    """A stem of two pieces, and a thinner twig that leaves it in the middle."""
+    return graph([[0, 0, 0], [0, 0, 1], [0, 0, 2], [1, 0, 1]], [[0, 1], [1, 2], [1, 3]], [0.2, 0.2, 0.2, 1e-9])
+
+
+@pytest.fixture(scope="module")
+def tree():
+    """A tree with branches of several orders."""
+    return editing.reroot(pipelines.tree("z")(samples.tree(6000, forks=4, seed=1).points), "z")
+
+
+def reader(name, **instead):
+    """A module of another program, as it comes: what it warns of is its own affair."""
+    with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
+        warnings.simplefilter("ignore")
+        for module, stand_in in instead.items():
+            patch.setitem(sys.modules, module, stand_in)
+        return pytest.importorskip(name, reason="a reader of tests/readers.txt", exc_type=ImportError)
+
+
+@pytest.fixture(scope="module")
+def read_mtg_file():
+    try:
+        return importlib.import_module("openalea.mtg.io").read_mtg_file
+    except ImportError:
+        return reader("tomatowur.skeletonisation_methods.plantscan3d.io").read_mtg_file
+
+
+@pytest.fixture(scope="module")
+def skeleton_graph():
+    """The class of TomatoWUR; its viewer has no part in reading."""
+    reader("pandas")
+    return reader("tomatowur.scripts.skeleton_graph", polyscope=MagicMock()).SkeletonGraph
+
+
+def orders(parent, begins):
+    order = np.zeros(len(parent), int)
+    for vertex, before in enumerate(parent):
+        order[vertex] = order[before] + begins[vertex] if before >= 0 else 0
+    return order
+
+
+# ----------------------------------------------------------------------------------------------------------------- axes
+
+
+def test_orders_are_those_of_the_branch_table(tree):
+    order, table = orders(*plant_axes(tree)), tree.branch_table(0)
+    assert table.order.max() > 3
+    for row, path in enumerate(tree.branches):
+        assert (order[path[path != table.start[row]]] == table.order[row]).all()
+
+
+@pytest.mark.parametrize("root", [(0, 0, 1.5), (0, 0, 0.9), "-z"])
+def test_one_edge_at_most_goes_on_wherever_the_root_is(root):
+    line = np.column_stack([np.zeros((5, 2)), np.linspace(0, 2, 5)])
+    places = np.concatenate([line, line[[1, 2]] @ [[0, 1, 0], [1, 0, 0], [1, 0, 0]] + [0, 0, 1]])
+    rooted = editing.reroot(graph(places, [[0, 1], [1, 2], [2, 3], [3, 4], [2, 5], [5, 6]]), root)
+    parent, begins = plant_axes(rooted)
+    np.testing.assert_array_equal(parent[rooted.edges[:, 1]], rooted.edges[:, 0])
+    assert parent[0] == -1
+    goes_on = np.bincount(parent[1:][~begins[1:]], minlength=len(parent))
+    ends = np.isin(np.arange(len(parent)), parent, invert=True)
+    np.testing.assert_array_equal(goes_on, ~ends)
+    assert begins.sum() + 1 == ends.sum()  # every axis has its end
+
+
+def test_at_a_root_the_thickest_goes_on():
+    star = graph(np.vstack([np.zeros(3), np.eye(3)]), [[0, 1], [0, 2], [0, 3]], [0.1, 0.1, 0.3, 0.1])
+    assert plant_axes(star)[1].tolist() == [False, True, False, True]
+    bare = graph(star.vertices, star.edges, np.nan)
+    assert plant_axes(bare)[1].sum() == 2
+
+
+# ------------------------------------------------------------------------------------------------------------------ MTG
+
+
+def test_mtg_by_hand():
+    rows = [
+        "ENTITY-CODE\t\tXX\tYY\tZZ\tradius",
+        "/P1/N0\t\t0.0\t0.0\t0.0\t0.2",
+        "^<N1\t\t0.0\t0.0\t1.0\t0.2",
+        "\t+N3\t1.0\t0.0\t1.0\t0.000000001",
+        "^<N2\t\t0.0\t0.0\t2.0\t0.2",
+    ]
+    assert mtg.write(two_branches()).decode() == HEAD + "\n".join(rows) + "\n"
+
+
+def test_mtg_in_the_reader_of_openalea(tree, read_mtg_file, tmp_path):
+    two = editing.reroot(
+        Skeleton(
+            np.concatenate([tree.vertices, tree.vertices * 1e-7 + 50]),
+            np.concatenate([tree.edges, tree.edges + len(tree.vertices)]),
+            np.concatenate([tree.radii, np.full(len(tree.radii), np.nan)]),
+            *((),) * 3,
+        ),
+        "z",
+    )
+    (tmp_path / "t.mtg").write_bytes(mtg.write(two))
+    g = read_mtg_file(str(tmp_path / "t.mtg"))
+    assert (g.max_scale(), g.nb_vertices(scale=1), g.nb_vertices(scale=2)) == (2, 2, len(two.vertices))
+    number = {vertex: int(g.property("index")[vertex]) for vertex in g.vertices(scale=2)}
+    parent, begins = plant_axes(two)
+    place = np.full((len(two.vertices), 4), np.nan)
+    for vertex, i in number.items():
+        place[i] = [g.property(name).get(vertex, np.nan) for name in ("XX", "YY", "ZZ", "radius")]
+        before = g.parent(vertex)
+        assert (-1 if before is None else number[before]) == parent[i]
+        assert before is None or g.edge_type(vertex) == "<+"[int(begins[i])]
+    np.testing.assert_array_equal(place, np.column_stack([two.vertices, two.radii]))
+
+
+def test_mtg_of_nothing_has_a_header():
+    assert mtg.write(Skeleton((), (), (), (), (), ())).decode() == HEAD + "ENTITY-CODE\tXX\tYY\tZZ\tradius\n"
+
+
+# ------------------------------------------------------------------------------------------------------------ TomatoWUR
+
+
+def test_node_list_by_hand():
+    assert plant_csv.write(two_branches()).decode() == (
+        "x,y,z,x_skeleton,y_skeleton,z_skeleton,vid,parentid,edgetype,radius\n"
+        "0.0,0.0,0.0,0.0,0.0,0.0,0,,,0.2\n"
+        "0.0,0.0,1.0,0.0,0.0,1.0,1,0,<,0.2\n"
+        "0.0,0.0,2.0,0.0,0.0,2.0,2,1,<,0.2\n"
+        "1.0,0.0,1.0,1.0,0.0,1.0,3,1,+,1e-09\n"
+    )
+
+
+@pytest.mark.parametrize("load", ["load_csv", "from_nodelist", "from_skeleton_gt_data"])
+def test_node_list_in_tomatowur(tree, skeleton_graph, load, tmp_path):
+    path = tmp_path / "t.plant.csv"
+    path.write_bytes(plant_csv.write(tree))
+    found = skeleton_graph(path) if load == "load_csv" else getattr(skeleton_graph, load)(path)
+    found.get_node_order()  # fails on what is not a tree from node 0
+    places = found.get_node_attribute("pos")
+    np.testing.assert_allclose(np.sort(places, axis=0), np.sort(tree.vertices, axis=0), rtol=1e-15)
+    ends = places[found.get_edges()]
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(tree.length, rel=1e-12)
+    written = {tuple(pair) for pair in np.round(tree.vertices[tree.edges], 9).reshape(-1, 6).tolist()}
+    assert {tuple(pair) for pair in np.round(ends, 9).reshape(-1, 6).tolist()} == written
+    assert sorted(found.get_node_attribute("node_order")) == sorted(orders(*plant_axes(tree)))
+
+
+def test_mtg_in_tomatowur(tree, skeleton_graph, tmp_path):
+    (tmp_path / "t.mtg").write_bytes(mtg.write(tree))
+    found = skeleton_graph.from_mtg(str(tmp_path / "t.mtg"))
+    ends = found.get_node_attribute("pos")[found.get_edges()]
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(tree.length, rel=1e-12)
+
+
+def test_node_list_holds_one_plant_and_leaves_out_what_is_not_known():
+    two = graph([[0, 0, 0], [0, 0, 1]], np.empty((0, 2), int))
+    with pytest.raises(FileFormatError, match="one plant and the skeleton has 2 components"):
+        plant_csv.write(two)
+    bare = graph([[0, 0, 0], [0, 0, 1]], [[0, 1]], np.nan)
+    rows = list(csv.DictReader(io.StringIO(plant_csv.write(bare).decode())))
+    assert [row["radius"] for row in rows] == ["", ""]

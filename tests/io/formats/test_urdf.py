@@ -1,0 +1,160 @@
+"""Trees as robot models, read by yourdfpy: where its forward kinematics puts links, and what they are made of."""
+
+import io
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+import yourdfpy
+
+from glsk_o3d import FileFormatError, pipelines, samples
+from glsk_o3d.editing import cut_loops, reroot, simplify
+from glsk_o3d.io.formats import urdf
+
+WATER = 1000.0
+
+
+def load(skeleton):
+    robot = yourdfpy.URDF.load(io.BytesIO(urdf.write(skeleton)), load_meshes=False)
+    assert robot.validate()
+    assert robot.base_link == "base"
+    return robot
+
+
+def numbers(of, link):
+    """The vertex that a link or joint belongs to."""
+    return int(of.name.removeprefix(f"{link}_"))
+
+
+def ends(robot, uses="collisions"):
+    """Both ends of every cylinder, and the centre of every ball, in the frame of the base, by vertex."""
+    cylinders, balls = {}, {}
+    for link in robot.robot.links[1:]:
+        i = numbers(link, "link")
+        frame = robot.get_transform(link.name, "base")
+        for part in getattr(link, uses):
+            place = frame @ (np.eye(4) if part.origin is None else part.origin)
+            if part.geometry.cylinder:
+                half = [0, 0, part.geometry.cylinder.length / 2]
+                cylinders[i] = [(place @ [*half * np.array(side), 1])[:3] for side in (-1, 1)]
+            else:
+                balls[i] = place[:3, 3]
+    return cylinders, balls
+
+
+@pytest.fixture(scope="module")
+def grown():
+    """A plant with forks, far from the origin, as a tree of a hundred vertices or so."""
+    skeleton = pipelines.tree()(samples.tree(6000, forks=3, seed=1).points)
+    return reroot(simplify(skeleton, n=100), "z")
+
+
+@pytest.mark.parametrize("uses", ["collisions", "visuals"])
+@pytest.mark.parametrize("offset", [0.0, 3e5])
+def test_forward_kinematics_finds_the_vertices(grown, offset, uses):
+    far = replace(grown, vertices=grown.vertices + offset)
+    cylinders, balls = ends(load(far), uses)
+    assert sorted(balls) == list(range(len(far.vertices)))
+    assert sorted(cylinders) == sorted(far.edges[:, 1])
+    for parent, child in far.edges:
+        np.testing.assert_allclose(cylinders[child], far.vertices[[parent, child]], rtol=0, atol=1e-9)
+    np.testing.assert_allclose([balls[i] for i in sorted(balls)], far.vertices, rtol=0, atol=1e-9)
+
+
+def test_the_offset_of_the_cloud_is_in_the_joint_of_the_root_alone(grown):
+    far = replace(grown, vertices=grown.vertices + [4e5, 5e6, 300])
+    steps = {numbers(joint, "joint"): joint.origin[:3, 3] for joint in load(far).robot.joints}
+    assert (steps.pop(0) == far.vertices[0]).all()  # to the last bit
+    assert np.abs(list(steps.values())).max() < 2 * np.ptp(far.vertices, axis=0).max()
+
+
+def test_sizes_are_those_of_the_skeleton(grown):
+    for link in load(grown).robot.links[1:]:
+        i = numbers(link, "link")
+        shapes = [part.geometry for part in link.collisions]
+        assert [shape.sphere.radius for shape in shapes if shape.sphere] == [grown.radii[i]]
+        (row,) = np.flatnonzero(grown.edges[:, 1] == i) if i else (None,)
+        if row is None:
+            assert len(shapes) == 1
+            continue
+        (cylinder,) = [shape.cylinder for shape in shapes if shape.cylinder]
+        assert cylinder.radius == pytest.approx(grown.radii[grown.edges[row]].mean(), rel=1e-15)
+        assert cylinder.length == pytest.approx(grown.edge_lengths[row], rel=1e-15)
+
+
+def test_masses_are_those_of_water(grown):
+    """The inertia of a cylinder from the mesh that trimesh makes of it: finite sides, hence a little less."""
+    robot = load(grown)
+    total = sum(link.inertial.mass for link in robot.robot.links[1:])
+    mean = grown.radii[grown.edges].mean(axis=1)
+    ball = math.pi * 4 / 3 * grown.radii[0] ** 3
+    assert total == pytest.approx(WATER * ((math.pi * mean**2 * grown.edge_lengths).sum() + ball), rel=1e-12)
+    for name in ("link_0", "link_1", f"link_{len(grown.vertices) - 1}"):
+        link = robot.link_map[name]
+        shape = link.collisions[0].geometry
+        if shape.cylinder:
+            mesh = trimesh.creation.cylinder(shape.cylinder.radius, shape.cylinder.length, sections=2000)
+        else:
+            mesh = trimesh.creation.icosphere(5, radius=shape.sphere.radius)
+        mesh.density = WATER
+        assert link.inertial.mass == pytest.approx(mesh.mass, rel=1e-3)
+        np.testing.assert_allclose(
+            link.inertial.inertia, mesh.moment_inertia, rtol=1e-3, atol=1e-6 * np.abs(mesh.moment_inertia).max()
+        )
+        np.testing.assert_allclose(
+            link.inertial.origin, np.eye(4) if link.collisions[0].origin is None else link.collisions[0].origin
+        )
+
+
+def test_directions_along_the_axes(make):
+    steps = np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]) * 2.0
+    star = make(np.array([[0, 0, 0], *steps]) + 1, [[0, i] for i in range(1, 7)])
+    cylinders, _ = ends(load(star))
+    for i, step in enumerate(steps, 1):
+        np.testing.assert_allclose(cylinders[i], [np.ones(3), 1 + step], atol=1e-15)
+
+
+def test_every_component_stands_on_the_base(forest):
+    rooted = reroot(forest, "x")
+    joints = load(rooted).robot.joints
+    roots = np.setdiff1d(np.arange(len(rooted.vertices)), rooted.edges[:, 1])
+    assert len(roots) == rooted.n_components == 3
+    assert [numbers(joint, "joint") for joint in joints if joint.parent == "base"] == roots.tolist()
+    assert {joint.type for joint in joints} == {"fixed"}
+    _, balls = ends(load(rooted))
+    np.testing.assert_allclose([balls[i] for i in range(6)], rooted.vertices, rtol=0, atol=1e-9)
+
+
+def test_a_dot_and_nothing(dot):
+    assert [link.name for link in load(dot).robot.links] == ["base", "link_0"]
+    nothing = replace(dot, vertices=(), radii=(), confidence=(), vertex_of_point=(), points=(), normals=())
+    assert [link.name for link in load(nothing).robot.links] == ["base"]
+
+
+def test_what_has_no_size_is_left_out(make):
+    path = make(np.array([[0, 0, 0], [0, 0, 0], [0, 0, 1], [0, 0, 2.0]]), [[0, 1], [1, 2], [2, 3]])
+    path = replace(path, radii=[0.1, 0.1, 0, 0])
+    robot = load(path)
+    kinds = {
+        link.name: ["cylinder" if part.geometry.cylinder else "sphere" for part in link.collisions]
+        for link in robot.robot.links
+    }
+    assert kinds == {"base": [], "link_0": ["sphere"], "link_1": ["sphere"], "link_2": ["cylinder"], "link_3": []}
+    assert [link.name for link in robot.robot.links if link.inertial is not None] == ["link_0", "link_2"]
+    np.testing.assert_array_equal(robot.get_transform("link_3", "base")[:3, 3], [0, 0, 1])
+
+
+def test_loops_other_numbers_and_missing_values_are_refused(loop, tree, make):
+    with pytest.raises(FileFormatError, match="trees only and the skeleton has 2 loop"):
+        urdf.write(loop)
+    assert load(reroot(cut_loops(loop)[0], "x"))
+    fork = make(np.eye(3), [[0, 2], [1, 2]])
+    with pytest.raises(FileFormatError, match=r"do not lead from a root: .*reroot"):
+        urdf.write(fork)
+    assert load(reroot(fork, 0))
+    with pytest.raises(FileFormatError, match="needs radii, and 2 of 6 vertices have none"):
+        urdf.write(replace(tree, radii=[1, np.nan, 1, np.inf, 1, 1]))
+    with pytest.raises(FileFormatError, match="finite coordinates"):
+        urdf.write(replace(tree, vertices=np.full((6, 3), np.nan)))
