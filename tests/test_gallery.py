@@ -10,7 +10,12 @@ matplotlib = pytest.importorskip("matplotlib")
 import matplotlib.pyplot as plt  # noqa: E402
 
 GALLERY = Path(__file__).resolve().parents[1] / "docs" / "gallery"
-NEEDS = {"plot_04_meshlab_script": "pymeshlab", "plot_13_batch_with_dask": "distributed"}
+NEEDS = {
+    "plot_04_meshlab_script": "pymeshlab",
+    "plot_13_batch_with_dask": "distributed",
+    "plot_17_plot_of_trees": "lazrs",
+    "plot_18_rig": "pygltflib",
+}
 
 
 @pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")  # what plt.show() says where there is a screen
@@ -40,4 +45,4 @@ def test_runs(script, tmp_path, monkeypatch, capsys):
 
 def test_there_is_one_for_each_subject():
     titles = [path.read_text().splitlines()[1] for path in sorted(GALLERY.glob("plot_*.py"))]
-    assert len(titles) == len(set(titles)) == 16
+    assert len(titles) == len(set(titles)) == 18

@@ -28,6 +28,7 @@ def test_meshlab_opens_it(skeleton, tmp_path):
     mesh = meshes.current_mesh()
     np.testing.assert_array_equal(mesh.vertex_matrix(), skeleton.vertices)
     np.testing.assert_array_equal(mesh.edge_matrix().reshape(-1, 2), skeleton.edges)
+    np.testing.assert_array_equal(mesh.vertex_scalar_array(), skeleton.radii)  # by which it colours
 
 
 def test_ply_written_by_open3d(tree, tmp_path):
