@@ -66,6 +66,8 @@ def prepared(tmp_path_factory):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         assert o3d.io.write_point_cloud(str(folder / name), cloud)
     (folder / "list.txt").write_text("scan.ply\n")
+    trees = np.concatenate([np.column_stack([shape.points + [0, 3 * i, 0], np.full(1000, i)]) for i in (17, 18)])
+    np.savetxt(folder / "plot.csv", trees, delimiter=",", header="x,y,z,treeID", comments="")
     np.savez(folder / "axis.npz", nodes=shape.nodes, edges=shape.edges, radii=shape.radii)
     cloud.estimate_normals()
     cloud.orient_normals_consistent_tangent_plane(10)

@@ -1,0 +1,96 @@
+"""Installs the wheel alone, then with each extra, in folders of their own, and runs every command there.
+
+    python scripts/try_wheel.py [EXTRA ...]
+
+Prints a table: what was installed, how many seconds and megabytes it took, and which extras commands asked for. A
+command may succeed, or end with a message that names an extra; anything else is an error.
+"""
+
+import subprocess
+import sys
+import tempfile
+import time
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+USERS = ("pictures", "crosscheck", "meshlab", "las", "e57", "cluster", "full")
+TABLE = "x,y,z,tree\n" + "".join(f"{x},{y},{z},{x % 2}\n" for x in range(40) for y in (0, 1, 2) for z in (0, 1, 2))
+COMMANDS = """\
+demo
+filters
+info
+info demo/cloud.ply
+info demo/skeleton.json
+skeletonize demo/cloud.ply -o s.json -o s.vtp -o s.dxf -o s.ply --where z>-9
+skeletonize demo/cloud.ply --pipeline tree -o t.json
+skeletonize demo/cloud.ply -o r.json --preview r.png --report r.html
+batch demo/cloud.ply -o many
+batch scan.csv -o trees --by tree
+branches s.json -o branches.csv
+tree t.json --unit m -o cylinders.csv
+edit t.json -o e.json --prune-order 1
+convert t.json t.swc t.glb t.urdf
+evaluate s.json demo/cloud.ply
+rerun s.json -o again.json
+run glskeleton demo/cloud.ply -o g.ply
+run scan_cleanup demo/cloud.ply -o c.ply
+crosscheck demo/cloud.ply
+info scan.las
+info scan.e57
+"""
+"""What is run; the last two files are none, so that what is missing shows."""
+
+
+def pip(python, *words):
+    subprocess.run([python, "-m", "pip", "--disable-pip-version-check", "-qq", *words], check=True)
+
+
+def try_extra(wheel: Path, extra: str, folder: Path) -> tuple[float, float, list[str], list[str]]:
+    """Seconds and megabytes of an installation, the extras that commands asked for, and what went wrong."""
+    venv.create(folder / "venv", with_pip=True)
+    binaries = folder / "venv" / ("Scripts" if sys.platform == "win32" else "bin")
+    before, start = size(folder), time.perf_counter()
+    pip(binaries / "python", "install", f"{wheel}[{extra}]" if extra else wheel)
+    seconds, here = time.perf_counter() - start, folder / "work"
+    here.mkdir()
+    megabytes = (size(folder) - before) / 1e6
+    (here / "scan.csv").write_text(TABLE)
+    for name in ("scan.las", "scan.e57"):
+        (here / name).write_bytes(b"none")
+    asked, wrong = [], []
+    for line in COMMANDS.splitlines():
+        done = subprocess.run([binaries / "glsk", *line.split()], cwd=here, capture_output=True, text=True)
+        said = done.stderr.strip().splitlines()[-1:] or [""]
+        if "glsk-o3d[" in done.stderr:
+            asked.append(done.stderr.partition("glsk-o3d[")[2].partition("]")[0])
+        elif done.returncode and not (line.startswith("info scan") and "not a valid" in said[0]):
+            wrong.append(f"glsk {line}: {said[0]}")
+    return seconds, megabytes, sorted(set(asked)), wrong
+
+
+def size(folder: Path) -> int:
+    """Bytes of all files below a folder."""
+    return sum(path.lstat().st_size for path in folder.rglob("*") if path.is_file())
+
+
+def main() -> int:
+    """Try the wheel alone and with the extras that are named, by default all for users."""
+    extras, failed = sys.argv[1:] or ["", *USERS], 0
+    with tempfile.TemporaryDirectory() as place:
+        pip(sys.executable, "wheel", "--no-deps", "-w", place, ROOT)
+        (wheel,) = Path(place).glob("*.whl")
+        print("| installed | s | MB | commands that ask for more |\n|---|--:|--:|---|", flush=True)
+        for extra in extras:
+            with tempfile.TemporaryDirectory() as folder:
+                seconds, megabytes, asked, wrong = try_extra(wheel, extra, Path(folder))
+            print(
+                f"| {extra or 'alone'} | {seconds:.0f} | {megabytes:.0f} | {', '.join(asked) or 'none'} |", flush=True
+            )
+            failed += len(wrong)
+            print(*wrong, sep="\n", end="\n" * bool(wrong), file=sys.stderr)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
