@@ -124,7 +124,7 @@ def _meant(given: str, out: str, recursive: bool, left_out: dict[str, str]) -> I
     """Absolute paths, each with the folder from which its name counts."""
     absolute = os.path.abspath(given)
     if os.path.isdir(given):
-        found = _walk(absolute, recursive)
+        found = _walk(absolute, recursive, left_out)
         none = f"{given}: no cloud in this folder" + " (sub-folders are taken with recursive)" * (not recursive)
         yield from ((absolute, path) for path in _clouds(found, absolute, out, none, left_out))
     elif os.path.lexists(given) and given.lower().endswith(".txt") and not holds_points(Path(given)):
@@ -143,8 +143,11 @@ def _meant(given: str, out: str, recursive: bool, left_out: dict[str, str]) -> I
         raise FileNotFoundError(f"{given}: no such file or folder")
 
 
-def _walk(folder: str, recursive: bool) -> Iterator[str]:
-    for here, folders, files in os.walk(folder):
+def _walk(folder: str, recursive: bool, left_out: dict[str, str]) -> Iterator[str]:
+    def unreadable(error: OSError) -> None:
+        left_out[str(error.filename)] = f"cannot be read: {error.strerror}"
+
+    for here, folders, files in os.walk(folder, onerror=unreadable):
         folders[:] = [name for name in folders if recursive and not name.startswith(".")]
         yield from (os.path.join(here, name) for name in files if not name.startswith("."))
 
@@ -174,6 +177,8 @@ def _listed(path: str) -> list[str]:
     """The files that a list names, one a line, from the working folder; blank lines and comments are skipped."""
     lines = [os.fsdecode(line.strip()) for line in Path(path).read_bytes().removeprefix(b"\xef\xbb\xbf").splitlines()]
     lines = [line for line in lines if line and not line.startswith("#")]
+    if any("\0" in line for line in lines):
+        raise FileNotFoundError(f"{path}: is no list of files: it holds a NUL, which no name does")
     if not any(map(os.path.lexists, lines)):
         what = (
             f"none of {len(lines)} lines names one that is there, not {lines[0][:60]!r}" if lines else "it names none"

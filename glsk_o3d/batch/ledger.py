@@ -54,11 +54,11 @@ class Ledger:
         lines = self.path.read_bytes().splitlines() if self.path.exists() else []
         broken = 0
         for line in lines:
-            try:
-                row = json.loads(line)
-                self._keep({**row, "name": str(row["name"]), "input": str(row["input"]), "status": row["status"]})
-            except (ValueError, TypeError, KeyError):
+            row = _checked(line)
+            if row is None:
                 broken += 1
+            else:
+                self._keep(row)
         self._once()
         if broken:
             _log.warning("%s: %d broken lines passed over; their inputs are done anew", self.path, broken)
@@ -98,6 +98,37 @@ class Ledger:
         )
 
 
+def _checked(line: bytes) -> Row | None:
+    """The row on a line, None if no batch has written it: its outputs may be removed, so they must be in the folder."""
+    try:
+        row = json.loads(line, parse_constant=_refuse)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(row, dict):
+        return None
+    texts = [row.get(name) for name in ("name", "input", "status")]
+    outputs, messages = row.get("outputs", []), row.get("messages", [])
+    if not (all(isinstance(text, str) for text in texts) and isinstance(outputs, list) and isinstance(messages, list)):
+        return None
+    others = [value for name, value in row.items() if name not in ("outputs", "messages")]
+    plain = all(value is None or isinstance(value, str | int | float) for value in [*others, *messages])
+    return (
+        row if plain and row["status"] in (DONE, FAILED, STALE) and all(map(_is_inside, [texts[0], *outputs])) else None
+    )
+
+
+def _refuse(constant: str) -> float:
+    raise ValueError(f"{constant} is no number of JSON")
+
+
+def _is_inside(path: Any) -> bool:
+    """Whether a path is one below a folder, without a way out of it."""
+    if not isinstance(path, str) or not path or "\0" in path:
+        return False
+    parts = path.replace(os.sep, "/").split("/")
+    return not os.path.isabs(path) and not os.path.splitdrive(path)[0] and not {"", ".", ".."} & set(parts)
+
+
 def _line(row: Row) -> bytes:
     try:
         return json.dumps(row, ensure_ascii=False, allow_nan=False).encode() + b"\n"
@@ -106,7 +137,9 @@ def _line(row: Row) -> bytes:
 
 
 def _cell(value: Any) -> Any:
-    return "; ".join(map(str, value)) if isinstance(value, list) else value
+    text = "; ".join(map(str, value)) if isinstance(value, list) else value
+    formula = isinstance(text, str) and text.startswith(("=", "+", "-", "@"))  # to a spreadsheet
+    return f"'{text}" if formula else text
 
 
 def file_hash(path: str | os.PathLike) -> str:

@@ -82,6 +82,36 @@ def test_what_a_folder_holds_beside_clouds_is_left_out_with_the_reason(touch, he
     }
 
 
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root reads everything")
+def test_folders_that_cannot_be_read_are_told(touch, here):
+    touch("in/a.ply", "in/shut/b.ply")
+    (here / "in" / "shut").chmod(0)
+    try:
+        found = find_inputs(["in"], "out", recursive=True)
+    finally:
+        (here / "in" / "shut").chmod(0o700)
+    assert found.left_out == {str(here / "in" / "shut"): "cannot be read: Permission denied"}
+
+
+def test_folders_that_go_away_are_told(touch, here, monkeypatch):
+    touch("in/a.ply", "in/sub/b.ply")
+    listed = os.scandir
+
+    def scandir(path):
+        if str(path).endswith("sub"):
+            raise PermissionError(13, "Permission denied", str(path))
+        return listed(path)
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    assert list(find_inputs(["in"], "out", recursive=True).left_out.values()) == ["cannot be read: Permission denied"]
+
+
+def test_a_list_with_a_nul(here):
+    (here / "list.txt").write_bytes(b"scan\0.ply\n")
+    with pytest.raises(FileNotFoundError, match="it holds a NUL"):
+        names("list.txt")
+
+
 def test_the_points_of_a_file_taken_apart(here):
     (here / "forest.csv").write_text("x,y,z,tree\n" + "".join(f"{i},0,0,{i % 3}\n" for i in range(9)))
     (here / "bare.xyz").write_text("1 2 3\n")
@@ -96,7 +126,7 @@ def test_the_points_of_a_file_taken_apart(here):
         find_inputs(["forest.csv"], "out", by="trees")
 
 
-@pytest.mark.parametrize("first", [b"0.25 1", b"x,y,z", b"\0\xff\xfe", b"gone.ply"])
+@pytest.mark.parametrize("first", [b"0.25 1", b"x,y,z", b"\xff\xfe", b"gone.ply"])
 def test_a_text_that_is_no_list(here, first):
     (here / "list.txt").write_bytes(first + b"\nsome words" * 99)
     with pytest.raises(

@@ -55,6 +55,48 @@ def test_a_broken_end_is_mended(tmp_path, end, caplog):
     assert lines(tmp_path) == [row("a"), row("b"), row("c")]
 
 
+@pytest.mark.parametrize(
+    "harm",
+    [
+        dict(outputs=["../keep.me"]),
+        dict(outputs=["a.ply", "/etc/keep.me"]),
+        dict(outputs=["sub/../../keep.me"]),
+        dict(outputs=[f"a{os.sep}..{os.sep}..{os.sep}keep.me"]),
+        dict(outputs=["a\0.ply"]),
+        dict(outputs=[7]),
+        dict(outputs="a.ply"),
+        dict(name="../a"),
+        dict(name="/tmp/a"),
+        dict(name=""),
+        dict(name=7),
+        dict(input=None),
+        dict(status="perhaps"),
+        dict(points={"deep": []}),
+        dict(messages=[[]]),
+    ],
+    ids=str,
+)
+def test_a_line_that_no_batch_wrote_is_passed_over(tmp_path, caplog, harm):
+    text = json.dumps({**row("a"), **harm})
+    (tmp_path / "ledger.jsonl").write_text(f"{text}\n{json.dumps(row('b'))}\n")
+    assert list(Ledger(tmp_path).rows) == ["b"]
+    assert "1 broken lines passed over" in caplog.text
+
+
+@pytest.mark.parametrize("line", ['{"name": "a", "input": "a", "status": "done", "seconds": NaN}', "[" * 100_000])
+def test_a_line_that_is_no_json(tmp_path, line):
+    (tmp_path / "ledger.jsonl").write_text(line + "\n")
+    assert Ledger(tmp_path).rows == {}
+
+
+def test_no_cell_of_the_table_is_a_formula(tmp_path):
+    ledger = Ledger(tmp_path)
+    ledger.add(row("=cmd|' /C calc'!A0", messages=["+1"], points=-3))
+    ledger.close()
+    (told,) = csv.DictReader((tmp_path / "ledger.csv").read_text().splitlines())
+    assert (told["name"], told["messages"], told["points"]) == ("'=cmd|' /C calc'!A0", "'+1", "-3")
+
+
 @pytest.mark.parametrize("cut", [1, 10, 60])
 def test_every_line_but_the_cut_one_survives(tmp_path, cut):
     ledger = Ledger(tmp_path)
