@@ -12,11 +12,10 @@ import numpy as np
 from ..errors import FileFormatError, MissingPackageError
 from ..interop.packages import import_open3d
 from ..interop.verbosity import following_open3d
-from .clouds import e57, las, text_tables
+from .clouds import e57, las, ply_points, text_tables
 from .clouds.completeness import check_complete
-from .clouds.scanned import NO_TRIANGLES, NoPoints, Scan, attribute_name, unit_colors
+from .clouds.scanned import NoPoints, Scan, attribute_name, unit_colors
 from .clouds.selection import select
-from .formats.ply import ply_elements
 from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unknown_ending
 from .skeletons import holds_skeleton, read_skeleton
 
@@ -150,9 +149,7 @@ def _is_skeleton(path: Path) -> bool:
 def _read(path: Path, ending: str) -> Scan:
     """The points of a file, none if it has none; FileFormatError where it is damaged."""
     try:
-        if ending in _CLOUD_READERS:
-            return _CLOUD_READERS[ending](path)
-        return _read_mesh(path) if ending in MESH_ENDINGS else _read_with_open3d(path, ending)
+        return _CLOUD_READERS[ending](path)
     except MissingPackageError:
         raise
     except NoPoints as error:
@@ -161,11 +158,11 @@ def _read(path: Path, ending: str) -> Scan:
         raise FileFormatError(f"{path}: not a valid {ending} cloud: {error}") from error
 
 
-def _read_with_open3d(path: Path, ending: str) -> Scan:
-    """A PLY or PCD file, by Open3D's tensor reader: its other one knows no attributes, and garbles doubles in PCD."""
+def _read_pcd(path: Path) -> Scan:
+    """A PCD file, by Open3D's tensor reader: its other one knows no attributes, and garbles doubles."""
     o3d = import_open3d()
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        point = o3d.t.io.read_point_cloud(str(path), format=ending[1:]).point
+        point = o3d.t.io.read_point_cloud(str(path), format="pcd").point
     known = {name: point[name].numpy() for name in point}
     positions = np.ascontiguousarray(known.pop("positions", np.empty((0, 3))), float)
     colors, normals = known.pop("colors", None), known.pop("normals", None)
@@ -173,8 +170,7 @@ def _read_with_open3d(path: Path, ending: str) -> Scan:
     for name, values in known.items():
         if values.shape[1:] == (1,):
             attributes[attribute_name(name, attributes)] = values[:, 0]
-    triangles = _read_mesh(path).triangles if ending == ".ply" and "face" in ply_elements(path) else NO_TRIANGLES
-    return Scan(positions, None if colors is None else unit_colors(colors), normals, attributes, triangles)
+    return Scan(positions, None if colors is None else unit_colors(colors), normals, attributes)
 
 
 def _read_mesh(path: Path) -> Scan:
@@ -186,7 +182,15 @@ def _read_mesh(path: Path) -> Scan:
     return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))
 
 
-_CLOUD_READERS = {**dict.fromkeys(TEXT_ENDINGS, text_tables.read), ".las": las.read, ".laz": las.read, ".e57": e57.read}
+_CLOUD_READERS = {
+    **dict.fromkeys(MESH_ENDINGS, _read_mesh),
+    **dict.fromkeys(TEXT_ENDINGS, text_tables.read),
+    ".ply": ply_points.read,
+    ".pcd": _read_pcd,
+    ".las": las.read,
+    ".laz": las.read,
+    ".e57": e57.read,
+}
 
 
 def _coarse(vertices: np.ndarray, triangles: np.ndarray) -> bool:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from ...errors import FileFormatError
-from ..formats.ply import read_header
+from ..formats.ply_tables import read_header
 
 
 class Promise(NamedTuple):
@@ -69,10 +69,10 @@ def _ply(stream: BinaryIO) -> Promise | None:
     order, elements = read_header(stream)
     here = [element.name for element in elements].index("vertex")
     *before, vertex = elements[: here + 1]
-    if any(element.has_lists for element in elements[: here + 1]):
+    if any(column.counts for element in elements[: here + 1] for column in element.columns):
         return None
     skip = sum(element.rows * (element.dtype(order).itemsize if order else 1) for element in before)
-    return Promise(vertex.rows, len(vertex.properties), skip, vertex.dtype(order).itemsize if order else 0)
+    return Promise(vertex.rows, len(vertex.columns), skip, vertex.dtype(order).itemsize if order else 0)
 
 
 def _pcd(stream: BinaryIO) -> Promise | None:
