@@ -26,6 +26,9 @@ _SAID_HERE = {
     "must be None or a whole number": "must be 0 (no limit) or a whole number",
     "make one with glsk_o3d.skeletonize": "run 'glsk skeletonize' first",
     "pass cut_loops=True to drop": "add --cut-loops to drop",
+    "give min_confidence=0": "add --min-confidence 0",
+    "give cloud=points, or cloud=() to check nothing": "give the scan with --cloud",
+    "max_opening = ": "--opening ",
     "taken with recursive": "taken with --recursive",
     "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
 }
