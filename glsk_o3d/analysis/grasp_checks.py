@@ -91,8 +91,8 @@ def free_ways(
         At the first opening, for the ways that are not free at any.
     opening, depth : (P, A) float array
         The least opening at which the way is free; and of the fingertips past the axis.
-    contacts : (P, A) int array
-        Jaws that close on points, as `GraspCandidates` has them.
+    seen : (P, A) int array
+        Sides of the part that have points, as `GraspCandidates` has them.
     """
     shape = ways.approach.shape[:2]
     far = float(np.linalg.norm(np.ptp(scene.middle, axis=0)))
@@ -101,7 +101,7 @@ def free_ways(
     others = [each if each.ndim == 1 else cells(each, close) for each in scene.obstacles]
     depth = np.minimum(gripper.reach, width / 2)
     reasons: dict[str, np.ndarray] = {}
-    opening, contacts, free = np.full(shape, np.nan), np.zeros(shape, int), np.zeros(shape, bool)
+    opening, seen, free = np.full(shape, np.nan), np.zeros(shape, int), np.zeros(shape, bool)
     for times in WIDER:
         wide = np.minimum(width + times * clearance, gripper.max_opening)
         low, high = swept(gripper, wide, depth, clearance, far)
@@ -113,10 +113,10 @@ def free_ways(
         if len(surface):
             found |= _met(ways, surface, low, high, asked, "the object")
             asked &= ~np.any(list(found.values()), axis=0)
-            jaws = hits(ways, surface, *between(gripper, wide, depth), asked).sum(axis=2)
-            contacts = np.where(asked, jaws, contacts)
-            found[NOTHING_BETWEEN] = asked & (jaws == 0)
-            asked &= jaws > 0
+            beside = hits(ways, surface, *sides(gripper, wide, depth, width), asked)
+            seen = np.where(asked, beside.sum(axis=2), seen)
+            found[NOTHING_BETWEEN] = asked & ~beside[..., :2].any(axis=2)
+            asked &= ~found[NOTHING_BETWEEN]
         for obstacle in others:
             if obstacle.ndim == 1:
                 behind = hits_plane(ways, obstacle, scene.middle, low, high)
@@ -133,7 +133,7 @@ def free_ways(
         {name: part & ~free for name, part in reasons.items()},
         opening,
         np.broadcast_to(depth[:, None], shape),
-        contacts,
+        seen,
     )
 
 
@@ -176,11 +176,17 @@ def swept(
     return low - towards, high + away
 
 
-def between(gripper: Gripper, opening: np.ndarray, depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of the boxes through which either jaw closes, (P, 2, 3) float arrays: as far to either side of the axis
-    as the fingertips reach past it."""
-    half = np.column_stack([opening / 2, np.full_like(opening, gripper.finger[1] / 2), depth])
-    return np.stack([-half, half * [0, -1, -1]], axis=1), np.stack([half * [0, 1, 1], half], axis=1)
+def sides(gripper: Gripper, opening: np.ndarray, depth: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of the boxes around three sides of the part, (P, 3, 3) float arrays: those on which the jaws close, and
+    the one towards the palm.
+
+    Each begins a quarter of the width from the axis, so that a round part has 120 degrees of its section in it, as far
+    as the fingers are wide and reach.
+    """
+    jaw, core, across = opening / 2, width / 4, np.full_like(opening, gripper.finger[1] / 2)
+    low = [[-jaw, -across, -depth], [core, -across, -depth], [-jaw, -across, -jaw]]
+    high = [[-core, across, depth], [jaw, across, depth], [jaw, across, -core]]
+    return np.moveaxis(np.array(low), 2, 0), np.moveaxis(np.array(high), 2, 0)
 
 
 def cells(points: np.ndarray, close: float) -> np.ndarray:

@@ -40,8 +40,9 @@ class GraspCandidates(Rows, row="grasp"):
         Of the skeleton there; NaN where it is unknown.
     quality : (G,) float array
         From 0 to 1; see `grasp_candidates`.
-    contacts : (G,) int array
-        Jaws that close on points of the object: 2, or 1 where the other side was not seen; 0 if nobody has looked.
+    seen : (G,) int array
+        How many have points of the three sides that the gripper is around: those on which the jaws close, and the one
+        towards the palm. What was not seen may be in the way. 0 if nobody has looked.
     gripper : Gripper
         That they are for.
     places : int
@@ -55,8 +56,8 @@ class GraspCandidates(Rows, row="grasp"):
     >>> from glsk_o3d.analysis import grasp_candidates
     >>> from glsk_o3d.samples import tube
     >>> best = grasp_candidates(skeletonize(tube(1000).points), 0.4)[:3]
-    >>> best.poses.shape, best.contacts
-    ((3, 4, 4), array([2, 2, 2]))
+    >>> best.poses.shape, best.seen
+    ((3, 4, 4), array([3, 3, 3]))
     """
 
     position: np.ndarray
@@ -67,7 +68,7 @@ class GraspCandidates(Rows, row="grasp"):
     branch: np.ndarray
     confidence: np.ndarray
     quality: np.ndarray
-    contacts: np.ndarray
+    seen: np.ndarray
     gripper: Gripper
     places: int = 0
     left_out: dict[str, int] = field(default_factory=dict)

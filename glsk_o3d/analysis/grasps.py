@@ -101,10 +101,11 @@ def grasp_candidates(
 
     Notes
     -----
-    The quality is confidence x room x evenness. *Room* is :math:`1 - w / w_{max}`, the share of the widest opening that
-    is left to miss the part by. *Evenness* is :math:`\sqrt{1 - r'^2}`, the cosine of the angle between the closing
-    direction and the surface where the jaws meet it: 1 on a tube. An unknown confidence counts as 1. It ranks; it is no
-    measure of force closure. What no camera has seen is taken for free.
+    The quality is confidence x room x evenness x sight. *Room* is :math:`1 - w / w_{max}`, the share of the widest
+    opening that is left to miss the part by. *Evenness* is :math:`\sqrt{1 - r'^2}`, the cosine of the angle between the
+    closing direction and the surface where the jaws meet it: 1 on a tube. *Sight* is the share, of the three sides of
+    the part that the gripper is around, on which there are points. An unknown confidence counts as 1, and so does the
+    sight if nobody looks. It ranks; it is no measure of force closure. What no camera has seen is taken for free.
 
     References
     ----------
@@ -153,14 +154,16 @@ def grasp_candidates(
     short = sum(len(rows) == 0 for rows in found)
     if short:
         left_out["branches without a place between their margins"] = short
-    taken = taken[np.argsort(-quality[taken].round(9), kind="stable")]  # equal ones differ in their last digits
     approach = directions_around(place[taken, 3:6], above, around).reshape(-1, around, 3)
     ways = Ways(place[taken, :3], place[taken, 3:6], approach)
     scene = Scene(points, obstacle_list(obstacles), points if len(points) else skeleton.vertices, cone)
-    blocked, opening, depth, contacts = free_ways(ways, scene, gripper, width[taken], clearance)
+    blocked, opening, depth, seen = free_ways(ways, scene, gripper, width[taken], clearance)
     free, ways_left_out = _sorted_out(blocked, approach.shape[0] * around)
     left_out |= ways_left_out
     again = taken[free // around]
+    best = quality[again] * (seen.ravel()[free] / 3 if len(points) else 1)
+    order = np.argsort(-best.round(9), kind="stable")  # equal ones differ in their last digits
+    free, again = free[order], again[order]
     candidates = GraspCandidates(
         position=place[again, :3],
         approach=approach.reshape(-1, 3)[free],
@@ -169,8 +172,8 @@ def grasp_candidates(
         depth=depth.ravel()[free],
         branch=branch[again],
         confidence=confidence[again],
-        quality=quality[again],
-        contacts=contacts.ravel()[free],
+        quality=best[order],
+        seen=seen.ravel()[free],
         gripper=gripper,
         places=len(place),
         left_out=left_out,

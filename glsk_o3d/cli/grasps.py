@@ -20,7 +20,7 @@ PRINTED_GRASP = {
     "approach": ".2f",
     "opening": ".4g",
     "quality": ".2f",
-    "contacts": "d",
+    "seen": "d",
     "branch": "d",
 }
 

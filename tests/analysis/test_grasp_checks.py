@@ -44,7 +44,7 @@ def grasp(skeleton, **options):
 
 def same(some, others):
     assert some.left_out == others.left_out
-    for name in ("position", "approach", "closing", "opening", "depth", "quality", "contacts"):
+    for name in ("position", "approach", "closing", "opening", "depth", "quality", "seen"):
         np.testing.assert_allclose(getattr(some, name), getattr(others, name), atol=1e-9)
 
 
@@ -63,7 +63,7 @@ def test_a_wall_keeps_away_exactly_what_comes_from_its_side(obstacle):
     kept = free.approach[:, 1] > -1e-9
     same(replace(free[kept], left_out=beside.left_out), beside)
     np.testing.assert_allclose(beside.opening, 0.2 + CLEARANCE)
-    assert (beside.contacts == 2).all()
+    assert (beside.seen == 3).all()
 
 
 def test_several_obstacles_and_one_that_has_points_of_the_object():
@@ -135,7 +135,7 @@ def test_turned_moved_scaled_and_shuffled():
     assert len(found) > 20
     assert len(found.left_out) >= 4
     assert found.left_out == again.left_out
-    np.testing.assert_array_equal(found.contacts, again.contacts)
+    np.testing.assert_array_equal(found.seen, again.seen)
     np.testing.assert_allclose(again.position, moved(found.position), atol=1e-8)
     np.testing.assert_allclose(again.opening, scale * found.opening)
     np.testing.assert_allclose(again.depth, scale * found.depth)
@@ -188,11 +188,16 @@ def test_pieces_of_surface_reach_halfway_to_the_neighbours():
 def test_the_jaws_close_on_something():
     with pytest.warns(SkeletonWarning, match="72 ways in with nothing between the jaws"):
         assert len(grasp(rod(), cloud=rod().points + [0, 0, 30])) == 0
-    half = rod()
-    half = grasp(replace(half, points=half.points[half.points[:, 1] > 0.01]), around=4)
-    seen = np.abs(half.approach[:, 1]) > 0.5  # towards the half that is there, or away from it
+
+
+def test_what_was_seen_is_told_and_ranks():
+    whole = rod()
+    half = grasp(replace(whole, points=whole.points[whole.points[:, 1] > 0.01]), around=4)
+    across = half.approach[:, 1].round(6)  # 1: from the side that is not there, past both edges of the other
     assert len(half) == 4 * half.places
-    np.testing.assert_array_equal(half.contacts, np.where(seen, 2, 1))
+    np.testing.assert_array_equal(half.seen, np.select([across == 1, across == -1], [2, 3], 2))
+    np.testing.assert_allclose(half.quality, grasp(whole, around=4).quality * half.seen / 3)
+    assert (across[: half.places] == -1).all()
 
 
 def test_jaws_open_wider_where_points_scatter(monkeypatch):
@@ -290,7 +295,7 @@ def test_a_skeleton_without_points_asks_for_them():
     with pytest.raises(InvalidParameterError, match=r"cloud=\(\)"):
         grasp(bare)
     same(grasp(bare, cloud=rod().points), grasp(rod()))
-    assert (grasp(bare, cloud=()).contacts == 0).all()
+    assert (grasp(bare, cloud=()).seen == 0).all()
     assert len(grasp(bare, cloud=(), obstacles=(0, 0, 1, 0.11))) < len(grasp(bare, cloud=()))
 
 
