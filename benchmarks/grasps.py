@@ -48,19 +48,22 @@ def pierced(
         fill(page, {"pierced": "\n".join([where, "", markdown_table(*found[0])])})
 
 
+COLUMNS = [(condition, key) for condition in CONDITIONS for key in ("alone", "checked")] + [(CONDITIONS[-1], "seen")]
+WORDS = {"alone": "axis alone", "checked": "checked", "seen": "all sides seen"}
+
+
 def tables(rows: list[dict]) -> Tables:
-    """A line for each object; before and after in each condition."""
+    """A line for each object; without and with the check in each condition."""
     lines = []
     for shape in dict.fromkeys(row["shape"] for row in rows):
         cells = []
-        for condition in CONDITIONS:
+        for condition, key in COLUMNS:
             here = [row for row in pick(rows, shape=shape, condition=condition) if "failure" not in row]
-            for key in ("before", "after"):
-                bad, best, found = (sum(row[key][name] for row in here) for name in ("coming", "best", "found"))
-                cells.append(f"{bad} of {best}" + (f" ({found})" if key == "after" else ""))
+            bad, best, found = (sum(row[key][name] for row in here) for name in ("coming", "best", "found"))
+            cells.append(f"{bad} of {best}" + ("" if key == "alone" else f" ({found})"))
         lines.append([shape, *cells])
-    header = ["object", *(f"{condition}, {key}" for condition in CONDITIONS for key in ("axis alone", "points too"))]
-    return [(f"Of the best {BEST} grasps, with a finger or the palm in the object (of all found)", header, lines)]
+    header = ["object", *(f"{condition}, {WORDS[key]}" for condition, key in COLUMNS)]
+    return [(f"Of the best {BEST}, with a finger or the palm in the object (of all found)", header, lines)]
 
 
 if __name__ == "__main__":

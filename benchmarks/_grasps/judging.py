@@ -44,11 +44,17 @@ def measure(name: str, condition: str, n: int, seed: int) -> dict:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # no grasp at all shows as such
         skeleton = skeletonize(points)
-        for key, cloud in (("before", ()), ("after", None)):
+        for key, cloud in (("alone", ()), ("checked", None)):
             start = time.process_time()
             found = grasp_candidates(skeleton, opening, cloud=cloud)
             row[f"{key} cpu"] = time.process_time() - start
-            best = found[:BEST]
-            rest, coming = pierces(best, thing.inside, way).sum(axis=0).tolist()
-            row[key] = dict(found=len(found), best=len(best), rest=rest, coming=coming)
+            row[key] = judged(found, thing.inside, way)
+        row["seen"] = judged(found[found.seen == 3], thing.inside, way)
     return row
+
+
+def judged(found: GraspCandidates, inside: Callable[[np.ndarray], np.ndarray], way: float) -> dict:
+    """How many there are, and how many of the best are bad, at rest and on the way in."""
+    best = found[:BEST]
+    rest, coming = pierces(best, inside, way).sum(axis=0).tolist()
+    return dict(found=len(found), best=len(best), rest=rest, coming=coming)

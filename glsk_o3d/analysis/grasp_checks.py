@@ -23,6 +23,7 @@ CELL_NEIGHBOURS = 8  # measured: a finger came through a wall of scattered point
 # derived: eight neighbours within half a finger's thickness leave a hole as wide as a finger with probability e^-10
 CLOSE_POINTS = 0.5
 WIDER = (1, 2, 3)  # measured: clearances to try; in noise of 0.5 % of the diagonal the first alone leaves few grasps
+AT_THE_SIDE = np.sqrt(3) / 2  # derived: where a side begins, over the radius: the cosine of 30 degrees
 OUTSIDE_CONE = "ways in outside the cone"
 NOTHING_BETWEEN = "ways in with nothing between the jaws"
 
@@ -180,10 +181,10 @@ def sides(gripper: Gripper, opening: np.ndarray, depth: np.ndarray, width: np.nd
     """Corners of the boxes around three sides of the part, (P, 3, 3) float arrays: those on which the jaws close, and
     the one towards the palm.
 
-    Each begins a quarter of the width from the axis, so that a round part has 120 degrees of its section in it, as far
-    as the fingers are wide and reach.
+    Of the section of a round part each has what is within 30 degrees of its direction; fingers are as wide as they are,
+    and jaws close as far to either side of the axis as their tips reach past it.
     """
-    jaw, core, across = opening / 2, width / 4, np.full_like(opening, gripper.finger[1] / 2)
+    jaw, core, across = opening / 2, AT_THE_SIDE * width / 2, np.full_like(opening, gripper.finger[1] / 2)
     low = [[-jaw, -across, -depth], [core, -across, -depth], [-jaw, -across, -jaw]]
     high = [[-core, across, depth], [jaw, across, depth], [jaw, across, -core]]
     return np.moveaxis(np.array(low), 2, 0), np.moveaxis(np.array(high), 2, 0)

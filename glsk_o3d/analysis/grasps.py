@@ -6,7 +6,7 @@ import math
 import warnings
 from collections import Counter
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -136,6 +136,50 @@ def grasp_candidates(
     cone = None if cone is None else _cone(cone)
     above = _direction("up", up) if up is not None else np.array([0.0, 0, 1]) if cone is None else -cone[0]
     points = _object(skeleton, cloud)
+    places, left_out = _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence)
+    approach = directions_around(places.axis, above, around).reshape(-1, around, 3)
+    ways = Ways(places.position, places.axis, approach)
+    scene = Scene(points, obstacle_list(obstacles), points if len(points) else skeleton.vertices, cone)
+    blocked, opening, depth, seen = free_ways(ways, scene, gripper, places.width, clearance)
+    free, ways_left_out = _sorted_out(blocked, approach.shape[0] * around)
+    quality = places.quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
+    order = np.argsort(-quality.round(9), kind="stable")  # equal ones differ in their last digits
+    free, quality = free[order], quality[order]
+    again = free // around
+    candidates = GraspCandidates(
+        position=places.position[again],
+        approach=approach.reshape(-1, 3)[free],
+        closing=ways.closing.reshape(-1, 3)[free],
+        opening=opening.ravel()[free],
+        depth=depth.ravel()[free],
+        branch=places.branch[again],
+        confidence=places.confidence[again],
+        quality=quality,
+        seen=seen.ravel()[free],
+        gripper=gripper,
+        places=places.looked_at,
+        left_out=left_out | ways_left_out,
+    )
+    if len(candidates) == 0:
+        why = told(candidates.left_out, ": ") or ": the skeleton has no branch"
+        warnings.warn(f"no grasp at {places.looked_at} places{why}", SkeletonWarning, stacklevel=outside())
+    return candidates
+
+
+class _Places(NamedTuple):
+    """Where the part fits between the jaws."""
+
+    position: np.ndarray
+    axis: np.ndarray
+    width: np.ndarray
+    quality: np.ndarray
+    confidence: np.ndarray
+    branch: np.ndarray
+    looked_at: int
+
+
+def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
+    """Places that fit, and how many do not, by reason."""
     found = [places_along(skeleton, path, spacing, margin) for path in skeleton.branches]
     place = np.concatenate([np.empty((0, 9)), *found])
     branch = np.repeat(np.arange(len(found)), list(map(len, found))) if found else np.empty(0, int)
@@ -150,38 +194,13 @@ def grasp_candidates(
         "too thin": width <= gripper.min_opening,
         "uncertain": ~(confidence >= min_confidence) if min_confidence > 0 else np.zeros(len(width), bool),
     }
-    taken, left_out = _sorted_out(reasons, len(place))
+    some, left_out = _sorted_out(reasons, len(place))
     short = sum(len(rows) == 0 for rows in found)
     if short:
         left_out["branches without a place between their margins"] = short
-    approach = directions_around(place[taken, 3:6], above, around).reshape(-1, around, 3)
-    ways = Ways(place[taken, :3], place[taken, 3:6], approach)
-    scene = Scene(points, obstacle_list(obstacles), points if len(points) else skeleton.vertices, cone)
-    blocked, opening, depth, seen = free_ways(ways, scene, gripper, width[taken], clearance)
-    free, ways_left_out = _sorted_out(blocked, approach.shape[0] * around)
-    left_out |= ways_left_out
-    again = taken[free // around]
-    best = quality[again] * (seen.ravel()[free] / 3 if len(points) else 1)
-    order = np.argsort(-best.round(9), kind="stable")  # equal ones differ in their last digits
-    free, again = free[order], again[order]
-    candidates = GraspCandidates(
-        position=place[again, :3],
-        approach=approach.reshape(-1, 3)[free],
-        closing=ways.closing.reshape(-1, 3)[free],
-        opening=opening.ravel()[free],
-        depth=depth.ravel()[free],
-        branch=branch[again],
-        confidence=confidence[again],
-        quality=best[order],
-        seen=seen.ravel()[free],
-        gripper=gripper,
-        places=len(place),
-        left_out=left_out,
-    )
-    if len(candidates) == 0:
-        why = told(left_out, ": ") or ": the skeleton has no branch"
-        warnings.warn(f"no grasp at {len(place)} places{why}", SkeletonWarning, stacklevel=outside())
-    return candidates
+    place, branch, confidence = place[some], branch[some], confidence[some]
+    fitting = _Places(place[:, :3], place[:, 3:6], width[some], quality[some], confidence, branch, len(width))
+    return fitting, left_out
 
 
 def _sorted_out(reasons, n):
