@@ -24,7 +24,7 @@ def parts(tool):
 
 
 def test_what_is_inside_a_mug(parts):
-    mug = parts.objects.built("mug")
+    mug = parts.objects.built("mug", 0)
     inside = [[0.038, 0, 0.05], [0, 0, 0.003], [-0.038, 0, 0.09], [0.068, 0, 0.0475], [0.068, 0.005, 0.0475]]
     outside = [
         [0, 0, 0.05],
@@ -38,7 +38,7 @@ def test_what_is_inside_a_mug(parts):
 
 
 def test_clouds_of_a_mug(parts):
-    mug = parts.objects.built("mug")
+    mug = parts.objects.built("mug", 0)
     clean, noisy, seen = (mug.cloud(2000, condition, 0) for condition in parts.objects.CONDITIONS)
     assert clean.shape == noisy.shape == seen.shape == (2000, 3)
     np.testing.assert_array_equal(clean, mug.cloud(2000, "clean", 0))
@@ -51,12 +51,20 @@ def test_clouds_of_a_mug(parts):
 
 
 def test_clouds_of_a_sample(parts):
-    torus = parts.objects.built("torus")
+    torus = parts.objects.built("torus", 0)
     whole, seen = (torus.cloud(500, condition, 0) for condition in ("clean", "two cameras"))
     assert not torus.inside(1.001 * whole + 0.001 * np.sign(whole)).all()
     assert torus.inside(torus.nodes).all()
     assert (whole[:, 2] < -0.08).any()
     assert seen[:, 2].min() > -0.08
+
+
+@pytest.mark.parametrize("name", ["tree", "sauropod", "helix"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_points_are_on_the_shape_that_judges(parts, name, seed):
+    thing = parts.objects.built(name, seed)
+    distance = samples.signed_distance(thing.cloud(300, "clean", seed), thing.nodes, thing.edges, thing.radii)
+    np.testing.assert_allclose(distance, 0, atol=1e-3)  # the helix is drawn smooth, and judged by its chords
 
 
 @pytest.mark.parametrize(("opening", "bad"), [(0.19, True), (0.201, False)])

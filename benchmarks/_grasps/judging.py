@@ -36,7 +36,7 @@ def pierces(grasps: GraspCandidates, inside: Callable[[np.ndarray], np.ndarray],
 
 def measure(name: str, condition: str, n: int, seed: int) -> dict:
     """The best grasps of one cloud, found without and with a look at its points."""
-    thing = built(name)
+    thing = built(name, seed)
     points = thing.cloud(n, condition, seed)
     way = float(np.linalg.norm(np.ptp(points, axis=0)))
     opening = OPENING.get(name, USUAL_OPENING)

@@ -22,9 +22,9 @@ CONDITIONS = ("clean", "noise", "two cameras")
 class Capsules:
     """A sample of the package: points, and what is inside by the distance to its capsules."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, seed: int) -> None:
         self.name = name
-        drawn = samples.SAMPLES[name](16)
+        drawn = samples.SAMPLES[name](16, seed=seed)  # each seed is another tree
         self.nodes, self.edges, self.radii = drawn.nodes, drawn.edges, drawn.radii
         lengths = np.linalg.norm(self.nodes[self.edges[:, 1]] - self.nodes[self.edges[:, 0]], axis=1)
         self.tree, self.most = cKDTree(self.nodes), self.radii.max() + lengths.max() / 2
@@ -79,9 +79,9 @@ class Mug:
 
 
 @cache
-def built(name: str) -> Capsules | Mug:
-    """An object by its name."""
-    return Mug() if name == "mug" else Capsules(name)
+def built(name: str, seed: int) -> Capsules | Mug:
+    """An object by its name, and the seed of its cloud."""
+    return Mug() if name == "mug" else Capsules(name, seed)
 
 
 def cameras(points: np.ndarray) -> np.ndarray:
