@@ -6,8 +6,9 @@ from .branches import branch_table
 from .comparison import Comparison, compare
 from .curvature import curvature_torsion
 from .forestry import TreeMeasures, tree_measures
+from .grasp_rows import GraspCandidates
 from .grasps import grasp_candidates
-from .grippers import GraspCandidates
+from .gripper import Gripper
 from .loops import Loop
 from .segmentation import segment
 from .thickness import thickness
@@ -20,6 +21,7 @@ __all__ = [
     "Comparison",
     "Cylinders",
     "GraspCandidates",
+    "Gripper",
     "Loop",
     "LoopWidth",
     "TreeMeasures",

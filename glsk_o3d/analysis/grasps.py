@@ -1,17 +1,22 @@
-"""Where a gripper with parallel jaws can take an object: candidates along its skeleton."""
+"""Where a gripper with parallel jaws can take an object: candidates along its skeleton, with a free way in."""
 
 from __future__ import annotations
 
 import math
 import warnings
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidParameterError, SkeletonWarning
+from ..interop.clouds import cloud_points
 from ..report import outside
-from .grippers import GraspCandidates, told
+from .grasp_checks import Scene, Ways, free_ways, obstacle_list
+from .grasp_places import directions_around, places_along
+from .grasp_rows import GraspCandidates, told
+from .gripper import Gripper, checked
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -19,15 +24,17 @@ if TYPE_CHECKING:
 
 def grasp_candidates(
     skeleton: Skeleton,
-    max_opening: float,
+    gripper: Gripper | float,
     *,
-    min_opening: float = 0.0,
+    cloud: Any = None,
+    obstacles: Any = None,
+    cone: tuple[Any, float] | None = None,
     clearance: float | None = None,
     around: int = 8,
     spacing: float | None = None,
     margin: float = 1.0,
     min_confidence: float = 0.5,
-    up: Any = (0.0, 0.0, 1.0),
+    up: Any = None,
 ) -> GraspCandidates:
     r"""Candidates for grasps with parallel jaws, from the axis and the radii of a skeleton's branches.
 
@@ -37,17 +44,29 @@ def grasp_candidates(
     touches ahead of its widest section. Direction and :math:`r'` are those of a chord of the curve, from one radius
     before the place to one behind.
 
+    The gripper comes in straight, open, from as far away as the diagonal of the object, until its fingertips are past
+    the axis: by its reach, or as far as the part if that is less. Ways on which a finger or the palm would sweep over
+    points of the object, or over an obstacle, are left out, and so are those on which there is no point between the
+    jaws.
+
     Parameters
     ----------
     skeleton : Skeleton
         With radii.
-    max_opening : float
-        Widest opening of the gripper [cloud's units]. A place is left out where w and the clearance exceed it.
-    min_opening : float
-        Opening down to which it closes [cloud's units]; parts no wider than that are left out.
+    gripper : Gripper or float
+        Or its widest opening [cloud's units]; then all else is in proportion.
+    cloud : cloud, optional
+        All points of the object; by default those of the skeleton. An empty tuple leaves it out: nothing keeps a finger
+        from going through the object then.
+    obstacles : cloud or (4,) array_like, or a sequence of these, optional
+        Clouds of what else is there; of a mesh the vertices count, and points of the object do no harm. Four numbers
+        are a plane, as Open3D's ``segment_plane`` gives it: what is behind it, as seen from the object, is solid.
+    cone : (direction, degrees), optional
+        Approaches may differ from this (3,) direction by no more.
     clearance : float, optional
-        What the opening exceeds the width w by [cloud's units], half on either side; by default a tenth of
-        `max_opening`.
+        What the opening exceeds the width w by [cloud's units], half on either side; twice or three times as much
+        where less is not free, as in noise. Half of it is also kept all around the gripper. By default a tenth of the
+        widest opening.
     around : int
         Approach directions at each place, evenly around the axis.
     spacing : float, optional
@@ -58,20 +77,22 @@ def grasp_candidates(
         parts, or only half of them the part.
     min_confidence : float
         Least confidence of the skeleton, from 0 to 1. 0 takes also what nobody has measured.
-    up : (3,) float array_like
+    up : (3,) float array_like, optional
         The first approach comes from above, as nearly as can be at a right angle to the axis; on axes parallel to `up`,
-        from a side that depends on nothing but `up`.
+        from a side that depends on nothing but `up`. By default against the direction of the cone, or else z.
 
     Returns
     -------
     GraspCandidates
-        Best first; of equal ones, in the order of the branches, along them and around. Places: ``len`` over `around`.
+        Best first; of equal ones, in the order of the branches, along them and around.
 
     Raises
     ------
     InvalidParameterError
-        The skeleton is empty or has no radii; it has no confidence, but `min_confidence` is above 0; or a parameter is
-        out of range.
+        The skeleton is empty or has no radii; it has no confidence, but `min_confidence` is above 0, or no points, and
+        no `cloud` is given; or a parameter is out of range.
+    InvalidCloudError
+        An obstacle or the object is no cloud.
 
     Warns
     -----
@@ -80,16 +101,19 @@ def grasp_candidates(
 
     Notes
     -----
-    The quality is confidence x room x evenness. *Room* is :math:`1 - w / w_{max}`, the share of the widest opening that
-    is left to miss the part by. *Evenness* is :math:`\sqrt{1 - r'^2}`, the cosine of the angle between the closing
-    direction and the surface where the jaws meet it: 1 on a tube. An unknown confidence counts as 1. It ranks; it is no
-    measure of force closure. What stands in the way of the gripper is not looked at.
+    The quality is confidence x room x evenness x sight. *Room* is :math:`1 - w / w_{max}`, the share of the widest
+    opening that is left to miss the part by. *Evenness* is :math:`\sqrt{1 - r'^2}`, the cosine of the angle between the
+    closing direction and the surface where the jaws meet it: 1 on a tube. *Sight* is the share, of the three sides of
+    the part that the gripper is around, on which there are points. An unknown confidence counts as 1, and so does the
+    sight if nobody looks. It ranks; it is no measure of force closure. What no camera has seen is taken for free.
 
     References
     ----------
     After Vahrenkamp et al. 2018, "Planning high-quality grasps using mean curvature object skeletons", IEEE RA-L 3(2),
     who place hands along the branches of a mesh's skeleton, at right angles to them. They align the hand with the
-    section of the surface and evaluate the contacts; this function spreads the approaches evenly and does not.
+    section of the surface and evaluate the contacts; this function spreads the approaches evenly and does not. Ten Pas
+    et al. 2017, "Grasp pose detection in point clouds", IJRR 36(13-14), check candidates as here: no point in the
+    boxes of the hand, some between its fingers.
 
     Examples
     --------
@@ -97,145 +121,137 @@ def grasp_candidates(
     >>> from glsk_o3d.samples import tube
     >>> straight = tube(length=1.0, radius=0.1)
     >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), (), confidence=[1, 1])
-    >>> grasps = grasp_candidates(axis, max_opening=0.4, clearance=0.05, around=4)
+    >>> grasps = grasp_candidates(axis, 0.4, cloud=straight.points, clearance=0.05, around=4)
     >>> grasps
     GraspCandidates(36 at 9 places)
     >>> float(grasps.opening[0]), float(grasps.quality[0])
     (0.25, 0.5)
+    >>> table = (0, 0, 1, 0.1)  # z = -0.1: the tube lies on it, and cannot be taken from below, nor from the side
+    >>> grasp_candidates(axis, 0.4, cloud=straight.points, obstacles=table, clearance=0.05, around=4)
+    GraspCandidates(9 at 9 places; not taken: 27 ways in with a finger in an obstacle)
     """
-    clearance = max_opening / 10 if clearance is None and _is_number(max_opening) else clearance
-    _check(skeleton, max_opening, min_opening, clearance, around, spacing, margin, min_confidence)
-    found = [_places(skeleton, path, spacing, margin) for path in skeleton.branches]
-    empty = np.empty((0, 9))
-    place = np.concatenate([empty, *found])
+    gripper = gripper if isinstance(gripper, Gripper) else Gripper(gripper)
+    clearance = gripper.max_opening / 10 if clearance is None else clearance
+    _check(skeleton, clearance, around, spacing, margin, min_confidence)
+    cone = None if cone is None else _cone(cone)
+    above = _direction("up", up) if up is not None else np.array([0.0, 0, 1]) if cone is None else -cone[0]
+    points = _object(skeleton, cloud)
+    places, left_out = _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence)
+    approach = directions_around(places.axis, above, around).reshape(-1, around, 3)
+    ways = Ways(places.position, places.axis, approach)
+    scene = Scene(points, obstacle_list(obstacles), points if len(points) else skeleton.vertices, cone)
+    blocked, opening, depth, seen = free_ways(ways, scene, gripper, places.width, clearance)
+    free, ways_left_out = _sorted_out(blocked, approach.shape[0] * around)
+    quality = places.quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
+    order = np.argsort(-quality.round(9), kind="stable")  # equal ones differ in their last digits
+    free, quality = free[order], quality[order]
+    again = free // around
+    candidates = GraspCandidates(
+        position=places.position[again],
+        approach=approach.reshape(-1, 3)[free],
+        closing=ways.closing.reshape(-1, 3)[free],
+        opening=opening.ravel()[free],
+        depth=depth.ravel()[free],
+        branch=places.branch[again],
+        confidence=places.confidence[again],
+        quality=quality,
+        seen=seen.ravel()[free],
+        gripper=gripper,
+        places=places.looked_at,
+        left_out=left_out | ways_left_out,
+    )
+    if len(candidates) == 0:
+        why = told(candidates.left_out, ": ") or ": the skeleton has no branch"
+        warnings.warn(f"no grasp at {places.looked_at} places{why}", SkeletonWarning, stacklevel=outside())
+    return candidates
+
+
+class _Places(NamedTuple):
+    """Where the part fits between the jaws."""
+
+    position: np.ndarray
+    axis: np.ndarray
+    width: np.ndarray
+    quality: np.ndarray
+    confidence: np.ndarray
+    branch: np.ndarray
+    looked_at: int
+
+
+def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
+    """Places that fit, and how many do not, by reason."""
+    found = [places_along(skeleton, path, spacing, margin) for path in skeleton.branches]
+    place = np.concatenate([np.empty((0, 9)), *found])
     branch = np.repeat(np.arange(len(found)), list(map(len, found))) if found else np.empty(0, int)
-    positions, axis = place[:, :3], place[:, 3:6]
     radius, slope, confidence = place[:, 6:].T
     with np.errstate(divide="ignore", invalid="ignore"):
         even = np.sqrt(np.clip(1 - slope**2, 0, None))
         width = 2 * radius / even
+        quality = np.nan_to_num(confidence, nan=1.0) * (1 - width / gripper.max_opening) * even
     reasons = {
         "unknown radius": np.isnan(width),
-        "too wide": width + clearance > max_opening,
-        "too thin": width <= min_opening,
+        "too wide": width + clearance > gripper.max_opening,
+        "too thin": width <= gripper.min_opening,
         "uncertain": ~(confidence >= min_confidence) if min_confidence > 0 else np.zeros(len(width), bool),
     }
-    first = np.select(list(reasons.values()), list(reasons), "")
-    left_out = dict(Counter(first[first != ""].tolist()))
+    some, left_out = _sorted_out(reasons, len(place))
     short = sum(len(rows) == 0 for rows in found)
     if short:
         left_out["branches without a place between their margins"] = short
-    taken = np.flatnonzero(first == "")
-    quality = np.nan_to_num(confidence[taken], nan=1.0) * (1 - width[taken] / max_opening) * even[taken]
-    order = np.argsort(-quality.round(9), kind="stable")  # equal ones differ in their last digits
-    taken = taken[order]
-    approach = _around(axis[taken], _direction(up), around)
-    again = np.repeat(taken, around)
-    candidates = GraspCandidates(
-        positions=positions[again],
-        approach=approach,
-        closing=np.cross(axis[again], approach),
-        opening=(width + clearance)[again],
-        branch=branch[again],
-        confidence=confidence[again],
-        quality=np.repeat(quality[order], around),
-        places=len(place),
-        left_out=left_out,
-    )
-    if len(taken) == 0:
-        why = told(left_out, ": ") or ": the skeleton has no branch"
-        warnings.warn(f"no grasp at {len(place)} places{why}", SkeletonWarning, stacklevel=outside())
-    return candidates
+    place, branch, confidence = place[some], branch[some], confidence[some]
+    fitting = _Places(place[:, :3], place[:, 3:6], width[some], quality[some], confidence, branch, len(width))
+    return fitting, left_out
 
 
-def _check(skeleton, max_opening, min_opening, clearance, around, spacing, margin, min_confidence):
+def _sorted_out(reasons, n):
+    """The rows for which no reason holds, and how often each is the first that does."""
+    first = np.select([reason.ravel() for reason in reasons.values()], list(reasons), "") if reasons else np.full(n, "")
+    return np.flatnonzero(first == ""), dict(Counter(first[first != ""].tolist()))
+
+
+def _object(skeleton, cloud):
+    """The points of the object, none if the check is left out."""
+    if isinstance(cloud, tuple | list) and len(cloud) == 0:
+        return np.empty((0, 3))
+    if cloud is None and len(skeleton.points) == 0:
+        raise InvalidParameterError(
+            "this skeleton does not know the points of the object: give cloud=points, or cloud=() to check nothing"
+        )
+    points = skeleton.points if cloud is None else cloud_points(cloud)
+    return points[np.isfinite(points).all(axis=1)]
+
+
+def _check(skeleton, clearance, around, spacing, margin, min_confidence):
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: there is nothing to grasp")
     if not (np.isfinite(skeleton.vertices).all() and np.isfinite(skeleton.radii).any()):
         raise InvalidParameterError("grasps need finite vertices and radii: save skeletons as .json, .npz or .ply")
     if min_confidence != 0 and np.isnan(skeleton.confidence).all():
         raise InvalidParameterError("this skeleton has no confidence, perhaps due to its file: give min_confidence=0")
-    for name, value, low, high, closed in (
-        ("max_opening", max_opening, 0, math.inf, False),
-        ("min_opening", min_opening, 0, max_opening, True),
-        ("clearance", clearance, 0, math.inf, True),
-        ("spacing", spacing, 0, math.inf, False),
-        ("margin", margin, 0, math.inf, True),
-        ("min_confidence", min_confidence, 0, 1, True),
-    ):
-        if name == "spacing" and value is None:
-            continue
-        if not (_is_number(value) and (low <= value if closed else low < value) and value <= high):
-            limits = f"{'at least' if closed else 'above'} {low}" + (f" and at most {high}" if high < math.inf else "")
-            raise InvalidParameterError(f"{name} = {value!r}: must be a finite number, {limits}")
+    checked("clearance", clearance, low=0)
+    if spacing is not None:
+        checked("spacing", spacing, above=0)
+    checked("margin", margin, low=0)
+    checked("min_confidence", min_confidence, low=0, high=1)
     if isinstance(around, bool) or not isinstance(around, int | np.integer) or around < 1:
         raise InvalidParameterError(f"around = {around!r}: must be a whole number of at least 1")
 
 
-def _is_number(value):
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool) and math.isfinite(value)
+def _cone(cone):
+    """Its unit direction, and the least cosine of the angle to it."""
+    if not isinstance(cone, Iterable) or isinstance(cone, str) or len(tuple(cone)) != 2:
+        raise InvalidParameterError(f"cone = {cone!r}: must be a direction and an angle in degrees")
+    direction, degrees = cone
+    angle = checked("the angle of cone", degrees, low=0, high=180)
+    return _direction("the direction of cone", direction), math.cos(math.radians(angle)) - 1e-9  # rounding
 
 
-def _direction(up):
+def _direction(name, given):
     try:
-        vector = np.asarray(up, float)
+        vector = np.asarray(given, float)
     except (TypeError, ValueError):
         vector = np.empty(0)
     if vector.shape != (3,) or not (np.isfinite(vector).all() and vector.any()):
-        raise InvalidParameterError(f"up = {up!r}: must be three finite numbers, not all 0")
+        raise InvalidParameterError(f"{name} = {given!r}: must be three finite numbers, not all 0")
     vector = vector / np.abs(vector).max()
     return vector / np.linalg.norm(vector)
-
-
-def _places(skeleton, path, spacing, margin):
-    """Places along a branch, (n, 9): position, axis, radius, its slope, confidence."""
-    curve, radii = skeleton.vertices[path], skeleton.radii[path]
-    along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
-    length = along[-1]
-    if not length > 0:
-        return np.empty((0, 9))
-    closed = path[0] == path[-1] and skeleton.degree[path[0]] == 2
-    usual = np.nanmedian(radii) if np.isfinite(radii).any() else 0.0
-    step = spacing or usual or length / 10
-    low, high = 0.0, length
-    if closed:
-        count = max(round(length / step), 1)
-        at = length / count * np.arange(count)
-    else:
-        low, high = margin * np.nan_to_num(radii[0]), length - margin * np.nan_to_num(radii[-1])
-        if low > high:
-            return np.empty((0, 9))
-        count = int((high - low) / step * (1 + 1e-12)) + 1
-        at = (low + high) / 2 + step * (np.arange(count) - (count - 1) / 2)
-
-    values = np.column_stack([curve, radii, skeleton.confidence[path]])
-
-    def sample(places):
-        period = {"period": length} if closed else {}
-        return np.column_stack([np.interp(places, along, column, **period) for column in values.T])
-
-    here = sample(at)
-    reach = np.where(here[:, 3] > 0, here[:, 3], step)
-    if closed:
-        before, behind = at - np.minimum(reach, length / 4), at + np.minimum(reach, length / 4)
-    else:
-        before, behind = np.maximum(at - reach, 0), np.minimum(at + reach, length)
-    chord = sample(behind) - sample(before)
-    size = np.linalg.norm(chord[:, :3], axis=1, keepdims=True)
-    axis = np.divide(chord[:, :3], size, out=np.full((count, 3), np.nan), where=size > 0)
-    slope = chord[:, 3] / (behind - before)
-    found = np.column_stack([here[:, :3], axis, here[:, 3], slope, here[:, 4]])
-    return found[size[:, 0] > 0]
-
-
-def _around(axis, up, n):
-    """Directions perpendicular to each axis, n of each in turn; the first points down as far as it can."""
-    side = np.eye(3)[np.argmin(np.abs(up))]
-    down = -(up - axis * (axis @ up)[:, None])
-    other = side - axis * (axis @ side)[:, None]
-    size = np.linalg.norm(down, axis=1, keepdims=True)
-    first = np.where(size > 1e-6, down, other)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    turn = 2 * np.pi * np.arange(n)[:, None] / n
-    around = np.cos(turn) * first[:, None] + np.sin(turn) * np.cross(axis, first)[:, None]
-    return around.reshape(-1, 3)

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any, ClassVar
 
+import numpy as np
+
 from ..interop.atomic import write_csv
 
 
@@ -15,7 +17,7 @@ class Rows:
     """Base of dataclasses whose fields are arrays with a row per thing.
 
     Iteration gives a dict of plain numbers and strings per row, the number of the row first; points, in fields whose
-    names end in ``_point``, become three columns without it.
+    names end in ``_point``, become three columns without it. Fields that are no arrays are no columns.
     """
 
     _row: ClassVar[str]
@@ -31,6 +33,8 @@ class Rows:
         columns: dict[str, list] = {self._row: list(range(len(self)))}
         for field in fields(self):  # type: ignore[arg-type]
             array = getattr(self, field.name)
+            if not isinstance(array, np.ndarray):
+                continue
             if array.ndim == 1:
                 columns[field.name] = array.tolist()
             else:

@@ -18,6 +18,7 @@ from .demo import demo
 from .edit import convert, edit
 from .evaluate import evaluate
 from .filters import filters
+from .grasps import grasps
 from .info import info
 from .rerun import rerun
 from .run import run
@@ -46,6 +47,7 @@ for command in (
     crosscheck,
     branches,
     tree,
+    grasps,
     edit,
     convert,
     view,

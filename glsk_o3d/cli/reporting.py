@@ -33,6 +33,9 @@ _SAID_HERE = {
     "only trees have a root; see cut_loops()": "only trees have a root: add --cut-loops",
     "keep one with editing.largest_component()": "keep one with 'glsk edit --largest'",
     "pass unit=, such as 'mm'": "say --unit, such as --unit mm",
+    "give min_confidence=0": "add --min-confidence 0",
+    "give cloud=points, or cloud=() to check nothing": "give the scan with --cloud",
+    "max_opening = ": "--opening ",
     "taken with recursive": "taken with --recursive",
     "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
 }

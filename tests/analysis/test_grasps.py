@@ -9,9 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import InvalidParameterError, Skeleton, SkeletonWarning, samples, skeletonize
-from glsk_o3d.analysis import GraspCandidates, grasp_candidates
+from glsk_o3d.analysis import GraspCandidates, Gripper
+from glsk_o3d.analysis import grasp_candidates as checked_candidates
 
-ARRAYS = [field.name for field in fields(GraspCandidates)][:7]
+ARRAYS = [field.name for field in fields(GraspCandidates)][:9]
 WIDE = 10.0
 
 
@@ -32,6 +33,11 @@ TUBE = axis_of(samples.tube(10, length=1.0, radius=0.1))
 SAUROPOD = axis_of(samples.sauropod(10))
 
 
+def grasp_candidates(skeleton, gripper, **options):
+    """By the axis and the radii alone."""
+    return checked_candidates(skeleton, gripper, cloud=(), **options)
+
+
 def directions_are_sound(grasps):
     identity = grasps.poses[:, :3, :3].transpose(0, 2, 1) @ grasps.poses[:, :3, :3]
     np.testing.assert_allclose(identity, np.tile(np.eye(3), (len(grasps), 1, 1)), atol=1e-12)
@@ -45,7 +51,7 @@ def test_a_straight_tube():
     grasps = grasp_candidates(TUBE, 0.5, clearance=0.03, around=6, spacing=0.1)
     directions_are_sound(grasps)
     assert (len(grasps), grasps.places, grasps.left_out) == (54, 9, {})
-    np.testing.assert_allclose(grasps.positions[::6], np.linspace(-0.4, 0.4, 9)[:, None] * [1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(grasps.position[::6], np.linspace(-0.4, 0.4, 9)[:, None] * [1, 0, 0], atol=1e-12)
     np.testing.assert_allclose(grasps.opening, 0.23)
     np.testing.assert_allclose(grasps.quality, 1 - 0.2 / 0.5)
     np.testing.assert_allclose(grasps.axis, np.tile([1, 0, 0], (54, 1)), atol=1e-12)
@@ -59,18 +65,18 @@ def test_a_straight_tube():
 def test_jaws_without_clearance_touch_the_surface(skeleton):
     grasps = grasp_candidates(skeleton, WIDE, clearance=0, around=5)
     for side in (-1, 1):
-        jaws = grasps.positions + side * grasps.opening[:, None] / 2 * grasps.closing
+        jaws = grasps.position + side * grasps.opening[:, None] / 2 * grasps.closing
         distance = samples.signed_distance(jaws, skeleton.vertices, skeleton.edges, skeleton.radii)
         np.testing.assert_allclose(distance, 0, atol=1e-12)
 
 
 def test_a_cone_is_wider_across_than_the_ball_in_it():
     grasps = grasp_candidates(cone(0.1, 0.25), 1.0, clearance=0.01, spacing=0.1)
-    slope, radius = 0.15, 0.1 + 0.15 * grasps.positions[:, 0]
+    slope, radius = 0.15, 0.1 + 0.15 * grasps.position[:, 0]
     width = 2 * radius / np.sqrt(1 - slope**2)
     np.testing.assert_allclose(grasps.opening, width + 0.01)
     np.testing.assert_allclose(grasps.quality, (1 - width) * np.sqrt(1 - slope**2))
-    assert (np.diff(grasps.positions[:, 0]) >= 0).all()  # the thin end is best
+    assert (np.diff(grasps.position[:, 0]) >= 0).all()  # the thin end is best
 
 
 def test_a_cone_that_is_one_ball_has_no_width():
@@ -84,7 +90,7 @@ def test_a_torus():
     directions_are_sound(grasps)
     assert grasps.places == round(2 * np.pi * 0.4 / 0.1) == 25
     np.testing.assert_allclose(grasps.opening, 0.25)
-    position, out = grasps.positions[::4], grasps.positions / np.linalg.norm(grasps.positions, axis=1, keepdims=True)
+    position, out = grasps.position[::4], grasps.position / np.linalg.norm(grasps.position, axis=1, keepdims=True)
     gap = np.linalg.norm(position - np.roll(position, 1, axis=0), axis=1)
     np.testing.assert_allclose(gap, 2 * 0.4 * np.sin(np.pi / 25), rtol=2e-3)
     turned = np.abs(np.einsum("ij,ij->i", grasps.axis, out))
@@ -94,7 +100,7 @@ def test_a_torus():
 
 @pytest.mark.parametrize(("spacing", "count"), [(0.1, 9), (0.8, 2), (0.81, 1), (5.0, 1), (0.05, 17)])
 def test_places_share_the_room_between_the_margins(spacing, count):
-    x = grasp_candidates(TUBE, WIDE, spacing=spacing, around=1).positions[:, 0]
+    x = grasp_candidates(TUBE, WIDE, spacing=spacing, around=1).position[:, 0]
     assert len(x) == count
     np.testing.assert_allclose(np.diff(np.sort(x)), spacing)
     np.testing.assert_allclose(x.min(), -x.max(), atol=1e-12)
@@ -107,7 +113,7 @@ def test_turned_moved_and_scaled():
     there = grasp_candidates(moved, 0.2 * scale, around=3, up=turn.apply([0, 0, 1]))
     assert len(here) == len(there) > 100
     assert here.left_out == there.left_out
-    np.testing.assert_allclose(there.positions, scale * turn.apply(here.positions) + shift, atol=1e-9)
+    np.testing.assert_allclose(there.position, scale * turn.apply(here.position) + shift, atol=1e-9)
     np.testing.assert_allclose(there.opening, scale * here.opening)
     np.testing.assert_allclose(there.quality, here.quality)
     for name in ("approach", "closing"):
@@ -127,7 +133,7 @@ def test_an_axis_that_points_up(up):
 def test_places_keep_away_from_ends_and_junctions():
     sample = samples.y_junction(10, radii=(0.09, 0.05, 0.05))
     grasps = grasp_candidates(axis_of(sample), WIDE, margin=1.5, spacing=0.01)
-    distance = np.linalg.norm(grasps.positions[:, None] - sample.nodes, axis=2)
+    distance = np.linalg.norm(grasps.position[:, None] - sample.nodes, axis=2)
     assert (distance >= 1.5 * sample.radii - 1e-12).all()
     np.testing.assert_allclose(distance.min(axis=0), 1.5 * sample.radii, atol=0.01)
     assert set(grasps.branch) == {0, 1, 2}
@@ -140,13 +146,13 @@ def test_a_loop_with_a_junction_has_margins_too(loop):
     assert whole.places == round(skeleton.length / 0.01)
     grasps = grasp_candidates(tailed, WIDE, spacing=0.01, around=1)
     ring = grasps.branch == next(i for i, path in enumerate(tailed.branches) if path[0] == path[-1])
-    assert np.linalg.norm(grasps.positions[ring] - tailed.vertices[0], axis=1).min() > 0.19
+    assert np.linalg.norm(grasps.position[ring] - tailed.vertices[0], axis=1).min() > 0.19
     assert 0 < ring.sum() == int((skeleton.length - 0.4) / 0.01) + 1
 
 
 def test_every_place_is_taken_or_told():
     doubtful = replace(SAUROPOD, confidence=np.where(SAUROPOD.vertices[:, 0] > 0.3, 0.2, 0.9))
-    grasps = grasp_candidates(doubtful, 0.16, min_opening=0.065, clearance=0.01, around=3)
+    grasps = grasp_candidates(doubtful, Gripper(0.16, 0.065), clearance=0.01, around=3)
     assert set(grasps.left_out) >= {"too wide", "too thin", "uncertain"}
     places = sum(count for reason, count in grasps.left_out.items() if not reason.startswith("branches"))
     assert len(grasps) == 3 * (grasps.places - places)
@@ -162,12 +168,12 @@ def test_every_place_is_taken_or_told():
 @pytest.mark.parametrize(
     ("skeleton", "options", "why"),
     [
-        (TUBE, dict(max_opening=0.2), "no grasp at 9 places: 9 too wide"),
-        (TUBE, dict(max_opening=0.3, min_opening=0.21), "9 too thin"),
-        (axis_of(samples.tube(10), 0.3), dict(max_opening=1.0), "9 uncertain"),
-        (TUBE, dict(max_opening=1.0, margin=6), "no grasp at 0 places: 1 branches without a place"),
-        (replace(TUBE, edges=()), dict(max_opening=1.0), "the skeleton has no branch"),
-        (replace(TUBE, vertices=[[1, 2, 3]] * 2), dict(max_opening=1.0), "1 branches without a place"),
+        (TUBE, dict(gripper=0.2), "no grasp at 9 places: 9 too wide"),
+        (TUBE, dict(gripper=Gripper(0.3, 0.21)), "9 too thin"),
+        (axis_of(samples.tube(10), 0.3), dict(gripper=1.0), "9 uncertain"),
+        (TUBE, dict(gripper=1.0, margin=6), "no grasp at 0 places: 1 branches without a place"),
+        (replace(TUBE, edges=()), dict(gripper=1.0), "the skeleton has no branch"),
+        (replace(TUBE, vertices=[[1, 2, 3]] * 2), dict(gripper=1.0), "1 branches without a place"),
     ],
 )
 def test_nothing_to_grasp_is_told(skeleton, options, why, tmp_path):
@@ -175,11 +181,11 @@ def test_nothing_to_grasp_is_told(skeleton, options, why, tmp_path):
         grasps = grasp_candidates(skeleton, **options)
     assert warned[0].filename == __file__
     assert len(grasps) == len(list(grasps)) == 0
-    assert grasps.positions.shape == grasps.approach.shape == grasps.closing.shape == grasps.axis.shape == (0, 3)
+    assert grasps.position.shape == grasps.approach.shape == grasps.closing.shape == grasps.axis.shape == (0, 3)
     assert grasps.poses.shape == (0, 4, 4)
     assert len(grasps.to_line_set().lines) == 0
     grasps.to_csv(tmp_path / "g.csv")
-    assert (tmp_path / "g.csv").read_text().startswith("position_x,")
+    assert (tmp_path / "g.csv").read_text().startswith("grasp,position_x,")
     grasps.to_json(tmp_path / "g.json")
     assert json.loads((tmp_path / "g.json").read_text())["grasps"] == []
 
@@ -196,24 +202,24 @@ def test_unknown_confidence_and_radii():
     half = replace(cone(), radii=np.where(np.arange(8) < 4, 0.1, np.nan))
     grasps = grasp_candidates(half, 0.5)
     assert grasps.left_out["unknown radius"] > 0
-    assert grasps.positions[:, 0].max() < 3 / 7
+    assert grasps.position[:, 0].max() < 3 / 7
 
 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (dict(max_opening=0), "max_opening = 0: .* above 0"),
-        (dict(max_opening=np.inf), "max_opening"),
-        (dict(max_opening="wide"), "max_opening = 'wide'"),
-        (dict(max_opening=1.0, min_opening=1.5), "min_opening = 1.5: .* at most 1.0"),
-        (dict(max_opening=1.0, clearance=-0.1), "clearance"),
-        (dict(max_opening=1.0, spacing=0.0), "spacing"),
-        (dict(max_opening=1.0, margin=np.nan), "margin"),
-        (dict(max_opening=1.0, min_confidence=1.1), "min_confidence"),
-        (dict(max_opening=1.0, around=0), "around = 0"),
-        (dict(max_opening=1.0, around=2.0), "around = 2.0"),
-        (dict(max_opening=1.0, up=(0, 0, 0)), "up"),
-        (dict(max_opening=1.0, up="z"), "up = 'z'"),
+        (dict(gripper=0), "max_opening = 0: .* above 0"),
+        (dict(gripper=1.0, clearance=-0.1), "clearance"),
+        (dict(gripper=1.0, spacing=0.0), "spacing"),
+        (dict(gripper=1.0, margin=np.nan), "margin"),
+        (dict(gripper=1.0, min_confidence=1.1), "min_confidence"),
+        (dict(gripper=1.0, around=0), "around = 0"),
+        (dict(gripper=1.0, around=2.0), "around = 2.0"),
+        (dict(gripper=1.0, up=(0, 0, 0)), "up"),
+        (dict(gripper=1.0, up="z"), "up = 'z'"),
+        (dict(gripper=1.0, cone=(0, 0, 1)), r"cone = \(0, 0, 1\): must be a direction and an angle"),
+        (dict(gripper=1.0, cone=((0, 0, 0), 30)), "direction of cone"),
+        (dict(gripper=1.0, cone=((0, 0, 1), 200)), "angle of cone = 200: .* at most 180"),
     ],
 )
 def test_wrong_parameters(options, said):
@@ -232,7 +238,7 @@ def test_on_the_skeleton_of_a_cloud():
     assert grasps.places > 5
     np.testing.assert_allclose(grasps.opening, 0.16, rtol=0.05)
     np.testing.assert_allclose(np.abs(grasps.axis[:, 0]), 1, atol=0.005)
-    assert np.hypot(*grasps.positions[:, 1:].T).max() < 0.05 * 0.08
+    assert np.hypot(*grasps.position[:, 1:].T).max() < 0.05 * 0.08
 
 
 # ------------------------------------------------------------------------------------------------------------- results
@@ -254,9 +260,10 @@ def test_lines_of_the_gripper():
     points = np.asarray(lines.points).reshape(-1, 6, 3)
     assert len(points) == len(grasps)
     tips = points[:, [0, 3]]
-    np.testing.assert_allclose(tips.mean(axis=1), grasps.positions, atol=1e-12)
+    tip = grasps.position + grasps.depth[:, None] * grasps.approach
+    np.testing.assert_allclose(tips.mean(axis=1), tip, atol=1e-12)
     np.testing.assert_allclose(tips[:, 0] - tips[:, 1], grasps.opening[:, None] * grasps.closing, atol=1e-12)
-    np.testing.assert_allclose(points[:, 4], grasps.positions - grasps.opening[:, None] * grasps.approach, atol=1e-12)
+    np.testing.assert_allclose(points[:, 4], tip - grasps.gripper.finger[2] * grasps.approach, atol=1e-12)
     assert np.asarray(lines.lines).shape == np.asarray(lines.colors).shape[:1] + (2,) == (4 * len(grasps), 2)
     colour = np.asarray(lines.colors)[::4]
     assert (colour[0] > colour[-1]).tolist() == [True, True, False]  # yellow is best, dark blue worst
@@ -273,7 +280,7 @@ def test_files(tmp_path):
     assert {row["confidence"] for row in rows} == {""}
     for name in ("position", "approach", "closing"):
         values = np.array([[float(row[f"{name}_{axis}"]) for axis in "xyz"] for row in rows])
-        np.testing.assert_array_equal(values, getattr(grasps, f"{name}s" if name == "position" else name))
+        np.testing.assert_array_equal(values, getattr(grasps, name))
     grasps.to_json(tmp_path / "g.json")
     data = json.loads((tmp_path / "g.json").read_text())
     assert (data["places"], data["left_out"]) == (grasps.places, grasps.left_out)

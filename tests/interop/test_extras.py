@@ -42,7 +42,7 @@ assert glsk.load_recipe("r.toml") == glsk.pipelines.default()
 skeleton.to_networkx(), skeleton.to_line_set(), skeleton.to_tensor_line_set()
 skeleton.annotate(points, color=(1, 0, 0))
 table = skeleton.branch_table()
-table.to_csv("branches.csv"), str(table), glsk.analysis.grasp_candidates(skeleton, max_opening=1.0)
+table.to_csv("branches.csv"), str(table), glsk.analysis.grasp_candidates(skeleton, 1.0)
 """
 ASKS = """
 import json
@@ -55,7 +55,7 @@ asking = {
     "report": lambda: glsk.save_report(skeleton, "s.html"),
     "plot": lambda: glsk.plot_skeleton(skeleton),
     "colours": lambda: skeleton.to_line_set(color="branch"),
-    "grasps": lambda: glsk.analysis.grasp_candidates(skeleton, max_opening=1.0).to_line_set(),
+    "grasps": lambda: glsk.analysis.grasp_candidates(skeleton, 1.0).to_line_set(),
     "crosscheck": lambda: cross_check(points),
     "meshlab": lambda: glsk.MeshSet(),
     "cluster": lambda: glsk.batch.run_batch("s.ply", "out", scheduler="tcp://127.0.0.1:1"),

@@ -1,0 +1,1 @@
+"""What `grasps.py` is made of: objects whose inside is known, and grasps judged by it."""

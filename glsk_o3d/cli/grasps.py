@@ -1,0 +1,147 @@
+"""``glsk grasps``: where a gripper with parallel jaws can take an object, and what is in its way."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .console import print_json, print_table
+from .options import Json, Quiet, Verbose
+from .reporting import WrongUsage, reporting
+
+if TYPE_CHECKING:
+    from ..analysis import GraspCandidates
+
+ENDINGS = (".json", ".csv", ".ply")
+PRINTED_GRASP = {
+    "position": ".4g",
+    "approach": ".2f",
+    "opening": ".4g",
+    "quality": ".2f",
+    "seen": "d",
+    "branch": "d",
+}
+
+
+def grasps(
+    skeleton: Annotated[
+        Path, typer.Argument(metavar="SKELETON", help="Of the object; JSON and npz files know its points.")
+    ],
+    opening: Annotated[float, typer.Option(metavar="LENGTH", help="Of the gripper, at its widest.")],
+    cloud: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="All points of the object, where the skeleton has none.")
+    ] = None,
+    scene: Annotated[
+        list[Path] | None, typer.Option(metavar="FILE", help="Points of what else is there; may be repeated.")
+    ] = None,
+    plane: Annotated[
+        list[str] | None,
+        typer.Option(metavar="A,B,C,D", help="A table, where ax + by + cz + d = 0; may be repeated."),
+    ] = None,
+    cone: Annotated[
+        str | None,
+        typer.Option(metavar="DIRECTION,DEGREES", help="Come in no farther from this: -z,60, or 0,0.5,-1,60."),
+    ] = None,
+    up: Annotated[
+        str | None,
+        typer.Option(metavar="DIRECTION", help="Of what is above: z, or x,y,z. Else against the cone, or z."),
+    ] = None,
+    clearance: Annotated[
+        float | None,
+        typer.Option(metavar="LENGTH", help="Half of it on each side of the part; a tenth of the opening."),
+    ] = None,
+    finger: Annotated[
+        str | None, typer.Option(metavar="THICKNESS,WIDTH,LENGTH", help="Of a finger; else as the Franka Hand has it.")
+    ] = None,
+    palm: Annotated[
+        str | None, typer.Option(metavar="EXTENT,WIDTH,DEPTH", help="Of the hand behind the fingers; else the same.")
+    ] = None,
+    min_confidence: Annotated[float, typer.Option(metavar="SHARE", help="Of the skeleton, from 0 to 1.")] = 0.5,
+    count: Annotated[int, typer.Option("-n", min=1, metavar="N", help="So many of the best.")] = 20,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write them: json, csv, or ply to look at.")
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Find where a gripper with two jaws can take an object.
+
+    All lengths are in the file's units. The jaws close across the branches of the skeleton. Left out is where a finger
+    or the palm would meet points of the object or of the scene, or the far side of a plane, on a straight way in. What
+    was not scanned is taken for free.
+    """
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..analysis import Gripper, grasp_candidates
+        from ..io.scans import read_cloud
+        from ..io.skeletons import read_skeleton
+        from .outputs import check_findings
+
+        ending = output.suffix.lower() if output is not None and output.suffix.lower() in ENDINGS else ENDINGS[0]
+        check_findings([(output, ending, "grasps are JSON, CSV or PLY")], skeleton, cloud, *(scene or []))
+        planes = [_numbers("--plane", text, 4) for text in plane or []]
+        shape = {name: _numbers(f"--{name}", text, 3) for name, text in (("finger", finger), ("palm", palm)) if text}
+        gripper = Gripper(opening, finger=shape.get("finger"), palm=shape.get("palm"))
+        found = grasp_candidates(
+            read_skeleton(skeleton),
+            gripper,
+            cloud=None if cloud is None else read_cloud(cloud),
+            obstacles=[*planes, *map(read_cloud, scene or [])],
+            clearance=clearance,
+            min_confidence=min_confidence,
+            cone=_cone(cone),
+            up=None if up is None else _direction("--up", up),
+        )
+        best = found[:count]
+        if output is not None:
+            {".json": best.to_json, ".csv": best.to_csv, ".ply": best.to_ply}[ending](output)
+        if as_json:
+            print_json({"skeleton": str(skeleton), "found": len(found), **best.as_dict()})
+        elif not quiet:
+            _print(best, len(found))
+            if output is not None:
+                typer.echo(f"wrote {output}")
+
+
+def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
+    try:
+        values = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != count:
+        raise WrongUsage(f"{option} {text}: write {count} numbers with commas between them")
+    return values
+
+
+def _direction(option: str, text: str) -> tuple[float, ...]:
+    """An axis with or without a minus, or three numbers."""
+    name = text.strip().lower()
+    if name.removeprefix("-") in ("x", "y", "z"):
+        return tuple((-1.0 if name[0] == "-" else 1.0) * (axis == name[-1]) for axis in "xyz")
+    return _numbers(option, text, 3)
+
+
+def _cone(text: str | None) -> tuple[tuple[float, ...], float] | None:
+    if text is None:
+        return None
+    direction, _, degrees = text.rpartition(",")
+    return _direction("--cone", direction), _numbers("--cone", degrees, 1)[0]
+
+
+def _print(best: GraspCandidates, found: int) -> None:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    typer.echo(f"{found} grasps at {best.places} places")
+    for reason, times in best.left_out.items():
+        typer.echo(f"left out: {times} {reason}")
+    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
+    for name in PRINTED_GRASP:
+        shown.add_column(name, justify="right")
+    for columns in zip(*(getattr(best, name) for name in PRINTED_GRASP), strict=True):
+        cells = zip(columns, PRINTED_GRASP.values(), strict=True)
+        shown.add_row(*(" ".join(f"{value:{form}}" for value in cell.reshape(-1).tolist()) for cell, form in cells))
+    if len(best):
+        print_table(shown, whole=True)

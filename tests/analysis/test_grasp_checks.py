@@ -1,0 +1,338 @@
+"""Ways in of a gripper beside walls, through handles, over planes, in noise and in gaps: where the answer is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import open3d as o3d
+import pytest
+from scipy.spatial.transform import Rotation
+
+from glsk_o3d import (
+    InvalidCloudError,
+    InvalidParameterError,
+    Skeleton,
+    SkeletonWarning,
+    read_cloud,
+    samples,
+    skeletonize,
+)
+from glsk_o3d.analysis import Gripper, grasp_candidates, grasp_checks
+
+HAND = Gripper(0.4, finger=(0.05, 0.06, 0.3), palm=(0.5, 0.1, 0.2), reach=0.05)
+CLEARANCE = 0.02
+OBJECT_FINGER, OBJECT_PALM, OBSTACLE_FINGER = (
+    f"ways in with {part}" for part in ("a finger in the object", "the palm in the object", "a finger in an obstacle")
+)
+
+
+def rod(extra=(), n=4000):
+    """The axis of a tube of radius 0.1 along x, its points, and more."""
+    sample = samples.tube(n, length=1.0, radius=0.1)
+    points = np.concatenate([sample.points, np.reshape(extra, (-1, 3))])
+    return Skeleton(sample.nodes, sample.edges, sample.radii, (), points, (), confidence=[1, 1])
+
+
+def sheet(x, y, z, step=0.01):
+    """Points on a grid between these limits; a number is a limit that is not left."""
+    axes = [np.arange(*side, step) if isinstance(side, tuple) else [side] for side in (x, y, z)]
+    return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 3)
+
+
+def grasp(skeleton, **options):
+    return grasp_candidates(skeleton, HAND, **{"clearance": CLEARANCE, **options})
+
+
+def same(some, others):
+    assert some.left_out == others.left_out
+    for name in ("position", "approach", "closing", "opening", "depth", "quality", "seen"):
+        np.testing.assert_allclose(getattr(some, name), getattr(others, name), atol=1e-9)
+
+
+# ---------------------------------------------------------------------------------------------------------------- walls
+
+WALL = sheet((-1, 1), 0.3, (-1.5, 1.5))
+
+
+@pytest.mark.parametrize(
+    "obstacle", [WALL, (0, 1, 0, -0.3), (0, -10, 0, 3.0), o3d.geometry.PointCloud(o3d.utility.Vector3dVector(WALL))]
+)
+def test_a_wall_keeps_away_exactly_what_comes_from_its_side(obstacle):
+    free, beside = grasp(rod()), grasp(rod(), obstacles=obstacle)
+    assert len(free) == 8 * free.places
+    assert beside.left_out == {OBSTACLE_FINGER: 3 * free.places}
+    kept = free.approach[:, 1] > -1e-9
+    same(replace(free[kept], left_out=beside.left_out), beside)
+    np.testing.assert_allclose(beside.opening, 0.2 + CLEARANCE)
+    assert (beside.seen == 3).all()
+
+
+def test_several_obstacles_and_one_that_has_points_of_the_object():
+    skeleton = rod()
+    both = grasp(skeleton, obstacles=[WALL, (0, 0, 1, 0.3)])
+    assert both.left_out == {
+        OBSTACLE_FINGER: 5 * both.places
+    }  # three from the wall, three from below, one of them both
+    assert both.approach[:, 1].min() > -1e-9
+    assert both.approach[:, 2].max() < 1e-9
+    same(both, grasp(skeleton, obstacles=[np.concatenate([WALL, skeleton.points]), (0, 0, -1, -0.3)]))
+
+
+def test_no_obstacle_at_all():
+    same(grasp(rod()), grasp(rod(), obstacles=[]))
+
+
+@pytest.mark.parametrize(("gap", "sides"), [(0.05 + CLEARANCE - 1e-3, 0), (0.05 + CLEARANCE + 1e-3, 2)])
+def test_a_finger_goes_through_a_handle_that_is_wider_than_it(gap, sides):
+    """From the side one finger is between the rod and the body below it, half the clearance from either."""
+    handle = grasp(rod(sheet((-0.6, 0.6), (-0.2, 0.2), -0.1 - gap)), around=4)
+    assert handle.left_out[OBJECT_FINGER] == (3 - sides) * handle.places
+    assert len(handle) == (1 + sides) * handle.places
+    assert handle.approach[:, 2].max() < 1e-9  # none from below
+
+
+def test_a_palm_stops_at_what_is_as_far_as_the_fingers_are_long():
+    """A ridge on the rod, between the fingers."""
+    front = 0.3 - 0.05 - CLEARANCE / 2
+    low, high = (rod(sheet((-0.6, 0.6), (-0.05, 0.05), front + step)) for step in (-1e-3, 1e-3))
+    assert len(grasp(low, around=1)) == 9
+    with pytest.warns(SkeletonWarning, match=f"9 {OBJECT_PALM}"):
+        assert len(grasp(high, around=1)) == 0
+
+
+def test_a_way_in_is_as_long_as_the_object():
+    skeleton = rod()
+    diagonal = np.linalg.norm(np.ptp(skeleton.points, axis=0))
+    back = 0.05 - 0.3 - 0.2 - diagonal - CLEARANCE / 2  # where the palm comes from
+    for height, places in ((-back + 0.01, 9), (-back - 0.01, 0)):
+        lid = sheet((-0.6, 0.6), (-0.02, 0.02), height)
+        assert sum(grasp(skeleton, obstacles=lid).approach[:, 2] < -0.99) == places
+
+
+# --------------------------------------------------------------------------------------------------------------- points
+
+
+def test_turned_moved_scaled_and_shuffled():
+    turn, shift, scale, rng = (
+        Rotation.from_rotvec([0.3, -1.1, 0.7]),
+        np.array([3.0, -7, 1]),
+        25.0,
+        np.random.default_rng(0),
+    )
+    sample = samples.sauropod(3000)
+    plain = Skeleton(sample.nodes, sample.edges, sample.radii, (), sample.points, (), confidence=0 * sample.radii + 1)
+    wall = sheet((-1, 1), 0.25, (-1, 1), 0.02)
+
+    def moved(points):
+        return scale * turn.apply(points) + shift
+
+    there = replace(
+        plain, vertices=moved(plain.vertices), radii=scale * plain.radii, points=moved(rng.permutation(plain.points))
+    )
+    found = grasp_candidates(plain, 0.2, obstacles=wall, cone=((0, 0, -1), 100), around=4)
+    again = grasp_candidates(
+        there, 0.2 * scale, obstacles=moved(rng.permutation(wall)), cone=(turn.apply([0, 0, -1]), 100), around=4
+    )
+    assert len(found) > 20
+    assert len(found.left_out) >= 4
+    assert found.left_out == again.left_out
+    np.testing.assert_array_equal(found.seen, again.seen)
+    np.testing.assert_allclose(again.position, moved(found.position), atol=1e-8)
+    np.testing.assert_allclose(again.opening, scale * found.opening)
+    np.testing.assert_allclose(again.depth, scale * found.depth)
+    np.testing.assert_allclose(again.approach, turn.apply(found.approach), atol=1e-9)
+
+
+def test_points_between_the_jaws_are_no_obstacle():
+    inside = np.random.default_rng(0).uniform(-1, 1, (500, 3)) * [0.5, 0.06, 0.06]
+    same(grasp(rod()), grasp(rod(inside)))
+
+
+def test_points_that_are_not_finite_do_not_count():
+    same(grasp(rod()), grasp(rod([[np.nan, 0, 0], [0, np.inf, 0]])))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_no_finger_slips_between_the_points_of_a_sparse_thin_wall(seed, monkeypatch):
+    """Points scattered over a wall, 1.2 thicknesses of a finger apart: it is hit, though often no point is."""
+    rng, size = np.random.default_rng(seed), np.array([1.6, 1.6])
+    n = int(size.prod() / (1.2 * HAND.finger[0]) ** 2)
+    wall = np.insert((rng.random((n, 2)) - 0.5) * size, 1, 0.2, axis=1)
+    options = dict(obstacles=wall, cone=((0, -1, 0), 5), around=1, spacing=0.02, clearance=0.0)
+    with pytest.warns(SkeletonWarning, match="an obstacle"):
+        assert len(grasp(rod(), **options)) == 0
+    monkeypatch.setattr(grasp_checks, "cells", lambda points, close: points[:, None])
+    assert len(grasp(rod(), **options)) > 0
+
+
+def test_a_sparse_object_is_not_made_thicker():
+    sparse = rod(n=150)
+    assert grasp_checks.cells(sparse.points, 0.025).shape[1] > 1
+    found = grasp(sparse)
+    assert len(found) == 8 * found.places
+    np.testing.assert_allclose(found.opening, 0.2 + CLEARANCE)
+
+
+def test_pieces_of_surface_reach_halfway_to_the_neighbours():
+    grid = sheet((0, 5), (0, 5), 0, 1.0)
+    pieces = grasp_checks.cells(np.concatenate([grid, grid]), 0.5)
+    assert pieces.shape == (25, 9, 3)
+    low, high = pieces.min(axis=1), pieces.max(axis=1)
+    middle = (pieces[:, 0] > 0.5).all(axis=1, where=[True, True, False]) & (pieces[:, 0] < 3.5).all(axis=1)
+    np.testing.assert_allclose((high - low)[middle], np.tile([1, 1, 0], (9, 1)))
+    assert low.min() == 0
+    assert high.max() == 4
+    assert grasp_checks.cells(grid, 10).shape == (25, 1, 3)
+    assert grasp_checks.cells(grid[:1], 10).shape == (1, 1, 3)
+
+
+def test_the_jaws_close_on_something():
+    with pytest.warns(SkeletonWarning, match="72 ways in with nothing between the jaws"):
+        assert len(grasp(rod(), cloud=rod().points + [0, 0, 30])) == 0
+
+
+def test_what_was_seen_is_told_and_ranks():
+    whole = rod()
+    half = grasp(replace(whole, points=whole.points[whole.points[:, 1] > 0.01]), around=4)
+    across = half.approach[:, 1].round(6)  # 1: from the side that is not there, past both edges of the other
+    assert len(half) == 4 * half.places
+    np.testing.assert_array_equal(half.seen, np.select([across == 1, across == -1], [2, 3], 2))
+    np.testing.assert_allclose(half.quality, grasp(whole, around=4).quality * half.seen / 3)
+    assert (across[: half.places] == -1).all()
+
+
+def test_jaws_open_wider_where_points_scatter(monkeypatch):
+    noisy = rod()
+    noisy = replace(noisy, points=noisy.points + np.random.default_rng(0).normal(scale=0.006, size=noisy.points.shape))
+    found = grasp(noisy)
+    times = ((found.opening - 0.2) / CLEARANCE).round(6)
+    assert len(found) == 72
+    assert {2} < set(times) <= {1, 2, 3}
+    monkeypatch.setattr(grasp_checks, "WIDER", (1,))
+    narrow = grasp(noisy)
+    same(replace(found[times == 1], left_out=narrow.left_out), narrow)
+
+
+def test_fingers_reach_as_far_as_the_part_and_no_farther_than_they_can():
+    thin = rod()
+    thin = replace(thin, radii=[0.02, 0.02], points=thin.points * [1, 0.2, 0.2])
+    np.testing.assert_allclose(grasp(thin).depth, 0.02)
+    np.testing.assert_allclose(grasp(rod()).depth, HAND.reach)
+
+
+# ----------------------------------------------------------------------------------------------------------------- cone
+
+
+def test_a_cone():
+    free = grasp(rod())
+    found = grasp(rod(), cone=((0, 1, -1), 50))
+    assert len(found) == 3 * free.places
+    assert found.left_out == {grasp_checks.OUTSIDE_CONE: 5 * free.places}
+    assert (found.approach @ [0, 1, -1] / np.sqrt(2) >= np.cos(np.radians(50))).all()
+    narrow = grasp(rod(), cone=((0, 0.2, -1), 1e-3), around=3)  # its own direction is looked at
+    np.testing.assert_allclose(narrow.approach, np.tile(np.array([0, 0.2, -1]) / np.hypot(0.2, 1), (free.places, 1)))
+
+
+# ------------------------------------------------------------------------------------------------- against exact shapes
+
+
+@pytest.mark.parametrize(("shape", "n"), [("two_rings", 4000), ("helix", 4000)])
+def test_nothing_is_in_the_object_by_its_formula(shape, n):
+    sample = samples.sample_object(n, 0, 0, shape)
+    skeleton = skeletonize(sample.points)
+
+    def pierced(grasps):
+        found = []
+        corners = grasps.gripper.boxes(grasps.opening, grasps.depth)
+        for pose, *boxes in zip(grasps.poses, *corners, strict=True):
+            grid = [np.meshgrid(*np.linspace(*box, 12).T) for box in zip(*boxes, strict=True)]
+            grid = [np.stack(axes, axis=-1).reshape(-1, 3) for axes in grid]
+            places = np.concatenate(grid) @ pose[:3, :3].T + pose[:3, 3]
+            found.append((samples.signed_distance(places, sample.nodes, sample.edges, sample.radii) < 0).any())
+        return np.array(found)
+
+    assert pierced(grasp_candidates(skeleton, 0.3, cloud=())[:20]).any()
+    safe = grasp_candidates(skeleton, 0.3)
+    assert len(safe) >= 20
+    assert not pierced(safe[:20]).any()
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.errors.SkeletonWarning")  # of a mug's topology, sometimes
+@pytest.mark.parametrize("name", ["ycb_mug", "ycb_banana", "ycb_power_drill"])
+def test_a_quarter_of_a_scan_is_enough_to_keep_out_of_the_rest(shared_dir, name):
+    points = np.asarray(read_cloud(shared_dir / "data" / f"{name}.ply").points)
+    found = grasp_candidates(skeletonize(points[::4]), 0.08, clearance=0.006)
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    assert len(found) > 4
+    corners = found.gripper.boxes(found.opening, found.depth)
+    for pose, *boxes in zip(found.poses, *corners, strict=True):
+        for low, high in zip(*boxes, strict=True):
+            box = o3d.geometry.OrientedBoundingBox(
+                pose[:3, :3] @ (low + high) / 2 + pose[:3, 3], pose[:3, :3], high - low
+            )
+            assert box.get_point_indices_within_bounding_box(cloud.points) == []
+
+
+# --------------------------------------------------------------------------------------------------------------- errors
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "said"),
+    [
+        (dict(obstacles=(0, 0, 0, 1)), InvalidParameterError, "is no plane"),
+        (dict(obstacles=[(0, 0, np.nan, 1)]), InvalidParameterError, "is no plane"),
+        (dict(obstacles=["table.ply"]), InvalidCloudError, "not a file name"),
+        (dict(obstacles=3), InvalidCloudError, "is no cloud"),
+        (dict(cloud=np.empty((0, 3))), InvalidCloudError, "empty"),
+    ],
+)
+def test_what_is_refused(options, error, said):
+    with pytest.raises(error, match=said):
+        grasp(rod(), **options)
+
+
+def test_a_skeleton_without_points_asks_for_them():
+    bare = replace(rod(), points=())
+    with pytest.raises(InvalidParameterError, match=r"cloud=\(\)"):
+        grasp(bare)
+    same(grasp(bare, cloud=rod().points), grasp(rod()))
+    assert (grasp(bare, cloud=()).seen == 0).all()
+    assert len(grasp(bare, cloud=(), obstacles=(0, 0, 1, 0.11))) < len(grasp(bare, cloud=()))
+
+
+# ------------------------------------------------------------------------------------------------------------- grippers
+
+
+def test_boxes_of_a_gripper():
+    low, high = HAND.boxes([0.2, 0.3], [0.05, 0.01])
+    assert low.shape == high.shape == (2, 3, 3)
+    np.testing.assert_allclose(low[0], [[-0.15, -0.03, -0.25], [0.1, -0.03, -0.25], [-0.25, -0.05, -0.45]])
+    np.testing.assert_allclose(high[0], [[-0.1, 0.03, 0.05], [0.15, 0.03, 0.05], [0.25, 0.05, -0.25]])
+    np.testing.assert_allclose((high - low)[0], (high - low)[1])
+    np.testing.assert_allclose(high[1, :, 2], [0.01, 0.01, -0.29])
+
+
+def test_a_gripper_in_proportion():
+    small, large = Gripper(0.08), Gripper(80)
+    np.testing.assert_allclose(np.multiply(1000, small.finger + small.palm), large.finger + large.palm)
+    assert small == Gripper(0.08, finger=list(small.finger))
+    with pytest.raises(AttributeError):
+        small.reach = 1
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (dict(max_opening=np.inf), "max_opening"),
+        (dict(max_opening="wide"), "max_opening = 'wide'"),
+        (dict(max_opening=True), "max_opening"),
+        (dict(max_opening=1.0, min_opening=1.5), "min_opening = 1.5: .* at most 1.0"),
+        (dict(max_opening=1.0, min_opening=-1), "min_opening = -1: .* at least 0"),
+        (dict(max_opening=1.0, finger=(1, 2)), r"finger = \(1, 2\): must be three lengths"),
+        (dict(max_opening=1.0, finger=3), "finger = 3: must be three lengths"),
+        (dict(max_opening=1.0, palm=(1, 0, 1)), "a side of palm = 0: .* above 0"),
+        (dict(max_opening=1.0, finger=(1, 1, 1), reach=1.5), "reach = 1.5: .* at most 1.0"),
+    ],
+)
+def test_wrong_grippers(options, said):
+    with pytest.raises(InvalidParameterError, match=said):
+        Gripper(**options)

@@ -1,0 +1,98 @@
+"""`glsk grasps`: the lines, the files, the scene from files, and what it says when something is wrong."""
+
+import csv
+import json
+
+import numpy as np
+import open3d as o3d
+import pytest
+
+from glsk_o3d import Skeleton, read_skeleton, samples
+from glsk_o3d.analysis import Gripper, grasp_candidates
+
+
+@pytest.fixture
+def rod(tmp_path):
+    """The axis of a tube, with its points."""
+    sample = samples.tube(3000, length=1.0, radius=0.1)
+    skeleton = Skeleton(sample.nodes, sample.edges, sample.radii, [0] * 3000, sample.points, (), confidence=[1, 1])
+    skeleton.save(tmp_path / "rod.npz")
+    return "rod.npz"
+
+
+def test_lines_files_and_json_agree(invoke, tmp_path, rod):
+    found = grasp_candidates(read_skeleton(tmp_path / rod), 0.4, obstacles=(0, 0, 1, 0.25), cone=((0, 0, -1), 60))
+    words = ("grasps", rod, "--opening", 0.4, "--plane", "0,0,1,0.25", "--cone", "-z,60", "-n", 5)
+    result = invoke(*words, "-o", "g.json")
+    assert (result.exit_code, result.stderr) == (0, "")
+    lines = result.stdout.splitlines()
+    assert lines[0] == f"{len(found)} grasps at 9 places"
+    assert lines[1] == f"left out: {5 * 9} ways in outside the cone"
+    assert lines[-1] == "wrote g.json"
+    rows = [line for line in lines if line.endswith(" 0") and "left out" not in line]
+    assert len(rows) == 5
+    told, printed = json.loads((tmp_path / "g.json").read_text()), json.loads(invoke(*words, "--json").stdout)
+    assert printed == {"skeleton": rod, "found": len(found), **told}
+    assert told["gripper"]["finger"] == list(Gripper(0.4).finger)
+    np.testing.assert_allclose([row["pose"] for row in told["grasps"]], found[:5].poses)
+    invoke(*words, "-o", "g.csv")
+    with (tmp_path / "g.csv").open(newline="") as stream:
+        table = list(csv.DictReader(stream))
+    np.testing.assert_allclose([float(row["opening"]) for row in table], found[:5].opening)
+    invoke(*words, "-o", "g.ply")
+    drawn = o3d.io.read_line_set(str(tmp_path / "g.ply"))
+    np.testing.assert_allclose(drawn.points, found[:5].to_line_set().points, atol=1e-6)
+    assert len(drawn.lines) == len(drawn.colors) == 20
+    assert invoke(*words, "-q").stdout == ""
+
+
+def test_the_scene_and_the_points_come_from_files(invoke, tmp_path, rod, write_scan):
+    skeleton = read_skeleton(tmp_path / rod)
+    skeleton.save(tmp_path / "axis.ply")
+    write_scan(tmp_path / "rod.ply", skeleton.points)
+    wall = np.stack(np.meshgrid(np.arange(-1, 1, 0.02), [0.3], np.arange(-1, 1, 0.02)), axis=-1).reshape(-1, 3)
+    write_scan(tmp_path / "wall.ply", wall)
+    hand = ("--opening", 0.4, "--finger", "0.05,0.06,0.3", "--palm", "0.5,0.1,0.2", "--clearance", 0.02)
+    other = ("grasps", "axis.ply", "--cloud", "rod.ply", "--min-confidence", 0, "--scene", "wall.ply", *hand, "-n", 99)
+    facts = json.loads(invoke(*other, "--json").stdout)
+    assert facts["left_out"] == {"ways in with a finger in an obstacle": 27}
+    assert facts["found"] == len(facts["grasps"]) == 45
+    assert min(row["approach"][1] for row in facts["grasps"]) > -1e-9
+    assert {row["confidence"] for row in facts["grasps"]} == {None}
+    up = json.loads(invoke(*other, "--json", "--up", "0,1,0").stdout)
+    assert up["grasps"][0]["approach"] != facts["grasps"][0]["approach"]
+
+
+def test_no_grasp_is_a_warning(invoke, rod):
+    result = invoke("grasps", rod, "--opening", 0.15)
+    assert result.exit_code == 0
+    assert result.stderr == "glsk: warning: no grasp at 9 places: 9 too wide\n"
+    assert result.stdout == "0 grasps at 9 places\nleft out: 9 too wide\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["rod.npz", "--opening", "-1"], "--opening -1.0: must be a finite number, above 0"),
+        (["rod.npz", "--opening", "1", "--plane", "0,0,1"], "--plane 0,0,1: write 4 numbers with commas"),
+        (["rod.npz", "--opening", "1", "--plane", "0,0,0,1"], "is no plane"),
+        (["rod.npz", "--opening", "1", "--cone", "down,30"], "--cone down: write 3 numbers"),
+        (["rod.npz", "--opening", "1", "--cone", "z"], "--cone"),
+        (["rod.npz", "--opening", "1", "--cone", "z,270"], "the angle of cone = 270.0: must be"),
+        (["rod.npz", "--opening", "1", "--up", "w"], "--up w: write 3 numbers"),
+        (["rod.npz", "--opening", "1", "--finger", "a,b,c"], "--finger a,b,c: write 3 numbers"),
+        (["rod.npz", "--opening", "1", "-o", "g.txt"], "the grasps are JSON, CSV or PLY and its name ends in .json"),
+        (["y.ply", "--opening", "1"], "has no confidence, perhaps due to its file: add --min-confidence 0"),
+        (
+            ["y.ply", "--opening", "1", "--min-confidence", "0"],
+            "does not know the points of the object: give the scan with",
+        ),
+    ],
+)
+def test_refuses(refused, rod, y, words, message):
+    assert message in refused(2, "grasps", *words)
+
+
+def test_files_that_are_not_there(refused, rod):
+    assert "none.ply" in refused(1, "grasps", rod, "--opening", 1, "--scene", "none.ply")
+    assert "no such folder" in refused(1, "grasps", rod, "--opening", 1, "-o", "none/g.json")
