@@ -14,7 +14,7 @@ from .reporting import WrongUsage, reporting
 if TYPE_CHECKING:
     from ..analysis import GraspCandidates
 
-ENDINGS = (".json", ".csv", ".ply")
+GRASP_ENDINGS = (".json", ".csv", ".ply")
 PRINTED_GRASP = {
     "position": ".4g",
     "approach": ".2f",
@@ -79,7 +79,9 @@ def grasps(
         from ..io.skeletons import read_skeleton
         from .outputs import check_findings
 
-        ending = output.suffix.lower() if output is not None and output.suffix.lower() in ENDINGS else ENDINGS[0]
+        ending = (
+            output.suffix.lower() if output is not None and output.suffix.lower() in GRASP_ENDINGS else GRASP_ENDINGS[0]
+        )
         check_findings([(output, ending, "grasps are JSON, CSV or PLY")], skeleton, cloud, *(scene or []))
         planes = [_numbers("--plane", text, 4) for text in plane or []]
         shape = {name: _numbers(f"--{name}", text, 3) for name, text in (("finger", finger), ("palm", palm)) if text}

@@ -65,11 +65,11 @@ def tree(
     with reporting(quiet=quiet, verbose=verbose):
         from ..analysis import cylinders, tree_measures
         from ..analysis.forestry import metres
-        from ..io.cylinders import ENDINGS, cylinders_ending, save_cylinders
+        from ..io.cylinders import CYLINDER_ENDINGS, cylinders_ending, save_cylinders
         from ..io.skeletons import read_skeleton
         from .outputs import check_findings
 
-        check_findings([(output, ENDINGS, "file is a table of cylinders")], skeleton)
+        check_findings([(output, CYLINDER_ENDINGS, "file is a table of cylinders")], skeleton)
         metres(unit)
         place, curve = root_place(root), read_skeleton(skeleton)
         measures = tree_measures(curve, place, up=up, unit=unit)

@@ -19,7 +19,7 @@ IN_METRES: dict[str, Callable[[Cylinders], bytes]] = {
     ".txt": treetools.write,
 }
 """Formats of other programs, which take lengths for metres, by the ending of the file."""
-ENDINGS = (*IN_METRES, ".csv")
+CYLINDER_ENDINGS = (*IN_METRES, ".csv")
 """All endings, longer ones before those that they end in."""
 
 
@@ -73,7 +73,7 @@ def save_cylinders(tree: Cylinders, path: str | os.PathLike, unit: float | str =
 
 
 def cylinders_ending(path: str | os.PathLike) -> str:
-    """The one of `ENDINGS` that a file name has; FileFormatError if there is none.
+    """The one of `CYLINDER_ENDINGS` that a file name has; FileFormatError if there is none.
 
     Examples
     --------
@@ -81,9 +81,9 @@ def cylinders_ending(path: str | os.PathLike) -> str:
     ('.qsm.csv', '.csv')
     """
     name = Path(path).name.lower()
-    found = [ending for ending in ENDINGS if name.endswith(ending)]
+    found = [ending for ending in CYLINDER_ENDINGS if name.endswith(ending)]
     if not found:
-        raise unknown_ending(Path(path), ENDINGS)
+        raise unknown_ending(Path(path), CYLINDER_ENDINGS)
     return found[0]
 
 

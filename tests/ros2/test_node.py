@@ -77,7 +77,7 @@ def test_with_an_opening_poses_are_grasps(ros, cloud, expected, rows):
     grasps = grasp_candidates(expected, 0.6)
     assert len(grasps) > 8
     poses = node.published[1][1].poses
-    np.testing.assert_array_equal(rows(pose.position for pose in poses), grasps.positions)
+    np.testing.assert_array_equal(rows(pose.position for pose in poses), grasps.position)
     turns = Rotation.from_quat([[q.x, q.y, q.z, q.w] for q in (pose.orientation for pose in poses)]).as_matrix()
     np.testing.assert_allclose(turns[:, :, 0], grasps.closing, atol=1e-12)
     np.testing.assert_allclose(turns[:, :, 2], grasps.approach, atol=1e-12)

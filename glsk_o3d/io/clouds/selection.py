@@ -67,7 +67,26 @@ def select(scan: Scan, where: str) -> Scan:
 
 
 def parsed(where: str) -> ast.expr:
-    """A condition as a tree; InvalidParameterError if it is none, or an attribute is called as a word of Python is."""
+    """A condition as a tree of Python's grammar.
+
+    Parameters
+    ----------
+    where : str
+
+    Returns
+    -------
+    ast.expr
+
+    Raises
+    ------
+    InvalidParameterError
+        It is none, or an attribute is called as a word of Python is.
+
+    Examples
+    --------
+    >>> ast.dump(parsed("z"))
+    "Name(id='z', ctx=Load())"
+    """
     try:
         return ast.parse(where.strip(), mode="eval").body
     except SyntaxError as error:
@@ -77,7 +96,28 @@ def parsed(where: str) -> ast.expr:
 
 
 def labels(scan: Scan, name: str) -> np.ndarray:
-    """The distinct values of an attribute, sorted; InvalidParameterError if the points do not have it."""
+    """The distinct values of an attribute.
+
+    Parameters
+    ----------
+    scan : Scan
+    name : str
+
+    Returns
+    -------
+    (n,) array
+        Sorted.
+
+    Raises
+    ------
+    InvalidParameterError
+        The points do not have it.
+
+    Examples
+    --------
+    >>> labels(Scan(np.eye(3), attributes={"tree": np.array([7, 4, 7])}), "tree")
+    array([4, 7])
+    """
     return np.unique(_column(name, scan.attributes))
 
 
