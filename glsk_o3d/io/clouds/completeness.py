@@ -5,6 +5,7 @@ Where a PLY, PCD or PTS file breaks off, or has text for numbers, Open3D returns
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -26,12 +27,15 @@ class Promise(NamedTuple):
         Lines or bytes ahead of them.
     size : int
         Bytes of each; 0 for text.
+    what : str
+        What they are called.
     """
 
     points: int
     columns: int
     skip: int
     size: int
+    what: str = "points"
 
 
 def check_complete(path: Path) -> None:
@@ -51,14 +55,16 @@ def check_complete(path: Path) -> None:
         except (ValueError, KeyError, IndexError) as error:
             raise FileFormatError(f"{path}: not a valid {path.suffix} file: {error}") from error
     if found < promise.points:
-        raise FileFormatError(f"{path}: promises {promise.points} points and holds {max(found, 0)}: it breaks off")
+        raise FileFormatError(
+            f"{path}: promises {promise.points} {promise.what} and holds {max(found, 0)}: it breaks off"
+        )
 
 
 def _count_points(stream: BinaryIO, promise: Promise, file_size: int) -> int:
     """The points that follow the header, counted no further than promised if they are text."""
     if promise.size:
         return (file_size - stream.tell() - promise.skip) // promise.size
-    lines = islice((line for line in stream if line.strip()), promise.skip, promise.skip + promise.points)
+    lines = islice(_meant(stream), promise.skip, promise.skip + promise.points)
     return sum(len([float(word) for word in line.split()[: promise.columns]]) == promise.columns for line in lines)
 
 
@@ -97,4 +103,23 @@ def _pts(stream: BinaryIO) -> Promise:
     return Promise(int(line), 3, 0, 0)
 
 
-_PROMISES = {".ply": _ply, ".pcd": _pcd, ".pts": _pts}
+def _off(stream: BinaryIO) -> Promise:
+    words: list[bytes] = []
+    for line in _meant(stream):
+        words += line.split()
+        if len(words) >= 4:
+            break
+    if not words or not words[0].endswith(b"OFF"):
+        raise ValueError("it does not start with 'OFF'")
+    vertices, faces = (int(word) for word in words[1:3])
+    if vertices < 0 or faces < 0:
+        raise ValueError("its numbers of vertices and faces are negative")
+    return Promise(vertices + faces, 3, 0, 0, "vertices and faces")
+
+
+def _meant(stream: BinaryIO) -> Iterator[bytes]:
+    """Lines that are neither blank nor comments."""
+    return (line for line in stream if line.strip() and not line.lstrip().startswith(b"#"))
+
+
+_PROMISES = {".ply": _ply, ".pcd": _pcd, ".pts": _pts, ".off": _off}

@@ -51,3 +51,18 @@ def test_damaged_clouds(tmp_path, name, text, says):
     (tmp_path / name).write_text(text)
     with pytest.raises(FileFormatError, match=says):
         read_cloud(tmp_path / name)
+
+
+@pytest.mark.parametrize("comment", ["", "# made by hand\n"])
+def test_off_files_that_break_off(tmp_path, comment):
+    import open3d as o3d
+
+    path = tmp_path / "m.off"
+    o3d.io.write_triangle_mesh(str(path), o3d.geometry.TriangleMesh.create_sphere(1.0, 6))
+    lines = (comment + path.read_text()).splitlines(keepends=True)
+    path.write_text("".join(lines))
+    assert len(read_cloud(path).points) == 62
+    for cut in range(1, len(lines)):
+        path.write_text("".join(lines[:cut]))
+        with pytest.raises(FileFormatError, match=r"m\.off"):
+            read_cloud(path)
