@@ -20,6 +20,7 @@ from .evaluate import evaluate
 from .filters import filters
 from .info import info
 from .rerun import rerun
+from .rig import rig
 from .run import run
 from .skeletonize import skeletonize
 from .tree import tree
@@ -48,6 +49,7 @@ for command in (
     tree,
     edit,
     convert,
+    rig,
     view,
     demo,
     filters,
