@@ -37,7 +37,7 @@ class RootSlot(Slot):
 
     @property
     def types(self):
-        return ("RichString", "RichInt")
+        return ("RichString", "RichInt", "RichPosition")
 
     def checked(self, value):
         if isinstance(value, np.generic):

@@ -145,6 +145,15 @@ def test_roots_in_all_words(meshes, whole):
     assert step(verb, {"root": (0, 0.5, 2)}).call.params[0].attributes == {"value": "0.0,0.5,2.0"}
 
 
+def test_a_root_in_a_script_may_be_of_three_types(tmp_path):
+    attributes = ('RichString" value="0.5,0,2.0', 'RichPosition" x="0.5" y="0" z="2', 'RichInt" value="4')
+    for said, root in zip(attributes, ("0.5,0,2.0", "0.5,0.0,2.0", 4), strict=True):
+        text = _filters("Rerooted Skeleton").replace("\n\n", f'\n<Param name="root" type="{said}"/>\n')
+        (tmp_path / "s.mlx").write_text(text)
+        (one,) = read_steps(tmp_path / "s.mlx")
+        assert one.verb.plan(one.values) == {"root": root}
+
+
 def test_radii_are_what_meshlab_left_as_scalars(meshes, whole):
     middle = float(np.median(whole.radii))
     meshes.compute_scalar_by_function_per_vertex(q="2*q")
