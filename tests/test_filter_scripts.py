@@ -1,13 +1,17 @@
 """The scripts in filters/ run at every scale, do what their table says, and are all documented."""
 
 import re
+import sys
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import glsk_o3d
-from glsk_o3d import samples
+from glsk_o3d import editing, samples
+from glsk_o3d.cli.main import app
+from glsk_o3d.meshlab.layers import Layer
 from glsk_o3d.meshlab.script import comment
 from glsk_o3d.meshlab.steps import read_steps, scripts
 
@@ -52,6 +56,29 @@ def test_scripts_with_ours_fit_every_scale(name):
     assert found[0][:2] == (1, 1)
     for other in found[1:]:
         assert other == pytest.approx(found[0], rel=1e-3)
+
+
+def test_the_skeleton_of_limbs_has_no_twigs_and_few_vertices(tmp_path, monkeypatch):
+    points = samples.tree(3000).points
+    Layer.of(points).save(tmp_path / "scan.ply")
+    monkeypatch.setitem(sys.modules, "pymeshlab", None)
+    words = ["run", "skeleton_of_limbs", str(tmp_path / "scan.ply"), "-o", str(tmp_path / "s.json")]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    found, whole = glsk_o3d.read_skeleton(tmp_path / "s.json"), glsk_o3d.skeletonize(points)
+    limbs = editing.prune(whole, length=0.1 * np.linalg.norm(np.ptp(whole.vertices, axis=0)))
+    assert 2 < len(found.leaves) == len(limbs.leaves) < len(whole.leaves)
+    assert len(found.vertices) < len(limbs.vertices) / 4
+    across = np.linalg.norm(np.ptp(limbs.vertices, axis=0))
+    expected = editing.simplify(limbs, tolerance=0.002 * across)
+    np.testing.assert_array_equal(found.vertices, expected.vertices)
+    np.testing.assert_array_equal(found.radii, expected.radii)
+
+
+def test_the_skeleton_of_limbs_is_the_script_of_its_page(root, tmp_path):
+    (text,) = re.findall(r"```xml\n(.*?)```", (root / "docs" / "editing.md").read_text(), re.DOTALL)
+    (tmp_path / "page.mlx").write_text(text)
+    shown, shipped = (read_steps(path) for path in (tmp_path / "page.mlx", scripts()["skeleton_of_limbs"]))
+    assert [(one.name, one.values) for one in shown] == [(one.name, one.values) for one in shipped]
 
 
 @pytest.mark.parametrize("name", scripts())

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import CutLoops, Output, Quiet, Verbose, root_place
+from .options import ROOT_WORDS, TREE_ENDINGS, CutLoops, Output, Quiet, Verbose, root_place
 from .reporting import WrongUsage, reporting
 
 if TYPE_CHECKING:
@@ -26,8 +26,7 @@ def edit(
         typer.Option(
             "--root",
             metavar="ROOT",
-            help="Number vertices from a root outwards: x to -z for the lowest along an axis, thickest, the number of "
-            "a vertex, or x,y,z.",
+            help=f"Number vertices from a root outwards, and count orders from there: {ROOT_WORDS}.",
         ),
     ] = None,
     prune_order: Annotated[
@@ -72,16 +71,29 @@ def convert(
     skeleton: Source,
     output: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Other formats, by their endings.")],
     cut_loops: CutLoops = False,
+    root: Annotated[
+        str | None,
+        typer.Option(
+            "--root",
+            metavar="ROOT",
+            help=f"Where the tree grows from, in formats that hold only trees: {ROOT_WORDS}. By default, where it was "
+            "made to grow from, or else the part with the most volume.",
+        ),
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Write a skeleton in another format."""
     with reporting(quiet=quiet, verbose=verbose):
-        from ..io.skeletons import read_skeleton
+        from ..io.skeletons import FORMATS, read_skeleton, skeleton_ending
         from .outputs import check_outputs
 
         check_outputs(output, skeleton=skeleton)
-        _write(read_skeleton(skeleton), output, [], quiet, cut_loops)
+        if root is not None and not any(FORMATS[skeleton_ending(path)].trees for path in output):
+            raise WrongUsage(
+                f"--root is for formats that hold only trees, {', '.join(TREE_ENDINGS)}: for others use 'glsk edit'"
+            )
+        _write(read_skeleton(skeleton), output, [], quiet, cut_loops=cut_loops, root=root_place(root))
 
 
 def _graph(skeleton: Skeleton, largest: bool, cut: bool, root: int | str | None) -> tuple[Skeleton, list[str]]:
@@ -117,11 +129,21 @@ def _curves(
     return skeleton, told
 
 
-def _write(skeleton: Skeleton, outputs: list[Path], told: list[str], quiet: bool, cut_loops: bool = False) -> None:
+def _write(
+    skeleton: Skeleton,
+    outputs: list[Path],
+    told: list[str],
+    quiet: bool,
+    *,
+    cut_loops: bool = False,
+    root: int | str | None = None,
+) -> None:
     from .outputs import write
     from .running import tell_files
 
-    written, problems = write(skeleton, outputs, None, title="", cut_loops=cut_loops, update=lambda text: None)
+    written, problems = write(
+        skeleton, outputs, None, title="", cut_loops=cut_loops, root=root, update=lambda text: None
+    )
     for line in told if not quiet else ():
         typer.echo(line)
     tell_files(written, problems, quiet=quiet)

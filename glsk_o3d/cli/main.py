@@ -21,6 +21,7 @@ from .filters import filters
 from .grasps import grasps
 from .info import info
 from .rerun import rerun
+from .rig import rig
 from .run import run
 from .skeletonize import skeletonize
 from .tree import tree
@@ -50,6 +51,7 @@ for command in (
     grasps,
     edit,
     convert,
+    rig,
     view,
     demo,
     filters,

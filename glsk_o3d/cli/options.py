@@ -11,6 +11,11 @@ SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "graphml", "cgal", "poly
 SKELETON_ENDINGS += ["vtp", "dxf", "glb", "mtg", "plant.csv", "urdf"]
 """Endings of skeletons; written out, since the table of formats is slow to import."""
 
+TREE_ENDINGS = ["swc", "glb", "mtg", "plant.csv", "urdf"]
+"""Endings of formats that hold only trees."""
+ROOT_WORDS = "x to -z for the lowest along an axis, thickest, the number of a vertex, or a point near one, x,y,z"
+"""What may follow ``--root``, in all commands."""
+
 Where = Annotated[
     str | None,
     typer.Option(
@@ -36,7 +41,8 @@ ReportPage = Annotated[
     ),
 ]
 CutLoops = Annotated[
-    bool, typer.Option("--cut-loops", help="Cut loops open for formats that hold only trees (swc, glb).")
+    bool,
+    typer.Option("--cut-loops", help=f"Cut loops open for formats that hold only trees ({', '.join(TREE_ENDINGS)})."),
 ]
 PipelineName = Annotated[
     str,
@@ -65,9 +71,8 @@ Root = Annotated[
     typer.Option(
         "--root",
         metavar="ROOT",
-        help="Where the skeleton grows from: x to -z for the lowest along an axis, thickest, the number of a vertex, "
-        "or a point near one, x,y,z. By default, where it was made to grow from, or else its part with the most "
-        "volume.",
+        help=f"Where the skeleton grows from: {ROOT_WORDS}. By default, where it was made to grow from, or else its "
+        "part with the most volume.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout instead of tables.")]

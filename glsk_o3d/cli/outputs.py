@@ -12,6 +12,7 @@ from types import MappingProxyType
 from ..errors import FileFormatError, GlskError
 from ..interop.packages import require_for
 from ..io.skeletons import skeleton_ending
+from ..refinement.rooted import Where
 from ..skeleton import Skeleton
 from ..viewing.page import save_report
 from ..viewing.preview import save_preview
@@ -106,15 +107,17 @@ def write(
     *,
     title: str,
     cut_loops: bool,
+    root: Where | None = None,
     update,
     recorder: ContractionRecorder | None = None,
 ) -> tuple[list[Path], list[str]]:
     """Write all files of a run, and `others`, as `write_each` does.
 
-    The title is above the preview and the page; the recorder watched the run, for the page.
+    `cut_loops` and `root` are as for `save_skeleton`. The title is above the preview and the page; the recorder watched
+    the run, for the page.
     """
     writers: dict[Path, Callable[[Path], object]] = {
-        path: partial(skeleton.save, cut_loops=cut_loops) for path in outputs
+        path: partial(skeleton.save, cut_loops=cut_loops, root=root) for path in outputs
     }
     if preview is not None:
         writers[preview] = partial(save_preview, skeleton, title=title)

@@ -31,6 +31,7 @@ _SAID_HERE = {
     "see pipelines.tree() and editing.largest_component()": "keep one with 'glsk edit --largest', or join them with "
     "'glsk skeletonize --pipeline tree'",
     "only trees have a root; see cut_loops()": "only trees have a root: add --cut-loops",
+    "branches have an order in a tree; see cut_loops()": "branches have an order in a tree: add --cut-loops",
     "keep one with editing.largest_component()": "keep one with 'glsk edit --largest'",
     "pass unit=, such as 'mm'": "say --unit, such as --unit mm",
     "give min_confidence=0": "add --min-confidence 0",

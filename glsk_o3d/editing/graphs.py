@@ -78,7 +78,7 @@ def cut_loops(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
     return replace(skeleton, edges=skeleton.edges[stays]), skeleton.vertices[skeleton.edges[~stays]]
 
 
-def reroot(skeleton: Skeleton, root: Where) -> Skeleton:
+def reroot(skeleton: Skeleton, root: Where = "z") -> Skeleton:
     """Number the vertices from a root outwards, as `pipelines.tree` does.
 
     Parameters

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,8 @@ class Layer:
         What our filters pass on, of which the vertices are the visible part.
     source : Layer or None
         The layer from which the flow was made.
+    told : mapping
+        What else there is to say of how it was made.
     """
 
     vertices: np.ndarray
@@ -56,6 +59,7 @@ class Layer:
     label: str = "cloud"
     flow: Contraction | Skeleton | None = None
     source: Layer | None = None
+    told: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, data: Any, label: str = "cloud", source: Layer | None = None) -> Layer:
@@ -123,6 +127,11 @@ class Layer:
         return np.array_equal(self.vertices, other.vertices) and np.array_equal(mine, its)
 
     @property
+    def is_skeleton(self) -> bool:
+        """Whether it has vertices and edges alone, or is a skeleton of ours, of a single vertex perhaps."""
+        return isinstance(self.flow, Skeleton) or (self.edges is not None and self.faces is None)
+
+    @property
     def diagonal(self) -> float:
         """That of the axis-aligned bounding box of the finite vertices, 0 if there are none."""
         finite = self.vertices[np.isfinite(self.vertices).all(axis=1)]
@@ -137,7 +146,8 @@ class Layer:
             found |= {"length": flow.length}
         elif self.colors is not None and self.scalars is not None:
             found["branches"] = int(self.scalars.max(initial=-1)) + 1
-        if flow is not None:
+        found |= self.told
+        if flow is not None and flow.report.stages:  # else it is from a file
             report = flow.report
             found |= {"iterations": len(report.iterations), "converged": report.converged}
             found |= {"stop_reason": report.stop_reason, "warnings": list(report.warnings)}
@@ -183,7 +193,7 @@ class Layer:
             The file cannot be written.
         """
         path = Path(path)
-        if self.edges is not None and self.faces is None:
+        if self.is_skeleton:
             save_skeleton(self.to_skeleton(), path, **options)
             return
         check_ending(path, "points" if self.faces is None else "points or mesh")

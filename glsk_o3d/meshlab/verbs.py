@@ -1,14 +1,14 @@
 """Our filters as MeshLab's users meet them: verbs that make a new layer from the current one.
 
-Everything is generated from the catalogue: every filter there is has a verb, with its parameters as they describe
-themselves.
+Everything is generated: every filter of the catalogue has a verb, with its parameters as they describe themselves, and
+so has every function of `glsk_o3d.editing`.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..contractor import Contractor
-from ..errors import InvalidCloudError, InvalidParameterError, did_you_mean
+from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import Cloud
 from ..io.colors import shades
 from ..lpr_reducer import LPRReducer
@@ -27,8 +27,10 @@ from ..recipes.catalogue import catalogue, known_pipelines, named_pipeline, serv
 from ..ring_builder import RingBuilder
 from ..skeleton import Skeleton
 from ..state import Contraction
+from .edits import edits
 from .layers import Layer
 from .slots import OF_FRAME, PARTS, Slot, facts_of, slots_of
+from .verb import SEGMENTED, WHOLE, Verb, called
 
 _NAMES = {
     "RingBuilder": "generate_one_rings",
@@ -38,64 +40,23 @@ _NAMES = {
     "Refiner": "generate_refined_skeleton",
 }
 
-_WHOLE, _SEGMENTED = "generate_curve_skeleton", "generate_segmented_cloud"
-
 
 @dataclass(frozen=True)
-class Verb:
-    """One of our filters for MeshLab.
-
-    Attributes
-    ----------
-    name : str
-        In Python: ``"generate_curve_skeleton_glsk"``.
-    title : str
-        In scripts: ``"Generate Curve Skeleton (GLSkeleton)"``.
-    doc : str
-    slots : dict of str to Slot
-    """
-
-    name: str
-    title: str
-    doc: str
-    slots: dict[str, Slot]
+class PipelineVerb(Verb):
+    """A pipeline of filters, run on the vertices of a layer: a cloud, a mesh, or what a filter of ours made."""
 
     default: ClassVar[str] = "default"
-
-    @property
-    def makes(self) -> str:
-        """What the result may be, as `check_ending` has it."""
-        return "skeleton"
 
     def start(self, values: Mapping[str, Any]) -> Pipeline:
         """The pipeline whose parameters the values change."""
         return named_pipeline(values.get("pipeline", self.default))
 
     def plan(self, values: Mapping[str, Any]) -> Pipeline:
-        """The filters that the verb runs with such parameters, checked.
+        """The filters that the verb runs with such parameters.
 
-        Parameters
-        ----------
-        values : mapping of str to object
-
-        Returns
-        -------
-        Pipeline
-
-        Raises
-        ------
-        InvalidParameterError
-            An unknown parameter (the message names the nearest), one of something that is not in the pipeline, or a
-            value of the wrong type or out of range.
+        InvalidParameterError also for a parameter of something that is not in the pipeline.
         """
-        made = {}
-        for name, value in values.items():
-            if name not in self.slots:
-                raise InvalidParameterError(did_you_mean(name, self.slots, f"parameter of {self.name}"))
-            try:
-                made[name] = self.slots[name].checked(value)
-            except ValueError as error:
-                raise InvalidParameterError(f"{name} = {value!r}: {error}") from None
+        made = self.checked(values)
         options = {
             f"{slot.owner.__name__}.{slot.field}": name for name in made if (slot := self.slots[name]).owner is not None
         }
@@ -110,11 +71,11 @@ class Verb:
 
         A percentage that was not given is as the filter has it, and says so: ``"1% of the frame"``.
         """
-        pipeline = self.plan(given)
+        pipeline, own = self.plan(given), super().values(given)
         found: dict[str, Any] = {}
         for slot in self.slots.values():
             if slot.owner is None:
-                found[slot.name] = given.get(slot.name, slot.default)
+                found[slot.name] = own[slot.name]
             for part in parts(pipeline):
                 if type(part) is slot.owner:
                     value = getattr(part, slot.field)
@@ -131,36 +92,13 @@ class Verb:
             return pipeline
         return self.plan({**given, **{name: resolve_length(value, diagonal) for name, value in percent.items()}})
 
-    def run(self, layer: Layer, given: Mapping[str, Any], on_iteration: Callable[..., Any] | None = None) -> Layer:
-        """Run on a layer.
-
-        Parameters
-        ----------
-        layer : Layer
-            A cloud, a mesh (its vertices are the cloud), or what another of our filters made.
-        given : mapping of str to object
-            Parameters that differ from the defaults. Percentages are of the diagonal of the layer's bounding box.
-        on_iteration : callable, optional
-            As in `glsk_o3d.skeletonize`.
-
-        Returns
-        -------
-        Layer
-
-        Raises
-        ------
-        InvalidParameterError, InvalidCloudError
-        """
+    def run(self, layer, given, on_iteration=None):
         pipeline = self.plan_for(layer, given)
         return self.shown(pipeline(_cloud(layer), on_iteration=on_iteration), layer)
 
-    def shown(self, result: Any, source: Layer) -> Layer:
-        """The layer that shows a result."""
-        return Layer.of(result, f"{self.title.partition(' (')[0].partition(' ')[2]} of {source.label}", source)
-
 
 @dataclass(frozen=True)
-class FilterVerb(Verb):
+class FilterVerb(PipelineVerb):
     """One filter of a pipeline. What must run before it runs first, unless the layer comes from there."""
 
     filter: type[Filter]
@@ -175,7 +113,7 @@ class FilterVerb(Verb):
 
     def run(self, layer, given, on_iteration=None):
         pipeline = self.plan_for(layer, given)
-        if self.filter.consumes is not Cloud and isinstance(layer.flow, self.filter.consumes):
+        if _goes_on(layer, self.filter.consumes):
             return self.shown(pipeline(layer.flow, on_iteration=on_iteration), _plain(layer))
         pipeline = Pipeline(*self.before(), *pipeline.stages)
         return self.shown(pipeline(_cloud(layer), on_iteration=on_iteration), layer)
@@ -201,7 +139,7 @@ class FilterVerb(Verb):
 
 
 @dataclass(frozen=True)
-class SegmentVerb(Verb):
+class SegmentVerb(PipelineVerb):
     """Points labelled by the branch of the skeleton that they belong to."""
 
     @property
@@ -210,7 +148,7 @@ class SegmentVerb(Verb):
 
     def run(self, layer, given, on_iteration=None):
         pipeline = self.plan_for(layer, given)
-        if isinstance(layer.flow, Skeleton):
+        if _goes_on(layer, Skeleton):
             skeleton, layer = layer.flow, _plain(layer)
         else:
             skeleton = pipeline(_cloud(layer), on_iteration=on_iteration)
@@ -229,17 +167,20 @@ class SegmentVerb(Verb):
 def verbs() -> dict[str, Verb]:
     """Our filters for MeshLab by their names in Python.
 
-    The whole pipeline first, then each filter of the catalogue, then the segmentation.
+    The whole pipeline first, then each filter of the catalogue, the segmentation, and what changes skeletons.
     """
     known = catalogue()
     whole = {type(part): None for make in known_pipelines().values() for part in parts(make())}
     whole |= {cls: None for cls in known.values() if any(serves(cls, kind) for kind in PARTS)}
     about = "The named pipeline; parameters that are not given are as it has them."
     choice = facts_of(about, "choice", tuple(known_pipelines()))
-    slots = [Slot("pipeline", choice, default=Verb.default), *chain.from_iterable(slots_of(cls) for cls in whole)]
-    found = [
-        Verb(
-            *_called(_WHOLE),
+    slots = [
+        Slot("pipeline", choice, default=PipelineVerb.default),
+        *chain.from_iterable(slots_of(cls) for cls in whole),
+    ]
+    found: list[Verb] = [
+        PipelineVerb(
+            *called(WHOLE),
             "The curve skeleton of the current layer's vertices, with radii as scalars.",
             {slot.name: slot for slot in slots},
         )
@@ -252,21 +193,18 @@ def verbs() -> dict[str, Verb]:
             own |= {slot.name: slot for part in inside for slot in slots_of(part)}
             words = "_".join(re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z0-9]*", name)).lower()
             doc = (cls.__doc__ or name).partition("\n\n")[0].replace("\n", " ")
-            found.append(FilterVerb(*_called(_NAMES.get(name, f"generate_by_{words}")), doc, own, cls))
+            found.append(FilterVerb(*called(_NAMES.get(name, f"generate_by_{words}")), doc, own, cls))
     found.append(
         SegmentVerb(
-            *_called(_SEGMENTED),
+            *called(SEGMENTED),
             "The points that a skeleton was made from, with the branch that each belongs to as scalar and as colour. "
             "On a layer without skeleton the default pipeline makes one first. Faces are kept.",
             {},
         )
     )
+    found += edits()
     layer = Slot("layer", facts_of("The layer to act on; -1 is the current one.", "int", low=-1), default=-1)
     return {verb.name: dataclasses.replace(verb, slots={**verb.slots, layer.name: layer}) for verb in found}
-
-
-def _called(stem: str) -> tuple[str, str]:
-    return f"{stem}_glsk", f"{stem.replace('_', ' ').title()} (GLSkeleton)"
 
 
 def _plain(layer: Layer) -> Layer:
@@ -274,8 +212,14 @@ def _plain(layer: Layer) -> Layer:
     return layer.source or layer
 
 
+def _goes_on(layer: Layer, kind: type) -> bool:
+    """Whether a layer holds what a filter takes, with the points that it is of: those of a file have none."""
+    flow = layer.flow
+    return flow is not None and kind is not Cloud and isinstance(flow, kind) and len(flow.points) > 0
+
+
 def _cloud(layer: Layer) -> np.ndarray:
-    if layer.edges is not None and layer.faces is None:
+    if layer.is_skeleton:
         raise InvalidCloudError(
             f"the current layer ({layer.label}) is a skeleton or another line drawing: make the scan the current layer"
         )

@@ -1,9 +1,13 @@
 """``glsk edit`` and ``glsk convert``."""
 
+import json
+
 import numpy as np
 import pytest
 
 from glsk_o3d import Skeleton, read_skeleton
+from glsk_o3d.cli.options import SKELETON_ENDINGS, TREE_ENDINGS
+from glsk_o3d.io.skeletons import FORMATS
 
 
 @pytest.fixture
@@ -79,3 +83,45 @@ def test_convert_to_a_format_of_trees(invoke, file, tmp_path):
     assert "loop" in refused.stderr
     assert invoke("convert", file, tmp_path / "a.swc", "--cut-loops").exit_code == 0
     assert invoke("convert", file, tmp_path / "a.nope").exit_code == 2
+
+
+@pytest.fixture
+def line(tmp_path):
+    """Three edges along x, from the thin end to the thick one."""
+    path = tmp_path / "line.json"
+    Skeleton([[x, 0, 0] for x in range(-1, 3)], [(0, 1), (1, 2), (2, 3)], [0.1, 0.2, 0.3, 0.4], (), (), ()).save(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("word", "x"), [("x", -1), ("-x", 2), ("thickest", 2), ("1", 0), ("0.9,0.1,0", 1), ("-0.9,0.1,0", -1)]
+)
+def test_a_root_in_all_words(invoke, line, tmp_path, word, x):
+    for name in ("swc", "mtg", "plant.csv", "urdf", "glb"):
+        result = invoke("convert", line, tmp_path / f"t.{name}", "--root", word)
+        assert (result.exit_code, result.stderr) == (0, ""), result.output
+        read_skeleton(line).save(tmp_path / f"expected.{name}", root=[x, 0, 0])
+        assert (tmp_path / f"t.{name}").read_bytes() == (tmp_path / f"expected.{name}").read_bytes()
+    assert read_skeleton(tmp_path / "t.swc").vertices[0].tolist() == [x, 0, 0]
+    result = invoke("edit", line, "-o", tmp_path / "e.json", "--root", word)
+    assert result.stdout.startswith(f"grows from ({x}, 0, 0)\n")
+    told = json.loads(invoke("tree", line, "--json", "--root", word).stdout)
+    assert told["root"] == [x, 0, 0] or 0 <= x <= 1  # from inside a branch a tree grows from an end of it
+
+
+def test_a_root_is_for_formats_of_trees(invoke, refused, line, tmp_path):
+    assert refused(2, "convert", line, tmp_path / "a.ply", "--root", "x").endswith("for others use 'glsk edit'")
+    both = [tmp_path / "a.ply", tmp_path / "a.swc"]
+    assert invoke("convert", line, *both, "--root", "-x").exit_code == 0
+    assert [read_skeleton(path).vertices[0].tolist() for path in both] == [[-1, 0, 0], [2, 0, 0]]
+    assert "a.swc: root = 7: there are vertices 0 to 3" in invoke("convert", line, both[1], "--root", "7").stderr
+
+
+def test_formats_of_trees_are_those_of_the_table():
+    assert {ending for ending, format in FORMATS.items() if format.trees} == {f".{ending}" for ending in TREE_ENDINGS}
+    assert set(FORMATS) == {f".{ending}" for ending in SKELETON_ENDINGS}
+
+
+def test_says_what_to_add_where_orders_need_a_tree(invoke, file, tmp_path):
+    told = invoke("edit", file, "-o", tmp_path / "new.ply", "--prune-order", "0").stderr
+    assert " ".join(told.split()).endswith("branches have an order in a tree: add --cut-loops")

@@ -145,7 +145,7 @@ def test_ctrl_c(refused, scans, monkeypatch):
 def test_ctrl_c_while_open3d_loads(refused, scans, monkeypatch):
     import glsk_o3d.io.scans as clouds
 
-    def slow(path):
+    def slow(path, where=None):
         signal.raise_signal(signal.SIGINT)
         held.append(Path(path).name)  # not before this is done
 

@@ -57,6 +57,14 @@ OURS = {
     "generate_refined_skeleton_glsk": {"recentre": 1},
     "generate_segmented_cloud_glsk": {},
 }
+EDITS = {
+    "generate_largest_skeleton_component_glsk": {},
+    "generate_skeleton_without_loops_glsk": {},
+    "generate_rerooted_skeleton_glsk": {"root": (0.5, 0, 0)},
+    "generate_pruned_skeleton_glsk": {"length": "5%", "radius": 0.01},
+    "generate_smoothed_skeleton_glsk": {"passes": 2},
+    "generate_simplified_skeleton_glsk": {"tolerance": pymeshlab.PercentageValue(1)},
+}
 THEIRS = {
     "compute_matrix_from_scaling_or_normalization": {"axisx": 1.5, "uniformflag": True},
     "compute_selection_by_condition_per_vertex": {"condselect": "x > 0"},
@@ -70,6 +78,8 @@ THEIRS = {
 numbers = st.integers(0, 5)
 ACTS = st.one_of(
     st.tuples(st.sampled_from(sorted(OURS)), st.none() | numbers),
+    st.tuples(st.sampled_from(sorted(EDITS)), st.none()),
+    st.tuples(st.sampled_from(sorted(EDITS)), numbers),
     st.tuples(st.sampled_from(sorted(THEIRS)), st.none()),
     st.tuples(st.just("distance"), st.tuples(numbers, numbers)),
     st.tuples(st.just("look"), numbers),
@@ -89,8 +99,8 @@ def _act(meshes, name, layer):
                 meshes.compute_scalar_by_distance_from_another_mesh_per_vertex(
                     measuremesh=chosen[0], refmesh=chosen[-1], signeddist=False
                 )
-        elif name in OURS:
-            meshes.apply_filter(name, **OURS[name], **({} if layer is None else {"layer": chosen[0]}))
+        elif name in OURS | EDITS:
+            meshes.apply_filter(name, **(OURS | EDITS)[name], **({} if layer is None else {"layer": chosen[0]}))
         else:
             meshes.apply_filter(name, **THEIRS[name])
     except (GlskError, pymeshlab.PyMeshLabException):
@@ -99,10 +109,12 @@ def _act(meshes, name, layer):
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 @settings(max_examples=50)
-@given(n_scans=st.integers(1, 2), acts=st.lists(ACTS, min_size=3, max_size=9))
-def test_any_session_replays_bit_for_bit(tmp_path_factory, n_scans, acts):
+@given(n_scans=st.integers(1, 2), begun=st.booleans(), acts=st.lists(ACTS, min_size=3, max_size=9))
+def test_any_session_replays_bit_for_bit(tmp_path_factory, n_scans, begun, acts):
     scans = SCANS[:n_scans]
     session = _loaded(scans)
+    if begun:  # by chance alone there is hardly ever a skeleton to change
+        session.generate_curve_skeleton_glsk()
     for name, layer in acts:
         _act(session, name, layer)
     path = tmp_path_factory.getbasetemp() / "replay.mlx"
@@ -116,6 +128,25 @@ def test_any_session_replays_bit_for_bit(tmp_path_factory, n_scans, acts):
     before = path.read_text()
     again.save_filter_script(path)
     assert path.read_text() == before
+
+
+def test_what_changes_skeletons_replays_between_meshlabs_filters(tmp_path):
+    session = _loaded(SCANS)
+    session.generate_curve_skeleton_glsk(layer=0)
+    session.generate_skeleton_without_loops_glsk()
+    session.compute_scalar_by_function_per_vertex(q="q/3")  # the radii
+    session.generate_rerooted_skeleton_glsk(root="thickest")
+    session.generate_pruned_skeleton_glsk(length="5%", order=3, layer=3)
+    session.set_current_mesh(4)
+    session.generate_copy_of_current_mesh()
+    session.generate_smoothed_skeleton_glsk(passes=3)
+    session.generate_simplified_skeleton_glsk(n=np.int64(12), layer=np.int64(2))
+    session.generate_segmented_cloud_glsk(layer=5)
+    again = _replayed(session, SCANS, tmp_path / "s.mlx")
+    assert len(session.mesh(8).vertex_matrix()) == 12
+    assert [mesh.id() for mesh in again] == [mesh.id() for mesh in session] == list(range(10))
+    for ours, theirs in zip(session, again, strict=True):
+        _equal(ours, theirs)
 
 
 def test_the_command_and_the_session_agree(tmp_path):

@@ -267,10 +267,11 @@ def test_what_is_written_is_read(tmp_path_factory, written):
 
 @pytest.mark.parametrize("verb", verbs().values(), ids=verbs())
 def test_our_defaults_survive_a_script(tmp_path, verb):
-    write_script(tmp_path / "s.mlx", [step(verb, {}).call])
+    needed = {"tolerance": 0.1} if "tolerance" in verb.slots else {}
+    write_script(tmp_path / "s.mlx", [step(verb, needed).call])
     (back,) = read_steps(tmp_path / "s.mlx")
     assert back.verb is verb
-    assert verb.plan(back.values) == verb.plan({})
+    assert verb.plan(back.values) == verb.plan(needed)
 
 
 def test_our_values_survive_a_script(tmp_path):
