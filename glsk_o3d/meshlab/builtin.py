@@ -14,6 +14,9 @@ from ..errors import did_you_mean
 from ..interop.packages import require
 from .script import BOOL, FLOAT, INT, LENGTH, MATRIX, POINT, TEXT, Param
 
+ON_LAYERS = ("apply_", "compute_", "create_", "delete_", "generate_", "get_", "meshing_", "set_", "transfer_")
+"""Beginnings of the names of filters that work on layers; others save, load, export or build files."""
+
 
 @cache
 def names() -> dict[str, str]:
@@ -69,6 +72,8 @@ def arguments(name: str, params: tuple[Param, ...]) -> dict[str, Any]:
         With the line of the parameter as its second argument, or None.
     MissingPackageError
     """
+    if not name.startswith(ON_LAYERS):
+        raise ValueError("it writes or reads files, or sends them: scripts run only filters that work on layers", None)
     if name not in require("pymeshlab").filter_list():
         raise ValueError("the pymeshlab that is installed has no such filter", None)
     known, found = defaults(name), {}

@@ -312,6 +312,15 @@ def test_a_filter_of_the_pymeshlab_of_another_year(tmp_path, monkeypatch):
         read_steps(tmp_path / "s.mlx")
 
 
+@pytest.mark.parametrize("filter", ["NXS Build", "NXS Compress", "Export to Sketchfab"])
+def test_filters_that_write_files_or_send_them_are_refused(tmp_path, filter):
+    pytest.importorskip("pymeshlab")
+    (tmp_path / "s.mlx").write_text(f'<FilterScript>\n<filter name="{filter}"/>\n</FilterScript>')
+    with pytest.raises(ScriptError, match=f"line 2: filter '{filter}': .*only filters that work on layers"):
+        read_steps(tmp_path / "s.mlx")
+    assert [path.name for path in tmp_path.iterdir()] == ["s.mlx"]
+
+
 def test_a_new_filter_is_a_verb_by_itself(monkeypatch, tmp_path):
     @documented
     @dataclasses.dataclass(frozen=True, kw_only=True)

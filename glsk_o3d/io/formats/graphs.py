@@ -37,8 +37,8 @@ def graph_skeleton(vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | Non
 
 
 def checked(skeleton: Skeleton) -> Skeleton:
-    """A skeleton, if its arrays fit together; ValueError where lengths differ, or something names a vertex that is not
-    there.
+    """A skeleton, if its arrays fit together and can be true; ValueError where lengths differ, something names a vertex
+    that is not there, a vertex is nowhere, a radius is negative, or a confidence is none.
     """
     m, vertex_of_point = len(skeleton.vertices), skeleton.vertex_of_point
     if skeleton.edges.size and (skeleton.edges.min() < 0 or skeleton.edges.max() >= m):
@@ -49,4 +49,10 @@ def checked(skeleton: Skeleton) -> Skeleton:
         raise ValueError(f"{len(skeleton.radii)} radii for {m} vertices")
     if len({len(array) for array in (vertex_of_point, skeleton.points, skeleton.normals)} - {0}) > 1:
         raise ValueError("points, normals and vertex_of_point differ in length")
+    if not np.isfinite(skeleton.vertices).all():
+        raise ValueError("a vertex has coordinates that are not finite")
+    for name, values, high in (("radius", skeleton.radii, np.inf), ("confidence", skeleton.confidence, 1.0)):
+        wrong = values[(values < 0) | (values > high)]
+        if len(wrong):
+            raise ValueError(f"a {name} is {wrong[0]:g}")
     return skeleton
