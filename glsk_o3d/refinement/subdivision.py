@@ -26,9 +26,10 @@ def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
     """
     ends = skeleton.edges
     m = len(skeleton.vertices)
-    length = np.maximum(spacing * skeleton.radii[ends].mean(axis=1), 1e-3 * skeleton.edge_lengths)
+    length = np.maximum(spacing * skeleton.radii[ends].mean(axis=1), np.maximum(1e-3 * skeleton.edge_lengths, TINY))
     points = (support(skeleton) / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
-    pieces = np.ceil(np.minimum(skeleton.edge_lengths / length, np.maximum(points / POINTS_PER_PIECE, 1))).astype(int)
+    most = np.maximum(points / POINTS_PER_PIECE, 1)
+    pieces = np.ceil(np.clip(skeleton.edge_lengths / length, 1, most)).astype(int)  # also edges of no length are one
     inner = pieces - 1
     edge = np.repeat(np.arange(len(ends)), inner)
     step = np.arange(len(edge)) - np.repeat(np.cumsum(inner) - inner, inner) + 1

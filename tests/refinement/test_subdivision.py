@@ -96,3 +96,10 @@ def test_points_never_cross_to_a_strand_that_only_passes_by():
     assert len(skeleton.vertices) > 30
     np.testing.assert_array_equal(skeleton.vertices[skeleton.vertex_of_point, 1] > 0.05, side == 1)
     assert np.abs(skeleton.vertices[skeleton.vertex_of_point, 0] - points[:, 0]).max() < 0.051
+
+
+@pytest.mark.parametrize("radii", [(0.1, 0.2), (0.0, 0.0)])
+def test_an_edge_of_no_length_stays(radii):
+    points = bar(40).points * 0
+    nowhere = Skeleton(np.zeros((2, 3)), [(0, 1)], radii, np.repeat([0, 1], 40), points, np.ones((80, 3)))
+    assert len(subdivide_edges(nowhere, 0.5).edges) == 1
