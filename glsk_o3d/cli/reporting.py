@@ -33,6 +33,8 @@ _SAID_HERE = {
     "only trees have a root; see cut_loops()": "only trees have a root: add --cut-loops",
     "keep one with editing.largest_component()": "keep one with 'glsk edit --largest'",
     "pass unit=, such as 'mm'": "say --unit, such as --unit mm",
+    "remove it first, with Open3D's segment_plane or read_cloud(..., where='z > ...')": "remove it first, with "
+    "--where 'z > ...' or Open3D's segment_plane",
     "taken with recursive": "taken with --recursive",
     "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
 }

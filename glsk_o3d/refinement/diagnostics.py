@@ -40,7 +40,8 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     if sheet > MAJORITY:
         return [
             f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
-            "so that a curve skeleton says little about it"
+            "so that a curve skeleton says little about it; where that is the table or the floor under an object, "
+            "remove it first, with Open3D's segment_plane or read_cloud(..., where='z > ...')"
         ]
 
     component, n = skeleton.component_of_vertex[vertex], skeleton.n_components
