@@ -16,6 +16,7 @@ from .interop.verbosity import QUIET, open3d_is
 
 Place: TypeAlias = tuple[float, float, float]
 
+NOT_CONTRACTED = "not contracted"
 STOPPED_BY_CALLER = "stopped by the caller"
 REFUSED = "refused, last sound state kept"
 
@@ -222,7 +223,7 @@ class Report:
     seconds: dict[str, float] = field(default_factory=dict)
     iterations: tuple[IterationRecord, ...] = ()
     converged: bool = False
-    stop_reason: str = "not contracted"
+    stop_reason: str = NOT_CONTRACTED
     warnings: tuple[str, ...] = ()
     versions: dict[str, str] = field(default_factory=_versions)
 
@@ -231,6 +232,11 @@ class Report:
         if not open3d_is(QUIET):
             _warnings.warn(message, SkeletonWarning, stacklevel=outside())
         return dataclasses.replace(self, warnings=(*self.warnings, message))
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether the cloud was so large that a sample stands for it."""
+        return 0 < self.n_sampled < self.n_input - self.n_dropped
 
     @property
     def uncertain(self) -> tuple[Judgement, ...]:

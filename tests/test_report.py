@@ -34,6 +34,15 @@ def test_dict_holds_plain_python_values_only(report):
     assert plain(report.to_dict())
 
 
+@pytest.mark.parametrize(
+    ("counts", "sampled"),
+    [((0, 0, 0), False), ((10, 0, 10), False), ((10, 2, 8), False), ((10, 0, 0), False), ((10, 0, 4), True)],
+)
+def test_sampled_only_where_a_cloud_was_large(counts, sampled):
+    n, dropped, kept = counts
+    assert Report(n_input=n, n_dropped=dropped, n_sampled=kept).is_sampled is sampled
+
+
 def test_is_frozen(report):
     for part in (report, report.iterations[0]):
         with pytest.raises(dataclasses.FrozenInstanceError):

@@ -80,8 +80,17 @@ def test_a_report(invoke, write_scan, scans, tmp_path):
     assert "wrote r.html\n" in result.stdout
     text = (tmp_path / "r.html").read_text("utf-8")
     assert "<title>&lt;b&gt;&#x27;&amp;.ply</title>" in text
-    solves = int(re.search(r"^iterations +(\d+)$", result.stdout, re.MULTILINE)[1])
+    solves = int(re.search(r"^contraction +converged after (\d+) solves$", result.stdout, re.MULTILINE)[1])
     assert text.count("After solve") == solves > 0
+
+
+def test_the_end_of_the_contraction_in_a_line(invoke, scans):
+    words = ("skeletonize", scans / "sample.ply", "-o", "s.ply", "--set", "Contractor.max_iterations=1")
+    result = invoke(*words)
+    assert "contraction  not converged after 1 solve: reached max_iterations = 1\n" in result.stdout
+    assert not re.search(r"^(iterations|stop reason|converged|sampled) ", result.stdout, re.MULTILINE)
+    facts = json.loads(invoke(*words, "--json").stdout)
+    assert (facts["iterations"], facts["converged"], facts["stop_reason"]) == (1, False, "reached max_iterations = 1")
 
 
 def test_settings_reach_the_run(invoke, scans, tmp_path):
