@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, plot_skeleton, samples
+from glsk_o3d.io.colors import COLOR_NAMES
 
 plt = pytest.importorskip("matplotlib.pyplot")
 
@@ -72,7 +73,7 @@ def test_a_cloud_alone_in_colours():
     assert len(few.collections[0].get_facecolor()) <= 100
 
 
-@pytest.mark.parametrize("color", ["branch", "radius", "confidence", (0, 0, 1)])
+@pytest.mark.parametrize("color", [*COLOR_NAMES, (0, 0, 1)])
 def test_colours_of_edges(skeleton, color):
     axes = plot_skeleton(skeleton, color=color)
     pixels(axes)
