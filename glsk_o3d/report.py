@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 import warnings as _warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -127,10 +127,21 @@ class Judgement:
     @property
     def question(self) -> str:
         """What the probability is of, such as ``"the loop at (0, 0, 1) is a handle"``."""
-        return _QUESTIONS[self.about].format(", ".join(f"{c:.4g}" for c in self.place))
+        return _QUESTIONS[self.about].format(coordinates(self.place))
 
     def __str__(self) -> str:
         return f"{self.question}: {self.probability:.2f}, {self.outcome}"
+
+
+def coordinates(place: Iterable[float]) -> str:
+    """A place as people read it: four digits, and of coordinates as on a map all ahead of the point and two more.
+
+    Examples
+    --------
+    >>> coordinates((0.123456, -12.3456, 5600321.98765))
+    '0.1235, -12.35, 5600321.99'
+    """
+    return ", ".join(f"{c:.4g}" if abs(c) < 1000 or not abs(c) < 1e8 else f"{c:.2f}" for c in place)
 
 
 def _known(cls: type[Report] | type[IterationRecord] | type[Judgement], data: Mapping[str, Any]) -> dict[str, Any]:

@@ -81,6 +81,21 @@ def test_colours_of_edges(skeleton, color):
         assert len(drawn.get_edgecolor()) == len(skeleton.edges)
 
 
+def test_a_map_costs_no_digits(tree):
+    small = dataclasses.replace(tree, vertices=1e-2 * tree.vertices, points=1e-2 * tree.points)
+    offset = np.array([4.5e5, 5.6e6, 310])
+    there = dataclasses.replace(small, vertices=small.vertices + offset, points=small.points + offset)
+    here, far = (pixels(plot_skeleton(each)) for each in (small, there))
+    assert is_red(here).sum() > 100
+    assert np.abs(here - far).mean() < 2e-3
+
+
+def test_the_root_has_a_name_for_the_legend(tree):
+    rooted = dataclasses.replace(tree, report=dataclasses.replace(tree.report, root=tuple(tree.vertices[0].tolist())))
+    assert plot_skeleton(rooted).get_legend_handles_labels()[1] == ["root"]
+    assert plot_skeleton(tree).get_legend_handles_labels()[1] == []
+
+
 def test_what_is_wrong(tree):
     with pytest.raises(InvalidParameterError, match="color"):
         plot_skeleton(tree, color="size")
