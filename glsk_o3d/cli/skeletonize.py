@@ -86,8 +86,8 @@ def skeletonize(
     Everything that can be checked is checked before the computation starts. Files appear complete or not at all.
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
-        from ..io.meshes import write_mesh
-        from ..io.scans import read_cloud, read_tensor_cloud, write_tensor_cloud
+        from ..io.meshes import save_mesh
+        from ..io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
         from ..recipes import save_recipe as write_recipe
         from ..recipes import to_recipe
         from ..recipes.writing import recipe_ending
@@ -113,9 +113,9 @@ def skeletonize(
                 cloud = read(scan, where=where)
             skeleton, seconds = run(chosen, cloud, update, recorder)
             if tubes is not None:
-                others[tubes] = lambda path: write_mesh(skeleton.to_tubes(), path)
+                others[tubes] = lambda path: save_mesh(skeleton.to_tubes(), path)
             if labelled is not None:
-                others[labelled] = lambda path: write_tensor_cloud(_labelled(skeleton, cloud), path)
+                others[labelled] = lambda path: save_tensor_cloud(_labelled(skeleton, cloud), path)
             written, problems = write(
                 skeleton,
                 outputs,

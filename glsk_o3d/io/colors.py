@@ -73,7 +73,18 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
 
 
 def thickness_shades(thickness: np.ndarray) -> np.ndarray:
-    """Colours of thicknesses, (n,) float array, as `shades` has them: (n, 3) float array; NaN is grey."""
+    """Colours of thicknesses, as `shades` has them.
+
+    Parameters
+    ----------
+    thickness : (n,) float array
+        As from `glsk_o3d.analysis.thickness`; NaN is grey.
+
+    Returns
+    -------
+    (n, 3) float array
+        Red, green and blue from 0 to 1.
+    """
     return _ramp(_thickness_share(thickness))
 
 

@@ -56,7 +56,7 @@ def read_mesh(path: str | os.PathLike) -> Any:
     return mesh
 
 
-def write_mesh(mesh: Any, path: str | os.PathLike) -> None:
+def save_mesh(mesh: Any, path: str | os.PathLike) -> None:
     """Write a triangle mesh with the normals and colours of its vertices; the ending chooses the format.
 
     Parameters
@@ -86,7 +86,7 @@ def write_mesh(mesh: Any, path: str | os.PathLike) -> None:
     >>> from glsk_o3d.samples import torus
     >>> tubes = skeletonize(torus(1000).points).to_tubes()
     >>> with TemporaryDirectory() as folder:
-    ...     write_mesh(tubes, f"{folder}/ring.obj")
+    ...     save_mesh(tubes, f"{folder}/ring.obj")
     ...     len(read_mesh(f"{folder}/ring.obj").triangles) == len(tubes.triangles)
     True
     """

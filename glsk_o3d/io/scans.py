@@ -110,7 +110,7 @@ def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> A
     return read_scan(path, where).to_tensor()
 
 
-def write_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
+def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
     """Write a tensor cloud with all its attributes and all digits; `read_tensor_cloud` reads PLY and PCD again.
 
     Parameters
@@ -133,7 +133,7 @@ def write_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
     >>> from glsk_o3d.samples import torus
     >>> marked = skeletonize(torus(1000).points).annotate()
     >>> with TemporaryDirectory() as folder:
-    ...     write_tensor_cloud(marked, f"{folder}/marked.ply")
+    ...     save_tensor_cloud(marked, f"{folder}/marked.ply")
     ...     bool((read_tensor_cloud(f"{folder}/marked.ply").point.radius == marked.point.radius).all())
     True
     """

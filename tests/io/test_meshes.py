@@ -6,7 +6,7 @@ import pytest
 
 from glsk_o3d import Skeleton, samples
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
-from glsk_o3d.io.meshes import WRITTEN_MESH_ENDINGS, mesh_arrays, read_mesh, write_mesh
+from glsk_o3d.io.meshes import WRITTEN_MESH_ENDINGS, mesh_arrays, read_mesh, save_mesh
 
 OCTAHEDRON = o3d.geometry.TriangleMesh.create_octahedron()
 
@@ -70,7 +70,7 @@ def moved(mesh, offset):
 
 @pytest.mark.parametrize("ending", [*WRITTEN_MESH_ENDINGS, ".PLY", ".GLB"])
 def test_written_meshes_have_their_triangles_and_colours(tmp_path, capfd, tubes, ending):
-    write_mesh(tubes, tmp_path / f"t{ending}")
+    save_mesh(tubes, tmp_path / f"t{ending}")
     assert capfd.readouterr() == ("", "")
     assert [path.name for path in tmp_path.iterdir()] == [f"t{ending}"]
     back = read_mesh(tmp_path / f"t{ending}")
@@ -83,7 +83,7 @@ def test_written_meshes_have_their_triangles_and_colours(tmp_path, capfd, tubes,
 def test_coordinates_on_a_map_keep_their_digits(tmp_path, tubes, ending):
     trimesh = pytest.importorskip("trimesh")
     there = moved(tubes, FAR)
-    write_mesh(there, tmp_path / f"t.{ending}")
+    save_mesh(there, tmp_path / f"t.{ending}")
     back = trimesh.load(tmp_path / f"t.{ending}", process=False, maintain_order=True)
     np.testing.assert_array_equal(back.vertices, np.asarray(there.vertices))
     np.testing.assert_array_equal(back.faces, np.asarray(there.triangles))
@@ -92,7 +92,7 @@ def test_coordinates_on_a_map_keep_their_digits(tmp_path, tubes, ending):
 @pytest.mark.parametrize("ending", ["stl", "glb", "gltf"])
 def test_too_few_digits_are_refused(tmp_path, tubes, ending):
     with pytest.raises(FileFormatError, match=rf"t\.{ending}: \.{ending} has too few digits .* write ply"):
-        write_mesh(moved(tubes, FAR), tmp_path / f"t.{ending}")
+        save_mesh(moved(tubes, FAR), tmp_path / f"t.{ending}")
     assert not list(tmp_path.iterdir())
 
 
@@ -108,7 +108,7 @@ def test_a_mesh_that_breaks_off_is_no_file(tmp_path, monkeypatch, tubes, ending)
 
     monkeypatch.setattr(o3d.io, "write_triangle_mesh", full)
     with pytest.raises(OSError, match="could not write all of it"):
-        write_mesh(tubes, tmp_path / f"t.{ending}")
+        save_mesh(tubes, tmp_path / f"t.{ending}")
     assert not list(tmp_path.iterdir())
 
 
@@ -116,7 +116,7 @@ def test_many_vertices(tmp_path):
     ring = samples.torus(2000)
     tubes = Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ()).to_tubes(sides=512)
     assert len(tubes.vertices) > 2**16
-    write_mesh(tubes, tmp_path / "t.gltf")
+    save_mesh(tubes, tmp_path / "t.gltf")
     back = read_mesh(tmp_path / "t.gltf")
     assert len(back.triangles) == len(tubes.triangles)
     assert back.get_surface_area() == pytest.approx(tubes.get_surface_area(), rel=1e-5)

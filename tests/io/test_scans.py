@@ -5,7 +5,7 @@ import pytest
 
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
-from glsk_o3d.io.scans import read_cloud, read_scan, read_tensor_cloud, write_tensor_cloud
+from glsk_o3d.io.scans import read_cloud, read_scan, read_tensor_cloud, save_tensor_cloud
 from glsk_o3d.io.skeletons import READABLE
 
 
@@ -133,7 +133,7 @@ def test_tensor_clouds_come_back_as_they_were(tmp_path, capfd, name):
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(held["positions"]))
     for key, values in held.items():
         cloud.point[key] = o3d.core.Tensor(values)
-    write_tensor_cloud(cloud, tmp_path / name)
+    save_tensor_cloud(cloud, tmp_path / name)
     assert capfd.readouterr() == ("", "")
     path = str(tmp_path / name)
     back = o3d.t.io.read_point_cloud(path) if name.endswith("npz") else read_tensor_cloud(path)
@@ -156,7 +156,7 @@ def test_a_cloud_that_breaks_off_is_no_file(tmp_path, monkeypatch):
 
     monkeypatch.setattr(o3d.t.io, "write_point_cloud", full)
     with pytest.raises(OSError, match="could not write all of it"):
-        write_tensor_cloud(o3d.t.geometry.PointCloud(np.eye(3).repeat(20, axis=0)), tmp_path / "c.ply")
+        save_tensor_cloud(o3d.t.geometry.PointCloud(np.eye(3).repeat(20, axis=0)), tmp_path / "c.ply")
     with pytest.raises(FileFormatError, match=r"c\.xyz.*\.npz"):
-        write_tensor_cloud(o3d.t.geometry.PointCloud(np.eye(3)), tmp_path / "c.xyz")
+        save_tensor_cloud(o3d.t.geometry.PointCloud(np.eye(3)), tmp_path / "c.xyz")
     assert not list(tmp_path.iterdir())
