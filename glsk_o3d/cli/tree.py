@@ -92,7 +92,7 @@ def _print(measures: TreeMeasures) -> None:
     for name, unit in UNITS.items():
         value = getattr(measures, name)
         typer.echo(f"{name.replace('_', ' ')}: " + (f"{value:.4g} {unit}" if math.isfinite(value) else "not known"))
-    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
+    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="")
     for name in ("order", "length m", "area m2", "volume m3"):
         shown.add_column(name, justify="right")
     for order, values in enumerate(zip(measures.length, measures.area, measures.volume, strict=True)):
