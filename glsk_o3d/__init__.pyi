@@ -27,7 +27,8 @@ from .io.annotation import annotate_contraction
 from .io.axes import read_truth
 from .io.cylinders import save_cylinders
 from .io.formats.gltf import save_rig
-from .io.scans import read_cloud, read_tensor_cloud
+from .io.meshes import save_mesh
+from .io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
 from .io.skeletons import read_skeleton, save_skeleton
 from .lpr_reducer import LPRReducer
 from .meshlab.meshset import MeshSet
@@ -93,11 +94,13 @@ __all__ = [
     "rerun",
     "save_assessment",
     "save_cylinders",
+    "save_mesh",
     "save_preview",
     "save_recipe",
     "save_report",
     "save_rig",
     "save_skeleton",
+    "save_tensor_cloud",
     "skeletonize",
     "to_recipe",
 ]

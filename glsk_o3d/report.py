@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 import warnings as _warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -16,6 +16,7 @@ from .interop.verbosity import QUIET, open3d_is
 
 Place: TypeAlias = tuple[float, float, float]
 
+NOT_CONTRACTED = "not contracted"
 STOPPED_BY_CALLER = "stopped by the caller"
 REFUSED = "refused, last sound state kept"
 
@@ -126,10 +127,21 @@ class Judgement:
     @property
     def question(self) -> str:
         """What the probability is of, such as ``"the loop at (0, 0, 1) is a handle"``."""
-        return _QUESTIONS[self.about].format(", ".join(f"{c:.4g}" for c in self.place))
+        return _QUESTIONS[self.about].format(coordinates(self.place))
 
     def __str__(self) -> str:
         return f"{self.question}: {self.probability:.2f}, {self.outcome}"
+
+
+def coordinates(place: Iterable[float]) -> str:
+    """A place as people read it: four digits, and of coordinates as on a map all ahead of the point and two more.
+
+    Examples
+    --------
+    >>> coordinates((0.123456, -12.3456, 5600321.98765))
+    '0.1235, -12.35, 5600321.99'
+    """
+    return ", ".join(f"{c:.4g}" if abs(c) < 1000 or not abs(c) < 1e8 else f"{c:.2f}" for c in place)
 
 
 def _known(cls: type[Report] | type[IterationRecord] | type[Judgement], data: Mapping[str, Any]) -> dict[str, Any]:
@@ -222,7 +234,7 @@ class Report:
     seconds: dict[str, float] = field(default_factory=dict)
     iterations: tuple[IterationRecord, ...] = ()
     converged: bool = False
-    stop_reason: str = "not contracted"
+    stop_reason: str = NOT_CONTRACTED
     warnings: tuple[str, ...] = ()
     versions: dict[str, str] = field(default_factory=_versions)
 
@@ -231,6 +243,11 @@ class Report:
         if not open3d_is(QUIET):
             _warnings.warn(message, SkeletonWarning, stacklevel=outside())
         return dataclasses.replace(self, warnings=(*self.warnings, message))
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether the cloud was so large that a sample stands for it."""
+        return 0 < self.n_sampled < self.n_input - self.n_dropped
 
     @property
     def uncertain(self) -> tuple[Judgement, ...]:

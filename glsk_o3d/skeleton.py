@@ -246,7 +246,7 @@ class Skeleton:
 
         Parameters
         ----------
-        color : {"branch", "radius", "confidence"} or three floats in [0, 1]
+        color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1]
             What the colours of the edges show, or the one colour of all.
         """
         from .io.line_sets import to_line_set
@@ -258,7 +258,7 @@ class Skeleton:
 
         Parameters
         ----------
-        color : {"branch", "radius", "confidence"} or three floats in [0, 1], optional
+        color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1], optional
             What the colours of the edges show, or the one colour of all; by default there are none.
         """
         from .io.line_sets import to_tensor_line_set

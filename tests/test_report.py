@@ -34,6 +34,20 @@ def test_dict_holds_plain_python_values_only(report):
     assert plain(report.to_dict())
 
 
+def test_places_on_a_map_keep_their_digits():
+    told = Judgement("loop", (450123.456789, 5600321.987654, -0.0123456), 0.5, changed=False).question
+    assert told == "the loop at (450123.46, 5600321.99, -0.01235) is a handle"
+
+
+@pytest.mark.parametrize(
+    ("counts", "sampled"),
+    [((0, 0, 0), False), ((10, 0, 10), False), ((10, 2, 8), False), ((10, 0, 0), False), ((10, 0, 4), True)],
+)
+def test_sampled_only_where_a_cloud_was_large(counts, sampled):
+    n, dropped, kept = counts
+    assert Report(n_input=n, n_dropped=dropped, n_sampled=kept).is_sampled is sampled
+
+
 def test_is_frozen(report):
     for part in (report, report.iterations[0]):
         with pytest.raises(dataclasses.FrozenInstanceError):

@@ -34,8 +34,8 @@ class BranchTable(Rows, row="branch"):
     """One row per branch: those of `Skeleton.branches` in their order, then the vertices without edges.
 
     Lengths are in the cloud's units. Means are along the curve. NaN where something is unknown or means nothing.
-    Iteration gives a dict of plain numbers and strings per row; the two points become ``start_x`` and so on. ``print``
-    shows the main columns, as ``glsk branches`` does.
+    Iteration gives a dict of plain numbers and strings per row; the two points become ``start_point_x`` and so
+    on. ``print`` shows the main columns, as ``glsk branches`` does with spaces for underscores.
 
     Attributes
     ----------

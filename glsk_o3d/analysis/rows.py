@@ -16,8 +16,8 @@ from ..interop.atomic import write_csv
 class Rows:
     """Base of dataclasses whose fields are arrays with a row per thing.
 
-    Iteration gives a dict of plain numbers and strings per row, the number of the row first; points, in fields whose
-    names end in ``_point``, become three columns without it. Fields that are no arrays are no columns.
+    Iteration gives a dict of plain numbers and strings per row, the number of the row first; a point becomes three
+    columns, whose names end in ``_x``, ``_y`` and ``_z``. Fields that are no arrays are no columns.
     """
 
     _row: ClassVar[str]
@@ -38,8 +38,8 @@ class Rows:
             if array.ndim == 1:
                 columns[field.name] = array.tolist()
             else:
-                name = field.name.removesuffix("_point")
-                columns |= {f"{name}_{axis}": column.tolist() for axis, column in zip("xyz", array.T, strict=True)}
+                coordinates = zip("xyz", array.T.tolist(), strict=True)
+                columns |= {f"{field.name}_{axis}": column for axis, column in coordinates}
         return columns
 
     def __iter__(self) -> Iterator[dict[str, Any]]:

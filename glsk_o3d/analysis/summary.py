@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
+
+from ..report import NOT_CONTRACTED
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
+
+ENDING_FACTS = ("iterations", "converged", "stop_reason")
+"""What `ending` tells in one line."""
 
 
 def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
@@ -30,6 +36,23 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
         "stop_reason": report.stop_reason,
         "seconds": seconds,
     }
+
+
+def ending(facts: Mapping[str, Any]) -> str | None:
+    """How a contraction ended, in a line, from what `summary` says of it; None where there was none.
+
+    Examples
+    --------
+    >>> ending({"iterations": 4, "converged": True, "stop_reason": "explained score settled: De = 0.01 < 0.03"})
+    'converged after 4 solves'
+    >>> ending({"iterations": 1, "converged": False, "stop_reason": "reached max_iterations = 1"})
+    'not converged after 1 solve: reached max_iterations = 1'
+    """
+    n, reason = facts["iterations"], facts["stop_reason"]
+    if n == 0 and reason == NOT_CONTRACTED:
+        return None
+    told = f"converged after {n} solve{'s' * (n != 1)}"
+    return told if facts["converged"] else f"not {told}: {reason}"
 
 
 def structure(skeleton: Skeleton) -> dict[str, Any]:

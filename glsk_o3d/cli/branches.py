@@ -67,9 +67,9 @@ def _print(table: BranchTable) -> None:
 
     from ..analysis.branch_rows import PRINTED_COLUMNS, cell
 
-    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
+    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="")
     for name, form in PRINTED_COLUMNS.items():
-        shown.add_column(name, justify="left" if form == "s" else "right")
+        shown.add_column(name.replace("_", " "), justify="left" if form == "s" else "right")
     for row in table:
         shown.add_row(*(cell(row, name) for name in PRINTED_COLUMNS))
     print_table(shown, whole=True)

@@ -98,6 +98,7 @@ def convert(
 
 def _graph(skeleton: Skeleton, largest: bool, cut: bool, root: int | str | None) -> tuple[Skeleton, list[str]]:
     from .. import editing
+    from ..report import coordinates
 
     told = []
     if largest:
@@ -105,10 +106,10 @@ def _graph(skeleton: Skeleton, largest: bool, cut: bool, root: int | str | None)
         skeleton = editing.largest_component(skeleton)
     if cut:
         skeleton, ends = editing.cut_loops(skeleton)
-        told += [f"cut a loop at {_place(pair.mean(axis=0))}" for pair in ends]
+        told += [f"cut a loop at ({coordinates(pair.mean(axis=0))})" for pair in ends]
     if root is not None:
         skeleton = editing.reroot(skeleton, root)
-        told.append(f"grows from {_place(skeleton.vertices[0])}")
+        told.append(f"grows from ({coordinates(skeleton.vertices[0])})")
     return skeleton, told
 
 
@@ -147,7 +148,3 @@ def _write(
     for line in told if not quiet else ():
         typer.echo(line)
     tell_files(written, problems, quiet=quiet)
-
-
-def _place(point) -> str:
-    return "(" + ", ".join(f"{x:.4g}" for x in point.tolist()) + ")"

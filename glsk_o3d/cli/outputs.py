@@ -10,7 +10,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ..errors import FileFormatError, GlskError
-from ..interop.packages import require_for
+from ..interop.packages import require, require_for
+from ..io.meshes import mesh_ending
+from ..io.scans import tensor_cloud_ending
 from ..io.skeletons import skeleton_ending
 from ..refinement.rooted import Where
 from ..skeleton import Skeleton
@@ -31,6 +33,9 @@ def check_outputs(
     page: Path | None = None,
     others: Iterable[Path] = (),
     check_ending: Callable[[Path], object] = skeleton_ending,
+    *,
+    tubes: Path | None = None,
+    labelled: Path | None = None,
     **inputs: Path | None,
 ) -> None:
     """Find out before computing whether the files can be written.
@@ -39,16 +44,16 @@ def check_outputs(
     or another input among them, or no file at all; OSError where a folder is missing, or a file cannot be written.
     """
     for path in outputs:
-        try:
-            check_ending(path)
-        except FileFormatError as error:
-            hint = _MADE_WITH.get(path.suffix.lower(), "")
-            raise WrongUsage(f"{error}{hint}") from None
+        _check(check_ending, path, _MADE_WITH.get(path.suffix.lower(), ""))
+    for check, coloured in ((mesh_ending, tubes), (tensor_cloud_ending, labelled)):
+        if coloured is not None:
+            _check(check, coloured)
+            require("matplotlib")
     if preview is not None and preview.suffix.lower() != ".png":
         raise WrongUsage(f"{preview}: the preview is a picture and its name ends in .png")
     if page is not None and page.suffix.lower() not in (".html", ".htm"):
         raise WrongUsage(f"{page}: the report is a page and its name ends in .html")
-    files = [*outputs, *(path for path in (preview, page) if path is not None)]
+    files = [*outputs, *(path for path in (preview, page, tubes, labelled) if path is not None)]
     if not files:
         raise WrongUsage("nothing to write: give an output with -o, a picture with --preview, a page with --report")
     files += others
@@ -61,6 +66,13 @@ def check_outputs(
         seen[real] = "is named twice"
     for path in files:
         check_writable(path)
+
+
+def _check(check_ending: Callable[[Path], object], path: Path, hint: str = "") -> None:
+    try:
+        check_ending(path)
+    except FileFormatError as error:
+        raise WrongUsage(f"{error}{hint}") from None
 
 
 def check_findings(files: Iterable[tuple[Path | None, str | tuple[str, ...], str]], *inputs: Path | None) -> None:

@@ -37,6 +37,8 @@ _SAID_HERE = {
     "give min_confidence=0": "add --min-confidence 0",
     "give cloud=points, or cloud=() to check nothing": "give the scan with --cloud",
     "max_opening = ": "--opening ",
+    "remove it first, with Open3D's segment_plane or read_cloud(..., where='z > ...')": "remove it first, with "
+    "--where 'z > ...' or Open3D's segment_plane",
     "taken with recursive": "taken with --recursive",
     "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
 }

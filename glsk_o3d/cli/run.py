@@ -88,9 +88,14 @@ def run(
 
 
 def _print_results(steps: Sequence[Step], results: Sequence[dict[str, Any]]) -> None:
+    from ..analysis.summary import ENDING_FACTS, ending
+
     for i, (step, result) in enumerate(zip(steps, results, strict=True), 1):
-        said = _said({key: value for key, value in result.items() if key != "warnings"})
-        typer.echo(f"{i}. {step.call.name}" + f": {said}" * bool(said))
+        said = [_said({key: value for key, value in result.items() if key not in ("warnings", *ENDING_FACTS)})]
+        if result.keys() >= set(ENDING_FACTS):
+            said.append(ending(result) or "")
+        told = ", ".join(filter(None, said))
+        typer.echo(f"{i}. {step.call.name}" + f": {told}" * bool(told))
 
 
 def _plain(result: Any) -> Any:

@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from ..analysis.summary import summary
+from ..analysis.summary import ENDING_FACTS, ending, summary
 from ..skeleton import Skeleton
 from .console import print_iterations, print_json, print_rows
 
@@ -65,16 +65,17 @@ def print_results(
         warnings = list(skeleton.report.warnings)
         print_json({**facts, "warnings": warnings, "files": [str(path) for path in written]})
     elif not quiet:
-        hidden = {"dropped": facts["dropped"] or None, "converged": None, "seconds": f"{seconds:.2f}"}
-        if facts["sampled"] in (0, facts["points"] - facts["dropped"]):
+        told = {name: value for name, value in facts.items() if name not in (*ENDING_FACTS, "seconds")}
+        hidden = {"dropped": facts["dropped"] or None}
+        if not skeleton.report.is_sampled:
             hidden["sampled"] = None
         hidden["loops_closed"] = None  # most clouds have some, true ones are hardly ever among them
         hidden |= {name: None for name in ("outliers", "cuts", "bridges", "traced", "joined") if not facts[name]}
         hidden["uncertain"] = "\n".join(map(str, skeleton.report.uncertain)) or None
         if facts["contracted"] == facts["distinct"]:
             hidden["contracted"] = None
-        words = {name: "yes" if value else "no" for name, value in facts.items() if isinstance(value, bool)}
-        print_rows({**facts, **words, **hidden})
+        words = {name: "yes" if value else "no" for name, value in told.items() if isinstance(value, bool)}
+        print_rows({**told, **words, **hidden, "contraction": ending(facts), "seconds": f"{seconds:.2f}"})
     tell_files(written, problems, quiet=quiet or as_json)
 
 

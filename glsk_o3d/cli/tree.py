@@ -16,14 +16,15 @@ from .reporting import reporting
 if TYPE_CHECKING:
     from ..analysis import TreeMeasures
 
-WORDS = {
-    "height": ("height", "m"),
-    "stem_diameter": ("stem diameter at 1.3 m", "m"),
-    "crown_base": ("lowest branch", "m"),
-    "crown_width": ("crown width", "m"),
-    "crown_area": ("crown area from above", "m2"),
-    "traced": ("share of the volume with confidence 0", ""),
+UNITS = {
+    "height": "m",
+    "stem_diameter": "m",
+    "crown_base": "m",
+    "crown_width": "m",
+    "crown_area": "m2",
+    "traced": "of the volume",
 }
+"""Fields of `TreeMeasures` that are printed, and what they are in."""
 
 
 def tree(
@@ -88,11 +89,11 @@ def _print(measures: TreeMeasures) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    for name, (words, unit) in WORDS.items():
+    for name, unit in UNITS.items():
         value = getattr(measures, name)
-        typer.echo(f"{words}: " + (f"{value:.4g} {unit}".rstrip() if math.isfinite(value) else "not known"))
-    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
-    for name in ("order", "length m", "surface m2", "volume m3"):
+        typer.echo(f"{name.replace('_', ' ')}: " + (f"{value:.4g} {unit}" if math.isfinite(value) else "not known"))
+    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="")
+    for name in ("order", "length m", "area m2", "volume m3"):
         shown.add_column(name, justify="right")
     for order, values in enumerate(zip(measures.length, measures.area, measures.volume, strict=True)):
         shown.add_row(str(order), *(f"{value:.4g}" for value in values))

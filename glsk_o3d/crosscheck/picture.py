@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..interop.atomic import check_ending
-from ..viewing.preview import INK, MOST_DRAWN_POINTS, colour_bar, new_figure, printable, room, save_figure, three_views
+from ..viewing.layout import room, three_views
+from ..viewing.preview import INK, MOST_DRAWN_POINTS, colour_bar, new_figure, printable, save_figure
 
 if TYPE_CHECKING:
     from .check import CrossCheck
@@ -18,7 +19,7 @@ _OURS, _THEIRS, _UNKNOWN = "#111111", "#0a6fc2", "#c9c9c9"
 # All fitted to the eye.
 _MOST_REASONS = 3  # lines of text
 _MOST_DEGREES = 60.0  # degrees at which the colours end
-_HEAD_ROOM, _FOOT_ROOM = 0.95, 0.85  # inches above and below the three views
+_HEAD_ROOM, _FOOT_ROOM = 0.95, 0.57  # inches above and below the three views
 
 
 def save_crosscheck_picture(
@@ -78,7 +79,7 @@ def _draw(check, size, title):
     centre, extent = room(shown)
     points = points - centre
     colours = np.where(np.isnan(angle)[:, None], to_rgba(_UNKNOWN), scale.to_rgba(np.nan_to_num(angle)))
-    for a, b, axes in three_views(figure, extent, head=_HEAD_ROOM, foot=_FOOT_ROOM, names=0.62):
+    for a, b, axes in three_views(figure, extent, head=_HEAD_ROOM, foot=_FOOT_ROOM):
         dot = float(np.clip(16000 / max(len(points), 1), 2, 6))
         axes.scatter(points[:, a], points[:, b], s=dot, c=colours, linewidths=0, clip_on=False)
         for skeleton, colour, line in ((check.mesh_skeleton, _THEIRS, 2.6), (check.skeleton, _OURS, 1.2)):

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analysis.branches import branch_table
 from ..analysis.segmentation import branch_of_point, label_of_nearest, vertex_of_cloud
 from ..analysis.thickness import thickness_of_points
 from ..interop.clouds import cloud_points, open3d_class
 from ..interop.packages import import_open3d
-from .colors import ColorChoice, shades
+from .colors import ColorChoice, shades, thickness_shades
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -25,6 +26,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
 
     - ``skeleton_vertex`` (N, 1) int32: the vertex it belongs to, as in `Skeleton.vertex_of_point`;
     - ``branch`` (N, 1) int32: the row of `Skeleton.branch_table`, as from `Skeleton.segment`;
+    - ``order`` (N, 1) int32: that of the branch in `Skeleton.branch_table`, 0 for axes at the root;
     - ``radius`` and ``confidence`` (N, 1), of the type of the positions: those of the vertex;
     - ``thickness`` (N, 1), of that type: the radius over how far the points are apart, see
       `glsk_o3d.analysis.thickness`.
@@ -37,7 +39,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     cloud : cloud, optional
         By default the one the skeleton was made from. Points of another one go with the nearest point of that, or with
         the nearest place on the curve if the skeleton's file held no cloud.
-    color : {"branch", "radius", "confidence"} or three floats in [0, 1], optional
+    color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1], optional
         What the colours of the points are to show, or the one colour of all; see `glsk_o3d.io.colors.shades`.
 
     Returns
@@ -63,11 +65,15 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     geometry, put = _copy(points if cloud is None else cloud)
     put("skeleton_vertex", vertex[:, None], "int32")
     put("branch", branch[:, None], "int32")
+    put("order", np.where(branch >= 0, branch_table(skeleton).order[branch], -1)[:, None], "int32")
     for name, values in (("radius", skeleton.radii), ("confidence", skeleton.confidence)):
         put(name, np.where(vertex >= 0, values[vertex], np.nan)[:, None])
-    put("thickness", thickness_of_points(skeleton, points, vertex)[:, None])
+    thickness = thickness_of_points(skeleton, points, vertex)
+    put("thickness", thickness[:, None])
     if color is not None:
-        put("colors", np.round(255 * shades(skeleton, color, branch, vertex)), "uint8")
+        thick = isinstance(color, str) and color == "thickness"  # of these points, not of those of the skeleton
+        colors = thickness_shades(thickness) if thick else shades(skeleton, color, branch, vertex)
+        put("colors", np.round(255 * colors), "uint8")
     return geometry
 
 

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
+from ..analysis.branches import branch_table
+from ..analysis.thickness import thickness_of_points
 from ..errors import InvalidParameterError
 from ..interop.packages import require
+from ..numerics.groups import group_median
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-ColorChoice: TypeAlias = Literal["branch", "radius", "confidence"] | Sequence[float]
+ColorChoice: TypeAlias = Literal["branch", "order", "radius", "confidence", "thickness"] | Sequence[float]
 """What colours show, or one colour for all: red, green and blue from 0 to 1."""
 
 UNKNOWN_GREY = (0.6, 0.6, 0.6)
-COLOR_NAMES = ("branch", "radius", "confidence")
+COLOR_NAMES = ("branch", "order", "radius", "confidence", "thickness")
+THICKNESS_SPAN = 4.0  # fitted: that of the last colour; of the first it is one over that
 
 
 def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices: np.ndarray) -> np.ndarray:
@@ -26,9 +30,11 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
     Parameters
     ----------
     skeleton : Skeleton
-    color : {"branch", "radius", "confidence"} or three floats in [0, 1]
-        Branches have 18 colours in turn; radii go from dark blue, the least of the skeleton, to yellow, the largest;
-        confidences from 0 to 1 likewise. Or one colour for all: red, green, blue.
+    color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1]
+        Branches have 18 colours in turn. Orders of the branches, as in the table of them, go from dark blue, 0, to
+        yellow, the highest of the skeleton; radii from the least to the largest likewise, confidences from 0 to 1, and
+        the median thickness of the points of a vertex from a quarter to four, 1 in the middle. Or one colour for all:
+        red, green, blue.
     branch : (n,) int array
         -1 for none: grey.
     vertices : (n,) or (n, k) int array
@@ -58,11 +64,60 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
         palette = np.delete(colormaps["tab20"].colors, [14, 15], axis=0)  # grey is for none
         palette = np.concatenate([palette[::2], palette[1::2]])  # the strong ones first
         return np.where((branch >= 0)[:, None], palette[branch % len(palette)], UNKNOWN_GREY)
-    if color == "radius":
-        low, high = np.nanmin(skeleton.radii, initial=np.inf), np.nanmax(skeleton.radii, initial=-np.inf)
-        values = (skeleton.radii - low) / (high - low) if high > low else np.where(np.isnan(skeleton.radii), np.nan, 0)
-    else:
-        values = skeleton.confidence
+    if color == "order":
+        order = branch_table(skeleton).order if len(branch) else np.zeros(1, int)
+        return _ramp(np.where(branch >= 0, order[branch] / max(order.max(), 1), np.nan))
     vertices = vertices if vertices.ndim == 2 else vertices[:, None]
-    shown = np.where((vertices >= 0).all(axis=1), values[vertices].mean(axis=1), np.nan)
-    return np.where(np.isnan(shown)[:, None], UNKNOWN_GREY, colormaps["viridis"](np.nan_to_num(shown))[:, :3])
+    values = _OF_VERTICES[color](skeleton)
+    return _ramp(np.where((vertices >= 0).all(axis=1), values[vertices].mean(axis=1), np.nan))
+
+
+def thickness_shades(thickness: np.ndarray) -> np.ndarray:
+    """Colours of thicknesses, as `shades` has them.
+
+    Parameters
+    ----------
+    thickness : (n,) float array
+        As from `glsk_o3d.analysis.thickness`; NaN is grey.
+
+    Returns
+    -------
+    (n, 3) float array
+        Red, green and blue from 0 to 1.
+    """
+    return _ramp(_thickness_share(thickness))
+
+
+def _ramp(shown: np.ndarray) -> np.ndarray:
+    """Colours of numbers from 0 to 1; what is beyond has that of the end, NaN is grey."""
+    viridis = require("matplotlib").colormaps["viridis"]
+    return np.where(np.isnan(shown)[:, None], UNKNOWN_GREY, viridis(np.nan_to_num(shown))[:, :3])
+
+
+def _radius_share(skeleton: Skeleton) -> np.ndarray:
+    radii = skeleton.radii
+    low, high = np.nanmin(radii, initial=np.inf), np.nanmax(radii, initial=-np.inf)
+    return (radii - low) / (high - low) if high > low else np.where(np.isnan(radii), np.nan, 0)
+
+
+def _thickness_share(thickness: np.ndarray) -> np.ndarray:
+    with np.errstate(divide="ignore"):
+        return np.clip(np.log(thickness) / np.log(THICKNESS_SPAN) / 2 + 0.5, 0, 1)
+
+
+def _median_thickness(skeleton: Skeleton) -> np.ndarray:
+    owned = np.flatnonzero(skeleton.vertex_of_point >= 0)
+    found, count = np.full(len(skeleton.vertices), np.nan), len(skeleton.vertices)
+    if len(owned):
+        vertex = skeleton.vertex_of_point[owned]
+        values = thickness_of_points(skeleton, skeleton.points, skeleton.vertex_of_point)[owned]
+        some = np.bincount(vertex, minlength=count) > 0
+        found[some] = group_median(values, vertex, count)[some]
+    return found
+
+
+_OF_VERTICES: dict[str, Callable[[Skeleton], np.ndarray]] = {
+    "radius": _radius_share,
+    "confidence": lambda skeleton: skeleton.confidence,
+    "thickness": lambda skeleton: _thickness_share(_median_thickness(skeleton)),
+}

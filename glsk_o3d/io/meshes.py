@@ -1,16 +1,25 @@
-"""Triangle meshes from files and from Open3D."""
+"""Triangle meshes from files, to files, and from Open3D."""
 
 from __future__ import annotations
 
+import json
 import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import FileFormatError, InvalidParameterError
+from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
-from .paths import MESH_ENDINGS
+from .formats.text import line, text
+from .paths import MESH_ENDINGS, unknown_ending
 from .scans import check_scan
+
+WRITTEN_MESH_ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf")
+SINGLE_PRECISION = (".stl", ".glb", ".gltf")
+LOST_SHARE = 0.01  # derived: of an edge; an error of so much turns a triangle by less than a degree
+PLY_VERTEX_BYTES, PLY_TRIANGLE_BYTES, STL_TRIANGLE_BYTES = 51, 13, 50  # published: formats, as Open3D fills them
 
 
 def read_mesh(path: str | os.PathLike) -> Any:
@@ -45,6 +54,102 @@ def read_mesh(path: str | os.PathLike) -> Any:
     if not mesh.has_triangles():
         raise FileFormatError(f"{path}: no triangles could be read: it is a cloud, or damaged")
     return mesh
+
+
+def save_mesh(mesh: Any, path: str | os.PathLike) -> None:
+    """Write a triangle mesh with the normals and colours of its vertices; the ending chooses the format.
+
+    Parameters
+    ----------
+    mesh : open3d.geometry.TriangleMesh
+        With normals and colours, as from `Skeleton.to_tubes`.
+    path : path-like
+        PLY, OBJ or OFF, which hold coordinates to the last bit; STL, GLB or glTF, which hold them as float32, STL
+        without colours. It appears complete or not at all.
+
+    Raises
+    ------
+    FileFormatError
+        The ending is unknown, or the format has too few digits for coordinates as large as these.
+    OSError
+        The folder does not exist, or the file cannot be written.
+
+    Notes
+    -----
+    Open3D writes OBJ and OFF with six digits, GLB such that it cannot read it again, and says of a file that breaks off
+    on a full disk that all went well.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> tubes = skeletonize(torus(1000).points).to_tubes()
+    >>> with TemporaryDirectory() as folder:
+    ...     save_mesh(tubes, f"{folder}/ring.obj")
+    ...     len(read_mesh(f"{folder}/ring.obj").triangles) == len(tubes.triangles)
+    True
+    """
+    ending = mesh_ending(path)
+    points, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+    if ending in SINGLE_PRECISION and len(triangles):
+        side = np.median(np.linalg.norm(points[triangles[:, 0]] - points[triangles[:, 1]], axis=1))
+        largest = np.abs(points).max()
+        step = largest * np.finfo(np.float32).eps
+        if step > LOST_SHARE * side:
+            raise FileFormatError(
+                f"{os.fspath(path)}: {ending} has too few digits for coordinates as large as {largest:.3g}, "
+                f"they would be up to {step:.2g} off: write ply, obj or off"
+            )
+    text_writer = {".obj": _obj, ".off": _off}.get(ending)
+    if text_writer is not None:
+        data = text_writer(points, triangles, mesh)
+        write_atomically(path, lambda temporary: temporary.write_bytes(data))
+    else:
+        write_atomically(path, lambda temporary: _write_open3d(mesh, temporary))
+
+
+def mesh_ending(path: str | os.PathLike) -> str:
+    """The ending of a mesh to be written, in lower case; FileFormatError if it is unknown."""
+    ending = Path(path).suffix.lower()
+    if ending not in WRITTEN_MESH_ENDINGS:
+        raise unknown_ending(f"{os.fspath(path)}: tubes are a mesh", WRITTEN_MESH_ENDINGS)
+    return ending
+
+
+def _write_open3d(mesh: Any, path: Path) -> None:
+    o3d, ending = import_open3d(), path.suffix.lower()
+    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+        if ending == ".glb":
+            done = o3d.t.io.write_triangle_mesh(str(path), o3d.t.geometry.TriangleMesh.from_legacy(mesh))
+        else:
+            done = o3d.io.write_triangle_mesh(str(path), mesh)
+    n, m = len(mesh.vertices), len(mesh.triangles)
+    least = {".ply": PLY_VERTEX_BYTES * n + PLY_TRIANGLE_BYTES * m, ".stl": STL_TRIANGLE_BYTES * m}.get(ending, 1)
+    if not done or path.stat().st_size < least or (ending == ".gltf" and not _is_json(path)):
+        raise OSError("Open3D could not write all of it: is the disk full?")
+
+
+def _is_json(path: Path) -> bool:
+    try:
+        return bool(json.loads(path.read_bytes()))
+    except ValueError:
+        return False
+
+
+def _obj(points: np.ndarray, triangles: np.ndarray, mesh: Any) -> bytes:
+    colors = np.asarray(mesh.vertex_colors).tolist()
+    vertices = [line("v", *point, *color) for point, color in zip(points.tolist(), colors, strict=True)]
+    normals = [line("vn", *normal) for normal in np.asarray(mesh.vertex_normals).tolist()]
+    faces = [line("f", *(f"{corner}//{corner}" for corner in face)) for face in (triangles + 1).tolist()]
+    return text([*vertices, *normals, *faces])
+
+
+def _off(points: np.ndarray, triangles: np.ndarray, mesh: Any) -> bytes:
+    colors = np.rint(255 * np.asarray(mesh.vertex_colors)).astype(int).tolist()
+    vertices = [line(*point, *color, 255) for point, color in zip(points.tolist(), colors, strict=True)]
+    faces = [line(3, *face) for face in triangles.tolist()]
+    return text(["COFF", line(len(points), len(triangles), 0), *vertices, *faces])
 
 
 def mesh_arrays(mesh: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ import numpy as np
 from ..numerics.components import component_labels
 from ..numerics.groups import group_median, group_sum
 from ..numerics.vectors import dot, norm
+from ..report import coordinates
 from ..skeleton import Skeleton
 
 # All fitted; what tubes and balls have is derived.
@@ -40,7 +41,8 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     if sheet > MAJORITY:
         return [
             f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
-            "so that a curve skeleton says little about it"
+            "so that a curve skeleton says little about it; where that is the table or the floor under an object, "
+            "remove it first, with Open3D's segment_plane or read_cloud(..., where='z > ...')"
         ]
 
     component, n = skeleton.component_of_vertex[vertex], skeleton.n_components
@@ -97,8 +99,7 @@ def _weak_region(skeleton: Skeleton, count: np.ndarray) -> list[str]:
     most = np.argmax(np.bincount(label[weak], count[weak], minlength=len(weak)))
     region = skeleton.vertices[weak & (label == most)]
     middle = region.mean(axis=0)
-    reach = norm(region - middle).max()
-    place = ", ".join(f"{c:.4g}" for c in middle)
+    reach, place = norm(region - middle).max(), coordinates(middle)
     return [
         f"weakly supported: around {share:.0%} of the points, above all within {reach:.3g} of ({place}), the points do "
         "not agree on an axis: too sparse or too noisy for how thin the parts are, or no tubes at all"

@@ -162,6 +162,8 @@ def origin(report: Report) -> str:
         "traced, no surface": report.n_traced,
         "gaps joined": len(report.joined),
     }
+    if not report.is_sampled:
+        del counts["sampled from a large cloud"]
     numbers = {name: f"{n:,}" for name, n in counts.items()} if report.n_input else {}
     numbers |= {f"{name}, seconds": f"{seconds:.3f}" for name, seconds in report.seconds.items()}
     return f'{told}<div class="pair">{_facts("The run", numbers, "number")}{_facts("Versions", report.versions)}</div>'

@@ -11,6 +11,7 @@ from ..errors import InvalidParameterError
 from ..interop.clouds import cloud_points
 from ..interop.packages import require
 from ..io.colors import shades
+from .preview import ROOT_MARK
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -35,8 +36,9 @@ def plot_skeleton(
     """Draw a skeleton and its cloud into matplotlib's three-dimensional axes.
 
     All axes have one scale and no ticks, the projection is orthographic, points are lighter where they are farther, and
-    the skeleton lies on top. The axes come back to draw more into; since the drawing fills the place of the axes, which
-    matplotlib clips to a square, give ``clip_on=False`` with what you add.
+    the skeleton lies on top, with a blue diamond where a tree grows from, which ``axes.legend()`` calls root. The axes
+    come back to draw more into; since the drawing fills the place of the axes, which matplotlib clips to a square, give
+    ``clip_on=False`` with what you add.
 
     Parameters
     ----------
@@ -46,7 +48,7 @@ def plot_skeleton(
         By default new ones in a new figure.
     cloud : cloud, optional
         Anything that carries points, instead of the skeleton's own.
-    color : {"branch", "radius", "confidence"} or three floats in [0, 1]
+    color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1]
         Of the edges, as for `Skeleton.to_line_set`.
     point_colors : (N, 3) float array, optional
         Red, green and blue of the cloud's points from 0 to 1, instead of greys.
@@ -106,6 +108,8 @@ def plot_skeleton(
         axes.add_collection(
             Line3DCollection(lines, colors=colors, linewidths=line_width, capstyle="round", clip_on=False, zorder=2)
         )
+    if skeleton is not None and skeleton.report.root:
+        axes.scatter(*skeleton.report.root, **ROOT_MARK, depthshade=False, clip_on=False, zorder=3)
     half = np.maximum(high - low, 0.05 * (high - low).max() or 1.0) / 2
     for name, middle, reach in zip("xyz", (low + high) / 2, half, strict=True):
         getattr(axes, f"set_{name}lim")(middle - reach, middle + reach)

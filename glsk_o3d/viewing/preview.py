@@ -4,42 +4,53 @@ from __future__ import annotations
 
 import os
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
+from ..numerics.vectors import norm
+from .layout import VIEW_GAP, fitting_size, room, three_views
+from .recorder import thinned
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 MOST_DRAWN_POINTS = 20_000
 DPI = 150
-_VIEWS, _VIEW_GAP = ((0, 1), (0, 2), (1, 2)), 0.3  # inches between them at least
 INK, _RED, _AMBER, _PAPER = "#333333", "#d0121f", "#a05000", "white"
 _LINE_HEIGHT, _LETTER_WIDTH, _MOST_LINES, _MOST_WARNINGS = 0.16, 0.066, 2, 2  # inches; lines of each warning, warnings
-_FAR_DOT, _NEAR_DOT = np.array([0.90] * 3), np.array([0.68] * 3)
+_FAR_DOT, _NEAR_DOT = np.array([0.91] * 3), np.array([0.70] * 3)
+ROOT_MARK = {"marker": "D", "s": 22, "facecolors": "#1f5fbf", "edgecolors": "white", "linewidths": 0.6, "label": "root"}
+"""How the place is drawn that a tree grows from."""
+
+# Fitted to the eye: the cloud's dots as a share of the area of a view, and each in square points at least and at most;
+# the width of lines and of the dots on them over the median branch, and at least and at most in points.
+_DOTS_SHARE, _DOT_AREA = 0.1, (0.5, 3)
+_LINE_SHARE, _LINE_WIDTH = 0.065, (0.6, 1.5)
+_DOT_SHARE, _WIDEST_DOT, _LONE_DOT = 0.12, 3.0, 3.7
 
 
 def save_preview(
-    skeleton: Skeleton, path: str | os.PathLike, *, size: tuple[int, int] = (1800, 760), title: str | None = None
+    skeleton: Skeleton, path: str | os.PathLike, *, size: tuple[int, int] | None = None, title: str | None = None
 ) -> None:
     """Draw a skeleton and its cloud from three sides into a PNG file.
 
     The three views look along the coordinate axes, all at one scale: x across and y up, x across and z up, y across and
-    z up. The cloud is grey, lighter where it is farther; edges are red, junctions dark dots, leaves open ones. Below
-    are the counts and what the run warned of: the first two warnings, long ones shortened, fewer and shorter in a low
-    picture, and how many more there are.
+    z up. They are arranged so that they are large. The cloud is grey, lighter where it is farther; edges are red,
+    junctions dark dots and leaves open ones, unless branches are too short for dots; a blue diamond is where a tree
+    grows from, `Report.root`. Below are the counts and what the run warned of: the first two warnings, long ones
+    shortened, fewer and shorter in a low picture, and how many more there are.
 
     Parameters
     ----------
     skeleton : Skeleton
     path : path-like
         PNG; it appears complete or not at all.
-    size : (width, height)
-        In pixels.
+    size : (width, height), optional
+        In pixels. By default as the object is wide and tall: from 900 x 450 to 1800 x 1200.
     title : str, optional
         Above the views.
 
@@ -71,34 +82,29 @@ def save_preview(
 
 def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] = ()):
     """The figure, not yet in a file."""
-    figure = new_figure(size)
-    from matplotlib.collections import LineCollection
-
-    width, height = figure.get_size_inches()
-    cloud = skeleton.points[np.isfinite(skeleton.points).all(axis=1)]
-    cloud = cloud[:: max(1, -(-len(cloud) // MOST_DRAWN_POINTS))]
+    cloud = skeleton.points[thinned(skeleton.points, MOST_DRAWN_POINTS)]
     centre, extent = room(np.concatenate([cloud, skeleton.vertices]))
-    cloud, vertices = cloud - centre, skeleton.vertices - centre
+    head, foot = 0.55 if title else 0.25, 0.34
+    if size is None:
+        told = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if warnings else 0
+        size = DPI * fitting_size(extent, head=head, foot=foot + told)
+    figure = new_figure((size[0], size[1]))
+    width, height = figure.get_size_inches()
     warned = _warned(warnings, width, int(height / 3 / _LINE_HEIGHT))
     below = _LINE_HEIGHT * len(warned)
-    views = three_views(figure, extent, head=0.55 if title else 0.25, foot=0.6 + below, names=0.36 + below)
-    for a, b, axes in views:
-        style = {"linewidths": 0, "clip_on": False, "s": np.clip(4500 / max(len(cloud), 1), 0.8, 3)}
-        depth, toward = cloud[:, 3 - a - b], 1 if (a, b) != (0, 2) else -1  # x, y, z are right-handed
-        order = np.argsort(toward * depth, kind="stable")
-        near = (np.arange(len(order)) / max(len(order) - 1, 1))[:, None]
-        axes.scatter(cloud[order, a], cloud[order, b], c=_FAR_DOT + near * (_NEAR_DOT - _FAR_DOT), **style)
-        segments = vertices[skeleton.edges][:, :, [a, b]]
-        axes.add_collection(LineCollection(segments, colors=_RED, linewidths=1.5, capstyle="round", clip_on=False))
-        for chosen, face, area in (
-            (skeleton.degree == 0, _RED, 14),
-            (skeleton.degree == 1, _PAPER, 9),
-            (skeleton.degree > 2, INK, 9),
-        ):
-            spots = {"s": area, "facecolors": face, "edgecolors": _RED if face == _PAPER else face, "linewidths": 0.9}
-            axes.scatter(*vertices[chosen][:, [a, b]].T, zorder=3, clip_on=False, **spots)
+    for a, b, axes in three_views(figure, extent, head=head, foot=foot + below):
+        scale = 72 * axes.get_position().width * width / extent[a]  # points per unit
+        _draw_cloud(axes, cloud - centre, a, b, scale**2 * np.prod(np.sort(extent)[1:]))
+        _draw_curve(axes, skeleton, skeleton.vertices - centre, [a, b], scale)
+        if skeleton.report.root:
+            place = np.subtract(skeleton.report.root, centre)[[a, b]]
+            mark = axes.scatter(*place, **ROOT_MARK, zorder=4, clip_on=False)
+    if skeleton.report.root:
+        figure.legend(handles=[mark], loc="upper left", frameon=False, fontsize=8, labelcolor=INK, borderaxespad=0.3)
     if caption:
-        figure.text(0.5, (0.12 + below) / height, _caption(skeleton), ha="center", color=INK, fontsize=8)
+        counts = _caption(skeleton)
+        points = 8 * min(1, (width - VIEW_GAP) / (_LETTER_WIDTH * len(counts)))
+        figure.text(0.5, (0.12 + below) / height, counts, ha="center", color=INK, fontsize=points)
     for row, line in enumerate(reversed(warned)):
         place = (0.1 + row * _LINE_HEIGHT) / height
         figure.text(0.5, place, printable(line), ha="center", color=_AMBER, fontsize=8, parse_math=False)
@@ -107,7 +113,34 @@ def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] 
     return figure
 
 
-def new_figure(size: tuple[int, int]) -> Any:
+def _draw_cloud(axes, cloud, a, b, area):
+    """Grey dots, lighter where they are farther, smaller where they are many in such an area [square points]."""
+    depth, toward = cloud[:, 3 - a - b], 1 if (a, b) != (0, 2) else -1  # x, y, z are right-handed
+    order = np.argsort(toward * depth, kind="stable")
+    near = (np.arange(len(order)) / max(len(order) - 1, 1))[:, None]
+    style = {"linewidths": 0, "clip_on": False, "s": np.clip(_DOTS_SHARE * area / max(len(cloud), 1), *_DOT_AREA)}
+    axes.scatter(cloud[order, a], cloud[order, b], c=_FAR_DOT + near * (_NEAR_DOT - _FAR_DOT), **style)
+
+
+def _draw_curve(axes, skeleton, vertices, across_up, scale):
+    """Edges, and junctions and leaves where branches are long enough for dots on them; the scale is points per unit."""
+    from matplotlib.collections import LineCollection
+
+    lengths = [norm(np.diff(skeleton.vertices[path], axis=0)).sum() for path in skeleton.branches]
+    branch = scale * float(np.median(lengths)) if lengths else 0.0
+    line = float(np.clip(_LINE_SHARE * branch, *_LINE_WIDTH))
+    segments = vertices[skeleton.edges][:, :, across_up]
+    axes.add_collection(LineCollection(segments, colors=_RED, linewidths=line, capstyle="round", clip_on=False))
+    dot = min(_DOT_SHARE * branch, _WIDEST_DOT)
+    spots = [(skeleton.degree == 0, _RED, _LONE_DOT)]
+    if dot > line:
+        spots += [(skeleton.degree == 1, _PAPER, dot), (skeleton.degree > 2, INK, dot)]
+    for chosen, face, wide in spots:
+        style = {"s": wide**2, "facecolors": face, "edgecolors": _RED if face == _PAPER else face}
+        axes.scatter(*vertices[chosen][:, across_up].T, zorder=3, clip_on=False, linewidths=0.3 * wide, **style)
+
+
+def new_figure(size: tuple[float, float]) -> Any:
     """A white figure of so many pixels, on a canvas of its own: pyplot and its global state stay out of it."""
     require("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -116,39 +149,6 @@ def new_figure(size: tuple[int, int]) -> Any:
     figure = Figure(np.asarray(size) / DPI, facecolor=_PAPER)
     FigureCanvasAgg(figure)
     return figure
-
-
-def room(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Middle and size, (3,) float arrays, of the box of points, (n, 3) float array, that is drawn.
-
-    matplotlib's transforms lose digits unless the middle is taken off.
-    """
-    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else np.zeros((2, 3))
-    return low + (high - low) / 2, np.maximum(high - low, 0.08 * (high - low).max() or 1.0)
-
-
-def three_views(
-    figure, extent: np.ndarray, *, head: float, foot: float, names: float
-) -> Iterator[tuple[int, int, Any]]:
-    """Axes for the views along the coordinate axes, all at one scale, with the names of their axes below.
-
-    What is drawn is around the origin, of this extent, (3,) float array; head and foot are the room above and below,
-    and names the height of the names, in inches. Gives the coordinates that are drawn, across and up, and their axes.
-    """
-    width, height = figure.get_size_inches()
-    across, up = np.array([extent[[a, b]] for a, b in _VIEWS]).T
-    scale = min((width - 4 * _VIEW_GAP) / across.sum(), (height - foot - head) / up.max())
-    gap = (width - scale * across.sum()) / 4
-    left, middle = gap, foot + (height - foot - head) / 2
-    for a, b in _VIEWS:
-        box = [left, middle - scale * extent[b] / 2, scale * extent[a], scale * extent[b]]
-        axes = figure.add_axes(np.divide(box, [width, height] * 2))
-        axes.set_axis_off()
-        axes.set(xlim=extent[a] * np.array([-0.5, 0.5]), ylim=extent[b] * np.array([-0.5, 0.5]))
-        yield a, b, axes
-        told = f"{'xyz'[a]}\N{RIGHTWARDS ARROW} {'xyz'[b]}\N{UPWARDS ARROW}"
-        figure.text((left + box[2] / 2) / width, names / height, told, ha="center", color="#999999", fontsize=7)
-        left += box[2] + gap
 
 
 def colour_bar(figure, scale, box, ticks: list[float], labels: list[str] | None = None) -> None:
@@ -172,7 +172,7 @@ def printable(text: object) -> str:
 
 def _warned(warnings: Sequence[str], width: float, room: int) -> list[str]:
     """At most so many lines that tell the warnings in a figure so many inches wide; the last counts what is left."""
-    letters = max(int((width - 2 * _VIEW_GAP) / _LETTER_WIDTH), 20)
+    letters = max(int((width - 2 * VIEW_GAP) / _LETTER_WIDTH), 20)
     lines: list[str] = []
     more = len(warnings)
     for warning in warnings[:_MOST_WARNINGS]:

@@ -101,7 +101,7 @@ def test_by_hand():
 def test_rows_and_csv(tmp_path):
     table = cylinders(by_hand(), root=0)
     first = next(iter(table))
-    assert list(first)[:5] == ["cylinder", "start_x", "start_y", "start_z", "end_x"]
+    assert list(first)[:5] == ["cylinder", *(f"start_point_{axis}" for axis in "xyz"), "end_point_x"]
     table.to_csv(tmp_path / "c.csv")
     assert len((tmp_path / "c.csv").read_text().splitlines()) == 1 + len(table)
 

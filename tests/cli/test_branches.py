@@ -2,10 +2,14 @@
 
 import csv
 import json
+import re
+from dataclasses import fields
 
 import pytest
 
 from glsk_o3d import Skeleton, read_skeleton, samples
+from glsk_o3d.analysis import BranchTable
+from glsk_o3d.analysis.branch_rows import PRINTED_COLUMNS
 
 
 def test_table_file_and_json_agree(invoke, tmp_path, y):
@@ -17,6 +21,9 @@ def test_table_file_and_json_agree(invoke, tmp_path, y):
     rows = list(read_skeleton(tmp_path / y).branch_table())
     with (tmp_path / "y.csv").open(newline="") as stream:
         assert [row["kind"] for row in csv.DictReader(stream)] == [row["kind"] for row in rows]
+    names = ["branch", *(field.name for field in fields(BranchTable))]
+    heads = [head.replace(" ", "_") for head in re.split(r"  +", next(filter(None, lines)).strip())]
+    assert heads == [name for name in PRINTED_COLUMNS if name in names]
     told = [line.split() for line in lines if line.strip()[:1].isdigit()]
     assert [words[:7] for words in told] == [
         ["0", "tip", "-", "0", "0", "0", "0.5"],

@@ -12,7 +12,7 @@ import pytest
 import glsk_o3d
 from glsk_o3d import read_cloud, read_skeleton
 
-SUMMARY = "points distinct vertices edges components loops leaves junctions length iterations stop seconds wrote"
+SUMMARY = "points distinct vertices edges components loops leaves junctions length contraction seconds wrote"
 
 
 def failed(run, code):
@@ -145,7 +145,7 @@ def test_ctrl_c(refused, scans, monkeypatch):
 def test_ctrl_c_while_open3d_loads(refused, scans, monkeypatch):
     import glsk_o3d.io.scans as clouds
 
-    def slow(path, where=None):
+    def slow(path, **_):
         signal.raise_signal(signal.SIGINT)
         held.append(Path(path).name)  # not before this is done
 

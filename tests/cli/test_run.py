@@ -40,6 +40,9 @@ def test_a_script_of_ours_is_the_pipeline(invoke, scans, script, tmp_path, monke
     radius = 0.02 * Layer.read(scan).diagonal
     pipeline = glsk_o3d.RingBuilder() | contractor | glsk_o3d.Connector(radius=radius) | glsk_o3d.Refiner()
     expected = pipeline(read_cloud(scan))
+    solves = len(expected.report.iterations)
+    assert f", converged after {solves} solves\n" in result.stdout
+    assert "iterations" not in result.stdout
     back = read_skeleton(tmp_path / "s.json")
     np.testing.assert_array_equal(back.vertices, expected.vertices)
     assert back.report.stages == expected.report.stages

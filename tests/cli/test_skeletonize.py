@@ -7,10 +7,12 @@ import re
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from glsk_o3d import read_skeleton, samples
+from glsk_o3d import read_skeleton, read_tensor_cloud, samples
 from glsk_o3d.cli.options import PipelineName
+from glsk_o3d.io.meshes import read_mesh
 from glsk_o3d.pipelines import PIPELINES
 
 
@@ -31,6 +33,11 @@ from glsk_o3d.pipelines import PIPELINES
         (1, ["-o", "s.ply", "--preview", "no/s.png"], "no: no such folder"),
         (1, ["--report", "no/s.html"], "no: no such folder"),
         (1, ["-o", "/proc/s.ply"], "/proc/s.ply: no file can be made in this folder"),
+        (2, ["--tubes", "s.xyz"], "s.xyz: tubes are a mesh: unknown ending; known are .ply, .obj"),
+        (2, ["--labelled", "s.xyz"], "s.xyz: a cloud with labels: unknown ending; known are .ply, .pcd, .npz"),
+        (2, ["-o", "s.ply", "--tubes", "s.ply"], "s.ply: is named twice"),
+        (2, ["--labelled", "SCAN"], "is the scan itself"),
+        (1, ["--tubes", "no/s.ply"], "no: no such folder"),
         (2, ["-o", "s.ply", "--pipeline", "wen2042"], "no pipeline is called 'wen2042': did you mean 'wen2024'?"),
         (2, ["-o", "s.ply", "--set", "Connector.radius=-1"], "Connector.radius = -1.0: must be above 0"),
         (2, ["-o", "s.ply", "--set", "RingSizeRatio.threshold=1"], "RingSizeRatio is not in the pipeline 'default'"),
@@ -80,8 +87,78 @@ def test_a_report(invoke, write_scan, scans, tmp_path):
     assert "wrote r.html\n" in result.stdout
     text = (tmp_path / "r.html").read_text("utf-8")
     assert "<title>&lt;b&gt;&#x27;&amp;.ply</title>" in text
-    solves = int(re.search(r"^iterations +(\d+)$", result.stdout, re.MULTILINE)[1])
+    solves = int(re.search(r"^contraction +converged after (\d+) solves$", result.stdout, re.MULTILINE)[1])
     assert text.count("After solve") == solves > 0
+
+
+def test_the_end_of_the_contraction_in_a_line(invoke, scans):
+    words = ("skeletonize", scans / "sample.ply", "-o", "s.ply", "--set", "Contractor.max_iterations=1")
+    result = invoke(*words)
+    assert "contraction  not converged after 1 solve: reached max_iterations = 1\n" in result.stdout
+    assert not re.search(r"^(iterations|stop reason|converged|sampled) ", result.stdout, re.MULTILINE)
+    facts = json.loads(invoke(*words, "--json").stdout)
+    assert (facts["iterations"], facts["converged"], facts["stop_reason"]) == (1, False, "reached max_iterations = 1")
+
+
+MAP = np.array([471234.5, 5612345.25, 123.0])
+
+
+@pytest.fixture
+def las(tmp_path):
+    """A ring on a map, on a table, with what a LAS file says of its points."""
+    laspy = pytest.importorskip("laspy")
+    ring, n = samples.torus(1000).points, 1000
+    header = laspy.LasHeader(point_format=7, version="1.4")
+    header.offsets, header.scales = MAP, [1e-5] * 3
+    header.add_extra_dim(laspy.ExtraBytesParams("treeID", type="uint32"))
+    data = laspy.LasData(header)
+    table = np.column_stack([ring[:200, :2], np.full(200, -2.0)])
+    data.x, data.y, data.z = (np.concatenate([ring, table]) + MAP).T
+    data.classification = np.repeat([5, 2], [n, 200])
+    data.intensity, data.treeID = np.arange(n + 200), np.arange(n + 200) // 7
+    data.red = np.repeat([65535, 0], [n, 200])
+    data.write(tmp_path / "ring.las")
+    return "ring.las"
+
+
+@pytest.mark.parametrize("ending", ["ply", "pcd"])
+def test_a_scan_with_labels_has_all_that_it_had(invoke, las, tmp_path, ending):
+    result = invoke("skeletonize", las, "--where", "classification == 5", "--labelled", f"l.{ending}", "-o", "s.npz")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert f"wrote l.{ending}\n" in result.stdout
+    scan = read_tensor_cloud(tmp_path / las, where="classification == 5")
+    skeleton = read_skeleton(tmp_path / "s.npz")
+    back = read_tensor_cloud(tmp_path / f"l.{ending}").point
+    assert len(skeleton.points) == 1000
+    for name in ("positions", "classification", "intensity", "treeID"):
+        np.testing.assert_array_equal(back[name].numpy(), scan.point[name].numpy(), err_msg=name)
+    assert (back.scan_red.numpy() == 255).all()
+    expected = skeleton.annotate(color="branch").point
+    for name in ("skeleton_vertex", "branch", "order", "radius", "confidence", "thickness", "colors"):
+        np.testing.assert_array_equal(back[name].numpy(), expected[name].numpy(), err_msg=name)
+
+
+def test_labels_do_not_change_the_skeleton(invoke, scans, tmp_path):
+    for name, more in {"a": [], "b": ["--labelled", "l.npz", "--tubes", "t.stl"]}.items():
+        words = ("skeletonize", scans / "nan.ply", "--drop-invalid", "-o", f"{name}.npz", *more)
+        assert invoke(*words).exit_code == 0
+    a, b = (read_skeleton(tmp_path / name) for name in ("a.npz", "b.npz"))
+    np.testing.assert_array_equal(a.vertices, b.vertices)
+    with np.load(tmp_path / "l.npz") as labels:
+        np.testing.assert_array_equal(labels["skeleton_vertex"][:, 0], a.vertex_of_point)
+        assert np.flatnonzero(labels["branch"] < 0).tolist() == [3, 8]
+
+
+def test_tubes_are_those_of_the_skeleton_and_one_file_does_not_cost_the_others(invoke, las, tmp_path):
+    words = ("skeletonize", las, "--where", "z > 122", "-o", "s.npz", "--labelled", "l.ply")
+    result = invoke(*words, "--tubes", "t.stl")
+    assert result.exit_code == 1
+    assert result.stderr.startswith("glsk: error: t.stl: .stl has too few digits for coordinates as large as 5.61e+06")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["l.ply", "ring.las", "s.npz"]
+    assert invoke(*words, "--tubes", "t.ply").exit_code == 0
+    tubes, skeleton = read_mesh(tmp_path / "t.ply"), read_skeleton(tmp_path / "s.npz")
+    np.testing.assert_array_equal(np.asarray(tubes.vertices), np.asarray(skeleton.to_tubes().vertices))
+    assert tubes.has_vertex_colors()
 
 
 def test_settings_reach_the_run(invoke, scans, tmp_path):

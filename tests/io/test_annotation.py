@@ -6,6 +6,7 @@ import pytest
 
 import glsk_o3d as glsk
 from glsk_o3d import InvalidParameterError, annotate_contraction, samples
+from glsk_o3d.io.colors import thickness_shades
 
 POINTS = samples.y_junction(800).points
 RNG = np.random.default_rng(1)
@@ -53,13 +54,14 @@ def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton, state)
     annotated = held(skeleton.annotate(cloud))
     kind = cloud.point.positions.numpy().dtype
     assert_equal({name: annotated[name] for name in before}, before)
-    assert annotated.keys() - before.keys() == {"skeleton_vertex", "branch", "radius", "confidence", "thickness"}
     floats = dict.fromkeys(("radius", "confidence", "thickness"), kind)
-    for name, dtype in {"skeleton_vertex": np.int32, "branch": np.int32, **floats}.items():
+    assert annotated.keys() - before.keys() == {"skeleton_vertex", "branch", "order", *floats}
+    for name, dtype in {**dict.fromkeys(("skeleton_vertex", "branch", "order"), np.int32), **floats}.items():
         assert annotated[name].dtype == dtype
         assert annotated[name].shape == (800, 1)
     np.testing.assert_array_equal(annotated["skeleton_vertex"][:, 0], skeleton.vertex_of_point)
     np.testing.assert_array_equal(annotated["branch"][:, 0], skeleton.segment())
+    np.testing.assert_array_equal(annotated["order"][:, 0], skeleton.branch_table().order[skeleton.segment()])
     np.testing.assert_array_equal(annotated["radius"][:, 0], skeleton.radii[skeleton.vertex_of_point].astype(kind))
 
     contracted = held(annotate_contraction(state, skeleton.annotate(cloud)))
@@ -158,8 +160,14 @@ def test_colours(cloud, skeleton):
     radius = skeleton.radii[skeleton.vertex_of_point]
     brightness = by_radius @ [0.2, 0.7, 0.1]
     assert brightness[radius.argmin()] < brightness[radius.argmax()]
+    marked = skeleton.annotate(cloud, color="thickness")
+    expected = np.round(255 * thickness_shades(marked.point.thickness.numpy()[:, 0].astype(float)))
+    assert np.abs(marked.point.colors.numpy() - expected).max() <= 1
+    by_order = skeleton.annotate(cloud, color="order")
+    for order in np.unique(by_order.point.order.numpy()):
+        assert len(np.unique(by_order.point.colors.numpy()[by_order.point.order.numpy()[:, 0] == order], axis=0)) == 1
     legacy = skeleton.annotate(cloud, color="branch").to_legacy()
     np.testing.assert_allclose(np.asarray(legacy.colors), shown / 255, atol=1e-6)
-    for wrong in ("thickness", (1, 0), (0, 0, 2), ("a", 0, 0), np.nan):
+    for wrong in ("size", (1, 0), (0, 0, 2), ("a", 0, 0), np.nan):
         with pytest.raises(InvalidParameterError, match="color"):
             skeleton.annotate(cloud, color=wrong)

@@ -6,6 +6,7 @@ import pytest
 
 import glsk_o3d as glsk
 from glsk_o3d import samples
+from glsk_o3d.io.colors import COLOR_NAMES
 from glsk_o3d.io.line_sets import to_line_set
 
 
@@ -49,14 +50,14 @@ def test_line_sets_do_not_alias_the_skeleton(tree):
 
 def test_colours_without_radii_or_confidence(branched):
     bare = glsk.Skeleton(branched.vertices, branched.edges, np.full(len(branched.radii), np.nan), (), (), ())
-    for color in ("radius", "confidence"):
+    for color in ("radius", "confidence", "thickness"):
         assert (np.asarray(bare.to_line_set(color).colors) == 0.6).all()
     even = glsk.Skeleton([[0, 0, 0], [1, 0, 0]], [(0, 1)], [1, 1], (), (), ())
     assert np.ptp(np.asarray(even.to_line_set("radius").colors)) > 0
 
 
 @pytest.mark.parametrize("count", [0, 1])
-@pytest.mark.parametrize("color", ["branch", "radius", "confidence", (0.1, 0.2, 0.3)])
+@pytest.mark.parametrize("color", [*COLOR_NAMES, (0.1, 0.2, 0.3)])
 def test_line_sets_in_colour_without_edges(count, color):
     lone = glsk.Skeleton(np.zeros((count, 3)), (), np.ones(count), (), (), (), confidence=np.ones(count))
     legacy, tensor = lone.to_line_set(color), lone.to_tensor_line_set(color)

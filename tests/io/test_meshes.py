@@ -4,8 +4,9 @@ import numpy as np
 import open3d as o3d
 import pytest
 
+from glsk_o3d import Skeleton, samples
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
-from glsk_o3d.io.meshes import mesh_arrays, read_mesh
+from glsk_o3d.io.meshes import WRITTEN_MESH_ENDINGS, mesh_arrays, read_mesh, save_mesh
 
 OCTAHEDRON = o3d.geometry.TriangleMesh.create_octahedron()
 
@@ -50,3 +51,72 @@ def test_every_kind_of_mesh_gives_the_same_arrays():
 def test_useless_meshes(mesh, says):
     with pytest.raises(InvalidParameterError, match=says):
         mesh_arrays(mesh)
+
+
+# ------------------------------------------------------------------------------------------------------------- writing
+
+FAR = np.array([471234.56789012, 5612345.67890123, 123.456789])
+
+
+@pytest.fixture(scope="module")
+def tubes():
+    ring = samples.torus(60)
+    return Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ()).to_tubes()
+
+
+def moved(mesh, offset):
+    return o3d.geometry.TriangleMesh(mesh).translate(offset)
+
+
+@pytest.mark.parametrize("ending", [*WRITTEN_MESH_ENDINGS, ".PLY", ".GLB"])
+def test_written_meshes_have_their_triangles_and_colours(tmp_path, capfd, tubes, ending):
+    save_mesh(tubes, tmp_path / f"t{ending}")
+    assert capfd.readouterr() == ("", "")
+    assert [path.name for path in tmp_path.iterdir()] == [f"t{ending}"]
+    back = read_mesh(tmp_path / f"t{ending}")
+    corners = [np.asarray(mesh.vertices)[np.asarray(mesh.triangles)] for mesh in (back, tubes)]
+    np.testing.assert_allclose(*(np.sort(each.mean(axis=1), axis=0) for each in corners), atol=1e-6)
+    assert back.has_vertex_colors() == (ending != ".stl")
+
+
+@pytest.mark.parametrize("ending", ["ply", "obj", "off"])
+def test_coordinates_on_a_map_keep_their_digits(tmp_path, tubes, ending):
+    trimesh = pytest.importorskip("trimesh")
+    there = moved(tubes, FAR)
+    save_mesh(there, tmp_path / f"t.{ending}")
+    back = trimesh.load(tmp_path / f"t.{ending}", process=False, maintain_order=True)
+    np.testing.assert_array_equal(back.vertices, np.asarray(there.vertices))
+    np.testing.assert_array_equal(back.faces, np.asarray(there.triangles))
+
+
+@pytest.mark.parametrize("ending", ["stl", "glb", "gltf"])
+def test_too_few_digits_are_refused(tmp_path, tubes, ending):
+    with pytest.raises(FileFormatError, match=rf"t\.{ending}: \.{ending} has too few digits .* write ply"):
+        save_mesh(moved(tubes, FAR), tmp_path / f"t.{ending}")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("ending", ["ply", "stl", "gltf"])
+def test_a_mesh_that_breaks_off_is_no_file(tmp_path, monkeypatch, tubes, ending):
+    write = o3d.io.write_triangle_mesh
+
+    def full(path, mesh):
+        done = write(path, mesh)
+        with open(path, "rb+") as stream:
+            stream.truncate(20000)
+        return done
+
+    monkeypatch.setattr(o3d.io, "write_triangle_mesh", full)
+    with pytest.raises(OSError, match="could not write all of it"):
+        save_mesh(tubes, tmp_path / f"t.{ending}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_many_vertices(tmp_path):
+    ring = samples.torus(2000)
+    tubes = Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ()).to_tubes(sides=512)
+    assert len(tubes.vertices) > 2**16
+    save_mesh(tubes, tmp_path / "t.gltf")
+    back = read_mesh(tmp_path / "t.gltf")
+    assert len(back.triangles) == len(tubes.triangles)
+    assert back.get_surface_area() == pytest.approx(tubes.get_surface_area(), rel=1e-5)

@@ -5,7 +5,7 @@ import pytest
 
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
-from glsk_o3d.io.scans import read_cloud, read_scan
+from glsk_o3d.io.scans import read_cloud, read_scan, read_tensor_cloud, save_tensor_cloud
 from glsk_o3d.io.skeletons import READABLE
 
 
@@ -115,3 +115,48 @@ def test_verbosity_is_restored(tmp_path):
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Debug):
         read_cloud(tmp_path / "c.xyz")
         assert o3d.utility.get_verbosity_level() == o3d.utility.VerbosityLevel.Debug
+
+
+@pytest.mark.parametrize("name", ["c.ply", "c.pcd", "c.npz", "C.PLY"])
+def test_tensor_clouds_come_back_as_they_were(tmp_path, capfd, name):
+    import open3d as o3d
+
+    rng = np.random.default_rng(0)
+    held = {
+        "positions": rng.random((50, 3)) + [471234.5, 5612345.6, 123.4],
+        "normals": rng.normal(size=(50, 3)),
+        "colors": rng.integers(0, 256, (50, 3)).astype(np.uint8),
+        "classification": rng.integers(0, 9, (50, 1)).astype(np.int32),
+        "intensity": rng.random((50, 1)).astype(np.float32),
+        "gps_time": 1e9 * rng.random((50, 1)),
+    }
+    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(held["positions"]))
+    for key, values in held.items():
+        cloud.point[key] = o3d.core.Tensor(values)
+    save_tensor_cloud(cloud, tmp_path / name)
+    assert capfd.readouterr() == ("", "")
+    path = str(tmp_path / name)
+    back = o3d.t.io.read_point_cloud(path) if name.endswith("npz") else read_tensor_cloud(path)
+    assert {*back.point} == held.keys()
+    for key, values in held.items():
+        assert back.point[key].numpy().dtype == values.dtype
+        np.testing.assert_array_equal(back.point[key].numpy(), values, err_msg=key)
+
+
+def test_a_cloud_that_breaks_off_is_no_file(tmp_path, monkeypatch):
+    import open3d as o3d
+
+    write = o3d.t.io.write_point_cloud
+
+    def full(path, cloud):
+        done = write(path, cloud)
+        with open(path, "rb+") as stream:
+            stream.truncate(400)
+        return done
+
+    monkeypatch.setattr(o3d.t.io, "write_point_cloud", full)
+    with pytest.raises(OSError, match="could not write all of it"):
+        save_tensor_cloud(o3d.t.geometry.PointCloud(np.eye(3).repeat(20, axis=0)), tmp_path / "c.ply")
+    with pytest.raises(FileFormatError, match=r"c\.xyz.*\.npz"):
+        save_tensor_cloud(o3d.t.geometry.PointCloud(np.eye(3)), tmp_path / "c.xyz")
+    assert not list(tmp_path.iterdir())

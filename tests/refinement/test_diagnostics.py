@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Judgement, Skeleton
+from glsk_o3d.cli.reporting import said_here
 from glsk_o3d.refinement.diagnostics import LOW_CONFIDENCE, LOW_CONFIDENCE_SHARE, diagnose
 
 
@@ -75,6 +76,14 @@ def test_shapes(shapes, start, size):
     messages = diagnose(scaled)
     assert len(messages) == (start is not None)
     assert not start or messages[0].startswith(start)
+
+
+def test_the_cure_for_a_table_is_said_as_each_door_has_it():
+    (message,) = diagnose(skeleton_of(sheet(600), torus(400)))
+    assert "segment_plane or read_cloud(..., where='z > ...')" in message
+    there = said_here(message)
+    assert "--where 'z > ...'" in there
+    assert "read_cloud" not in there
 
 
 def test_asks_the_cloud_and_not_the_skeleton():

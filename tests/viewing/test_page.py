@@ -234,6 +234,13 @@ def test_warnings_once_each():
     assert sections.warnings(["<a>", "b", "<a>"]).count("<li>") == 2
 
 
+@pytest.mark.parametrize(("kept", "told"), [(0, False), (100, False), (40, True)])
+def test_a_sample_is_told_of_where_there_was_one(kept, told):
+    text = sections.origin(Report(n_input=100, n_sampled=kept, n_distinct=kept))
+    assert ("sampled from a large cloud" in text) is told
+    assert "input points" in text
+
+
 # ---------------------------------------------------------------------------------------------------------- topology
 
 

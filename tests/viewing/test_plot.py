@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, plot_skeleton, samples
+from glsk_o3d.io.colors import COLOR_NAMES
 
 plt = pytest.importorskip("matplotlib.pyplot")
 
@@ -72,12 +73,27 @@ def test_a_cloud_alone_in_colours():
     assert len(few.collections[0].get_facecolor()) <= 100
 
 
-@pytest.mark.parametrize("color", ["branch", "radius", "confidence", (0, 0, 1)])
+@pytest.mark.parametrize("color", [*COLOR_NAMES, (0, 0, 1)])
 def test_colours_of_edges(skeleton, color):
     axes = plot_skeleton(skeleton, color=color)
     pixels(axes)
     for drawn in axes.collections[1:]:
         assert len(drawn.get_edgecolor()) == len(skeleton.edges)
+
+
+def test_a_map_costs_no_digits(tree):
+    small = dataclasses.replace(tree, vertices=1e-2 * tree.vertices, points=1e-2 * tree.points)
+    offset = np.array([4.5e5, 5.6e6, 310])
+    there = dataclasses.replace(small, vertices=small.vertices + offset, points=small.points + offset)
+    here, far = (pixels(plot_skeleton(each)) for each in (small, there))
+    assert is_red(here).sum() > 100
+    assert np.abs(here - far).mean() < 2e-3
+
+
+def test_the_root_has_a_name_for_the_legend(tree):
+    rooted = dataclasses.replace(tree, report=dataclasses.replace(tree.report, root=tuple(tree.vertices[0].tolist())))
+    assert plot_skeleton(rooted).get_legend_handles_labels()[1] == ["root"]
+    assert plot_skeleton(tree).get_legend_handles_labels()[1] == []
 
 
 def test_what_is_wrong(tree):

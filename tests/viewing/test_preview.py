@@ -49,6 +49,77 @@ def test_three_views_at_one_scale(make, tmp_path, offset):
     np.testing.assert_allclose(np.array(measured) / unit, expected, atol=0.1)
 
 
+def test_a_map_costs_no_digits(tmp_path, tree):
+    """Something of a millimetre, at the origin and on a map, where float64 tells 1e-9 apart."""
+    offset = np.array([4.5e5, 5.6e6, 310])
+    small = dataclasses.replace(tree, vertices=1e-3 * tree.vertices, points=1e-3 * tree.points)
+    there = dataclasses.replace(small, vertices=small.vertices + offset, points=small.points + offset)
+    images = []
+    for name, skeleton in (("here", small), ("there", there)):
+        save_preview(skeleton, tmp_path / f"{name}.png")
+        images.append(imread(tmp_path / f"{name}.png"))
+    assert np.abs(np.subtract(*images)).mean() < 1e-3
+
+
+def shaped(make, *size):
+    corners = np.array(list(np.ndindex(2, 2, 2))) * size
+    edges = [(0, 1), (1, 3), (3, 7), (7, 6), (6, 4), (4, 0)]
+    return dataclasses.replace(make(corners, edges), points=(), vertex_of_point=(), normals=())
+
+
+@pytest.mark.parametrize(
+    ("size", "share"),
+    [((1, 1, 1), 0.75), ((5, 5, 20), 0.8), ((30, 1, 1), 0.85), ((1, 30, 1), 0.85), ((1, 1, 30), 0.8), ((9, 6, 0), 0.8)],
+)
+def test_objects_of_any_shape_fill_their_picture(make, tmp_path, size, share):
+    save_preview(shaped(make, *size), tmp_path / "p.png")
+    image = imread(tmp_path / "p.png")
+    rows, columns = np.nonzero(is_red(image))
+    height, width = image.shape[:2]
+    assert 450 <= height <= 1200
+    assert 900 <= width <= 1800
+    assert max(np.ptp(rows) / height, np.ptp(columns) / width) > share
+    assert min(rows.min(), columns.min(), height - rows.max(), width - columns.max()) > 5
+
+
+def test_views_in_several_rows_keep_one_scale(make):
+    figure = preview.draw(shaped(make, 30, 2, 1), None, None)
+    width, _ = figure.get_size_inches()
+    boxes = [axes.get_position() for axes in figure.axes]
+    scale = max(box.width for box in boxes) * width / 30
+    assert len({round(box.x0, 6) for box in boxes}) == 1  # one above the other
+    assert sorted(round(box.width * width / scale, 2) for box in boxes) == [2.4, 30, 30]
+
+
+def test_dots_do_not_bury_short_branches(make):
+    rng = np.random.default_rng(0)
+    ends = rng.random((600, 3))
+    star = make(np.concatenate([[[0.5, 0.5, 0.5]], ends]), [(0, i + 1) for i in range(600)])
+    comb = np.column_stack([np.arange(601) / 600, np.zeros(601), np.zeros(601)])
+    teeth = comb[:600] + [0, 0, 0.002]
+    edges = [(i, i + 1) for i in range(600)] + [(i, 601 + i) for i in range(600)]
+    fine = make(np.concatenate([comb, teeth]), edges)
+    sizes = []
+    for skeleton in (star, fine):
+        axes = preview.draw(skeleton, None, None).axes[0]
+        lines, *spots = axes.collections[1:]
+        dots = [spot for spot in spots[1:] if len(spot.get_offsets())]
+        sizes.append((lines.get_linewidths()[0], len(dots)))
+    assert sizes[0][1] == 2
+    assert sizes[1][1] == 0  # no room for any
+    assert sizes[0][0] > sizes[1][0]
+
+
+def test_the_root_is_marked(tree):
+    rooted = dataclasses.replace(tree, report=dataclasses.replace(tree.report, root=tuple(tree.vertices[0].tolist())))
+    assert not preview.draw(tree, None, None).legends
+    figure = preview.draw(rooted, None, "tree")
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["root"]
+    marks = [each for axes in figure.axes for each in axes.collections if each.get_label() == "root"]
+    assert len(marks) == 3
+
+
 def test_planar_clouds_and_clouds_without_a_skeleton(make, tmp_path):
     flat = np.random.default_rng(0).random((500, 3)) * [1, 1, 0]
     whole = make(flat[:3], [[0, 1]])
