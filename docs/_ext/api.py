@@ -41,6 +41,7 @@ MODULES = {
     "glsk_o3d.io.annotation": "Attributes on clouds",
     "glsk_o3d.io.clouds.selection": "Some of the points",
     "glsk_o3d.io.tubes": "Tubes",
+    "glsk_o3d.analysis.skinning": "Skins",
     "glsk_o3d.io.colors": "Colours",
     "glsk_o3d.parameters": "Making filters",
     "glsk_o3d.interop.clouds": "What counts as a cloud",

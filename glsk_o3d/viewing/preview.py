@@ -41,7 +41,7 @@ def save_preview(
     The three views look along the coordinate axes, all at one scale: x across and y up, x across and z up, y across and
     z up. They are arranged so that they are large. The cloud is grey, lighter where it is farther; edges are red,
     junctions dark dots and leaves open ones, unless branches are too short for dots; a blue diamond is where a tree
-    grows from, `Report.root`. Below are the counts and what the run warned of: the first two warnings, long ones
+    grows from, ``Report.root``. Below are the counts and what the run warned of: the first two warnings, long ones
     shortened, fewer and shorter in a low picture, and how many more there are.
 
     Parameters
