@@ -13,6 +13,7 @@ from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..numerics.neighbourhoods import nearest_neighbours
+from ..preparation.frame import check_extent
 from ..skeleton import Skeleton
 from .cross_sections import cross_sections
 from .graph import check_graph, count_components, simple_edges
@@ -171,6 +172,8 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     skeleton = replace(skeleton, edges=simple_edges(edges))
     if not skeleton.length > 0:
         raise InvalidParameterError("the skeleton has no edge with a length: there is no curve to assess")
+    if len(cloud) > 1:
+        check_extent(cloud)
     reach, clusters = _neighbourhood(cloud)
     sections = cross_sections(skeleton.vertices, skeleton.branches, cloud, shortest=reach)
     found = sections.counts >= MIN_SECTION_POINTS

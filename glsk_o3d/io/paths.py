@@ -20,14 +20,16 @@ SCAN_ENDINGS = CLOUD_ENDINGS + MESH_ENDINGS
 def existing_file(path: str | os.PathLike) -> Path:
     """The path of a file that is there and not empty.
 
-    FileNotFoundError, or FileFormatError for a folder or an empty file.
+    FileNotFoundError, or FileFormatError for a folder, a pipe or an empty file.
     """
     path = Path(path)
     if path.is_dir():
         raise FileFormatError(f"{path}: is a folder, not a file")
     if not path.exists():
         raise FileNotFoundError(f"{path}: no such file")
-    if path.is_file() and path.stat().st_size == 0:
+    if not path.is_file():  # it may never end
+        raise FileFormatError(f"{path}: is a pipe or a device, not a file: write what it gives to one first")
+    if path.stat().st_size == 0:
         raise FileFormatError(f"{path}: the file is empty")
     return path
 

@@ -159,12 +159,7 @@ def to_working_frame(points: np.ndarray, counts: np.ndarray, by: str, k: Callabl
     """
     if len(points) < MIN_POINTS:
         raise InvalidCloudError(f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones")
-    with np.errstate(over="ignore"):
-        extent = np.ptp(points, axis=0).max()
-    if extent == 0:
-        raise InvalidCloudError(f"all {len(points)} points coincide: there is nothing to skeletonise")
-    if not MIN_EXTENT < extent < MAX_EXTENT:
-        raise InvalidCloudError(f"the cloud is {extent:g} long, too extreme for its squares: rescale it")
+    check_extent(points)
     frame = Frame.of(points, by)
     scaled = frame.into(points)
     order = morton_order(scaled)
@@ -190,3 +185,13 @@ def to_working_frame(points: np.ndarray, counts: np.ndarray, by: str, k: Callabl
     weight = np.empty(len(cloud))
     weight[representative] = counts
     return DistinctPoints(frame, cloud, representative, weight, distance, neighbours)
+
+
+def check_extent(points: np.ndarray) -> None:
+    """Raise InvalidCloudError where points coincide, or squares of their distances overflow or vanish."""
+    with np.errstate(over="ignore"):
+        extent = np.ptp(points, axis=0).max()
+    if extent == 0:
+        raise InvalidCloudError(f"all {len(points)} points coincide: there is nothing to skeletonise")
+    if not MIN_EXTENT < extent < MAX_EXTENT:
+        raise InvalidCloudError(f"the cloud is {extent:g} long, too extreme for its squares: rescale it")

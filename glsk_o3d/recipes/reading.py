@@ -6,6 +6,7 @@ import dataclasses
 import json
 import os
 import sys
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -64,10 +65,9 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
 
 def _read_json(text: str) -> Any:
     def table(pairs):
-        keys = [key for key, _ in pairs]
-        twice = [key for key in keys if keys.count(key) > 1]
-        if twice:
-            raise ValueError(f"the key {twice[0]!r} stands twice in one table")
+        often = Counter(key for key, _ in pairs)
+        if len(often) < len(pairs):
+            raise ValueError(f"the key {often.most_common(1)[0][0]!r} stands twice in one table")
         return dict(pairs)
 
     return json.loads(text, object_pairs_hook=table)

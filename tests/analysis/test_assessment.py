@@ -191,3 +191,9 @@ def test_the_example_in_the_documentation(root, capsys, tmp_path, monkeypatch):
     promised = re.findall(r"# prints (.*)", code)
     assert capsys.readouterr().out.splitlines() == promised
     assert promised
+
+
+@pytest.mark.parametrize("scale", [1e200, 1e-200])
+def test_clouds_whose_squares_overflow_are_refused(pipe, axis_of, scale):
+    with pytest.raises(InvalidCloudError, match="too extreme for its squares"):
+        assess(axis_of(pipe), pipe.points * scale)

@@ -519,3 +519,10 @@ def test_reports_ahead_add_up():
     assert report.seconds == {"RingBuilder": 1.5, "Refiner": 0.25}
     assert report.recipe == recipe_of(*(stage.table() for stage in (RingBuilder(), RingBuilder(k=9), Refiner())))
     assert report.n_input == 3
+
+
+def test_a_key_that_stands_twice_is_refused_however_many_there_are(tmp_path):
+    keys = ", ".join(f'"key{i}": 1' for i in range(200_000))  # counted one by one this would take half an hour
+    (tmp_path / "r.json").write_text(f'{{{keys}, "key7": 2}}')
+    with pytest.raises(RecipeError, match="the key 'key7' stands twice"):
+        load_recipe(tmp_path / "r.json")
