@@ -29,6 +29,8 @@ batch demo/cloud.ply -o many
 batch scan.csv -o trees --by tree
 branches s.json -o branches.csv
 tree t.json --unit m -o cylinders.csv
+grasps s.json --opening 0.3 -o grasps.json
+rig s.json -o rig.glb --cut-loops
 edit t.json -o e.json --prune-order 1
 convert t.json t.swc t.glb t.urdf
 evaluate s.json demo/cloud.ply

@@ -76,7 +76,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     label = branch_of_point(skeleton, skeleton.points, skeleton.vertex_of_point)
     angle = np.array([_angle(skeleton, outward, i, parent[i]) for i in range(len(paths))])
     mean_radius = mean(skeleton.radii)
-    axis, order = axes(parent, level, start, angle, mean_radius)
+    axis, order = axes(parent, level, start, angle, mean_radius, length)
     return BranchTable(
         kind=_kinds(skeleton, paths),
         component=skeleton.component_of_vertex[start],
@@ -135,7 +135,7 @@ def _angle(skeleton, paths, row, parent):
 
 
 def _heading(curve, radius):
-    """Where a curve goes from its first point: from one to three radii, or the first quarter."""
+    """RootPlace a curve goes from its first point: from one to three radii, or the first quarter."""
     along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
     reach = along[-1]
     near, far = np.minimum(np.multiply(HEADING_SPAN, radius), [reach / 2, reach]) if radius > 0 else (0, reach / 4)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from scipy.spatial.distance import pdist
 
 from ..errors import InvalidParameterError, SkeletonWarning
 from ..numerics.vectors import AXES, TINY, along_axis
-from .tree_cylinders import OUTSIDE, cylinders
+from .tree_cylinders import OUTSIDE, Cylinders, cylinders
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
 TALLEST_TREE = 116.07  # published: metres, Hyperion, the tallest tree known, as measured in 2019
@@ -147,7 +148,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
 
     return TreeMeasures(
         height=tallest,
-        stem_diameter=float(2 * unit * pieces.radius[breast[0]]) if len(breast) else np.nan,
+        stem_diameter=2 * unit * _radius_at(BREAST_HEIGHT, height, pieces, breast[0]) if len(breast) else np.nan,
         crown_base=float(leaving.min()) if len(leaving) else np.nan,
         crown_width=width,
         crown_area=area,
@@ -159,6 +160,15 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
         up=up,
         unit=unit,
     )
+
+
+def _radius_at(level: float, height: Callable[[np.ndarray], np.ndarray], pieces: Cylinders, at: int) -> float:
+    """Radius of an axis at a height, between the middles of the cylinder there and of those before and after it."""
+    near = np.flatnonzero((pieces.parent == at) | (np.arange(len(pieces.radius)) == pieces.parent[at]))
+    near = np.append(near[pieces.order[near] == pieces.order[at]], at)
+    middle = height((pieces.start_point + pieces.end_point)[near] / 2)
+    order = np.argsort(middle)
+    return float(np.interp(level, middle[order], pieces.radius[near][order]))
 
 
 def metres(unit: float | str) -> float:

@@ -6,9 +6,11 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
+from ..errors import InvalidParameterError
 from ..interop.atomic import write_atomically, write_json
 from ..interop.packages import import_open3d, require
 from .gripper import Gripper
@@ -160,12 +162,21 @@ class GraspCandidates(Rows, row="grasp"):
 
         Raises
         ------
+        InvalidParameterError
+            There is no grasp.
         MissingPackageError
         OSError
             The folder does not exist, or the file cannot be written.
         """
         o3d, drawn = import_open3d(), self.to_line_set()
-        write_atomically(path, lambda temporary: o3d.io.write_line_set(str(temporary), drawn))
+        if len(self) == 0:
+            raise InvalidParameterError("there is no grasp to draw: write .json or .csv, which may be empty")
+
+        def write(temporary: Path) -> None:
+            if not o3d.io.write_line_set(str(temporary), drawn):
+                raise OSError("Open3D could not write it: is the disk full?")
+
+        write_atomically(path, write)
 
 
 def told(left_out: Mapping[str, int], before: str) -> str:

@@ -21,6 +21,8 @@ from .gripper import Gripper, checked
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
+UNIT_FACTOR = 10  # derived: the least factor between metric units that people mistake for each other
+
 
 def grasp_candidates(
     skeleton: Skeleton,
@@ -136,6 +138,10 @@ def grasp_candidates(
     cone = None if cone is None else _cone(cone)
     above = _direction("up", up) if up is not None else np.array([0.0, 0, 1]) if cone is None else -cone[0]
     points = _object(skeleton, cloud)
+    size = np.linalg.norm(np.ptp(points if len(points) else skeleton.vertices, axis=0))
+    if 0 < UNIT_FACTOR * size < gripper.max_opening:
+        message = f"the gripper opens {gripper.max_opening:.3g} and the object is {size:.3g} long: is it the same unit?"
+        warnings.warn(message, SkeletonWarning, stacklevel=outside())
     places, left_out = _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence)
     approach = directions_around(places.axis, above, around).reshape(-1, around, 3)
     ways = Ways(places.position, places.axis, approach)

@@ -48,9 +48,12 @@ def grow(skeleton, paths, length, section, chosen):
     return parent, level, backwards
 
 
-def axes(parent, level, start, angle, radius):
-    """First row of every row's axis, and the axes before it: of those that begin in one place, one goes straight on."""
-    straight = np.cos(np.radians(angle))
+def axes(parent, level, start, angle, radius, length):
+    """First row of every row's axis, and the axes before it: of those that begin in one place, one goes on.
+
+    It is the one that is straight, thick, and has the longest way ahead to a tip.
+    """
+    straight = np.cos(np.radians(angle)) * _ahead(parent, level, length)
     _, fork = np.unique([parent, start], axis=1, return_inverse=True)
     fork = fork.ravel()  # NumPy 2.0 gives it two axes
     unknown = np.isin(fork, fork[(straight > 0) & np.isnan(radius)])  # there the angle alone decides
@@ -66,3 +69,13 @@ def axes(parent, level, start, angle, radius):
             same = straightest.get((int(before), int(start[row]))) == row
             axis[row], order[row] = (axis[before], order[before]) if same else (row, order[before] + 1)
     return axis, order
+
+
+def _ahead(parent, level, length):
+    """The longest way from the start of every row to a tip, away from the root."""
+    ahead = np.array(length, float)
+    for row in np.argsort(-level, kind="stable").tolist():  # those farthest from the root first
+        before = parent[row]
+        if before >= 0:
+            ahead[before] = max(ahead[before], length[before] + ahead[row])
+    return ahead

@@ -10,12 +10,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
+from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError, did_you_mean
 from ..io.clouds.selection import labels
 from ..io.clouds.text_tables import holds_points
 from ..io.paths import SCAN_ENDINGS
 from ..io.scans import read_scan
 
+MOST_LABELS = 10_000  # fitted: more things than anybody numbers in a file; fewer than a scanner's intensities
 LISTS = (".txt", ".csv")  # what they are, their endings do not say
 RESERVED_STEMS = ("ledger", "recipe")
 """Names of files that a batch itself writes into the output folder."""
@@ -101,10 +102,21 @@ def find_inputs(
     if not roots:
         raise InvalidParameterError("there is no input: give a folder, a glob pattern, a list (.txt) or clouds")
     for name, path in _named(roots).items():
-        found.named |= {name: Source(path)} if by is None else _apart(name, path, by, where, found.left_out)
+        new = {name: Source(path)} if by is None else _apart(name, path, by, where, found.left_out)
+        for each in new.keys() & found.named.keys():
+            raise _one_name(found.named[each], new[each], each)
+        found.named |= new
     if not found.named:
-        raise InvalidParameterError(f"by = {by!r}: no input has this attribute; 'glsk info' lists what each has")
+        path, reason = next(iter(found.left_out.items()))
+        raise InvalidParameterError(f"by = {by!r}: no input can be taken apart; {path}: {reason}")
     return found
+
+
+def _one_name(first: object, second: object, name: str) -> InvalidParameterError:
+    return InvalidParameterError(
+        f"the results of {first} and {second} would both be called {name}: give the folder above them, "
+        "a quoted pattern, or each an output folder"
+    )
 
 
 def _apart(name: str, path: Path, by: str, where: str | None, left_out: dict[str, str]) -> dict[str, Source]:
@@ -113,11 +125,21 @@ def _apart(name: str, path: Path, by: str, where: str | None, left_out: dict[str
         scan = read_scan(path, where)
     except (FileFormatError, InvalidCloudError, OSError):
         return {name: Source(path)}  # the worker will say what is wrong
+    except InvalidParameterError as error:
+        left_out[str(path)] = str(error)
+        return {}
     if by not in scan.attributes:
-        left_out[str(path)] = f"its points have no {by}; they have {', '.join(scan.attributes) or 'only coordinates'}"
+        left_out[str(path)] = did_you_mean(by, scan.given, "attribute of its points")
         return {}
     values = labels(scan, by).tolist()
-    return {f"{name}-{value:.10g}": Source(path, f"{by} == {value!r}") for value in values if value == value}
+    if len(values) > MOST_LABELS:
+        raise InvalidParameterError(f"by = {by!r}: has {len(values)} values in {path}: it numbers no things")
+    return {f"{name}-{_label(value)}": Source(path, f"{by} == {value!r}") for value in values if value == value}
+
+
+def _label(value: float) -> str:
+    """A value as part of a name: all digits, since others may differ in the last one."""
+    return str(int(value)) if value == int(value) else repr(value)
 
 
 def _meant(given: str, out: str, recursive: bool, left_out: dict[str, str]) -> Iterator[tuple[str, str]]:
@@ -198,9 +220,6 @@ def _named(roots: dict[str, str]) -> dict[str, Path]:
     for path in whole:
         name = short[path] if often[short[path]] == 1 and short[path] not in RESERVED_STEMS else whole[path]
         if name in named:
-            raise InvalidParameterError(
-                f"the results of {named[name]} and {path} would both be called {name}: give the folder above them, "
-                "a quoted pattern, or each an output folder"
-            )
+            raise _one_name(named[name], path, name)
         named[name] = Path(path)
     return dict(sorted(named.items()))

@@ -13,14 +13,16 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
 from ..analysis.summary import summary
 from ..errors import GlskError
-from ..io.scans import read_cloud
+from ..io.clouds.scanned import Scan
+from ..io.clouds.selection import select
+from ..io.scans import read_cloud, read_scan
 from ..recipes import from_recipe
 from ..viewing.preview import save_preview
 from .ledger import DONE, FAILED, Row, file_hash
@@ -105,16 +107,29 @@ def clear(job: Job, written: Iterable[str] = ()) -> None:
 
 def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
 
-    skeleton = from_recipe(job.recipe)(read_cloud(job.path, where=job.where or None))
+    skeleton = from_recipe(job.recipe)(_cloud(job))
     messages += skeleton.report.warnings
     facts = summary(skeleton, 0.0).items()
     row |= {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in facts}
     for output in job.outputs:
         save = partial(skeleton.save, cut_loops=job.cut_loops)
         if output.endswith(".png"):
-            save = partial(save_preview, skeleton, title=os.path.basename(job.path))
+            save = partial(save_preview, skeleton, title=os.path.basename(job.source or job.path))
         save(Path(job.out_dir, output))
         row["outputs"].append(output)
+
+
+def _cloud(job: Job) -> Any:
+    """The points that are meant; a file that is taken apart is read once for all that follow each other."""
+    if not job.where:
+        return read_cloud(job.path)
+    state = os.stat(job.path)
+    return select(_last_scan(job.path, (state.st_mtime_ns, state.st_size)), job.where).to_legacy()
+
+
+@lru_cache(maxsize=1)
+def _last_scan(path: str, state: tuple[int, int]) -> Scan:
+    return read_scan(path)
 
 
 def told(error: BaseException) -> str:

@@ -128,7 +128,8 @@ def batch(
             ]
             print_json({**told, "failures": failures, "left_out": watch.left_out})
         elif not quiet:
-            print_rows(told)
+            warned = sum(bool(row.get("warnings")) for row in result.rows.values())
+            print_rows({**told, "with_warnings": f"{warned}, see ledger.csv" if warned else None})
         if result.failed:
             table = result.ledger.with_suffix(".csv")
             raise BatchError(f"{result.failed} of {len(result.rows)} scans failed: {table} says why")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .console import print_json, print_table
-from .options import Json, Quiet, Root, Verbose, root_place
+from .options import SKELETON_FILE, Json, Quiet, Root, Verbose, root_place
 from .reporting import reporting
 
 if TYPE_CHECKING:
@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 
 def branches(
     skeleton: Annotated[
-        Path, typer.Argument(metavar="SKELETON", help="In any format that 'glsk skeletonize' writes, or the like.")
+        Path,
+        typer.Argument(metavar="SKELETON", help=SKELETON_FILE),
     ],
     output: Annotated[
-        Path | None,
+        list[Path] | None,
         typer.Option(
             "--output",
             "-o",
@@ -44,17 +45,17 @@ def branches(
         from ..io.skeletons import read_skeleton
         from .outputs import check_findings
 
-        check_findings([(output, ".csv", "table is CSV")], skeleton)
+        check_findings([(path, ".csv", "table is CSV") for path in output or []], skeleton)
         place = root_place(root)
         curve = read_skeleton(skeleton)
         if len(curve.vertices) == 0:
             raise FileFormatError(f"{skeleton}: the skeleton is empty: it has no branches to measure")
         table = curve.branch_table(place)
-        if output is not None:
-            table.to_csv(output)
+        for path in output or []:
+            table.to_csv(path)
         if as_json:
             print_json({"skeleton": str(skeleton), "branches": list(table)})
-        elif not quiet and output is None:
+        elif not quiet and not output:
             _print(table)
         elif not quiet:
             typer.echo(f"{len(table)} branches, {table.order.max() + 1} orders, length {table.length.sum():.4g}")

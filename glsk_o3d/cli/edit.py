@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import ROOT_WORDS, TREE_ENDINGS, CutLoops, Output, Quiet, Verbose, root_place
+from .options import ROOT_WORDS, SKELETON_FILE, TREE_ENDINGS, CutLoops, Output, Quiet, Verbose, root_place
 from .reporting import WrongUsage, reporting
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-Source = Annotated[Path, typer.Argument(metavar="SKELETON", help="In any format that 'glsk skeletonize' writes.")]
+Source = Annotated[Path, typer.Argument(metavar="SKELETON", help=SKELETON_FILE)]
 
 
 def edit(

@@ -10,7 +10,7 @@ import typer
 
 from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
 from .console import print_json, print_table, progress
-from .options import Json, Quiet, Verbose
+from .options import SKELETON_FILE, Json, Quiet, Verbose
 from .reporting import holding_interrupts, reporting
 
 if TYPE_CHECKING:
@@ -38,7 +38,8 @@ _MEASURES = {  # measure: (best, what it is), as the table shows them
 
 def evaluate(
     skeleton: Annotated[
-        Path, typer.Argument(metavar="SKELETON", help="In any format that 'glsk skeletonize' writes, or the like.")
+        Path,
+        typer.Argument(metavar="SKELETON", help=SKELETON_FILE),
     ],
     cloud: Annotated[Path, typer.Argument(metavar="CLOUD", help="The cloud it was made from, in the same units.")],
     truth: Annotated[

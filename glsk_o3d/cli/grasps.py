@@ -12,11 +12,13 @@ from .options import Json, Quiet, Verbose
 from .reporting import WrongUsage, reporting
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ..analysis import GraspCandidates
 
 GRASP_ENDINGS = (".json", ".csv", ".ply")
 PRINTED_GRASP = {
-    "position": ".4g",
+    "position": "",  # with the digits of a map
     "approach": ".2f",
     "opening": ".4g",
     "quality": ".2f",
@@ -61,7 +63,8 @@ def grasps(
     min_confidence: Annotated[float, typer.Option(metavar="SHARE", help="Of the skeleton, from 0 to 1.")] = 0.5,
     count: Annotated[int, typer.Option("-n", min=1, metavar="N", help="So many of the best.")] = 20,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write them: json, csv, or ply to look at.")
+        list[Path] | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write them: json, csv, ply to look at; may be repeated."),
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -79,10 +82,8 @@ def grasps(
         from ..io.skeletons import read_skeleton
         from .outputs import check_findings
 
-        ending = (
-            output.suffix.lower() if output is not None and output.suffix.lower() in GRASP_ENDINGS else GRASP_ENDINGS[0]
-        )
-        check_findings([(output, ending, "grasps are JSON, CSV or PLY")], skeleton, cloud, *(scene or []))
+        files = [(path, GRASP_ENDINGS, "grasps are JSON, CSV or PLY") for path in output or []]
+        check_findings(files, skeleton, cloud, *(scene or []))
         planes = [_numbers("--plane", text, 4) for text in plane or []]
         shape = {name: _numbers(f"--{name}", text, 3) for name, text in (("finger", finger), ("palm", palm)) if text}
         gripper = Gripper(opening, finger=shape.get("finger"), palm=shape.get("palm"))
@@ -97,14 +98,14 @@ def grasps(
             up=None if up is None else _direction("--up", up),
         )
         best = found[:count]
-        if output is not None:
-            {".json": best.to_json, ".csv": best.to_csv, ".ply": best.to_ply}[ending](output)
+        for path in output or []:
+            {".json": best.to_json, ".csv": best.to_csv, ".ply": best.to_ply}[path.suffix.lower()](path)
         if as_json:
             print_json({"skeleton": str(skeleton), "found": len(found), **best.as_dict()})
         elif not quiet:
             _print(best, len(found))
-            if output is not None:
-                typer.echo(f"wrote {output}")
+            for path in output or []:
+                typer.echo(f"wrote {path}")
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
@@ -144,6 +145,13 @@ def _print(best: GraspCandidates, found: int) -> None:
         shown.add_column(name, justify="right")
     for columns in zip(*(getattr(best, name) for name in PRINTED_GRASP), strict=True):
         cells = zip(columns, PRINTED_GRASP.values(), strict=True)
-        shown.add_row(*(" ".join(f"{value:{form}}" for value in cell.reshape(-1).tolist()) for cell, form in cells))
+        shown.add_row(*(_cell(cell, form) for cell, form in cells))
     if len(best):
         print_table(shown, whole=True)
+
+
+def _cell(values: np.ndarray, form: str) -> str:
+    from ..report import coordinates
+
+    numbers = values.reshape(-1).tolist()
+    return " ".join(f"{value:{form}}" for value in numbers) if form else coordinates(numbers)

@@ -110,7 +110,7 @@ def cloud_facts(scan: Scan) -> dict[str, Any]:
         "median_spacing": float(spacing),
         "colours": scan.colors is not None,
         "normals": scan.normals is not None,
-        "attributes": {name: _attribute(values) for name, values in scan.attributes.items()} or None,
+        "attributes": {name: _attribute(values) for name, values in scan.given.items()} or None,
     }
 
 

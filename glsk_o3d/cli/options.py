@@ -16,6 +16,8 @@ TREE_ENDINGS = ["swc", "glb", "mtg", "plant.csv", "urdf"]
 ROOT_WORDS = "x to -z for the lowest along an axis, thickest, the number of a vertex, or a point near one, x,y,z"
 """What may follow ``--root``, in all commands."""
 
+SKELETON_FILE = "A skeleton in a file: json, npz, ply, obj, swc, graphml, cgal or polylines.txt."
+
 Where = Annotated[
     str | None,
     typer.Option(

@@ -14,7 +14,7 @@ from ..interop.packages import require, require_for
 from ..io.meshes import mesh_ending
 from ..io.scans import tensor_cloud_ending
 from ..io.skeletons import skeleton_ending
-from ..refinement.rooted import Where
+from ..refinement.rooted import RootPlace
 from ..skeleton import Skeleton
 from ..viewing.page import save_report
 from ..viewing.preview import save_preview
@@ -119,7 +119,7 @@ def write(
     *,
     title: str,
     cut_loops: bool,
-    root: Where | None = None,
+    root: RootPlace | None = None,
     update,
     recorder: ContractionRecorder | None = None,
 ) -> tuple[list[Path], list[str]]:

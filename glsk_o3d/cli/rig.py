@@ -7,12 +7,15 @@ from typing import Annotated, Any
 
 import typer
 
-from .options import ROOT_WORDS, Quiet, Verbose, root_place
+from .options import ROOT_WORDS, SKELETON_FILE, Quiet, Verbose, root_place
 from .reporting import WrongUsage, holding_interrupts, reporting
 
 
 def rig(
-    skeleton: Annotated[Path, typer.Argument(metavar="SKELETON", help="In any format that 'glsk skeletonize' writes.")],
+    skeleton: Annotated[
+        Path,
+        typer.Argument(metavar="SKELETON", help=SKELETON_FILE),
+    ],
     mesh: Annotated[
         Path | None,
         typer.Argument(
@@ -22,7 +25,7 @@ def rig(
         ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="GLB", help="Where to write the rig: binary glTF.")
+        list[Path] | None, typer.Option("--output", "-o", metavar="GLB", help="Where to write the rig: binary glTF.")
     ] = None,
     root: Annotated[
         str | None,
@@ -37,8 +40,8 @@ def rig(
 ) -> None:
     """Write a mesh with the skeleton's armature, for Blender.
 
-    Every edge of the skeleton is a bone, named by its branch, and moves what is next to it. Textures and colours do not
-    go along.
+    Every edge of the skeleton is a bone, named by its branch, and moves what is next to it. Textures do not go
+    along.
     """
     with reporting(mesh, quiet=quiet, verbose=verbose):
         import numpy as np
@@ -48,21 +51,21 @@ def rig(
         from ..io.skeletons import read_skeleton
         from .outputs import check_findings
 
-        if output is None:
-            raise WrongUsage("nothing to write: give an output with -o")
+        if output is None or len(output) > 1:
+            raise WrongUsage("give one output with -o")
         if up not in UPRIGHT:
             raise WrongUsage(f"--up {up}: must be {' or '.join(UPRIGHT)}")
-        check_findings([(output, ".glb", "rig is binary glTF")], skeleton, mesh)
+        check_findings([(output[0], ".glb", "rig is binary glTF")], skeleton, mesh)
         curve = read_skeleton(skeleton)
         if mesh is None and not len(curve.points) and not np.isfinite(curve.radii).all():
             raise FileFormatError(f"{skeleton}: holds neither radii nor points to make a surface of: give a MESH")
         with holding_interrupts():
             surface = None if mesh is None else _surface(mesh)
-        save_rig(curve, output, surface, cut_loops=cut_loops, root=root_place(root), up=up)
+        save_rig(curve, output[0], surface, cut_loops=cut_loops, root=root_place(root), up=up)
         if not quiet:
             bones = len(curve.vertices) - curve.n_components
             typer.echo(f"{bones} bones move {_told(surface)}")
-            typer.echo(f"wrote {output}")
+            typer.echo(f"wrote {output[0]}")
 
 
 def _surface(path: Path) -> Any:

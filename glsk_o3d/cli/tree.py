@@ -32,13 +32,13 @@ def tree(
         Path, typer.Argument(metavar="SKELETON", help="Of a tree, with radii: 'glsk skeletonize --pipeline tree'.")
     ],
     output: Annotated[
-        Path | None,
+        list[Path] | None,
         typer.Option(
             "--output",
             "-o",
             metavar="FILE",
             help="Write the cylinders: csv in the file's units; in metres qsm.csv for rTwig, mat for TreeQSM, txt for "
-            "treetools.",
+            "treetools; may be repeated.",
         ),
     ] = None,
     root: Root = None,
@@ -70,19 +70,19 @@ def tree(
         from ..io.skeletons import read_skeleton
         from .outputs import check_findings
 
-        check_findings([(output, CYLINDER_ENDINGS, "file is a table of cylinders")], skeleton)
+        check_findings([(path, CYLINDER_ENDINGS, "file is a table of cylinders") for path in output or []], skeleton)
         metres(unit)
         place, curve = root_place(root), read_skeleton(skeleton)
         measures = tree_measures(curve, place, up=up, unit=unit)
-        if output is not None:
-            save_cylinders(cylinders(curve, place), output, unit)
+        for path in output or []:
+            save_cylinders(cylinders(curve, place), path, unit)
         if as_json:
             print_json({"skeleton": str(skeleton), **asdict(measures)})
         elif not quiet:
             _print(measures)
-            if output is not None:
-                told = f"the units of {skeleton.name}" if cylinders_ending(output) == ".csv" else "metres"
-                typer.echo(f"wrote {output}, in {told}")
+            for path in output or []:
+                told = f"the units of {skeleton.name}" if cylinders_ending(path) == ".csv" else "metres"
+                typer.echo(f"wrote {path}, in {told}")
 
 
 def _print(measures: TreeMeasures) -> None:

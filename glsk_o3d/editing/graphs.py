@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from ..errors import InvalidParameterError
 from ..numerics.near_links import linked
-from ..refinement.rooted import Where, numbered_from, root_among
+from ..refinement.rooted import RootPlace, numbered_from, root_among
 from ..skeleton import Skeleton
 
 
@@ -78,7 +78,7 @@ def cut_loops(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
     return replace(skeleton, edges=skeleton.edges[stays]), skeleton.vertices[skeleton.edges[~stays]]
 
 
-def reroot(skeleton: Skeleton, root: Where = "z") -> Skeleton:
+def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
     """Number the vertices from a root outwards, as `pipelines.tree` does.
 
     Parameters

@@ -14,16 +14,17 @@ from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
 from .formats.text import line, text
 from .paths import MESH_ENDINGS, unknown_ending
-from .scans import check_scan
+from .scans import read_scan
 
 WRITTEN_MESH_ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf")
 SINGLE_PRECISION = (".stl", ".glb", ".gltf")
 LOST_SHARE = 0.01  # derived: of an edge; an error of so much turns a triangle by less than a degree
-PLY_VERTEX_BYTES, PLY_TRIANGLE_BYTES, STL_TRIANGLE_BYTES = 51, 13, 50  # published: formats, as Open3D fills them
+PLY_VERTEX_BYTES, PLY_COLOR_BYTES, PLY_TRIANGLE_BYTES, STL_TRIANGLE_BYTES = 48, 3, 13, 50
+"""Published: formats, as Open3D fills them."""
 
 
 def read_mesh(path: str | os.PathLike) -> Any:
-    """Read a triangle mesh with Open3D.
+    """Read a triangle mesh.
 
     Parameters
     ----------
@@ -44,15 +45,15 @@ def read_mesh(path: str | os.PathLike) -> Any:
     endings = (".ply", *MESH_ENDINGS)
     if not str(path).lower().endswith(endings):
         raise FileFormatError(f"{path}: unknown ending of a mesh; known are {', '.join(endings)}")
-    path = check_scan(path)
-    o3d = import_open3d()
-    try:
-        with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-            mesh = o3d.io.read_triangle_mesh(str(path))
-    except Exception as error:  # std::bad_alloc, undecodable text
-        raise FileFormatError(f"{path}: Open3D cannot read it: {error}") from error
-    if not mesh.has_triangles():
+    scan, o3d = read_scan(path), import_open3d()
+    if not len(scan.triangles):
         raise FileFormatError(f"{path}: no triangles could be read: it is a cloud, or damaged")
+    mesh = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(scan.positions), o3d.utility.Vector3iVector(scan.triangles.astype(np.int32))
+    )
+    for name, values in (("vertex_normals", scan.normals), ("vertex_colors", scan.colors)):
+        if values is not None:
+            setattr(mesh, name, o3d.utility.Vector3dVector(values))
     return mesh
 
 
@@ -62,7 +63,7 @@ def save_mesh(mesh: Any, path: str | os.PathLike) -> None:
     Parameters
     ----------
     mesh : open3d.geometry.TriangleMesh
-        With normals and colours, as from `Skeleton.to_tubes`.
+        Normals are computed if it has none.
     path : path-like
         PLY, OBJ or OFF, which hold coordinates to the last bit; STL, GLB or glTF, which hold them as float32, STL
         without colours. It appears complete or not at all.
@@ -90,7 +91,11 @@ def save_mesh(mesh: Any, path: str | os.PathLike) -> None:
     ...     len(read_mesh(f"{folder}/ring.obj").triangles) == len(tubes.triangles)
     True
     """
-    ending = mesh_ending(path)
+    ending, mesh = mesh_ending(path), import_open3d().geometry.TriangleMesh(mesh)
+    if not mesh.has_vertex_normals():
+        mesh.compute_vertex_normals()
+    if not mesh.has_triangle_normals():
+        mesh.compute_triangle_normals()  # which STL has
     points, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
     if ending in SINGLE_PRECISION and len(triangles):
         side = np.median(np.linalg.norm(points[triangles[:, 0]] - points[triangles[:, 1]], axis=1))
@@ -125,7 +130,8 @@ def _write_open3d(mesh: Any, path: Path) -> None:
         else:
             done = o3d.io.write_triangle_mesh(str(path), mesh)
     n, m = len(mesh.vertices), len(mesh.triangles)
-    least = {".ply": PLY_VERTEX_BYTES * n + PLY_TRIANGLE_BYTES * m, ".stl": STL_TRIANGLE_BYTES * m}.get(ending, 1)
+    vertex = PLY_VERTEX_BYTES + PLY_COLOR_BYTES * mesh.has_vertex_colors()
+    least = {".ply": vertex * n + PLY_TRIANGLE_BYTES * m, ".stl": STL_TRIANGLE_BYTES * m}.get(ending, 1)
     if not done or path.stat().st_size < least or (ending == ".gltf" and not _is_json(path)):
         raise OSError("Open3D could not write all of it: is the disk full?")
 
@@ -138,18 +144,25 @@ def _is_json(path: Path) -> bool:
 
 
 def _obj(points: np.ndarray, triangles: np.ndarray, mesh: Any) -> bytes:
-    colors = np.asarray(mesh.vertex_colors).tolist()
-    vertices = [line("v", *point, *color) for point, color in zip(points.tolist(), colors, strict=True)]
+    vertices = [line("v", *row) for row in np.hstack([points, *_colors(mesh)]).tolist()]
     normals = [line("vn", *normal) for normal in np.asarray(mesh.vertex_normals).tolist()]
     faces = [line("f", *(f"{corner}//{corner}" for corner in face)) for face in (triangles + 1).tolist()]
     return text([*vertices, *normals, *faces])
 
 
 def _off(points: np.ndarray, triangles: np.ndarray, mesh: Any) -> bytes:
-    colors = np.rint(255 * np.asarray(mesh.vertex_colors)).astype(int).tolist()
-    vertices = [line(*point, *color, 255) for point, color in zip(points.tolist(), colors, strict=True)]
+    colors = np.hstack([*_colors(mesh), np.empty((len(points), 0))])
+    shades = [(*row, 255) if row else () for row in np.rint(255 * colors).astype(int).tolist()]
+    vertices = [line(*point, *shade) for point, shade in zip(points.tolist(), shades, strict=True)]
     faces = [line(3, *face) for face in triangles.tolist()]
-    return text(["COFF", line(len(points), len(triangles), 0), *vertices, *faces])
+    return text(
+        ["COFF" if mesh.has_vertex_colors() else "OFF", line(len(points), len(triangles), 0), *vertices, *faces]
+    )
+
+
+def _colors(mesh: Any) -> list[np.ndarray]:
+    """The colours of the vertices, if there are any."""
+    return [np.asarray(mesh.vertex_colors)] if mesh.has_vertex_colors() else []
 
 
 def mesh_arrays(mesh: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -165,7 +165,7 @@ def tensor_cloud_ending(path: str | os.PathLike) -> str:
 
 def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
     """Read all that `read_tensor_cloud` does, and the triangles between the points of a mesh if all are taken."""
-    path = check_scan(path)
+    path = existing_file(path) if Path(path).suffix.lower() == ".ply" else check_scan(path)  # that reader looks itself
     ending = path.suffix.lower()
     if holds_skeleton(path) if ending in SCAN_ENDINGS else _is_skeleton(path):
         raise FileFormatError(f"{path}: is a skeleton, not a scan")
@@ -212,7 +212,7 @@ def _read(path: Path, ending: str) -> Scan:
     except NoPoints as error:
         raise FileFormatError(f"{path}: no points could be read: {error}") from None
     except Exception as error:  # whatever a parser raises on a hostile file, std::bad_alloc
-        raise FileFormatError(f"{path}: not a valid {ending} cloud: {error}") from error
+        raise FileFormatError(f"{path}: not a valid {ending} file: {error}") from error
 
 
 def _read_pcd(path: Path) -> Scan:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from ..errors import FileFormatError, MissingPackageError
 from ..interop.atomic import write_atomically
-from ..refinement.rooted import Where
+from ..refinement.rooted import RootPlace
 from ..skeleton import Skeleton
 from .formats import dxf, gltf, graphml, json, mtg, npz, obj, plant_csv, ply, polylines, swc, urdf, vtp
 from .formats.forests import as_forest
@@ -65,7 +65,7 @@ def save_skeleton(
     path: str | os.PathLike,
     *,
     cut_loops: bool = False,
-    root: Where | None = None,
+    root: RootPlace | None = None,
     format: str | None = None,
 ) -> None:
     """Write a skeleton to a file; the ending chooses the format.
@@ -100,7 +100,8 @@ def save_skeleton(
         of refusing.
     root : str, int or (x, y, z), optional
         For the same formats: where the tree grows from, as for `glsk_o3d.editing.reroot`; the vertices are numbered
-        from there. By default that of `Skeleton.branch_table`.
+        from there. By default vertex 0, if the numbers go outwards from it, as those of `pipelines.tree` do, or else
+        the root of `Skeleton.branch_table`.
     format : str, optional
         The ending of another format than that of `path`, with or without its dot.
 
@@ -167,6 +168,8 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     True
     """
     path = existing_file(path)
+    if format is None and path.name.lower().endswith(SCAN_ENDINGS) and not path.name.lower().endswith(tuple(FORMATS)):
+        raise FileFormatError(f"{path}: is a cloud, not a skeleton: make one with glsk_o3d.skeletonize")
     ending = skeleton_ending(path, format)
     read = FORMATS[ending].read
     if read is None:

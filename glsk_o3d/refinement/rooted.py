@@ -1,4 +1,4 @@
-"""Where a tree grows from, and its vertices in the order in which they grow."""
+"""RootPlace a tree grows from, and its vertices in the order in which they grow."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..numerics.vectors import AXES, along_axis, norm
 from ..parameters import resolve_point
 from ..skeleton import Skeleton
 
-Where = str | int | Sequence[float] | np.ndarray
+RootPlace = str | int | Sequence[float] | np.ndarray
 
 
-def root_among(places: np.ndarray, skeleton: Skeleton, which: Where, thick: np.ndarray | None = None) -> int:
+def root_among(places: np.ndarray, skeleton: Skeleton, which: RootPlace, thick: np.ndarray | None = None) -> int:
     """Which of some places a tree grows from.
 
     Parameters

@@ -44,7 +44,7 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     surface : float
         Least share of the points of a region that must show a surface, see `without_surface`; 0 traces none.
     root : str or None
-        Where a tree grows from, as `Refiner.root` says.
+        RootPlace a tree grows from, as `Refiner.root` says.
 
     Returns
     -------

@@ -150,3 +150,22 @@ def test_a_file_without_a_report_keeps_its_root(tmp_path):
     np.testing.assert_allclose(first[2], first[1])
     with pytest.warns(SkeletonWarning):
         assert np.isnan(tree_measures(read_skeleton(tmp_path / "t.ply")).traced)
+
+
+def test_the_stem_is_as_thick_as_at_breast_height_wherever_cylinders_end():
+    """A cone of 3 m from 0.3 to 0 in diameter: 0.17 at 1.3 m, though its cylinders are longer than that changes."""
+    for pieces in (4, 7, 30, 301):
+        height = np.linspace(0, 3, pieces)
+        up = np.column_stack([0 * height, 0 * height, height])
+        edges = np.column_stack([np.arange(pieces - 1), np.arange(1, pieces)])
+        stem = Skeleton(up, edges, 0.15 * (1 - height / 3), (), (), ())
+        assert tree_measures(stem, 0, up="z").stem_diameter == pytest.approx(0.3 * (1 - 1.3 / 3), rel=0.004)
+
+
+def test_an_axis_goes_on_past_a_stub_as_thick_as_itself():
+    """A spur inside the trunk, straight ahead and thicker than what goes on, ends nothing."""
+    places = [[0, 0, 0], [0, 0, 3], [0, 0, 3.03], [0.3, 0, 6], [1, 1, 4]]
+    tree = Skeleton(places, [[0, 1], [1, 2], [1, 3], [1, 4]], [0.1, 0.08, 0.08, 0.03, 0.03], (), (), ())
+    table = tree.branch_table(0)
+    trunk = [i for i, path in enumerate(tree.branches) if set(path) & {0, 3}]
+    assert table.order[trunk].tolist() == [0, 0]

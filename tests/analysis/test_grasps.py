@@ -289,3 +289,15 @@ def test_files(tmp_path):
     assert {row["confidence"] for row in data["grasps"]} == {None}
     with pytest.raises(FileNotFoundError):
         grasps.to_json(tmp_path / "none" / "g.json")
+
+
+def test_no_grasps_are_no_drawing(tmp_path):
+    none = grasp_candidates(axis_of(samples.tube()), 0.4)[:0]
+    with pytest.raises(InvalidParameterError, match="no grasp to draw"):
+        none.to_ply(tmp_path / "g.ply")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_opening_in_another_unit_is_doubted():
+    with pytest.warns(SkeletonWarning, match="the gripper opens 80 and the object is 1.*: is it the same unit"):
+        grasp_candidates(TUBE, 80.0)

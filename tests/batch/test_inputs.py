@@ -121,8 +121,10 @@ def test_the_points_of_a_file_taken_apart(here):
         **{f"forest-{i}": f"tree == {i}" for i in range(3)},
         "broken": "",  # what is wrong with it shows when it is read
     }
-    assert found.left_out == {str(here / "bare.xyz"): "its points have no tree; they have only coordinates"}
-    with pytest.raises(InvalidParameterError, match="by = 'trees': no input has this attribute"):
+    assert found.left_out == {str(here / "bare.xyz"): "no attribute of its points is called 'tree': there are none"}
+    with pytest.raises(
+        InvalidParameterError, match=r"by = 'trees': no input can be taken .*forest\.csv: .* did you mean 'tree'"
+    ):
         find_inputs(["forest.csv"], "out", by="trees")
 
 
@@ -213,3 +215,31 @@ def test_odd_names(touch, here):
     touch(*odd)
     assert sorted(names("in")) == sorted(os.path.splitext(name)[0][3:] for name in odd)
     assert names("in/[a].ply") == ["[a]"]
+
+
+def test_labels_that_differ_in_their_last_digit_are_two(here):
+    rows = "".join(f"{i},0,0,{12345678901 + i % 2}\n" for i in range(6))
+    (here / "a.csv").write_text("x,y,z,tree\n" + rows)
+    assert list(find_inputs(["a.csv"], "out", by="tree").named) == ["a-12345678901", "a-12345678902"]
+
+
+def test_a_label_never_takes_the_name_of_another_file(here):
+    (here / "in").mkdir()
+    (here / "in" / "a-1.ply").write_text("ply\n")  # its points cannot be read, and it keeps its name
+    (here / "in" / "a.csv").write_text("x,y,z,tree\n1,2,3,1\n")
+    with pytest.raises(InvalidParameterError, match="would both be called a-1"):
+        find_inputs(["in"], "out", by="tree")
+
+
+def test_a_file_without_what_the_condition_names_stops_no_other(here):
+    (here / "a.csv").write_text("x,y,z,tree,cl\n1,2,3,1,5\n1,2,3,2,4\n")
+    (here / "b.csv").write_text("x,y,z,tree\n1,2,3,1\n")
+    found = find_inputs(["a.csv", "b.csv"], "out", by="tree", where="cl == 5")
+    assert list(found.named) == ["a-1"]
+    assert "no attribute of the points is called 'cl'" in found.left_out[str(here / "b.csv")]
+
+
+def test_what_numbers_no_things_is_refused(here):
+    (here / "a.csv").write_text("x,y,z,time\n" + "".join(f"1,2,3,{i}\n" for i in range(10_001)))
+    with pytest.raises(InvalidParameterError, match=r"has 10001 values .* numbers no things"):
+        find_inputs(["a.csv"], "out", by="time")

@@ -105,3 +105,19 @@ def test_refuses(invoke, tmp_path, y, code, words, message):
     assert result.exit_code == code
     assert message in " ".join(result.stderr.split())
     assert len(result.stderr.splitlines()) == 1 or code == 2
+
+
+def test_every_output_is_written(invoke, tmp_path):
+    from glsk_o3d import pipelines
+    from glsk_o3d.samples import y_junction
+
+    pipelines.tree()(y_junction(2000).points).save(tmp_path / "y.json")
+    names = ["c.csv", "c.txt", "c.mat", "c.qsm.csv"]
+    result = invoke("tree", "y.json", *(word for name in names for word in ("-o", name)))
+    assert result.exit_code == 0, result.output
+    assert all((tmp_path / name).stat().st_size for name in names)
+    assert invoke("branches", "y.json", "-o", "a.csv", "-o", "b.csv").exit_code == 0
+    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
+    assert invoke("grasps", "y.json", "--opening", "1", "-o", "g.json", "-o", "g.csv").exit_code == 0
+    assert (tmp_path / "g.csv").exists()
+    assert invoke("rig", "y.json", "-o", "a.glb", "-o", "b.glb").exit_code == 2

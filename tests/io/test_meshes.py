@@ -120,3 +120,26 @@ def test_many_vertices(tmp_path):
     back = read_mesh(tmp_path / "t.gltf")
     assert len(back.triangles) == len(tubes.triangles)
     assert back.get_surface_area() == pytest.approx(tubes.get_surface_area(), rel=1e-5)
+
+
+@pytest.mark.parametrize("ending", ["ply", "obj", "off", "stl", "glb", "gltf"])
+@pytest.mark.parametrize("coloured", [False, True])
+def test_any_mesh_of_open3d_is_written(tmp_path, ending, coloured):
+    import open3d as o3d
+
+    mesh = o3d.geometry.TriangleMesh.create_sphere(1.0, 8)
+    if coloured:
+        mesh.paint_uniform_color([0.5, 0.25, 0])
+    save_mesh(mesh, tmp_path / f"m.{ending}")
+    back = read_mesh(tmp_path / f"m.{ending}")
+    assert len(back.triangles) == len(mesh.triangles)
+    assert not mesh.has_vertex_normals()  # what was given is as it was
+
+
+def test_a_damaged_mesh_does_not_crash(tmp_path):
+    face = "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
+    head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    for corners in ("0", "4 0 1 99 98", "3 -1 0 1"):
+        (tmp_path / "m.ply").write_text(head + face + corners + "\n")
+        with pytest.raises(FileFormatError, match="no triangles"):
+            read_mesh(tmp_path / "m.ply")

@@ -30,6 +30,9 @@ def read(path: Path) -> Scan:
     colors, attributes = None, {"scan": np.repeat(np.arange(len(scans)), [len(scan[_E57_PLACE[0]]) for scan in scans])}
     if all(name in scan for scan in scans for name in _E57_COLORS):
         colors = unit_colors(np.column_stack([column(name) for name in _E57_COLORS]))
-    if all("intensity" in scan for scan in scans):
-        attributes["intensity"] = column("intensity")
+    if any("intensity" in scan for scan in scans):
+        unknown = [np.full(len(scan[_E57_PLACE[0]]), np.nan) for scan in scans]
+        attributes["intensity"] = np.concatenate(
+            [scan.get("intensity", none) for scan, none in zip(scans, unknown, strict=True)]
+        )
     return Scan(positions, colors, None, attributes)

@@ -13,7 +13,7 @@ from .scanned import COLOR_CHANNELS, Scan, attribute_name, unit_colors
 
 
 def read(path: Path) -> Scan:
-    """The points of a LAS or LAZ file; dimensions that are 0 throughout count as not given."""
+    """The points of a LAS or LAZ file; dimensions that are 0 throughout are unset."""
     require_for(path.suffix)
     laspy = require("laspy")
     file = laspy.read(path)
@@ -24,8 +24,9 @@ def read(path: Path) -> Scan:
     attributes: dict[str, np.ndarray] = {}
     for name in names:
         values = np.asarray(file[name])
-        if name not in COLOR_CHANNELS and values.ndim == 1 and values.any():
+        if name not in COLOR_CHANNELS and values.ndim == 1:
             attributes[attribute_name(name, attributes)] = values
+    unset = frozenset(name for name, values in attributes.items() if not values.any())
     if colors is not None:
         colors = unit_colors(colors) if colors.any() else None
-    return Scan(np.ascontiguousarray(file.xyz, float), colors, None, attributes)
+    return Scan(np.ascontiguousarray(file.xyz, float), colors, None, attributes, unset=unset)

@@ -34,6 +34,8 @@ class Scan:
         All else, such as ``intensity`` or ``classification``; the names can stand in an expression.
     triangles : (T, 3) int array
         Between the points, if it is a mesh.
+    unset : frozenset of str
+        Attributes that the format has, and nobody gave: they can be asked for, but are not told.
     """
 
     positions: np.ndarray
@@ -41,6 +43,7 @@ class Scan:
     normals: np.ndarray | None = None
     attributes: dict[str, np.ndarray] = field(default_factory=dict)
     triangles: np.ndarray = field(default_factory=lambda: NO_TRIANGLES)
+    unset: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -52,7 +55,13 @@ class Scan:
             None if self.colors is None else self.colors[rows],
             None if self.normals is None else self.normals[rows],
             {name: values[rows] for name, values in self.attributes.items()},
+            unset=self.unset,
         )
+
+    @property
+    def given(self) -> dict[str, np.ndarray]:
+        """The attributes that are not unset."""
+        return {name: values for name, values in self.attributes.items() if name not in self.unset}
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
@@ -77,7 +86,7 @@ class Scan:
             cloud.point.colors = o3d.core.Tensor(np.round(255 * np.clip(self.colors, 0, 1)).astype(np.uint8))
         if self.normals is not None:
             cloud.point.normals = o3d.core.Tensor(np.ascontiguousarray(self.normals, float))
-        for name, values in self.attributes.items():
+        for name, values in self.given.items():
             whole = values.dtype.kind in "iub" and np.abs(values.astype(float)).max(initial=0) < 2**31
             kind = np.int32 if whole else values.dtype if values.dtype == np.float32 else float
             cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(values[:, None], kind))

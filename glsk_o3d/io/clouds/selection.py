@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 import operator
+import re
 from collections.abc import Callable, Mapping
 from functools import reduce
+from keyword import iskeyword
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,7 @@ _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.In: np.isin,
     ast.NotIn: lambda values, among: ~np.isin(values, among),
 }
+_GRAMMAR = {"and", "or", "not", "in"}
 _JOINS = {ast.And: np.logical_and, ast.Or: np.logical_or}
 
 
@@ -58,7 +61,7 @@ def select(scan: Scan, where: str) -> Scan:
     except (TypeError, ValueError) as error:
         if isinstance(error, InvalidParameterError):
             raise
-        raise InvalidParameterError(f"where = {where!r}: cannot be compared: {error}") from None
+        raise InvalidParameterError(f"where = {where!r}: cannot be compared: write such as 'label in (1, 2)'") from None
     if chosen.shape != (len(scan),) or chosen.dtype != bool:
         raise InvalidParameterError(f"where = {where!r}: is no condition on points: write such as 'label == 5'")
     if not chosen.any():
@@ -89,10 +92,13 @@ def parsed(where: str) -> ast.expr:
     """
     try:
         return ast.parse(where.strip(), mode="eval").body
-    except SyntaxError as error:
-        raise InvalidParameterError(
-            f"where = {where!r}: {error.msg}: write such as 'classification == 5', and class_ for class"
-        ) from None
+    except (SyntaxError, RecursionError, MemoryError) as error:
+        why = getattr(error, "msg", "it is nested too deeply")
+        cure = "write == for equal" if re.search(r"[^=!<>]=[^=]", where) else "write such as 'classification == 5'"
+        cure = "write 'and' and 'or'" if "&&" in where or "||" in where else cure
+        word = next((word for word in re.findall(r"\w+", where) if iskeyword(word) and word not in _GRAMMAR), "")
+        cure = f"write {word}_ for {word}" if word else cure
+        raise InvalidParameterError(f"where = {where[:200]!r}: {why}: {cure}") from None
 
 
 def labels(scan: Scan, name: str) -> np.ndarray:
@@ -135,7 +141,7 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
         case ast.UnaryOp(op=ast.Not(), operand=part):
             return np.logical_not(_value(part, columns))
         case ast.UnaryOp(op=ast.USub(), operand=part):
-            return -_value(part, columns)
+            return np.negative(_value(part, columns), dtype=float)
         case ast.Compare(left=left, ops=ops, comparators=rest) if all(type(op) in _COMPARISONS for op in ops):
             sides = [_value(part, columns) for part in (left, *rest)]
             pairs = zip(ops, sides, sides[1:], strict=False)

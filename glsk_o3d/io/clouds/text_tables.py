@@ -22,12 +22,14 @@ from .scanned import COLOR_CHANNELS, NoPoints, Scan, attribute_name, unit_colors
 
 _log = logging.getLogger(__name__)
 
+ENCODED_BYTES = 1 << 16  # fitted: more than any header, by which the alphabet is told
+LOOK_AHEAD = 20  # fitted: lines in which a decimal comma shows
 HEADER_LINES = 100  # fitted to nothing: longer headers are those of other files
 UNIT_SLACK = 0.01  # measured: normals in text have two digits at the least
 _ROLES = {
-    **dict.fromkeys(("x", "easting"), "x"),
-    **dict.fromkeys(("y", "northing"), "y"),
-    **dict.fromkeys(("z", "height", "elevation", "altitude"), "z"),
+    **dict.fromkeys(("x", "easting", "rechtswert", "ostwert"), "x"),
+    **dict.fromkeys(("y", "northing", "hochwert", "nordwert"), "y"),
+    **dict.fromkeys(("z", "height", "elevation", "altitude", "höhe", "hoehe"), "z"),
     **dict.fromkeys(("r", "red", "rf"), "red"),
     **dict.fromkeys(("g", "green", "gf"), "green"),
     **dict.fromkeys(("b", "blue", "bf"), "blue"),
@@ -68,23 +70,21 @@ class Layout(NamedTuple):
 def holds_points(path: Path) -> bool:
     """Whether a file of text looks like a cloud: a line has three numbers, and columns with names have x, y and z."""
     try:
-        with path.open(encoding="utf-8-sig", errors="strict") as stream:
-            layout = _layout(stream)
-    except (NoPoints, UnicodeError, OSError):
+        with _opened(path) as stream:
+            _layout(stream)
+    except (NoPoints, OSError):
         return False
-    return not layout.names or {"x", "y", "z"} <= set(map(_role, layout.names))
+    return True
 
 
 def read(path: Path) -> Scan:
     """The points of a file of text; NoPoints if there is none. Lines that hold no point are skipped and logged."""
-    with path.open(encoding="utf-8-sig", errors="replace") as stream:
+    with _opened(path) as stream:
         layout = _layout(stream)
         stream.seek(0)
         rows = _rows(stream, layout, path)
     names = [layout.names[column] for column in layout.columns] if layout.names else []
     roles = [_role(name) for name in names] or _guess(rows, path.suffix.lower())
-    if not {"x", "y", "z"} <= set(roles):
-        raise NoPoints(f"none of its columns is called x, y or z: they are {', '.join(layout.names)}")
 
     def together(wanted: Sequence[str]) -> np.ndarray | None:
         return rows[:, [roles.index(role) for role in wanted]] if set(wanted) <= set(roles) else None
@@ -99,18 +99,42 @@ def read(path: Path) -> Scan:
     return Scan(positions, None if colors is None else unit_colors(colors), normals, attributes)
 
 
+def _opened(path: Path) -> TextIO:
+    """A file of text, in UTF-8, or else in the eight bits of Western Europe."""
+    with path.open("rb") as stream:
+        head = stream.read(ENCODED_BYTES).rpartition(b"\n")[0]
+    try:
+        head.decode("utf-8")
+        encoding = "utf-8-sig"
+    except UnicodeDecodeError:
+        encoding = "cp1252"
+    return path.open(encoding=encoding, errors="replace")
+
+
 def _layout(stream: TextIO) -> Layout:
     names: list[str] = []
+    first = ""
+    strange: list[str] = []  # names right above the data of which none is x
     for skip, line in enumerate(islice(stream, HEADER_LINES)):
         comment = re.match(r"\s*(#|//|%)", line)
         words, delimiter, decimal_comma = _parted(line[comment.end() :] if comment else line)
         columns = [] if comment else [i for i, word in enumerate(words) if _is_number(word)]
         if len(columns) >= 3:
-            names = names if len(names) == len(words) else []
-            return Layout(skip, delimiter, decimal_comma, names, columns)
+            following = [_parted(next_line) for next_line in islice(stream, LOOK_AHEAD)]
+            decimal_comma |= delimiter != "," and any(comma for _, _, comma in following)
+            if strange and len(strange) == len(words):
+                raise NoPoints(f"none of its columns is called x, y or z: they are {', '.join(strange)}")
+            return Layout(skip, delimiter, decimal_comma, names if len(names) == len(words) else [], columns)
+        strange, first = [], first or line.strip()
+        if words[:1] == ["ncols"]:
+            raise NoPoints("it is a grid of heights, no cloud")
         if len(words) >= 3 and sum(map(_is_number, words)) < len(words) / 2:
-            names = [word.strip().strip("\"'") for word in words]
-    raise NoPoints("no line of its beginning has three numbers")
+            called = [word.strip().strip("\"'") for word in words]
+            if set("xyz") <= set(map(_role, called)):
+                names = called
+            elif not comment and delimiter and not names:
+                strange = called
+    raise NoPoints(f"no line of its beginning has three numbers, such as {first[:60]!r}")
 
 
 def _parted(line: str) -> tuple[list[str], str | None, bool]:

@@ -7,13 +7,13 @@ import numpy as np
 from ...analysis.branches import branch_table
 from ...editing.graphs import cut_loops, reroot
 from ...errors import FileFormatError
-from ...refinement.rooted import Where, numbered_from
+from ...refinement.rooted import RootPlace, numbered_from
 from ...skeleton import Skeleton
 
 FLOAT32_SHARE = 0.01  # derived: an error of a hundredth of a radius is below what any fit of the axis knows
 
 
-def as_forest(skeleton: Skeleton, cut: bool, root: Where | None) -> Skeleton:
+def as_forest(skeleton: Skeleton, cut: bool, root: RootPlace | None) -> Skeleton:
     """A skeleton as one tree per component: each vertex but the first of a component has one of lower number before it.
 
     Parameters
@@ -58,13 +58,12 @@ def parents(forest: Skeleton) -> np.ndarray:
 def global_shift(skeleton: Skeleton) -> np.ndarray:
     """What to take off coordinates so that float32 holds them, (3,) float array of whole numbers.
 
-    0 where float32 holds them as they are, or where float64 could not give them back.
+    0 along axes where float32 holds them as they are.
     """
     finite = skeleton.vertices[np.isfinite(skeleton.vertices).all(axis=1)]
     sizes = np.concatenate([skeleton.radii, skeleton.edge_lengths])
     sizes = sizes[sizes > 0]
     if len(finite) == 0 or len(sizes) == 0:
         return np.zeros(3)
-    lost = np.abs(finite).max() * np.finfo(np.float32).eps > FLOAT32_SHARE * np.median(sizes)
-    shift = np.floor(finite.min(axis=0))
-    return shift if lost and ((finite - shift) + shift == finite).all() else np.zeros(3)
+    lost = np.abs(finite).max(axis=0) * np.finfo(np.float32).eps > FLOAT32_SHARE * np.median(sizes)
+    return np.where(lost, np.floor(finite.min(axis=0)), 0.0)

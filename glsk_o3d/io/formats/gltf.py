@@ -17,12 +17,15 @@ from ...analysis.skinning import skin_weights
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...interop.atomic import check_ending, write_atomically
 from ...interop.clouds import cloud_points, open3d_class
-from ...refinement.rooted import Where
+from ...numerics.vectors import norm, unit
+from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
 from .forests import as_forest, global_shift, parents
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
 COMPONENT_TYPES = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
+MOST_JOINTS = 65535  # published: glTF 2.0, 3.7.3.3, in which joints are counted in 16 bits at most
+SRGB_KNEE = 0.04045  # published: IEC 61966-2-1, where the curve of sRGB begins
 POINTS_MODE, TRIANGLES_MODE = 0, 4  # published: glTF 2.0, 5.24
 UPRIGHT = {"z": [-(0.5**0.5), 0.0, 0.0, 0.5**0.5], "y": [0.0, 0.0, 0.0, 1.0]}  # derived: turns up into glTF's y
 
@@ -33,7 +36,7 @@ def save_rig(
     mesh: Any = None,
     *,
     cut_loops: bool = False,
-    root: Where | None = None,
+    root: RootPlace | None = None,
     up: str = "z",
 ) -> None:
     """Write a mesh or a cloud with a skeleton's armature that moves it, as a binary glTF file.
@@ -84,16 +87,24 @@ def write(forest: Skeleton) -> bytes:
 
 
 def _surface(skeleton: Skeleton) -> Any:
-    known = np.isfinite(skeleton.radii).all() or len(skeleton.points) == 0
-    return skeleton.to_tubes((1, 1, 1)) if known else skeleton.points[skeleton.vertex_of_point >= 0]
+    if np.isfinite(skeleton.radii).all():
+        return skeleton.to_tubes((1, 1, 1))
+    if len(skeleton.points) == 0:
+        raise FileFormatError("a rig needs radii or points: read the skeleton from a .json, .npz, .ply or .swc file")
+    return skeleton.points[skeleton.vertex_of_point >= 0]
 
 
 def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
     if len(forest.edges) == 0:
         raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
+    if len(forest.edges) > MOST_JOINTS:
+        raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
     points, triangles = cloud_points(mesh), _triangles(mesh)
     if not np.isfinite(points).all():
         raise InvalidCloudError("the surface has points that are not finite: drop them first")
+    (low, high), (least, most) = ((each.min(axis=0), each.max(axis=0)) for each in (forest.vertices, points))
+    if max((least - high).max(), (low - most).max()) > np.linalg.norm(high - low):  # its own size away
+        raise InvalidCloudError("the surface is not where the skeleton is: are they in the same units and place?")
     origin = global_shift(forest)
     buffer = _Buffer()
     nodes, heads = _bones(forest, origin)
@@ -105,11 +116,13 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
         "JOINTS_0": buffer.add(np.pad(bones, ((0, 0), (0, 2))) * (np.pad(weights, ((0, 0), (0, 2))) > 0), "u2", "VEC4"),
         "WEIGHTS_0": buffer.add(np.pad(weights, ((0, 0), (0, 2))), "f4", "VEC4"),
     }
+    for name, values in _looks(mesh, len(points)).items():
+        attributes[name] = buffer.add(values, "f4", "VEC3")
     primitive: dict[str, Any] = {"attributes": attributes, "mode": POINTS_MODE}
     if len(triangles):
         primitive |= {"indices": buffer.add(triangles.reshape(-1), "u4", "SCALAR"), "mode": TRIANGLES_MODE}
     place = {"translation": _upright(origin, up), "rotation": UPRIGHT[up]}
-    roots = [i for i, edge in enumerate(forest.edges[:, 0]) if parents(forest)[edge] < 0]
+    roots = np.flatnonzero(parents(forest)[forest.edges[:, 0]] < 0).tolist()
     n = len(nodes)
     tree = {
         "asset": {"version": "2.0", "generator": "glsk-o3d"},
@@ -133,6 +146,27 @@ def _upright(place: np.ndarray, up: str) -> list[float]:
     """A place of the data in glTF's axes."""
     x, y, z = place.tolist()
     return [x, z, -y] if up == "z" else [x, y, z]
+
+
+def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
+    """Normals and colours, where there is one of each vertex; colours are linear in glTF."""
+    name, tensor = open3d_class(mesh)
+    if name not in ("PointCloud", "TriangleMesh"):
+        return {}
+    if tensor:
+        held = mesh.vertex if name == "TriangleMesh" else mesh.point
+        keys = (key if key in held else "" for key in ("normals", "colors"))
+        normals, colors = (held[key].cpu().numpy() if key else np.empty((0, 3)) for key in keys)
+    else:
+        start = "vertex_" if name == "TriangleMesh" else ""
+        normals, colors = (np.asarray(getattr(mesh, f"{start}{key}")) for key in ("normals", "colors"))
+    found = {}
+    if len(normals) == n and (norm(normals) > 0).all():
+        found["NORMAL"] = unit(normals)
+    if len(colors) == n:
+        shades = colors / 255 if colors.dtype == np.uint8 else colors
+        found["COLOR_0"] = np.where(shades <= SRGB_KNEE, shades / 12.92, ((shades + 0.055) / 1.055) ** 2.4)
+    return found
 
 
 def _triangles(mesh: Any) -> np.ndarray:

@@ -187,6 +187,9 @@ def _binary(stream: BinaryIO, element: Element, order: str) -> Table:
     lists = [i for i, column in enumerate(element.columns) if column.counts]
     counts = _first_counts(stream, element, order) if lists and element.rows else [0] * len(lists)
     dtype = element.dtype(order, counts)
+    if not element.rows:
+        none = Lists(np.empty(0, np.int64), np.empty(0))
+        return {name: np.empty(0, kind) if count is None else none for name, kind, count in element.columns}
     if left >= element.rows * dtype.itemsize:
         start = stream.tell()
         rows = np.frombuffer(stream.read(element.rows * dtype.itemsize), dtype)

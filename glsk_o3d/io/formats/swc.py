@@ -11,6 +11,7 @@ import re
 
 import numpy as np
 
+from ...report import coordinates
 from ...skeleton import Skeleton
 from .forests import global_shift, parents
 from .graphs import graph_skeleton
@@ -24,9 +25,10 @@ _SHIFT = re.compile(r"#\s*global_shift:\s*(\S+)\s+(\S+)\s+(\S+)")
 def write(forest: Skeleton) -> bytes:
     """The content of an SWC file of a skeleton that is numbered from its roots outwards."""
     shift = global_shift(forest)
+    shift *= ((forest.vertices - shift) + shift == forest.vertices).all()  # what is read must be what was
     header = ["# curve skeleton written by glsk-o3d: id type x y z radius parent"]
     if shift.any():
-        _log.warning("coordinates are written less a global shift of %s, since float32 would lose digits", shift)
+        _log.warning("written less a global shift of (%s), since float32 would lose digits", coordinates(shift))
         header.append(line("# global_shift:", *shift.tolist()))
     parent = parents(forest)
     number = np.where(parent >= 0, parent + 1, -1).tolist()
@@ -46,6 +48,6 @@ def read(data: bytes) -> Skeleton:
     place = np.searchsorted(names[order], parents[child]).clip(max=len(names) - 1)
     if (names[order][place] != parents[child]).any() or len(np.unique(names)) < len(names):
         raise ValueError("a parent is not there, or two rows have one id")
-    shift = _SHIFT.search(data.decode())
+    shift = _SHIFT.search(data.decode("utf-8", "replace"))
     origin = [float(word) for word in shift.groups()] if shift else 0.0
     return graph_skeleton(table[:, 2:5] + origin, np.column_stack([child, order[place]]), table[:, 5])

@@ -17,5 +17,5 @@ def text(lines: Iterable[str]) -> bytes:
 
 def words_by_line(data: bytes) -> list[list[str]]:
     """The words of every line that has some, comments left out."""
-    lines = (line.partition("#")[0].split() for line in data.decode().splitlines())
+    lines = (line.partition("#")[0].split() for line in data.decode("utf-8", "replace").splitlines())
     return [words for words in lines if words]

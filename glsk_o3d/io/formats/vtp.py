@@ -26,7 +26,11 @@ def write(skeleton: Skeleton) -> bytes:
     data = xml.SubElement(piece, "PointData", Scalars="radius")
     _array(data, "radius", skeleton.radii)
     _array(data, "confidence", skeleton.confidence)
-    _array(xml.SubElement(piece, "CellData"), "branch", np.r_[np.full(len(alone), -1), np.arange(len(paths))])
+    _array(
+        xml.SubElement(piece, "CellData"),
+        "branch",
+        np.r_[np.full(len(alone), -1), np.arange(len(paths))].astype(np.int64),
+    )
     _array(xml.SubElement(piece, "Points"), "Points", skeleton.vertices)
     _cells(piece, "Verts", alone[:, None])
     _cells(piece, "Lines", paths)

@@ -75,9 +75,11 @@ def convert(source: Path, target: Path, topic: str, **options: Any) -> int:
             for connection, time, data in reader.messages(clouds):
                 try:
                     results = skeletonize(reader.deserialize(data, connection.msgtype))
-                except GlskError as error:
+                except Exception as error:  # whatever is wrong with a cloud, the others are to be done
                     print(f"cloud at {time} left out: {error}", file=sys.stderr)
                     continue
+                for warning in results.warnings:
+                    print(f"cloud at {time}: {warning}", file=sys.stderr)
                 for name, kind in RESULTS.items():
                     writer.write(out[name], time, types.serialize_cdr(getattr(results, name), kind))
                 done += 1

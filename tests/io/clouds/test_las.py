@@ -37,7 +37,7 @@ def test_coordinates_keep_their_digits_and_attributes_survive(las, name, version
     path = las(name, version, point_format, classification=[2, 5, 5], intensity=[7, 65535, 0], treeID=[0, 4, 9])
     scan = read_scan(path)
     np.testing.assert_allclose(scan.positions, PLACES, rtol=0, atol=1e-9)
-    assert {key: values.tolist() for key, values in scan.attributes.items()} == {
+    assert {key: values.tolist() for key, values in scan.given.items()} == {
         "intensity": [7, 65535, 0],
         "classification": [2, 5, 5],
         "treeID": [0, 4, 9],
@@ -112,3 +112,21 @@ def test_e57_has_colours_and_intensity(e57):
     scan = read_scan(e57(np.eye(3), **colors, intensity=np.array([0.0, 0.25, 1.0])))
     np.testing.assert_allclose(scan.colors, np.tile(grey[:, None] / 255, 3))
     np.testing.assert_allclose(scan.attributes["intensity"], [0, 0.25, 1])
+
+
+def test_what_nobody_set_can_be_asked_for_and_is_not_told(las):
+    scan = read_scan(las(intensity=[1, 2, 3]))
+    assert "withheld" in scan.unset
+    assert "withheld" not in scan.given
+    assert len(read_cloud(las(intensity=[1, 2, 3]), where="withheld == 0 and classification != 7").points) == 3
+    assert "classification" not in read_tensor_cloud(las(intensity=[1, 2, 3])).point
+
+
+def test_e57_with_intensity_in_one_scan_of_two(e57, tmp_path):
+    pye57 = pytest.importorskip("pye57")
+    file = pye57.E57(str(tmp_path / "c.e57"), mode="w")
+    for fields in ({}, {"intensity": np.array([0.25, 0.5, 1])}):
+        file.write_scan_raw(dict(zip(("cartesianX", "cartesianY", "cartesianZ"), np.eye(3), strict=True)) | fields)
+    file.close()
+    found = read_scan(tmp_path / "c.e57").attributes["intensity"]
+    np.testing.assert_allclose(found, [np.nan] * 3 + [0.25, 0.5, 1])

@@ -32,8 +32,10 @@ def test_it_means_what_python_means(where):
     ("where", "why"),
     [
         ("lable == 1", "did you mean 'label'"),
-        ("class == 1", "write such as"),
-        ("label = 1", "write such as"),
+        ("class == 1", "write class_ for class"),
+        ("label = 1", "write == for equal"),
+        ("label == 1 && x > 2", "write 'and' and 'or'"),
+        ("label in 1, 2", r"write such as 'label in \(1, 2\)'"),
         ("label", "is no condition"),
         ("1 == 1", "is no condition"),
         ("label + 1 == 2", "'label . 1' is not understood"),
@@ -59,3 +61,10 @@ def test_labels():
     assert labels(SCAN, "label").tolist() == [0, 1, 2]
     with pytest.raises(InvalidParameterError, match="did you mean 'label'"):
         labels(SCAN, "labels")
+
+
+def test_signs_do_not_wrap_and_depth_is_refused():
+    scan = Scan(SCAN.positions, attributes={"intensity": N.astype(np.uint16)})
+    assert len(select(scan, "-intensity < -5")) == 14
+    with pytest.raises(InvalidParameterError, match="write such as"):
+        select(scan, "not " * 100_000 + "intensity == 1")

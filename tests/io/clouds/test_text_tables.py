@@ -110,3 +110,33 @@ def test_text_that_is_no_cloud(tmp_path, text, why):
     assert not holds_points(tmp_path / "c.csv")
     with pytest.raises(FileFormatError, match=rf"c\.csv: no points could be read: {why}"):
         read_cloud(tmp_path / "c.csv")
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "# exported by CloudCompare\n",
+        "my first scan\n",
+        "# X Y Z\n",
+        "X,Y,Z\n[m],[m],[m]\n",
+        "// 1 of 3\n",
+        "Höhe über Null\n",
+    ],
+)
+def test_what_may_stand_above_the_points(tmp_path, head):
+    apart = "," if "," in head else " "
+    text = head + "".join(apart.join(("1.5", "2", str(i))) + "\n" for i in range(3))
+    (tmp_path / "c.txt").write_bytes(text.encode("latin-1"))
+    assert holds_points(tmp_path / "c.txt")
+    np.testing.assert_array_equal(read_scan(tmp_path / "c.txt").positions, [[1.5, 2, i] for i in range(3)])
+
+
+def test_a_decimal_comma_that_shows_late(tmp_path):
+    (tmp_path / "c.txt").write_text("0 0 0\n1,5 2,5 3,5\n")
+    np.testing.assert_array_equal(read_scan(tmp_path / "c.txt").positions, [[0, 0, 0], [1.5, 2.5, 3.5]])
+
+
+def test_a_grid_of_heights_is_no_cloud(tmp_path):
+    (tmp_path / "c.asc").write_text("ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 1\n" + "1 2 3 4\n" * 3)
+    with pytest.raises(FileFormatError, match="it is a grid of heights"):
+        read_cloud(tmp_path / "c.asc")

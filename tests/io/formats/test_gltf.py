@@ -152,3 +152,37 @@ def test_the_file_is_binary_gltf(tree, tmp_path):
     length = int.from_bytes(data[12:16], "little")
     names = [node["name"] for node in json.loads(data[20 : 20 + length])["nodes"]]
     assert len(set(names)) == len(names) == len(tree.edges) + 2
+
+
+def test_more_bones_than_gltf_can_count_are_refused(tmp_path):
+    n = 65538
+    line = Skeleton(np.column_stack([np.arange(n), 0 * np.arange(n), 0 * np.arange(n)]),
+                    np.column_stack([np.arange(n - 1), np.arange(1, n)]), np.ones(n), (), (), ())  # fmt: skip
+    with pytest.raises(FileFormatError, match="at most 65535 bones, not 65537: simplify"):
+        save_rig(line, tmp_path / "r.glb", [[0, 0, 0]])
+
+
+def test_without_radii_and_points_there_is_nothing_to_skin(tmp_path):
+    with pytest.raises(FileFormatError, match="a rig needs radii or points"):
+        save_rig(Skeleton([[0, 0, 0], [1, 0, 0]], [[0, 1]], [np.nan] * 2, (), (), ()), tmp_path / "r.glb")
+
+
+def test_a_surface_elsewhere_or_in_another_unit_is_refused(tree, tmp_path):
+    for far in (tree.vertices + 100, tree.vertices * 1000 + 5000):
+        with pytest.raises(InvalidCloudError, match="not where the skeleton is"):
+            save_rig(tree, tmp_path / "r.glb", far)
+
+
+def test_normals_and_colours_go_along(tree, rig):
+    import open3d as o3d
+
+    mesh = tree.to_tubes((1.0, 0.5, 0.0))
+    for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
+        file = rig(tree, given)
+        part = file.meshes[0].primitives[0].attributes
+        np.testing.assert_allclose(accessor(file, part.NORMAL), np.asarray(mesh.vertex_normals), atol=1e-6)
+        # sRGB's half is 0.214 in linear light
+        np.testing.assert_allclose(accessor(file, part.COLOR_0)[0], [1, 0.2140, 0], atol=1e-3)
+    bare = rig(tree, np.asarray(mesh.vertices)).meshes[0].primitives[0].attributes
+    assert bare.NORMAL is None
+    assert bare.COLOR_0 is None

@@ -136,11 +136,11 @@ def test_properties_of_all_kinds(scan):
 @pytest.mark.parametrize(
     ("header", "says"),
     [
-        ("element vertex 2\nproperty float x\nproperty float x\nproperty float y\n", "occurs more than once"),
+        ("element vertex 2\nproperty float x\nproperty float x\nproperty float y\n", "two properties of one name"),
         ("element vertex 2\nproperty float x\nproperty float y\n", "no x, y and z"),
         ("element vertex 2\nproperty list float int x\n", "has the line"),
         ("element vertex 2\n", "m.ply"),
-        ("element face 1\nproperty list uchar int vertex_indices\n", "'vertex' is not"),
+        ("element face 1\nproperty list uchar int vertex_indices\n", "no element 'vertex'"),
         ("comment \n" * 9999, "does not end"),
         ("comment " + "x" * 100_000 + "\n", "has the line"),
     ],

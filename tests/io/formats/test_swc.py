@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from glsk_o3d import Skeleton
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.skeletons import read_skeleton
 
@@ -53,3 +54,17 @@ def test_damaged_files(tmp_path, text):
     (tmp_path / "s.swc").write_text(text, encoding="latin-1")
     with pytest.raises(FileFormatError, match=r"s\.swc"):
         read_skeleton(tmp_path / "s.swc")
+
+
+def test_coordinates_of_a_map_are_shifted_along_the_axes_that_need_it(tmp_path, caplog):
+    vertices = np.array([[5e5, 5.4e6, -0.05], [5e5 + 0.25, 5.4e6 + 0.125, 10.0]])
+    far = Skeleton(vertices, [[0, 1]], [0.01, 0.01], (), (), ())
+    far.save(tmp_path / "s.swc")
+    assert "# global_shift: 500000.0 5400000.0 0.0" in (tmp_path / "s.swc").read_text()
+    assert "global shift of (500000.00, 5400000.00, 0)" in caplog.text
+    np.testing.assert_array_equal(read_skeleton(tmp_path / "s.swc").vertices, vertices)
+
+
+def test_comments_of_other_alphabets(tmp_path):
+    (tmp_path / "s.swc").write_bytes("# Bäume aus Köln\n1 0 0 0 0 1 -1\n".encode("latin-1"))
+    assert len(read_skeleton(tmp_path / "s.swc").vertices) == 1
