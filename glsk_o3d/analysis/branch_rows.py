@@ -66,7 +66,8 @@ class BranchTable(Rows, row="branch"):
         Mean confidence.
     axis : (B,) int array
         The first row of the axis that a branch is part of. Where branches part, the one with the largest mean radius
-        times cos(`angle`) continues the axis of its parent, unless it turns back; each other one begins an axis.
+        times cos(`angle`) continues the axis of its parent, unless it turns back, or ends within its own radius; each
+        other one begins an axis.
     order : (B,) int array
         Centrifugal (Gravelius) order: 0 for axes at the root, and one more for each axis that grows from another.
         Unlike `level` it is the same all along a stem.

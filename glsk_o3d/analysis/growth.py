@@ -51,9 +51,10 @@ def grow(skeleton, paths, length, section, chosen):
 def axes(parent, level, start, angle, radius, length):
     """First row of every row's axis, and the axes before it: of those that begin in one place, one goes on.
 
-    It is the one that is straight, thick, and has the longest way ahead to a tip.
+    It is the one that is straight and thick, but no stub: one that ends within its own radius is inside the part.
     """
-    straight = np.cos(np.radians(angle)) * _ahead(parent, level, length)
+    stub = _ahead(parent, level, length) < np.nan_to_num(radius)
+    straight = np.where(stub, 0, np.cos(np.radians(angle)))
     _, fork = np.unique([parent, start], axis=1, return_inverse=True)
     fork = fork.ravel()  # NumPy 2.0 gives it two axes
     unknown = np.isin(fork, fork[(straight > 0) & np.isnan(radius)])  # there the angle alone decides
