@@ -60,7 +60,9 @@ def edit(
 
         if tolerance is not None and vertices is not None:
             raise WrongUsage("--simplify and --vertices: choose one of them")
-        check_outputs(output or [], skeleton=skeleton)
+        if not output:
+            raise WrongUsage("nothing to write: give an output with -o")
+        check_outputs(output, skeleton=skeleton)
         found, told = _graph(read_skeleton(skeleton), largest, cut_loops, root_place(root))
         pruning = dict(length=prune_length, radius=prune_radius, order=prune_order)
         found, more = _curves(found, pruning, smooth, tolerance, vertices)

@@ -139,7 +139,8 @@ def _print(best: GraspCandidates, found: int) -> None:
 
     typer.echo(f"{found} grasps at {best.places} places")
     for reason, times in best.left_out.items():
-        typer.echo(f"left out: {times} {reason}")
+        limit = " (confidence below --min-confidence)" if reason == "uncertain" else ""
+        typer.echo(f"left out: {times} {reason}{limit}")
     shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
     for name in PRINTED_GRASP:
         shown.add_column(name, justify="right")
