@@ -59,7 +59,8 @@ def branches(
             _print(table)
         elif not quiet:
             typer.echo(f"{len(table)} branches, {table.order.max() + 1} orders, length {table.length.sum():.4g}")
-            typer.echo(f"wrote {output}, in the units of {skeleton.name}")
+            for path in output or []:
+                typer.echo(f"wrote {path}, in the units of {skeleton.name}")
 
 
 def _print(table: BranchTable) -> None:

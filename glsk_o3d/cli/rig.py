@@ -52,7 +52,7 @@ def rig(
         from .outputs import check_findings
 
         if output is None or len(output) > 1:
-            raise WrongUsage("give one output with -o")
+            raise WrongUsage("nothing to write: give one output with -o")
         if up not in UPRIGHT:
             raise WrongUsage(f"--up {up}: must be {' or '.join(UPRIGHT)}")
         check_findings([(output[0], ".glb", "rig is binary glTF")], skeleton, mesh)

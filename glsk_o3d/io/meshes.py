@@ -14,7 +14,7 @@ from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
 from .formats.text import line, text
 from .paths import MESH_ENDINGS, unknown_ending
-from .scans import read_scan
+from .scans import read_whole
 
 WRITTEN_MESH_ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf")
 SINGLE_PRECISION = (".stl", ".glb", ".gltf")
@@ -45,7 +45,7 @@ def read_mesh(path: str | os.PathLike) -> Any:
     endings = (".ply", *MESH_ENDINGS)
     if not str(path).lower().endswith(endings):
         raise FileFormatError(f"{path}: unknown ending of a mesh; known are {', '.join(endings)}")
-    scan, o3d = read_scan(path), import_open3d()
+    scan, o3d = read_whole(path), import_open3d()
     if not len(scan.triangles):
         raise FileFormatError(f"{path}: no triangles could be read: it is a cloud, or damaged")
     mesh = o3d.geometry.TriangleMesh(

@@ -13,9 +13,9 @@ from ..errors import FileFormatError, MissingPackageError
 from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
 from ..interop.verbosity import following_open3d
-from .clouds import e57, las, ply_points, text_tables
+from .clouds import e57, las, pcd, ply_points, text_tables
 from .clouds.completeness import check_complete
-from .clouds.scanned import NoPoints, Scan, attribute_name, unit_colors
+from .clouds.scanned import NoPoints, Scan
 from .clouds.selection import select
 from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unknown_ending
 from .skeletons import holds_skeleton, read_skeleton
@@ -165,6 +165,19 @@ def tensor_cloud_ending(path: str | os.PathLike) -> str:
 
 def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
     """Read all that `read_tensor_cloud` does, and the triangles between the points of a mesh if all are taken."""
+    scan = read_whole(path)
+    if _coarse(scan.positions, scan.triangles):
+        with following_open3d():
+            _log.warning(
+                "%s: the %d vertices of this mesh are far apart, and only vertices count as points: sample its surface "
+                "first, for example with Open3D's sample_points_uniformly",
+                *(os.fspath(path), len(scan)),
+            )
+    return scan if where is None else select(scan, where)
+
+
+def read_whole(path: str | os.PathLike) -> Scan:
+    """Read all points of a cloud or mesh, and its triangles."""
     path = existing_file(path) if Path(path).suffix.lower() == ".ply" else check_scan(path)  # that reader looks itself
     ending = path.suffix.lower()
     if holds_skeleton(path) if ending in SCAN_ENDINGS else _is_skeleton(path):
@@ -174,14 +187,7 @@ def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
     scan = _read(path, ending)
     if len(scan) == 0:
         raise FileFormatError(f"{path}: no points could be read: it is damaged, empty, or not a {ending} file")
-    if _coarse(scan.positions, scan.triangles):
-        with following_open3d():
-            _log.warning(
-                "%s: the %d vertices of this mesh are far apart, and only vertices count as points: sample its surface "
-                "first, for example with Open3D's sample_points_uniformly",
-                *(path, len(scan)),
-            )
-    return scan if where is None else select(scan, where)
+    return scan
 
 
 def check_scan(path: str | os.PathLike) -> Path:
@@ -215,21 +221,6 @@ def _read(path: Path, ending: str) -> Scan:
         raise FileFormatError(f"{path}: not a valid {ending} file: {error}") from error
 
 
-def _read_pcd(path: Path) -> Scan:
-    """A PCD file, by Open3D's tensor reader: its other one knows no attributes, and garbles doubles."""
-    o3d = import_open3d()
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        point = o3d.t.io.read_point_cloud(str(path), format="pcd").point
-    known = {name: point[name].numpy() for name in point}
-    positions = np.ascontiguousarray(known.pop("positions", np.empty((0, 3))), float)
-    colors, normals = known.pop("colors", None), known.pop("normals", None)
-    attributes: dict[str, np.ndarray] = {}
-    for name, values in known.items():
-        if values.shape[1:] == (1,):
-            attributes[attribute_name(name, attributes)] = values[:, 0]
-    return Scan(positions, None if colors is None else unit_colors(colors), normals, attributes)
-
-
 def _read_mesh(path: Path) -> Scan:
     o3d = import_open3d()
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
@@ -243,7 +234,7 @@ _CLOUD_READERS = {
     **dict.fromkeys(MESH_ENDINGS, _read_mesh),
     **dict.fromkeys(TEXT_ENDINGS, text_tables.read),
     ".ply": ply_points.read,
-    ".pcd": _read_pcd,
+    ".pcd": pcd.read,
     ".las": las.read,
     ".laz": las.read,
     ".e57": e57.read,

@@ -275,7 +275,7 @@ def test_bad_files_stop_nothing(batch, scans, rows, write, tmp_path):
     assert failed.pop("empty.ply") == "the file is empty"
     assert failed.pop("text.xyz").startswith("no points could be read")
     assert "points" in failed.pop("nan.xyz")
-    assert failed.pop("cut.ply") == "promises 256 points and holds 251: it breaks off"
+    assert failed.pop("cut.ply").endswith("promises 256 points and holds 251: it breaks off")
     assert failed.pop("other.pcd").startswith("not a valid .pcd file")
     assert failed.pop("gone.ply") == "no such file"
     assert failed.pop("in") == "is a folder, not a file"

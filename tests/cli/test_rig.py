@@ -72,7 +72,7 @@ def test_loops_are_cut_if_one_says_so(invoke, refused, ring, tmp_path):
 @pytest.mark.parametrize(
     ("code", "words", "message"),
     [
-        (2, ["y.ply"], "nothing to write: give an output with -o"),
+        (2, ["y.ply"], "nothing to write: give one output with -o"),
         (2, ["none.ply", "-o", "r.fbx"], "r.fbx: the rig is binary glTF and its name ends in .glb"),
         (2, ["none.ply", "-o", "r.glb", "--up", "x"], "--up x: must be z or y"),
         (2, ["y.ply", "r.glb", "-o", "r.glb"], "r.glb: is an input: choose another name"),

@@ -12,6 +12,7 @@ from typing import BinaryIO, NamedTuple
 
 from ...errors import FileFormatError
 from ..formats.ply_tables import read_header
+from . import pcd
 
 
 class Promise(NamedTuple):
@@ -82,18 +83,11 @@ def _ply(stream: BinaryIO) -> Promise | None:
 
 
 def _pcd(stream: BinaryIO) -> Promise | None:
-    header: dict[str, list[str]] = {}
-    while "DATA" not in header:
-        line = stream.readline()
-        if not line:
-            raise ValueError("its header has no DATA")
-        key, *values = line.decode("ascii", "replace").split() or ["#"]
-        header[key] = values
-    if header["DATA"] not in (["ascii"], ["binary"]):
+    row, points, kept = pcd.read_header(stream)
+    if kept not in ("ascii", "binary"):
         return None
-    counts = [int(count) for count in header.get("COUNT", ["1"] * len(header["FIELDS"]))]
-    size = sum(int(size) * count for size, count in zip(header["SIZE"], counts, strict=True))
-    return Promise(int(header["POINTS"][0]), sum(counts), 0, size if header["DATA"] == ["binary"] else 0)
+    columns = sum(row[name].shape[0] for name in row.names or ())
+    return Promise(points, columns, 0, row.itemsize if kept == "binary" else 0)
 
 
 def _pts(stream: BinaryIO) -> Promise:

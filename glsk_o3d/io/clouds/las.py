@@ -11,10 +11,14 @@ import numpy as np
 from ...interop.packages import require, require_for
 from .scanned import COLOR_CHANNELS, Scan, attribute_name, unit_colors
 
+VLR_BYTES, EVLR_BYTES = 54, 60  # published: LAS 1.4 R15, of the heads of records
+MOST_PACKED = 10_000  # fitted: points of a LAZ file per byte; repeated ones pack well, but not so well
+
 
 def read(path: Path) -> Scan:
     """The points of a LAS or LAZ file; dimensions that are 0 throughout are unset."""
     require_for(path.suffix)
+    _check_header(path)
     laspy = require("laspy")
     file = laspy.read(path)
     if len(file.points) < file.header.point_count:
@@ -30,3 +34,21 @@ def read(path: Path) -> Scan:
     if colors is not None:
         colors = unit_colors(colors) if colors.any() else None
     return Scan(np.ascontiguousarray(file.xyz, float), colors, None, attributes, unset=unset)
+
+
+def _check_header(path: Path) -> None:
+    """Raise ValueError where the header promises more records than the file has bytes: laspy would look for each."""
+    with path.open("rb") as stream:
+        head, size = stream.read(375), path.stat().st_size
+    if len(head) < 227 or head[:4] != b"LASF":
+        raise ValueError("it does not start with the header of a LAS file")
+
+    def number(at: int, length: int) -> int:
+        return int.from_bytes(head[at : at + length], "little")
+
+    is_14 = (head[24], head[25]) >= (1, 4) and len(head) >= 255
+    points = number(247, 8) if is_14 else number(107, 4)
+    least = 1 if path.suffix.lower() == ".las" else MOST_PACKED
+    records = [(number(100, 4), VLR_BYTES), (number(243, 4) * is_14, EVLR_BYTES), (points / least, 1)]
+    if any(count * length > size for count, length in records) or number(96, 4) > size:
+        raise ValueError(f"its header promises more than its {size} bytes can hold")

@@ -1,0 +1,131 @@
+"""PCD, the files of PCL: text, binary and compressed; every field with one value, read without trust."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from .scanned import Scan, attribute_name
+
+_PCD_NORMALS = ["normal_x", "normal_y", "normal_z"]
+_PCD_TYPES = {kind + size for kind, sizes in (("F", "48"), ("I", "1248"), ("U", "1248")) for size in sizes}
+_PACKED_COLORS = ("rgb", "rgba")
+
+
+def read_header(stream: BinaryIO) -> tuple[np.dtype, int, str]:
+    """The type of a row, the number of points and how the data are kept; ValueError where it makes no sense."""
+    header: dict[str, list[str]] = {}
+    while "DATA" not in header:
+        line = stream.readline(1 << 16)
+        if not line:
+            raise ValueError("its header has no DATA")
+        key, *values = line.decode("ascii", "replace").split() or ["#"]
+        header[key] = values
+    names, sizes, kinds = header["FIELDS"], header["SIZE"], header["TYPE"]
+    counts = [int(count) for count in header.get("COUNT", ["1"] * len(names))]
+    points, (data,) = int(header["POINTS"][0]), header["DATA"]
+    if points < 0 or min(counts, default=0) < 1:
+        raise ValueError("its header counts less than nothing")
+    if not all(kind + size in _PCD_TYPES for kind, size in zip(kinds, sizes, strict=True)):
+        raise ValueError("its header has types that are not understood")
+    rows = zip(names, sizes, kinds, counts, strict=True)
+    fields = [(f"{i} {name}", f"<{kind.lower()}{size}", (n,)) for i, (name, size, kind, n) in enumerate(rows)]
+    return np.dtype(fields), points, data
+
+
+def read(path: Path) -> Scan:
+    """The points of a PCD file; ValueError where it is damaged or breaks off."""
+    with path.open("rb") as stream:
+        row, points, kept = read_header(stream)
+        if kept == "ascii":
+            columns = _text(stream, row, points)
+        elif kept == "binary":
+            columns = _rows(stream.read(points * row.itemsize), row, points)
+        elif kept == "binary_compressed":
+            columns = _compressed(stream, row, points)
+        else:
+            raise ValueError(f"its data are {kept!r}, which is not understood")
+    known = {name.partition(" ")[2]: values[:, 0] for name, values in columns.items() if values.shape[1] == 1}
+    if not set("xyz") <= known.keys():
+        raise ValueError("it has no fields x, y and z")
+    positions = np.column_stack([known.pop(axis) for axis in "xyz"]).astype(float)
+    packed = next((known.pop(name) for name in _PACKED_COLORS if name in known), None)
+    normals = None
+    if set(_PCD_NORMALS) <= known.keys():
+        normals = np.column_stack([known.pop(name) for name in _PCD_NORMALS]).astype(float)
+    attributes: dict[str, np.ndarray] = {}
+    for name, values in known.items():
+        if name != "_":  # padding
+            attributes[attribute_name(name, attributes)] = np.ascontiguousarray(values)
+    return Scan(positions, None if packed is None else _colors(packed), normals, attributes)
+
+
+def _colors(packed: np.ndarray) -> np.ndarray:
+    """Red, green and blue from 0 to 1 of the bits of a number of four bytes."""
+    bits = np.ascontiguousarray(packed, packed.dtype if packed.dtype.itemsize == 4 else np.uint32).view(np.uint32)
+    return np.stack([bits >> 16 & 255, bits >> 8 & 255, bits & 255], axis=1) / 255
+
+
+def _broken_off(points: int, found: int) -> ValueError:
+    return ValueError(f"it promises {points} points and holds {found}: it breaks off")
+
+
+def _text(stream: BinaryIO, row: np.dtype, points: int) -> dict[str, np.ndarray]:
+    lines = [line.decode("ascii", "replace") for line in stream if line.strip()][:points]
+    if len(lines) < points:
+        raise _broken_off(points, len(lines))
+    widths = [row[name].shape[0] for name in row.names or ()]
+    table = (
+        np.loadtxt(lines, ndmin=2, comments=None, usecols=range(sum(widths))) if lines else np.empty((0, sum(widths)))
+    )
+    parts = np.split(table, np.cumsum(widths)[:-1], axis=1)
+    with np.errstate(invalid="ignore"):
+        return {name: part.astype(row[name].base) for name, part in zip(row.names or (), parts, strict=True)}
+
+
+def _rows(data: bytes, row: np.dtype, points: int) -> dict[str, np.ndarray]:
+    if len(data) < points * row.itemsize:
+        raise _broken_off(points, len(data) // row.itemsize)
+    table = np.frombuffer(data, row, points)
+    return {name: table[name] for name in row.names or ()}
+
+
+def _compressed(stream: BinaryIO, row: np.dtype, points: int) -> dict[str, np.ndarray]:
+    """Columns one after the other, packed with LZF."""
+    packed, size = np.frombuffer(stream.read(8).ljust(8, b"\0"), "<u4").tolist()
+    data = stream.read(packed)
+    if len(data) < packed or size < points * row.itemsize:
+        raise ValueError("its compressed data break off")
+    columns, found = io.BytesIO(_unpacked(data, size)), {}
+    for name in row.names or ():
+        base, n = row[name].base, row[name].shape[0]
+        found[name] = np.frombuffer(columns.read(points * n * base.itemsize), base).reshape(points, n)
+    return found
+
+
+def _unpacked(data: bytes, size: int) -> bytes:
+    """What LZF has packed, of so many bytes: runs as they are, and copies of what came before (liblzf's format)."""
+    out, at = bytearray(), 0
+    while at < len(data) and len(out) < size:
+        control = data[at]
+        at += 1
+        if control < 32:
+            out += data[at : at + control + 1]
+            at += control + 1
+            continue
+        length = control >> 5
+        if length == 7:
+            length += data[at]
+            at += 1
+        start = len(out) - ((control & 31) << 8) - data[at] - 1
+        at, length = at + 1, length + 2
+        if start < 0:
+            raise ValueError("its compressed data make no sense")
+        piece = out[start : start + length]
+        out += (piece * (length // len(piece) + 1))[:length]  # it may overlap what it makes
+    if len(out) != size:
+        raise ValueError("its compressed data break off")
+    return bytes(out)

@@ -1,0 +1,102 @@
+"""PCD as Open3D writes it, and as nobody should."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.clouds.pcd import _unpacked
+from glsk_o3d.io.scans import read_scan
+
+HEAD = """VERSION 0.7
+FIELDS x y z rgb _ label more
+SIZE 4 4 8 4 1 2 4
+TYPE F F F F U U F
+COUNT 1 1 1 1 3 1 2
+POINTS 2
+"""
+RUNS, COPIES = st.binary(min_size=1, max_size=32), st.tuples(st.integers(1, 40), st.integers(3, 264))
+
+
+@pytest.mark.parametrize("options", [{}, {"write_ascii": True}, {"compressed": True}], ids=str)
+def test_what_open3d_writes_comes_back(tmp_path, options):
+    import open3d as o3d
+
+    rng = np.random.default_rng(0)
+    place = rng.random((500, 3)).round(3) + [471000, 5612000, 0]
+    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(place))
+    cloud.point.colors = o3d.core.Tensor(rng.integers(0, 256, (500, 3)).astype(np.uint8))
+    cloud.point.normals = o3d.core.Tensor(np.tile([0, 0.6, 0.8], (500, 1)))
+    cloud.point.label = o3d.core.Tensor(np.arange(500, dtype=np.int32)[:, None] // 9)
+    assert o3d.t.io.write_point_cloud(str(tmp_path / "c.pcd"), cloud, **options)
+    scan = read_scan(tmp_path / "c.pcd")
+    np.testing.assert_allclose(scan.positions, place, rtol=0, atol=1e-3 if "write_ascii" in options else 0)
+    np.testing.assert_array_equal(np.rint(255 * scan.colors), cloud.point.colors.numpy())
+    np.testing.assert_allclose(scan.normals, [[0, 0.6, 0.8]] * 500, rtol=1e-6)
+    np.testing.assert_array_equal(scan.attributes["label"], cloud.point.label.numpy()[:, 0])
+
+
+@pytest.mark.parametrize("kept", ["ascii", "binary"])
+def test_padding_and_fields_of_many_values(tmp_path, kept):
+    row = np.dtype("<f4,<f4,<f8,<u4,3u1,<u2,2<f4")
+    rows = np.array([(1, 2, 3, 0xFF3300, (0, 0, 0), 7, (1, 2)), (4, 5, 6, 0x0000FF, (0, 0, 0), 8, (3, 4))], row)
+    body = rows.tobytes()
+    if kept == "ascii":
+        shades = rows["f3"].view("<f4").tolist()
+        lines = [(*at, shade, 0, 0, 0, label, 1, 2) for (*at, _, _, label, _), shade in zip(rows.tolist(), shades)]  # noqa: B905
+        body = "\n".join(" ".join(map(repr, line)) for line in lines).encode()
+    (tmp_path / "c.pcd").write_bytes(f"{HEAD}DATA {kept}\n".encode() + body)
+    scan = read_scan(tmp_path / "c.pcd")
+    np.testing.assert_array_equal(scan.positions, [[1, 2, 3], [4, 5, 6]])
+    np.testing.assert_allclose(scan.colors, [[1, 0.2, 0], [0, 0, 1]])
+    assert {name: values.tolist() for name, values in scan.attributes.items()} == {"label": [7, 8]}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("DATA binary", "DATA zipped", "'zipped', which is not understood"),
+        ("TYPE F F F F", "TYPE F F F X", "types that are not understood"),
+        ("SIZE 4 4 8", "SIZE 4 4 3", "types that are not understood"),
+        ("COUNT 1 1", "COUNT 0 1", "less than nothing"),
+        ("FIELDS x y", "FIELDS x w", "no fields x, y and z"),
+        ("POINTS 2", "POINTS 3", "promises 3 points and holds 2"),
+        ("COUNT 1 1 1 1", "COUNT 1 1 1", "c.pcd"),
+    ],
+)
+def test_headers_that_make_no_sense(tmp_path, old, new, says):
+    (tmp_path / "c.pcd").write_bytes(f"{HEAD}DATA binary\n".replace(old, new).encode() + b"\0" * 2 * 33)
+    with pytest.raises(FileFormatError, match=says):
+        read_scan(tmp_path / "c.pcd")
+
+
+@given(
+    st.lists(
+        st.one_of(st.binary(min_size=1, max_size=32), st.tuples(st.integers(1, 40), st.integers(3, 264))), max_size=12
+    )
+)
+@settings(deadline=None)
+def test_lzf_is_unpacked(pieces):
+    """Runs as they are and copies from behind, packed by the letter of the format."""
+    packed, plain = bytearray(), bytearray()
+    for piece in pieces:
+        if isinstance(piece, bytes):
+            packed += bytes([len(piece) - 1]) + piece
+            plain += piece
+        elif plain:
+            back, length = min(piece[0], len(plain)), piece[1]
+            offset = back - 1
+            if length < 9:
+                packed += bytes([(length - 2) << 5 | offset >> 8, offset & 255])
+            else:
+                packed += bytes([7 << 5 | offset >> 8, length - 9, offset & 255])
+            for _ in range(length):
+                plain.append(plain[-back])
+    assert _unpacked(bytes(packed), len(plain)) == bytes(plain)
+
+
+@pytest.mark.parametrize("data", [b"", b"\xe0", b"\x20\x05", b"\x05ab", b"\x01ab\xff"])
+def test_packed_data_that_break_off(data):
+    with pytest.raises((ValueError, IndexError)):
+        _unpacked(data, 50)
