@@ -143,8 +143,12 @@ def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
         if ending == ".npz":  # where the disk is full, Open3D's own writer ends the process
             np.savez(temporary, **{name: cloud.point[name].cpu().numpy() for name in cloud.point})
             return
+        written = cloud
+        if ending == ".pcd" and "normals" in cloud.point:  # Open3D's header has the type of the positions for both
+            written = cloud.clone()
+            written.point.normals = cloud.point.normals.to(cloud.point.positions.dtype)
         with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-            done = o3d.t.io.write_point_cloud(str(temporary), cloud)
+            done = o3d.t.io.write_point_cloud(str(temporary), written)
         try:
             check_complete(temporary)  # where it is, Open3D does not say so
         except FileFormatError:

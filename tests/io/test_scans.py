@@ -160,3 +160,16 @@ def test_a_cloud_that_breaks_off_is_no_file(tmp_path, monkeypatch):
     with pytest.raises(FileFormatError, match=r"c\.xyz.*\.npz"):
         save_tensor_cloud(o3d.t.geometry.PointCloud(np.eye(3)), tmp_path / "c.xyz")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("ending", ["ply", "pcd"])
+def test_clouds_whose_normals_are_of_another_type_are_written(tmp_path, ending):
+    import open3d as o3d
+
+    place = np.random.default_rng(0).random((50, 3))
+    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(place))
+    cloud.point.normals = o3d.core.Tensor(np.float32(place))
+    save_tensor_cloud(cloud, tmp_path / f"c.{ending}")
+    scan = read_scan(tmp_path / f"c.{ending}")
+    np.testing.assert_array_equal(scan.positions, place)
+    np.testing.assert_array_equal(scan.normals, np.float32(place))
