@@ -43,13 +43,36 @@ def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tu
     ([[0, 1]], [[0.5, 0.5]])
     """
     edges = forest.edges
-    before = np.full(len(forest.vertices), -1)  # the edge that leads to each vertex
-    before[edges[:, 1]] = np.arange(len(edges))
     order = np.argsort(edges.ravel(), kind="stable")
     first = np.searchsorted(edges.ravel()[order], np.arange(len(forest.vertices)))
     column = np.arange(forest.degree.max(initial=1))
     around = np.where(column < forest.degree[:, None], order[(first[:, None] + column) % max(len(order), 1)] // 2, -1)
     bone, along = nearest_on_edges(forest.vertices, edges, around[vertex], points)
-    parent = before[edges[bone, 0]]
+    parent = bone_before(forest)[bone]
     own = np.where(parent >= 0, np.minimum(2 * along, 1), 1)
     return np.column_stack([np.where(parent >= 0, parent, bone), bone]), np.column_stack([1 - own, own])
+
+
+def bone_before(forest: Skeleton) -> np.ndarray:
+    """The bone that each bone hangs on.
+
+    Parameters
+    ----------
+    forest : Skeleton
+        Without loops, numbered from its roots outwards.
+
+    Returns
+    -------
+    (E,) int array
+        Rows of `forest.edges`; -1 for bones at a root.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Skeleton
+    >>> line = Skeleton([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1], [1, 2]], [1, 1, 1], (), (), ())
+    >>> bone_before(line)
+    array([-1,  0])
+    """
+    leading = np.full(len(forest.vertices), -1)
+    leading[forest.edges[:, 1]] = np.arange(len(forest.edges))
+    return leading[forest.edges[:, 0]]

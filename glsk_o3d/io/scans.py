@@ -182,7 +182,7 @@ def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
 
 def read_whole(path: str | os.PathLike) -> Scan:
     """Read all points of a cloud or mesh, and its triangles."""
-    path = existing_file(path) if Path(path).suffix.lower() == ".ply" else check_scan(path)  # that reader looks itself
+    path = existing_file(path) if Path(path).suffix.lower() in _LOOK_THEMSELVES else check_scan(path)
     ending = path.suffix.lower()
     if holds_skeleton(path) if ending in SCAN_ENDINGS else _is_skeleton(path):
         raise FileFormatError(f"{path}: is a skeleton, not a scan")
@@ -234,6 +234,7 @@ def _read_mesh(path: Path) -> Scan:
     return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))
 
 
+_LOOK_THEMSELVES = (".ply", ".pcd")  # whether files are complete: they would be read twice
 _CLOUD_READERS = {
     **dict.fromkeys(MESH_ENDINGS, _read_mesh),
     **dict.fromkeys(TEXT_ENDINGS, text_tables.read),

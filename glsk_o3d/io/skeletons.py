@@ -169,7 +169,7 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     """
     path = existing_file(path)
     if format is None and path.name.lower().endswith(SCAN_ENDINGS) and not path.name.lower().endswith(tuple(FORMATS)):
-        raise FileFormatError(f"{path}: is a cloud, not a skeleton: make one with glsk_o3d.skeletonize")
+        raise _is_cloud(path)
     ending = skeleton_ending(path, format)
     read = FORMATS[ending].read
     if read is None:
@@ -180,9 +180,13 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     except MissingPackageError:
         raise
     except NoEdges:
-        raise FileFormatError(f"{path}: is a cloud, not a skeleton: make one with glsk_o3d.skeletonize") from None
+        raise _is_cloud(path) from None
     except Exception as error:  # whatever a parser raises on a hostile file
         raise FileFormatError(f"{path}: not a valid {ending} skeleton: {error}") from error
+
+
+def _is_cloud(path: Path) -> FileFormatError:
+    return FileFormatError(f"{path}: is a cloud, not a skeleton: make one with glsk_o3d.skeletonize")
 
 
 def holds_skeleton(path: str | os.PathLike) -> bool:

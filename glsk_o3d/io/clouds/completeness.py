@@ -1,6 +1,6 @@
 """Whether a scan holds the points that its header promises.
 
-Where a PLY, PCD or PTS file breaks off, or has text for numbers, Open3D returns uninitialised memory for the rest.
+Where a PLY, PCD, PTS or OFF file breaks off, or has text for numbers, Open3D returns uninitialised memory for the rest.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...interop.packages import require, require_for
-from .scanned import COLOR_CHANNELS, Scan, attribute_name, unit_colors
+from .scanned import COLOR_CHANNELS, Scan, named_attributes, unit_colors
 
 VLR_BYTES, EVLR_BYTES = 54, 60  # published: LAS 1.4 R15, of the heads of records
 MOST_PACKED = 10_000  # fitted: points of a LAZ file per byte; repeated ones pack well, but not so well
@@ -25,11 +25,8 @@ def read(path: Path) -> Scan:
         raise ValueError(f"it promises {file.header.point_count} points and holds {len(file.points)}: it breaks off")
     names = [name for name in file.point_format.dimension_names if name not in ("X", "Y", "Z")]
     colors = np.column_stack([file[name] for name in COLOR_CHANNELS]) if set(COLOR_CHANNELS) <= set(names) else None
-    attributes: dict[str, np.ndarray] = {}
-    for name in names:
-        values = np.asarray(file[name])
-        if name not in COLOR_CHANNELS and values.ndim == 1:
-            attributes[attribute_name(name, attributes)] = values
+    held = ((name, np.asarray(file[name])) for name in names if name not in COLOR_CHANNELS)
+    attributes = named_attributes((name, values) for name, values in held if values.ndim == 1)
     unset = frozenset(name for name, values in attributes.items() if not values.any())
     if colors is not None:
         colors = unit_colors(colors) if colors.any() else None

@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from .scanned import Scan, attribute_name
+from .scanned import Scan, named_attributes
 
 _PCD_NORMALS = ["normal_x", "normal_y", "normal_z"]
 _PCD_TYPES = {kind + size for kind, sizes in (("F", "48"), ("I", "1248"), ("U", "1248")) for size in sizes}
@@ -43,7 +43,7 @@ def read(path: Path) -> Scan:
         if kept == "ascii":
             columns = _text(stream, row, points)
         elif kept == "binary":
-            columns = _rows(stream.read(points * row.itemsize), row, points)
+            columns = _rows(stream.read(), row, points)
         elif kept == "binary_compressed":
             columns = _compressed(stream, row, points)
         else:
@@ -56,10 +56,8 @@ def read(path: Path) -> Scan:
     normals = None
     if set(_PCD_NORMALS) <= known.keys():
         normals = np.column_stack([known.pop(name) for name in _PCD_NORMALS]).astype(float)
-    attributes: dict[str, np.ndarray] = {}
-    for name, values in known.items():
-        if name != "_":  # padding
-            attributes[attribute_name(name, attributes)] = np.ascontiguousarray(values)
+    known.pop("_", None)  # padding
+    attributes = named_attributes((name, np.ascontiguousarray(values)) for name, values in known.items())
     return Scan(positions, None if packed is None else _colors(packed), normals, attributes)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..formats.ply_tables import Lists, read_tables
-from .scanned import COLOR_CHANNELS, NO_TRIANGLES, Scan, attribute_name, unit_colors
+from .scanned import COLOR_CHANNELS, NO_TRIANGLES, Scan, named_attributes, unit_colors
 
 _PLY_NORMALS = ["nx", "ny", "nz"]
 
@@ -27,14 +27,12 @@ def read(path: Path) -> Scan:
 
     positions, colors, normals = (together(names) for names in ([*"xyz"], COLOR_CHANNELS, _PLY_NORMALS))
     assert positions is not None
-    attributes: dict[str, np.ndarray] = {}
-    for name, values in known.items():
-        attributes[attribute_name(name, attributes)] = values.astype(values.dtype.newbyteorder("="))
+    native = ((name, values.astype(values.dtype.newbyteorder("="))) for name, values in known.items())
     return Scan(
         np.ascontiguousarray(positions, float),
         None if colors is None else unit_colors(colors),
         None if normals is None else np.ascontiguousarray(normals, float),
-        attributes,
+        named_attributes(native),
         _triangles(tables.get("face", {}), len(positions)),
     )
 

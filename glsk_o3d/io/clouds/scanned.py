@@ -111,6 +111,14 @@ def attribute_name(text: str, taken: Iterable[str] = ()) -> str:
     return unique
 
 
+def named_attributes(columns: Iterable[tuple[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Columns by names that can stand in an expression, each its own."""
+    found: dict[str, np.ndarray] = {}
+    for name, values in columns:
+        found[attribute_name(name, found)] = values
+    return found
+
+
 def unit_colors(values: np.ndarray) -> np.ndarray:
     """Colours from 0 to 1, of numbers up to 255 or 65535, or up to 1 if they are no integers."""
     top = np.nanmax(values, initial=0)

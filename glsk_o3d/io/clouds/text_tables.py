@@ -18,7 +18,7 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from ...interop.verbosity import following_open3d
-from .scanned import COLOR_CHANNELS, NoPoints, Scan, attribute_name, unit_colors
+from .scanned import COLOR_CHANNELS, NoPoints, Scan, named_attributes, unit_colors
 
 _log = logging.getLogger(__name__)
 
@@ -91,11 +91,9 @@ def read(path: Path) -> Scan:
 
     positions, colors, normals = rows[:, list(map(roles.index, "xyz"))], together(COLOR_CHANNELS), together(_NORMALS)
     used = {*"xyz", *(COLOR_CHANNELS if colors is not None else ()), *(_NORMALS if normals is not None else ())}
-    attributes: dict[str, np.ndarray] = {}
-    for i, role in enumerate(roles):
-        if role not in used or i != roles.index(role):
-            given = names[i] if names else role or f"column_{layout.columns[i] + 1}"
-            attributes[attribute_name(given, attributes)] = _whole(rows[:, i])
+    others = [i for i, role in enumerate(roles) if role not in used or i != roles.index(role)]
+    called = names or [role or f"column_{column + 1}" for role, column in zip(roles, layout.columns, strict=True)]
+    attributes = named_attributes((called[i], _whole(rows[:, i])) for i in others)
     return Scan(positions, None if colors is None else unit_colors(colors), normals, attributes)
 
 
@@ -166,7 +164,7 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
             continue
         words = (text.replace(",", ".") if layout.decimal_comma else text).split(layout.delimiter)
         row = [_number(words[i]) if i < len(words) else np.nan for i in layout.columns]
-        if len([True for i in layout.columns[:3] if i < len(words) and _is_number(words[i])]) == 3:
+        if all(i < len(words) and _is_number(words[i]) for i in layout.columns[:3]):
             found.append(row)
         else:
             lost += 1

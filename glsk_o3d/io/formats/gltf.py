@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from ...analysis.segmentation import branch_of_edge, vertex_of_cloud
-from ...analysis.skinning import skin_weights
+from ...analysis.skinning import bone_before, skin_weights
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...interop.atomic import check_ending, write_atomically
 from ...interop.clouds import cloud_points, open3d_class
 from ...numerics.vectors import norm, unit
 from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
-from .forests import as_forest, global_shift, parents
+from .forests import as_forest, global_shift
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
 COMPONENT_TYPES = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
@@ -108,13 +108,14 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
     origin = global_shift(forest)
     buffer = _Buffer()
     nodes, heads = _bones(forest, origin)
-    bones, weights = skin_weights(forest, points, vertex_of_cloud(forest, points)[1])
+    found = skin_weights(forest, points, vertex_of_cloud(forest, points)[1])
+    bones, weights = (np.pad(each, ((0, 0), (0, 2))) for each in found)  # glTF has four joints for each point
     inverse = np.tile(np.eye(4), (len(heads), 1, 1))
     inverse[:, :3, 3] = -heads
     attributes = {
         "POSITION": buffer.add(points - origin, "f4", "VEC3", bounds=True),
-        "JOINTS_0": buffer.add(np.pad(bones, ((0, 0), (0, 2))) * (np.pad(weights, ((0, 0), (0, 2))) > 0), "u2", "VEC4"),
-        "WEIGHTS_0": buffer.add(np.pad(weights, ((0, 0), (0, 2))), "f4", "VEC4"),
+        "JOINTS_0": buffer.add(bones * (weights > 0), "u2", "VEC4"),
+        "WEIGHTS_0": buffer.add(weights, "f4", "VEC4"),
     }
     for name, values in _looks(mesh, len(points)).items():
         attributes[name] = buffer.add(values, "f4", "VEC3")
@@ -122,7 +123,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
     if len(triangles):
         primitive |= {"indices": buffer.add(triangles.reshape(-1), "u4", "SCALAR"), "mode": TRIANGLES_MODE}
     place = {"translation": _upright(origin, up), "rotation": UPRIGHT[up]}
-    roots = np.flatnonzero(parents(forest)[forest.edges[:, 0]] < 0).tolist()
+    roots = np.flatnonzero(bone_before(forest) < 0).tolist()
     n = len(nodes)
     tree = {
         "asset": {"version": "2.0", "generator": "glsk-o3d"},
@@ -179,10 +180,7 @@ def _triangles(mesh: Any) -> np.ndarray:
 def _bones(forest: Skeleton, origin: np.ndarray) -> tuple[list[dict[str, Any]], np.ndarray]:
     """The joints, one per edge, each placed from the one before it; and where they are from the origin."""
     edges, branch = forest.edges, branch_of_edge(forest)
-    heads = forest.vertices[edges[:, 0]] - origin
-    before = np.full(len(forest.vertices), -1)
-    before[edges[:, 1]] = np.arange(len(edges))
-    parent = before[edges[:, 0]]
+    heads, parent = forest.vertices[edges[:, 0]] - origin, bone_before(forest)
     moved = np.where((parent >= 0)[:, None], heads - heads[parent], heads)
     count: dict[int, int] = {}
     nodes: list[dict[str, Any]] = []

@@ -13,6 +13,7 @@ import numpy as np
 from ...errors import FileFormatError
 from ...numerics.vectors import norm
 from ...skeleton import Skeleton
+from .forests import is_outward, parents
 from .text import line
 
 URDF_DENSITY = 1000.0  # published: of water, in kg/m³; fresh wood and most plants are near it
@@ -52,9 +53,9 @@ def write(skeleton: Skeleton) -> bytes:
     """
     _check(skeleton)
     vertices, radii = skeleton.vertices, skeleton.radii
-    parent = np.arange(len(vertices))
-    parent[skeleton.edges[:, 1]] = skeleton.edges[:, 0]
-    root = parent == np.arange(len(vertices))
+    before = parents(skeleton)
+    root = before < 0
+    parent = np.where(root, np.arange(len(vertices)), before)
     frame = vertices[parent]
     steps = frame - np.where(root[:, None], 0.0, frame[parent])
     span = vertices - frame
@@ -89,7 +90,7 @@ def write(skeleton: Skeleton) -> bytes:
 
 
 def _check(skeleton: Skeleton) -> None:
-    if skeleton.n_loops or len(np.unique(skeleton.edges[:, 1])) < len(skeleton.edges):
+    if skeleton.n_loops or not is_outward(skeleton):
         what = (
             f"the skeleton has {skeleton.n_loops} loop(s)" if skeleton.n_loops else "the edges do not lead from a root"
         )
