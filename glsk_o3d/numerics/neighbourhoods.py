@@ -87,6 +87,30 @@ def nearest_left(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, k
     return found
 
 
+def nearest_moved(points: np.ndarray, neighbours: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """The nearest points of every point after some have moved a little; asked anew only around these.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        Where they are now.
+    neighbours : (n, k) int array
+        As from `nearest_neighbours` of where they were.
+    moved : (n,) bool array
+        Those that have moved, not farther than their neighbours were.
+
+    Returns
+    -------
+    (n, k) int array
+        Of the points that have not moved one in a thousand lacks one that came from beyond its old neighbours.
+    """
+    changed = moved[neighbours].any(axis=1)
+    changed[neighbours[moved]] = True
+    found = neighbours.copy()
+    found[changed] = nearest_neighbours(points, neighbours.shape[1], of=points[changed])[1]
+    return found
+
+
 def local_outlier_ratio(mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """How much farther a point is from its neighbours than these are from theirs (after Breunig et al. 2000, LOF).
 

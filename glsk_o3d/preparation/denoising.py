@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..numerics.eigen import main_direction
 from ..numerics.groups import group_sum
-from ..numerics.neighbourhoods import local_outlier_ratio, nearest_left, nearest_neighbours, principal
+from ..numerics.neighbourhoods import local_outlier_ratio, nearest_left, nearest_moved, nearest_neighbours, principal
 from ..numerics.pairing import merge_nearest
 from ..numerics.vectors import PAIRS, dot
 from .frame import MIN_POINTS
@@ -65,8 +65,8 @@ def denoise(surface: Surface, passes: int, set_aside: bool) -> Surface:
         return surface
     denoised = subspace_mean_shift(surface.points, surface.noise, passes, surface.weight)
     k, outlier = surface.neighbours.shape[1], np.zeros(len(denoised), bool)
-    distance, neighbours = nearest_neighbours(denoised, k)
-    found = local_outlier_ratio(distance[:, 1:].mean(axis=1), neighbours) > DENOISED_RATIO
+    neighbours = nearest_moved(denoised, surface.neighbours, surface.noise > 0)
+    found = local_outlier_ratio(_mean_distance(denoised, neighbours), neighbours) > DENOISED_RATIO
     found &= (surface.noise > DENOISED_NOISE) & set_aside
     if 0 < found.sum() <= len(denoised) - max(k, MIN_POINTS):
         outlier = found
@@ -88,6 +88,11 @@ def denoise(surface: Surface, passes: int, set_aside: bool) -> Surface:
         representative=representative[surface.representative],
         outlier=surface.outlier | outlier[surface.representative],
     )
+
+
+def _mean_distance(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    away = points[neighbours[:, 1:]] - points[:, None]
+    return np.sqrt(np.einsum("nki,nki->nk", away, away)).mean(axis=1)
 
 
 def average_noisy(

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..numerics.components import component_labels
 from ..numerics.neighbourhoods import local_outlier_ratio, nearest_neighbours, principal, row_medians
-from .frame import MIN_POINTS, to_working_frame
+from .frame import MIN_POINTS, Frame, to_working_frame
 from .surface import Surface
 
 # All fitted, on clouds with outliers of 1 to 10 %, sparse limbs and crowns.
@@ -54,21 +54,29 @@ def set_aside_outliers(
     frame, cloud, representative, weight, distance, neighbours = to_working_frame(points, counts, by, k)
     outlier = np.zeros(len(points), bool)
     if factor:
-        found = np.ones(len(cloud), bool)
-        found[inliers(cloud, weight, distance, neighbours, factor, MIN_POINTS)] = False
-        outlier = found[representative]
+        left, among_left = inliers(cloud, weight, distance, neighbours, factor, MIN_POINTS)
+        kept = np.zeros(len(cloud), bool)
+        kept[left] = True
+        outlier = ~kept[representative]
     if outlier.any():
         inside = ~outlier
-        frame, cloud, representative[inside], weight, _, neighbours = to_working_frame(
-            points[inside], counts[inside], by, k
-        )
+        if len(cloud) == len(points):  # the neighbours are known
+            given = np.empty(len(cloud), int)
+            given[representative] = np.arange(len(points))
+            frame = Frame.of(points[given[left]], by)
+            cloud, weight, neighbours = frame.into(points[given[left]]), weight[left], among_left[:, : k(len(left))]
+            representative = (np.cumsum(kept) - 1)[representative]
+        else:  # copies in a frame that far ones made wide may be none in their own
+            frame, cloud, representative[inside], weight, _, neighbours = to_working_frame(
+                points[inside], counts[inside], by, k
+            )
         representative[outlier] = cKDTree(cloud).query(frame.into(points[outlier]))[1]
     return Surface.measured(frame, cloud, neighbours, weight, np.ones(len(cloud)), representative, outlier)
 
 
 def inliers(
     points: np.ndarray, weight: np.ndarray, distance: np.ndarray, neighbours: np.ndarray, factor: float, least: int
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray]:
     """The points left when those far from all others are set aside, round by round.
 
     An outlier is `factor` times farther from its neighbours than these are from theirs. Where there are many, its
@@ -88,8 +96,10 @@ def inliers(
 
     Returns
     -------
-    (m,) int array
+    left : (m,) int array
         Rows, ascending.
+    neighbours : (m, k) int array
+        Their nearest neighbours among those left.
     """
     left = np.arange(len(points))
     for _ in range(OUTLIER_ROUNDS):
@@ -107,7 +117,7 @@ def inliers(
         distance, neighbours = distance[keep, :k], index[neighbours[keep, :k]]
         there = points[left]
         distance[changed], neighbours[changed] = nearest_neighbours(there, k, of=there[changed])
-    return left
+    return left, neighbours
 
 
 def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:

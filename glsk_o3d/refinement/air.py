@@ -79,7 +79,7 @@ def branch_facts(
     """
     vertices, edges, m = skeleton.vertices, skeleton.edges, len(skeleton.vertices)
     length = np.maximum(skeleton.edge_lengths, TINY)
-    winding = evidence.winding(vertices[edges].mean(axis=1))
+    winding = evidence.winding_along(skeleton)
     typical = np.median(winding)
     scatter = 1.4826 * np.median(np.abs(winding - typical)) + LEAST_SCATTER * abs(typical)
     along = evidence.surface_around(skeleton)

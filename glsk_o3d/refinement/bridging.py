@@ -81,7 +81,7 @@ def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[in
     ends = list(_ends(skeleton))
     if not ends or not len(evidence.points):
         return
-    typical = float(np.median(evidence.winding(skeleton.vertices[skeleton.edges].mean(axis=1))))
+    typical = float(np.median(evidence.winding_along(skeleton)))
     if typical < LEAST_INSIDE:
         return  # parts too thin to have an inside, which could go on across a gap
     leaves = [end.leaf for end in ends]

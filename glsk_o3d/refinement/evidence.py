@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from ..numerics.morton import MORTON_BITS, morton_codes
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
 from ..numerics.vectors import TINY, dot
 from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
@@ -14,11 +17,14 @@ from .axis_fit import incident_edges, nearest_on_edges
 
 # fitted: winding number below which an axis is in nothing; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
+ENOUGH_EVIDENCE = 16384  # measured: points beyond which the same is said of the topology, only later
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """The points that support a skeleton, as an oriented surface; it holds while the graph is changed.
+
+    Of many points it takes every so-manieth along a Morton curve, about 16384.
 
     Attributes
     ----------
@@ -38,11 +44,16 @@ class Evidence:
     neighbours: np.ndarray
     normals: np.ndarray
     areas: np.ndarray
+    _said: dict[str, tuple[Skeleton, Any]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, skeleton: Skeleton) -> Evidence:
         """The evidence for a skeleton that has edges and was fitted to its points."""
         supporting = skeleton.supporting_points
+        many = len(supporting) // ENOUGH_EVIDENCE
+        if many > 1:
+            code = morton_codes(skeleton.points[supporting], 2**MORTON_BITS - 1)
+            supporting = np.sort(supporting[np.argsort(code, kind="stable")[::many]])
         points = skeleton.points[supporting]
         edge, t = _nearest_edges(skeleton, supporting)
         start, stop = skeleton.vertices[skeleton.edges[edge]].transpose(1, 0, 2)
@@ -54,6 +65,10 @@ class Evidence:
     def winding(self, queries: np.ndarray) -> np.ndarray:
         """Winding number of the surface around each place, (m,) float array from (m, 3): near 1 inside, 0 outside."""
         return winding_number(self.points, self.normals, self.areas, queries)
+
+    def winding_along(self, skeleton: Skeleton) -> np.ndarray:
+        """That at the middle of every edge, (E,) float array."""
+        return self._once("winding", skeleton, lambda: self.winding(skeleton.vertices[skeleton.edges].mean(axis=1)))
 
     def surface_around(self, skeleton: Skeleton) -> np.ndarray:
         """Area of the surface along every edge, (E,) float array.
@@ -80,6 +95,17 @@ class Evidence:
             Vertices, i < j.
         weight : (B,) float array
         """
+        return self._once("bonds", skeleton, lambda: self._bonds(skeleton))
+
+    def _once(self, what: str, skeleton: Skeleton, ask: Callable[[], Any]) -> Any:
+        """What was said of the same skeleton before, or is now."""
+        of, answer = self._said.get(what, (None, None))
+        if of is not skeleton:
+            answer = ask()
+            self._said[what] = skeleton, answer
+        return answer
+
+    def _bonds(self, skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
         vertex, m = skeleton.vertex_of_point[self.supporting], len(skeleton.vertices)
         p, q = np.repeat(np.arange(len(vertex)), self.neighbours.shape[1] - 1), self.neighbours[:, 1:].ravel()
         foreign = vertex[p] != vertex[q]

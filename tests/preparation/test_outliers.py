@@ -16,7 +16,7 @@ SURFACE = samples.torus(N, ring_radius=0.4, radius=0.1).points
 
 def left(points, weight=None, factor=2.5, least=8):
     weight = np.ones(len(points)) if weight is None else weight
-    return inliers(points, weight, *nearest_neighbours(points, K), factor, least)
+    return inliers(points, weight, *nearest_neighbours(points, K), factor, least)[0]
 
 
 def floating(n, seed=0, reach=0.6):
@@ -73,7 +73,7 @@ def test_another_noisy_object_stays(scale):
 def test_more_neighbours_than_points_are_left():
     points = np.concatenate([samples.torus(200).points, floating(6, reach=3)])
     for k in (100, 203, 206):
-        kept = inliers(points, np.ones(206), *nearest_neighbours(points, k), 2.5, 8)
+        kept = inliers(points, np.ones(206), *nearest_neighbours(points, k), 2.5, 8)[0]
         np.testing.assert_array_equal(kept, np.arange(200))
 
 

@@ -8,7 +8,7 @@ from glsk_o3d import samples
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
 from glsk_o3d.preparation.denoising import average_noisy
 from glsk_o3d.preparation.sampling import sample_grid
-from glsk_o3d.preparation.thinning import MOST_IN_ONE, thin, thin_dense
+from glsk_o3d.preparation.thinning import MOST_IN_ONE, points_around, thin, thin_dense
 
 
 def thinned(points, n, k=16):
@@ -84,23 +84,40 @@ def smoothed(points, around, k=16):
     return thin_dense(points, neighbours, principal(points, neighbours)[0], around)
 
 
+def tube(many, noise, seed=0):
+    """Points of a tube of radius 1 with so many around it; noise in units of their spacing."""
+    rng, spacing = np.random.default_rng(seed), 2 * np.pi / many
+    n = int(2 * np.pi * 20 / spacing**2)
+    turn = rng.uniform(0, 2 * np.pi, n)
+    points = np.column_stack([np.cos(turn), np.sin(turn), rng.uniform(0, 20, n)])
+    return points + rng.normal(0, noise * spacing, points.shape)
+
+
+@pytest.mark.parametrize("noise", [0, 0.1, 0.2])
 @pytest.mark.parametrize("around", [20, 40])
-def test_dense_tubes_are_merged_as_far_as_allowed_and_sparse_ones_stay(around):
+def test_dense_tubes_are_merged_as_far_as_allowed_and_sparse_ones_stay(around, noise):
     """A cylinder with 100 points around it, and one with half as many as are enough."""
     for many in (100, around / 2):
-        spacing = 2 * np.pi / many
-        n = int(2 * np.pi * 4 / spacing**2)
-        rng = np.random.default_rng(0)
-        turn = rng.uniform(0, 2 * np.pi, n)
-        points = np.column_stack([np.cos(turn), np.sin(turn), rng.uniform(0, 4, n)])
+        points = tube(many, noise)
         into = smoothed(points, around)
         np.testing.assert_array_equal(into[into], into)
         mass = np.bincount(into)[left(into)]
         assert mass.max() <= MOST_IN_ONE
         if many == 100:
-            assert len(left(into)) < 0.6 * n
+            assert len(left(into)) < 0.6 * len(points)
         else:
-            assert len(left(into)) > 0.98 * n
+            assert len(left(into)) > 0.95 * len(points)
+
+
+@pytest.mark.parametrize("noise", [0, 0.1, 0.2])
+@pytest.mark.parametrize("many", [18, 25, 35, 50, 80])
+def test_points_around_are_counted_whatever_the_noise(many, noise):
+    """Plane fits alone say 12 to 23 around each of them where the noise is a fifth of the spacing."""
+    points = tube(many, noise)
+    neighbours = nearest_neighbours(points, 16)[1]
+    inner = np.abs(points[:, 2] - 10) < 6
+    found = points_around(points, neighbours, principal(points, neighbours)[0])[inner]
+    assert np.median(found) == pytest.approx(many, rel=0.15)
 
 
 def test_the_formula_of_the_ratio():
@@ -115,9 +132,16 @@ def test_the_formula_of_the_ratio():
     assert np.median(spread[:, 0] / spread[:, 2]) == pytest.approx(np.pi * k / (4 * around**2), rel=0.1)
 
 
-def test_noise_is_not_smooth(surface):
-    noisy = surface + np.random.default_rng(0).normal(0, 0.03, surface.shape)
-    assert len(left(smoothed(noisy, 10))) > 0.97 * 3000 > len(left(smoothed(surface, 10)))
+def test_thin_parts_of_a_dense_cloud_stay():
+    """A rod with 8 points around it, far from a tube with 60, both as noisy."""
+    thick = tube(60, 0.2)
+    spacing = 2 * np.pi / 60
+    thin = tube(8, 0)[:, [0, 1, 2]] * (8 * spacing / (2 * np.pi)) + [20, 0, 0]
+    thin += np.random.default_rng(1).normal(0, 0.2 * spacing, thin.shape)
+    into = smoothed(np.concatenate([thick, thin]), 20)
+    share = np.bincount(into, minlength=len(into)) > 0
+    assert share[: len(thick)].mean() < 0.5
+    assert share[len(thick) :].mean() > 0.95
 
 
 # ---- on a grid
