@@ -12,13 +12,13 @@ from ..numerics.eigen import main_direction
 from ..numerics.groups import group_sum
 from ..numerics.neighbourhoods import local_outlier_ratio, nearest_left, nearest_moved, nearest_neighbours, principal
 from ..numerics.pairing import merge_nearest
-from ..numerics.vectors import PAIRS, dot
+from ..numerics.vectors import PAIRS
 from .frame import MIN_POINTS
 from .surface import Surface
 from .thinning import MOST_IN_ONE, STEADY_SHARE
 
 RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
-RIDGE_CHUNK = 16384  # measured: points at a time: memory stays flat
+RIDGE_CHUNK = 1024  # measured: points at a time: the (3, points, 32) work arrays then stay in the cache
 ENOUGH_NOISY = 4096  # fitted: noisy points that are enough; down to about so many they are averaged
 DENOISED_RATIO, DENOISED_NOISE = 1.8, 0.2  # fitted: local outlier ratio of a denoised outlier, and its least noise
 
@@ -157,23 +157,22 @@ def subspace_mean_shift(
     if passes == 0 or len(noisy) == 0:
         return points
     weight = np.ones(len(points)) if weight is None else weight
-    moved = points.copy()
+    moved, coordinates = points.copy(), np.ascontiguousarray(points.T)
     around = nearest_neighbours(points, min(RIDGE_NEIGHBOURS, len(points)), of=points[noisy])[1]
     for start in range(0, len(noisy), RIDGE_CHUNK):
         part = slice(start, start + RIDGE_CHUNK)
-        patch, mass = points.take(around[part], axis=0), weight.take(around[part])
-        step, x = noise[noisy[part], None], points[noisy[part]]
+        patch, mass = coordinates.take(around[part], axis=1), weight.take(around[part])
+        step, x = noise[noisy[part]], coordinates[:, noisy[part]]
         for _ in range(passes):
-            apart = patch - x[:, None]
-            squared = np.einsum("nki,nki->nk", apart, apart)
-            kernel = mass * np.exp(-squared / (2 * squared.mean(axis=1, keepdims=True)))
+            apart = patch - x[:, :, None]
+            squared = (apart * apart).sum(axis=0)
+            kernel = mass * np.exp(squared / (-2 * squared.mean(axis=1, keepdims=True)))
             kernel /= kernel.sum(axis=1, keepdims=True)
-            mean = np.matmul(kernel[:, None], patch)[:, 0]
-            offset = patch - mean[:, None]
-            spread = np.matmul((kernel[:, :, None] * offset).transpose(0, 2, 1), offset)
-            along = main_direction(np.stack([spread[:, i, j] for i, j in PAIRS]))
-            shift = mean - x
-            shift -= dot(shift, along)[:, None] * along
+            heavy = kernel * apart
+            shift = heavy.sum(axis=2)
+            spread = [np.einsum("nk,nk->n", heavy[i], apart[j]) - shift[i] * shift[j] for i, j in PAIRS]
+            along = main_direction(np.stack(spread)).T
+            shift -= (shift * along).sum(axis=0) * along
             x = x + step * shift
-        moved[noisy[part]] = x
+        moved[noisy[part]] = x.T
     return moved
