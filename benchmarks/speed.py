@@ -23,6 +23,7 @@ from _speed.figures import figure_tables, measure_figures, objects
 from _speed.large import large_tables, measure_large
 from _speed.pictures import draw_figures, draw_stages, tables_of
 from _speed.rate import measure_rate, rate_tables
+from _speed.scans import measure_scans, scan_tables
 from _speed.stages import measure_stages, stage_tables
 
 app = application(__doc__)
@@ -112,6 +113,32 @@ def rate(
     rows = measure_rate(numbers(sizes), pipeline.split(","), shape, repeat, jobs)
     save(output, rows)
     present(rate_tables(rows), markdown, machine())
+
+
+@app.command()
+def scans(
+    page: Annotated[
+        Path | None,
+        typer.Argument(metavar="PAGE", help="Markdown page to put the tables into.", callback=page_with("scans")),
+    ] = None,
+    folder: Annotated[
+        list[Path] | None, typer.Option("--folder", metavar="DIR", help="Scans of shapes: depth2, misreg and lidar.")
+    ] = None,
+    sizes: Sizes = "1024,4096,16384,65536",
+    pipeline: Annotated[str, typer.Option("--pipeline", metavar="NAME")] = "default",
+    repeat: Repeat = 3,
+    jobs: Jobs = 1,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Clouds as scanners give them: noisy bodies, scans of the shapes in folders, scanned objects."""
+    where = machine()
+    rows = measure_scans(folder or [], numbers(sizes), pipeline, repeat, jobs)
+    save(output, rows)
+    tables = scan_tables(rows)
+    if page is not None:
+        fill(page, {"scans": "\n".join([where, "", *(markdown_table(*table) for table in tables)])})
+    present(tables, markdown, where)
 
 
 @app.command()

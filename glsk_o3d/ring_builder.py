@@ -102,7 +102,7 @@ class RingBuilder(Filter[Contraction]):
         20.0,
         "Points around a part that are enough: where the surface has more, near ones are merged, at most four into "
         "one at a time, which takes over their mass. Fewer are faster; edges and thin parts, and clouds of less than "
-        "1000 points, stay as they are. 0 merges none for this, and so does a `radius`.",
+        "2000 points, stay as they are. 0 merges none for this, and so does a `radius`.",
         type="float",
         unit="points",
         low=0,

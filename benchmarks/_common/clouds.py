@@ -39,7 +39,7 @@ BUILTIN: dict[str, Callable[..., samples.Sample]] = {
     "sauropod": partial(samples.sauropod, cameras=None),
 }
 """Samples of the package that have an axis, as whole surfaces."""
-BUILTIN_VARIANT = re.compile(r"(clean|density|holes|outliers|scan(?=2_)|noise(?=\d))(\d*)_(\d+)")
+BUILTIN_VARIANT = re.compile(r"(clean|density|holes|outliers|scan(?=2_)|noise(?=\d))(\d*|\d+\.\d+)_(\d+)")
 RANDOM_SHAPE = re.compile(r"(.+)_(\d+)")  # a shape drawn at random: its family and the seed
 CAMERAS = np.array([[1, -2, 2], [-1, 2, 2]]) / 3  # where from a built-in scan is taken; nothing is hidden from both
 
@@ -85,7 +85,7 @@ def builtin(shape: str, variant: str, draw: int = 0) -> tuple[np.ndarray, Truth]
         raise ValueError(
             f"{variant}: built-in variants are clean_N, density_N, holes_N, outliers_N, scan2_N and noiseP_N"
         )
-    kind, percent, n = found[1], int(found[2] or 0), int(found[3])
+    kind, percent, n = found[1], float(found[2] or 0), int(found[3])
     rng = np.random.default_rng(1 + draw)
     # the points of a sample are independent, so that the first n of those kept are a fair choice
     more, noise = 10 if kind in ("density", "holes", "scan") else 1, percent / 100 if kind == "noise" else 0.0

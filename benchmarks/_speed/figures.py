@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -61,17 +61,23 @@ def objects(folder: Path | None, own: bool, shapes: str, sizes: list[int]) -> li
     if missing := [n for n in sizes if n not in dict(found)]:
         typer.echo(f"the built-in shapes instead for {', '.join(map(str, missing))} points", err=True)
         found += objects(None, True, "", missing)
+    return found + [(scan.n, scan) for scan in scanned(sizes)]
+
+
+def scanned(sizes: Sequence[int]) -> list[Scan]:
+    """The scans of $GLSK_DATA, or of the folder shared/data beside the repository, that are large enough."""
     try:
         folder = folder_or(None, "GLSK_DATA", "shared/data")
     except typer.BadParameter as problem:
         typer.echo(f"left out: scans, {problem}", err=True)
-        return found
+        return []
+    found: list[Scan] = []
     listed = json.loads((folder / "manifest.json").read_text())
     for n in sizes:
         large = [it for it in listed if it["n_points"] >= n]
         if len(large) < len(listed):
             typer.echo(f"left out: {len(listed) - len(large)} clouds of less than {n} points", err=True)
-        found += [(n, Scan(it["name"], folder / it["path"], n)) for it in large]
+        found += [Scan(it["name"], folder / it["path"], n) for it in large]
     return found
 
 

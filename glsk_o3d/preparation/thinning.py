@@ -16,7 +16,7 @@ from .surface import Surface
 
 MOST_IN_ONE = 4  # fitted: points that one may stand for after a pass, where there are more than enough
 ASK_AGAIN = 0.25  # measured: share of the points left, below which the neighbours are looked up anew
-DENSE_FROM, DENSE_TO = 1000, 8192  # fitted: points from which on, and down to which, more than enough are merged
+DENSE_FROM, DENSE_TO = 2000, 8192  # fitted: points from which on, and down to which, more than enough are merged
 WIDER = 3  # measured: steps from neighbour to neighbour: fewer see no more than noise, more see other parts
 WIDER_BIAS = 1.25  # measured: on tubes with 18 to 80 points around them, noise of up to a fifth of their spacing
 STEADY_SHARE = 0.9  # fitted: share of the points left by a pass at which passes end
