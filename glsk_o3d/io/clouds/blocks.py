@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from ...errors import InvalidParameterError
 from ..scans import holds_no_points, read_whole, refused_where_damaged, scan_file
@@ -15,7 +16,9 @@ from .selection import chosen_points, none_chosen, parsed
 BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take more memory
 
 
-def read_blocks(path: str | os.PathLike, *, rows: int = BLOCK_ROWS, where: str | None = None) -> Iterator[Scan]:
+def read_blocks(
+    path: str | os.PathLike, *, rows: int = BLOCK_ROWS, where: str | None = None, bare: bool = False
+) -> Iterator[Scan]:
     """Read a scan a few points at a time, in the order of the file.
 
     LAS, LAZ, PCD (text and binary) and binary PLY without faces are read in blocks. Everything else is one block: text,
@@ -28,6 +31,8 @@ def read_blocks(path: str | os.PathLike, *, rows: int = BLOCK_ROWS, where: str |
         Points to a block.
     where : str, optional
         As for `glsk_o3d.read_cloud`. Blocks have fewer points then, and there is none without.
+    bare : bool
+        Positions alone are wanted: a condition apart, nothing else is read where that is faster.
 
     Returns
     -------
@@ -65,11 +70,19 @@ def read_blocks(path: str | os.PathLike, *, rows: int = BLOCK_ROWS, where: str |
     path = scan_file(path)
     if where is not None:
         parsed(where)
+    reader = _BLOCK_READERS.get(path.suffix.lower())
     with refused_where_damaged(path):
-        read = _BLOCK_READERS.get(path.suffix.lower())
-        blocks = None if read is None else read(path, rows)
+        blocks = None if reader is None else reader.blocks(path, rows, bare and where is None)
     found = iter([read_whole(path)]) if blocks is None else _watched(path, blocks)
     return found if where is None else _selected(found, where)
+
+
+def promised_points(path: str | os.PathLike) -> int | None:
+    """How many points a file holds by its header; None for one that is not read in blocks. Errors as `read_blocks`."""
+    path = scan_file(path)
+    reader = _BLOCK_READERS.get(path.suffix.lower())
+    with refused_where_damaged(path):
+        return None if reader is None else reader.promised(path)
 
 
 def _watched(path: Path, blocks: Iterator[Scan]) -> Iterator[Scan]:
@@ -94,9 +107,4 @@ def _selected(blocks: Iterator[Scan], where: str) -> Iterator[Scan]:
         raise none_chosen(where)
 
 
-_BLOCK_READERS: dict[str, Callable[[Path, int], Iterator[Scan] | None]] = {
-    ".ply": ply_points.blocks,
-    ".pcd": pcd.blocks,
-    ".las": las.blocks,
-    ".laz": las.blocks,
-}
+_BLOCK_READERS: dict[str, Any] = {".ply": ply_points, ".pcd": pcd, ".las": las, ".laz": las}

@@ -22,23 +22,29 @@ def read(path: Path) -> Scan:
     return only(blocks(path, ALL_ROWS))
 
 
-def blocks(path: Path, rows: int) -> Iterator[Scan]:
-    """The same, so many points at a time; unset is what is 0 in a block."""
+def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan]:
+    """The same, so many points at a time; unset is what is 0 in a block. `bare` ones are positions alone."""
     require_for(path.suffix)
     _check_header(path)
-    return _blocks(path, rows)
+    return _blocks(path, rows, bare)
 
 
-def _blocks(path: Path, rows: int) -> Iterator[Scan]:
+def promised(path: Path) -> int:
+    """The points that the header promises."""
+    return _check_header(path)
+
+
+def _blocks(path: Path, rows: int, bare: bool) -> Iterator[Scan]:
     laspy = require("laspy")
-    with laspy.open(path) as file:
+    chosen = laspy.DecompressionSelection
+    with laspy.open(path, decompression_selection=chosen.base().decompress_z() if bare else chosen.all()) as file:
         n = file.header.point_count
-        top = _brightest(laspy, path, rows) if rows < n else None
+        top = _brightest(laspy, path, rows) if rows < n and not bare else None
         for begin in range(0, n, rows):
             points = file.read_points(rows)
             if len(points) < min(rows, n - begin):
                 raise _broken_off(n, begin + len(points))
-            yield _scan(points, top)
+            yield Scan(_places(points)) if bare else _scan(points, top)
 
 
 def _scan(points: Any, top: float | None) -> Scan:
@@ -51,8 +57,11 @@ def _scan(points: Any, top: float | None) -> Scan:
     if colors is not None:
         top = brightest(colors) if top is None else top
         colors = unit_colors(colors, top) if top else None
-    xyz = np.column_stack([points.x, points.y, points.z])
-    return Scan(np.ascontiguousarray(xyz, float), colors, None, attributes, unset=unset)
+    return Scan(_places(points), colors, None, attributes, unset=unset)
+
+
+def _places(points: Any) -> np.ndarray:
+    return np.ascontiguousarray(np.column_stack([points.x, points.y, points.z]), float)
 
 
 def _brightest(laspy: Any, path: Path, rows: int) -> float:
@@ -67,8 +76,11 @@ def _brightest(laspy: Any, path: Path, rows: int) -> float:
     return top
 
 
-def _check_header(path: Path) -> None:
-    """Raise ValueError where the header promises more records than the file has bytes: laspy would look for each."""
+def _check_header(path: Path) -> int:
+    """The points of a file.
+
+    ValueError where the header promises more records than the file has bytes: laspy would look for each.
+    """
     with path.open("rb") as stream:
         head, size = stream.read(375), path.stat().st_size
     if len(head) < 227 or head[:4] != b"LASF":
@@ -86,6 +98,7 @@ def _check_header(path: Path) -> None:
     start, length = number(96, 4), number(105, 2)
     if path.suffix.lower() == ".las" and size - start < points * length:
         raise _broken_off(points, (size - start) // length)
+    return points
 
 
 def _broken_off(points: int, found: int) -> ValueError:

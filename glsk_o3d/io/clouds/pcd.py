@@ -14,6 +14,7 @@ from .scanned import ALL_ROWS, Scan, named_attributes, only
 
 _PCD_NORMALS = ["normal_x", "normal_y", "normal_z"]
 _PCD_TYPES = {kind + size for kind, sizes in (("F", "48"), ("I", "1248"), ("U", "1248")) for size in sizes}
+_PLACE = (" x", " y", " z")  # after the number of the field
 _PACKED_COLORS = ("rgb", "rgba")
 
 
@@ -49,8 +50,11 @@ def read(path: Path) -> Scan:
     return only(blocks(path, ALL_ROWS))
 
 
-def blocks(path: Path, rows: int) -> Iterator[Scan] | None:
-    """The same, so many points at a time; None where it has to be read whole, since columns follow each other."""
+def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan] | None:
+    """The same, so many points at a time; None where it has to be read whole, since columns follow each other.
+
+    `bare` ones are positions alone.
+    """
     with path.open("rb") as stream:
         row, points, kept = read_header(stream)
         start = stream.tell()
@@ -59,10 +63,20 @@ def blocks(path: Path, rows: int) -> Iterator[Scan] | None:
     there = (path.stat().st_size - start) // row.itemsize
     if kept == "binary" and there < points:
         raise _broken_off(points, there)
-    return _blocks(path, start, row, points, _ROW_READERS[kept], rows)
+    found = _blocks(path, start, row, points, _ROW_READERS[kept], rows)
+    return (_scan({name: columns[name] for name in columns if not bare or name[-2:] in _PLACE}) for columns in found)
 
 
-def _blocks(path: Path, start: int, row: np.dtype, points: int, read_rows: _RowReader, rows: int) -> Iterator[Scan]:
+def promised(path: Path) -> int | None:
+    """The points that the header promises; None where they have to be read whole."""
+    with path.open("rb") as stream:
+        _, points, kept = read_header(stream)
+    return points if kept in _ROW_READERS else None
+
+
+def _blocks(
+    path: Path, start: int, row: np.dtype, points: int, read_rows: _RowReader, rows: int
+) -> Iterator[dict[str, np.ndarray]]:
     with path.open("rb") as stream:
         stream.seek(start)
         for begin in range(0, points, rows):
@@ -70,7 +84,7 @@ def _blocks(path: Path, start: int, row: np.dtype, points: int, read_rows: _RowR
             columns, found = read_rows(stream, row, n)
             if found < n:
                 raise _broken_off(points, begin + found)
-            yield _scan(columns)
+            yield columns
 
 
 def _scan(columns: dict[str, np.ndarray]) -> Scan:

@@ -27,24 +27,34 @@ def read(path: Path) -> Scan:
     return replace(scan, triangles=_triangles(tables.get("face", {}), len(scan)))
 
 
-def blocks(path: Path, rows: int) -> Iterator[Scan] | None:
+def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan] | None:
     """The same, so many points at a time; None where it has to be read whole: text, lists, and meshes.
+
+    `bare` ones are positions alone.
 
     ValueError, before the first block, where it is damaged or breaks off.
     """
+    found = _found(path)
+    return None if found is None else _blocks(path, *found, rows, bare)
+
+
+def promised(path: Path) -> int | None:
+    """The points that the header promises; None where they have to be read whole."""
+    found = _found(path)
+    return None if found is None else found[2]
+
+
+def _found(path: Path) -> tuple[int, np.dtype, int] | None:
+    """Where vertices begin, what a row of them is, and how many there are."""
     with path.open("rb") as stream:
         found = find_rows(stream, "vertex", without=("face",))
-        start = stream.tell()
-    if found is None:
-        return None
-    row, n = found
-    return _blocks(path, start, row, n, rows)
+        return None if found is None else (stream.tell(), *found)
 
 
-def _blocks(path: Path, start: int, row: np.dtype, n: int, rows: int) -> Iterator[Scan]:
-    top = _brightest(path, start, row, n, rows) if rows < n else None
+def _blocks(path: Path, start: int, row: np.dtype, n: int, rows: int, bare: bool) -> Iterator[Scan]:
+    top = _brightest(path, start, row, n, rows) if rows < n and not bare else None
     for table in _rows(path, start, row, n, rows):
-        yield _scan({name: table[name] for name in row.names or ()}, top)
+        yield _scan({name: table[name] for name in row.names or () if not bare or name in "xyz"}, top)
 
 
 def _rows(path: Path, start: int, row: np.dtype, n: int, rows: int) -> Iterator[np.ndarray]:

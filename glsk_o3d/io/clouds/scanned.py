@@ -85,6 +85,20 @@ class Scan:
         """Everything that can be asked about a point, by name: the attributes, and ``x``, ``y`` and ``z``."""
         return {**dict(zip("xyz", self.positions.T, strict=True)), **self.attributes}
 
+    @property
+    def kinds(self) -> dict[str, np.dtype]:
+        """As what Open3D's clouds have the given attributes: int32, since Open3D writes no int64, or floats."""
+        found = {}
+        for name, values in self.given.items():
+            whole = values.dtype.kind in "iub" and np.abs(values.astype(float)).max(initial=0) < 2**31
+            found[name] = np.dtype(np.int32 if whole else values.dtype if values.dtype == np.float32 else float)
+        return found
+
+    @property
+    def shades(self) -> np.ndarray | None:
+        """The colours from 0 to 255, (N, 3) uint8 array or None."""
+        return None if self.colors is None else np.round(255 * np.clip(self.colors, 0, 1)).astype(np.uint8)
+
     def to_legacy(self) -> Any:
         """As an ``open3d.geometry.PointCloud``, which has no place for attributes."""
         o3d = import_open3d()
@@ -99,14 +113,12 @@ class Scan:
         """As an ``open3d.t.geometry.PointCloud`` with everything: integers as int32, since Open3D writes no int64."""
         o3d = import_open3d()
         cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(np.ascontiguousarray(self.positions, float)))
-        if self.colors is not None:
-            cloud.point.colors = o3d.core.Tensor(np.round(255 * np.clip(self.colors, 0, 1)).astype(np.uint8))
+        if self.shades is not None:
+            cloud.point.colors = o3d.core.Tensor(self.shades)
         if self.normals is not None:
             cloud.point.normals = o3d.core.Tensor(np.ascontiguousarray(self.normals, float))
-        for name, values in self.given.items():
-            whole = values.dtype.kind in "iub" and np.abs(values.astype(float)).max(initial=0) < 2**31
-            kind = np.int32 if whole else values.dtype if values.dtype == np.float32 else float
-            cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(values[:, None], kind))
+        for name, kind in self.kinds.items():
+            cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(self.attributes[name][:, None], kind))
         return cloud
 
 

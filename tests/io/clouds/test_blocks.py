@@ -118,6 +118,17 @@ def test_blocks_joined_are_the_file(tmp_path, make, rows):
     assert_same(Scan.joined(blocks), read_scan(path))
 
 
+@pytest.mark.parametrize("make", FILES.values(), ids=FILES)
+def test_bare_blocks_are_the_positions(tmp_path, make):
+    path = make(tmp_path)
+    bare = Scan.joined(read_blocks(path, rows=10, bare=True))
+    assert bare.colors is None
+    assert bare.attributes == {}
+    np.testing.assert_array_equal(bare.positions, read_scan(path).positions)
+    chosen = Scan.joined(read_blocks(path, rows=10, bare=True, where="y > 0"))
+    np.testing.assert_array_equal(chosen.positions, read_scan(path, "y > 0").positions)
+
+
 @pytest.mark.parametrize("make", WHOLE.values(), ids=WHOLE)
 def test_other_files_are_one_block(tmp_path, make):
     path = make(tmp_path)
