@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from _common.tables import Tables, number, short
 
+from glsk_o3d import Skeleton, read_cloud, read_skeleton, skeletonize
 from glsk_o3d.interop.packages import require
 from glsk_o3d.samples import sauropod
+
+from .large import apart, from_file_to_file
 
 HUGE_BLOCK = 1_000_000  # points written at a time
 SURFACE_POINTS = 2_000_000  # of which each is drawn again and again, with noise of its own: far nearer than the noise
 HUGE_NOISE = 0.003  # its standard deviation, as a share of the diagonal
+GB = 1e9
 LAS_STEP = 1e-5  # between coordinates in LAS, in units of the shape, which is one and a half long
 
 
@@ -44,3 +50,54 @@ def write_huge(path: Path, n: int, seed: int = 0) -> None:
             record = laspy.ScaleAwarePointRecord.zeros(len(block), header=header)
             record.x, record.y, record.z = block.T
             file.write_points(record)
+
+
+def measure_huge(endings: list[str], labelled: list[str], n: int, against: int, folder: Path | None) -> list[dict]:
+    """A row for the whole command on each file, without and with labels, and how far its skeleton is from that of a
+    small cloud of the shape.
+
+    In a folder of one's own files stay, and those that are there already are taken.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        small = Path(scratch, "small.ply")
+        write_huge(small, against, seed=1)
+        base = skeletonize(read_cloud(small))
+        diagonal = float(np.linalg.norm(np.ptp(base.points, axis=0)))
+        rows = [dict(measure="huge", file=f"in memory, from {small.suffix}", n=against, **shape(base))]
+        for ending in dict.fromkeys([*endings, *labelled]):
+            path = Path(folder or scratch, f"huge_{n}{ending}")
+            if not path.exists():
+                write_huge(path, n)
+            size = path.stat().st_size / GB
+            every = [[]] * (ending in endings) + [["--labelled", path.with_name("labelled.ply")]] * (ending in labelled)
+            for words in every:
+                facts = from_file_to_file(path, "--stream", *words)
+                skeleton = read_skeleton(path.with_name("skeleton.ply"))
+                mean, most = apart(skeleton, base, diagonal)
+                what = ending + (", and labels of all points" if words else "")
+                rows.append(
+                    dict(measure="huge", file=what, n=n, size=size, mean=mean, most=most) | facts | shape(skeleton)
+                )
+                path.with_name("labelled.ply").unlink(missing_ok=True)
+            if folder is None:
+                path.unlink()
+        return rows
+
+
+def shape(skeleton: Skeleton) -> dict[str, int]:
+    """How a skeleton hangs together."""
+    ends = int((skeleton.degree == 1).sum())
+    return dict(vertices=len(skeleton.vertices), components=skeleton.n_components, loops=skeleton.n_loops, ends=ends)
+
+
+def huge_tables(rows: list[dict]) -> Tables:
+    """A line for each file."""
+    header = ["", "points", "file GB", "CPU s", "wall s", "MB", "vertices", "components", "loops", "ends"]
+    lines = []
+    for row in rows:
+        spent = [short(row[key]) if key in row else "-" for key in ("file_cpu", "file_wall")]
+        size, peak = number(row.get("size"), 2), number(row.get("file_peak"), 0)
+        counts = [str(row[key]) for key in ("vertices", "components", "loops", "ends")]
+        away = [number(row.get(key), 2) for key in ("mean", "most")]
+        lines.append([row["file"], str(row["n"]), size, *spent, peak, *counts, *away])
+    return [("from disk to disk", [*header, "mean %", "largest %"], lines)]
