@@ -147,7 +147,9 @@ def huge(
     points: Annotated[int, typer.Option("--points", help="Of each file.")] = 100_000_000,
     against: Annotated[int, typer.Option("--against", help="Points to skeletonise in memory.")] = 1_000_000,
     endings: Annotated[str, typer.Option("--endings", help="Of the files: .ply, .las, .laz.")] = ".ply,.laz",
-    labelled: Annotated[str, typer.Option("--labelled", help="Of those to label, too: 63 bytes a point.")] = "",
+    labelled: Annotated[
+        str, typer.Option("--labelled", help="Of those whose points are labelled, too: 63 bytes each.")
+    ] = "",
     folder: Annotated[Path | None, typer.Option("--folder", help="Where the files are, or are made and stay.")] = None,
     output: Output = None,
     markdown: Markdown = False,

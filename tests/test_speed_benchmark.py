@@ -448,15 +448,19 @@ class TestCommands:
         printed = call("huge", page, *words, "-o", out, "--markdown")
         small, *rows = json.loads(out.read_text())["rows"]
         assert (small["n"], small["loops"], small["components"]) == (5000, 1, 1)
-        assert [row["file"] for row in rows] == [".ply", ".laz", ".laz, and labels of all points"]
-        for row in rows:
+        assert [row["file"] for row in rows] == [".ply", ".laz", ".laz: labels"]
+        assert rows[2]["size"] > rows[0]["size"]  # of what is written
+        for row in rows[:2]:
             assert (row["n"], row["loops"], row["components"]) == (9000, 1, 1)
             assert 0 < row["mean"] < row["most"] < 10
+        for row in rows:
             assert min(row["file_cpu"], row["file_wall"], row["size"]) > 0
         lines = [line for line in printed.splitlines() if line.startswith("|")]
         assert len(lines) == 6
         assert [line for line in page.read_text().splitlines() if line.startswith("|")] == lines
-        assert sorted(path.name for path in tmp_path.glob("huge_*")) == ["huge_9000.laz", "huge_9000.ply"]
+        assert sorted(path.name for path in tmp_path.glob("huge_*")) == [
+            f"huge_9000.{it}" for it in ("laz", "npz", "ply")
+        ]
         assert not (tmp_path / "labelled.ply").exists()
 
     def test_distance_of_curves(self, parts):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,12 +15,26 @@ from glsk_o3d.interop.packages import require
 from glsk_o3d.samples import sauropod
 
 from .large import apart, from_file_to_file
+from .timing import fresh_python
 
 HUGE_BLOCK = 1_000_000  # points written at a time
 SURFACE_POINTS = 2_000_000  # of which each is drawn again and again, with noise of its own: far nearer than the noise
 HUGE_NOISE = 0.003  # its standard deviation, as a share of the diagonal
 GB = 1e9
 LAS_STEP = 1e-5  # between coordinates in LAS, in units of the shape, which is one and a half long
+
+LABELS = """
+import json, resource, sys
+told, benchmarks, skeleton, cloud, labelled = sys.argv[1:]
+sys.path.insert(0, benchmarks)
+from _speed.stopwatch import MB, peak
+from glsk_o3d import annotate_file, read_skeleton
+annotate_file(read_skeleton(skeleton), cloud, labelled)
+used = resource.getrusage(resource.RUSAGE_SELF)
+with open(told, "w") as file:
+    json.dump(dict(file_cpu=used.ru_utime + used.ru_stime, file_peak=peak() / MB), file)
+"""
+"""Labels from file to file, imports and all, and what it took."""
 
 
 def noisy_blocks(n: int, seed: int = 0) -> Iterator[np.ndarray]:
@@ -53,8 +68,8 @@ def write_huge(path: Path, n: int, seed: int = 0) -> None:
 
 
 def measure_huge(endings: list[str], labelled: list[str], n: int, against: int, folder: Path | None) -> list[dict]:
-    """A row for the whole command on each file, without and with labels, and how far its skeleton is from that of a
-    small cloud of the shape.
+    """A row for the whole command on each file, and how far its skeleton is from that of a small cloud of the shape;
+    and one for labels of all points.
 
     In a folder of one's own files stay, and those that are there already are taken.
     """
@@ -64,24 +79,30 @@ def measure_huge(endings: list[str], labelled: list[str], n: int, against: int, 
         base = skeletonize(read_cloud(small))
         diagonal = float(np.linalg.norm(np.ptp(base.points, axis=0)))
         rows = [dict(measure="huge", file=f"in memory, from {small.suffix}", n=against, **shape(base))]
-        for ending in dict.fromkeys([*endings, *labelled]):
+        for ending in endings:
             path = Path(folder or scratch, f"huge_{n}{ending}")
             if not path.exists():
                 write_huge(path, n)
-            size = path.stat().st_size / GB
-            every = [[]] * (ending in endings) + [["--labelled", path.with_name("labelled.ply")]] * (ending in labelled)
-            for words in every:
-                facts = from_file_to_file(path, "--stream", *words)
-                skeleton = read_skeleton(path.with_name("skeleton.ply"))
-                mean, most = apart(skeleton, base, diagonal)
-                what = ending + (", and labels of all points" if words else "")
-                rows.append(
-                    dict(measure="huge", file=what, n=n, size=size, mean=mean, most=most) | facts | shape(skeleton)
-                )
-                path.with_name("labelled.ply").unlink(missing_ok=True)
+            size, skeleton = path.stat().st_size / GB, path.with_suffix(".npz")
+            facts = from_file_to_file(path, "--stream", "-o", skeleton)
+            found = read_skeleton(skeleton)
+            mean, most = apart(found, base, diagonal)
+            row = dict(measure="huge", n=n)
+            rows.append(row | dict(file=ending, size=size, mean=mean, most=most) | facts | shape(found))
+            if ending in labelled:
+                rows.append(row | dict(file=f"{ending}: labels") | label(path, skeleton))
             if folder is None:
                 path.unlink()
         return rows
+
+
+def label(cloud: Path, skeleton: Path) -> dict[str, float]:
+    """CPU and wall seconds of `annotate_file`, the most memory in MB of the process, and the size of what it writes."""
+    told, labelled = cloud.with_name("told.json"), cloud.with_name("labelled.ply")
+    _, wall = fresh_python(LABELS, told, Path(__file__).parents[1], skeleton, cloud, labelled)
+    size = labelled.stat().st_size / GB
+    labelled.unlink()
+    return json.loads(told.read_text()) | dict(file_wall=wall, size=size)
 
 
 def shape(skeleton: Skeleton) -> dict[str, int]:
@@ -97,7 +118,7 @@ def huge_tables(rows: list[dict]) -> Tables:
     for row in rows:
         spent = [short(row[key]) if key in row else "-" for key in ("file_cpu", "file_wall")]
         size, peak = number(row.get("size"), 2), number(row.get("file_peak"), 0)
-        counts = [str(row[key]) for key in ("vertices", "components", "loops", "ends")]
+        counts = [str(row.get(key, "-")) for key in ("vertices", "components", "loops", "ends")]
         away = [number(row.get(key), 2) for key in ("mean", "most")]
         lines.append([row["file"], str(row["n"]), size, *spent, peak, *counts, *away])
     return [("from disk to disk", [*header, "mean %", "largest %"], lines)]
