@@ -111,9 +111,13 @@ def sampled(path: str | os.PathLike, size: Callable[[int], int], where: str | No
                 yield block.positions if finite.all() else block.positions[finite]
             at += len(block)
 
-    if next(blocks(), None) is None:
+    if promised_points(path) is None:  # it is one block: no need to read it again and again
+        whole = list(blocks())
+        points, counts = sample_blocks(lambda: whole, size)
+    else:
+        points, counts = sample_blocks(blocks, size)
+    if len(points) == 0:
         raise InvalidCloudError(f"{os.fspath(path)}: there is no point with finite coordinates")
-    points, counts = sample_blocks(blocks, size)
     o3d = import_open3d()
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(points))
     cloud.point[SAMPLE_COUNT] = o3d.core.Tensor(np.minimum(counts, np.iinfo(np.int32).max)[:, None].astype(np.int32))

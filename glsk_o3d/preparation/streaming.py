@@ -38,7 +38,7 @@ def sample_blocks(blocks: Blocks, size: Callable[[int], int]) -> tuple[np.ndarra
         extent.add(points)
     n = size(extent.n)
     if extent.n <= 2 * n:
-        return np.concatenate(list(blocks())), np.ones(extent.n, int)
+        return np.concatenate([np.empty((0, 3)), *blocks()]), np.ones(extent.n, int)
     grid = extent.grid()
     cells = _fineness(blocks, grid, n)
     means = _Means()

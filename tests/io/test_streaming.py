@@ -79,6 +79,16 @@ def test_a_sample_of_another_size_and_of_some_points(scans, points):
     np.testing.assert_array_equal(few.point.positions.numpy(), np.asarray(read_cloud(scans / "scan.ply").points))
 
 
+def test_a_file_that_is_one_block_is_read_once(tmp_path, points, monkeypatch):
+    np.savetxt(tmp_path / "c.xyz", points[:3000], fmt="%.17g")
+    read, reads = streaming.read_blocks, []
+    monkeypatch.setattr(streaming, "read_blocks", lambda *given, **more: reads.append(1) or read(*given, **more))
+    sample = read_sample(tmp_path / "c.xyz", n=500)
+    assert len(reads) == 1
+    assert len(sample.point.positions) < 1000
+    assert int(sample.point.sample_count.numpy().sum()) == 3000
+
+
 @pytest.mark.parametrize(("n", "says"), [(0, "n = 0"), (2.5, "n = 2.5"), (True, "n = True")])
 def test_sizes_are_whole_numbers(scans, n, says):
     with pytest.raises(InvalidParameterError, match=says):

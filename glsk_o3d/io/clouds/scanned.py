@@ -113,8 +113,8 @@ class Scan:
         """As an ``open3d.t.geometry.PointCloud`` with everything: integers as int32, since Open3D writes no int64."""
         o3d = import_open3d()
         cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(np.ascontiguousarray(self.positions, float)))
-        if self.shades is not None:
-            cloud.point.colors = o3d.core.Tensor(self.shades)
+        if (shades := self.shades) is not None:
+            cloud.point.colors = o3d.core.Tensor(shades)
         if self.normals is not None:
             cloud.point.normals = o3d.core.Tensor(np.ascontiguousarray(self.normals, float))
         for name, kind in self.kinds.items():
