@@ -49,9 +49,12 @@ def info(
             told = skeleton_facts(skeleton)
             records = skeleton.report.iterations
         else:
-            with holding_interrupts():
-                many = (promised_points(file) or 0) > LARGE_CLOUD
-                told = large_facts(read_blocks(file, where=where)) if many else cloud_facts(read_scan(file, where))
+            if (promised_points(file) or 0) > LARGE_CLOUD:
+                told = large_facts(read_blocks(file, where=where))
+            else:
+                with holding_interrupts():
+                    scan = read_scan(file, where)
+                told = cloud_facts(scan)
             records = ()
         if as_json:
             iterations = {"iterations": skeleton.report.to_dict()["iterations"]} if records else {}

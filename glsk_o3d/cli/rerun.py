@@ -55,14 +55,11 @@ def rerun(
             update(f"reading {result.name}")
             made = read_skeleton(result)
             try:
-                cloud = None
-                if scan is not None:
+                if scan is None or not is_of_sample(made):
                     with holding_interrupts():
-                        cloud = (
-                            sample_for(from_recipe(made.report.recipe), scan, stream=True)
-                            if is_of_sample(made)
-                            else read_cloud(scan)
-                        )
+                        cloud = read_cloud(scan) if scan is not None else None
+                else:
+                    cloud = sample_for(from_recipe(made.report.recipe), scan, stream=True)
                 skeleton, seconds = run(partial(run_again, made), cloud, update, recorder)
             except RecipeError as error:
                 raise RecipeError(f"{result}: cannot be repeated: {error}") from error

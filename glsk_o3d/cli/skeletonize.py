@@ -117,8 +117,7 @@ def skeletonize(
         recorder = ContractionRecorder() if report is not None else None
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")
-            with holding_interrupts():
-                cloud, write_labelled = _read(scan, where, chosen, stream, labelled, quiet)
+            cloud, write_labelled = _read(scan, where, chosen, stream, labelled, quiet)
             skeleton, seconds = run(chosen, cloud, update, recorder)
             if tubes is not None:
                 others[tubes] = lambda path: save_mesh(skeleton.to_tubes(), path)
@@ -142,9 +141,12 @@ def _read(
     scan: Path, where: str | None, pipeline: Pipeline[Any], stream: bool | None, labelled: Path | None, quiet: bool
 ) -> tuple[Any, Callable[[Skeleton, Path], object]]:
     """The cloud, or the sample of a large one; and what writes all of it with labels."""
+    from ..interop.packages import import_open3d
     from ..io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
     from ..io.streaming import STREAMED_ENDING, annotate_file, sample_for
 
+    with holding_interrupts():
+        import_open3d()
     if labelled is None or labelled.suffix.lower() == STREAMED_ENDING:
         sample = sample_for(pipeline, scan, where, stream)
         if sample is not None:
@@ -154,7 +156,8 @@ def _read(
             return sample, lambda skeleton, path: annotate_file(skeleton, scan, path, where=where)
     elif stream:
         raise WrongUsage(f"{labelled}: --stream writes a cloud with labels as {STREAMED_ENDING} alone")
-    cloud = (read_cloud if labelled is None else read_tensor_cloud)(scan, where=where)
+    with holding_interrupts():
+        cloud = (read_cloud if labelled is None else read_tensor_cloud)(scan, where=where)
     return cloud, lambda skeleton, path: save_tensor_cloud(_labelled(skeleton, cloud), path)
 
 
