@@ -20,6 +20,7 @@ from _common.command_line import Folder, Jobs, Markdown, Output, Own, Pipelines,
 from _common.results import machine, save
 from _common.tables import fill, markdown_table, page_with, present
 from _speed.figures import figure_tables, measure_figures, objects
+from _speed.huge import huge_tables, measure_huge
 from _speed.large import large_tables, measure_large
 from _speed.pictures import draw_figures, draw_stages, tables_of
 from _speed.rate import measure_rate, rate_tables
@@ -161,6 +162,33 @@ def large(
     tables = large_tables(rows)
     if page is not None:
         fill(page, {"large": "\n".join([where, "", *(markdown_table(*table) for table in tables)])})
+    present(tables, markdown, where)
+
+
+@app.command()
+def huge(
+    page: Annotated[
+        Path | None,
+        typer.Argument(metavar="PAGE", help="Markdown page to put the table into.", callback=page_with("huge")),
+    ] = None,
+    points: Annotated[int, typer.Option("--points", help="Of each file.")] = 100_000_000,
+    against: Annotated[int, typer.Option("--against", help="Points to skeletonise in memory.")] = 1_000_000,
+    endings: Annotated[str, typer.Option("--endings", help="Of the files: .ply, .las, .laz.")] = ".ply,.laz",
+    labelled: Annotated[
+        str, typer.Option("--labelled", help="Of those whose points are labelled, too: 63 bytes each.")
+    ] = "",
+    folder: Annotated[Path | None, typer.Option("--folder", help="Where the files are, or are made and stay.")] = None,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Clouds larger than memory: the whole command, and whether its skeleton is that of a small cloud."""
+    where = machine()
+    chosen = ([ending for ending in given.split(",") if ending] for given in (endings, labelled))
+    rows = measure_huge(*chosen, points, against, folder)
+    save(output, rows)
+    tables = huge_tables(rows)
+    if page is not None:
+        fill(page, {"huge": "\n".join([where, "", *(markdown_table(*table) for table in tables)])})
     present(tables, markdown, where)
 
 

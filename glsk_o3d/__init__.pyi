@@ -30,6 +30,7 @@ from .io.formats.gltf import save_rig
 from .io.meshes import save_mesh
 from .io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
 from .io.skeletons import read_skeleton, save_skeleton
+from .io.streaming import annotate_file, read_sample
 from .lpr_reducer import LPRReducer
 from .meshlab.meshset import MeshSet
 from .pipeline import Filter, Pipeline
@@ -80,6 +81,7 @@ __all__ = [
     "StageError",
     "analysis",
     "annotate_contraction",
+    "annotate_file",
     "batch",
     "crosscheck",
     "from_recipe",
@@ -87,6 +89,7 @@ __all__ = [
     "pipelines",
     "plot_skeleton",
     "read_cloud",
+    "read_sample",
     "read_skeleton",
     "read_tensor_cloud",
     "read_truth",

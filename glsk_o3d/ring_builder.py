@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from .errors import InvalidParameterError
-from .interop.clouds import SearchParam, cloud_points, search_parameters
+from .interop.clouds import SearchParam, cloud_counts, cloud_points, search_parameters
 from .numerics.neighbourhoods import plane_axes
 from .numerics.rings import Rings, star_rings
 from .parameters import documented, parameter, resolve_length
@@ -163,15 +163,21 @@ class RingBuilder(Filter[Contraction]):
         points = cloud_points(cloud)
         finite = finite_points(points, self.drop_invalid)
         given = points if finite.all() else points[finite]
-        most = self._most(len(given))
-        # a radius is in terms of the spacing that the cloud came with
-        sample = sample_cloud(given, 2 * most if self.radius is None else len(given))
+        counts = cloud_counts(cloud, finite)
+        n = len(given) if counts is None else int(counts.sum())
+        most = self._most(n)
+        sample = sample_cloud(given, self.sample_size(n), counts)
         surface = set_aside_outliers(given[sample.kept], sample.counts, self.frame, self._k, self.outlier_factor)
         if self.denoise and self._may_merge:
             surface = average_noise(surface, self._k)
         surface = denoise(surface, self.denoise, self.outlier_factor > 0)
         thinned = thin_surface(surface, self.around if self._may_merge else 0, most, self._k)
-        return _contraction(points, finite, sample, surface, thinned, self._rings(surface, thinned))
+        return _contraction(points, n, finite, sample, surface, thinned, self._rings(surface, thinned))
+
+    def sample_size(self, n: int) -> int:
+        """About how many of n points say where the surface is, if these are more than twice as many."""
+        # a radius is in terms of the spacing that the cloud came with
+        return 2 * self._most(n) if self.radius is None else n
 
     def _rings(self, surface: Surface, thinned: Thinned) -> Rings:
         """Delaunay stars among the neighbours within the radius, in the planes of the neighbourhoods."""
@@ -209,7 +215,7 @@ class RingBuilder(Filter[Contraction]):
 
 
 def _contraction(
-    points: np.ndarray, finite: np.ndarray, sample: Sample, surface: Surface, thinned: Thinned, rings: Rings
+    points: np.ndarray, given: int, finite: np.ndarray, sample: Sample, surface: Surface, thinned: Thinned, rings: Rings
 ) -> Contraction:
     """What flows on: nothing has moved yet."""
     representative, outlier, sampled = np.full(len(points), -1), *np.zeros((2, len(points)), bool)
@@ -231,7 +237,7 @@ def _contraction(
         mass=np.bincount(thinned.representative, surface.merged) * (n / surface.merged.sum()),
         **at_rest(surface.points[thinned.survivors], rings),
         report=Report(
-            n_input=len(points),
+            n_input=given + int((~finite).sum()),
             n_dropped=int((~finite).sum()),
             n_outliers=int(outlier.sum()),
             n_sampled=len(sample.kept),

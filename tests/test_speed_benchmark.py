@@ -429,6 +429,40 @@ class TestCommands:
         assert 100 < row["file_peak"] < 2000
         assert "file MB" in printed
 
+    def test_huge(self, call, tmp_path):
+        pytest.importorskip("laspy")
+        page, out = tmp_path / "speed.md", tmp_path / "out.json"
+        page.write_text("before\n<!-- huge -->\nold\n<!-- end -->\nafter\n")
+        words = (
+            "--points",
+            9000,
+            "--against",
+            5000,
+            "--endings",
+            ".ply,.laz",
+            "--labelled",
+            ".laz",
+            "--folder",
+            tmp_path,
+        )
+        printed = call("huge", page, *words, "-o", out, "--markdown")
+        small, *rows = json.loads(out.read_text())["rows"]
+        assert (small["n"], small["loops"], small["components"]) == (5000, 1, 1)
+        assert [row["file"] for row in rows] == [".ply", ".laz", ".laz: labels"]
+        assert rows[2]["size"] > rows[0]["size"]  # of what is written
+        for row in rows[:2]:
+            assert (row["n"], row["loops"], row["components"]) == (9000, 1, 1)
+            assert 0 < row["mean"] < row["most"] < 10
+        for row in rows:
+            assert min(row["file_cpu"], row["file_wall"], row["size"]) > 0
+        lines = [line for line in printed.splitlines() if line.startswith("|")]
+        assert len(lines) == 6
+        assert [line for line in page.read_text().splitlines() if line.startswith("|")] == lines
+        assert sorted(path.name for path in tmp_path.glob("huge_*")) == [
+            f"huge_9000.{it}" for it in ("laz", "npz", "ply")
+        ]
+        assert not (tmp_path / "labelled.ply").exists()
+
     def test_distance_of_curves(self, parts):
         ends = np.array([[0.0, 0, 0], [10, 0, 0]])
         curve, beside = (Skeleton(ends + [0, y, 0], np.array([[0, 1]]), np.ones(2), (), (), ()) for y in (0, 1))

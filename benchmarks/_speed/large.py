@@ -38,10 +38,10 @@ with open(told, "w") as file:
 """The whole command ``glsk``, imports and all, and what it took."""
 
 
-def from_file_to_file(cloud: Path) -> dict[str, float]:
+def from_file_to_file(cloud: Path, *more: str | Path) -> dict[str, float]:
     """CPU and wall seconds of ``glsk skeletonize``, and the most memory in MB, all of the process."""
     told, skeleton = cloud.with_name("told.json"), cloud.with_name("skeleton.ply")
-    _, wall = fresh_python(COMMAND, told, Path(__file__).parents[1], "skeletonize", cloud, "-o", skeleton)
+    _, wall = fresh_python(COMMAND, told, Path(__file__).parents[1], "skeletonize", cloud, "-o", skeleton, *more)
     return json.loads(told.read_text()) | dict(file_wall=wall)
 
 

@@ -16,8 +16,8 @@ TASKS = {
     "Pipelines, and what runs in them": ("Pipeline", "Filter", "Cloud", "Contraction", "annotate_contraction"),
     "Pipelines as files": ("to_recipe", "from_recipe", "save_recipe", "load_recipe", "rerun"),
     "Reading and writing": (
-        *("read_cloud", "read_tensor_cloud", "read_skeleton", "read_truth"),
-        *("save_skeleton", "save_cylinders", "save_rig", "save_mesh", "save_tensor_cloud"),
+        *("read_cloud", "read_tensor_cloud", "read_sample", "read_skeleton", "read_truth"),
+        *("save_skeleton", "save_cylinders", "save_rig", "save_mesh", "save_tensor_cloud", "annotate_file"),
     ),
     "Looking": ("plot_skeleton", "save_preview", "save_report", "save_assessment", "ContractionRecorder"),
     "In MeshLab's way": ("MeshSet",),

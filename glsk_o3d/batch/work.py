@@ -23,6 +23,8 @@ from ..errors import GlskError
 from ..io.clouds.scanned import Scan
 from ..io.clouds.selection import select
 from ..io.scans import read_cloud, read_scan
+from ..io.streaming import sample_for
+from ..pipeline import Pipeline
 from ..recipes import from_recipe
 from ..viewing.preview import save_preview
 from .ledger import DONE, FAILED, Row, file_hash
@@ -106,8 +108,8 @@ def clear(job: Job, written: Iterable[str] = ()) -> None:
 
 
 def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
-
-    skeleton = from_recipe(job.recipe)(_cloud(job))
+    pipeline = from_recipe(job.recipe)
+    skeleton = pipeline(_cloud(job, pipeline))
     messages += skeleton.report.warnings
     facts = summary(skeleton, 0.0).items()
     row |= {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in facts}
@@ -119,8 +121,13 @@ def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
         row["outputs"].append(output)
 
 
-def _cloud(job: Job) -> Any:
-    """The points that are meant; a file that is taken apart is read once for all that follow each other."""
+def _cloud(job: Job, pipeline: Pipeline[Any]) -> Any:
+    """The points that are meant, or of many a sample; a smaller file that is taken apart is read once for all that
+    follow each other.
+    """
+    sample = sample_for(pipeline, job.path, job.where or None)
+    if sample is not None:
+        return sample
     if not job.where:
         return read_cloud(job.path)
     state = os.stat(job.path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,8 +36,10 @@ def info(
 ) -> None:
     """Say what is in a cloud or skeleton file."""
     with reporting(quiet=quiet, verbose=verbose):
+        from ..io.clouds.blocks import promised_points, read_blocks
         from ..io.scans import read_scan
         from ..io.skeletons import holds_skeleton, read_skeleton
+        from ..io.streaming import LARGE_CLOUD
 
         if file is None:
             _formats(as_json)
@@ -46,9 +49,13 @@ def info(
             told = skeleton_facts(skeleton)
             records = skeleton.report.iterations
         else:
-            with holding_interrupts():
-                scan = read_scan(file, where)
-            told, records = cloud_facts(scan), ()
+            if (promised_points(file) or 0) > LARGE_CLOUD:
+                told = large_facts(read_blocks(file, where=where))
+            else:
+                with holding_interrupts():
+                    scan = read_scan(file, where)
+                told = cloud_facts(scan)
+            records = ()
         if as_json:
             iterations = {"iterations": skeleton.report.to_dict()["iterations"]} if records else {}
             print_json({"file": str(file), **told, **iterations})
@@ -112,6 +119,48 @@ def cloud_facts(scan: Scan) -> dict[str, Any]:
         "normals": scan.normals is not None,
         "attributes": {name: _attribute(values) for name, values in scan.given.items()} or None,
     }
+
+
+def large_facts(blocks: Iterable[Scan]) -> dict[str, Any]:
+    """The same for a cloud in blocks, but for what only all of its points together say: duplicates, and spacing."""
+    import numpy as np
+
+    n, lost, ends, known = 0, 0, [], dict[str, dict[str, Any]]()
+    unset: set[str] = set()
+    for i, block in enumerate(blocks):
+        finite = block.positions[np.isfinite(block.positions).all(axis=1)]
+        n, lost = n + len(block), lost + len(block) - len(finite)
+        ends += [finite.min(axis=0), finite.max(axis=0)] if len(finite) else []
+        unset = unset & block.unset if i else set(block.unset)
+        for name, values in block.attributes.items():
+            told = _attribute(values)
+            known[name] = _together(known[name], told) if name in known else told
+    low, high = (np.min(ends, axis=0), np.max(ends, axis=0)) if ends else (np.full(3, np.nan),) * 2
+    return {
+        "kind": "cloud",
+        "points": n,
+        "not_finite": lost,
+        "lowest": low.tolist(),
+        "highest": high.tolist(),
+        "diagonal": float(np.linalg.norm(high - low)),
+        "colours": block.colors is not None,
+        "normals": block.normals is not None,
+        "attributes": {name: facts for name, facts in known.items() if name not in unset} or None,
+    }
+
+
+def _together(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    """What two blocks say of an attribute: how many points have each value only while these are few."""
+    some = [each for each in (one, other) if "lowest" in each]
+    told: dict[str, Any] = {}
+    if some:
+        told = {"lowest": min(each["lowest"] for each in some), "highest": max(each["highest"] for each in some)}
+    if "counts" in one and "counts" in other:
+        both = one["counts"] | other["counts"]
+        counts = {name: one["counts"].get(name, 0) + other["counts"].get(name, 0) for name in both}
+        if len(counts) <= FEW_VALUES:
+            told |= {"distinct": len(counts), "counts": {name: counts[name] for name in sorted(counts, key=float)}}
+    return told
 
 
 def _attribute(values: Any) -> dict[str, Any]:
@@ -183,7 +232,8 @@ def _in_words(told: dict[str, Any]) -> dict[str, Any]:
 def _range(facts: dict[str, Any]) -> str:
     if "counts" in facts:
         return ", ".join(f"{value} ({n} points)" for value, n in facts["counts"].items()) or "unknown"
-    return f"{facts['lowest']:.10g} to {facts['highest']:.10g}, {facts['distinct']} values"
+    values = f", {facts['distinct']} values" if "distinct" in facts else ""
+    return f"{facts['lowest']:.10g} to {facts['highest']:.10g}{values}"
 
 
 def _words(value: Any, name: str) -> Any:

@@ -39,8 +39,10 @@ def rerun(
         from ..errors import RecipeError
         from ..io.scans import read_cloud
         from ..io.skeletons import read_skeleton
-        from ..recipes import identical
+        from ..io.streaming import sample_for
+        from ..recipes import from_recipe, identical
         from ..recipes import rerun as run_again
+        from ..recipes.rerun import is_of_sample
         from ..viewing.recorder import ContractionRecorder
         from .outputs import check_outputs, write
         from .running import print_results, run
@@ -52,9 +54,12 @@ def rerun(
         with progress(not quiet and not verbose) as update:
             update(f"reading {result.name}")
             made = read_skeleton(result)
-            with holding_interrupts():
-                cloud = read_cloud(scan) if scan is not None else None
             try:
+                if scan is None or not is_of_sample(made):
+                    with holding_interrupts():
+                        cloud = read_cloud(scan) if scan is not None else None
+                else:
+                    cloud = sample_for(from_recipe(made.report.recipe), scan, stream=True)
                 skeleton, seconds = run(partial(run_again, made), cloud, update, recorder)
             except RecipeError as error:
                 raise RecipeError(f"{result}: cannot be repeated: {error}") from error

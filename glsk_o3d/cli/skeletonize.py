@@ -24,9 +24,10 @@ from .options import (
     Verbose,
     Where,
 )
-from .reporting import holding_interrupts, reporting
+from .reporting import WrongUsage, holding_interrupts, reporting
 
 if TYPE_CHECKING:
+    from ..pipeline import Pipeline
     from ..skeleton import Skeleton
 
 
@@ -75,6 +76,15 @@ def skeletonize(
         Path | None,
         typer.Option("--save-recipe", metavar="FILE", help="Also write the pipeline as run to a json or toml file."),
     ] = None,
+    stream: Annotated[
+        bool | None,
+        typer.Option(
+            "--stream/--no-stream",
+            help="Read the scan in blocks, and of it the sample that its skeleton is made from: memory does not grow "
+            "with the file. By default where it has more than ten million points.",
+            show_default=False,
+        ),
+    ] = None,
     drop_invalid: DropInvalid = False,
     cut_loops: CutLoops = False,
     as_json: Json = False,
@@ -87,7 +97,6 @@ def skeletonize(
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
         from ..io.meshes import save_mesh
-        from ..io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
         from ..recipes import save_recipe as write_recipe
         from ..recipes import to_recipe
         from ..recipes.writing import recipe_ending
@@ -108,14 +117,12 @@ def skeletonize(
         recorder = ContractionRecorder() if report is not None else None
         with progress(not quiet and not verbose) as update:
             update(f"reading {scan.name}")
-            with holding_interrupts():
-                read = read_cloud if labelled is None else read_tensor_cloud
-                cloud = read(scan, where=where)
+            cloud, write_labelled = _read(scan, where, chosen, stream, labelled, quiet)
             skeleton, seconds = run(chosen, cloud, update, recorder)
             if tubes is not None:
                 others[tubes] = lambda path: save_mesh(skeleton.to_tubes(), path)
             if labelled is not None:
-                others[labelled] = lambda path: save_tensor_cloud(_labelled(skeleton, cloud), path)
+                others[labelled] = lambda path: write_labelled(skeleton, path)
             written, problems = write(
                 skeleton,
                 outputs,
@@ -128,6 +135,30 @@ def skeletonize(
                 recorder=recorder,
             )
         print_results(skeleton, seconds, written, problems, quiet=quiet, verbose=verbose, as_json=as_json)
+
+
+def _read(
+    scan: Path, where: str | None, pipeline: Pipeline[Any], stream: bool | None, labelled: Path | None, quiet: bool
+) -> tuple[Any, Callable[[Skeleton, Path], object]]:
+    """The cloud, or the sample of a large one; and what writes all of it with labels."""
+    from ..interop.packages import import_open3d
+    from ..io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
+    from ..io.streaming import STREAMED_ENDING, annotate_file, sample_for
+
+    with holding_interrupts():
+        import_open3d()
+    if labelled is None or labelled.suffix.lower() == STREAMED_ENDING:
+        sample = sample_for(pipeline, scan, where, stream)
+        if sample is not None:
+            if not quiet:
+                n = len(sample.point.positions)
+                typer.echo(f"{scan}: read in blocks: the skeleton is that of a sample of {n} points", err=True)
+            return sample, lambda skeleton, path: annotate_file(skeleton, scan, path, where=where)
+    elif stream:
+        raise WrongUsage(f"{labelled}: --stream writes a cloud with labels as {STREAMED_ENDING} alone")
+    with holding_interrupts():
+        cloud = (read_cloud if labelled is None else read_tensor_cloud)(scan, where=where)
+    return cloud, lambda skeleton, path: save_tensor_cloud(_labelled(skeleton, cloud), path)
 
 
 def _labelled(skeleton: Skeleton, cloud: Any) -> Any:

@@ -11,6 +11,8 @@ from ..errors import InvalidCloudError
 from .packages import import_open3d
 
 ACCEPTED = "an Open3D point cloud or triangle mesh (legacy or tensor) or an (N, 3) array of real numbers"
+SAMPLE_COUNT = "sample_count"
+"""The attribute of a tensor cloud that says how many points of a larger one each stands for."""
 MOST_NEIGHBOURS = 30  # within a radius without a limit of its own: as many as Open3D's KDTreeSearchParamKNN has
 
 
@@ -76,6 +78,34 @@ def cloud_points(cloud: Any) -> np.ndarray:
             f"a {type(cloud).__name__} of shape {array.shape} and dtype {array.dtype} is no cloud: give {ACCEPTED}"
         )
     return np.array(array, np.float64, order="C")
+
+
+def cloud_counts(cloud: Any, finite: np.ndarray) -> np.ndarray | None:
+    """How many points of a larger cloud each point of a sample stands for.
+
+    Parameters
+    ----------
+    cloud : cloud
+    finite : (N,) bool array
+        The points to tell it of.
+
+    Returns
+    -------
+    (n,) float64 array or None
+        The attribute ``sample_count`` of a tensor cloud, as `glsk_o3d.read_sample` gives it; None if there is none.
+
+    Raises
+    ------
+    InvalidCloudError
+        Some are not positive.
+    """
+    name, tensor = open3d_class(cloud)
+    if not (name == "PointCloud" and tensor and SAMPLE_COUNT in cloud.point):
+        return None
+    counts = cloud.point[SAMPLE_COUNT].cpu().numpy().astype(float).reshape(-1)[finite]
+    if not (counts > 0).all():
+        raise InvalidCloudError(f"the cloud's attribute {SAMPLE_COUNT} must be above 0 everywhere")
+    return counts
 
 
 def _held(cloud: Any) -> Any:

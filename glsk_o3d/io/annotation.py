@@ -61,20 +61,46 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     that of labels means nothing where branches meet. Annotate its result once more.
     """
     points, vertex = vertex_of_cloud(skeleton, cloud)
-    branch = branch_of_point(skeleton, points, vertex)
     geometry, put = _copy(points if cloud is None else cloud)
-    put("skeleton_vertex", vertex[:, None], "int32")
-    put("branch", branch[:, None], "int32")
-    put("order", np.where(branch >= 0, branch_table(skeleton).order[branch], -1)[:, None], "int32")
+    found = labels(skeleton, points, vertex, thickness_of_points(skeleton, points, vertex), color)
+    for name, values in found.items():
+        whole = values.dtype.kind != "f"
+        put(name, values if values.ndim == 2 else values[:, None], values.dtype.name if whole else None)
+    return geometry
+
+
+def labels(
+    skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray, thickness: np.ndarray, color: ColorChoice | None = None
+) -> dict[str, np.ndarray]:
+    """What `annotate` says of points.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    points : (N, 3) float array
+    vertex : (N,) int array
+        What each belongs to, -1 for nothing.
+    thickness : (N,) float array
+    color : optional
+        As for `annotate`.
+
+    Returns
+    -------
+    dict of str to (N,) array
+        Integers are int32; ``colors`` are (N, 3) uint8, if asked for.
+    """
+    branch = branch_of_point(skeleton, points, vertex)
+    orders = np.where(branch >= 0, branch_table(skeleton).order[branch], -1)
+    whole = {"skeleton_vertex": vertex, "branch": branch, "order": orders}
+    found = {name: values.astype(np.int32) for name, values in whole.items()}
     for name, values in (("radius", skeleton.radii), ("confidence", skeleton.confidence)):
-        put(name, np.where(vertex >= 0, values[vertex], np.nan)[:, None])
-    thickness = thickness_of_points(skeleton, points, vertex)
-    put("thickness", thickness[:, None])
+        found[name] = np.where(vertex >= 0, values[vertex], np.nan)
+    found["thickness"] = thickness
     if color is not None:
         thick = isinstance(color, str) and color == "thickness"  # of these points, not of those of the skeleton
         colors = thickness_shades(thickness) if thick else shades(skeleton, color, branch, vertex)
-        put("colors", np.round(255 * colors), "uint8")
-    return geometry
+        found["colors"] = np.round(255 * colors).astype(np.uint8)
+    return found
 
 
 def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -182,16 +184,23 @@ def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
 
 def read_whole(path: str | os.PathLike) -> Scan:
     """Read all points of a cloud or mesh, and its triangles."""
+    path = scan_file(path)
+    with refused_where_damaged(path):
+        scan = _CLOUD_READERS[path.suffix.lower()](path)
+    if len(scan) == 0:
+        raise holds_no_points(path)
+    return scan
+
+
+def scan_file(path: str | os.PathLike) -> Path:
+    """The path of a file that can be a scan; errors as from `read_cloud`, but for those of reading it."""
     path = existing_file(path) if Path(path).suffix.lower() in _LOOK_THEMSELVES else check_scan(path)
     ending = path.suffix.lower()
     if holds_skeleton(path) if ending in SCAN_ENDINGS else _is_skeleton(path):
         raise FileFormatError(f"{path}: is a skeleton, not a scan")
     if ending not in SCAN_ENDINGS:
         raise unknown_ending(path, SCAN_ENDINGS)
-    scan = _read(path, ending)
-    if len(scan) == 0:
-        raise FileFormatError(f"{path}: no points could be read: it is damaged, empty, or not a {ending} file")
-    return scan
+    return path
 
 
 def check_scan(path: str | os.PathLike) -> Path:
@@ -213,16 +222,23 @@ def _is_skeleton(path: Path) -> bool:
     return True
 
 
-def _read(path: Path, ending: str) -> Scan:
-    """The points of a file, none if it has none; FileFormatError where it is damaged."""
+@contextmanager
+def refused_where_damaged(path: Path) -> Iterator[None]:
+    """FileFormatError for what goes wrong with the contents of a file."""
     try:
-        return _CLOUD_READERS[ending](path)
+        yield
     except MissingPackageError:
         raise
     except NoPoints as error:
         raise FileFormatError(f"{path}: no points could be read: {error}") from None
     except Exception as error:  # whatever a parser raises on a hostile file, std::bad_alloc
-        raise FileFormatError(f"{path}: not a valid {ending} file: {error}") from error
+        raise FileFormatError(f"{path}: not a valid {path.suffix.lower()} file: {error}") from error
+
+
+def holds_no_points(path: Path) -> FileFormatError:
+    """The error for a file without points."""
+    ending = path.suffix.lower()
+    return FileFormatError(f"{path}: no points could be read: it is damaged, empty, or not a {ending} file")
 
 
 def _read_mesh(path: Path) -> Scan:

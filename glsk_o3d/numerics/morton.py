@@ -17,7 +17,9 @@ def morton_order(points: np.ndarray) -> np.ndarray:
     return np.argsort(morton_codes(points, 2**MORTON_BITS - 1), kind="stable")
 
 
-def morton_codes(points: np.ndarray, cells: float) -> np.ndarray:
+def morton_codes(
+    points: np.ndarray, cells: float, corner: np.ndarray | None = None, extent: float | None = None
+) -> np.ndarray:
     """Morton code of the cell of every point, in a cubic grid with its corner in that of the bounding box.
 
     Parameters
@@ -25,15 +27,19 @@ def morton_codes(points: np.ndarray, cells: float) -> np.ndarray:
     points : (n, 3) float array
     cells : float
         Cells along the longest side of the bounding box; at most 2^21 - 1.
+    corner : (3,) float array, optional
+    extent : float, optional
+        Lowest corner and longest side of another box than that of the points, around them.
 
     Returns
     -------
     (n,) uint64 array
     """
-    extent = max(np.ptp(points, axis=0).max(), TINY)
+    corner = points.min(axis=0) if corner is None else corner
+    extent = max(np.ptp(points, axis=0).max() if extent is None else extent, TINY)
     code = np.zeros(len(points), np.uint64)
     for axis, column in enumerate(points.T):
-        cell = ((column - column.min()) / extent * cells).astype(np.uint64)
+        cell = ((column - corner[axis]) / extent * cells).astype(np.uint64)
         code |= _spread(cell) << np.uint64(axis)
     return code
 

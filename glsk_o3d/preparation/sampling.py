@@ -10,6 +10,7 @@ from ..numerics.morton import MORTON_BITS, morton_codes
 from ..numerics.vectors import dot
 
 GRID_TAIL = 0.001  # fitted: share of the points that may be far off, at either end of each axis
+TAIL_POINTS = 100000  # fitted: points by which that is told
 
 
 class Sample(NamedTuple):
@@ -20,20 +21,97 @@ class Sample(NamedTuple):
     counts: np.ndarray  # (c,) points that each stands for; copies in a row of the grid's finest cells count once
 
 
-def sample_cloud(points: np.ndarray, n: int) -> Sample:
+def sample_cloud(points: np.ndarray, n: int, counts: np.ndarray | None = None) -> Sample:
     """About n points that stand for a cloud of more than twice as many, or all of a smaller one.
 
     Parameters
     ----------
     points : (m, 3) float array
     n : int
+    counts : (m,) float array, optional
+        Points of another cloud that each of these stands for already.
     """
-    return sample_grid(points, n) if len(points) > 2 * n else everybody(points)
+    if counts is None:
+        return sample_grid(points, n) if len(points) > 2 * n else everybody(points)
+    if len(points) <= 2 * n:
+        return everybody(points)._replace(counts=counts)
+    sample = sample_grid(points, n)
+    return sample._replace(counts=np.bincount(sample.representative, counts))
 
 
 def everybody(points: np.ndarray) -> Sample:
     """All points, each for itself."""
     return Sample(np.arange(len(points)), np.arange(len(points)), np.ones(len(points)))
+
+
+class Grid(NamedTuple):
+    """Where the cells of a cubic grid around a cloud are. Points far off share the cells at its border."""
+
+    low: np.ndarray  # (3,) to which coordinates are raised
+    high: np.ndarray  # (3,) and lowered
+    corner: np.ndarray  # (3,) lowest coordinates then
+    extent: float  # longest side of the box around the points then
+
+    def codes(self, points: np.ndarray, cells: float) -> np.ndarray:
+        """Morton codes of the cells of points, (m,) uint64 array, with so many cells along the longest side."""
+        return morton_codes(np.clip(points, self.low, self.high), cells, self.corner, self.extent)
+
+
+class Extent:
+    """How far a cloud reaches, told by its points in any number of blocks.
+
+    Attributes
+    ----------
+    n : int
+        Points so far.
+    """
+
+    def __init__(self) -> None:
+        self.n = 0
+        self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
+        self._some, self._stride = np.empty((0, 3)), 1  # every so manieth point
+
+    def add(self, points: np.ndarray) -> None:
+        """Take in some points, (m, 3) float array, at least one."""
+        self._low, self._high = np.minimum(self._low, points.min(axis=0)), np.maximum(self._high, points.max(axis=0))
+        more = points[-self.n % self._stride :: self._stride]
+        while len(self._some) + len(more) > TAIL_POINTS:
+            self._some, self._stride = self._some[::2], 2 * self._stride
+            more = points[-self.n % self._stride :: self._stride]
+        self._some = np.concatenate([self._some, more])
+        self.n += len(points)
+
+    def grid(self) -> Grid:
+        """A grid around the points: a few far off do not decide how wide its cells are."""
+        low, high = np.quantile(self._some, [GRID_TAIL, 1 - GRID_TAIL], axis=0)
+        low, high = 2 * low - high, 2 * high - low
+        corner, top = (np.clip(ends, low, high) for ends in (self._low, self._high))
+        return Grid(low, high, corner, float((top - corner).max()))
+
+
+def occupied_cells(codes: np.ndarray, bits: int, n: int) -> list[int]:
+    """Numbers of occupied cells of grids each twice as fine as the one before, from one cell to at least n, or to all.
+
+    Parameters
+    ----------
+    codes : (m,) uint64 array
+        Morton codes of the occupied cells of the finest of them, in order; they may repeat.
+    bits : int
+        Per axis of these.
+    n : int
+    """
+    counts = [1]
+    while counts[-1] < n and len(counts) <= bits:
+        counts.append(1 + np.count_nonzero(np.diff(codes >> np.uint64(3 * (bits - len(counts))))))
+    return counts
+
+
+def cells_along(counts: list[int], n: int) -> float:
+    """How many cells a grid must have along its longest side for about n to be occupied, by `occupied_cells`."""
+    if counts[-1] < n:
+        return 2**MORTON_BITS - 1
+    wider = np.log(counts[-1] / n) / np.log(counts[-1] / counts[-2])
+    return 2 ** (len(counts) - 1 - wider)
 
 
 def sample_grid(points: np.ndarray, n: int) -> Sample:
@@ -48,21 +126,17 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     Returns
     -------
     Sample
-        One point per cell, about n. Points far off share the cells at the border.
+        One point per cell, about n.
     """
-    # A few points far off must not decide how wide the cells are.
-    low, high = np.quantile(points[:: 1 + len(points) // 100000], [GRID_TAIL, 1 - GRID_TAIL], axis=0)
-    inner = np.clip(points, 2 * low - high, 2 * high - low)
-    code = morton_codes(inner, 2**MORTON_BITS - 1)
+    extent = Extent()
+    extent.add(points)
+    grid = extent.grid()
+    code = grid.codes(points, 2**MORTON_BITS - 1)
     order = np.argsort(code, kind="stable")
-    ordered = code[order]
-    counts = [1]
-    while counts[-1] < n:  # cells half as wide
-        if len(counts) > MORTON_BITS:
-            return everybody(points)
-        counts.append(1 + np.count_nonzero(np.diff(ordered >> np.uint64(3 * (MORTON_BITS - len(counts))))))
-    wider = np.log(counts[-1] / n) / np.log(counts[-1] / counts[-2])
-    code = morton_codes(inner, 2 ** (len(counts) - 1 - wider))[order]
+    counts = occupied_cells(code[order], MORTON_BITS, n)
+    if counts[-1] < n:
+        return everybody(points)
+    code = grid.codes(points, cells_along(counts, n))[order]
     again = np.argsort(code, kind="stable")
     order, code = order[again], code[again]
     begin = np.flatnonzero(np.append(True, code[1:] != code[:-1]))
@@ -71,8 +145,8 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     ordered = points[order]
     x, y, z = (ordered[1:] != ordered[:-1]).T
     fresh = np.append(True, x | y | z)  # no copy of the one before
-    counts = np.bincount(cell, fresh)
-    mean = np.add.reduceat(ordered * fresh[:, None], begin) / counts[:, None]
+    weight = np.bincount(cell, fresh)
+    mean = np.add.reduceat(ordered * fresh[:, None], begin) / weight[:, None]
     away = ordered - np.repeat(mean, size, axis=0)
     squared = dot(away, away)
     nearest = np.flatnonzero(squared == np.repeat(np.minimum.reduceat(squared, begin), size))
@@ -80,4 +154,4 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     kept[cell[nearest[::-1]]] = order[nearest[::-1]]
     representative = np.empty(len(points), int)
     representative[order] = cell
-    return Sample(kept, representative, counts)
+    return Sample(kept, representative, weight)

@@ -34,6 +34,11 @@ def identical(skeleton: Skeleton, other: Skeleton) -> bool:
     )
 
 
+def is_of_sample(skeleton: Skeleton) -> bool:
+    """Whether the points that a skeleton was made from stand for more, as those of `glsk_o3d.read_sample` do."""
+    return 0 < len(skeleton.points) < skeleton.report.n_input
+
+
 def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -> Skeleton:
     """Make a skeleton again with the recipe in its report.
 
@@ -83,6 +88,8 @@ def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -
         return pipeline(cloud, **callbacks)
     if not len(skeleton.points):
         raise RecipeError("it holds no points: give the scan")
+    if is_of_sample(skeleton):
+        raise RecipeError("it holds a sample of a large cloud, and not how many points each stands for: give the scan")
     first = max((i for i, stage in enumerate(pipeline.stages) if stage.produces is Cloud), default=-1) + 1
     again = Pipeline(*pipeline.stages[first:])(skeleton.points, **callbacks)
     if first:

@@ -169,3 +169,25 @@ def test_without_a_package_it_says_which_files_cannot_be_read(invoke, monkeypatc
     monkeypatch.setitem(sys.modules, "pye57", None)
     assert list(json.loads(invoke("info", "--json").stdout)["lacking"]) == [".e57"]
     assert ".e57: pye57 cannot be imported: pip install" in " ".join(invoke("info").stdout.split())
+
+
+def test_a_large_cloud_is_told_block_by_block(told, scans, tmp_path, monkeypatch):
+    import open3d as o3d
+
+    from glsk_o3d import save_tensor_cloud
+    from glsk_o3d.io import streaming
+    from glsk_o3d.io.clouds import blocks
+
+    random = np.random.default_rng(2)
+    places = random.normal(size=(500, 3))
+    places[77] = np.nan
+    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(places))
+    cloud.point.label = o3d.core.Tensor(random.integers(0, 9, (500, 1)).astype(np.int32))
+    cloud.point.time = o3d.core.Tensor(random.random((500, 1)))
+    save_tensor_cloud(cloud, tmp_path / "c.ply")
+    whole = told(tmp_path / "c.ply")
+    monkeypatch.setattr(streaming, "LARGE_CLOUD", 499)
+    monkeypatch.setitem(blocks.read_blocks.__kwdefaults__, "rows", 60)
+    found = told(tmp_path / "c.ply")
+    assert whole["attributes"]["time"].pop("distinct") == 500
+    assert found == {name: whole[name] for name in whole if name not in ("duplicates", "median_spacing", "triangles")}

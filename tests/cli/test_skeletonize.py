@@ -266,3 +266,36 @@ def test_a_writer_that_breaks_does_not_keep_the_others_from_it(invoke, scans, tm
     assert result.exit_code == 1
     assert result.stderr == "glsk: error: s.png: cannot be written: ZeroDivisionError: division by zero\n"
     assert [path.name for path in tmp_path.iterdir()] == ["s.html"]
+
+
+def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, monkeypatch):
+    import open3d as o3d
+
+    from glsk_o3d import save_tensor_cloud
+    from glsk_o3d.io import streaming
+    from glsk_o3d.io.clouds import blocks
+
+    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(samples.torus(120000).points))
+    save_tensor_cloud(cloud, tmp_path / "scan.ply")
+    monkeypatch.setitem(blocks.read_blocks.__kwdefaults__, "rows", 30000)
+    whole = invoke("skeletonize", tmp_path / "scan.ply", "-o", "whole.json")
+    assert whole.stderr == ""
+    monkeypatch.setattr(streaming, "LARGE_CLOUD", 100000)
+    result = invoke("skeletonize", tmp_path / "scan.ply", "-o", "s.json", "--labelled", "l.ply", "--json")
+    assert result.exit_code == 0, result.output
+    facts = json.loads(result.stdout)
+    assert (facts["points"], facts["loops"]) == (120000, 1)
+    assert f"read in blocks: the skeleton is that of a sample of {facts['sampled']} points" in result.stderr
+    np.testing.assert_allclose(read_skeleton("s.json").vertices, read_skeleton("whole.json").vertices, atol=1e-9)
+    assert len(read_tensor_cloud("l.ply").point.branch) == 120000
+    again = invoke("rerun", "s.json", "--json")
+    assert "it holds a sample of a large cloud, and not how many points each stands for: give the scan" in again.stderr
+    assert json.loads(invoke("rerun", "s.json", tmp_path / "scan.ply", "--json").stdout)["identical"]
+    assert invoke("skeletonize", tmp_path / "scan.ply", "-o", "s.json", "--quiet").stderr == ""
+    assert invoke("skeletonize", tmp_path / "scan.ply", "-o", "s.json", "--no-stream").stderr == ""
+
+
+def test_a_sample_that_cannot_be_taken(refused, scans):
+    words = ("skeletonize", scans / "sample.ply", "--stream", "-o", "s.json")
+    assert "this pipeline takes all points of a cloud" in refused(2, *words, "--pipeline", "wen2024")
+    assert "--stream writes a cloud with labels as .ply alone" in refused(2, *words, "--labelled", "l.npz")

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
-from .scanned import Scan, named_attributes
+from .scanned import ALL_ROWS, Scan, named_attributes, only
 
 _PCD_NORMALS = ["normal_x", "normal_y", "normal_z"]
 _PCD_TYPES = {kind + size for kind, sizes in (("F", "48"), ("I", "1248"), ("U", "1248")) for size in sizes}
+_PLACE = (" x", " y", " z")  # after the number of the field
 _PACKED_COLORS = ("rgb", "rgba")
 
 
@@ -40,14 +43,51 @@ def read(path: Path) -> Scan:
     """The points of a PCD file; ValueError where it is damaged or breaks off."""
     with path.open("rb") as stream:
         row, points, kept = read_header(stream)
-        if kept == "ascii":
-            columns = _text(stream, row, points)
-        elif kept == "binary":
-            columns = _rows(stream.read(), row, points)
-        elif kept == "binary_compressed":
-            columns = _compressed(stream, row, points)
-        else:
+        if kept == "binary_compressed":
+            return _scan(_compressed(stream, row, points))
+        if kept not in _ROW_READERS:
             raise ValueError(f"its data are {kept!r}, which is not understood")
+    return only(blocks(path, ALL_ROWS))
+
+
+def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan] | None:
+    """The same, so many points at a time; None where it has to be read whole, since columns follow each other.
+
+    `bare` ones are positions alone.
+    """
+    with path.open("rb") as stream:
+        row, points, kept = read_header(stream)
+        start = stream.tell()
+    if kept not in _ROW_READERS:
+        return None
+    there = (path.stat().st_size - start) // row.itemsize
+    if kept == "binary" and there < points:
+        raise _broken_off(points, there)
+    found = _blocks(path, start, row, points, _ROW_READERS[kept], rows)
+    return (_scan({name: columns[name] for name in columns if not bare or name[-2:] in _PLACE}) for columns in found)
+
+
+def promised(path: Path) -> int | None:
+    """The points that the header promises; None where they have to be read whole."""
+    with path.open("rb") as stream:
+        _, points, kept = read_header(stream)
+    return points if kept in _ROW_READERS else None
+
+
+def _blocks(
+    path: Path, start: int, row: np.dtype, points: int, read_rows: _RowReader, rows: int
+) -> Iterator[dict[str, np.ndarray]]:
+    with path.open("rb") as stream:
+        stream.seek(start)
+        for begin in range(0, points, rows):
+            n = min(rows, points - begin)
+            columns, found = read_rows(stream, row, n)
+            if found < n:
+                raise _broken_off(points, begin + found)
+            yield columns
+
+
+def _scan(columns: dict[str, np.ndarray]) -> Scan:
     known = {name.partition(" ")[2]: values[:, 0] for name, values in columns.items() if values.shape[1] == 1}
     if not set("xyz") <= known.keys():
         raise ValueError("it has no fields x, y and z")
@@ -71,24 +111,27 @@ def _broken_off(points: int, found: int) -> ValueError:
     return ValueError(f"it promises {points} points and holds {found}: it breaks off")
 
 
-def _text(stream: BinaryIO, row: np.dtype, points: int) -> dict[str, np.ndarray]:
-    lines = [line.decode("ascii", "replace") for line in stream if line.strip()][:points]
-    if len(lines) < points:
-        raise _broken_off(points, len(lines))
+def _text(stream: BinaryIO, row: np.dtype, n: int) -> tuple[dict[str, np.ndarray], int]:
+    """The next n rows, or those that are left, and how many they are."""
+    lines = [line.decode("ascii", "replace") for line in islice((line for line in stream if line.strip()), n)]
     widths = [row[name].shape[0] for name in row.names or ()]
     table = (
         np.loadtxt(lines, ndmin=2, comments=None, usecols=range(sum(widths))) if lines else np.empty((0, sum(widths)))
     )
     parts = np.split(table, np.cumsum(widths)[:-1], axis=1)
     with np.errstate(invalid="ignore"):
-        return {name: part.astype(row[name].base) for name, part in zip(row.names or (), parts, strict=True)}
+        columns = {name: part.astype(row[name].base) for name, part in zip(row.names or (), parts, strict=True)}
+    return columns, len(lines)
 
 
-def _rows(data: bytes, row: np.dtype, points: int) -> dict[str, np.ndarray]:
-    if len(data) < points * row.itemsize:
-        raise _broken_off(points, len(data) // row.itemsize)
-    table = np.frombuffer(data, row, points)
-    return {name: table[name] for name in row.names or ()}
+def _rows(stream: BinaryIO, row: np.dtype, n: int) -> tuple[dict[str, np.ndarray], int]:
+    data = stream.read(n * row.itemsize)
+    table = np.frombuffer(data, row, len(data) // row.itemsize)
+    return {name: table[name] for name in row.names or ()}, len(table)
+
+
+_RowReader = Callable[[BinaryIO, np.dtype, int], tuple[dict[str, np.ndarray], int]]
+_ROW_READERS: dict[str, _RowReader] = {"ascii": _text, "binary": _rows}
 
 
 def _compressed(stream: BinaryIO, row: np.dtype, points: int) -> dict[str, np.ndarray]:

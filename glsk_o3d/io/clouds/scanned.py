@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from keyword import iskeyword
 from typing import Any
@@ -14,6 +15,7 @@ from ...interop.packages import import_open3d
 
 COLOR_CHANNELS = ["red", "green", "blue"]
 NO_TRIANGLES = np.empty((0, 3), np.int64)
+ALL_ROWS = sys.maxsize  # derived: more than any file has
 
 
 class NoPoints(Exception):
@@ -58,6 +60,21 @@ class Scan:
             unset=self.unset,
         )
 
+    @staticmethod
+    def joined(parts: Iterable[Scan]) -> Scan:
+        """The points of several scans with the same columns, one after the other; unset is what is so in all."""
+        parts = list(parts)
+        if len(parts) == 1:
+            return parts[0]
+        colors, normals = ([getattr(part, name) for part in parts] for name in ("colors", "normals"))
+        return Scan(
+            np.concatenate([part.positions for part in parts]),
+            None if colors[0] is None else np.concatenate(colors),
+            None if normals[0] is None else np.concatenate(normals),
+            {name: np.concatenate([part.attributes[name] for part in parts]) for name in parts[0].attributes},
+            unset=frozenset.intersection(*(part.unset for part in parts)),
+        )
+
     @property
     def given(self) -> dict[str, np.ndarray]:
         """The attributes that are not unset."""
@@ -67,6 +84,20 @@ class Scan:
     def columns(self) -> dict[str, np.ndarray]:
         """Everything that can be asked about a point, by name: the attributes, and ``x``, ``y`` and ``z``."""
         return {**dict(zip("xyz", self.positions.T, strict=True)), **self.attributes}
+
+    @property
+    def kinds(self) -> dict[str, np.dtype]:
+        """As what Open3D's clouds have the given attributes: int32, since Open3D writes no int64, or floats."""
+        found = {}
+        for name, values in self.given.items():
+            whole = values.dtype.kind in "iub" and np.abs(values.astype(float)).max(initial=0) < 2**31
+            found[name] = np.dtype(np.int32 if whole else values.dtype if values.dtype == np.float32 else float)
+        return found
+
+    @property
+    def shades(self) -> np.ndarray | None:
+        """The colours from 0 to 255, (N, 3) uint8 array or None."""
+        return None if self.colors is None else np.round(255 * np.clip(self.colors, 0, 1)).astype(np.uint8)
 
     def to_legacy(self) -> Any:
         """As an ``open3d.geometry.PointCloud``, which has no place for attributes."""
@@ -82,15 +113,18 @@ class Scan:
         """As an ``open3d.t.geometry.PointCloud`` with everything: integers as int32, since Open3D writes no int64."""
         o3d = import_open3d()
         cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(np.ascontiguousarray(self.positions, float)))
-        if self.colors is not None:
-            cloud.point.colors = o3d.core.Tensor(np.round(255 * np.clip(self.colors, 0, 1)).astype(np.uint8))
+        if (shades := self.shades) is not None:
+            cloud.point.colors = o3d.core.Tensor(shades)
         if self.normals is not None:
             cloud.point.normals = o3d.core.Tensor(np.ascontiguousarray(self.normals, float))
-        for name, values in self.given.items():
-            whole = values.dtype.kind in "iub" and np.abs(values.astype(float)).max(initial=0) < 2**31
-            kind = np.int32 if whole else values.dtype if values.dtype == np.float32 else float
-            cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(values[:, None], kind))
+        for name, kind in self.kinds.items():
+            cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(self.attributes[name][:, None], kind))
         return cloud
+
+
+def only(blocks: Iterator[Scan] | None) -> Scan:
+    """The one block of a file that was read whole, without points if there is none."""
+    return next(blocks or iter(()), Scan(np.empty((0, 3))))
 
 
 def attribute_name(text: str, taken: Iterable[str] = ()) -> str:
@@ -119,8 +153,16 @@ def named_attributes(columns: Iterable[tuple[str, np.ndarray]]) -> dict[str, np.
     return found
 
 
-def unit_colors(values: np.ndarray) -> np.ndarray:
-    """Colours from 0 to 1, of numbers up to 255 or 65535, or up to 1 if they are no integers."""
-    top = np.nanmax(values, initial=0)
+def brightest(values: np.ndarray) -> float:
+    """The largest number among colours, at least 0; NaN is none."""
+    return float(np.fmax.reduce(values, axis=None, initial=0))
+
+
+def unit_colors(values: np.ndarray, top: float | None = None) -> np.ndarray:
+    """Colours from 0 to 1, of numbers up to 255 or 65535, or up to 1 if they are no integers.
+
+    `top` is the brightest of all, where these are only some.
+    """
+    top = brightest(values) if top is None else top
     scale = 1 if top <= 1 and values.dtype.kind == "f" else 255 if top <= 255 else 65535
     return np.asarray(values, float) / scale

@@ -56,6 +56,14 @@ def select(scan: Scan, where: str) -> Scan:
     >>> select(scan, "label == 8 and z < 0.5").positions
     array([[0., 1., 0.]])
     """
+    chosen = chosen_points(scan, where)
+    if not chosen.any():
+        raise none_chosen(where)
+    return scan[chosen]
+
+
+def chosen_points(scan: Scan, where: str) -> np.ndarray:
+    """For which points a condition holds, (N,) bool array; InvalidParameterError as from `select`."""
     try:
         chosen = np.asarray(_value(parsed(where), scan.columns))
     except (TypeError, ValueError) as error:
@@ -64,9 +72,12 @@ def select(scan: Scan, where: str) -> Scan:
         raise InvalidParameterError(f"where = {where!r}: cannot be compared: write such as 'label in (1, 2)'") from None
     if chosen.shape != (len(scan),) or chosen.dtype != bool:
         raise InvalidParameterError(f"where = {where!r}: is no condition on points: write such as 'label == 5'")
-    if not chosen.any():
-        raise InvalidCloudError(f"there is no point with {where}")
-    return scan[chosen]
+    return chosen
+
+
+def none_chosen(where: str) -> InvalidCloudError:
+    """The error for a condition that holds for no point."""
+    return InvalidCloudError(f"there is no point with {where}")
 
 
 def parsed(where: str) -> ast.expr:

@@ -113,11 +113,54 @@ def read_tables(stream: BinaryIO, wanted: Iterable[str]) -> dict[str, Table]:
     order, elements = read_header(stream)
     last = max((i for i, element in enumerate(elements) if element.name in set(wanted)), default=-1)
     tables: dict[str, Table] = {}
+    _check_names(elements[: last + 1])
     for element in elements[: last + 1]:
-        if len(set(element.names)) < len(element.names):
-            raise ValueError(f"element {element.name!r} has two properties of one name")
         tables[element.name] = _text(stream, element) if order == "" else _binary(stream, element, order)
     return {name: table for name, table in tables.items() if name in set(wanted)}
+
+
+def find_rows(stream: BinaryIO, name: str, without: Iterable[str] = ()) -> tuple[np.dtype, int] | None:
+    """Find an element whose rows can be read a few at a time.
+
+    Parameters
+    ----------
+    stream : binary stream
+        At its beginning; it can be sought, and is left at the first row.
+    name : str
+        Of the element.
+    without : iterable of str
+        Elements that the file must not have a row of.
+
+    Returns
+    -------
+    dtype and int, or None
+        What a row is, and how many there are. None if the data are text, or there are lists in it or before it, or
+        there is none.
+
+    Raises
+    ------
+    ValueError
+        It is no PLY file, or damaged, or it ends before the element does.
+    """
+    order, elements = read_header(stream)
+    at = next((i for i, element in enumerate(elements) if element.name == name), None)
+    if order == "" or at is None or any(element.rows for element in elements if element.name in set(without)):
+        return None
+    if any(column.counts for element in elements[: at + 1] for column in element.columns):
+        return None
+    _check_names(elements[: at + 1])
+    stream.seek(sum(element.rows * element.dtype(order).itemsize for element in elements[:at]), os.SEEK_CUR)
+    element, left = elements[at], max(_bytes_left(stream), 0)
+    row = element.dtype(order)
+    if left < element.rows * row.itemsize:
+        raise _broken_off(element, left // row.itemsize)
+    return row, element.rows
+
+
+def _check_names(elements: Iterable[Element]) -> None:
+    for element in elements:
+        if len(set(element.names)) < len(element.names):
+            raise ValueError(f"element {element.name!r} has two properties of one name")
 
 
 def _broken_off(element: Element, found: int) -> ValueError:
