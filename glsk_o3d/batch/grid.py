@@ -14,10 +14,15 @@ from ..errors import InvalidParameterError
 Tile = tuple[int, int, int]
 
 OVERLAP_SHARE = 1 / 8  # fitted: of the size of a tile, how far it looks beyond itself unless told
-MOST_OVERLAP = 1 / 4  # derived: of the size: tiles may be half as wide, and a point belongs to two along an axis at most
+MOST_OVERLAP = (
+    1 / 4
+)  # derived: of the size: tiles may be half as wide, and a point belongs to two along an axis at most
 SEAM_SHARE = 1 / 4  # fitted: of the overlap, how far beyond a tile its skeleton counts: more than tiles differ
 CUT_REACH = 2.0  # measured: radii from a cut through a tube up to which its skeleton strays by over 1 % of the radius
-MOST_TILES = 10_000  # fitted: files in a folder that file systems still list at once
+
+
+class TooManyParts(InvalidParameterError):
+    """A scene would be taken apart into more parts than anybody means."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ class Grid:
         """The grid over a box: along an axis that is longer than `size` as many equal tiles as it takes, else one."""
         extent = np.asarray(high, float) - low
         if not (np.isfinite(extent).all() and (extent / size < 2**20).all()):
-            raise InvalidParameterError(
+            raise TooManyParts(
                 f"tiles = {size:g}: the points span {' x '.join(f'{each:.4g}' for each in extent)}: set far ones aside "
                 "with a condition, or give larger tiles"
             )
@@ -126,6 +131,12 @@ def checked_sizes(tiles: float, overlap: float | None) -> tuple[float, float]:
 def tile_name(tile: Tile) -> str:
     """A tile as part of a name: ``0-2-0``."""
     return "-".join(map(str, tile))
+
+
+def tile_of(name: str) -> Tile:
+    """The tile that `tile_name` names."""
+    x, y, z = (int(each) for each in name.split("-"))
+    return x, y, z
 
 
 def _triple(values) -> tuple[float, float, float]:

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from ..analysis.curves import along, pieces
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
 from .grid import Grid, Tile
@@ -26,6 +27,7 @@ from .loose_ends import Seams, finished
 from .strands import BORDER, INNER, Strands, inside
 
 SAMPLE_STEP = 0.25  # fitted: of the scale of a curve, between the places at which others are compared with it
+MOST_SAMPLES = 1000  # derived: places on an edge, where the part has no thickness: a thousandth of it is near enough
 CLAIM_SHARE = 0.5  # fitted: of how far beyond its box a tile counts, up to where a piece must come to be its own
 
 
@@ -170,17 +172,14 @@ def _not_there(
 
 
 def _sampled(strands: Strands, first: int) -> Samples:
-    a, b = strands.edges.T
-    start, stop = strands.values[a], strands.values[b]
-    scale = np.fmin(start[:, 5], stop[:, 5])
-    length = norm(stop[:, :3] - start[:, :3])
-    pieces = np.maximum(np.ceil(length / np.maximum(SAMPLE_STEP * scale, length / 1000 + 1e-300)), 1).astype(np.int64)
-    edge = np.repeat(np.arange(len(a)), pieces - 1)
-    step = np.arange(len(edge)) - np.repeat(np.cumsum(pieces - 1) - (pieces - 1), pieces - 1) + 1
-    share = (step / pieces[edge])[:, None]
-    values = np.concatenate([strands.values, start[edge] + share * (stop - start)[edge]])
-    vertex = np.concatenate([np.arange(len(strands.values)), np.where(share[:, 0] <= 0.5, a[edge], b[edge])])
-    outward = np.concatenate([strands.outward(), np.zeros((len(edge), 3))])
+    places, edges = strands.values[:, :3], strands.edges
+    scale = np.fmax(np.fmin(*strands.values[edges, 5].T), np.finfo(float).tiny)
+    step = np.fmax(SAMPLE_STEP * scale, norm(places[edges[:, 1]] - places[edges[:, 0]]) / MOST_SAMPLES)
+    row, part = pieces(places, edges, step) if len(edges) else (np.empty(0, int), np.empty(0))
+    between = along(edges, row, part, strands.values) if len(edges) else np.empty((0, 6))
+    values = np.concatenate([strands.values, between])
+    vertex = np.concatenate([np.arange(len(places)), edges[row, (part > 0.5).astype(int)]])
+    outward = np.concatenate([strands.outward(), np.zeros((len(row), 3))])
     return Samples(values[:, :3], values[:, 5], first + vertex, outward)
 
 

@@ -25,7 +25,7 @@ DONE, FAILED, STALE = "done", "failed", "stale"  # the last: what is there is of
 LEDGER_COLUMNS = (
     *("name", "input", "status", "error", "seconds", "points", "dropped", "sampled", "outliers"),
     *("distinct", "contracted", "vertices", "edges", "components", "loops", "leaves", "junctions", "length"),
-    *("loops_closed", "cuts", "bridges", "uncertain"),
+    *("loops_closed", "cuts", "bridges", "uncertain", "seams", "unmatched"),
     *("iterations", "converged", "stop_reason", "warnings", "messages", "parameters", "input_hash"),
     *("outputs", "worker", "version", "finished"),
 )

@@ -57,8 +57,9 @@ class Seams:
             )
         if self.thick:
             need = grid.overlap * self.thickest / grid.thickest
+            cuts = self.joined + self.unmatched
             told.append(
-                f"{self.thick} of {self.joined + self.unmatched} seams cut a part thicker than the overlap of {grid.overlap:g} allows, "
+                f"{self.thick} of {cuts} seams cut a part thicker than the overlap of {grid.overlap:g} allows, "
                 f"radius {self.thickest:.3g}: give an overlap of {need:.3g} or more"
             )
         return told

@@ -6,9 +6,10 @@ import logging
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,9 +18,12 @@ from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
 from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
+from .inputs import TILES_FOLDER
 from .ledger import DONE, FAILED, LEDGER_COLUMNS, STALE, Row, locked
-from .plan import RECIPE_FILE, UP_TO_DATE, Plan, Task, plan_batch
-from .work import clear, told, work
+from .plan import RECIPE_FILE, UP_TO_DATE, Plan, Task
+from .planning import planned
+from .wanted import Wanted
+from .work import Job, clear, told, work
 from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, died
 
 if TYPE_CHECKING:
@@ -134,12 +138,14 @@ def run_batch(
         raise InvalidParameterError("scheduler: the cluster has its own workers: give neither workers nor an executor")
     if workers is not None and workers < 1:
         raise InvalidParameterError(f"workers = {workers}: must be at least 1")
-    folder = Path(os.path.abspath(out_dir))
+    wanted, folder = Wanted.of(**options), Path(os.path.abspath(out_dir))
     if not folder.is_dir():
-        plan_batch(inputs, folder, **options)  # what is wrong is said before there is a folder
+        planned(
+            inputs, folder, replace(wanted, cut=None), write=False
+        )  # what is wrong is said before there is a folder
         folder.mkdir(parents=True)
     with locked(folder):
-        plan = plan_batch(inputs, folder, **options)
+        plan = planned(inputs, folder, wanted, write=True)
         if on_plan is not None:
             on_plan(plan)
         crew, left = _hired(plan, workers, scheduler, executor), True
@@ -150,6 +156,7 @@ def run_batch(
                 _work_through(plan, crew, on_result)
             finally:
                 plan.ledger.close()
+            _sweep(plan)
             left = False
         finally:
             crew.close(at_once=left)
@@ -176,14 +183,36 @@ def _make_room(plan: Plan) -> None:
             rows[name] = rows.pop(name) | {"input": source}
         elif task.why != UP_TO_DATE and rows.get(name, {}).get("status") == DONE:
             rows[name]["status"] = STALE
+    for task in plan.todo:
+        if task.job.needs:
+            _forget_tiles(plan, task.job)
     plan.ledger.rewrite()
     write_json(plan.out_dir / RECIPE_FILE, plan.recipe)
     for folder in {(plan.out_dir / task.job.name).parent for task in plan.todo}:
         folder.mkdir(parents=True, exist_ok=True)
 
 
+def _forget_tiles(plan: Plan, job: Job) -> None:
+    """Drop tiles of earlier batches that are none any more, since the size has changed, or the scene."""
+    rows, first = plan.ledger.rows, job.name + TILES_FOLDER
+    for name in [name for name in rows if name.startswith(first) and name not in job.needs]:
+        for output in rows.pop(name).get("outputs", ()):
+            if output.startswith(first):
+                Path(plan.out_dir, output).unlink(missing_ok=True)
+
+
+def _sweep(plan: Plan) -> None:
+    """Remove the files of those parts of scenes that are done."""
+    for task in plan.tasks:
+        if task.job.origin and plan.ledger.rows[task.job.name]["status"] == DONE:
+            Path(task.job.path).unlink(missing_ok=True)
+            with suppress(OSError):  # others are to be done
+                Path(task.job.path).parent.rmdir()
+
+
 def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], object] | None) -> None:
-    queue, again = deque(plan.todo), deque[Task]()
+    queue, again = deque(task for task in plan.todo if not task.job.needs), deque[Task]()
+    waiting, open_jobs = [task for task in plan.todo if task.job.needs], {task.job.name for task in plan.todo}
     running: dict[Future, Task] = {}
     alone = warned = False
 
@@ -194,10 +223,21 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
         row = {"parameters": plan.parameters} | row | {"name": task.job.name, "input": task.job.source}
         row = {name: row[name] for name in LEDGER_COLUMNS if name in row}
         plan.ledger.add(row)
+        open_jobs.discard(task.job.name)
         if on_result is not None:
             on_result(row)
 
+    def hand_on():
+        for task in [task for task in waiting if open_jobs.isdisjoint(task.job.needs)]:
+            waiting.remove(task)
+            failed = [name for name in task.job.needs if plan.ledger.rows[name]["status"] != DONE]
+            if failed:
+                enter(task, _without(task, failed, plan.ledger.rows[failed[0]]["error"]))
+            else:
+                queue.append(task)
+
     with counted_interrupts() as interrupts:  # no line of the ledger is torn
+        hand_on()
         while running or ((queue or again) and not interrupts):
             while queue and not interrupts and len(running) < workers.capacity():
                 hand_out(queue.popleft())
@@ -215,6 +255,7 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
                     again.append(task)
                 else:
                     enter(task, _row(task, future, error, plan.ledger.rows.get(task.job.name, {})))
+            hand_on()
             if lost is not None:
                 raise lost
             if len(interrupts) > 1:
@@ -237,10 +278,15 @@ def _row(task: Task, future: Future, error: BaseException | None, before: Row) -
         if row.get("kept") and row["outputs"]:  # what the line told of them stays, too
             return (before or row) | {name: row[name] for name in ("status", "error", "outputs")}
         return row
+    return _failed(task, WORKER_DIED if died(error) else told(error))
+
+
+def _without(task: Task, failed: Sequence[str], error: str) -> Row:
+    """The row of what is not joined, since some of its tiles failed."""
+    count = f"{len(failed)} of {len(task.job.needs)} tiles failed"
+    return _failed(task, f"{count}, {failed[0]} since {error}: the same batch tries them again")
+
+
+def _failed(task: Task, error: str) -> Row:
     clear(task.job)
-    return {
-        "status": FAILED,
-        "error": WORKER_DIED if died(error) else told(error),
-        "outputs": [],
-        "version": __version__,
-    }
+    return {"status": FAILED, "error": error, "outputs": [], "version": __version__}

@@ -85,7 +85,7 @@ class Strands:
         """
         degree = np.bincount(self.edges[edges].ravel(), minlength=len(self.values))
         marks = self.marks.copy()
-        marks[:, mark] |= (0 < degree) & (degree < self.degree)
+        marks[:, mark] |= (degree > 0) & (degree < self.degree)
         return Strands(self.values, self.edges[edges], marks)._compact((degree > 0) | (alone & (self.degree == 0)))
 
     def with_pieces(self, chosen: np.ndarray) -> Strands:
@@ -142,4 +142,4 @@ class Strands:
 
 def inside(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Which rows, whose first columns are x, y and z, lie in a box, (n,) bool array."""
-    return ((values[:, :3] >= low) & (values[:, :3] <= high)).all(axis=1)
+    return np.all((values[:, :3] >= low) & (values[:, :3] <= high), axis=1)

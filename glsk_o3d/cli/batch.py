@@ -70,6 +70,24 @@ def batch(
         str | None,
         typer.Option("--by", metavar="ATTRIBUTE", help="One skeleton for each value of it, such as treeID."),
     ] = None,
+    tiles: Annotated[
+        float | None,
+        typer.Option(
+            "--tiles",
+            metavar="SIZE",
+            help="Take large scenes apart into tiles of at most this size, in the cloud's units, and join their "
+            "skeletons into one.",
+        ),
+    ] = None,
+    overlap: Annotated[
+        float | None,
+        typer.Option(
+            "--overlap",
+            metavar="LENGTH",
+            help="How far tiles look beyond themselves: at least 2.7 times the radius of what crosses their faces; by "
+            "default an eighth of SIZE.",
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Do also what is done already.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be done, and why.")] = False,
     as_json: Json = False,
@@ -98,6 +116,8 @@ def batch(
             recursive=recursive,
             where=where,
             by=by,
+            tiles=tiles,
+            overlap=overlap,
             force=force,
         )
         if dry_run:
