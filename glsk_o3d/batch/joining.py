@@ -163,7 +163,8 @@ def _not_there(
     ends[strands.edges[~there]] = False
     left = strands.keep(~there, ~_covered(strands.values, theirs), INNER)
     # a stretch of a curve that others saw, too, and elsewhere, is theirs; unless they have nothing there at all
-    seen = np.any([inside(left.middles, *grid.box(each, grid.trust)) for each in near], axis=0)
+    middles = left.middles
+    seen = np.any([inside(middles, *grid.box(each, grid.trust), middles[:, 5]) for each in near], axis=0)
     leaves = np.zeros(len(left.values), bool)
     leaves[left.edges[~seen]] = True
     pieces = left.pieces

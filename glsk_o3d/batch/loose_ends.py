@@ -79,6 +79,7 @@ def finished(joint: Joint, grid: Grid) -> tuple[Skeleton, Seams]:
     alive = same == np.arange(len(values))
     edges, loose = _tied(simple_edges(same[edges]), same[np.array(joint.touching, np.int64).reshape(-1, 2)], alive)
     ends = np.concatenate([np.array(joint.open, np.int64), loose])
+    ends = ends[np.bincount(edges.ravel(), minlength=len(values))[ends] < 2]  # where curves fork, some go on
     gone, ends = _stubs(values, edges, ends)
     alive[gone] = False
     edges = edges[alive[edges].all(axis=1)]

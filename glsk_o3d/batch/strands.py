@@ -140,6 +140,7 @@ class Strands:
         return Strands(self.values[kept], number[self.edges].reshape(-1, 2), self.marks[kept])
 
 
-def inside(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Which rows, whose first columns are x, y and z, lie in a box, (n,) bool array."""
-    return np.all((values[:, :3] >= low) & (values[:, :3] <= high), axis=1)
+def inside(values: np.ndarray, low: np.ndarray, high: np.ndarray, by: np.ndarray | float = 0.0) -> np.ndarray:
+    """Which rows, whose first columns are x, y and z, lie in a box, so far from its faces at least, (n,) bool array."""
+    places, by = values[:, :3], np.reshape(by, (-1, 1))
+    return np.all((places >= low + by) & (places <= high - by), axis=1)
