@@ -72,7 +72,7 @@ class Scene:
 
 
 def make_scene(count: int) -> Scene:
-    """Fifty objects turned at random, some of them exactly on seams and corners of the tiles."""
+    """Objects turned at random, some of them exactly on seams and corners of the tiles."""
     rng = np.random.default_rng(0)
     cells = [(i, j) for i in range(COLUMNS) for j in range(ROWS)]
     made, places = [], []

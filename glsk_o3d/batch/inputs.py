@@ -116,7 +116,8 @@ def find_inputs(
         found.named |= new
     if not found.named:
         path, reason = next(iter(found.left_out.items()))
-        raise InvalidParameterError(f"no input can be taken apart; {path}: {reason}")
+        apart = "" if splitter is None else f"{splitter.cut}: "
+        raise InvalidParameterError(f"{apart}no input can be taken apart; {path}: {reason}")
     return found
 
 

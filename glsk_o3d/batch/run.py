@@ -6,24 +6,24 @@ import logging
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import __version__
 from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
 from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
 from .inputs import TILES_FOLDER
-from .ledger import DONE, FAILED, LEDGER_COLUMNS, STALE, Row, locked
+from .ledger import DONE, FAILED, STALE, Row, locked
 from .plan import RECIPE_FILE, UP_TO_DATE, Plan, Task
 from .planning import planned
+from .queueing import Queue
 from .wanted import Wanted
-from .work import Job, clear, told, work
+from .work import Job, work
 from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, died
 
 if TYPE_CHECKING:
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 _POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed
 CANCELLED = "the work was cancelled, or its scheduler has gone: run the same batch to go on"
-WORKER_DIED = "the worker died with it, twice: out of memory, or a crash in native code"
 _log = logging.getLogger(__name__)
 
 
@@ -211,36 +210,17 @@ def _sweep(plan: Plan) -> None:
 
 
 def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], object] | None) -> None:
-    queue, again = deque(task for task in plan.todo if not task.job.needs), deque[Task]()
-    waiting, open_jobs = [task for task in plan.todo if task.job.needs], {task.job.name for task in plan.todo}
+    queue, again = Queue(plan, on_result), deque[Task]()
     running: dict[Future, Task] = {}
     alone = warned = False
 
     def hand_out(task):
         running[workers.submit(work, task.job)] = task
 
-    def enter(task, row):
-        row = {"parameters": plan.parameters} | row | {"name": task.job.name, "input": task.job.source}
-        row = {name: row[name] for name in LEDGER_COLUMNS if name in row}
-        plan.ledger.add(row)
-        open_jobs.discard(task.job.name)
-        if on_result is not None:
-            on_result(row)
-
-    def hand_on():
-        for task in [task for task in waiting if open_jobs.isdisjoint(task.job.needs)]:
-            waiting.remove(task)
-            failed = [name for name in task.job.needs if plan.ledger.rows[name]["status"] != DONE]
-            if failed:
-                enter(task, _without(task, failed, plan.ledger.rows[failed[0]]["error"]))
-            else:
-                queue.append(task)
-
     with counted_interrupts() as interrupts:  # no line of the ledger is torn
-        hand_on()
-        while running or ((queue or again) and not interrupts):
-            while queue and not interrupts and len(running) < workers.capacity():
-                hand_out(queue.popleft())
+        while running or ((queue.ready or again) and not interrupts):
+            while queue.ready and not interrupts and len(running) < workers.capacity():
+                hand_out(queue.ready.popleft())
             if again and not running and not interrupts:
                 alone = True
                 hand_out(again.popleft())
@@ -254,8 +234,7 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
                 elif died(error) and not alone:
                     again.append(task)
                 else:
-                    enter(task, _row(task, future, error, plan.ledger.rows.get(task.job.name, {})))
-            hand_on()
+                    queue.enter(task, queue.row(task, future, error))
             if lost is not None:
                 raise lost
             if len(interrupts) > 1:
@@ -267,26 +246,3 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
                 workers.capacity()  # notices that a scheduler has gone
         if interrupts:
             raise KeyboardInterrupt
-
-
-def _row(task: Task, future: Future, error: BaseException | None, before: Row) -> Row:
-    if error is None:
-        row = future.result()
-        missing = row["error"].startswith("no such file") or ": no such folder" in row["error"]
-        if missing and Path(task.job.path).exists():
-            row["error"] += f" (on {row['worker']}; there is one here: workers need the same files by the same paths)"
-        if row.get("kept") and row["outputs"]:  # what the line told of them stays, too
-            return (before or row) | {name: row[name] for name in ("status", "error", "outputs")}
-        return row
-    return _failed(task, WORKER_DIED if died(error) else told(error))
-
-
-def _without(task: Task, failed: Sequence[str], error: str) -> Row:
-    """The row of what is not joined, since some of its tiles failed."""
-    count = f"{len(failed)} of {len(task.job.needs)} tiles failed"
-    return _failed(task, f"{count}, {failed[0]} since {error}: the same batch tries them again")
-
-
-def _failed(task: Task, error: str) -> Row:
-    clear(task.job)
-    return {"status": FAILED, "error": error, "outputs": [], "version": __version__}

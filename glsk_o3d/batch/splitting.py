@@ -46,6 +46,9 @@ class Cut:
     where: str | None = None
     drop_invalid: bool = False
 
+    def __str__(self) -> str:
+        return f"by = {self.by!r}" if self.tiles is None else f"tiles = {self.tiles:g}"
+
 
 @dataclass(frozen=True)
 class Split:
@@ -159,9 +162,8 @@ def _divided(path: Path, cut: Cut, digest: str, files: PartFiles | None) -> Spli
         found = list(_by_label(scan, cut.by) if grid is None else _by_tile(scan, grid))
         parts |= {label: meant for label, meant, _ in found}
         if len(parts) > MOST_PARTS:
-            what = f"by = {cut.by!r}" if grid is None else f"tiles = {cut.tiles:g}"
             why = "it numbers no things" if grid is None else "give larger tiles"
-            raise TooManyParts(f"{what}: has {len(parts)} values or more in {path}: {why}")
+            raise TooManyParts(f"{cut}: has {len(parts)} parts or more in {path}: {why}")
         points += len(scan)
         kept += sum(len(rows) for _, _, rows in found) if grid is None else int(_finite(scan).sum())
         if files is not None:

@@ -248,5 +248,5 @@ def test_a_file_without_what_the_condition_names_stops_no_other(here):
 
 def test_what_numbers_no_things_is_refused(here):
     (here / "a.csv").write_text("x,y,z,time\n" + "".join(f"1,2,3,{i}\n" for i in range(10_001)))
-    with pytest.raises(InvalidParameterError, match=r"has 10001 values .* numbers no things"):
+    with pytest.raises(InvalidParameterError, match=r"has 10001 parts .* numbers no things"):
         find_inputs(["a.csv"], "out", splitter=by("time"))
