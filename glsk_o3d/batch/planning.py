@@ -106,6 +106,7 @@ def plan_batch(
 
     Of tiles the skeletons come first, and then the whole:
 
+    >>> import numpy as np
     >>> from glsk_o3d.samples import tube
     >>> with TemporaryDirectory() as folder:
     ...     np.savetxt(f"{folder}/pipe.xyz", tube(1000, radius=0.04).points)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,10 +19,11 @@ from ..interop.atomic import write_json
 from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
 from .inputs import TILES_FOLDER
-from .ledger import DONE, FAILED, STALE, Row, locked
+from .ledger import DONE, FAILED, LOCK_FILE, STALE, Row, locked
 from .plan import RECIPE_FILE, UP_TO_DATE, Plan, Task
 from .planning import planned
 from .queueing import Queue
+from .splitting import PARTS_FOLDER
 from .wanted import Wanted
 from .work import Job, work
 from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, died
@@ -138,13 +140,15 @@ def run_batch(
     if workers is not None and workers < 1:
         raise InvalidParameterError(f"workers = {workers}: must be at least 1")
     wanted, folder = Wanted.of(**options), Path(os.path.abspath(out_dir))
-    if not folder.is_dir():
+    new = not folder.is_dir()
+    if new:
         planned(
             inputs, folder, replace(wanted, cut=None), write=False
         )  # what is wrong is said before there is a folder
         folder.mkdir(parents=True)
     with locked(folder):
-        plan = planned(inputs, folder, wanted, write=True)
+        with _nothing_left_behind(folder) if new else nullcontext():
+            plan = planned(inputs, folder, wanted, write=True)
         if on_plan is not None:
             on_plan(plan)
         crew, left = _hired(plan, workers, scheduler, executor), True
@@ -163,6 +167,19 @@ def run_batch(
     failed = sum(row["status"] == FAILED for row in rows.values())
     done = len(plan.todo) - failed
     return BatchResult(rows, done, plan.skipped, failed, time.perf_counter() - start, plan.ledger.path)
+
+
+@contextmanager
+def _nothing_left_behind(folder: Path) -> Iterator[None]:
+    """Remove a new folder where it turns out that the batch cannot be planned."""
+    try:
+        yield
+    except BaseException:
+        shutil.rmtree(folder / PARTS_FOLDER, ignore_errors=True)
+        with suppress(OSError):  # on Windows nobody removes what is open
+            (folder / LOCK_FILE).unlink()
+            folder.rmdir()
+        raise
 
 
 def _hired(plan: Plan, workers, scheduler, executor) -> Workers:

@@ -169,6 +169,13 @@ def test_what_is_refused(scene, tmp_path, options, message):
         plan_batch(scene, tmp_path / "out", **options)
 
 
+def test_what_cannot_be_planned_leaves_no_folder_behind(scene, tmp_path):
+    for options in (dict(by="tree"), dict(tiles=1e-7, overlap=1e-8)):
+        with pytest.raises(InvalidParameterError):
+            run_batch(scene, tmp_path / "out", **options)
+        assert not (tmp_path / "out").exists()
+
+
 def test_a_scene_that_cannot_be_read_fails_with_its_reason(tmp_path):
     (tmp_path / "bad.ply").write_text("no")
     with ThreadPoolExecutor(1) as pool:
