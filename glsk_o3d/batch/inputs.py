@@ -10,33 +10,43 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError, did_you_mean
-from ..io.clouds.selection import labels
+from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..io.clouds.text_tables import holds_points
 from ..io.paths import SCAN_ENDINGS
-from ..io.scans import read_scan
+from .grid import TooManyParts
+from .splitting import Split, Splitter
 
-MOST_LABELS = 10_000  # fitted: more things than anybody numbers in a file; fewer than a scanner's intensities
 LISTS = (".txt", ".csv")  # what they are, their endings do not say
 RESERVED_STEMS = ("ledger", "recipe")
 """Names of files that a batch itself writes into the output folder."""
+TILES_FOLDER = ".tiles/"
+"""What follows the name of a scene in those of its tiles."""
 
 
 class Source(NamedTuple):
-    """A cloud: a file, or the points in it for which a condition holds.
+    """A cloud: a file, or some of the points in it.
 
     Attributes
     ----------
     path : Path
-    where : str
-        Empty for all points.
+    part : str
+        Which points, such as ``"where treeID == 17"`` or ``"tile 0-2-0"``; empty for all.
+    file : Path or None
+        Where these points are by themselves, as soon as a batch runs.
+    tiles : tuple of str
+        The names of the tiles from whose skeletons that of this cloud is joined.
+    split : Split or None
+        How the file was taken apart.
     """
 
     path: Path
-    where: str = ""
+    part: str = ""
+    file: Path | None = None
+    tiles: tuple[str, ...] = ()
+    split: Split | None = None
 
     def __str__(self) -> str:
-        return f"{self.path} where {self.where}" if self.where else str(self.path)
+        return f"{self.path} {self.part}" if self.part else str(self.path)
 
 
 @dataclass
@@ -59,8 +69,7 @@ def find_inputs(
     out_dir: str | os.PathLike,
     *,
     recursive: bool = False,
-    by: str | None = None,
-    where: str | None = None,
+    splitter: Splitter | None = None,
 ) -> Inputs:
     """The clouds that are meant, by the names that their results are to have.
 
@@ -72,10 +81,8 @@ def find_inputs(
         The output folder. Nothing in it counts as an input, where it lies below a folder or pattern.
     recursive : bool
         Take also the clouds in the sub-folders of folders.
-    by : str, optional
-        Take the points of a file apart by an attribute, such as ``"treeID"``: one source for each of its values.
-    where : str, optional
-        Of values of `by` take only those of points for which this holds.
+    splitter : Splitter, optional
+        Takes every file apart: a source for each label, or for each tile and one that is joined from them.
 
     Returns
     -------
@@ -84,7 +91,8 @@ def find_inputs(
         of a pattern without wildcards, or from the folder of a list (the whole path, where a list names what is not
         below); of a file that was given, its own name. It has no ending and ``/`` between folders; the ending stays
         where names would be equal without it. A file that is meant twice has the first of its names. Whether single
-        files of a list are there shows when they are read. With `by` a hyphen and the value follow.
+        files of a list are there shows when they are read. A hyphen and the value follow for a label; tiles are in a
+        folder with the ending ``.tiles``.
 
     Raises
     ------
@@ -102,13 +110,14 @@ def find_inputs(
     if not roots:
         raise InvalidParameterError("there is no input: give a folder, a glob pattern, a list (.txt) or clouds")
     for name, path in _named(roots).items():
-        new = {name: Source(path)} if by is None else _apart(name, path, by, where, found.left_out)
+        new = {name: Source(path)} if splitter is None else _apart(name, path, splitter, found.left_out)
         for each in new.keys() & found.named.keys():
             raise _one_name(found.named[each], new[each], each)
         found.named |= new
     if not found.named:
         path, reason = next(iter(found.left_out.items()))
-        raise InvalidParameterError(f"by = {by!r}: no input can be taken apart; {path}: {reason}")
+        apart = "" if splitter is None else f"{splitter.cut}: "
+        raise InvalidParameterError(f"{apart}no input can be taken apart; {path}: {reason}")
     return found
 
 
@@ -119,27 +128,23 @@ def _one_name(first: object, second: object, name: str) -> InvalidParameterError
     )
 
 
-def _apart(name: str, path: Path, by: str, where: str | None, left_out: dict[str, str]) -> dict[str, Source]:
-    """A source for every value of an attribute."""
+def _apart(name: str, path: Path, splitter: Splitter, left_out: dict[str, str]) -> dict[str, Source]:
+    """A source for every label, or for every tile and the whole."""
     try:
-        scan = read_scan(path, where)
+        split = splitter.split(name, path)
     except (FileFormatError, InvalidCloudError, OSError):
         return {name: Source(path)}  # the worker will say what is wrong
+    except TooManyParts:
+        raise
     except InvalidParameterError as error:
         left_out[str(path)] = str(error)
         return {}
-    if by not in scan.attributes:
-        left_out[str(path)] = did_you_mean(by, scan.given, "attribute of its points")
-        return {}
-    values = labels(scan, by).tolist()
-    if len(values) > MOST_LABELS:
-        raise InvalidParameterError(f"by = {by!r}: has {len(values)} values in {path}: it numbers no things")
-    return {f"{name}-{_label(value)}": Source(path, f"{by} == {value!r}") for value in values if value == value}
-
-
-def _label(value: float) -> str:
-    """A value as part of a name: all digits, since others may differ in the last one."""
-    return str(int(value)) if value == int(value) else repr(value)
+    between = "-" if split.grid is None else TILES_FOLDER
+    new = {
+        f"{name}{between}{label}": Source(path, part, splitter.file(name, label), split=split)
+        for label, part in split.parts.items()
+    }
+    return new if split.grid is None else {**new, name: Source(path, tiles=tuple(new), split=split)}
 
 
 def _meant(given: str, out: str, recursive: bool, left_out: dict[str, str]) -> Iterator[tuple[str, str]]:

@@ -22,10 +22,11 @@ except ImportError:  # Windows
 
 Row = dict[str, Any]
 DONE, FAILED, STALE = "done", "failed", "stale"  # the last: what is there is of something else, and to be done anew
+LOCK_FILE = ".ledger.lock"
 LEDGER_COLUMNS = (
     *("name", "input", "status", "error", "seconds", "points", "dropped", "sampled", "outliers"),
     *("distinct", "contracted", "vertices", "edges", "components", "loops", "leaves", "junctions", "length"),
-    *("loops_closed", "cuts", "bridges", "uncertain"),
+    *("loops_closed", "cuts", "bridges", "uncertain", "seams", "unmatched"),
     *("iterations", "converged", "stop_reason", "warnings", "messages", "parameters", "input_hash"),
     *("outputs", "worker", "version", "finished"),
 )
@@ -157,7 +158,7 @@ def locked(folder: Path) -> Iterator[None]:
 
     The lock is one of the operating system: it ends with the process that holds it, however that dies.
     """
-    with (folder / ".ledger.lock").open("a+", encoding="utf-8") as stream:
+    with (folder / LOCK_FILE).open("a+", encoding="utf-8") as stream:
         try:
             if fcntl is not None:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from dataclasses import dataclass
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import __version__
 from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
 from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
-from .ledger import DONE, FAILED, LEDGER_COLUMNS, STALE, Row, locked
-from .plan import RECIPE_FILE, UP_TO_DATE, Plan, Task, plan_batch
-from .work import clear, told, work
+from .inputs import TILES_FOLDER
+from .ledger import DONE, FAILED, LOCK_FILE, STALE, Row, locked
+from .plan import RECIPE_FILE, UP_TO_DATE, Plan, Task
+from .planning import planned
+from .queueing import Queue
+from .splitting import PARTS_FOLDER
+from .wanted import Wanted
+from .work import Job, work
 from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, died
 
 if TYPE_CHECKING:
@@ -27,7 +33,6 @@ if TYPE_CHECKING:
 
 _POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed
 CANCELLED = "the work was cancelled, or its scheduler has gone: run the same batch to go on"
-WORKER_DIED = "the worker died with it, twice: out of memory, or a crash in native code"
 _log = logging.getLogger(__name__)
 
 
@@ -134,12 +139,16 @@ def run_batch(
         raise InvalidParameterError("scheduler: the cluster has its own workers: give neither workers nor an executor")
     if workers is not None and workers < 1:
         raise InvalidParameterError(f"workers = {workers}: must be at least 1")
-    folder = Path(os.path.abspath(out_dir))
-    if not folder.is_dir():
-        plan_batch(inputs, folder, **options)  # what is wrong is said before there is a folder
+    wanted, folder = Wanted.of(**options), Path(os.path.abspath(out_dir))
+    new = not folder.is_dir()
+    if new:
+        planned(
+            inputs, folder, replace(wanted, cut=None), write=False
+        )  # what is wrong is said before there is a folder
         folder.mkdir(parents=True)
     with locked(folder):
-        plan = plan_batch(inputs, folder, **options)
+        with _nothing_left_behind(folder) if new else nullcontext():
+            plan = planned(inputs, folder, wanted, write=True)
         if on_plan is not None:
             on_plan(plan)
         crew, left = _hired(plan, workers, scheduler, executor), True
@@ -150,6 +159,7 @@ def run_batch(
                 _work_through(plan, crew, on_result)
             finally:
                 plan.ledger.close()
+            _sweep(plan)
             left = False
         finally:
             crew.close(at_once=left)
@@ -157,6 +167,19 @@ def run_batch(
     failed = sum(row["status"] == FAILED for row in rows.values())
     done = len(plan.todo) - failed
     return BatchResult(rows, done, plan.skipped, failed, time.perf_counter() - start, plan.ledger.path)
+
+
+@contextmanager
+def _nothing_left_behind(folder: Path) -> Iterator[None]:
+    """Remove a new folder where it turns out that the batch cannot be planned."""
+    try:
+        yield
+    except BaseException:
+        shutil.rmtree(folder / PARTS_FOLDER, ignore_errors=True)
+        with suppress(OSError):  # on Windows nobody removes what is open
+            (folder / LOCK_FILE).unlink()
+            folder.rmdir()
+        raise
 
 
 def _hired(plan: Plan, workers, scheduler, executor) -> Workers:
@@ -176,31 +199,45 @@ def _make_room(plan: Plan) -> None:
             rows[name] = rows.pop(name) | {"input": source}
         elif task.why != UP_TO_DATE and rows.get(name, {}).get("status") == DONE:
             rows[name]["status"] = STALE
+    for task in plan.todo:
+        if task.job.needs:
+            _forget_tiles(plan, task.job)
     plan.ledger.rewrite()
     write_json(plan.out_dir / RECIPE_FILE, plan.recipe)
     for folder in {(plan.out_dir / task.job.name).parent for task in plan.todo}:
         folder.mkdir(parents=True, exist_ok=True)
 
 
+def _forget_tiles(plan: Plan, job: Job) -> None:
+    """Drop tiles of earlier batches that are none any more, since the size has changed, or the scene."""
+    rows, first = plan.ledger.rows, job.name + TILES_FOLDER
+    for name in [name for name in rows if name.startswith(first) and name not in job.needs]:
+        for output in rows.pop(name).get("outputs", ()):
+            if output.startswith(first):
+                Path(plan.out_dir, output).unlink(missing_ok=True)
+
+
+def _sweep(plan: Plan) -> None:
+    """Remove the files of those parts of scenes that are done."""
+    for task in plan.tasks:
+        if task.job.origin and plan.ledger.rows[task.job.name]["status"] == DONE:
+            Path(task.job.path).unlink(missing_ok=True)
+            with suppress(OSError):  # others are to be done
+                Path(task.job.path).parent.rmdir()
+
+
 def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], object] | None) -> None:
-    queue, again = deque(plan.todo), deque[Task]()
+    queue, again = Queue(plan, on_result), deque[Task]()
     running: dict[Future, Task] = {}
     alone = warned = False
 
     def hand_out(task):
         running[workers.submit(work, task.job)] = task
 
-    def enter(task, row):
-        row = {"parameters": plan.parameters} | row | {"name": task.job.name, "input": task.job.source}
-        row = {name: row[name] for name in LEDGER_COLUMNS if name in row}
-        plan.ledger.add(row)
-        if on_result is not None:
-            on_result(row)
-
     with counted_interrupts() as interrupts:  # no line of the ledger is torn
-        while running or ((queue or again) and not interrupts):
-            while queue and not interrupts and len(running) < workers.capacity():
-                hand_out(queue.popleft())
+        while running or ((queue.ready or again) and not interrupts):
+            while queue.ready and not interrupts and len(running) < workers.capacity():
+                hand_out(queue.ready.popleft())
             if again and not running and not interrupts:
                 alone = True
                 hand_out(again.popleft())
@@ -214,7 +251,7 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
                 elif died(error) and not alone:
                     again.append(task)
                 else:
-                    enter(task, _row(task, future, error, plan.ledger.rows.get(task.job.name, {})))
+                    queue.enter(task, queue.row(task, future, error))
             if lost is not None:
                 raise lost
             if len(interrupts) > 1:
@@ -226,21 +263,3 @@ def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], objec
                 workers.capacity()  # notices that a scheduler has gone
         if interrupts:
             raise KeyboardInterrupt
-
-
-def _row(task: Task, future: Future, error: BaseException | None, before: Row) -> Row:
-    if error is None:
-        row = future.result()
-        missing = row["error"].startswith("no such file") or ": no such folder" in row["error"]
-        if missing and Path(task.job.path).exists():
-            row["error"] += f" (on {row['worker']}; there is one here: workers need the same files by the same paths)"
-        if row.get("kept") and row["outputs"]:  # what the line told of them stays, too
-            return (before or row) | {name: row[name] for name in ("status", "error", "outputs")}
-        return row
-    clear(task.job)
-    return {
-        "status": FAILED,
-        "error": WORKER_DIED if died(error) else told(error),
-        "outputs": [],
-        "version": __version__,
-    }

@@ -11,24 +11,31 @@ import time
 import traceback
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .. import __version__
 from ..analysis.summary import summary
-from ..errors import GlskError
-from ..io.clouds.scanned import Scan
-from ..io.clouds.selection import select
-from ..io.scans import read_cloud, read_scan
+from ..errors import GlskError, InvalidCloudError
+from ..io.scans import read_cloud
+from ..io.skeletons import read_skeleton
 from ..io.streaming import sample_for
-from ..pipeline import Pipeline
 from ..recipes import from_recipe
+from ..report import Report
+from ..skeleton import Skeleton
 from ..viewing.preview import save_preview
+from .grid import Grid, tile_of
+from .joining import join_tiles
 from .ledger import DONE, FAILED, Row, file_hash
+from .loose_ends import Seams
 
+TILE_ENDING = ".npz"
+"""Of the skeletons of tiles: what they keep, they keep to the last bit."""
 _log = logging.getLogger(__name__)
 
 
@@ -55,6 +62,14 @@ class Job:
         What the ledger calls the cloud: its path, and which of its points are meant if it is one of many in a file.
     where : str
         The points to take; empty for all.
+    origin, input_hash : str
+        The file of which `path` holds a part, and its hash; empty where it is that file.
+    needs : tuple of str
+        The jobs, by name, that come first: the tiles from whose skeletons, their only outputs, this one is joined.
+    grid : Grid or None
+        Of the tiles, for one of them and for what is joined.
+    points, dropped : int
+        Of what is joined from tiles: in all, and those that are in none.
     """
 
     name: str
@@ -67,6 +82,12 @@ class Job:
     foreign: tuple[str, ...] = ()
     source: str = ""
     where: str = ""
+    origin: str = ""
+    input_hash: str = ""
+    needs: tuple[str, ...] = ()
+    grid: Grid | None = None
+    points: int = 0
+    dropped: int = 0
 
 
 def work(job: Job) -> Row:
@@ -81,7 +102,7 @@ def work(job: Job) -> Row:
     with _Heard() as heard:
         try:
             with suppress(OSError):  # what it is shows when it is read
-                row["input_hash"] = file_hash(job.path)
+                row["input_hash"] = job.input_hash or file_hash(job.path)
             _skeletonize(job, row, heard.messages)
             row["status"] = DONE
         except Exception as error:  # whatever it is, the other clouds are to be done
@@ -108,8 +129,16 @@ def clear(job: Job, written: Iterable[str] = ()) -> None:
 
 
 def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
-    pipeline = from_recipe(job.recipe)
-    skeleton = pipeline(_cloud(job, pipeline))
+    row |= {"seams": None, "unmatched": None}
+    if job.needs:
+        skeleton, seams = _joined(job)
+        row |= {"seams": seams.joined, "unmatched": seams.unmatched}
+    elif job.grid is not None:
+        skeleton = _of_tile(job)
+    else:
+        pipeline, where = from_recipe(job.recipe), job.where or None
+        sample = sample_for(pipeline, job.path, where)  # of many points
+        skeleton = pipeline(read_cloud(job.path, where=where) if sample is None else sample)
     messages += skeleton.report.warnings
     facts = summary(skeleton, 0.0).items()
     row |= {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in facts}
@@ -121,22 +150,31 @@ def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
         row["outputs"].append(output)
 
 
-def _cloud(job: Job, pipeline: Pipeline[Any]) -> Any:
-    """The points that are meant, or of many a sample; a smaller file that is taken apart is read once for all that
-    follow each other.
-    """
-    sample = sample_for(pipeline, job.path, job.where or None)
-    if sample is not None:
-        return sample
-    if not job.where:
-        return read_cloud(job.path)
-    state = os.stat(job.path)
-    return select(_last_scan(job.path, (state.st_mtime_ns, state.st_size)), job.where).to_legacy()
+def _of_tile(job: Job) -> Skeleton:
+    """The skeleton of a tile, without its points; one without vertices, if these are too few or no curve is in them."""
+    cloud = read_cloud(job.path)
+    none = np.empty((0, 3))
+    try:
+        skeleton = from_recipe(job.recipe)(cloud)
+    except InvalidCloudError as error:
+        report = Report(n_input=len(cloud.points)).with_warning(f"no skeleton in this tile: {error}")
+        return Skeleton(none, np.empty((0, 2)), np.empty(0), np.empty(0), none, none, report)
+    return replace(skeleton, points=none, normals=none, vertex_of_point=np.empty(0))
 
 
-@lru_cache(maxsize=1)
-def _last_scan(path: str, state: tuple[int, int]) -> Scan:
-    return read_scan(path)
+def _joined(job: Job) -> tuple[Skeleton, Seams]:
+    """The skeleton of a scene, from those of its tiles."""
+    assert job.grid is not None
+    skeletons = {
+        tile_of(name.rpartition("/")[2]): read_skeleton(Path(job.out_dir, f"{name}{TILE_ENDING}")) for name in job.needs
+    }
+    skeleton, seams = join_tiles(skeletons, job.grid)
+    report = Report(n_input=job.points, n_dropped=job.dropped)
+    none = [each.report.n_input for each in skeletons.values() if not len(each.vertices)]
+    said = f"{len(none)} of {len(skeletons)} tiles have no skeleton, of {sum(none)} points: the ledger says why"
+    for message in [said] * bool(none) + seams.messages(job.grid):
+        report = report.with_warning(message)
+    return replace(skeleton, report=report), seams
 
 
 def told(error: BaseException) -> str:

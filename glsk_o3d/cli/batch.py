@@ -24,7 +24,7 @@ from .options import (
 from .reporting import WrongUsage, reporting, said_here
 
 if TYPE_CHECKING:
-    from ..batch import Plan
+    from ..batch import BatchResult, Plan
 
 SHOWN_NAMES = 5  # fitted: that fit on a line
 
@@ -70,6 +70,24 @@ def batch(
         str | None,
         typer.Option("--by", metavar="ATTRIBUTE", help="One skeleton for each value of it, such as treeID."),
     ] = None,
+    tiles: Annotated[
+        float | None,
+        typer.Option(
+            "--tiles",
+            metavar="SIZE",
+            help="Take large scenes apart into tiles of at most this size, in the cloud's units, and join their "
+            "skeletons into one.",
+        ),
+    ] = None,
+    overlap: Annotated[
+        float | None,
+        typer.Option(
+            "--overlap",
+            metavar="LENGTH",
+            help="How far tiles look beyond themselves: at least 2.7 times the radius of what crosses their faces; by "
+            "default an eighth of SIZE.",
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Do also what is done already.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be done, and why.")] = False,
     as_json: Json = False,
@@ -84,7 +102,6 @@ def batch(
     """
     with reporting(quiet=quiet, verbose=verbose):
         from ..batch import plan_batch, run_batch
-        from ..errors import BatchError
         from .overrides import choose
 
         if workers is not None and scheduler is not None:
@@ -98,6 +115,8 @@ def batch(
             recursive=recursive,
             where=where,
             by=by,
+            tiles=tiles,
+            overlap=overlap,
             force=force,
         )
         if dry_run:
@@ -115,24 +134,31 @@ def batch(
                 on_result=watch.step,
                 **what,
             )
-        told = {
-            **{"done": result.done, "skipped": result.skipped, "failed": result.failed},
-            **{"seconds": round(result.seconds, 3), "clouds_per_second": round(result.rate, 3)},
-            "ledger": str(result.ledger),
-        }
-        if as_json:
-            failures = [
-                {name: row.get(name) for name in ("input", "error")}
-                for row in result.rows.values()
-                if row["status"] == "failed"
-            ]
-            print_json({**told, "failures": failures, "left_out": watch.left_out})
-        elif not quiet:
-            warned = sum(bool(row.get("warnings")) for row in result.rows.values())
-            print_rows({**told, "with_warnings": f"{warned}, see ledger.csv" if warned else None})
-        if result.failed:
-            table = result.ledger.with_suffix(".csv")
-            raise BatchError(f"{result.failed} of {len(result.rows)} scans failed: {table} says why")
+        _tell(result, watch, as_json, quiet)
+
+
+def _tell(result: BatchResult, watch: _Watch, as_json: bool, quiet: bool) -> None:
+    """Say what a batch did; BatchError if something failed."""
+    from ..errors import BatchError
+
+    told = {
+        **{"done": result.done, "skipped": result.skipped, "failed": result.failed},
+        **{"seconds": round(result.seconds, 3), "clouds_per_second": round(result.rate, 3)},
+        "ledger": str(result.ledger),
+    }
+    if as_json:
+        failures = [
+            {name: row.get(name) for name in ("input", "error")}
+            for row in result.rows.values()
+            if row["status"] == "failed"
+        ]
+        print_json({**told, "failures": failures, "left_out": watch.left_out})
+    elif not quiet:
+        warned = sum(bool(row.get("warnings")) for row in result.rows.values())
+        print_rows({**told, "with_warnings": f"{warned}, see ledger.csv" if warned else None})
+    if result.failed:
+        table = result.ledger.with_suffix(".csv")
+        raise BatchError(f"{result.failed} of {len(result.rows)} scans failed: {table} says why")
 
 
 class _Watch:

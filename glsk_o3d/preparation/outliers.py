@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..numerics.components import component_labels
+from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import local_outlier_ratio, nearest_neighbours, principal, row_medians
 from .frame import MIN_POINTS, Frame, to_working_frame
 from .surface import Surface
@@ -61,11 +62,14 @@ def set_aside_outliers(
     if outlier.any():
         inside = ~outlier
         if len(cloud) == len(points):  # the neighbours are known
-            given = np.empty(len(cloud), int)
+            given, place = np.empty(len(cloud), int), np.empty(len(cloud), int)
             given[representative] = np.arange(len(points))
+            order = morton_order(points[given[left]])
+            left, among_left = left[order], among_left[order, : k(len(left))]
+            place[left] = np.arange(len(left))
             frame = Frame.of(points[given[left]], by)
-            cloud, weight, neighbours = frame.into(points[given[left]]), weight[left], among_left[:, : k(len(left))]
-            representative = (np.cumsum(kept) - 1)[representative]
+            cloud, weight, neighbours = frame.into(points[given[left]]), weight[left], np.argsort(order)[among_left]
+            representative = place[representative]
         else:  # copies in a frame that far ones made wide may be none in their own
             frame, cloud, representative[inside], weight, _, neighbours = to_working_frame(
                 points[inside], counts[inside], by, k

@@ -17,7 +17,7 @@ from .surface import Surface
 MOST_IN_ONE = 4  # fitted: points that one may stand for after a pass, where there are more than enough
 ASK_AGAIN = 0.25  # measured: share of the points left, below which the neighbours are looked up anew
 DENSE_FROM, DENSE_TO = 2000, 8192  # fitted: points from which on, and down to which, more than enough are merged
-WIDER = 3  # measured: steps from neighbour to neighbour: fewer see no more than noise, more see other parts
+WIDER_STEPS = 3  # measured: steps from neighbour to neighbour: fewer see no more than noise, more see other parts
 WIDER_BIAS = 1.25  # measured: on tubes with 18 to 80 points around them, noise of up to a fifth of their spacing
 STEADY_SHARE = 0.9  # fitted: share of the points left by a pass at which passes end
 
@@ -159,7 +159,7 @@ def points_around(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray
     n, k = neighbours.shape
     mean_over = csr_array((np.full(neighbours.size, 1 / k), neighbours.ravel(), k * np.arange(n + 1)), shape=(n, n))
     moments = np.column_stack([points, *(points[:, i] * points[:, j] for i, j in PAIRS)])
-    for _ in range(WIDER):
+    for _ in range(WIDER_STEPS):
         moments = mean_over @ moments
     mean, square = moments[:, :3].T, moments[:, 3:].T
     wider = principal_parts(square - [mean[i] * mean[j] for i, j in PAIRS])[0]

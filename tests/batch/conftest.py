@@ -90,16 +90,27 @@ def gate(tmp_path, until):
 
 
 @pytest.fixture
-def write():
+def write_points():
+    """Write points as a binary PLY file; gives its path."""
+
+    def save(path: Path, points) -> Path:
+        header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+        header += "property double x\nproperty double y\nproperty double z\nend_header\n"
+        path.write_bytes(header.encode() + np.asarray(points, "<f8").tobytes())
+        return path
+
+    return save
+
+
+@pytest.fixture
+def write(write_points):
     """Write a scan of 256 points; gives its path. The first `order` thousand say what the saboteur does."""
 
     def save(path: Path, seed=0, order=0) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         points = torus(256, seed=seed).points + [order + 500 * bool(order), 0, 0]
         if path.suffix == ".ply":
-            header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
-            header += "property double x\nproperty double y\nproperty double z\nend_header\n"
-            path.write_bytes(header.encode() + np.asarray(points, "<f8").tobytes())
+            write_points(path, points)
         else:
             np.savetxt(path, points)
         return path
@@ -128,6 +139,7 @@ def rows():
         written = {output for line in lines for output in line["outputs"]}
         own = {"ledger.jsonl", "ledger.csv", "recipe.json", ".ledger.lock"}
         there = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()} - own
+        there -= {name for name in there if name.startswith(".parts/") and (name.endswith(".json") or not strict)}
         assert written == there if strict else written <= there
         return found
 

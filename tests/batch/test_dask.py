@@ -10,7 +10,8 @@ import pytest
 
 from glsk_o3d import BatchError
 from glsk_o3d.batch import plan_batch, run_batch
-from glsk_o3d.batch.run import WORKER_DIED
+from glsk_o3d.batch.queueing import WORKER_DIED
+from glsk_o3d.samples import torus
 
 distributed = pytest.importorskip("distributed")
 
@@ -97,6 +98,34 @@ def test_a_scan_that_kills_its_workers(cluster, until, saboteur, write, rows, tm
     assert (result.done, result.failed) == (3, 1)
     assert found["0"]["error"] == WORKER_DIED
     until(lambda: sum(process.poll() is None for process in processes) == 1)
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # of work done in this process
+def test_a_worker_is_killed_in_the_midst_of_a_scene(cluster, until, gate, saboteur, rows, write_points, tmp_path):
+    ring = torus(4000, radius=0.05).points + [4500, 0, 0]  # wherever it is cut, workers wait at the gate
+    scene = write_points(tmp_path / "scene.ply", ring)
+    what = dict(pipeline=saboteur, tiles=0.5, overlap=0.12)
+    file, processes = cluster(2)
+    pids = [process.pid for process in processes]
+
+    def kill_one():
+        until(lambda: gate.waiting(*processes) == set(pids), *processes)  # both are in the middle of a tile
+        processes[0].kill()
+        processes[0].wait()
+        gate.open()
+
+    with ThreadPoolExecutor(1) as aside:
+        killing = aside.submit(kill_one)
+        result = run_batch(scene, tmp_path / "out", scheduler=file, **what)
+        killing.result()
+    found = rows(tmp_path / "out")
+    assert (result.done, result.failed) == (len(found), 0)
+    assert (found["scene"]["components"], found["scene"]["loops"], found["scene"]["unmatched"]) == (1, 1, 0)
+    assert {worker(row) for row in found.values()} == {pids[1]}
+    with ThreadPoolExecutor(1) as pool:
+        run_batch(scene, tmp_path / "undisturbed", executor=pool, **what)
+    results = [(tmp_path / out / "scene.ply").read_bytes() for out in ("out", "undisturbed")]
+    assert results[0] == results[1]
 
 
 @pytest.mark.parametrize("address", ["nonsense", "foo://a:1", "tcp://127.0.0.1:1"])

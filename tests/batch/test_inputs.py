@@ -8,6 +8,8 @@ import pytest
 
 from glsk_o3d import InvalidParameterError
 from glsk_o3d.batch.inputs import find_inputs
+from glsk_o3d.batch.ledger import file_hash
+from glsk_o3d.batch.splitting import Cut, Splitter
 from glsk_o3d.io.paths import SCAN_ENDINGS
 
 
@@ -25,6 +27,11 @@ def touch(here):
             (here / name).touch()
 
     return make
+
+
+def by(attribute, **more):
+    """What takes files apart by an attribute, and writes nothing."""
+    return Splitter(Path("out"), Cut(by=attribute, **more), file_hash, write=False)
 
 
 def names(*inputs, out="out", **options):
@@ -116,16 +123,16 @@ def test_the_points_of_a_file_taken_apart(here):
     (here / "forest.csv").write_text("x,y,z,tree\n" + "".join(f"{i},0,0,{i % 3}\n" for i in range(9)))
     (here / "bare.xyz").write_text("1 2 3\n")
     (here / "broken.ply").write_text("ply\n")
-    found = find_inputs(["forest.csv", "bare.xyz", "broken.ply"], "out", by="tree")
-    assert {name: source.where for name, source in found.named.items()} == {
-        **{f"forest-{i}": f"tree == {i}" for i in range(3)},
+    found = find_inputs(["forest.csv", "bare.xyz", "broken.ply"], "out", splitter=by("tree"))
+    assert {name: source.part for name, source in found.named.items()} == {
+        **{f"forest-{i}": f"where tree == {i}" for i in range(3)},
         "broken": "",  # what is wrong with it shows when it is read
     }
     assert found.left_out == {str(here / "bare.xyz"): "no attribute of its points is called 'tree': there are none"}
     with pytest.raises(
         InvalidParameterError, match=r"by = 'trees': no input can be taken .*forest\.csv: .* did you mean 'tree'"
     ):
-        find_inputs(["forest.csv"], "out", by="trees")
+        find_inputs(["forest.csv"], "out", splitter=by("trees"))
 
 
 @pytest.mark.parametrize("first", [b"0.25 1", b"x,y,z", b"\xff\xfe", b"gone.ply"])
@@ -220,7 +227,7 @@ def test_odd_names(touch, here):
 def test_labels_that_differ_in_their_last_digit_are_two(here):
     rows = "".join(f"{i},0,0,{12345678901 + i % 2}\n" for i in range(6))
     (here / "a.csv").write_text("x,y,z,tree\n" + rows)
-    assert list(find_inputs(["a.csv"], "out", by="tree").named) == ["a-12345678901", "a-12345678902"]
+    assert list(find_inputs(["a.csv"], "out", splitter=by("tree")).named) == ["a-12345678901", "a-12345678902"]
 
 
 def test_a_label_never_takes_the_name_of_another_file(here):
@@ -228,18 +235,18 @@ def test_a_label_never_takes_the_name_of_another_file(here):
     (here / "in" / "a-1.ply").write_text("ply\n")  # its points cannot be read, and it keeps its name
     (here / "in" / "a.csv").write_text("x,y,z,tree\n1,2,3,1\n")
     with pytest.raises(InvalidParameterError, match="would both be called a-1"):
-        find_inputs(["in"], "out", by="tree")
+        find_inputs(["in"], "out", splitter=by("tree"))
 
 
 def test_a_file_without_what_the_condition_names_stops_no_other(here):
     (here / "a.csv").write_text("x,y,z,tree,cl\n1,2,3,1,5\n1,2,3,2,4\n")
     (here / "b.csv").write_text("x,y,z,tree\n1,2,3,1\n")
-    found = find_inputs(["a.csv", "b.csv"], "out", by="tree", where="cl == 5")
+    found = find_inputs(["a.csv", "b.csv"], "out", splitter=by("tree", where="cl == 5"))
     assert list(found.named) == ["a-1"]
     assert "no attribute of the points is called 'cl'" in found.left_out[str(here / "b.csv")]
 
 
 def test_what_numbers_no_things_is_refused(here):
     (here / "a.csv").write_text("x,y,z,time\n" + "".join(f"1,2,3,{i}\n" for i in range(10_001)))
-    with pytest.raises(InvalidParameterError, match=r"has 10001 values .* numbers no things"):
-        find_inputs(["a.csv"], "out", by="time")
+    with pytest.raises(InvalidParameterError, match=r"has 10001 parts .* numbers no things"):
+        find_inputs(["a.csv"], "out", splitter=by("time"))

@@ -190,6 +190,20 @@ def test_one_skeleton_per_tree_of_a_plot(invoke, tmp_path):
     assert (half["done"], half["skipped"]) == (2, 0)  # other points are another result
 
 
+def test_one_skeleton_of_a_scene_in_tiles(invoke, tmp_path, write_scan):
+    from glsk_o3d.samples import torus
+
+    write_scan(tmp_path / "scene.ply", torus(3000, radius=0.05).points)
+    words = ["batch", "scene.ply", "-o", "out", "--tiles", "0.7", "--overlap", "0.17", "--json"]
+    plan = json.loads(invoke(*words, "--dry-run").stdout)
+    assert plan["todo"] == 5
+    assert plan["tasks"][0]["input"] == f"{tmp_path}/scene.ply tile 0-0-0"
+    told = json.loads(invoke(*words).stdout)
+    assert (told["done"], told["failed"]) == (5, 0)
+    assert read_skeleton("out/scene.ply").n_loops == 1
+    assert json.loads(invoke(*words).stdout)["skipped"] == 5
+
+
 def test_it_says_what_it_left_out(invoke, folder):
     for name in "abcdefg":
         (folder / f"{name}.md").touch()

@@ -112,32 +112,6 @@ def parsed(where: str) -> ast.expr:
         raise InvalidParameterError(f"where = {where[:200]!r}: {why}: {cure}") from None
 
 
-def labels(scan: Scan, name: str) -> np.ndarray:
-    """The distinct values of an attribute.
-
-    Parameters
-    ----------
-    scan : Scan
-    name : str
-
-    Returns
-    -------
-    (n,) array
-        Sorted.
-
-    Raises
-    ------
-    InvalidParameterError
-        The points do not have it.
-
-    Examples
-    --------
-    >>> labels(Scan(np.eye(3), attributes={"tree": np.array([7, 4, 7])}), "tree")
-    array([4, 7])
-    """
-    return np.unique(_column(name, scan.attributes))
-
-
 def _column(name: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
     if name not in columns:
         raise InvalidParameterError(did_you_mean(name, columns, "attribute of the points"))

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError
 from glsk_o3d.io.clouds.scanned import Scan
-from glsk_o3d.io.clouds.selection import labels, select
+from glsk_o3d.io.clouds.selection import select
 
 N = np.arange(20)
 SCAN = Scan(N[:, None] * [1.0, 2, 3], attributes={"label": N % 3, "intensity": N / 4})
@@ -55,12 +55,6 @@ def test_all_that_is_known_is_selected():
     some = select(scan, "label == 1")
     assert len(some) == len(some.colors) == len(some.normals) == len(some.attributes["intensity"]) == 7
     assert len(some.triangles) == 0
-
-
-def test_labels():
-    assert labels(SCAN, "label").tolist() == [0, 1, 2]
-    with pytest.raises(InvalidParameterError, match="did you mean 'label'"):
-        labels(SCAN, "labels")
 
 
 def test_signs_do_not_wrap_and_depth_is_refused():

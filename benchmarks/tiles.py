@@ -1,0 +1,244 @@
+"""``glsk batch --tiles`` on one large scene of many objects: is each found once, and are the seams as good as the rest?
+
+Everything is run as its users run it: the command ``glsk`` and the commands of Dask, as processes; one of two Dask
+workers is killed in the midst.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import tempfile
+import time
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from _common.command_line import Markdown, Output, writable
+from _common.plots import BLUE, INK, save_figure, sheet
+from _common.results import save
+from _common.tables import number, show
+from batch import command, dask_cluster, glsk_batch, ledger, write_ply
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from glsk_o3d import Skeleton, read_skeleton, samples
+from glsk_o3d.analysis.curves import along, pieces
+from glsk_o3d.batch.grid import Grid
+
+COLUMNS, ROWS, ROOM = 10, 5, 1.8
+"""Objects along x and y, and their distance."""
+ON_SEAMS = ((3, 6), (1, 3))
+"""Columns that stand exactly on a seam, and rows: four objects stand on corners of four tiles."""
+SIZE = 3.0
+NOISE = 0.002
+STEP = 0.01
+"""Between the places at which curves are compared."""
+TIP = 5
+"""Radii from the end of an axis up to which it may be missed: curve skeletons end early, in tiles or not."""
+SHAPES = (
+    partial(samples.tree, length=0.45, radius=0.045, forks=3),
+    partial(samples.sauropod, cameras=None),
+    samples.torus,
+    samples.helix,
+    samples.y_junction,
+    samples.two_rings,
+    partial(samples.tree, length=0.5, radius=0.05, forks=2),
+)
+app = typer.Typer(add_completion=False)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Objects with known axes.
+
+    Attributes
+    ----------
+    points : (n, 3) float array
+    axes : list of Skeleton
+    grid : Grid
+        That of the tiles.
+    """
+
+    points: np.ndarray
+    axes: list[Skeleton]
+    grid: Grid
+
+
+def make_scene(count: int) -> Scene:
+    """Objects turned at random, some of them exactly on seams and corners of the tiles."""
+    rng = np.random.default_rng(0)
+    cells = [(i, j) for i in range(COLUMNS) for j in range(ROWS)]
+    made, places = [], []
+    for at, (i, j) in enumerate(cells):
+        sample = SHAPES[at % len(SHAPES)](count // len(cells), noise=NOISE, seed=at)
+        angle = rng.uniform(0, 2 * np.pi)
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        middle = np.append((sample.points.min(axis=0) + sample.points.max(axis=0))[:2] / 2, sample.points[:, 2].min())
+        middle[:2] = sample.nodes[0, :2] if sample.name == "tree" else middle[:2]  # its trunk stands on the corner
+        made.append(((sample.points - middle) @ turn.T, (sample.nodes - middle) @ turn.T, sample))
+        places.append(np.array([ROOM * i, ROOM * j, 0.0]))
+    low = np.min([points.min(axis=0) + at for (points, _, _), at in zip(made, places, strict=True)], axis=0)
+    high = np.max([points.max(axis=0) + at for (points, _, _), at in zip(made, places, strict=True)], axis=0)
+    grid = Grid.over(low, high, SIZE, SIZE / 8)
+    for at, cell in zip(places, cells, strict=True):
+        for axis in (0, 1):
+            if cell[axis] in ON_SEAMS[axis]:
+                at[axis] = low[axis] + grid.cell[axis] * np.round((at[axis] - low[axis]) / grid.cell[axis])
+    axes = [
+        Skeleton(nodes + at, sample.edges, sample.radii, np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
+        for (_, nodes, sample), at in zip(made, places, strict=True)
+    ]
+    points = np.concatenate([points + at for (points, _, _), at in zip(made, places, strict=True)])
+    return Scene(points[rng.permutation(len(points))], axes, grid)
+
+
+def checked(found: Skeleton, scene: Scene) -> dict:
+    """What became of every object, how far the skeleton is from the axes, and whether a part is there twice."""
+    of_place, places, radii, tips = [], [], [], []
+    for at, axis in enumerate(scene.axes):
+        row, part = pieces(axis.vertices, axis.edges, STEP)
+        places.append(along(axis.edges, row, part, axis.vertices))
+        radii.append(along(axis.edges, row, part, axis.radii))
+        of_place.append(np.full(len(row), at))
+        tips.append(axis.vertices[axis.leaves])
+    truth, radius, owner = map(np.concatenate, (places, radii, of_place))
+    row, part = pieces(found.vertices, found.edges, STEP)
+    here = along(found.edges, row, part, found.vertices)
+    distance, nearest = cKDTree(truth).query(here)
+    missed = cKDTree(here).query(truth)[0] > radius
+    missed &= cKDTree(np.concatenate(tips)).query(truth)[0] > TIP * radius
+    wrong = []
+    piece = found.component_of_vertex[found.edges[row, 0]]
+    owners = np.array([np.bincount(owner[nearest[piece == c]]).argmax() for c in range(found.n_components)])
+    for at, axis in enumerate(scene.axes):
+        vertices = np.isin(found.component_of_vertex, np.flatnonzero(owners == at))
+        edges = vertices[found.edges[:, 0]].sum()
+        components = int((owners == at).sum())
+        loops = int(edges - vertices.sum() + components)
+        if (components, loops) != (axis.n_components, axis.n_loops) or missed[owner == at].any():
+            wrong.append((at, components, loops, int(missed[owner == at].sum())))
+    close = np.min([np.abs(here[:, [axis]] - planes).min(axis=1) for axis, planes in _seams(scene.grid)], axis=0)
+    at_seam = close < scene.grid.overlap
+    return {
+        "objects": len(scene.axes),
+        "right": len(scene.axes) - len(wrong),
+        "wrong": wrong,
+        "components": found.n_components,
+        "twice": _twice(found),
+        "length": found.length / sum(axis.length for axis in scene.axes),
+        **{
+            f"{what} {where}": float(value)
+            for where, which in (("at seams", at_seam), ("elsewhere", ~at_seam))
+            for what, value in (
+                ("median", np.median(distance[which])),
+                ("95 %", np.quantile(distance[which], 0.95)),
+                ("most", distance[which].max()),
+                ("most over radius", (distance / radius[nearest])[which].max()),
+            )
+        },
+    }
+
+
+def _seams(grid: Grid):
+    for axis in range(3):
+        if grid.counts[axis] > 1:
+            yield axis, grid.low[axis] + grid.cell[axis] * np.arange(1, grid.counts[axis])
+
+
+def _twice(found: Skeleton) -> int:
+    """Vertices with another one nearer than half their radius that is no neighbour: not within three radii along the
+    curve.
+    """
+    n = len(found.vertices)
+    pairs = cKDTree(found.vertices).query_pairs(found.radii.max() / 2, output_type="ndarray")
+    apart = np.linalg.norm(found.vertices[pairs[:, 0]] - found.vertices[pairs[:, 1]], axis=1)
+    pairs = pairs[apart < found.radii[pairs].min(axis=1) / 2]
+    graph = coo_array((found.edge_lengths, found.edges.T), shape=(n, n)).tocsr()
+    starts = np.unique(pairs[:, 0])
+    reach = dijkstra(graph, directed=False, indices=starts, limit=3 * found.radii.max())
+    along_curve = reach[np.searchsorted(starts, pairs[:, 0]), pairs[:, 1]]
+    return int((along_curve > 3 * found.radii[pairs].min(axis=1)).sum())
+
+
+def kill_one(scene: Path, out: Path, folder: Path, after: int) -> dict:
+    """Kill one of two Dask workers once some tiles are done; gives what became of all."""
+    begun = time.perf_counter()
+    with dask_cluster(2, folder) as (file, workers):
+        line = command(scene, out, "--tiles", str(SIZE), "--scheduler", file)
+        run = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        path = out / "ledger.jsonl"
+        while not path.exists() or path.read_bytes().count(b"\n") < after:
+            time.sleep(0.02)
+        workers[0].send_signal(signal.SIGKILL)
+        run.wait()
+    rows = ledger(out)
+    return {
+        "exit_code": run.returncode,
+        "seconds": time.perf_counter() - begun,
+        "lines": len(rows),
+        "inputs named twice": len(rows) - len({row["input"] for row in rows}),
+        "done": sum(row["status"] == "done" for row in rows),
+        "by the killed worker": sum(row["worker"].endswith(f" {workers[0].pid}") for row in rows),
+        "by the other": sum(row["worker"].endswith(f" {workers[1].pid}") for row in rows),
+    }
+
+
+def draw(found: Skeleton, scene: Scene, path: Path) -> None:
+    """The skeleton and the axes from above, with the borders of the tiles."""
+    figure, axes = sheet(9.5, width=18.0)
+    for axis, planes in _seams(scene.grid):
+        for plane in planes:
+            (axes.axvline if axis == 0 else axes.axhline)(plane, color=BLUE, linewidth=0.8)
+    for axis in scene.axes:
+        for a, b in axis.vertices[axis.edges]:
+            axes.plot(*np.stack([a, b])[:, :2].T, color="#bbbbbb", linewidth=3)
+    for branch in found.branches:
+        axes.plot(*found.vertices[branch, :2].T, linewidth=1)
+    axes.plot(*found.vertices[found.leaves, :2].T, "o", color=INK, markersize=2)
+    axes.set_aspect("equal")
+    save_figure(figure, path)
+
+
+@app.command()
+def main(
+    points: Annotated[int, typer.Option("--points", min=50_000, help="Of all fifty objects together.")] = 20_000_000,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="PNG", help="Draw the skeleton from above.", callback=writable)
+    ] = None,
+    markdown: Markdown = False,
+    output: Output = None,
+) -> None:
+    """Skeletonise a large scene in tiles, and kill a worker in the midst of it."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        scene, path = make_scene(points), folder / "scene.ply"
+        write_ply(path, scene.points)
+        undisturbed = glsk_batch(path, folder / "whole", "--tiles", str(SIZE), "--workers", "2")
+        most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
+        rows = {row["name"]: row for row in ledger(folder / "whole")}
+        killed = kill_one(path, folder / "killed", folder, after=max(2, len(rows) // 3))
+        results = [folder / run / "scene.ply" for run in ("whole", "killed")]
+        found = read_skeleton(results[1])
+        killed["bits as in the undisturbed run"] = results[0].read_bytes() == results[1].read_bytes()
+        joined = rows["scene"]
+        told = {"points": points, "tiles": len(rows) - 1, "wall": undisturbed["wall"], "most memory of a process": most}
+        told |= {"seams": joined["seams"], "unmatched": joined["unmatched"], **checked(found, scene)}
+        told["seconds of a tile, most"] = max(row["seconds"] for each, row in rows.items() if each != "scene")
+        if picture is not None:
+            draw(found, scene, picture)
+    title = f"One scene of {points} points, 50 objects, tiles of {SIZE:g}, two workers, {os.cpu_count()} cores"
+    for heading, facts in ((title, told), ("Again on Dask, one of two workers killed", killed)):
+        cells = [[key, number(value, 4) if isinstance(value, float) else str(value)] for key, value in facts.items()]
+        show(heading, ["", "note"], cells, markdown)
+    save(output, [{"run": "undisturbed", **told}, {"run": "one of two Dask workers killed", **killed}])
+
+
+if __name__ == "__main__":
+    app()

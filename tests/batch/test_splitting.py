@@ -1,0 +1,165 @@
+"""Scenes taken apart into files: nothing is lost, and nothing is read more often than it must be."""
+
+import json
+import os
+
+import numpy as np
+import pytest
+
+from glsk_o3d import BatchError, InvalidCloudError, InvalidParameterError
+from glsk_o3d.batch import splitting
+from glsk_o3d.batch.grid import tile_of
+from glsk_o3d.batch.ledger import file_hash
+from glsk_o3d.batch.part_files import PartFiles
+from glsk_o3d.batch.splitting import Cut, Splitter
+from glsk_o3d.io.clouds.blocks import read_blocks
+from glsk_o3d.io.clouds.scanned import Scan
+from glsk_o3d.io.scans import read_scan
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """Points with everything, in three dimensions."""
+    rng = np.random.default_rng(0)
+    table = np.column_stack([rng.random((900, 3)) * [5, 3, 1] + 1e6 / 3, rng.integers(0, 4, 900) * 1.0])
+    rows = np.rec.fromarrays(table.T, dtype=[(name, "<f8") for name in ("x", "y", "z", "tree")])
+    header = "".join(f"property double {name}\n" for name in rows.dtype.names)
+    path = tmp_path / "scene.ply"
+    path.write_bytes(
+        f"ply\nformat binary_little_endian 1.0\nelement vertex 900\n{header}end_header\n".encode() + rows.tobytes()
+    )
+    return path
+
+
+@pytest.fixture
+def passes(monkeypatch):
+    """How often a file has been read; in small blocks."""
+    count = []
+
+    def read(path, where=None):
+        count.append(path)
+        return read_blocks(path, rows=70, where=where)
+
+    monkeypatch.setattr(splitting, "read_blocks", read)
+    return count
+
+
+def splitter(tmp_path, write=True, **cut):
+    return Splitter(tmp_path / "out", Cut(**cut), file_hash, write)
+
+
+def test_a_file_per_label_in_one_pass(scene, passes, tmp_path):
+    at = splitter(tmp_path, by="tree", where="x > 333334")
+    split = at.split("scene", scene)
+    assert split.parts == {str(i): f"where tree == {i}.0" for i in range(4)}
+    assert len(passes) == 1
+    scan = read_scan(scene, "x > 333334")
+    assert (split.points, split.dropped, split.input_hash) == (len(scan), 0, file_hash(scene))
+    for label in split.parts:
+        of_label = scan.positions[scan.attributes["tree"] == float(label)]
+        np.testing.assert_array_equal(read_scan(at.file("scene", label)).positions, of_label)
+    assert at.split("scene", scene) == split
+    assert len(passes) == 1  # known
+
+
+def test_a_file_per_tile_in_two_passes(scene, passes, tmp_path):
+    at = splitter(tmp_path, tiles=2.0, overlap=0.25)
+    split = at.split("scene", scene)
+    assert len(passes) == 2  # one for the box
+    assert split.grid.counts == (3, 2, 1)
+    positions = read_scan(scene).positions
+    found = dict(split.grid.parted(positions))
+    assert {tile_of(label) for label in split.parts} == set(found)
+    for label in split.parts:
+        np.testing.assert_array_equal(read_scan(at.file("scene", label)).positions, positions[found[tile_of(label)]])
+
+
+def test_looking_writes_nothing(scene, passes, tmp_path):
+    looked = splitter(tmp_path, write=False, tiles=2.0, overlap=0.25).split("scene", scene)
+    assert not (tmp_path / "out").exists()
+    assert looked == splitter(tmp_path, tiles=2.0, overlap=0.25).split("scene", scene)
+
+
+def test_another_scene_or_another_cut_is_taken_apart_anew(scene, passes, tmp_path):
+    splitter(tmp_path, by="tree").split("scene", scene)
+    assert set(splitter(tmp_path, by="tree", where="tree > 1").split("scene", scene).parts) == {"2", "3"}
+    assert not (tmp_path / "out" / ".parts" / "scene" / "0.ply").exists()
+    data = scene.read_bytes()
+    scene.write_bytes(data[:-8] + np.array(9.0).tobytes())
+    assert "9" in splitter(tmp_path, by="tree", where="tree > 1").split("scene", scene).parts
+    assert len(passes) == 3
+
+
+@pytest.mark.parametrize("harm", [b"", b"[]", b"{}", b'{"version": 1}', b"\xff"])
+def test_a_list_of_parts_that_is_damaged_is_made_anew(scene, passes, tmp_path, harm):
+    split = splitter(tmp_path, tiles=2.0, overlap=0.25).split("scene", scene)
+    told = tmp_path / "out" / ".parts" / "scene.json"
+    whole = told.read_bytes()
+    told.write_bytes(harm or whole[:-20])
+    assert splitter(tmp_path, tiles=2.0, overlap=0.25).split("scene", scene) == split
+    assert told.read_bytes() == whole
+
+
+def test_what_breaks_off_is_not_believed(scene, monkeypatch, tmp_path):
+    def broken(path, where=None):
+        yield next(read_blocks(path, rows=100))
+        raise OSError("the disk is gone")
+
+    monkeypatch.setattr(splitting, "read_blocks", broken)
+    with pytest.raises(OSError, match="the disk is gone"):
+        splitter(tmp_path, by="tree").split("scene", scene)
+    assert not (tmp_path / "out" / ".parts" / "scene.json").exists()
+
+
+def test_normals_and_colours_stay(tmp_path):
+    rng = np.random.default_rng(1)
+    scan = Scan(rng.random((10, 3)), colors=rng.integers(0, 256, (10, 3)) / 255, normals=rng.normal(size=(10, 3)))
+    files = PartFiles(tmp_path)
+    files.add(scan, {"a": np.arange(6)})
+    files.add(Scan(scan.positions), {"a": np.arange(6, 10), "b": np.arange(3)})
+    files.close()
+    again = read_scan(tmp_path / "a.ply")
+    np.testing.assert_array_equal(again.positions, scan.positions)
+    np.testing.assert_allclose(again.colors[:6], scan.colors[:6], atol=1e-7)
+    np.testing.assert_allclose(again.normals[:6], scan.normals[:6], atol=1e-6)
+    assert len(read_scan(tmp_path / "b.ply")) == 3
+
+
+def test_points_that_are_not_finite_belong_to_no_tile(tmp_path):
+    points = np.random.default_rng(0).random((50, 3)) * 4
+    points[7] = np.nan
+    np.savetxt(tmp_path / "scene.xyz", points)
+    with pytest.raises(InvalidCloudError, match="1 of 50 points have NaN"):
+        splitter(tmp_path, tiles=2.0, overlap=0.25).split("scene", tmp_path / "scene.xyz")
+    split = splitter(tmp_path, tiles=2.0, overlap=0.25, drop_invalid=True).split("scene", tmp_path / "scene.xyz")
+    assert (split.points, split.dropped) == (50, 1)
+
+
+def test_points_without_a_label_are_told(tmp_path):
+    table = np.column_stack([np.eye(3).repeat(4, axis=0), [1.5] * 6 + [np.nan] * 6])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="x,y,z,tree", comments="")
+    split = splitter(tmp_path, by="tree").split("a", tmp_path / "a.csv")
+    assert (list(split.parts), split.points, split.dropped) == (["1.5"], 12, 6)
+
+
+def test_tiles_without_number_are_refused(scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(splitting, "MOST_PARTS", 100)
+    with pytest.raises(InvalidParameterError, match=r"tiles = 0\.2: has \d+ parts or more in .* give larger tiles"):
+        splitter(tmp_path, tiles=0.2, overlap=0.025).split("scene", scene)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no full disk here")
+def test_a_full_disk_is_no_fault_of_the_scene(scene, tmp_path):
+    folder = tmp_path / "out" / ".parts" / "scene"
+    folder.mkdir(parents=True)
+    files = PartFiles(folder)
+    (folder / "0.ply").symlink_to("/dev/full")
+    with pytest.raises(BatchError, match="the parts of a scene cannot be written there: No space left"):
+        files.add(Scan(np.zeros((9, 3))), {"0": np.arange(9)})
+
+
+def test_the_list_of_parts_is_json(scene, tmp_path):
+    splitter(tmp_path, tiles=2.0, overlap=0.25).split("scene", scene)
+    told = json.loads((tmp_path / "out" / ".parts" / "scene.json").read_text())
+    assert told["cut"]["tiles"] == 2.0
+    assert told["input"] == str(scene)
