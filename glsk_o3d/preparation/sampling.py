@@ -6,10 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..numerics.morton import MORTON_BITS, morton_codes
+from ..numerics.morton import MORTON_BITS, morton_codes, sort_within
 from ..numerics.vectors import dot
 
 GRID_TAIL = 0.001  # fitted: share of the points that may be far off, at either end of each axis
+TAIL_SAMPLE, TAIL_MARGIN = (
+    20000,
+    16,
+)  # measured: points that say about where the tails end, and how much farther to look
 
 
 class Sample(NamedTuple):
@@ -51,10 +55,11 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
         One point per cell, about n. Points far off share the cells at the border.
     """
     # A few points far off must not decide how wide the cells are.
-    low, high = np.quantile(points[:: 1 + len(points) // 100000], [GRID_TAIL, 1 - GRID_TAIL], axis=0)
+    tail = int(GRID_TAIL * len(points))
+    low, high = (sign * np.array([_least(sign * x, tail) for x in points.T]) for sign in (1, -1))
     inner = np.clip(points, 2 * low - high, 2 * high - low)
     code = morton_codes(inner, 2**MORTON_BITS - 1)
-    order = np.argsort(code, kind="stable")
+    order = sort_within(points, code, np.argsort(code, kind="stable"))
     ordered = code[order]
     counts = [1]
     while counts[-1] < n:  # cells half as wide
@@ -81,3 +86,12 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     representative = np.empty(len(points), int)
     representative[order] = cell
     return Sample(kept, representative, counts)
+
+
+def _least(values: np.ndarray, k: int) -> float:
+    """The value that k others are below: found among the few that are no more than one from the start of a sample."""
+    some = values[:: 1 + len(values) // TAIL_SAMPLE]
+    rank = min(2 * (k * len(some) // len(values)) + TAIL_MARGIN, len(some) - 1)
+    bound = np.partition(some, rank)
+    few = values[values <= bound[rank]]
+    return np.partition(few if len(few) > k else values, k)[k]
