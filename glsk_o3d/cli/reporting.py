@@ -14,7 +14,7 @@ import typer
 
 from ..errors import GlskError, InvalidCloudError, InvalidParameterError, PluginWarning, SkeletonWarning
 from ..interop.interrupts import counted_interrupts
-from .console import say
+from .console import echo, say
 
 FAILURE_CODE, USAGE_CODE, INTERRUPTED_CODE = 1, 2, 130
 
@@ -102,7 +102,7 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
                     say("warning", said_here(line))
     if problem is not None:
         if verbose:
-            traceback.print_exception(problem)
+            echo("".join(traceback.format_exception(problem)).rstrip("\n"), err=True)
         say("error", _message(problem))
         raise typer.Exit(code)
 

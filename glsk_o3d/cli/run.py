@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import MissingPackageError
-from .console import print_json, print_table, progress
+from .console import echo, print_json, print_table, progress
 from .options import CutLoops, Json, Quiet, Verbose
 from .reporting import WrongUsage, holding_interrupts, reporting
 
@@ -95,7 +95,7 @@ def _print_results(steps: Sequence[Step], results: Sequence[dict[str, Any]]) -> 
         if result.keys() >= set(ENDING_FACTS):
             said.append(ending(result) or "")
         told = ", ".join(filter(None, said))
-        typer.echo(f"{i}. {step.call.name}" + f": {told}" * bool(told))
+        echo(f"{i}. {step.call.name}" + f": {told}" * bool(told))
 
 
 def _plain(result: Any) -> Any:
@@ -139,4 +139,4 @@ def _list(as_json: bool) -> None:
     try:
         require("pymeshlab")
     except MissingPackageError as error:
-        typer.echo(f"\n{error}")
+        echo(f"\n{error}")

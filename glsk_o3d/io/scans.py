@@ -217,7 +217,7 @@ def _read(path: Path, ending: str) -> Scan:
     """The points of a file, none if it has none; FileFormatError where it is damaged."""
     try:
         return _CLOUD_READERS[ending](path)
-    except MissingPackageError:
+    except (MissingPackageError, PermissionError):
         raise
     except NoPoints as error:
         raise FileFormatError(f"{path}: no points could be read: {error}") from None

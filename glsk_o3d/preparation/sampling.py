@@ -8,6 +8,7 @@ import numpy as np
 
 from ..numerics.morton import MORTON_BITS, morton_codes, sort_within
 from ..numerics.vectors import dot
+from .frame import check_extent
 
 GRID_TAIL = 0.001  # fitted: share of the points that may be far off, at either end of each axis
 TAIL_SAMPLE, TAIL_MARGIN = (
@@ -53,7 +54,13 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     -------
     Sample
         One point per cell, about n. Points far off share the cells at the border.
+
+    Raises
+    ------
+    InvalidCloudError
+        See `check_extent`.
     """
+    check_extent(points)
     # A few points far off must not decide how wide the cells are.
     tail = int(GRID_TAIL * len(points))
     low, high = (sign * np.array([_least(sign * x, tail) for x in points.T]) for sign in (1, -1))

@@ -169,8 +169,9 @@ def _nearest(x: np.ndarray, ends: np.ndarray, around: np.ndarray, p: np.ndarray,
     at = group_sum(np.column_stack([miss, apart, np.full(len(p), 0.5)]), edge, len(ends))
     at = group_sum(np.concatenate([at, at]), np.concatenate([a, b]), len(x))
     miss_at, apart_at, support = (at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))).T
+    apart_at = np.maximum(apart_at, 0)  # but for rounding, a difference of squares
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
-    doubt = np.where(apart_at > 0, np.clip(2 * miss_at / np.maximum(apart_at, TINY), 0, 1), 1)
+    doubt = np.where(apart_at > 0, np.minimum(2 * miss_at, apart_at) / np.maximum(apart_at, TINY), 1)
     return _Nearest(edge, share, tangent, across, offset, miss, doubt, apart_at / np.maximum(support, TINY), support)
 
 

@@ -130,3 +130,62 @@ def test_e57_with_intensity_in_one_scan_of_two(e57, tmp_path):
     file.close()
     found = read_scan(tmp_path / "c.e57").attributes["intensity"]
     np.testing.assert_allclose(found, [np.nan] * 3 + [0.25, 0.5, 1])
+
+
+def packed(path, at, number, length=4):
+    """The file with a number written over what is there."""
+    data = bytearray(path.read_bytes())
+    data[at : at + length] = number.to_bytes(length, "little")
+    path.write_bytes(data)
+
+
+def chunks(path):
+    """Where the table of chunks begins."""
+    data = path.read_bytes()
+    start = int.from_bytes(data[96:100], "little")
+    return start, int.from_bytes(data[start : start + 8], "little")
+
+
+@pytest.mark.parametrize("count", [1000, 2**24, 2**31, 2**32 - 1])
+def test_chunks_that_no_file_holds_are_refused_before_memory_is_taken(las, count):
+    """For so many lazrs would end the process, even in another."""
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    packed(path, chunks(path)[1] + 4, count)
+    with pytest.raises(FileFormatError, match=r"table of chunks promises more than its \d+ bytes can hold"):
+        read_scan(path)
+
+
+@pytest.mark.parametrize("place", [0, 1, 2**40, 2**63])
+def test_a_table_of_chunks_that_is_elsewhere_is_refused(las, place):
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    packed(path, chunks(path)[0], place, 8)
+    with pytest.raises(FileFormatError, match="table of chunks"):
+        read_scan(path)
+
+
+def test_a_table_that_was_written_last_is_found_at_the_end(las):
+    pytest.importorskip("lazrs")
+    path = las("c.laz", classification=[2, 5, 5])
+    start, table = chunks(path)
+    packed(path, start, 2**64 - 1, 8)
+    path.write_bytes(path.read_bytes() + table.to_bytes(8, "little"))
+    np.testing.assert_allclose(read_scan(path).positions, PLACES, rtol=0, atol=1e-9)
+
+
+def test_points_that_are_packed_as_longer_ones_are_refused(las):
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    item = path.read_bytes().index(b"laszip encoded") - 2 + 54 + 34 + 2
+    packed(path, item, 65535, 2)
+    with pytest.raises(FileFormatError, match=r"its points have \d+ bytes, and those that are packed \d{5}"):
+        read_scan(path)
+
+
+def test_more_points_than_a_packed_file_holds_are_refused(las):
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    packed(path, 247, 100 * path.stat().st_size, 8)
+    with pytest.raises(FileFormatError, match="header promises more than its"):
+        read_scan(path)
