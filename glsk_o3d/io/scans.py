@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, MissingPackageError
+from ..errors import FileFormatError, MissingPackageError, brief
 from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
 from ..interop.verbosity import following_open3d
@@ -222,7 +222,7 @@ def _read(path: Path, ending: str) -> Scan:
     except NoPoints as error:
         raise FileFormatError(f"{path}: no points could be read: {error}") from None
     except Exception as error:  # whatever a parser raises on a hostile file, std::bad_alloc
-        raise FileFormatError(f"{path}: not a valid {ending} file: {error}") from error
+        raise FileFormatError(f"{path}: not a valid {ending} file: {brief(error)}") from error
 
 
 def _read_mesh(path: Path) -> Scan:

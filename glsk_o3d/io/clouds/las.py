@@ -13,7 +13,8 @@ from ...interop.packages import require, require_for
 from .scanned import COLOR_CHANNELS, Scan, named_attributes, unit_colors
 
 VLR_BYTES, EVLR_BYTES = 54, 60  # published: LAS 1.4 R15, of the heads of records
-PACKED_RECORD, PACKED_ITEM_BYTES = 22204, 6  # published: LASzip's own record, and what it says of each part of a point
+PACKED_RECORD, LAYERED = 22204, 3  # published: LASzip's own record, and its way to pack in which chunks have layers
+LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}  # published: of the parts of a point, by their types; others have one per byte
 MOST_PACKED = 16  # measured: points of a LAZ file per byte; those of a scan take bytes, a million in one place 1 / 140
 
 
@@ -24,7 +25,12 @@ def read(path: Path) -> Scan:
         _check_header(stream, path.stat().st_size, packed=path.suffix.lower() == ".laz")
     laspy = require("laspy")
     # In one thread: in many, lazrs takes all memory that a file asks for, and ends the process where there is none.
-    file = laspy.read(path, laz_backend=laspy.LazBackend.Lazrs)
+    try:
+        file = laspy.read(path, laz_backend=laspy.LazBackend.Lazrs)
+    except BaseException as error:  # what lazrs does not expect is none of Python's own exceptions
+        if type(error).__name__ != "PanicException":
+            raise
+        raise ValueError(f"lazrs cannot read it: {error}") from None
     if len(file.points) < file.header.point_count:
         raise ValueError(f"it promises {file.header.point_count} points and holds {len(file.points)}: it breaks off")
     names = [name for name in file.point_format.dimension_names if name not in ("X", "Y", "Z")]
@@ -57,20 +63,23 @@ def _check_header(stream: BinaryIO, size: int, packed: bool) -> None:
 
 
 def _check_packed(stream: BinaryIO, size: int, at: int, records: int, start: int, point_bytes: int) -> None:
-    """The same of what LASzip says: how many bytes a point has, and how many chunks there are of them."""
+    """The same of what LASzip says: the bytes of a point, the number of chunks, and how long their layers are."""
 
     def number(length: int) -> int:
         return int.from_bytes(stream.read(length), "little")
 
+    layers = 0
     for _ in range(records):
         stream.seek(at + 18)
         kind, length = number(2), number(2)
         if kind == PACKED_RECORD:
+            stream.seek(at + VLR_BYTES)
+            layered = number(2) == LAYERED
             stream.seek(at + VLR_BYTES + 32)
-            items = stream.read(PACKED_ITEM_BYTES * number(2))
-            sizes = [int.from_bytes(items[i + 2 : i + 4], "little") for i in range(0, len(items), PACKED_ITEM_BYTES)]
-            if sum(sizes) != point_bytes:
-                raise ValueError(f"its points have {point_bytes} bytes, and those that are packed {sum(sizes)}")
+            items = np.frombuffer(stream.read(6 * number(2)), "<u2").reshape(-1, 3)  # type, size, version
+            if items[:, 1].sum() != point_bytes:
+                raise ValueError(f"its points have {point_bytes} bytes, and those that are packed {items[:, 1].sum()}")
+            layers = sum(LAYERS.get(item, wide) for item, wide, _ in items.tolist()) * layered
         at += VLR_BYTES + length
     stream.seek(start)
     table = number(8)
@@ -78,5 +87,14 @@ def _check_packed(stream: BinaryIO, size: int, at: int, records: int, start: int
         stream.seek(size - 8)
         table = number(8)
     stream.seek(min(table, size) + 4)
-    if not (start < table < size and number(4) * max(point_bytes, 1) <= size):  # a chunk begins with a whole point
-        raise ValueError(f"its table of chunks promises more than its {size} bytes can hold")
+    chunks = number(4)
+    place, sound = start + 8, start < table < size and chunks * max(point_bytes, 1) <= size  # each has a whole point
+    for _ in range(chunks * (layers > 0) * sound):
+        stream.seek(place + point_bytes + 4)
+        lengths = np.frombuffer(stream.read(4 * layers), "<u4")
+        place += point_bytes + 4 + 4 * layers + int(lengths.sum(dtype=np.uint64))
+        if place > table:
+            sound = False
+            break
+    if not sound:
+        raise ValueError(f"its table of chunks, or one of them, promises more than its {size} bytes can hold")

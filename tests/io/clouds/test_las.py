@@ -152,7 +152,7 @@ def test_chunks_that_no_file_holds_are_refused_before_memory_is_taken(las, count
     pytest.importorskip("lazrs")
     path = las("c.laz")
     packed(path, chunks(path)[1] + 4, count)
-    with pytest.raises(FileFormatError, match=r"table of chunks promises more than its \d+ bytes can hold"):
+    with pytest.raises(FileFormatError, match=r"chunks, or one of them, promises more than its \d+ bytes can hold"):
         read_scan(path)
 
 
@@ -188,4 +188,41 @@ def test_more_points_than_a_packed_file_holds_are_refused(las):
     path = las("c.laz")
     packed(path, 247, 100 * path.stat().st_size, 8)
     with pytest.raises(FileFormatError, match="header promises more than its"):
+        read_scan(path)
+
+
+@pytest.mark.parametrize("point_format", [0, 1, 3, 6, 7, 8, 9, 10])
+@pytest.mark.parametrize("n", [1, 49_999, 130_000])
+def test_sound_packed_files_are_read_whatever_their_points_hold(tmp_path, point_format, n):
+    laspy = pytest.importorskip("laspy")
+    pytest.importorskip("lazrs")
+    header = laspy.LasHeader(point_format=point_format, version="1.4")
+    header.scales = [1e-6] * 3
+    header.add_extra_dim(laspy.ExtraBytesParams("treeID", type="uint32"))
+    header.add_extra_dim(laspy.ExtraBytesParams("three", type="3u1"))
+    scan = laspy.LasData(header)
+    scan.x, scan.y, scan.z = places = np.random.default_rng(0).normal(size=(3, n))
+    scan.treeID = np.arange(n)
+    scan.write(tmp_path / "s.laz")
+    found = read_scan(tmp_path / "s.laz")
+    np.testing.assert_allclose(found.positions, places.T, rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(found.attributes["treeID"], np.arange(n))
+
+
+@pytest.mark.parametrize("layer", [0, 5, 9])
+def test_layers_that_no_chunk_holds_are_refused_before_memory_is_taken(las, layer):
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    packed(path, chunks(path)[0] + 8 + 36 + 4 + 4 * layer, 2**32 - 1)
+    with pytest.raises(FileFormatError, match=r"chunks, or one of them, promises more than its \d+ bytes can hold"):
+        read_scan(path)
+
+
+def test_points_packed_as_nothing_are_refused(las):
+    """lazrs panics, which Python's own exceptions do not cover."""
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    packed(path, path.read_bytes().index(b"laszip encoded") - 2 + 54 + 32, 0, 2)
+    packed(path, 105, 0, 2)
+    with pytest.raises(FileFormatError, match=r"c\.laz: not a valid \.laz file"):
         read_scan(path)
