@@ -39,6 +39,7 @@ _SAID_HERE = {
     "max_opening = ": "--opening ",
     "remove it first, with Open3D's segment_plane or read_cloud(..., where='z > ...')": "remove it first, with "
     "--where 'z > ...' or Open3D's segment_plane",
+    "unless any_filter=True says": "unless --any-meshlab-filter says",
     "taken with recursive": "taken with --recursive",
     "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
 }

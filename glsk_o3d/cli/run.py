@@ -35,6 +35,13 @@ def run(
         ),
     ] = None,
     listed: Annotated[bool, typer.Option("--list", help="List the scripts that come with the package.")] = False,
+    any_filter: Annotated[
+        bool,
+        typer.Option(
+            "--any-meshlab-filter",
+            help="Run also filters of MeshLab's that write, read or send files: for scripts that you trust.",
+        ),
+    ] = False,
     cut_loops: CutLoops = False,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -56,7 +63,7 @@ def run(
             return
         if script is None or scan is None:
             raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
-        steps = read_steps(find_script(script))
+        steps = read_steps(find_script(script), any_filter)
         outputs, last = output or [], steps[-1]
         what = last.verb.makes if last.verb else "skeleton, points or mesh"
         if outputs or not last.name.startswith("get_"):  # a script that ends in a measurement needs no file
