@@ -1,7 +1,7 @@
 """Look for what breaks: degenerate clouds through all pipelines, damaged files through all readers.
 
-Findings are crashes, hangs, memory, errors that are not the package's own, warnings, vertices that are no numbers or out
-of the box of the points, indices out of range, and skeletons that depend on the order of the points.
+Findings are crashes, hangs, memory, errors that are not of the package, warnings, vertices that are no numbers or lie
+outside of the box of the points, indices out of range, and skeletons that depend on the order of the points.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -24,24 +25,26 @@ from _fuzz.workers import Outcome, one_case, run_cases
 MOST_CASES = 10**7  # more than there is time for
 
 app = application(__doc__)
-Seed = Annotated[int, typer.Option(min=0, help="Of all that is drawn.")]
+Runs = Annotated[int, typer.Option("--runs", min=1, help="Cases.")]
+Minutes = Annotated[float, typer.Option("--minutes", min=0, help="How long, about.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Of all that is drawn.")]
 Only = Annotated[int | None, typer.Option("--case", min=0, help="Run this one alone, in this process.")]
 
 
 @app.command()
-def arrays(runs: Annotated[int, typer.Option(min=1)] = 1000, seed: Seed = 0, case: Only = None) -> None:
+def arrays(runs: Runs = 1000, seed: Seed = 0, case: Only = None) -> None:
     """Degenerate clouds through the pipelines, each in two orders."""
     _run("arrays", runs, seed, case)
 
 
 @app.command()
-def files(runs: Annotated[int, typer.Option(min=1)] = 1000, seed: Seed = 0, case: Only = None) -> None:
+def files(runs: Runs = 1000, seed: Seed = 0, case: Only = None) -> None:
     """Damaged files through the readers."""
     _run("files", runs, seed, case)
 
 
 @app.command()
-def both(minutes: Annotated[float, typer.Option(min=0)] = 1.0, seed: Seed = 0) -> None:
+def both(minutes: Minutes = 1.0, seed: Seed = 0) -> None:
     """First files, then arrays, as long as there is time: half of it for each."""
     start, bad = time.monotonic(), False
     for part, what in enumerate(("files", "arrays"), 1):
@@ -71,7 +74,7 @@ def _tell(what: str, seed: int, outcomes: Iterable[Outcome]) -> bool:
     """Print a table, and the findings with how to repeat them; gives whether there are any."""
     counts: Counter[tuple[str, str]] = Counter()
     findings = []
-    for outcome in outcomes:
+    for outcome in _until_interrupted(outcomes):
         kind = outcome.kind or "not known"
         counts[kind, outcome.told] += 1
         counts[kind, "findings"] += len(outcome.findings)
@@ -83,6 +86,12 @@ def _tell(what: str, seed: int, outcomes: Iterable[Outcome]) -> bool:
     for number, finding in findings:
         typer.echo(f"benchmarks/fuzz.py {what} --seed {seed} --case {number}  # {finding}")
     return bool(findings)
+
+
+def _until_interrupted(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
+    """What has come when somebody has seen enough."""
+    with suppress(KeyboardInterrupt):
+        yield from outcomes
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from ..errors import FileFormatError, MissingPackageError, brief
 from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
 from ..interop.verbosity import following_open3d
-from .clouds import e57, las, pcd, ply_points, text_tables
+from .clouds import e57, gltf_sizes, las, pcd, ply_points, text_tables
 from .clouds.completeness import check_complete
 from .clouds.scanned import NoPoints, Scan
 from .clouds.selection import select
@@ -226,6 +226,8 @@ def _read(path: Path, ending: str) -> Scan:
 
 
 def _read_mesh(path: Path) -> Scan:
+    if path.suffix.lower() in (".gltf", ".glb"):
+        gltf_sizes.check_sizes(path)
     o3d = import_open3d()
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         mesh = o3d.io.read_triangle_mesh(str(path))
