@@ -9,12 +9,13 @@ PYTEST_ARGS ?= -n 2
 # See benchmarks/README.md for what else there is.
 ACCURACY_ARGS ?= truth --builtin
 PEERS_ARGS ?= --builtin --picture benchmarks/results/peers.png -o benchmarks/results/peers.json
+FUZZ_ARGS ?= both --minutes 1
 BENCH_ARGS ?= all --builtin --pictures benchmarks/results -o benchmarks/results/speed.json
 
 PYTHON_HINT = glsk-o3d needs Python 3.10 or newer: install it, or say 'make ... PYTHON=/path/to/python3'.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test docs figures accuracy bench peers lint format clean system-deps browser
+.PHONY: help demo test docs figures accuracy bench fuzz peers lint format clean system-deps browser
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -38,6 +39,9 @@ accuracy: $(VENV)/.installed-demo ## how far skeletons are from known axes (ACCU
 bench: $(VENV)/.installed-demo ## how fast skeletons are, stage by stage (BENCH_ARGS="stages --sizes 1048576" for more)
 	@mkdir -p benchmarks/results
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/speed.py $(BENCH_ARGS)
+
+fuzz: $(VENV)/.installed-test ## a minute of degenerate clouds and damaged files (FUZZ_ARGS="arrays --runs 20000" for more)
+	$(BIN)/python benchmarks/fuzz.py $(FUZZ_ARGS)
 
 peers: $(PEERS)/.installed ## what other tools make of the same clouds; they get a virtual environment of their own
 	@mkdir -p benchmarks/results

@@ -3,6 +3,8 @@
 import difflib
 from collections.abc import Iterable
 
+LONGEST_QUOTED = 300  # fitted: characters of another library's words
+
 
 class GlskError(Exception):
     """Base of all errors this package raises on purpose."""
@@ -50,6 +52,18 @@ class SkeletonWarning(UserWarning):
 
 class PluginWarning(UserWarning):
     """A plugin of another distribution is broken and was left out."""
+
+
+def brief(error: BaseException) -> str:
+    """What an error of another library says, but no more than the beginning: some repeat the whole file.
+
+    Examples
+    --------
+    >>> brief(ValueError("no number: " + 500 * "9"))[-8:]
+    '99999...'
+    """
+    words = str(error)
+    return words if len(words) <= LONGEST_QUOTED else f"{words[:LONGEST_QUOTED]}..."
 
 
 def did_you_mean(word: str, known: Iterable[str], what: str) -> str:

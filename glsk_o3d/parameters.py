@@ -6,12 +6,16 @@ import dataclasses
 import inspect
 import math
 import re
+import sys
 from numbers import Integral, Real
 from typing import Any, ClassVar, TypeVar
 
 from .errors import InvalidParameterError
 
 _Class = TypeVar("_Class", bound=type)
+
+LARGEST_WHOLE = 2**63 - 1  # derived: of the numbers that NumPy counts with
+LONGEST_SHOWN = 200  # fitted: characters of a value that say what was meant
 
 TYPES = ("int", "float", "bool", "length", "point", "choice", "reducer", "stop")
 """What a parameter may be; with a trailing ``?`` also None."""
@@ -98,7 +102,7 @@ class Parameters:
             value = getattr(self, field.name)
             problem = problem_with(value, field.metadata)
             if problem:
-                raise InvalidParameterError(f"{type(self).__name__}.{field.name} = {value!r}: {problem}")
+                raise InvalidParameterError(f"{type(self).__name__}.{field.name} = {shown(value)}: {problem}")
             if isinstance(value, Parameters):
                 value.check()
 
@@ -143,6 +147,14 @@ def _name(value: Any) -> str:
     return f"{'' if named is value else 'a '}{named.__module__}.{named.__qualname__}"
 
 
+def shown(value: Any) -> str:
+    """A value as messages show it: as in Python, but no pages of digits."""
+    if isinstance(value, Integral) and abs(int(value)) > LARGEST_WHOLE:
+        return f"a number of {math.floor(math.log10(abs(int(value)))) + 1} digits"
+    text = repr(value)
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
+
+
 def problem_with(value: Any, facts: Any) -> str | None:
     """What is wrong with the value of a parameter.
 
@@ -182,6 +194,9 @@ def problem_with(value: Any, facts: Any) -> str | None:
     if isinstance(value, bool) or not isinstance(value, Integral if kind == "int" else Real):
         words = "".join(f", or {choice!r}" for choice in facts["choices"])
         return f"must be {'an int' if kind == 'int' else 'a number'}{words}"
+    most = LARGEST_WHOLE if kind == "int" else sys.float_info.max
+    if isinstance(value, Integral) and abs(int(value)) > most:  # Python has larger ones, arrays and files do not
+        return f"must be at most {most:g}"
     if not isinstance(value, Integral) and not math.isfinite(value):
         return "must be finite"
     if low is not None and (value < low or (facts["open_low"] and value == low)):

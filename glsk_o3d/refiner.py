@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from .numerics.morton import morton_order
 from .numerics.vectors import AXES
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
@@ -143,7 +144,14 @@ class Refiner(Filter[Skeleton]):
                 if point.shape == (3,):
                     object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))
 
-    def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
+    def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
+        order = _order(given.points)
+        skeleton = self._refined(_with_points(given, order, given.points[order]))
+        back = np.empty(len(order), int)
+        back[order] = np.arange(len(order))
+        return _with_points(skeleton, back, given.points)
+
+    def _refined(self, skeleton: Skeleton) -> Skeleton:
         skeleton = self._fit(skeleton)
         asks = self.handle or self.limb or self.air or self.bridge
         if len(skeleton.edges) and len(skeleton.supporting_points) and (asks or self.recentre):
@@ -217,6 +225,22 @@ class Refiner(Filter[Skeleton]):
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
         return fit_axis(skeleton, min(2, self.recentre))
+
+
+def _order(points: np.ndarray) -> np.ndarray:
+    """An order of the points that does not depend on the one they came in, which sums would show in their last digit.
+
+    Where one thing is as good as another, as on grids, that digit decides.
+    """
+    finite = np.isfinite(points).all(axis=1)
+    some = np.flatnonzero(finite)
+    return np.concatenate([some[morton_order(points[some])] if len(some) else some, np.flatnonzero(~finite)])
+
+
+def _with_points(skeleton: Skeleton, order: np.ndarray, points: np.ndarray) -> Skeleton:
+    """The skeleton with its points in another order, in which `points` are."""
+    vertex, normals = skeleton.vertex_of_point[order], skeleton.normals.take(order, axis=0)
+    return replace(skeleton, points=points, normals=normals, vertex_of_point=vertex)
 
 
 def _of_changes(judgements: list[Judgement]) -> list[Judgement]:

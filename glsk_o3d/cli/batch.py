@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import print_json, print_rows, progress, say
+from .console import echo, print_json, print_rows, progress, say
 from .options import (
     SKELETON_ENDINGS,
     CutLoops,
@@ -200,8 +200,8 @@ def _print_plan(plan: Plan, as_json: bool, quiet: bool) -> None:
         )
     elif not quiet:
         for task in plan.todo:
-            typer.echo(f"{task.job.source} ({task.why}) -> {', '.join(task.job.outputs)}")
-        typer.echo(f"{len(plan.todo)} to do, {plan.skipped} to skip")
+            echo(f"{task.job.source} ({task.why}) -> {', '.join(task.job.outputs)}")
+        echo(f"{len(plan.todo)} to do, {plan.skipped} to skip")
         tell_left_out(plan.left_out)
 
 

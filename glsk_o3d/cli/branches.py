@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import print_json, print_table
+from .console import echo, print_json, print_table
 from .options import SKELETON_FILE, Json, Quiet, Root, Verbose, root_place
 from .reporting import reporting
 
@@ -58,9 +58,9 @@ def branches(
         elif not quiet and not output:
             _print(table)
         elif not quiet:
-            typer.echo(f"{len(table)} branches, {table.order.max() + 1} orders, length {table.length.sum():.4g}")
+            echo(f"{len(table)} branches, {table.order.max() + 1} orders, length {table.length.sum():.4g}")
             for path in output or []:
-                typer.echo(f"wrote {path}, in the units of {skeleton.name}")
+                echo(f"wrote {path}, in the units of {skeleton.name}")
 
 
 def _print(table: BranchTable) -> None:

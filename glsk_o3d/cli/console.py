@@ -9,16 +9,78 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 import typer
+from typer.core import TyperGroup
+
+# A terminal obeys these wherever they come from, the name of a file or a label in one; or shows text in another order.
+_CONTROLS = [*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A)]
+_SHOWN = {code: repr(chr(code))[1:-1] for code in _CONTROLS if chr(code) not in "\n\t"}
+_IN_JSON = {code: f"\\u{code:04x}" for code in _SHOWN if code > 0x20}  # the others json writes so itself
+
+
+def visible(text: str) -> str:
+    """Text with its control characters, but line ends and tabs, written as Python writes them.
+
+    Examples
+    --------
+    >>> print(visible("a\x1b[2Jb"))
+    a\\x1b[2Jb
+    """
+    return text.translate(_SHOWN)
+
+
+def echo(text: str = "", *, err: bool = False) -> None:
+    """Print lines on stdout, or stderr, with control characters visible: all text goes out here or by `console`."""
+    typer.echo(visible(text), err=err)
 
 
 def console(*, stderr: bool = False) -> Any:
-    """A rich console that prints text as it is, without markup or highlighting."""
-    from rich.console import Console
+    """A rich console that prints text as it is, without markup or highlighting, and with control characters visible."""
+    return _console_class()(stderr=stderr, markup=False, highlight=False, emoji=False)
 
-    return Console(stderr=stderr, markup=False, highlight=False, emoji=False)
+
+@cache
+def _console_class() -> type:
+    from rich.console import Console
+    from rich.segment import Segment
+
+    class VisibleConsole(Console):
+        def render(self, renderable: Any, options: Any = None) -> Iterator[Any]:
+            for text, style, control in super().render(renderable, options):
+                yield Segment(text if control else visible(text), style, control)
+
+    return VisibleConsole
+
+
+class VisibleGroup(TyperGroup):
+    """Commands of which the mistakes that typer itself finds on the command line are told with `visible` words.
+
+    A file that may not be read is no mistake in the command line: it is said as other errors are, in one line.
+    """
+
+    def make_context(self, *args: Any, **options: Any) -> Any:
+        with _visible_mistakes():
+            return super().make_context(*args, **options)
+
+    def invoke(self, ctx: Any) -> Any:
+        with _visible_mistakes():
+            return super().invoke(ctx)
+
+
+@contextmanager
+def _visible_mistakes() -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:  # typer's own have no public base
+        if isinstance(message := getattr(error, "message", None), str):
+            if message.endswith("is not readable."):
+                say("error", message.removesuffix("."))
+                raise typer.Exit(1) from None
+            error.message = visible(message)  # type: ignore[attr-defined]
+        raise
 
 
 def print_table(table: Any, *, stderr: bool = False, whole: bool = False) -> None:
@@ -30,7 +92,8 @@ def print_table(table: Any, *, stderr: bool = False, whole: bool = False) -> Non
         out.width = 10**4
     with out.capture() as captured:
         out.print(table)
-    typer.echo("\n".join(line.rstrip() for line in captured.get().splitlines()), err=stderr)
+    # not by `echo`: where there are colours, the console has put control characters in, and no others are left
+    typer.echo("\n".join(line.rstrip() for line in captured.get().removesuffix("\n").split("\n")), err=stderr)
 
 
 def say(kind: str, message: str) -> None:
@@ -91,7 +154,7 @@ def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
     for name, value in shown.items():
         text = f"{value:.6g}" if isinstance(value, float) else str(value)
         lines = [part for line in text.splitlines() for part in textwrap.wrap(line, room, drop_whitespace=False)]
-        typer.echo(f"{name:<{indent}}" + f"\n{'':<{indent}}".join(lines))
+        echo(f"{name:<{indent}}" + f"\n{'':<{indent}}".join(lines))
 
 
 def print_iterations(records, *, stderr: bool = False) -> None:
@@ -122,7 +185,7 @@ def print_iterations(records, *, stderr: bool = False) -> None:
 
 def print_json(data: Any) -> None:
     """Print JSON on stdout; numbers that are not finite become null."""
-    typer.echo(json.dumps(_finite(data), indent=2, ensure_ascii=False, allow_nan=False))
+    typer.echo(json.dumps(_finite(data), indent=2, ensure_ascii=False, allow_nan=False).translate(_IN_JSON))
 
 
 def _finite(data):

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .console import print_json, print_rows, progress
+from .console import echo, print_json, print_rows, progress
 from .options import DropInvalid, Json, PipelineName, Quiet, Verbose
 from .reporting import WrongUsage, holding_interrupts, reporting
 
@@ -92,7 +92,7 @@ def crosscheck(
         elif not quiet:
             print_rows(_rows(told), title=f"{scan}: {check.verdict}")
             for path in files:
-                typer.echo(f"wrote {path}")
+                echo(f"wrote {path}")
         if check.verdict == UNTOLD:
             raise InvalidCloudError(
                 f"the check says nothing about the skeleton: {check.reasons[0]}; give "

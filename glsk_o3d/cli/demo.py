@@ -18,7 +18,7 @@ def demo(
         "demo"
     ),
     points: Annotated[
-        int, typer.Option("--points", "-n", metavar="N", min=8, help="How many points the scan has.")
+        int, typer.Option("--points", "-n", metavar="N", min=8, max=10**9, help="How many points the scan has.")
     ] = 8192,
     pipeline: PipelineName = "default",
     quiet: Quiet = False,

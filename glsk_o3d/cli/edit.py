@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .console import echo
 from .options import ROOT_WORDS, SKELETON_FILE, TREE_ENDINGS, CutLoops, Output, Quiet, Verbose, root_place
 from .reporting import WrongUsage, reporting
 
@@ -38,7 +39,9 @@ def edit(
     prune_radius: Annotated[
         float, typer.Option("--prune-radius", metavar="RADIUS", min=0, help="Drop thinner branches that end.")
     ] = 0,
-    smooth: Annotated[int, typer.Option("--smooth", metavar="PASSES", min=0, help="Smooth the branches.")] = 0,
+    smooth: Annotated[
+        int, typer.Option("--smooth", metavar="PASSES", min=0, max=10**6, help="Smooth the branches.")
+    ] = 0,
     tolerance: Annotated[
         float | None,
         typer.Option("--simplify", metavar="TOLERANCE", min=0, help="Drop vertices that leave the curve as near."),
@@ -148,5 +151,5 @@ def _write(
         skeleton, outputs, None, title="", cut_loops=cut_loops, root=root, update=lambda text: None
     )
     for line in told if not quiet else ():
-        typer.echo(line)
+        echo(line)
     tell_files(written, problems, quiet=quiet)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
-from .console import print_json, print_table, progress
+from .console import echo, print_json, print_table, progress
 from .options import SKELETON_FILE, Json, Quiet, Verbose
 from .reporting import holding_interrupts, reporting
 
@@ -107,7 +107,7 @@ def evaluate(
         elif not quiet:
             _print_measures(assessment, comparison)
             for path in files:
-                typer.echo(f"wrote {path}")
+                echo(f"wrote {path}")
 
 
 def _measured(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import console, print_json, print_table
+from .console import console, echo, print_json, print_table
 from .options import Json
 from .reporting import WrongUsage, reporting
 
@@ -142,7 +142,7 @@ def _print_filter(cls, full: bool) -> None:
         shape = each["limits"] if each["type"] == "choice" else kind + unit + bounds
         table.add_row(f"  {each['name']}", Text.assemble(each["doc"], "\n", (f"{shape}; default {default}", "dim")))
     print_table(table)
-    typer.echo()
+    echo()
 
 
 def _pipeline_facts(name: str) -> dict[str, Any]:
@@ -172,4 +172,4 @@ def _print_pipeline(name: str, full: bool) -> None:
     for i, stage in enumerate(told["stages"]):
         table.add_row("  |" if i else "", stage)
     print_table(table)
-    typer.echo()
+    echo()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import print_json, print_table
+from .console import echo, print_json, print_table
 from .options import Json, Quiet, Verbose
 from .reporting import WrongUsage, reporting
 
@@ -105,7 +105,7 @@ def grasps(
         elif not quiet:
             _print(best, len(found))
             for path in output or []:
-                typer.echo(f"wrote {path}")
+                echo(f"wrote {path}")
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
@@ -137,10 +137,10 @@ def _print(best: GraspCandidates, found: int) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    typer.echo(f"{found} grasps at {best.places} places")
+    echo(f"{found} grasps at {best.places} places")
     for reason, times in best.left_out.items():
         limit = " (confidence below --min-confidence)" if reason == "uncertain" else ""
-        typer.echo(f"left out: {times} {reason}{limit}")
+        echo(f"left out: {times} {reason}{limit}")
     shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
     for name in PRINTED_GRASP:
         shown.add_column(name, justify="right")

@@ -13,6 +13,7 @@ import typer
 from .. import __version__
 from .batch import batch
 from .branches import branches
+from .console import VisibleGroup, echo
 from .crosscheck import crosscheck
 from .demo import demo
 from .edit import convert, edit
@@ -33,6 +34,7 @@ EPILOG = (
 )
 
 app = typer.Typer(
+    cls=VisibleGroup,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -62,7 +64,7 @@ for command in (
 
 def _version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"glsk-o3d {__version__}")
+        echo(f"glsk-o3d {__version__}")
         raise typer.Exit
 
 

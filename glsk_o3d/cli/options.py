@@ -84,4 +84,4 @@ Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print each 
 
 def root_place(text: str | None) -> int | str | None:
     """What ``--root`` says, as `refinement.rooted.root_among` takes it: the number of a vertex, or words."""
-    return int(text) if text is not None and text.isdecimal() else text
+    return int(text) if text is not None and text.isdecimal() and len(text) < 19 else text

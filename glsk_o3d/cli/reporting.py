@@ -14,7 +14,7 @@ import typer
 
 from ..errors import GlskError, InvalidCloudError, InvalidParameterError, PluginWarning, SkeletonWarning
 from ..interop.interrupts import counted_interrupts
-from .console import say
+from .console import echo, say
 
 FAILURE_CODE, USAGE_CODE, INTERRUPTED_CODE = 1, 2, 130
 
@@ -39,6 +39,7 @@ _SAID_HERE = {
     "max_opening = ": "--opening ",
     "remove it first, with Open3D's segment_plane or read_cloud(..., where='z > ...')": "remove it first, with "
     "--where 'z > ...' or Open3D's segment_plane",
+    "unless any_filter=True says": "unless --any-meshlab-filter says",
     "taken with recursive": "taken with --recursive",
     "save_report and save_preview make files": "--report PAGE.html and --preview PICTURE.png make files",
 }
@@ -102,7 +103,7 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
                     say("warning", said_here(line))
     if problem is not None:
         if verbose:
-            traceback.print_exception(problem)
+            echo("".join(traceback.format_exception(problem)).rstrip("\n"), err=True)
         say("error", _message(problem))
         raise typer.Exit(code)
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from .console import echo
 from .options import ROOT_WORDS, SKELETON_FILE, Quiet, Verbose, root_place
 from .reporting import WrongUsage, holding_interrupts, reporting
 
@@ -64,8 +65,8 @@ def rig(
         save_rig(curve, output[0], surface, cut_loops=cut_loops, root=root_place(root), up=up)
         if not quiet:
             bones = len(curve.vertices) - curve.n_components
-            typer.echo(f"{bones} bones move {_told(surface)}")
-            typer.echo(f"wrote {output[0]}")
+            echo(f"{bones} bones move {_told(surface)}")
+            echo(f"wrote {output[0]}")
 
 
 def _surface(path: Path) -> Any:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import MissingPackageError
-from .console import print_json, print_table, progress
+from .console import echo, print_json, print_table, progress
 from .options import CutLoops, Json, Quiet, Verbose
 from .reporting import WrongUsage, holding_interrupts, reporting
 
@@ -35,6 +35,13 @@ def run(
         ),
     ] = None,
     listed: Annotated[bool, typer.Option("--list", help="List the scripts that come with the package.")] = False,
+    any_filter: Annotated[
+        bool,
+        typer.Option(
+            "--any-meshlab-filter",
+            help="Run also filters of MeshLab's that write, read or send files: for scripts that you trust.",
+        ),
+    ] = False,
     cut_loops: CutLoops = False,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -56,7 +63,7 @@ def run(
             return
         if script is None or scan is None:
             raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
-        steps = read_steps(find_script(script))
+        steps = read_steps(find_script(script), any_filter)
         outputs, last = output or [], steps[-1]
         what = last.verb.makes if last.verb else "skeleton, points or mesh"
         if outputs or not last.name.startswith("get_"):  # a script that ends in a measurement needs no file
@@ -95,7 +102,7 @@ def _print_results(steps: Sequence[Step], results: Sequence[dict[str, Any]]) -> 
         if result.keys() >= set(ENDING_FACTS):
             said.append(ending(result) or "")
         told = ", ".join(filter(None, said))
-        typer.echo(f"{i}. {step.call.name}" + f": {told}" * bool(told))
+        echo(f"{i}. {step.call.name}" + f": {told}" * bool(told))
 
 
 def _plain(result: Any) -> Any:
@@ -139,4 +146,4 @@ def _list(as_json: bool) -> None:
     try:
         require("pymeshlab")
     except MissingPackageError as error:
-        typer.echo(f"\n{error}")
+        echo(f"\n{error}")

@@ -8,11 +8,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import typer
-
 from ..analysis.summary import ENDING_FACTS, ending, summary
 from ..skeleton import Skeleton
-from .console import print_iterations, print_json, print_rows
+from .console import echo, print_iterations, print_json, print_rows
 
 _DOING = {
     "RingBuilder": "building rings",
@@ -83,6 +81,6 @@ def tell_files(written: Sequence[Path], problems: Sequence[str] = (), *, quiet: 
     """Print which files were written; then raise OSError if some were not."""
     if not quiet:
         for path in written:
-            typer.echo(f"wrote {path}")
+            echo(f"wrote {path}")
     if problems:
         raise OSError("; ".join(problems))

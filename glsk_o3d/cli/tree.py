@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import print_json, print_table
+from .console import echo, print_json, print_table
 from .options import Json, Quiet, Root, Verbose, root_place
 from .reporting import reporting
 
@@ -82,7 +82,7 @@ def tree(
             _print(measures)
             for path in output or []:
                 told = f"the units of {skeleton.name}" if cylinders_ending(path) == ".csv" else "metres"
-                typer.echo(f"wrote {path}, in {told}")
+                echo(f"wrote {path}, in {told}")
 
 
 def _print(measures: TreeMeasures) -> None:
@@ -91,7 +91,7 @@ def _print(measures: TreeMeasures) -> None:
 
     for name, unit in UNITS.items():
         value = getattr(measures, name)
-        typer.echo(f"{name.replace('_', ' ')}: " + (f"{value:.4g} {unit}" if math.isfinite(value) else "not known"))
+        echo(f"{name.replace('_', ' ')}: " + (f"{value:.4g} {unit}" if math.isfinite(value) else "not known"))
     shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="")
     for name in ("order", "length m", "area m2", "volume m3"):
         shown.add_column(name, justify="right")

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, MissingPackageError
+from ..errors import FileFormatError, MissingPackageError, brief
 from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
 from ..interop.verbosity import following_open3d
-from .clouds import e57, las, pcd, ply_points, text_tables
+from .clouds import e57, gltf_sizes, las, pcd, ply_points, text_tables
 from .clouds.completeness import check_complete
 from .clouds.scanned import NoPoints, Scan
 from .clouds.selection import select
@@ -227,12 +227,12 @@ def refused_where_damaged(path: Path) -> Iterator[None]:
     """FileFormatError for what goes wrong with the contents of a file."""
     try:
         yield
-    except MissingPackageError:
+    except (MissingPackageError, PermissionError):
         raise
     except NoPoints as error:
         raise FileFormatError(f"{path}: no points could be read: {error}") from None
     except Exception as error:  # whatever a parser raises on a hostile file, std::bad_alloc
-        raise FileFormatError(f"{path}: not a valid {path.suffix.lower()} file: {error}") from error
+        raise FileFormatError(f"{path}: not a valid {path.suffix.lower()} file: {brief(error)}") from error
 
 
 def holds_no_points(path: Path) -> FileFormatError:
@@ -242,6 +242,8 @@ def holds_no_points(path: Path) -> FileFormatError:
 
 
 def _read_mesh(path: Path) -> Scan:
+    if path.suffix.lower() in (".gltf", ".glb"):
+        gltf_sizes.check_sizes(path)
     o3d = import_open3d()
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         mesh = o3d.io.read_triangle_mesh(str(path))

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from ..errors import FileFormatError, MissingPackageError
+from ..errors import FileFormatError, MissingPackageError, brief
 from ..interop.atomic import write_atomically
 from ..refinement.rooted import RootPlace
 from ..skeleton import Skeleton
@@ -182,7 +182,7 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     except NoEdges:
         raise _is_cloud(path) from None
     except Exception as error:  # whatever a parser raises on a hostile file
-        raise FileFormatError(f"{path}: not a valid {ending} skeleton: {error}") from error
+        raise FileFormatError(f"{path}: not a valid {ending} skeleton: {brief(error)}") from error
 
 
 def _is_cloud(path: Path) -> FileFormatError:

@@ -51,7 +51,7 @@ def defaults(name: str) -> dict[str, Any]:
     return dict(trial().filter_parameter_values(name))
 
 
-def arguments(name: str, params: tuple[Param, ...]) -> dict[str, Any]:
+def arguments(name: str, params: tuple[Param, ...], any_filter: bool = False) -> dict[str, Any]:
     """Parameters in a script as keyword arguments for pymeshlab, checked by pymeshlab itself.
 
     Parameters
@@ -59,6 +59,8 @@ def arguments(name: str, params: tuple[Param, ...]) -> dict[str, Any]:
     name : str
         As pymeshlab calls the filter.
     params : tuple of Param
+    any_filter : bool
+        Take also filters that do not work on layers, see `ON_LAYERS`.
 
     Returns
     -------
@@ -72,8 +74,12 @@ def arguments(name: str, params: tuple[Param, ...]) -> dict[str, Any]:
         With the line of the parameter as its second argument, or None.
     MissingPackageError
     """
-    if not name.startswith(ON_LAYERS):
-        raise ValueError("it writes or reads files, or sends them: scripts run only filters that work on layers", None)
+    if not (any_filter or name.startswith(ON_LAYERS)):
+        raise ValueError(
+            "it writes or reads files, or sends them: scripts run only filters that work on layers, unless "
+            "any_filter=True says that this one is trusted",
+            None,
+        )
     if name not in require("pymeshlab").filter_list():
         raise ValueError("the pymeshlab that is installed has no such filter", None)
     known, found = defaults(name), {}

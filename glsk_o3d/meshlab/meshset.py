@@ -207,19 +207,21 @@ class MeshSet(LayeredMeshSet):
 
     # ---------------------------------------------------------------------------------------------------- scripts
 
-    def load_filter_script(self, filter_script_name: str | os.PathLike) -> None:
+    def load_filter_script(self, filter_script_name: str | os.PathLike, *, any_filter: bool = False) -> None:
         """Make a script file the current script. Nothing is run; everything is checked.
 
         Parameters
         ----------
         filter_script_name : path-like
+        any_filter : bool
+            Take also filters of MeshLab's that write, read or send files, from a script that is trusted.
 
         Raises
         ------
         FileNotFoundError, FileFormatError, ScriptError
             See `glsk_o3d.meshlab.steps.read_steps`.
         """
-        self._script.load(read_steps(filter_script_name))
+        self._script.load(read_steps(filter_script_name, any_filter))
 
     def apply_filter_script(self) -> None:
         """Run the filters of the current script, in order, from the current layer on."""

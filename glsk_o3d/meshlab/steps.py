@@ -111,12 +111,14 @@ def change_of_layer(number: int) -> Step:
     )
 
 
-def read_steps(path: str | os.PathLike) -> list[Step]:
+def read_steps(path: str | os.PathLike, any_filter: bool = False) -> list[Step]:
     """Read a filter script and check all of it.
 
     Parameters
     ----------
     path : path-like
+    any_filter : bool
+        Take also filters of MeshLab's that write, read or send files, from a script that is trusted.
 
     Returns
     -------
@@ -138,7 +140,7 @@ def read_steps(path: str | os.PathLike) -> list[Step]:
             require("pymeshlab")
         except MissingPackageError as error:
             raise MissingPackageError(f"{path}: {_listed(foreign)}: {error}", name=error.name) from error
-    return [_step(call, path) for call in calls]
+    return [_step(call, path, any_filter) for call in calls]
 
 
 def meshlabs_own(calls: Sequence[Call], path: str | os.PathLike) -> list[Call]:
@@ -178,7 +180,7 @@ def _listed(calls: Sequence[Call]) -> str:
     return " and ".join(told) + (" are filters of MeshLab's own" if len(lines) > 1 else " is a filter of MeshLab's own")
 
 
-def _step(call: Call, path) -> Step:
+def _step(call: Call, path, any_filter: bool) -> Step:
     place = f"{path}, line {call.line}"
     verb = next((verb for verb in verbs().values() if verb.title == call.name), None)
     if verb is not None:
@@ -195,7 +197,7 @@ def _step(call: Call, path) -> Step:
         return replace(change_of_layer(values["mesh"]), place=place)
     name = builtin.names()[call.name]
     try:
-        return Step(name, builtin.arguments(name, call.params), call, place)
+        return Step(name, builtin.arguments(name, call.params, any_filter), call, place)
     except ValueError as error:
         message, line = error.args
         raise ScriptError(f"{path}, line {line or call.line}: filter {call.name!r}: {message}") from None

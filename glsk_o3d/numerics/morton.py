@@ -12,9 +12,35 @@ MORTON_BITS = 21  # derived: per axis: 63 bits in all
 def morton_order(points: np.ndarray) -> np.ndarray:
     """Permutation, (n,) int array, that sorts `points` (n, 3) along the Morton curve of their bounding box.
 
-    Stable: equal points keep their order.
+    Points in one cell of it are sorted by their coordinates, so that the order says nothing of the one before; only
+    equal points keep theirs.
     """
-    return np.argsort(morton_codes(points, 2**MORTON_BITS - 1), kind="stable")
+    codes = morton_codes(points, 2**MORTON_BITS - 1)
+    return sort_within(points, codes, np.argsort(codes, kind="stable"))
+
+
+def sort_within(points: np.ndarray, codes: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """An order by codes, in which points of equal codes are sorted by their coordinates.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    codes : (n,) uint64 array
+    order : (n,) int array
+        That sorts the codes; it is changed in place.
+
+    Returns
+    -------
+    (n,) int array
+        `order`.
+    """
+    ordered = codes.take(order)
+    same = ordered[1:] == ordered[:-1]
+    if same.any():
+        rows = np.flatnonzero(np.append(False, same) | np.append(same, False))
+        some = order[rows]
+        order[rows] = some[np.lexsort((*points[some].T, codes[some]))]
+    return order
 
 
 def morton_codes(

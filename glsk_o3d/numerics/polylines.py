@@ -45,7 +45,8 @@ def relative_distance(
     direction = step / np.maximum(length, tiny)[:, None]
     # relative to one of them: products of coordinates far from the origin would cancel
     points, start = points - start[0], start - start[0]
-    least = max(np.finfo(float).eps * np.abs(points).max(), tiny)  # of a line, which has no thickness but roundings
+    size = max(np.abs(points).max(), np.abs(start).max())
+    least = max(np.finfo(float).eps * size, tiny)  # of a line, which has no thickness but roundings
     found = np.empty(len(points))
     rows = max(POLYLINE_CHUNK // len(a), 1)
     for first in range(0, len(points), rows):

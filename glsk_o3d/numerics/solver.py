@@ -94,7 +94,8 @@ def solve_contraction(
     # The sum of all equations. The rows of a Laplacian sum to zero, so only W_H keeps the cloud in its place: where
     # it drowns beside L^T L in rounding, the corrections vanish but the points drift.
     pull = (system @ np.ones(len(points))) @ (wanted - system @ x)
-    drift = np.abs(pull).max() / ((position_weight**2).sum() * size)
+    held = (position_weight**2).sum() * size
+    drift = np.abs(pull).max() / held if held > 0 else np.inf
     if not drift < SOLVE_ACCEPTABLE:
         raise SolveError(f"the contraction system is too ill-conditioned: the cloud drifts by {drift:.1e} of its size")
     return x, float(error)

@@ -17,6 +17,7 @@ CLOUD_SLACK = 1.2  # published: how much larger than the cloud the contracted on
 FLAT_BOX = 0.01  # fitted: least half side of the box for that, over its diagonal
 MIN_POINTS = 8  # derived: the least that can have rings of three and a curve
 MIN_EXTENT, MAX_EXTENT = 1e-120, 1e120  # derived: a float64 holds their squares and products
+MIN_STEPS = 1024  # derived: across the cloud, between which coordinates can choose: places in it then have three digits
 SAME_POINT = 4e-15  # derived: a few roundings in the working frame; points nearer than this are duplicates
 
 
@@ -160,12 +161,15 @@ def to_working_frame(points: np.ndarray, counts: np.ndarray, by: str, k: Callabl
     if len(points) < MIN_POINTS:
         raise InvalidCloudError(f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones")
     check_extent(points)
+    # In this order from here on: even the last digit of a sum must not depend on how the points were numbered, since
+    # on grids it decides between neighbours that are equally near.
+    order = morton_order(points)
+    points, counts = points[order], counts[order]
     frame = Frame.of(points, by)
-    scaled = frame.into(points)
-    order = morton_order(scaled)
-    cloud, representative = scaled[order], np.empty(len(points), int)
+    cloud, representative = frame.into(points), np.empty(len(points), int)
     representative[order] = np.arange(len(points))
     distance, neighbours = nearest_neighbours(cloud, k(len(cloud)))
+    weight = counts
     if distance[:, 1].min() < SAME_POINT:
         cells = np.round(cloud / SAME_POINT).astype(np.int64)
         first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)[1:]
@@ -174,24 +178,29 @@ def to_working_frame(points: np.ndarray, counts: np.ndarray, by: str, k: Callabl
                 f"{len(points)} points but only {len(first)} distinct ones: a skeleton needs at least {MIN_POINTS}"
             )
         # Anew: the frame is that of the distinct points, however often they came.
-        distinct = points[order[first]]
-        frame = Frame.of(distinct, by)
-        cloud = frame.into(distinct)
-        order = morton_order(cloud)
-        position = np.empty(len(cloud), int)
-        position[order] = np.arange(len(cloud))
-        cloud, representative = cloud[order], position[inverse.reshape(-1)[representative]]
+        distinct = points[first]
+        order = morton_order(distinct)
+        frame = Frame.of(distinct[order], by)
+        position = np.empty(len(first), int)
+        position[order] = np.arange(len(first))
+        cloud, merged = frame.into(distinct[order]), position[inverse.reshape(-1)]
+        representative, weight = merged[representative], np.zeros(len(first))
+        np.maximum.at(weight, merged, counts)
         distance, neighbours = nearest_neighbours(cloud, k(len(cloud)))
-    weight = np.empty(len(cloud))
-    weight[representative] = counts
     return DistinctPoints(frame, cloud, representative, weight, distance, neighbours)
 
 
 def check_extent(points: np.ndarray) -> None:
-    """Raise InvalidCloudError where points coincide, or squares of their distances overflow or vanish."""
+    """Raise InvalidCloudError where points coincide or are only roundings apart, or squares overflow or vanish."""
     with np.errstate(over="ignore"):
         extent = np.ptp(points, axis=0).max()
     if extent == 0:
         raise InvalidCloudError(f"all {len(points)} points coincide: there is nothing to skeletonise")
     if not MIN_EXTENT < extent < MAX_EXTENT:
         raise InvalidCloudError(f"the cloud is {extent:g} long, too extreme for its squares: rescale it")
+    away = np.abs(points).max()
+    if extent < MIN_STEPS * np.spacing(away):
+        raise InvalidCloudError(
+            f"the cloud is {extent:g} long and {away:g} away from the origin, where numbers are {np.spacing(away):g} "
+            "apart: what shape it had is lost in rounding; subtract an offset before the coordinates are first stored"
+        )

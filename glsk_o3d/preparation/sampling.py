@@ -6,11 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..numerics.morton import MORTON_BITS, morton_codes
+from ..numerics.morton import MORTON_BITS, morton_codes, sort_within
 from ..numerics.vectors import dot
+from .frame import check_extent
 
 GRID_TAIL = 0.001  # fitted: share of the points that may be far off, at either end of each axis
 TAIL_POINTS = 100000  # fitted: points by which that is told
+# derived: odd numbers with bits everywhere, by which coordinates are mixed
+MIXING = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 
 
 class Sample(NamedTuple):
@@ -58,7 +61,7 @@ class Grid(NamedTuple):
 
 
 class Extent:
-    """How far a cloud reaches, told by its points in any number of blocks.
+    """How far a cloud reaches, told by its points in any number of blocks, whatever their order.
 
     Attributes
     ----------
@@ -69,24 +72,36 @@ class Extent:
     def __init__(self) -> None:
         self.n = 0
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
-        self._some, self._stride = np.empty((0, 3)), 1  # every so manieth point
+        self._some, self._mixed, self._share = np.empty((0, 3)), np.empty(0, np.uint64), np.uint64(0)
 
     def add(self, points: np.ndarray) -> None:
         """Take in some points, (m, 3) float array, at least one."""
         self._low, self._high = np.minimum(self._low, points.min(axis=0)), np.maximum(self._high, points.max(axis=0))
-        more = points[-self.n % self._stride :: self._stride]
-        while len(self._some) + len(more) > TAIL_POINTS:
-            self._some, self._stride = self._some[::2], 2 * self._stride
-            more = points[-self.n % self._stride :: self._stride]
-        self._some = np.concatenate([self._some, more])
+        mixed = _mixed(points)
+        few = mixed & self._share == 0
+        self._some = np.concatenate([self._some, points[few]])
+        self._mixed = np.concatenate([self._mixed, mixed[few]])
+        while len(self._some) > TAIL_POINTS:  # those that one more bit chooses
+            self._share = self._share << np.uint64(1) | np.uint64(1)
+            few = self._mixed & self._share == 0
+            self._some, self._mixed = self._some[few], self._mixed[few]
         self.n += len(points)
 
     def grid(self) -> Grid:
         """A grid around the points: a few far off do not decide how wide its cells are."""
-        low, high = np.quantile(self._some, [GRID_TAIL, 1 - GRID_TAIL], axis=0)
+        some = self._some if len(self._some) else np.stack([self._low, self._high])  # nothing but copies
+        low, high = np.quantile(some, [GRID_TAIL, 1 - GRID_TAIL], axis=0)
         low, high = 2 * low - high, 2 * high - low
         corner, top = (np.clip(ends, low, high) for ends in (self._low, self._high))
         return Grid(low, high, corner, float((top - corner).max()))
+
+
+def _mixed(points: np.ndarray) -> np.ndarray:
+    """A number for every point that is random but for its coordinates, (m,) uint64 array."""
+    bits = np.ascontiguousarray(points + 0.0).view(np.uint64)  # -0 is 0
+    mixed = (bits * MIXING).sum(axis=1, dtype=np.uint64)
+    mixed = (mixed ^ mixed >> np.uint64(32)) * MIXING[0]
+    return mixed ^ mixed >> np.uint64(29)
 
 
 def occupied_cells(codes: np.ndarray, bits: int, n: int) -> list[int]:
@@ -127,12 +142,18 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     -------
     Sample
         One point per cell, about n.
+
+    Raises
+    ------
+    InvalidCloudError
+        See `check_extent`.
     """
+    check_extent(points)
     extent = Extent()
     extent.add(points)
     grid = extent.grid()
     code = grid.codes(points, 2**MORTON_BITS - 1)
-    order = np.argsort(code, kind="stable")
+    order = sort_within(points, code, np.argsort(code, kind="stable"))
     counts = occupied_cells(code[order], MORTON_BITS, n)
     if counts[-1] < n:
         return everybody(points)

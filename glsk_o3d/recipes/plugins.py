@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stdout
 from importlib import metadata
 from typing import Any
 
@@ -86,8 +88,9 @@ def _load(group, builtin, check, found):
             if entry.name in builtin or entry.name in found:
                 owner = "the built-in one" if entry.name in builtin else "one of another plugin"
                 raise _Unfit(f"the name is that of {owner}")
-            plugin = entry.load()
-            check(entry.name, plugin)
+            with redirect_stdout(sys.stderr):  # where there are results of commands, nothing else may be
+                plugin = entry.load()
+                check(entry.name, plugin)
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # whatever code of others raises; some is no Exception

@@ -21,6 +21,8 @@ FIT_WIDEST = 100.0  # that ratio at most: vertices in one place have none
 FIT_STAY = 0.1  # weight of staying where it was, per point
 FIT_OUTLYING = 0.5  # distance from the axis, in radii, at which a point's normal counts half
 FIT_CENTROID = 0.5  # weight of the points themselves where their normals say nothing
+# derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
+FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
 HALF_SUPPORT = 8  # points that support a vertex half
 NEAREST_TIE = 1e-9  # derived: of roundings, which must not choose between the edges of a vertex
 ENTRIES = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # the upper triangle of a symmetric matrix, spread out
@@ -68,7 +70,8 @@ def fit_axis(skeleton: Skeleton, passes: int) -> Skeleton:
     edges_at = incident_edges(ends, m)
     around = edges_at[skeleton.vertex_of_point[points]]
     pattern = _Pattern(skeleton, edges_at)
-    far = np.sqrt(dot(p, p).max())
+    low, high = p.min(axis=0), p.max(axis=0)
+    slack = FIT_BEYOND * np.linalg.norm(high - low)
     for step in range(passes):
         near = _nearest(x, ends, around, p, n)
         weight, pull = np.ones(len(p)), np.zeros(len(p))
@@ -77,9 +80,8 @@ def fit_axis(skeleton: Skeleton, passes: int) -> Skeleton:
             weight = 1 / (1 + near.miss / np.maximum((FIT_OUTLYING * radius) ** 2, TINY))
             pull = FIT_CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1)
         x = _solve(x, near, p, weight, pull, pattern, FIT_SMOOTHING if step else 0)
-        size = norm(x)
-        run = np.where((size > far) & (skeleton.degree > 0), far / np.maximum(size, TINY), 1)
-        x = run[:, None] * x  # normals that mean nothing may meet anywhere
+        # normals that mean nothing may meet anywhere
+        x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low - slack, high + slack), x)
     near = _nearest(x, ends, around, p, n)
     radii = _plane_radii(skeleton, x + centre)
     if passes:  # the distance from a curve that nobody has centred is no radius
@@ -167,8 +169,9 @@ def _nearest(x: np.ndarray, ends: np.ndarray, around: np.ndarray, p: np.ndarray,
     at = group_sum(np.column_stack([miss, apart, np.full(len(p), 0.5)]), edge, len(ends))
     at = group_sum(np.concatenate([at, at]), np.concatenate([a, b]), len(x))
     miss_at, apart_at, support = (at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))).T
+    apart_at = np.maximum(apart_at, 0)  # but for rounding, a difference of squares
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
-    doubt = np.where(apart_at > 0, np.clip(2 * miss_at / np.maximum(apart_at, TINY), 0, 1), 1)
+    doubt = np.where(apart_at > 0, np.minimum(2 * miss_at, apart_at) / np.maximum(apart_at, TINY), 1)
     return _Nearest(edge, share, tangent, across, offset, miss, doubt, apart_at / np.maximum(support, TINY), support)
 
 
@@ -207,7 +210,8 @@ def _solve(
     reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
     stencil = np.column_stack([np.ones(len(inner)), -chord])
-    width = np.minimum((near.doubt * near.apart)[inner] / np.maximum(reach.prod(axis=1), TINY), FIT_WIDEST)
+    squared = np.maximum(reach.prod(axis=1), TINY)
+    width = np.minimum((near.doubt * near.apart)[inner], FIT_WIDEST * squared) / squared
     bend = FIT_BENDING * (1 + smoothing * width**2) * np.maximum(count[inner], 1)
     bend = bend[:, None, None] * stencil[:, :, None] * stencil[:, None]  # the same for all three coordinates
     blocks = np.concatenate(

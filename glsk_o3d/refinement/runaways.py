@@ -34,5 +34,5 @@ def recall_runaways(skeleton: Skeleton) -> Skeleton:
     spread = group_sum((skeleton.points[supporting] - (skeleton.vertices + mean)[vertex]) ** 2, vertex, m).sum(axis=1)
     reach = HALF_TUBE_REACH * np.sqrt(spread / np.maximum(count, 1))
     away = norm(mean)
-    back = np.where(away > reach, 1 - reach / np.maximum(away, TINY), 0)
+    back = 1 - np.minimum(reach, away) / np.maximum(away, TINY)
     return replace(skeleton, vertices=skeleton.vertices + back[:, None] * mean)

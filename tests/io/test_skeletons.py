@@ -203,3 +203,11 @@ def test_whether_a_file_holds_a_skeleton(cloud, skeleton, tmp_path, ending):
         assert not holds_skeleton(tmp_path / f"m{ending}")
     o3d.io.write_point_cloud(str(tmp_path / "c.ply"), cloud)
     assert not holds_skeleton(tmp_path / "c.ply")
+
+
+def test_an_error_does_not_repeat_the_file(tmp_path):
+    path = tmp_path / "s.swc"
+    path.write_text("1 0 " + 5000 * "x" + " 0 0 1 -1\n")
+    with pytest.raises(FileFormatError, match=r"s\.swc: not a valid \.swc skeleton: .*\.\.\.$") as caught:
+        read_skeleton(path)
+    assert len(str(caught.value)) < 600

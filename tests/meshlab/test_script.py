@@ -321,6 +321,33 @@ def test_filters_that_write_files_or_send_them_are_refused(tmp_path, filter):
     assert [path.name for path in tmp_path.iterdir()] == ["s.mlx"]
 
 
+def test_filters_that_write_files_run_where_somebody_says_that_the_script_is_trusted(tmp_path, monkeypatch):
+    pytest.importorskip("pymeshlab")
+    from typer.testing import CliRunner
+
+    from glsk_o3d.cli.main import app
+    from glsk_o3d.meshlab.meshset import MeshSet
+
+    script = tmp_path / "s.mlx"
+    script.write_text('<FilterScript>\n<filter name="Export to Sketchfab"/>\n</FilterScript>')
+    (told,) = read_steps(script, any_filter=True)
+    assert told.name == "export_mesh_to_sketchfab"
+    meshes = MeshSet()
+    with pytest.raises(ScriptError, match="unless any_filter=True says that this one is trusted"):
+        meshes.load_filter_script(script)
+    meshes.load_filter_script(script, any_filter=True)
+
+    np.savetxt(tmp_path / "s.xyz", samples.torus(100).points)
+    words = ["run", str(script), str(tmp_path / "s.xyz"), "-o", str(tmp_path / "o.ply")]
+    refused = CliRunner().invoke(app, words)
+    assert refused.exit_code == 1
+    assert "unless --any-meshlab-filter says that this one is trusted" in refused.output
+    ran = []
+    monkeypatch.setattr(MeshSet, "apply_step", lambda self, step, watch: ran.append(step.name))
+    CliRunner().invoke(app, [*words, "--any-meshlab-filter"])
+    assert ran == ["export_mesh_to_sketchfab"]
+
+
 def test_a_new_filter_is_a_verb_by_itself(monkeypatch, tmp_path):
     @documented
     @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -188,3 +188,9 @@ def test_identity_laplacian_by_hand():
     points = np.random.default_rng(0).normal(size=(5, 3))
     x, _ = solve_contraction(eye_array(5).tocsr(), np.full(5, 2.0), np.full(5, 3.0), points)
     np.testing.assert_allclose(x, points * 9 / 13, rtol=1e-14)
+
+
+def test_points_that_nothing_holds_are_refused():
+    laplacian, points, _ = small_system("torus")
+    with pytest.raises(SolveError):  # their squares are 0
+        solve_contraction(laplacian, np.ones(len(points)), np.full(len(points), 1e-200), points)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from glsk_o3d.errors import InvalidCloudError
 from glsk_o3d.numerics.morton import morton_order
-from glsk_o3d.preparation.frame import FRAME_SIDE, Frame
+from glsk_o3d.preparation.frame import FRAME_SIDE, Frame, check_extent
 
 CLOUD = np.random.default_rng(0).normal(size=(500, 3)) * [1, 3, 0.2]
 
@@ -137,6 +138,25 @@ def test_is_stable():
     order = morton_order(thrice)
     np.testing.assert_array_equal(order.reshape(-1, 3) % 500, np.repeat(morton_order(CLOUD), 3).reshape(-1, 3))
     assert (np.diff(order.reshape(-1, 3)) == 500).all()
+
+
+def test_points_in_one_cell_are_sorted_by_their_coordinates():
+    near = np.random.default_rng(4).random((40, 3)) * 1e-9
+    points = np.concatenate([near, np.ones((1, 3))])  # one cell is 5e-7 wide
+    order = morton_order(points)
+    assert order[-1] == 40
+    assert (np.diff(points[order[:40], 2]) > 0).all()
+    shuffled = np.random.default_rng(5).permutation(41)
+    np.testing.assert_array_equal(shuffled[morton_order(points[shuffled])], order)
+
+
+@pytest.mark.parametrize(("offset", "fine"), [(1e12, True), (1e13, True), (2e14, False), (1e15, False)])
+def test_what_is_lost_in_rounding_is_refused(offset, fine):
+    points = CLOUD + [0, offset, 0]
+    if fine:
+        return check_extent(points)
+    with pytest.raises(InvalidCloudError, match=r"lost in rounding; subtract an offset before"):
+        check_extent(points)
 
 
 def test_neighbours_in_the_order_are_neighbours_in_space():

@@ -48,7 +48,7 @@ def values(facts):
     kind = facts["type"].rstrip("?")
     low, high = facts["low"] if facts["low"] is not None else 0, facts["high"]
     numbers = st.floats(low, high, exclude_min=facts["open_low"], allow_nan=False, allow_infinity=False)
-    integers = st.integers(int(low) + facts["open_low"], high if high is None else int(high))
+    integers = st.integers(int(low) + facts["open_low"], 2**63 - 1 if high is None else int(high))
     strategy = {
         "int": integers,
         "float": numbers | integers,

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from glsk_o3d import Skeleton, samples, skeletonize
 from glsk_o3d.numerics.radii import plane_distance_radii
 from glsk_o3d.refinement import axis_fit
-from glsk_o3d.refinement.axis_fit import FIT_STAY, HALF_SUPPORT, incident_edges, nearest_on_edges
+from glsk_o3d.refinement.axis_fit import FIT_BEYOND, FIT_STAY, HALF_SUPPORT, incident_edges, nearest_on_edges
 
 R = 0.15  # of the tubes
 TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
@@ -543,3 +543,25 @@ def test_a_curve_that_nobody_centred_has_the_distances_to_the_planes():
     _, _, radii = fit_axis(skeleton, 0)
     expected = plane_distance_radii(skeleton.vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals)
     np.testing.assert_allclose(radii, expected, rtol=1e-12)
+
+
+def test_vertices_as_good_as_in_one_place_are_smoothed_at_most_so_much():
+    """Three of a tube, nearer than a square can say, among points as far away as a square may be."""
+    raw = tube()
+    vertices = raw.vertices.copy()
+    vertices[9:12, 0] = np.array([-1e-158, 0, 1e-158])
+    vertices[9:12, 1:] = 0
+    noisy = np.random.default_rng(0).permutation(raw.normals)
+    moved = fit_axis(replace(raw, vertices=vertices * 1e3, points=raw.points * 1e3, normals=noisy), 3)[0]
+    assert np.isfinite(moved).all()
+
+
+def test_normals_that_mean_nothing_do_not_lead_far_out_of_the_cloud():
+    """A strip that is bent as if its axis were a hundred times as far away as it is wide."""
+    raw = tube(arc=0.01, m=8)
+    fitted = fit_axis(raw, 3)[0]
+    low, high = raw.points.min(axis=0), raw.points.max(axis=0)
+    beyond = np.maximum(low - fitted, fitted - high).max() / np.linalg.norm(high - low)
+    assert beyond <= FIT_BEYOND * (1 + 1e-9)
+    third = tube(arc=2 * np.pi / 3)  # of a tube ten radii long and more has an axis
+    assert np.abs(fit_axis(third, 9)[0][:, 1:]).max() < 0.1 * R

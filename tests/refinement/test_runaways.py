@@ -81,3 +81,9 @@ def test_points_in_one_place_hold_their_vertex_there():
     np.testing.assert_allclose(skeleton.vertices, [[1, 1, 1]], atol=1e-15)
     on_them = recall_runaways(replace(raw, points=np.ones((8, 3)), vertices=[[1, 1, 1]]))
     np.testing.assert_array_equal(on_them.vertices, [[1, 1, 1]])
+
+
+def test_a_vertex_at_the_mean_stays_however_far_its_points_are():
+    points = np.array([[1e3, 0, 0], [-1e3, 0, 0]])  # the reach is more than any number times as far as the mean
+    raw = Skeleton([[0, 0, 0]], [], [1], [0, 0], points, points / 1e3)
+    np.testing.assert_array_equal(recall_runaways(raw).vertices, raw.vertices)

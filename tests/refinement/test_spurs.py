@@ -238,3 +238,11 @@ def test_the_farther_a_limb_reaches_the_more_probable_it_is():
 
 def test_a_part_with_two_ends_has_no_limbs():
     assert prune_spurs(tree(), 1.0)[1] == []
+
+
+def test_distance_of_a_point_that_is_a_vertex_to_a_line_without_thickness():
+    vertices = np.array([[0.0, 0, 0], [0, 0, 1], [0, 99, 0], [0, 99, 1]])
+    found = relative_distance(vertices[:1], vertices, np.zeros(4), [np.array([0, 1]), np.array([2, 3])])
+    np.testing.assert_array_equal(found, [0])
+    far = relative_distance(vertices[:1], vertices, np.zeros(4), [np.array([2, 3])])
+    assert 1e12 < far < np.inf

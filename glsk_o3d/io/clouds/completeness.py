@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from ...errors import FileFormatError
+from ...errors import FileFormatError, brief
 from ..formats.ply_tables import read_header
 from . import pcd
 
@@ -54,7 +54,7 @@ def check_complete(path: Path) -> None:
                 return
             found = _count_points(stream, promise, path.stat().st_size)
         except (ValueError, KeyError, IndexError) as error:
-            raise FileFormatError(f"{path}: not a valid {path.suffix} file: {error}") from error
+            raise FileFormatError(f"{path}: not a valid {path.suffix} file: {brief(error)}") from error
     if found < promise.points:
         raise FileFormatError(
             f"{path}: promises {promise.points} {promise.what} and holds {max(found, 0)}: it breaks off"
@@ -108,7 +108,19 @@ def _off(stream: BinaryIO) -> Promise:
     vertices, faces = (int(word) for word in words[1:3])
     if vertices < 0 or faces < 0:
         raise ValueError("its numbers of vertices and faces are negative")
+    _check_faces(stream, vertices, faces)
     return Promise(vertices + faces, 3, 0, 0, "vertices and faces")
+
+
+def _check_faces(stream: BinaryIO, vertices: int, faces: int) -> None:
+    """Raise ValueError where a face has a corner that is no vertex: Open3D looks for it in memory, and may crash."""
+    start = stream.tell()
+    for line in islice(_meant(stream), vertices, vertices + faces):
+        words = line.split()
+        corners = [int(word) for word in words[1 : 1 + int(words[0])]]
+        if len(corners) != int(words[0]) or not all(0 <= corner < vertices for corner in corners):
+            raise ValueError(f"a face has {words[0].decode(errors='replace')[:20]} corners that are not all vertices")
+    stream.seek(start)
 
 
 def _meant(stream: BinaryIO) -> Iterator[bytes]:

@@ -3,6 +3,7 @@
 import pytest
 
 from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.clouds.completeness import check_complete
 from glsk_o3d.io.scans import read_cloud
 
 PLY = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
@@ -66,3 +67,14 @@ def test_off_files_that_break_off(tmp_path, comment):
         path.write_text("".join(lines[:cut]))
         with pytest.raises(FileFormatError, match=r"m\.off"):
             read_cloud(path)
+
+
+@pytest.mark.parametrize("face", ["3 0 1 3", "3 0 1 -1", "3 0 1", "0.5 0 1 2", "-3 0 1 2", "3 0 1 1e9"])
+def test_corners_of_faces_that_are_no_vertices_are_refused(tmp_path, face):
+    """Open3D would look for them in memory."""
+    path = tmp_path / "m.off"
+    path.write_text(f"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n{face}\n")
+    with pytest.raises(FileFormatError, match=r"m\.off: not a valid \.off file"):
+        check_complete(path)
+    path.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    check_complete(path)

@@ -130,3 +130,99 @@ def test_e57_with_intensity_in_one_scan_of_two(e57, tmp_path):
     file.close()
     found = read_scan(tmp_path / "c.e57").attributes["intensity"]
     np.testing.assert_allclose(found, [np.nan] * 3 + [0.25, 0.5, 1])
+
+
+def packed(path, at, number, length=4):
+    """The file with a number written over what is there."""
+    data = bytearray(path.read_bytes())
+    data[at : at + length] = number.to_bytes(length, "little")
+    path.write_bytes(data)
+
+
+def chunks(path):
+    """Where the table of chunks begins."""
+    data = path.read_bytes()
+    start = int.from_bytes(data[96:100], "little")
+    return start, int.from_bytes(data[start : start + 8], "little")
+
+
+@pytest.mark.parametrize("count", [1000, 2**24, 2**31, 2**32 - 1])
+def test_chunks_that_no_file_holds_are_refused_before_memory_is_taken(las, count):
+    """For so many lazrs would end the process, even in another."""
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    packed(path, chunks(path)[1] + 4, count)
+    with pytest.raises(FileFormatError, match=r"chunks, or one of them, promises more than its \d+ bytes can hold"):
+        read_scan(path)
+
+
+@pytest.mark.parametrize("place", [0, 1, 2**40, 2**63])
+def test_a_table_of_chunks_that_is_elsewhere_is_refused(las, place):
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    packed(path, chunks(path)[0], place, 8)
+    with pytest.raises(FileFormatError, match="table of chunks"):
+        read_scan(path)
+
+
+def test_a_table_that_was_written_last_is_found_at_the_end(las):
+    pytest.importorskip("lazrs")
+    path = las("c.laz", classification=[2, 5, 5])
+    start, table = chunks(path)
+    packed(path, start, 2**64 - 1, 8)
+    path.write_bytes(path.read_bytes() + table.to_bytes(8, "little"))
+    np.testing.assert_allclose(read_scan(path).positions, PLACES, rtol=0, atol=1e-9)
+
+
+def test_points_that_are_packed_as_longer_ones_are_refused(las):
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    item = path.read_bytes().index(b"laszip encoded") - 2 + 54 + 34 + 2
+    packed(path, item, 65535, 2)
+    with pytest.raises(FileFormatError, match=r"its points have \d+ bytes, and those that are packed \d{5}"):
+        read_scan(path)
+
+
+def test_more_points_than_a_packed_file_holds_are_refused(las):
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    packed(path, 247, 100 * path.stat().st_size, 8)
+    with pytest.raises(FileFormatError, match="header promises more than its"):
+        read_scan(path)
+
+
+@pytest.mark.parametrize("point_format", [0, 1, 3, 6, 7, 8, 9, 10])
+@pytest.mark.parametrize("n", [1, 49_999, 130_000])
+def test_sound_packed_files_are_read_whatever_their_points_hold(tmp_path, point_format, n):
+    laspy = pytest.importorskip("laspy")
+    pytest.importorskip("lazrs")
+    header = laspy.LasHeader(point_format=point_format, version="1.4")
+    header.scales = [1e-6] * 3
+    header.add_extra_dim(laspy.ExtraBytesParams("treeID", type="uint32"))
+    header.add_extra_dim(laspy.ExtraBytesParams("three", type="3u1"))
+    scan = laspy.LasData(header)
+    scan.x, scan.y, scan.z = places = np.random.default_rng(0).normal(size=(3, n))
+    scan.treeID = np.arange(n)
+    scan.write(tmp_path / "s.laz")
+    found = read_scan(tmp_path / "s.laz")
+    np.testing.assert_allclose(found.positions, places.T, rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(found.attributes["treeID"], np.arange(n))
+
+
+@pytest.mark.parametrize("layer", [0, 5, 9])
+def test_layers_that_no_chunk_holds_are_refused_before_memory_is_taken(las, layer):
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    packed(path, chunks(path)[0] + 8 + 36 + 4 + 4 * layer, 2**32 - 1)
+    with pytest.raises(FileFormatError, match=r"chunks, or one of them, promises more than its \d+ bytes can hold"):
+        read_scan(path)
+
+
+def test_points_packed_as_nothing_are_refused(las):
+    """lazrs panics, which Python's own exceptions do not cover."""
+    pytest.importorskip("lazrs")
+    path = las("c.laz")
+    packed(path, path.read_bytes().index(b"laszip encoded") - 2 + 54 + 32, 0, 2)
+    packed(path, 105, 0, 2)
+    with pytest.raises(FileFormatError, match=r"c\.laz: not a valid \.laz file"):
+        read_scan(path)
