@@ -148,7 +148,16 @@ def _name(value: Any) -> str:
 
 
 def shown(value: Any) -> str:
-    """A value as messages show it: as in Python, but no pages of digits."""
+    """A value as messages show it: as in Python, but no pages of digits.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    str
+    """
     if isinstance(value, Integral) and abs(int(value)) > LARGEST_WHOLE:
         return f"a number of {math.floor(math.log10(abs(int(value)))) + 1} digits"
     text = repr(value)

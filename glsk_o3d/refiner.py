@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .numerics.morton import morton_order
 from .numerics.vectors import AXES
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
@@ -16,7 +15,7 @@ from .refinement.air import cut_air
 from .refinement.axis_fit import fit_axis
 from .refinement.bridging import bridge_gaps
 from .refinement.diagnostics import diagnose
-from .refinement.evidence import Evidence
+from .refinement.evidence import Evidence, in_order
 from .refinement.junctions import level_tips, move_junctions
 from .refinement.loops import close_loops, zip_narrow_loops
 from .refinement.reattachment import reattach_limbs
@@ -145,11 +144,10 @@ class Refiner(Filter[Skeleton]):
                     object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))
 
     def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
-        order = _order(given.points)
-        skeleton = self._refined(_with_points(given, order, given.points[order]))
-        back = np.empty(len(order), int)
-        back[order] = np.arange(len(order))
-        return _with_points(skeleton, back, given.points)
+        ordered, back = in_order(given)
+        skeleton = self._refined(ordered)
+        vertex, normals = skeleton.vertex_of_point[back], skeleton.normals.take(back, axis=0)
+        return replace(skeleton, points=given.points, normals=normals, vertex_of_point=vertex)
 
     def _refined(self, skeleton: Skeleton) -> Skeleton:
         skeleton = self._fit(skeleton)
@@ -225,22 +223,6 @@ class Refiner(Filter[Skeleton]):
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
         return fit_axis(skeleton, min(2, self.recentre))
-
-
-def _order(points: np.ndarray) -> np.ndarray:
-    """An order of the points that does not depend on the one they came in, which sums would show in their last digit.
-
-    Where one thing is as good as another, as on grids, that digit decides.
-    """
-    finite = np.isfinite(points).all(axis=1)
-    some = np.flatnonzero(finite)
-    return np.concatenate([some[morton_order(points[some])] if len(some) else some, np.flatnonzero(~finite)])
-
-
-def _with_points(skeleton: Skeleton, order: np.ndarray, points: np.ndarray) -> Skeleton:
-    """The skeleton with its points in another order, in which `points` are."""
-    vertex, normals = skeleton.vertex_of_point[order], skeleton.normals.take(order, axis=0)
-    return replace(skeleton, points=points, normals=normals, vertex_of_point=vertex)
 
 
 def _of_changes(judgements: list[Judgement]) -> list[Judgement]:

@@ -150,7 +150,9 @@ def test_contraction_distance_is_a_median_over_sixteen(state):
 def test_contraction_distance_of_a_tube_is_its_radius():
     state = Contractor()(RingBuilder()(samples.tube(n=2000, radius=0.1).points))
     middle = np.abs(state.contracted[:, 0]) < 0.4
-    np.testing.assert_allclose(contraction_distance(state)[middle] * state.frame.scale, 0.1, rtol=0.1)
+    off = np.abs(contraction_distance(state)[middle] * state.frame.scale - 0.1) / 0.1
+    assert np.median(off) < 0.04
+    assert np.quantile(off, 0.98) < 0.1
 
 
 def test_contraction_distance_ignores_a_few_points_gone_aunsupported(state):

@@ -157,7 +157,7 @@ class TestTableOfStages:
             stopwatch.find({"rings": stopwatch.Stage(after=("no", "such"))})
 
     def test_the_default_pipeline_goes_through_every_stage(self, stopwatch, parts, monkeypatch):
-        points = sauropod(1200, noise=0.01).points
+        points = sauropod(2400, noise=0.01).points
         pipelines.default()(points)  # so that nothing is imported below
         ticks = count()
         monkeypatch.setattr(stopwatch, "_clocks", lambda: (next(ticks), 0.0))

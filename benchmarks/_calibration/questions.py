@@ -13,7 +13,7 @@ from glsk_o3d.analysis.matching import TIP_REACH, matched
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
 from glsk_o3d.refinement.air import branch_facts
 from glsk_o3d.refinement.bridging import gap_facts
-from glsk_o3d.refinement.evidence import Evidence
+from glsk_o3d.refinement.evidence import Evidence, in_order
 from glsk_o3d.refinement.loops import loop_facts
 from glsk_o3d.refinement.reattachment import reattach_limbs
 from glsk_o3d.refinement.spurs import limb_facts
@@ -37,7 +37,7 @@ def questions(case: Case, pipeline: Pipeline) -> dict:
 def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tuple[str, dict[str, float], bool]]:
     """The questions in the order in which a pipeline's refiner asks them, each of the skeleton that it has then."""
     *stages, refiner = pipeline.stages
-    skeleton = refiner._fit(Pipeline(*stages)(points))
+    skeleton = refiner._fit(in_order(Pipeline(*stages)(points))[0])
     if not len(skeleton.edges):
         return
     evidence = Evidence.of(skeleton)

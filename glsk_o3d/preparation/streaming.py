@@ -115,13 +115,22 @@ class _Nearest:
         first = np.empty(len(cell), int)
         first[group[::-1]] = at[::-1]
         tied = np.flatnonzero(np.bincount(group)[group] > 1)
-        tied = tied[np.argsort(self._fine(points[at[tied]]), kind="stable")][::-1]
+        tied = tied[np.lexsort((*points[at[tied]].T, self._fine(points[at[tied]])))][::-1]
         first[group[tied]] = at[tied]
         points, best = points[first], self._squared[cell]
         nearer, same = least < best, np.flatnonzero(least == best)
-        nearer[same] = self._fine(points[same]) < self._fine(self.points[cell[same]])
+        nearer[same] = self._before(points[same], self.points[cell[same]])
         self._squared[cell[nearer]] = least[nearer]
         self.points[cell[nearer]] = points[nearer]
+
+    def _before(self, points: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Which come before others in Morton order; in one cell of it by their coordinates, the last first."""
+        ours, theirs = self._fine(points), self._fine(others)
+        before, same = ours < theirs, ours == theirs
+        for axis in (2, 1, 0):
+            before |= same & (points[:, axis] < others[:, axis])
+            same &= points[:, axis] == others[:, axis]
+        return before
 
     def _fine(self, points: np.ndarray) -> np.ndarray:
         return self._grid.codes(points, 2**MORTON_BITS - 1)

@@ -18,6 +18,7 @@ MOST_IN_ONE = 4  # fitted: points that one may stand for after a pass, where the
 ASK_AGAIN = 0.25  # measured: share of the points left, below which the neighbours are looked up anew
 DENSE_FROM, DENSE_TO = 2000, 8192  # fitted: points from which on, and down to which, more than enough are merged
 WIDER_STEPS = 3  # measured: steps from neighbour to neighbour: fewer see no more than noise, more see other parts
+SHEET_FROM = 0.4  # measured: second over third variance of these, from which on they are a sheet; tubes of 10 have it
 WIDER_BIAS = 1.25  # measured: on tubes with 18 to 80 points around them, noise of up to a fifth of their spacing
 STEADY_SHARE = 0.9  # fitted: share of the points left by a pass at which passes end
 
@@ -141,7 +142,8 @@ def points_around(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray
     \pi k / (4 N^2)`, the least over the largest principal variance; and noise adds to :math:`\sigma_1`. In wider
     surroundings, where :math:`\sigma_3` is s times as large, noise adds the same, but the tube rises s^2 times as
     much: their difference, over :math:`s^2 - 1`, is free of noise. These are the surroundings of the neighbours of the
-    neighbours, all together. In them edges, gaps and other parts look like thin parts.
+    neighbours, all together. In them edges, gaps and other parts look like thin parts. Where they are no sheet but a
+    line, a part with less than ten points around it, all of :math:`\sigma_1` is its thickness.
 
     Parameters
     ----------
@@ -164,6 +166,8 @@ def points_around(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray
     mean, square = moments[:, :3].T, moments[:, 3:].T
     wider = principal_parts(square - [mean[i] * mean[j] for i, j in PAIRS])[0]
     near = np.maximum(spread.T / k, TINY)
+    sheet = np.minimum(wider[1] / (SHEET_FROM * np.maximum(wider[2], TINY)), 1)
     bent = np.maximum(wider[0] - near[0], 0) / np.maximum((wider[2] / near[2]) ** 2 - 1, TINY)
+    bent = sheet * bent + (1 - sheet) * np.maximum(wider[0], 0)
     with np.errstate(divide="ignore"):
         return WIDER_BIAS * np.sqrt(np.pi * k / 4 * near[2] / bent)

@@ -11,7 +11,7 @@ from glsk_o3d.samples import sample_object
 @pytest.fixture(scope="module")
 def skeleton_file(tmp_path_factory):
     path = tmp_path_factory.mktemp("skeleton") / "s.json"
-    skeletonize(sample_object(600).points).save(path)
+    skeletonize(sample_object(700).points).save(path)
     return path
 
 

@@ -132,12 +132,16 @@ def test_the_formula_of_the_ratio():
     assert np.median(spread[:, 0] / spread[:, 2]) == pytest.approx(np.pi * k / (4 * around**2), rel=0.1)
 
 
-def test_thin_parts_of_a_dense_cloud_stay():
-    """A rod with 8 points around it, far from a tube with 60, both as noisy."""
-    thick = tube(60, 0.2)
-    spacing = 2 * np.pi / 60
-    thin = tube(8, 0)[:, [0, 1, 2]] * (8 * spacing / (2 * np.pi)) + [20, 0, 0]
-    thin += np.random.default_rng(1).normal(0, 0.2 * spacing, thin.shape)
+@pytest.mark.parametrize("noise", [0, 0.2, 0.4])
+@pytest.mark.parametrize("many", [4, 5, 6, 7, 8, 10])
+def test_thin_parts_of_a_dense_cloud_stay(many, noise):
+    """A rod with few points around it, far from a tube with 60, both as noisy."""
+    spacing, rng = 2 * np.pi / 60, np.random.default_rng(1)
+    thick, radius = tube(60, noise), many / 60
+    n = int(2 * np.pi * radius * 20 / spacing**2)
+    turn = rng.uniform(0, 2 * np.pi, n)
+    thin = np.column_stack([20 + radius * np.cos(turn), radius * np.sin(turn), rng.uniform(0, 20, n)])
+    thin += rng.normal(0, noise * spacing, thin.shape)
     into = smoothed(np.concatenate([thick, thin]), 20)
     share = np.bincount(into, minlength=len(into)) > 0
     assert share[: len(thick)].mean() < 0.5

@@ -63,7 +63,22 @@ def select(scan: Scan, where: str) -> Scan:
 
 
 def chosen_points(scan: Scan, where: str) -> np.ndarray:
-    """For which points a condition holds, (N,) bool array; InvalidParameterError as from `select`."""
+    """For which points a condition holds.
+
+    Parameters
+    ----------
+    scan : Scan
+    where : str
+
+    Returns
+    -------
+    (N,) bool array
+
+    Raises
+    ------
+    InvalidParameterError
+        As from `select`.
+    """
     try:
         chosen = np.asarray(_value(parsed(where), scan.columns))
     except (TypeError, ValueError) as error:
@@ -76,7 +91,16 @@ def chosen_points(scan: Scan, where: str) -> np.ndarray:
 
 
 def none_chosen(where: str) -> InvalidCloudError:
-    """The error for a condition that holds for no point."""
+    """The error for a condition that holds for no point.
+
+    Parameters
+    ----------
+    where : str
+
+    Returns
+    -------
+    InvalidCloudError
+    """
     return InvalidCloudError(f"there is no point with {where}")
 
 
