@@ -190,12 +190,15 @@ def to_working_frame(points: np.ndarray, counts: np.ndarray, by: str, k: Callabl
     return DistinctPoints(frame, cloud, representative, weight, distance, neighbours)
 
 
-def check_extent(points: np.ndarray) -> None:
-    """Raise InvalidCloudError where points coincide or are only roundings apart, or squares overflow or vanish."""
+def check_extent(points: np.ndarray, n: int | None = None) -> None:
+    """Raise InvalidCloudError where points coincide or are only roundings apart, or squares overflow or vanish.
+
+    `points` may be two corners of the box of n of them.
+    """
     with np.errstate(over="ignore"):
         extent = np.ptp(points, axis=0).max()
     if extent == 0:
-        raise InvalidCloudError(f"all {len(points)} points coincide: there is nothing to skeletonise")
+        raise InvalidCloudError(f"all {n or len(points)} points coincide: there is nothing to skeletonise")
     if not MIN_EXTENT < extent < MAX_EXTENT:
         raise InvalidCloudError(f"the cloud is {extent:g} long, too extreme for its squares: rescale it")
     away = np.abs(points).max()

@@ -16,6 +16,9 @@ TAIL_POINTS = 100000  # fitted: points by which that is told
 MIXING = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 
 
+ALL_BITS = np.uint64(2**64 - 1)  # derived
+
+
 class Sample(NamedTuple):
     """Points that stand for a cloud."""
 
@@ -81,14 +84,22 @@ class Extent:
         few = mixed & self._share == 0
         self._some = np.concatenate([self._some, points[few]])
         self._mixed = np.concatenate([self._mixed, mixed[few]])
-        while len(self._some) > TAIL_POINTS:  # those that one more bit chooses
+        while len(self._some) > TAIL_POINTS and self._share < ALL_BITS:  # those that one more bit chooses
             self._share = self._share << np.uint64(1) | np.uint64(1)
             few = self._mixed & self._share == 0
             self._some, self._mixed = self._some[few], self._mixed[few]
         self.n += len(points)
 
     def grid(self) -> Grid:
-        """A grid around the points: a few far off do not decide how wide its cells are."""
+        """A grid around the points: a few far off do not decide how wide its cells are.
+
+        Raises
+        ------
+        InvalidCloudError
+            See `check_extent`.
+        """
+        if self.n:
+            check_extent(np.stack([self._low, self._high]), self.n)
         some = self._some if len(self._some) else np.stack([self._low, self._high])  # nothing but copies
         low, high = np.quantile(some, [GRID_TAIL, 1 - GRID_TAIL], axis=0)
         low, high = 2 * low - high, 2 * high - low
@@ -99,7 +110,8 @@ class Extent:
 def _mixed(points: np.ndarray) -> np.ndarray:
     """A number for every point that is random but for its coordinates, (m,) uint64 array."""
     bits = np.ascontiguousarray(points + 0.0).view(np.uint64)  # -0 is 0
-    mixed = (bits * MIXING).sum(axis=1, dtype=np.uint64)
+    mixed = (bits * MIXING).sum(axis=1, dtype=np.uint64) + MIXING[1]  # nor is the origin, whose bits are 0, special
+    mixed = (mixed ^ mixed >> np.uint64(31)) * MIXING[2]
     mixed = (mixed ^ mixed >> np.uint64(32)) * MIXING[0]
     return mixed ^ mixed >> np.uint64(29)
 
@@ -123,6 +135,8 @@ def occupied_cells(codes: np.ndarray, bits: int, n: int) -> list[int]:
 
 def cells_along(counts: list[int], n: int) -> float:
     """How many cells a grid must have along its longest side for about n to be occupied, by `occupied_cells`."""
+    if len(counts) == 1:
+        return 1.0
     if counts[-1] < n:
         return 2**MORTON_BITS - 1
     wider = np.log(counts[-1] / n) / np.log(counts[-1] / counts[-2])
@@ -148,7 +162,6 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     InvalidCloudError
         See `check_extent`.
     """
-    check_extent(points)
     extent = Extent()
     extent.add(points)
     grid = extent.grid()

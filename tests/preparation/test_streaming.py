@@ -5,6 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from glsk_o3d.errors import InvalidCloudError
 from glsk_o3d.preparation.sampling import Extent, sample_cloud, sample_grid
 from glsk_o3d.preparation.streaming import sample_blocks
 from glsk_o3d.samples import torus, y_junction
@@ -100,3 +101,20 @@ def test_memory_does_not_grow_with_the_cloud():
 
     few, many = peak(10), peak(60)
     assert many < 1.2 * few  # the cells are as many; of all the points it would be six times as much
+
+
+@pytest.mark.parametrize("copies", [250, 120_000])
+def test_points_at_the_origin_are_as_others(copies):
+    """Cameras say so where they see nothing: they neither stay in the sample of tails for ever nor make the grid wide."""
+    rng = np.random.default_rng(0)
+    points = np.concatenate([rng.random((300_000, 3)) + [5e5, 5e6, 100], np.zeros((copies, 3))])
+    kept = sample_grid(points, 50_000).kept
+    assert 30_000 < len(kept) < 90_000 or copies > 0.001 * len(points)
+
+
+def test_few_of_many_and_what_has_no_extent():
+    points = np.random.default_rng(0).random((1000, 3))
+    assert len(sample_blocks(lambda: [points], lambda n: 1)[0]) >= 1
+    for scale in (1e200, 0):
+        with pytest.raises(InvalidCloudError, match="long|coincide"):
+            sample_blocks(lambda scale=scale: [scale * points], lambda n: 10)

@@ -174,7 +174,7 @@ def test_surfaces_sheets_and_clouds_are_not_traced(cloud):
 
 def test_a_large_cloud_has_the_surface_that_its_points_show():
     """Of a sample of a few ten thousand the twigs would look thinner than their points are apart."""
-    drawn = samples.tree(60_000, forks=6, seed=1, noise=0.0005)
+    drawn = samples.tree(60_000, forks=6, seed=4, noise=0.0005)
     found = pipelines.default()(drawn.points)
     assert found.report.n_traced == 0
     assert len(found.leaves) == 2**6 + 1
