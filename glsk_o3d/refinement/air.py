@@ -84,7 +84,8 @@ def branch_facts(
     scatter = 1.4826 * np.median(np.abs(winding - typical)) + LEAST_SCATTER * abs(typical)
     along = evidence.surface_around(skeleton)
     tubes = 2 * np.pi * np.maximum(skeleton.radii[edges].mean(axis=1), TINY) @ length
-    seen = max(along.sum() / tubes, TINY)
+    area = along.sum()
+    seen = max(area / max(tubes, area * TINY, TINY), TINY)  # a line has no tubes
     spacing = np.sqrt(np.median(evidence.areas))
     pairs, weight = evidence.bonds(skeleton)
     around, keys = _neighbours(skeleton), edges @ [m, 1]

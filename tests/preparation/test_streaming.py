@@ -105,7 +105,7 @@ def test_memory_does_not_grow_with_the_cloud():
 
 @pytest.mark.parametrize("copies", [250, 120_000])
 def test_points_at_the_origin_are_as_others(copies):
-    """Cameras say so where they see nothing: they neither stay in the sample of tails for ever nor make the grid wide."""
+    """Cameras say so where they see nothing: they neither stay in the sample of tails nor make the grid wide."""
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.random((300_000, 3)) + [5e5, 5e6, 100], np.zeros((copies, 3))])
     kept = sample_grid(points, 50_000).kept
@@ -116,5 +116,5 @@ def test_few_of_many_and_what_has_no_extent():
     points = np.random.default_rng(0).random((1000, 3))
     assert len(sample_blocks(lambda: [points], lambda n: 1)[0]) >= 1
     for scale in (1e200, 0):
-        with pytest.raises(InvalidCloudError, match="long|coincide"):
+        with pytest.raises(InvalidCloudError, match=r"long|coincide"):
             sample_blocks(lambda scale=scale: [scale * points], lambda n: 10)

@@ -98,6 +98,14 @@ def test_the_facts_of_a_false_edge(piped):
     assert found[False]["straightness"] == pytest.approx(1, abs=1e-6)
 
 
+def test_a_surface_along_a_line_without_thickness(piped):
+    """Its area over that of a tube is no number then; nothing overflows."""
+    raw = piped(ACROSS, tubes=[0, 1])
+    thin = replace(raw, vertices=1e6 * raw.vertices, points=1e6 * raw.points, radii=np.zeros(len(raw.radii)))
+    for _, _, facts in branch_facts(thin, Evidence.of(thin), 0.25):
+        assert np.isfinite(list(facts.values())).all()
+
+
 @pytest.mark.parametrize("turn", [0, 7, 13])
 def test_a_ring_has_no_seam(around, turn):
     """Its weakest place is where its points are fewest, and bonds cross all of it, whichever vertex is the first."""
