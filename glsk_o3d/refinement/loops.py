@@ -153,7 +153,7 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
         tube, inside = max(float(np.median(surface[cycle])), TINY), float(np.median(winding[cycle]))
         crossing = crossings(cycle, len(surface), pairs, weight)
         facts = dict(
-            opening=float(np.log(min(radius / tube, WIDE_OPEN) + 0.1)),
+            opening=float(np.log(min(radius, WIDE_OPEN * tube) / tube + 0.1)),
             winding=float(np.clip(least / max(inside, LEAST_INSIDE), 0, 1.5)),
             bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.01)),
             confidence=float(np.nan_to_num(skeleton.confidence[cycle]).mean()),

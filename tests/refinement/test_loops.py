@@ -129,6 +129,14 @@ def test_the_facts_of_a_ring_and_of_two_strands(piped):
     assert false["winding"] == pytest.approx(1, abs=0.15)
 
 
+def test_a_loop_of_a_tube_without_thickness_opens_wide(piped):
+    """Its points lie on it: how many times the tube it opens is no number."""
+    ring = piped(TORUS)
+    vertices = 1e6 * ring.vertices
+    ((facts, *_),) = facts_of(replace(ring, vertices=vertices, points=vertices[ring.vertex_of_point]))
+    assert facts["opening"] == pytest.approx(np.log(3.1))
+
+
 def test_what_nobody_measured_counts_as_no_confidence(piped):
     ((facts, *_),) = facts_of(replace(piped(TORUS), confidence=np.empty(0)))
     assert facts["confidence"] == 0
