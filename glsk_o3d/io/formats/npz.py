@@ -16,7 +16,7 @@ import numpy as np
 from ...skeleton import Skeleton
 from .fields import ARRAYS, FORMAT, FORMAT_VERSION, decode, dumps
 
-MOST_EXPANDED = 200  # measured: times the size of a file that its arrays may have; those of skeletons have 1 to 20
+MOST_EXPANDED = 200  # fitted: times the size of a file that its arrays may have; those of skeletons have 1 to 20
 SMALL_ARCHIVE = 1 << 26  # derived: bytes that may always be held
 
 
