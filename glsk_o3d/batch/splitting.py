@@ -16,7 +16,7 @@ from ..interop.atomic import write_json
 from ..io.clouds.blocks import read_blocks
 from ..io.clouds.scanned import Scan
 from ..preparation.frame import finite_points
-from .grid import Grid, TooManyParts, tile_name
+from .grid import Grid, TooManyParts, tile_name, tile_of
 from .part_files import PartFiles, writing
 
 PARTS_FOLDER = ".parts"
@@ -74,9 +74,12 @@ class Split:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> Split:
-        """From what `asdict` makes and JSON keeps."""
+        """From what `asdict` makes and JSON keeps; ValueError where a label is none: files are named by them."""
         found = data["grid"]
         grid = found and Grid(tuple(found["low"]), tuple(found["cell"]), tuple(found["counts"]), found["overlap"])
+        for label in data["parts"].keys():
+            if label != (label_text(float(label)) if grid is None else tile_name(tile_of(label))):
+                raise ValueError(f"{label!r} names no part")
         return cls(**{**data, "grid": grid})
 
 
@@ -132,7 +135,7 @@ class Splitter:
             told = json.loads(self._told(name).read_text(encoding="utf-8"))
             same = (SPLIT_VERSION, str(path), asdict(self.cut)) == (told["version"], told["input"], told["cut"])
             split = Split.from_json(told["split"]) if same else None
-        except (OSError, ValueError, KeyError, TypeError, AttributeError):  # none, or not of ours
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError):  # none, or not of ours
             return None
         return split if split is not None and split.input_hash == self._hash(path) else None
 

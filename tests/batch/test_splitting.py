@@ -100,6 +100,17 @@ def test_a_list_of_parts_that_is_damaged_is_made_anew(scene, passes, tmp_path, h
     assert told.read_bytes() == whole
 
 
+@pytest.mark.parametrize("cut", [dict(tiles=2.0, overlap=0.25), dict(by="tree")])
+@pytest.mark.parametrize("label", ["../../../keep", "/keep", "a", "1-2", "1-0-0\n", "01-0-0", "1e400", "nan", "1e0"])
+def test_a_list_with_labels_that_are_none_is_not_believed(scene, passes, tmp_path, cut, label):
+    split = splitter(tmp_path, **cut).split("scene", scene)
+    path = tmp_path / "out" / ".parts" / "scene.json"
+    told = json.loads(path.read_text())
+    told["split"]["parts"] = {label: "some points", **told["split"]["parts"]}
+    path.write_text(json.dumps(told))
+    assert splitter(tmp_path, **cut).split("scene", scene) == split
+
+
 def test_what_breaks_off_is_not_believed(scene, monkeypatch, tmp_path):
     def broken(path, where=None):
         yield next(read_blocks(path, rows=100))

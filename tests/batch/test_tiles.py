@@ -69,6 +69,19 @@ def test_a_tile_with_too_few_points_is_accounted_for(tmp_path):
     assert (result.rows["few"]["components"], result.rows["few"]["loops"]) == (1, 1)
 
 
+def test_nothing_outside_the_output_folder_is_touched(batch, tmp_path, write_points):
+    keep = write_points(tmp_path / "keep.ply", samples.torus(500).points)
+    before = keep.read_bytes()
+    batch()
+    path = tmp_path / "out" / ".parts" / "scene.json"
+    told = json.loads(path.read_text())
+    told["split"]["parts"] = {"../../../keep": "tile x", **told["split"]["parts"]}
+    path.write_text(json.dumps(told))
+    assert batch() == {}
+    assert keep.read_bytes() == before
+    assert not (tmp_path / "keep.npz").exists()
+
+
 def test_what_is_done_is_not_done_again(batch, rows, tmp_path):
     batch()
     assert batch() == {}
