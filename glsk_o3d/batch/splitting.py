@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable, Container, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import InvalidCloudError, InvalidParameterError, did_you_mean
+from ..errors import BatchError, InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.atomic import write_json
 from ..io.clouds.blocks import read_blocks
 from ..io.clouds.scanned import Scan
@@ -77,8 +79,10 @@ class Split:
         """From what `asdict` makes and JSON keeps; ValueError where a label is none: files are named by them."""
         found = data["grid"]
         grid = found and Grid(tuple(found["low"]), tuple(found["cell"]), tuple(found["counts"]), found["overlap"])
-        for label in data["parts"].keys():
-            if label != (label_text(float(label)) if grid is None else tile_name(tile_of(label))):
+        for label, meant in data["parts"].items():
+            if not isinstance(meant, str) or label != (
+                label_text(float(label)) if grid is None else tile_name(tile_of(label))
+            ):
                 raise ValueError(f"{label!r} names no part")
         return cls(**{**data, "grid": grid})
 
@@ -115,8 +119,9 @@ class Splitter:
         InvalidParameterError
             It lacks what is asked for.
         BatchError
-            The parts cannot be written.
+            The parts cannot be written, or there is something in their place that is not from here.
         """
+        self._check_place(name)
         known = self._known(name, path)
         if known is not None:
             return known
@@ -139,19 +144,41 @@ class Splitter:
             return None
         return split if split is not None and split.input_hash == self._hash(path) else None
 
+    def _check_place(self, name: str) -> None:
+        """Raise BatchError where parts would be somewhere else, through a link, or where others keep something."""
+        place = self.folder / name
+        straight = Path(os.path.realpath(self.folder.parent), PARTS_FOLDER, name)
+        if Path(os.path.realpath(place)) != straight or (place.exists() and not self._told(name).is_file()):
+            raise BatchError(
+                f"{place}: is not of a batch, which would keep the parts of a scene there: move it away, or give the "
+                "results another folder"
+            )
+
     def _divide(self, name: str, path: Path, labels: Container[str] | None = None) -> Split:
         with writing(self.folder):
-            self._told(name).unlink(missing_ok=True)
+            self._told(name).parent.mkdir(parents=True, exist_ok=True)
+            write_json(self._told(name), {})  # of a batch that is killed the next one knows whose the folder is
             if labels is None:
                 shutil.rmtree(self.folder / name, ignore_errors=True)
-            (self.folder / name).mkdir(parents=True, exist_ok=True)
+            (self.folder / name).mkdir(exist_ok=True)
         files = PartFiles(self.folder / name, labels)
-        split = _divided(path, self.cut, self._hash(path), files)
-        files.close()
+        try:
+            split = _divided(path, self.cut, self._hash(path), files)
+            files.close()
+        except BaseException:
+            self._forget(name)
+            raise
         with writing(self.folder):
             told = {"version": SPLIT_VERSION, "input": str(path), "cut": asdict(self.cut), "split": asdict(split)}
             write_json(self._told(name), told)
         return split
+
+    def _forget(self, name: str) -> None:
+        shutil.rmtree(self.folder / name, ignore_errors=True)
+        with suppress(OSError):  # on Windows nobody removes what is open; above, there may be other scenes
+            self._told(name).unlink()
+            for above in (self.folder / name).relative_to(self.folder.parent).parents[:-1]:
+                (self.folder.parent / above).rmdir()
 
     def _told(self, name: str) -> Path:
         return self.folder / f"{name}.json"

@@ -2,11 +2,13 @@
 
 import json
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
-from glsk_o3d import BatchError, InvalidCloudError, InvalidParameterError
+from glsk_o3d import BatchError, FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.batch import splitting
 from glsk_o3d.batch.grid import tile_of
 from glsk_o3d.batch.ledger import file_hash
@@ -120,6 +122,70 @@ def test_what_breaks_off_is_not_believed(scene, monkeypatch, tmp_path):
     with pytest.raises(OSError, match="the disk is gone"):
         splitter(tmp_path, by="tree").split("scene", scene)
     assert not (tmp_path / "out" / ".parts" / "scene.json").exists()
+
+
+def test_what_cannot_be_read_leaves_nothing(tmp_path):
+    (tmp_path / "bad.ply").write_text("no")
+    (tmp_path / "out").mkdir()
+    for name in ("bad", "in/bad"):
+        with pytest.raises(FileFormatError):
+            splitter(tmp_path, tiles=2.0, overlap=0.25).split(name, tmp_path / "bad.ply")
+        assert not list((tmp_path / "out").iterdir())
+
+
+def test_what_cannot_be_read_leaves_the_parts_of_others(scene, tmp_path):
+    (tmp_path / "bad.ply").write_text("no")
+    split = splitter(tmp_path, by="tree").split("in/scene", scene)
+    with pytest.raises(FileFormatError):
+        splitter(tmp_path, by="tree").split("in/bad", tmp_path / "bad.ply")
+    assert splitter(tmp_path, by="tree").file("in/scene", "0").is_file()
+    assert splitter(tmp_path, by="tree").split("in/scene", scene) == split
+
+
+@pytest.mark.parametrize("linked", ["", "scene"])
+def test_parts_do_not_go_through_a_link(scene, passes, tmp_path, linked):
+    mine = tmp_path / "mine" / "scene" / "notes"
+    mine.parent.mkdir(parents=True)
+    mine.write_text("mine")
+    link = tmp_path / "out" / ".parts" / linked
+    link.parent.mkdir(parents=True)
+    (tmp_path / "mine" / "scene.json").touch()
+    if linked:
+        link.with_suffix(".json").touch()
+    link.symlink_to(tmp_path / "mine", target_is_directory=True)
+    with pytest.raises(BatchError, match=r"scene: is not of a batch, .*: move it away, or give"):
+        splitter(tmp_path, by="tree").split("scene", scene)
+    assert (mine.read_text(), passes) == ("mine", [])
+    assert not list((tmp_path / "mine").rglob("*.ply"))
+
+
+def test_a_folder_of_somebody_else_stays(scene, passes, tmp_path):
+    notes = tmp_path / "out" / ".parts" / "scene" / "notes"
+    notes.parent.mkdir(parents=True)
+    notes.touch()
+    with pytest.raises(BatchError, match="is not of a batch"):
+        splitter(tmp_path, by="tree").split("scene", scene)
+    assert notes.exists()
+    assert not passes
+
+
+def test_the_output_folder_may_be_a_link(scene, tmp_path):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / "far", target_is_directory=True)
+    assert len(splitter(tmp_path, by="tree").split("scene", scene).parts) == 4
+
+
+def test_a_splitting_that_is_killed_is_begun_anew(scene, tmp_path):
+    code = (
+        "import os, sys; from pathlib import Path; from glsk_o3d.batch import splitting as s\n"
+        "s.PartFiles.close = lambda self: os._exit(9)\n"
+        "out, scene = map(Path, sys.argv[1:])\n"
+        "s.Splitter(out, s.Cut(by='tree'), lambda path: '', True).split('scene', scene)"
+    )
+    run = subprocess.run([sys.executable, "-c", code, str(tmp_path / "out"), str(scene)])
+    assert run.returncode == 9
+    assert splitter(tmp_path, by="tree").file("scene", "0").exists()
+    assert len(splitter(tmp_path, by="tree").split("scene", scene).parts) == 4
 
 
 def test_normals_and_colours_stay(tmp_path):
