@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 from collections.abc import Callable, Container, Iterator
@@ -23,6 +24,7 @@ from .part_files import PartFiles, writing
 
 PARTS_FOLDER = ".parts"
 MOST_PARTS = 10_000  # fitted: more things than anybody numbers in a file; fewer than a scanner's intensities
+LONGEST_LABEL = 24  # derived: characters of the longest number of 64 bits, -2.2250738585072014e-308
 SPLIT_VERSION = 1
 
 
@@ -232,16 +234,28 @@ def _by_label(scan: Scan, by: str | None) -> Iterator[tuple[str, str, np.ndarray
     values, group = np.unique(scan.attributes[by], return_inverse=True)
     order = np.argsort(group, kind="stable")
     for value, rows in zip(values.tolist(), np.split(order, np.cumsum(np.bincount(group))[:-1]), strict=True):
-        if value == value:  # points without a label are NaN
-            yield label_text(value), f"where {by} == {value!r}", rows
+        if math.isfinite(value):  # points without a label are NaN, say
+            try:
+                label = label_text(value)
+            except InvalidParameterError as error:
+                raise InvalidParameterError(f"{by}: {error}") from None
+            yield label, f"where {by} == {value!r}", rows
 
 
 def label_text(value: float) -> str:
     """A label as part of a name: all digits, since others may differ in the last one.
+
+    Raises
+    ------
+    InvalidParameterError
+        It is too long for a name.
 
     Examples
     --------
     >>> label_text(17.0), label_text(0.25)
     ('17', '0.25')
     """
-    return str(int(value)) if value == int(value) else repr(value)
+    text = str(int(value)) if value == int(value) else repr(value)
+    if len(text) > LONGEST_LABEL:
+        raise InvalidParameterError(f"{value!r} is no label: no name has that many digits")
+    return text

@@ -213,10 +213,22 @@ def test_points_that_are_not_finite_belong_to_no_tile(tmp_path):
 
 
 def test_points_without_a_label_are_told(tmp_path):
-    table = np.column_stack([np.eye(3).repeat(4, axis=0), [1.5] * 6 + [np.nan] * 6])
+    table = np.column_stack([np.eye(3).repeat(4, axis=0), [1.5] * 6 + [np.nan] * 3 + [np.inf, np.inf, -np.inf]])
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="x,y,z,tree", comments="")
     split = splitter(tmp_path, by="tree").split("a", tmp_path / "a.csv")
     assert (list(split.parts), split.points, split.dropped) == (["1.5"], 12, 6)
+
+
+def test_a_label_that_no_name_can_hold_is_refused(tmp_path):
+    table = np.column_stack([np.eye(3).repeat(4, axis=0), [1.0, 1e18, -2.2250738585072014e-308, 1e300] * 3])
+    for rows, refused in ((table, True), (table[table[:, 3] < 1e300], False)):
+        np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="x,y,z,tree", comments="", fmt="%.17g")
+        if refused:
+            with pytest.raises(InvalidParameterError, match=r"tree: 1e\+300 is no label"):
+                splitter(tmp_path, by="tree").split("a", tmp_path / "a.csv")
+        else:
+            labels = splitter(tmp_path, by="tree").split("a", tmp_path / "a.csv").parts
+            assert list(labels) == ["-2.2250738585072014e-308", "1", "1000000000000000000"]
 
 
 def test_tiles_without_number_are_refused(scene, tmp_path, monkeypatch):
