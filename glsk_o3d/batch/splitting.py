@@ -18,7 +18,7 @@ from ..errors import BatchError, InvalidCloudError, InvalidParameterError, did_y
 from ..interop.atomic import write_json
 from ..io.clouds.blocks import read_blocks
 from ..io.clouds.scanned import Scan
-from ..preparation.frame import finite_points
+from ..preparation.frame import not_finite
 from .grid import Grid, TooManyParts, tile_name, tile_of
 from .part_files import PartFiles, writing
 
@@ -209,10 +209,16 @@ def _grid(path: Path, cut: Cut) -> Grid:
     assert cut.tiles is not None
     assert cut.overlap is not None
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    points = invalid = first = 0
     for scan in read_blocks(path, where=cut.where):
-        finite = scan.positions[finite_points(scan.positions, cut.drop_invalid)]
-        low = np.minimum(low, finite.min(axis=0, initial=np.inf))
-        high = np.maximum(high, finite.max(axis=0, initial=-np.inf))
+        finite = _finite(scan)
+        if not (invalid or finite.all()):
+            first = points + int(np.argmin(finite))
+        points, invalid = points + len(scan), invalid + int(len(scan) - finite.sum())
+        low = np.minimum(low, scan.positions[finite].min(axis=0, initial=np.inf))
+        high = np.maximum(high, scan.positions[finite].max(axis=0, initial=-np.inf))
+    if invalid and not cut.drop_invalid:
+        raise not_finite(invalid, points, first)
     if not (low <= high).all():
         raise InvalidCloudError("none of its points is finite")
     return Grid.over(low, high, cut.tiles, cut.overlap)

@@ -212,6 +212,15 @@ def test_points_that_are_not_finite_belong_to_no_tile(tmp_path):
     assert (split.points, split.dropped) == (50, 1)
 
 
+def test_points_that_are_not_finite_are_counted_over_all_blocks(passes, tmp_path, write_points):
+    points = np.random.default_rng(0).random((300, 3)) * 4
+    points[[100, 101, 250]] = np.inf
+    scene = write_points(tmp_path / "scene.ply", points)
+    with pytest.raises(InvalidCloudError, match=r"^3 of 300 points have NaN .* first at index 100: drop them"):
+        splitter(tmp_path, tiles=2.0, overlap=0.25).split("scene", scene)
+    assert len(passes) == 1
+
+
 def test_points_without_a_label_are_told(tmp_path):
     table = np.column_stack([np.eye(3).repeat(4, axis=0), [1.5] * 6 + [np.nan] * 3 + [np.inf, np.inf, -np.inf]])
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="x,y,z,tree", comments="")
