@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
+from numbers import Real
 
 import numpy as np
 
@@ -117,15 +118,25 @@ class Grid:
 
 def checked_sizes(tiles: float, overlap: float | None) -> tuple[float, float]:
     """The size of tiles and their overlap, by default an eighth of it; InvalidParameterError where they are none."""
+    tiles = _number("tiles", tiles)
     if not (math.isfinite(tiles) and tiles > 0):
-        raise InvalidParameterError(f"tiles = {tiles!r}: the size of a tile is finite and above 0")
-    overlap = OVERLAP_SHARE * tiles if overlap is None else overlap
+        raise InvalidParameterError(f"tiles = {tiles:g}: the size of a tile is finite and above 0")
+    overlap = OVERLAP_SHARE * tiles if overlap is None else _number("overlap", overlap)
     if not 0 < overlap <= MOST_OVERLAP * tiles:
         raise InvalidParameterError(
-            f"overlap = {overlap!r}: must be above 0 and at most a quarter of the size of a tile, "
+            f"overlap = {overlap:g}: must be above 0 and at most a quarter of the size of a tile, "
             f"{MOST_OVERLAP * tiles:g}"
         )
-    return float(tiles), float(overlap)
+    return tiles, overlap
+
+
+def _number(name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise InvalidParameterError(f"{name} = {value!r}: must be a number, a length in the cloud's units")
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def tile_name(tile: Tile) -> str:

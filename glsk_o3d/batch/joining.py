@@ -22,7 +22,7 @@ from scipy.spatial.distance import cdist
 from ..analysis.curves import along, pieces
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
-from .grid import Grid, Tile
+from .grid import CUT_REACH, Grid, Tile
 from .loose_ends import Seams, finished
 from .strands import BORDER, INNER, Strands, inside
 
@@ -57,6 +57,8 @@ class Joint:
         Cut ends that nobody has gone on from.
     met : list of (k, 6) array
         Ends of the object that lie on what others brought: there a cut end has nothing to meet.
+    short : list of (k,) array
+        Radii at ends that are so near to where the points of a tile were cut off that they may be no ends.
     """
 
     strands: list[Strands] = field(default_factory=list)
@@ -65,6 +67,7 @@ class Joint:
     touching: list[tuple[int, int]] = field(default_factory=list)
     open: list[int] = field(default_factory=list)
     met: list[np.ndarray] = field(default_factory=list)
+    short: list[np.ndarray] = field(default_factory=list)
 
     def values(self, vertices: Sequence[int] | np.ndarray) -> np.ndarray:
         """The values of numbered vertices, (k, 6) float array."""
@@ -141,6 +144,7 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
     for tile in sorted(skeletons):
         near = [each for each in brought if max(abs(a - b) for a, b in zip(each, tile, strict=True)) <= 1]
         strands = Strands.of(skeletons[tile]).within(*grid.box(tile, grid.trust))
+        joint.short.append(_fell_short(strands, grid, tile))
         strands = strands.with_pieces(strands.touching(*grid.box(tile, CLAIM_SHARE * grid.trust)))
         theirs = _all([brought[each] for each in near])
         if len(theirs.places):
@@ -170,6 +174,12 @@ def _not_there(
     pieces = left.pieces
     leaves |= ~np.isin(pieces, pieces[left.marks[:, INNER]])
     return left.with_pieces(leaves).mended(), strands.values[ends]
+
+
+def _fell_short(strands: Strands, grid: Grid, tile: Tile) -> np.ndarray:
+    """Radii at ends within reach of a cut through the points: it is not known whether the part goes on."""
+    ends = strands.values[(strands.degree <= 1) & ~strands.marks[:, BORDER]]
+    return ends[~inside(ends, *grid.box(tile, grid.overlap), CUT_REACH * ends[:, 3]), 3]
 
 
 def _sampled(strands: Strands, first: int) -> Samples:

@@ -32,14 +32,15 @@ class Seams:
     unmatched : int
         Ends that nobody went on from: one of two tiles lost what the other has. They are kept as ends.
     thick : int
-        Cuts where the part is thicker than the overlap allows, so that the ends of what was cut out reach there.
+        Cut ends where the part is thicker than the overlap allows, so that the ends of what was cut out reach there;
+        and ends so near to where a tile's points were cut off that the part may go on.
     thickest : float
         Radius of the thickest part at a seam.
 
     Examples
     --------
     >>> Seams(joined=4, unmatched=0, thick=1, thickest=0.3).messages(Grid((0, 0, 0), (2, 2, 2), (2, 1, 1), 0.4))
-    ['1 of 4 seams cut a part thicker than the overlap of 0.4 allows, radius 0.3: give an overlap of 0.8 or more']
+    ['1 ends at seams are of parts thicker than the overlap of 0.4 allows, radius up to 0.3: give 0.8 or more']
     """
 
     joined: int
@@ -57,10 +58,9 @@ class Seams:
             )
         if self.thick:
             need = grid.overlap * self.thickest / grid.thickest
-            cuts = self.joined + self.unmatched
             told.append(
-                f"{self.thick} of {cuts} seams cut a part thicker than the overlap of {grid.overlap:g} allows, "
-                f"radius {self.thickest:.3g}: give an overlap of {need:.3g} or more"
+                f"{self.thick} ends at seams are of parts thicker than the overlap of {grid.overlap:g} allows, radius "
+                f"up to {self.thickest:.3g}: give {need:.3g} or more"
             )
         return told
 
@@ -84,7 +84,8 @@ def finished(joint: Joint, grid: Grid) -> tuple[Skeleton, Seams]:
     alive[gone] = False
     edges = edges[alive[edges].all(axis=1)]
     ends = ends[_unmet(values[ends], joint.met)]
-    radii = values[np.concatenate([other, ends]), 3]
+    touching = np.array(joint.touching, np.int64).reshape(-1, 2)
+    radii = np.concatenate([values[np.concatenate([other, touching[:, 0], ends]), 3], *joint.short])
     seams = Seams(
         joined=len(other) + len(joint.touching) - len(loose),
         unmatched=len(ends),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -94,6 +95,8 @@ def plan_batch(
         A format, or the picture, is written by a package that is not installed.
     RecipeError
         No recipe can hold the pipeline: then it cannot be told whether two runs are the same.
+    BatchError
+        Where the parts of a scene are to be, in the output folder, there is something else.
 
     Examples
     --------
@@ -136,7 +139,12 @@ def planned(
     given = [inputs] if isinstance(inputs, str | os.PathLike) else list(inputs)
     out = Path(os.path.abspath(out_dir))
     hashed = lru_cache(maxsize=None)(file_hash)  # of many clouds in one file
-    splitter = None if wanted.cut is None else Splitter(out, wanted.cut, hashed, write)
+    splitter = None
+    if wanted.cut is not None:  # what can be refused is refused before scenes are read
+        splitter = Splitter(out, wanted.cut, hashed, write)
+        _check_results(out, Ledger(out), (), set())
+        if wanted.cut.tiles is not None:
+            planned(given, out, replace(wanted, cut=None), write=False)
     found = find_inputs(given, out, recursive=wanted.recursive, splitter=splitter)
     ledger, parameters = Ledger(out), wanted.parameters
     tasks = [

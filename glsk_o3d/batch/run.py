@@ -117,7 +117,8 @@ def run_batch(
     Raises
     ------
     BatchError
-        Another batch writes into `out_dir`, or the workers cannot be had any more.
+        Another batch writes into `out_dir`, it has something else where the parts of a scene are to be, or the workers
+        cannot be had any more.
     KeyboardInterrupt
         After the ledger has been put in order.
     FileNotFoundError, InvalidParameterError, RecipeError

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import json
+import math
+import os
 import shutil
 from collections.abc import Callable, Container, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import InvalidCloudError, InvalidParameterError, did_you_mean
+from ..errors import BatchError, InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.atomic import write_json
 from ..io.clouds.blocks import read_blocks
 from ..io.clouds.scanned import Scan
-from ..preparation.frame import finite_points
-from .grid import Grid, TooManyParts, tile_name
+from ..preparation.frame import not_finite
+from .grid import Grid, TooManyParts, tile_name, tile_of
 from .part_files import PartFiles, writing
 
 PARTS_FOLDER = ".parts"
 MOST_PARTS = 10_000  # fitted: more things than anybody numbers in a file; fewer than a scanner's intensities
+LONGEST_LABEL = 24  # derived: characters of the longest number of 64 bits, -2.2250738585072014e-308
 SPLIT_VERSION = 1
 
 
@@ -74,9 +78,14 @@ class Split:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> Split:
-        """From what `asdict` makes and JSON keeps."""
+        """From what `asdict` makes and JSON keeps; ValueError where a label is none: files are named by them."""
         found = data["grid"]
         grid = found and Grid(tuple(found["low"]), tuple(found["cell"]), tuple(found["counts"]), found["overlap"])
+        for label, meant in data["parts"].items():
+            if not isinstance(meant, str) or label != (
+                label_text(float(label)) if grid is None else tile_name(tile_of(label))
+            ):
+                raise ValueError(f"{label!r} names no part")
         return cls(**{**data, "grid": grid})
 
 
@@ -112,8 +121,9 @@ class Splitter:
         InvalidParameterError
             It lacks what is asked for.
         BatchError
-            The parts cannot be written.
+            The parts cannot be written, or there is something in their place that is not from here.
         """
+        self._check_place(name)
         known = self._known(name, path)
         if known is not None:
             return known
@@ -132,23 +142,45 @@ class Splitter:
             told = json.loads(self._told(name).read_text(encoding="utf-8"))
             same = (SPLIT_VERSION, str(path), asdict(self.cut)) == (told["version"], told["input"], told["cut"])
             split = Split.from_json(told["split"]) if same else None
-        except (OSError, ValueError, KeyError, TypeError, AttributeError):  # none, or not of ours
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError):  # none, or not of ours
             return None
         return split if split is not None and split.input_hash == self._hash(path) else None
 
+    def _check_place(self, name: str) -> None:
+        """Raise BatchError where parts would be somewhere else, through a link, or where others keep something."""
+        place = self.folder / name
+        straight = Path(os.path.realpath(self.folder.parent), PARTS_FOLDER, name)
+        if Path(os.path.realpath(place)) != straight or (place.exists() and not self._told(name).is_file()):
+            raise BatchError(
+                f"{place}: is not of a batch, which would keep the parts of a scene there: move it away, or give the "
+                "results another folder"
+            )
+
     def _divide(self, name: str, path: Path, labels: Container[str] | None = None) -> Split:
         with writing(self.folder):
-            self._told(name).unlink(missing_ok=True)
+            self._told(name).parent.mkdir(parents=True, exist_ok=True)
+            write_json(self._told(name), {})  # of a batch that is killed the next one knows whose the folder is
             if labels is None:
                 shutil.rmtree(self.folder / name, ignore_errors=True)
-            (self.folder / name).mkdir(parents=True, exist_ok=True)
+            (self.folder / name).mkdir(exist_ok=True)
         files = PartFiles(self.folder / name, labels)
-        split = _divided(path, self.cut, self._hash(path), files)
-        files.close()
+        try:
+            split = _divided(path, self.cut, self._hash(path), files)
+            files.close()
+        except BaseException:
+            self._forget(name)
+            raise
         with writing(self.folder):
             told = {"version": SPLIT_VERSION, "input": str(path), "cut": asdict(self.cut), "split": asdict(split)}
             write_json(self._told(name), told)
         return split
+
+    def _forget(self, name: str) -> None:
+        shutil.rmtree(self.folder / name, ignore_errors=True)
+        with suppress(OSError):  # on Windows nobody removes what is open; above, there may be other scenes
+            self._told(name).unlink()
+            for above in (self.folder / name).relative_to(self.folder.parent).parents[:-1]:
+                (self.folder.parent / above).rmdir()
 
     def _told(self, name: str) -> Path:
         return self.folder / f"{name}.json"
@@ -177,10 +209,16 @@ def _grid(path: Path, cut: Cut) -> Grid:
     assert cut.tiles is not None
     assert cut.overlap is not None
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    points = invalid = first = 0
     for scan in read_blocks(path, where=cut.where):
-        finite = scan.positions[finite_points(scan.positions, cut.drop_invalid)]
-        low = np.minimum(low, finite.min(axis=0, initial=np.inf))
-        high = np.maximum(high, finite.max(axis=0, initial=-np.inf))
+        finite = _finite(scan)
+        if not (invalid or finite.all()):
+            first = points + int(np.argmin(finite))
+        points, invalid = points + len(scan), invalid + int(len(scan) - finite.sum())
+        low = np.minimum(low, scan.positions[finite].min(axis=0, initial=np.inf))
+        high = np.maximum(high, scan.positions[finite].max(axis=0, initial=-np.inf))
+    if invalid and not cut.drop_invalid:
+        raise not_finite(invalid, points, first)
     if not (low <= high).all():
         raise InvalidCloudError("none of its points is finite")
     return Grid.over(low, high, cut.tiles, cut.overlap)
@@ -202,16 +240,28 @@ def _by_label(scan: Scan, by: str | None) -> Iterator[tuple[str, str, np.ndarray
     values, group = np.unique(scan.attributes[by], return_inverse=True)
     order = np.argsort(group, kind="stable")
     for value, rows in zip(values.tolist(), np.split(order, np.cumsum(np.bincount(group))[:-1]), strict=True):
-        if value == value:  # points without a label are NaN
-            yield label_text(value), f"where {by} == {value!r}", rows
+        if math.isfinite(value):  # points without a label are NaN, say
+            try:
+                label = label_text(value)
+            except InvalidParameterError as error:
+                raise InvalidParameterError(f"{by}: {error}") from None
+            yield label, f"where {by} == {value!r}", rows
 
 
 def label_text(value: float) -> str:
     """A label as part of a name: all digits, since others may differ in the last one.
+
+    Raises
+    ------
+    InvalidParameterError
+        It is too long for a name.
 
     Examples
     --------
     >>> label_text(17.0), label_text(0.25)
     ('17', '0.25')
     """
-    return str(int(value)) if value == int(value) else repr(value)
+    text = str(int(value)) if value == int(value) else repr(value)
+    if len(text) > LONGEST_LABEL:
+        raise InvalidParameterError(f"{value!r} is no label: no name has that many digits")
+    return text

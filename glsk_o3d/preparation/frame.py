@@ -132,11 +132,16 @@ def finite_points(points: np.ndarray, drop: bool) -> np.ndarray:
     finite = np.isfinite(points).all(axis=1)
     dropped = int(len(points) - finite.sum())
     if dropped and not drop:
-        raise InvalidCloudError(
-            f"{dropped} of {len(points)} points have NaN or infinite coordinates, the first at index "
-            f"{int(np.argmin(finite))}: drop them with drop_invalid=True, or remove them first"
-        )
+        raise not_finite(dropped, len(points), int(np.argmin(finite)))
     return finite
+
+
+def not_finite(invalid: int, points: int, first: int) -> InvalidCloudError:
+    """The error that tells how many of the points have no finite coordinates, and the index of the first."""
+    return InvalidCloudError(
+        f"{invalid} of {points} points have NaN or infinite coordinates, the first at index {first}: drop them with "
+        "drop_invalid=True, or remove them first"
+    )
 
 
 def to_working_frame(points: np.ndarray, counts: np.ndarray, by: str, k: Callable[[int], int]) -> DistinctPoints:

@@ -48,6 +48,15 @@ def test_names():
     [
         ((0, None), "tiles = 0: the size"),
         ((float("nan"), None), "the size of a tile is finite"),
+        ((10**5000, None), "tiles = inf: the size"),
+        (("abc", None), "tiles = 'abc': must be a number"),
+        (([1], None), r"tiles = \[1\]: must be a number"),
+        ((True, None), "tiles = True: must be a number"),
+        ((np.array([1.0]), None), "must be a number"),
+        ((4, "1"), "overlap = '1': must be a number"),
+        ((4, True), "overlap = True: must be a number"),
+        ((4, float("nan")), "overlap = nan: must be above 0"),
+        ((4, 10**5000), "overlap = inf: must be above 0"),
         ((4, 0), "overlap = 0: must be above 0"),
         ((4, 1.1), "at most a quarter of the size of a tile, 1"),
     ],
@@ -59,6 +68,7 @@ def test_sizes_that_are_none(sizes, message):
 
 def test_the_overlap_is_an_eighth_unless_told():
     assert checked_sizes(4, None) == (4, 0.5)
+    assert checked_sizes(np.float32(4), np.int64(1)) == (4.0, 1.0)
 
 
 def test_a_point_far_off_is_named():

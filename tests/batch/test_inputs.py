@@ -246,6 +246,14 @@ def test_a_file_without_what_the_condition_names_stops_no_other(here):
     assert "no attribute of the points is called 'cl'" in found.left_out[str(here / "b.csv")]
 
 
+def test_a_file_whose_labels_are_too_large_stops_no_other(here):
+    (here / "a.csv").write_text("x,y,z,tree\n1,2,3,inf\n1,2,3,2\n")
+    (here / "b.csv").write_text("x,y,z,tree\n1,2,3,1e300\n")
+    found = find_inputs(["a.csv", "b.csv"], "out", splitter=by("tree"))
+    assert list(found.named) == ["a-2"]
+    assert found.left_out == {str(here / "b.csv"): "tree: 1e+300 is no label: no name has that many digits"}
+
+
 def test_what_numbers_no_things_is_refused(here):
     (here / "a.csv").write_text("x,y,z,time\n" + "".join(f"1,2,3,{i}\n" for i in range(10_001)))
     with pytest.raises(InvalidParameterError, match=r"has 10001 parts .* numbers no things"):

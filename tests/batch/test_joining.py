@@ -201,10 +201,29 @@ def test_parts_that_are_too_thick_are_told():
     grid = three_tiles(0.1)
     _, seams = join_tiles(seen(rod([0.1, 0, 0], [2.9, 0, 0], 0.06), grid), grid)
     (message,) = seams.messages(grid)
-    assert (
-        "2 of 2 seams cut a part thicker than the overlap of 0.1 allows, radius 0.06: give an overlap of 0.16"
-        in message
+    assert message == (
+        "2 ends at seams are of parts thicker than the overlap of 0.1 allows, radius up to 0.06: give 0.16 or more"
     )
+
+
+def test_limbs_that_are_too_thick_where_they_leave_a_trunk_are_told():
+    grid = Grid((-1, -1, -1), (1, 2, 2), (2, 1, 1), 0.2)
+    tree = curve([[0, 0, -0.9], [0, 0, 0], [0, 0, 0.9], [0.9, 0, 0]], [[0, 1], [1, 2], [1, 3]], 0.09)
+    found = {(0, 0, 0): rod([0, 0, -0.9], [0, 0, 0.9], 0.09), (1, 0, 0): refined(tree, 0.02)}
+    joined, seams = join_tiles(found, grid)
+    assert structure(joined) == (1, 0, 3)
+    assert (seams.joined, seams.unmatched, seams.thick, seams.thickest) == (1, 0, 1, pytest.approx(0.09))
+
+
+def test_parts_that_retreat_from_the_cut_are_told():
+    grid = three_tiles(0.02)
+    found = {(i, 0, 0): rod([i + 0.1, 0, 0], [i + 0.9, 0, 0], 0.08) for i in range(3)}
+    joined, seams = join_tiles(found, grid)
+    assert (structure(joined), seams.joined, seams.unmatched) == ((3, 0, 6), 0, 0)
+    (message,) = seams.messages(grid)
+    assert message.startswith("4 ends at seams are of parts thicker than the overlap of 0.02 allows")
+    thin = {tile: replace(each, radii=each.radii / 2) for tile, each in found.items()}
+    assert join_tiles(thin, grid)[1].messages(grid) == []
 
 
 def test_nothing_at_all():
@@ -245,6 +264,19 @@ def test_a_torus_over_four_tiles_is_one_loop():
     joined, seams = tiled(sample, [-0.65, -0.65, -0.1], 0.66, 0.16)
     assert (structure(joined), seams.unmatched) == ((1, 1, 0), 0)
     assert joined.length == pytest.approx(2 * np.pi * 0.4, rel=0.01)
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize("overlap", [0.001, 0.01])
+def test_an_overlap_that_is_far_too_small_is_told(overlap):
+    sample = samples.torus(4000, ring_radius=0.6, radius=0.05)
+    low = sample.points.min(axis=0)
+    joined, seams = tiled(sample, low, 1.2, overlap)
+    assert joined.n_loops == 0  # it is lost, and that is what is to be told
+    grid = Grid.over(low, sample.points.max(axis=0), 1.2, overlap)
+    (message,) = seams.messages(grid)
+    assert "thicker than the overlap" in message
+    assert seams.thickest == pytest.approx(0.05, rel=0.1)
 
 
 def test_a_fork_exactly_on_a_seam():

@@ -2,11 +2,13 @@
 
 import json
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
-from glsk_o3d import BatchError, InvalidCloudError, InvalidParameterError
+from glsk_o3d import BatchError, FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.batch import splitting
 from glsk_o3d.batch.grid import tile_of
 from glsk_o3d.batch.ledger import file_hash
@@ -100,6 +102,17 @@ def test_a_list_of_parts_that_is_damaged_is_made_anew(scene, passes, tmp_path, h
     assert told.read_bytes() == whole
 
 
+@pytest.mark.parametrize("cut", [dict(tiles=2.0, overlap=0.25), dict(by="tree")])
+@pytest.mark.parametrize("label", ["../../../keep", "/keep", "a", "1-2", "1-0-0\n", "01-0-0", "1e400", "nan", "1e0"])
+def test_a_list_with_labels_that_are_none_is_not_believed(scene, passes, tmp_path, cut, label):
+    split = splitter(tmp_path, **cut).split("scene", scene)
+    path = tmp_path / "out" / ".parts" / "scene.json"
+    told = json.loads(path.read_text())
+    told["split"]["parts"] = {label: "some points", **told["split"]["parts"]}
+    path.write_text(json.dumps(told))
+    assert splitter(tmp_path, **cut).split("scene", scene) == split
+
+
 def test_what_breaks_off_is_not_believed(scene, monkeypatch, tmp_path):
     def broken(path, where=None):
         yield next(read_blocks(path, rows=100))
@@ -109,6 +122,70 @@ def test_what_breaks_off_is_not_believed(scene, monkeypatch, tmp_path):
     with pytest.raises(OSError, match="the disk is gone"):
         splitter(tmp_path, by="tree").split("scene", scene)
     assert not (tmp_path / "out" / ".parts" / "scene.json").exists()
+
+
+def test_what_cannot_be_read_leaves_nothing(tmp_path):
+    (tmp_path / "bad.ply").write_text("no")
+    (tmp_path / "out").mkdir()
+    for name in ("bad", "in/bad"):
+        with pytest.raises(FileFormatError):
+            splitter(tmp_path, tiles=2.0, overlap=0.25).split(name, tmp_path / "bad.ply")
+        assert not list((tmp_path / "out").iterdir())
+
+
+def test_what_cannot_be_read_leaves_the_parts_of_others(scene, tmp_path):
+    (tmp_path / "bad.ply").write_text("no")
+    split = splitter(tmp_path, by="tree").split("in/scene", scene)
+    with pytest.raises(FileFormatError):
+        splitter(tmp_path, by="tree").split("in/bad", tmp_path / "bad.ply")
+    assert splitter(tmp_path, by="tree").file("in/scene", "0").is_file()
+    assert splitter(tmp_path, by="tree").split("in/scene", scene) == split
+
+
+@pytest.mark.parametrize("linked", ["", "scene"])
+def test_parts_do_not_go_through_a_link(scene, passes, tmp_path, linked):
+    mine = tmp_path / "mine" / "scene" / "notes"
+    mine.parent.mkdir(parents=True)
+    mine.write_text("mine")
+    link = tmp_path / "out" / ".parts" / linked
+    link.parent.mkdir(parents=True)
+    (tmp_path / "mine" / "scene.json").touch()
+    if linked:
+        link.with_suffix(".json").touch()
+    link.symlink_to(tmp_path / "mine", target_is_directory=True)
+    with pytest.raises(BatchError, match=r"scene: is not of a batch, .*: move it away, or give"):
+        splitter(tmp_path, by="tree").split("scene", scene)
+    assert (mine.read_text(), passes) == ("mine", [])
+    assert not list((tmp_path / "mine").rglob("*.ply"))
+
+
+def test_a_folder_of_somebody_else_stays(scene, passes, tmp_path):
+    notes = tmp_path / "out" / ".parts" / "scene" / "notes"
+    notes.parent.mkdir(parents=True)
+    notes.touch()
+    with pytest.raises(BatchError, match="is not of a batch"):
+        splitter(tmp_path, by="tree").split("scene", scene)
+    assert notes.exists()
+    assert not passes
+
+
+def test_the_output_folder_may_be_a_link(scene, tmp_path):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / "far", target_is_directory=True)
+    assert len(splitter(tmp_path, by="tree").split("scene", scene).parts) == 4
+
+
+def test_a_splitting_that_is_killed_is_begun_anew(scene, tmp_path):
+    code = (
+        "import os, sys; from pathlib import Path; from glsk_o3d.batch import splitting as s\n"
+        "s.PartFiles.close = lambda self: os._exit(9)\n"
+        "out, scene = map(Path, sys.argv[1:])\n"
+        "s.Splitter(out, s.Cut(by='tree'), lambda path: '', True).split('scene', scene)"
+    )
+    run = subprocess.run([sys.executable, "-c", code, str(tmp_path / "out"), str(scene)])
+    assert run.returncode == 9
+    assert splitter(tmp_path, by="tree").file("scene", "0").exists()
+    assert len(splitter(tmp_path, by="tree").split("scene", scene).parts) == 4
 
 
 def test_normals_and_colours_stay(tmp_path):
@@ -135,11 +212,32 @@ def test_points_that_are_not_finite_belong_to_no_tile(tmp_path):
     assert (split.points, split.dropped) == (50, 1)
 
 
+def test_points_that_are_not_finite_are_counted_over_all_blocks(passes, tmp_path, write_points):
+    points = np.random.default_rng(0).random((300, 3)) * 4
+    points[[100, 101, 250]] = np.inf
+    scene = write_points(tmp_path / "scene.ply", points)
+    with pytest.raises(InvalidCloudError, match=r"^3 of 300 points have NaN .* first at index 100: drop them"):
+        splitter(tmp_path, tiles=2.0, overlap=0.25).split("scene", scene)
+    assert len(passes) == 1
+
+
 def test_points_without_a_label_are_told(tmp_path):
-    table = np.column_stack([np.eye(3).repeat(4, axis=0), [1.5] * 6 + [np.nan] * 6])
+    table = np.column_stack([np.eye(3).repeat(4, axis=0), [1.5] * 6 + [np.nan] * 3 + [np.inf, np.inf, -np.inf]])
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="x,y,z,tree", comments="")
     split = splitter(tmp_path, by="tree").split("a", tmp_path / "a.csv")
     assert (list(split.parts), split.points, split.dropped) == (["1.5"], 12, 6)
+
+
+def test_a_label_that_no_name_can_hold_is_refused(tmp_path):
+    table = np.column_stack([np.eye(3).repeat(4, axis=0), [1.0, 1e18, -2.2250738585072014e-308, 1e300] * 3])
+    for rows, refused in ((table, True), (table[table[:, 3] < 1e300], False)):
+        np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="x,y,z,tree", comments="", fmt="%.17g")
+        if refused:
+            with pytest.raises(InvalidParameterError, match=r"tree: 1e\+300 is no label"):
+                splitter(tmp_path, by="tree").split("a", tmp_path / "a.csv")
+        else:
+            labels = splitter(tmp_path, by="tree").split("a", tmp_path / "a.csv").parts
+            assert list(labels) == ["-2.2250738585072014e-308", "1", "1000000000000000000"]
 
 
 def test_tiles_without_number_are_refused(scene, tmp_path, monkeypatch):

@@ -69,6 +69,19 @@ def test_a_tile_with_too_few_points_is_accounted_for(tmp_path):
     assert (result.rows["few"]["components"], result.rows["few"]["loops"]) == (1, 1)
 
 
+def test_nothing_outside_the_output_folder_is_touched(batch, tmp_path, write_points):
+    keep = write_points(tmp_path / "keep.ply", samples.torus(500).points)
+    before = keep.read_bytes()
+    batch()
+    path = tmp_path / "out" / ".parts" / "scene.json"
+    told = json.loads(path.read_text())
+    told["split"]["parts"] = {"../../../keep": "tile x", **told["split"]["parts"]}
+    path.write_text(json.dumps(told))
+    assert batch() == {}
+    assert keep.read_bytes() == before
+    assert not (tmp_path / "keep.npz").exists()
+
+
 def test_what_is_done_is_not_done_again(batch, rows, tmp_path):
     batch()
     assert batch() == {}
@@ -176,11 +189,24 @@ def test_what_cannot_be_planned_leaves_no_folder_behind(scene, tmp_path):
         assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("there", ["scene.ply", "recipe.json"])
+def test_what_is_refused_has_read_no_scene_and_left_no_parts(batch, tmp_path, monkeypatch, there):
+    import glsk_o3d.batch.splitting as module
+
+    monkeypatch.delattr(module, "read_blocks")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / there).write_text("mine")
+    with pytest.raises(InvalidParameterError, match=f"{there}: is not the result of a batch"):
+        batch()
+    assert not (tmp_path / "out" / ".parts").exists()
+
+
 def test_a_scene_that_cannot_be_read_fails_with_its_reason(tmp_path):
     (tmp_path / "bad.ply").write_text("no")
     with ThreadPoolExecutor(1) as pool:
         result = run_batch(tmp_path / "bad.ply", tmp_path / "out", executor=pool, tiles=1.0)
     assert result.rows["bad"]["error"].startswith("not a valid .ply file")
+    assert not (tmp_path / "out" / ".parts").exists()
 
 
 def test_a_picture_of_what_is_joined(batch, tmp_path):
