@@ -143,7 +143,8 @@ def _read(
     """The cloud, or the sample of a large one; and what writes all of it with labels."""
     from ..interop.packages import import_open3d
     from ..io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
-    from ..io.streaming import STREAMED_ENDING, annotate_file, sample_for
+    from ..io.streamed_labels import STREAMED_ENDING, annotate_file
+    from ..io.streaming import sample_for
 
     with holding_interrupts():
         import_open3d()
