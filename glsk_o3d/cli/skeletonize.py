@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import progress
+from .console import echo, progress
 from .options import (
     CutLoops,
     DropInvalid,
@@ -153,7 +153,7 @@ def _read(
         if sample is not None:
             if not quiet:
                 n = len(sample.point.positions)
-                typer.echo(f"{scan}: read in blocks: the skeleton is that of a sample of {n} points", err=True)
+                echo(f"{scan}: read in blocks: the skeleton is that of a sample of {n} points", err=True)
             return sample, lambda skeleton, path: annotate_file(skeleton, scan, path, where=where)
     elif stream:
         raise WrongUsage(f"{labelled}: --stream writes a cloud with labels as {STREAMED_ENDING} alone")
