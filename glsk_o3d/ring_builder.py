@@ -163,7 +163,8 @@ class RingBuilder(Filter[Contraction]):
         points = cloud_points(cloud)
         finite = finite_points(points, self.drop_invalid)
         given = points if finite.all() else points[finite]
-        counts = cloud_counts(cloud, finite)
+        counts = cloud_counts(cloud)
+        counts = None if counts is None else counts[finite]
         n = len(given) if counts is None else int(counts.sum())
         most = self._most(n)
         sample = sample_cloud(given, self.sample_size(n), counts)

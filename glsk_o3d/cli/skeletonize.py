@@ -142,7 +142,7 @@ def _read(
 ) -> tuple[Any, Callable[[Skeleton, Path], object]]:
     """The cloud, or the sample of a large one; and what writes all of it with labels."""
     from ..interop.packages import import_open3d
-    from ..io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
+    from ..io.scans import read_scan, save_tensor_cloud
     from ..io.streamed_labels import STREAMED_ENDING, annotate_file
     from ..io.streaming import sample_for
 
@@ -158,8 +158,9 @@ def _read(
     elif stream:
         raise WrongUsage(f"{labelled}: --stream writes a cloud with labels as {STREAMED_ENDING} alone")
     with holding_interrupts():
-        cloud = (read_cloud if labelled is None else read_tensor_cloud)(scan, where=where)
-    return cloud, lambda skeleton, path: save_tensor_cloud(_labelled(skeleton, cloud), path)
+        read = read_scan(scan, where)  # what it is skeletonised from is the same, whether it is labelled or not
+        cloud, whole = read.to_legacy(), None if labelled is None else read.to_tensor()
+    return cloud, lambda skeleton, path: save_tensor_cloud(_labelled(skeleton, whole), path)
 
 
 def _labelled(skeleton: Skeleton, cloud: Any) -> Any:

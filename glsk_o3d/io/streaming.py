@@ -45,7 +45,7 @@ def read_sample(
     -------
     open3d.t.geometry.PointCloud
         Points of the file, float64, and the attribute ``sample_count`` (N, 1) int32: how many points of the file each
-        stands for. Filters take it into account.
+        stands for. Filters take it into account; the commands, which begin with a file, count its points.
 
     Raises
     ------
