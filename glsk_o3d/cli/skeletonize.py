@@ -141,6 +141,8 @@ def _read(
     scan: Path, where: str | None, pipeline: Pipeline[Any], stream: bool | None, labelled: Path | None, quiet: bool
 ) -> tuple[Any, Callable[[Skeleton, Path], object]]:
     """The cloud, or the sample of a large one; and what writes all of it with labels."""
+    import numpy as np
+
     from ..interop.packages import import_open3d
     from ..io.scans import read_scan, save_tensor_cloud
     from ..io.streamed_labels import STREAMED_ENDING, annotate_file
@@ -152,7 +154,7 @@ def _read(
         sample = sample_for(pipeline, scan, where, stream)
         if sample is not None:
             if not quiet:
-                n = len(sample.point.positions)
+                n = int(np.isfinite(sample.point.positions.numpy()).all(axis=1).sum())
                 echo(f"{scan}: read in blocks: the skeleton is that of a sample of {n} points", err=True)
             return sample, lambda skeleton, path: annotate_file(skeleton, scan, path, where=where)
     elif stream:

@@ -79,14 +79,18 @@ def read_sample(
     if n is not None and (isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1):
         raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
     size = RingBuilder().sample_size if n is None else lambda total: int(n)
-    return sampled(path, size, where, drop_invalid)
+    return _cloud(*_sampled(path, size, where, drop_invalid)[:2])
 
 
-def sampled(path: str | os.PathLike, size: Callable[[int], int], where: str | None, drop_invalid: bool) -> Any:
-    """`read_sample` with as many points as `size` says of so many."""
+def _sampled(
+    path: str | os.PathLike, size: Callable[[int], int], where: str | None, drop_invalid: bool
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """As many points as `size` says of so many, how many each stands for, and how many were dropped."""
+    dropped = 0
 
     def blocks() -> Iterator[np.ndarray]:
-        at = 0
+        nonlocal dropped
+        at = dropped = 0
         for block in read_blocks(path, where=where, bare=True):
             finite = np.isfinite(block.positions).all(axis=1)
             if not (drop_invalid or finite.all()):
@@ -94,6 +98,7 @@ def sampled(path: str | os.PathLike, size: Callable[[int], int], where: str | No
                     f"points have NaN or infinite coordinates, the first at index {at + int(np.argmin(finite))}: "
                     "drop them with drop_invalid=True, or remove them first"
                 )
+            dropped += len(finite) - int(finite.sum())
             if finite.any():
                 yield block.positions if finite.all() else block.positions[finite]
             at += len(block)
@@ -105,6 +110,10 @@ def sampled(path: str | os.PathLike, size: Callable[[int], int], where: str | No
         points, counts = sample_blocks(blocks, size)
     if len(points) == 0:
         raise InvalidCloudError(f"{os.fspath(path)}: there is no point with finite coordinates")
+    return points, counts, dropped
+
+
+def _cloud(points: np.ndarray, counts: np.ndarray) -> Any:
     o3d = import_open3d()
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(points))
     cloud.point[SAMPLE_COUNT] = o3d.core.Tensor(np.minimum(counts, np.iinfo(np.int32).max)[:, None].astype(np.int32))
@@ -127,8 +136,9 @@ def sample_for(
     Returns
     -------
     open3d.t.geometry.PointCloud or None
-        As from `read_sample`. None if all is to be read: there are too few points to take a sample of, or they are not
-        to be read so, or the pipeline takes all.
+        As from `read_sample`; and where the pipeline drops points that are not finite, the last one is NaN and stands
+        for them, so that its report counts them. None if all is to be read: there are too few points to take a sample
+        of, or they are not to be read so, or the pipeline takes all.
 
     Raises
     ------
@@ -144,4 +154,7 @@ def sample_for(
         return None
     if stream is None and (n is None or n <= LARGE_CLOUD):
         return None
-    return sampled(path, rings.sample_size, where, rings.drop_invalid)
+    points, counts, dropped = _sampled(path, rings.sample_size, where, rings.drop_invalid)
+    if dropped:
+        points, counts = np.append(points, np.full((1, 3), np.nan), axis=0), np.append(counts, dropped)
+    return _cloud(points, counts)

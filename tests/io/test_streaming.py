@@ -116,6 +116,23 @@ def test_points_that_are_not_finite(tmp_path, points):
         read_sample(tmp_path / "none.ply", drop_invalid=True)
 
 
+def test_a_report_counts_what_was_dropped(tmp_path, points):
+    import open3d as o3d
+
+    spoilt = points.copy()
+    spoilt[::260] = np.nan
+    save_tensor_cloud(o3d.t.geometry.PointCloud(o3d.core.Tensor(spoilt)), tmp_path / "c.ply")
+    pipeline = pipelines.default().with_options(drop_invalid=True)
+    whole = pipeline(read_cloud(tmp_path / "c.ply"))
+    skeleton = pipeline(streaming.sample_for(pipeline, tmp_path / "c.ply", stream=True))
+    for report in (whole.report, skeleton.report):
+        assert (report.n_input, report.n_dropped) == (N, 500)
+    assert skeleton.report.n_sampled == whole.report.n_sampled == len(skeleton.points) - 1
+    assert skeleton.vertex_of_point[-1] == -1
+    np.testing.assert_allclose(skeleton.vertices, whole.vertices, rtol=0, atol=1e-9)
+    assert annotate_file(skeleton, tmp_path / "c.ply", tmp_path / "out.ply") == N
+
+
 @pytest.mark.parametrize("ending", ["ply", "pcd", "laz"])
 @pytest.mark.parametrize("where", [None, "classification == 5"])
 def test_labels_are_those_of_annotate(scans, tmp_path, ending, where):
