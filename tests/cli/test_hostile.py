@@ -15,6 +15,7 @@ from glsk_o3d.cli.console import console, echo, print_json, print_rows, print_ta
 from glsk_o3d.cli.main import app
 from glsk_o3d.cli.reporting import reporting
 from glsk_o3d.errors import FileFormatError
+from glsk_o3d.parameters import shown
 from glsk_o3d.samples import torus
 
 NASTY = "a\x1b[2J\x1b]0;title\x07\x9b31m\rb\u202ec\x7f"
@@ -143,6 +144,8 @@ def test_numbers_of_python_are_told_without_pages_of_digits():
 
     with pytest.raises(InvalidParameterError, match=r"RingBuilder\.k = a number of 5001 digits: must be at most 9\.2"):
         RingBuilder(k=10**5000).check()
+    for number, digits in {10**401 - 1: 401, -(10**401) + 1: 401, 10**401: 402, 2**63: 19, 10**19 - 1: 19}.items():
+        assert shown(number) == f"a number of {digits} digits"
     with pytest.raises(InvalidParameterError, match=r"around = a number of 401 digits: must be at most 1\.79769e\+308"):
         RingBuilder(around=10**400).check()
     RingBuilder(thin_to=2**63 - 1).check()
