@@ -81,17 +81,23 @@ def cloud_points(cloud: Any) -> np.ndarray:
     return np.array(array, np.float64, order="C")
 
 
-def cloud_counts(cloud: Any) -> np.ndarray | None:
+def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int, int]:
     """How many points of a larger cloud each point of a sample stands for.
 
     Parameters
     ----------
     cloud : cloud
+    finite : (N,) bool array
+        The points to tell it of.
 
     Returns
     -------
-    (N,) float64 array or None
+    counts : (n,) float64 array or None
         The attribute ``sample_count`` of a tensor cloud, as `glsk_o3d.read_sample` gives it; None if there is none.
+    n : int
+        For how many points these stand all together.
+    others : int
+        And all others.
 
     Raises
     ------
@@ -100,7 +106,7 @@ def cloud_counts(cloud: Any) -> np.ndarray | None:
     """
     name, tensor = open3d_class(cloud)
     if not (name == "PointCloud" and tensor and SAMPLE_COUNT in cloud.point):
-        return None
+        return None, int(finite.sum()), int((~finite).sum())
     held, wanted = cloud.point[SAMPLE_COUNT].cpu().numpy(), (len(cloud.point.positions), 1)
     if held.shape not in (wanted, wanted[:1]):
         raise InvalidCloudError(
@@ -113,7 +119,7 @@ def cloud_counts(cloud: Any) -> np.ndarray | None:
             f"the cloud's attribute {SAMPLE_COUNT} must be at least 1 everywhere, and less than 2^63 together: it says "
             "how many points each one stands for; rename what says something else"
         )
-    return counts
+    return counts[finite], int(counts[finite].sum()), int(counts[~finite].sum())
 
 
 def _held(cloud: Any) -> Any:

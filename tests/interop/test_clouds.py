@@ -144,10 +144,13 @@ def test_counts_that_are_none_are_refused(o3d, counts):
 
 def test_counts_are_of_any_real_type(o3d):
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(XYZ))
-    assert cloud_counts(cloud) is None
+    some = np.arange(9) < 6
+    assert cloud_counts(cloud, some) == (None, 6, 3)
     for dtype in ("i4", "u1", "i8", "f4"):
         cloud.point.sample_count = o3d.core.Tensor(np.arange(1, 10).astype(dtype)[:, None])
-        np.testing.assert_array_equal(cloud_counts(cloud), np.arange(1, 10))
+        counts, n, others = cloud_counts(cloud, some)
+        np.testing.assert_array_equal(counts, np.arange(1, 7))
+        assert (n, others) == (21, 24)
     cloud.point.sample_count = o3d.core.Tensor(np.full((9, 1), 2.0**59))
     assert RingBuilder()(cloud).report.n_input == 9 * 2**59
 
