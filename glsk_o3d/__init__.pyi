@@ -30,7 +30,8 @@ from .io.formats.gltf import save_rig
 from .io.meshes import save_mesh
 from .io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
 from .io.skeletons import read_skeleton, save_skeleton
-from .io.streaming import annotate_file, read_sample
+from .io.streamed_labels import annotate_file
+from .io.streaming import read_sample
 from .lpr_reducer import LPRReducer
 from .meshlab.meshset import MeshSet
 from .pipeline import Filter, Pipeline

@@ -159,9 +159,15 @@ def shown(value: Any) -> str:
     str
     """
     if isinstance(value, Integral) and abs(int(value)) > LARGEST_WHOLE:
-        return f"a number of {math.floor(math.log10(abs(int(value)))) + 1} digits"
+        return f"a number of {_digits(abs(int(value)))} digits"
     text = repr(value)
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
+
+
+def _digits(whole: int) -> int:
+    """Of a positive number; the logarithm is rounded, and Python writes no number of more than 4300."""
+    about = round(math.log10(whole))
+    return about + (whole >= 10**about)
 
 
 def problem_with(value: Any, facts: Any) -> str | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -163,8 +163,7 @@ class RingBuilder(Filter[Contraction]):
         points = cloud_points(cloud)
         finite = finite_points(points, self.drop_invalid)
         given = points if finite.all() else points[finite]
-        counts = cloud_counts(cloud, finite)
-        n = len(given) if counts is None else int(counts.sum())
+        counts, n, dropped = cloud_counts(cloud, finite)
         most = self._most(n)
         sample = sample_cloud(given, self.sample_size(n), counts)
         surface = set_aside_outliers(given[sample.kept], sample.counts, self.frame, self._k, self.outlier_factor)
@@ -172,7 +171,8 @@ class RingBuilder(Filter[Contraction]):
             surface = average_noise(surface, self._k)
         surface = denoise(surface, self.denoise, self.outlier_factor > 0)
         thinned = thin_surface(surface, self.around if self._may_merge else 0, most, self._k)
-        return _contraction(points, n, finite, sample, surface, thinned, self._rings(surface, thinned))
+        told = Report(n_input=n + dropped, n_dropped=dropped)
+        return _contraction(points, finite, sample, surface, thinned, self._rings(surface, thinned), told)
 
     def sample_size(self, n: int) -> int:
         """About how many of n points say where the surface is, if these are more than twice as many."""
@@ -215,7 +215,7 @@ class RingBuilder(Filter[Contraction]):
 
 
 def _contraction(
-    points: np.ndarray, given: int, finite: np.ndarray, sample: Sample, surface: Surface, thinned: Thinned, rings: Rings
+    points: np.ndarray, finite: np.ndarray, sample: Sample, surface: Surface, thinned: Thinned, rings: Rings, so: Report
 ) -> Contraction:
     """What flows on: nothing has moved yet."""
     representative, outlier, sampled = np.full(len(points), -1), *np.zeros((2, len(points)), bool)
@@ -236,9 +236,8 @@ def _contraction(
         representative=thinned.representative,
         mass=np.bincount(thinned.representative, surface.merged) * (n / surface.merged.sum()),
         **at_rest(surface.points[thinned.survivors], rings),
-        report=Report(
-            n_input=given + int((~finite).sum()),
-            n_dropped=int((~finite).sum()),
+        report=replace(
+            so,
             n_outliers=int(outlier.sum()),
             n_sampled=len(sample.kept),
             n_distinct=int(surface.merged.sum()),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import progress
+from .console import echo, progress
 from .options import (
     CutLoops,
     DropInvalid,
@@ -141,9 +141,12 @@ def _read(
     scan: Path, where: str | None, pipeline: Pipeline[Any], stream: bool | None, labelled: Path | None, quiet: bool
 ) -> tuple[Any, Callable[[Skeleton, Path], object]]:
     """The cloud, or the sample of a large one; and what writes all of it with labels."""
+    import numpy as np
+
     from ..interop.packages import import_open3d
-    from ..io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
-    from ..io.streaming import STREAMED_ENDING, annotate_file, sample_for
+    from ..io.scans import read_scan, save_tensor_cloud
+    from ..io.streamed_labels import STREAMED_ENDING, annotate_file
+    from ..io.streaming import sample_for
 
     with holding_interrupts():
         import_open3d()
@@ -151,14 +154,15 @@ def _read(
         sample = sample_for(pipeline, scan, where, stream)
         if sample is not None:
             if not quiet:
-                n = len(sample.point.positions)
-                typer.echo(f"{scan}: read in blocks: the skeleton is that of a sample of {n} points", err=True)
+                n = int(np.isfinite(sample.point.positions.numpy()).all(axis=1).sum())
+                echo(f"{scan}: read in blocks: the skeleton is that of a sample of {n} points", err=True)
             return sample, lambda skeleton, path: annotate_file(skeleton, scan, path, where=where)
     elif stream:
         raise WrongUsage(f"{labelled}: --stream writes a cloud with labels as {STREAMED_ENDING} alone")
     with holding_interrupts():
-        cloud = (read_cloud if labelled is None else read_tensor_cloud)(scan, where=where)
-    return cloud, lambda skeleton, path: save_tensor_cloud(_labelled(skeleton, cloud), path)
+        read = read_scan(scan, where)  # what it is skeletonised from is the same, whether it is labelled or not
+        cloud, whole = read.to_legacy(), None if labelled is None else read.to_tensor()
+    return cloud, lambda skeleton, path: save_tensor_cloud(_labelled(skeleton, whole), path)
 
 
 def _labelled(skeleton: Skeleton, cloud: Any) -> Any:

@@ -13,6 +13,7 @@ from .packages import import_open3d
 ACCEPTED = "an Open3D point cloud or triangle mesh (legacy or tensor) or an (N, 3) array of real numbers"
 SAMPLE_COUNT = "sample_count"
 """The attribute of a tensor cloud that says how many points of a larger one each stands for."""
+MOST_COUNTED = np.nextafter(2.0**63, 0)  # derived: the last float that int64 holds
 MOST_NEIGHBOURS = 30  # within a radius without a limit of its own: as many as Open3D's KDTreeSearchParamKNN has
 
 
@@ -80,7 +81,7 @@ def cloud_points(cloud: Any) -> np.ndarray:
     return np.array(array, np.float64, order="C")
 
 
-def cloud_counts(cloud: Any, finite: np.ndarray) -> np.ndarray | None:
+def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int, int]:
     """How many points of a larger cloud each point of a sample stands for.
 
     Parameters
@@ -91,21 +92,34 @@ def cloud_counts(cloud: Any, finite: np.ndarray) -> np.ndarray | None:
 
     Returns
     -------
-    (n,) float64 array or None
+    counts : (n,) float64 array or None
         The attribute ``sample_count`` of a tensor cloud, as `glsk_o3d.read_sample` gives it; None if there is none.
+    n : int
+        For how many points these stand all together.
+    others : int
+        And all others.
 
     Raises
     ------
     InvalidCloudError
-        Some are not positive.
+        They are no such numbers: one for each point, finite, at least 1, and less than 2^63 together.
     """
     name, tensor = open3d_class(cloud)
     if not (name == "PointCloud" and tensor and SAMPLE_COUNT in cloud.point):
-        return None
-    counts = cloud.point[SAMPLE_COUNT].cpu().numpy().astype(float).reshape(-1)[finite]
-    if not (counts > 0).all():
-        raise InvalidCloudError(f"the cloud's attribute {SAMPLE_COUNT} must be above 0 everywhere")
-    return counts
+        return None, int(finite.sum()), int((~finite).sum())
+    held, wanted = cloud.point[SAMPLE_COUNT].cpu().numpy(), (len(cloud.point.positions), 1)
+    if held.shape not in (wanted, wanted[:1]):
+        raise InvalidCloudError(
+            f"the cloud's attribute {SAMPLE_COUNT} has the shape {held.shape} and must have {wanted}: it says how many "
+            "points each one stands for; rename what says something else"
+        )
+    counts = held.astype(float).reshape(-1)
+    if not ((counts >= 1).all() and counts.sum() <= MOST_COUNTED):
+        raise InvalidCloudError(
+            f"the cloud's attribute {SAMPLE_COUNT} must be at least 1 everywhere, and less than 2^63 together: it says "
+            "how many points each one stands for; rename what says something else"
+        )
+    return counts[finite], int(counts[finite].sum()), int(counts[~finite].sum())
 
 
 def _held(cloud: Any) -> Any:

@@ -1,37 +1,24 @@
-"""Clouds larger than memory: a sample of a file to skeletonise, and labels from file to file."""
+"""Clouds larger than memory: a sample of a file to skeletonise."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ..analysis.segmentation import vertex_of_cloud
-from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
-from ..interop.atomic import check_ending, write_atomically
+from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import SAMPLE_COUNT
 from ..interop.packages import import_open3d
-from ..numerics.morton import morton_order
-from ..numerics.neighbourhoods import nearest_neighbours
 from ..preparation.streaming import sample_blocks
-from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from ..ring_builder import RingBuilder
-from .annotation import labels
 from .clouds.blocks import promised_points, read_blocks
-from .clouds.scanned import COLOR_CHANNELS, Scan
 
 if TYPE_CHECKING:
     from ..pipeline import Pipeline
-    from ..skeleton import Skeleton
 
 LARGE_CLOUD = 10_000_000  # measured: points that in memory take 2 GB, and in blocks hardly longer
-STREAMED_ENDING = ".ply"
-"""Of files that labels are streamed to."""
-_PLY_KINDS = {"u1": "uchar", "i4": "int", "f4": "float", "f8": "double"}
 
 
 def read_sample(
@@ -58,7 +45,7 @@ def read_sample(
     -------
     open3d.t.geometry.PointCloud
         Points of the file, float64, and the attribute ``sample_count`` (N, 1) int32: how many points of the file each
-        stands for. Filters take it into account.
+        stands for. Filters take it into account; the commands, which begin with a file, count its points.
 
     Raises
     ------
@@ -92,14 +79,18 @@ def read_sample(
     if n is not None and (isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1):
         raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
     size = RingBuilder().sample_size if n is None else lambda total: int(n)
-    return sampled(path, size, where, drop_invalid)
+    return _cloud(*_sampled(path, size, where, drop_invalid)[:2])
 
 
-def sampled(path: str | os.PathLike, size: Callable[[int], int], where: str | None, drop_invalid: bool) -> Any:
-    """`read_sample` with as many points as `size` says of so many."""
+def _sampled(
+    path: str | os.PathLike, size: Callable[[int], int], where: str | None, drop_invalid: bool
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """As many points as `size` says of so many, how many each stands for, and how many were dropped."""
+    dropped = 0
 
     def blocks() -> Iterator[np.ndarray]:
-        at = 0
+        nonlocal dropped
+        at = dropped = 0
         for block in read_blocks(path, where=where, bare=True):
             finite = np.isfinite(block.positions).all(axis=1)
             if not (drop_invalid or finite.all()):
@@ -107,6 +98,7 @@ def sampled(path: str | os.PathLike, size: Callable[[int], int], where: str | No
                     f"points have NaN or infinite coordinates, the first at index {at + int(np.argmin(finite))}: "
                     "drop them with drop_invalid=True, or remove them first"
                 )
+            dropped += len(finite) - int(finite.sum())
             if finite.any():
                 yield block.positions if finite.all() else block.positions[finite]
             at += len(block)
@@ -118,6 +110,10 @@ def sampled(path: str | os.PathLike, size: Callable[[int], int], where: str | No
         points, counts = sample_blocks(blocks, size)
     if len(points) == 0:
         raise InvalidCloudError(f"{os.fspath(path)}: there is no point with finite coordinates")
+    return points, counts, dropped
+
+
+def _cloud(points: np.ndarray, counts: np.ndarray) -> Any:
     o3d = import_open3d()
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(points))
     cloud.point[SAMPLE_COUNT] = o3d.core.Tensor(np.minimum(counts, np.iinfo(np.int32).max)[:, None].astype(np.int32))
@@ -140,8 +136,9 @@ def sample_for(
     Returns
     -------
     open3d.t.geometry.PointCloud or None
-        As from `read_sample`. None if all is to be read: there are too few points to take a sample of, or they are not
-        to be read so, or the pipeline takes all.
+        As from `read_sample`; and where the pipeline drops points that are not finite, the last one is NaN and stands
+        for them, so that its report counts them. None if all is to be read: there are too few points to take a sample
+        of, or they are not to be read so, or the pipeline takes all.
 
     Raises
     ------
@@ -157,141 +154,7 @@ def sample_for(
         return None
     if stream is None and (n is None or n <= LARGE_CLOUD):
         return None
-    return sampled(path, rings.sample_size, where, rings.drop_invalid)
-
-
-def annotate_file(
-    skeleton: Skeleton, path: str | os.PathLike, output: str | os.PathLike, *, where: str | None = None
-) -> int:
-    """Write a scan with labels to a file, block by block, in memory that does not grow with it.
-
-    `Skeleton.annotate` for files: the same attributes, coloured by branch. The scan's own colours are attributes
-    ``scan_red``, ``scan_green`` and ``scan_blue``.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Such as that of `read_sample`.
-    path : path-like
-        The scan, as for `read_cloud`.
-    output : path-like
-        PLY; it appears complete or not at all.
-    where : str, optional
-        As for `read_cloud`: other points are not written.
-
-    Returns
-    -------
-    int
-        The number of points.
-
-    Raises
-    ------
-    FileNotFoundError
-    FileFormatError
-        The scan cannot be read, or the output is no PLY file, or is the scan.
-    InvalidParameterError
-        The skeleton is empty, or as from `read_cloud`.
-    InvalidCloudError
-    MissingPackageError
-    OSError
-        The file cannot be written.
-
-    Notes
-    -----
-    A point belongs where the nearest point belongs that the skeleton was made from, as in `Skeleton.annotate`.
-    ``thickness`` is the one thing that differs: how far the points are apart is that of the cloud that the skeleton was
-    made from, at that point; NaN if it came without.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d import read_tensor_cloud, save_tensor_cloud, skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> ring = skeletonize(torus(1000).points)
-    >>> with TemporaryDirectory() as folder:
-    ...     save_tensor_cloud(skeletonize(torus(3000).points).annotate(), f"{folder}/scan.ply")
-    ...     annotate_file(ring, f"{folder}/scan.ply", f"{folder}/marked.ply")
-    ...     int(read_tensor_cloud(f"{folder}/marked.ply").point.skeleton_vertex.max().item()) < len(ring.vertices)
-    3000
-    True
-    """
-    check_ending(output, "labelled cloud of a large file is PLY", STREAMED_ENDING)
-    if Path(output).exists() and Path(path).exists() and os.path.samefile(path, output):
-        raise FileFormatError(f"{os.fspath(output)}: is the scan itself: give another name")
-    owner = _Owner(skeleton)
-    n, kinds = _survey(path, where)
-
-    def write(temporary: Path) -> None:
-        with temporary.open("wb") as stream:
-            for i, block in enumerate(read_blocks(path, where=where)):
-                table = _table(_columns(block, kinds, owner.labels(block.positions)))
-                if i == 0:
-                    _write_header(stream, table.dtype, n)
-                stream.write(table.tobytes())
-
-    write_atomically(output, write)
-    return n
-
-
-class _Owner:
-    """Whose each point is: the vertex, and how thick the part is there."""
-
-    def __init__(self, skeleton: Skeleton) -> None:
-        if len(skeleton.vertices) == 0:
-            raise InvalidParameterError("the skeleton is empty: there is nothing to label points with")
-        self._skeleton = skeleton
-        self._known = np.flatnonzero(skeleton.vertex_of_point >= 0)
-        if len(self._known):
-            points = skeleton.points[self._known]
-            self._tree = cKDTree(points)
-            apart = nearest_neighbours(points, min(SCALE_NEIGHBOUR + 1, len(points)))[0][:, -1]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                self._thickness = skeleton.radii[skeleton.vertex_of_point[self._known]] / apart
-
-    def labels(self, points: np.ndarray) -> dict[str, np.ndarray]:
-        """What is told of points, (m, 3) float array, coloured by branch."""
-        vertex, thickness = np.full(len(points), -1), np.full(len(points), np.nan)
-        if not len(self._known):
-            vertex = vertex_of_cloud(self._skeleton, points)[1]
-        elif len(rows := np.flatnonzero(np.isfinite(points).all(axis=1))):
-            rows = rows[morton_order(points[rows])]  # what is near in memory is found faster
-            nearest = self._tree.query(points[rows])[1]
-            vertex[rows] = self._skeleton.vertex_of_point[self._known[nearest]]
-            thickness[rows] = self._thickness[nearest]
-        return labels(self._skeleton, points, vertex, thickness, "branch")
-
-
-def _survey(path: str | os.PathLike, where: str | None) -> tuple[int, dict[str, np.dtype]]:
-    """How many points there are, and of what type each attribute is that some of them have."""
-    n, kinds = 0, dict[str, np.dtype]()
-    names: list[str] = []
-    for block in read_blocks(path, where=where):
-        n, names = n + len(block), list(block.attributes)
-        for name, kind in block.kinds.items():
-            kinds[name] = np.promote_types(kinds.get(name, kind), kind)
-    return n, {name: kinds[name] for name in names if name in kinds}
-
-
-def _columns(block: Scan, kinds: dict[str, np.dtype], found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Columns of a PLY file, by name: those of a scan, and labels."""
-    columns = dict(zip("xyz", block.positions.T, strict=True))
-    if block.normals is not None:
-        columns |= {f"n{axis}": values for axis, values in zip("xyz", block.normals.T, strict=True)}
-    columns |= {name: block.attributes[name].astype(kind) for name, kind in kinds.items()}
-    colors = found.pop("colors")
-    if (shades := block.shades) is not None:
-        columns |= {f"scan_{name}": shades[:, i].astype(np.int32) for i, name in enumerate(COLOR_CHANNELS)}
-    return columns | found | dict(zip(COLOR_CHANNELS, colors.T, strict=True))
-
-
-def _table(columns: dict[str, np.ndarray]) -> np.ndarray:
-    kinds = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
-    table = np.empty(len(columns["x"]), kinds)
-    for name, values in columns.items():
-        table[name] = values
-    return table
-
-
-def _write_header(stream: BinaryIO, row: np.dtype, n: int) -> None:
-    properties = "".join(f"property {_PLY_KINDS[row[name].str[1:]]} {name}\n" for name in row.names or ())
-    stream.write(f"ply\nformat binary_little_endian 1.0\nelement vertex {n}\n{properties}end_header\n".encode())
+    points, counts, dropped = _sampled(path, rings.sample_size, where, rings.drop_invalid)
+    if dropped:
+        points, counts = np.append(points, np.full((1, 3), np.nan), axis=0), np.append(counts, dropped)
+    return _cloud(points, counts)

@@ -70,8 +70,7 @@ def fit_axis(skeleton: Skeleton, passes: int) -> Skeleton:
     edges_at = incident_edges(ends, m)
     around = edges_at[skeleton.vertex_of_point[points]]
     pattern = _Pattern(skeleton, edges_at)
-    low, high = p.min(axis=0), p.max(axis=0)
-    slack = FIT_BEYOND * np.linalg.norm(high - low)
+    low, high = axis_box(p)
     for step in range(passes):
         near = _nearest(x, ends, around, p, n)
         weight, pull = np.ones(len(p)), np.zeros(len(p))
@@ -81,7 +80,7 @@ def fit_axis(skeleton: Skeleton, passes: int) -> Skeleton:
             pull = FIT_CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1)
         x = _solve(x, near, p, weight, pull, pattern, FIT_SMOOTHING if step else 0)
         # normals that mean nothing may meet anywhere
-        x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low - slack, high + slack), x)
+        x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low, high), x)
     near = _nearest(x, ends, around, p, n)
     radii = _plane_radii(skeleton, x + centre)
     if passes:  # the distance from a curve that nobody has centred is no radius
@@ -93,6 +92,13 @@ def fit_axis(skeleton: Skeleton, passes: int) -> Skeleton:
 
 def _plane_radii(skeleton: Skeleton, vertices: np.ndarray) -> np.ndarray:
     return plane_distance_radii(vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals, skeleton.radii)
+
+
+def axis_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest coordinates, (3,), that an axis of points, (n, 3) float array, n > 0, may have."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    slack = FIT_BEYOND * np.linalg.norm(high - low)
+    return low - slack, high + slack
 
 
 def incident_edges(edges: np.ndarray, m: int) -> np.ndarray:

@@ -13,6 +13,7 @@ from ..numerics.components import component_labels
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
+from .axis_fit import axis_box
 from .loops import surface_distance
 
 # All fitted.
@@ -128,19 +129,25 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
 
     The contraction draws limbs together before they meet: the junction of a sharp corner lies inside it, and limbs that
     leave a part bend. Where a limb has left the others its curve is undisturbed; the axes taken there meet where the
-    limbs do. A junction stays if they do not: if one passes by farther away than the thickest limb's radius.
+    limbs do. A junction stays if they do not: if one passes by farther away than the thickest limb's radius, or they
+    meet outside of the cloud, as those of limbs that are nearly parallel may, farther than an axis can be.
 
     Returns
     -------
     Skeleton
         With other places of the junctions and of the vertices beside them.
     """
+    if not len(skeleton.junctions):
+        return skeleton
     limbs = Limbs(skeleton, joined=False)
     vertices, radii = skeleton.vertices.copy(), skeleton.radii.copy()
+    supporting = skeleton.points[skeleton.supporting_points]
+    low, high = axis_box(supporting if len(supporting) else vertices)
     for junction in skeleton.junctions.tolist():
         here = limbs.at[junction]
         meeting = limbs.meeting(here, skeleton.vertices[junction])
-        if not (meeting.fits & meeting.ahead).all():
+        inside = (low <= meeting.place).all() and (meeting.place <= high).all()
+        if not (inside and (meeting.fits & meeting.ahead).all()):
             continue
         vertices[junction] = meeting.place
         radii[junction] = 0

@@ -1,18 +1,21 @@
 """What a hostile file, name or number must not do: reach the terminal, end in a traceback, or spoil JSON."""
 
+import ast
 import json
 import logging
+from pathlib import Path
 
 import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
 
-from glsk_o3d import Skeleton
+from glsk_o3d import Skeleton, cli
 from glsk_o3d.cli.console import console, echo, print_json, print_rows, print_table, say, visible
 from glsk_o3d.cli.main import app
 from glsk_o3d.cli.reporting import reporting
 from glsk_o3d.errors import FileFormatError
+from glsk_o3d.parameters import shown
 from glsk_o3d.samples import torus
 
 NASTY = "a\x1b[2J\x1b]0;title\x07\x9b31m\rb\u202ec\x7f"
@@ -80,6 +83,7 @@ def nasty_folder(tmp_path):
     [
         ["skeletonize", "s\x1b]0;t\x07.xyz", "-o", "k\x1b[31m.json"],
         ["skeletonize", "no\x1b[31m.xyz", "-o", "k.json"],
+        ["skeletonize", "s\x1b]0;t\x07.xyz", "-o", "k.json", "--stream"],
         ["skeletonize", "s\x1b]0;t\x07.xyz", "-o", "k.json", "--recipe", "r.toml"],
         ["skeletonize", "s\x1b]0;t\x07.xyz", "--set", "k\x1b[31m=3"],
         ["info", "bad\x1b[2J.json"],
@@ -98,6 +102,18 @@ def test_nothing_of_it_reaches_the_terminal(nasty_folder, monkeypatch, words):
     result = call(*words)
     assert commands(result.output) == []
     assert result.output.strip()
+
+
+def test_all_that_is_printed_goes_through_the_console():
+    bare = ("typer.echo", "typer.secho", "click.echo", "print", "sys.stdout.write", "sys.stderr.write")
+    found = [
+        f"{path.name}:{node.lineno}"
+        for path in Path(cli.__file__).parent.glob("*.py")
+        if path.name != "console.py"
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in bare
+    ]
+    assert found == []
 
 
 @pytest.mark.parametrize("number", ["9" * 401, "9" * 5000, "-" + "9" * 401])
@@ -128,6 +144,8 @@ def test_numbers_of_python_are_told_without_pages_of_digits():
 
     with pytest.raises(InvalidParameterError, match=r"RingBuilder\.k = a number of 5001 digits: must be at most 9\.2"):
         RingBuilder(k=10**5000).check()
+    for number, digits in {10**401 - 1: 401, -(10**401) + 1: 401, 10**401: 402, 2**63: 19, 10**19 - 1: 19}.items():
+        assert shown(number) == f"a number of {digits} digits"
     with pytest.raises(InvalidParameterError, match=r"around = a number of 401 digits: must be at most 1\.79769e\+308"):
         RingBuilder(around=10**400).check()
     RingBuilder(thin_to=2**63 - 1).check()

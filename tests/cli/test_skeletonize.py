@@ -295,6 +295,22 @@ def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, monkeypatch):
     assert invoke("skeletonize", tmp_path / "scan.ply", "-o", "s.json", "--no-stream").stderr == ""
 
 
+def test_the_skeleton_is_the_same_whether_points_are_labelled_or_not(invoke, tmp_path):
+    import open3d as o3d
+
+    from glsk_o3d import save_tensor_cloud
+
+    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(samples.torus(1000).points))
+    cloud.point.sample_count = o3d.core.Tensor((1 + np.arange(1000) % 7)[:, None].astype(np.int32))
+    save_tensor_cloud(cloud, tmp_path / "scan.ply")
+    assert invoke("skeletonize", tmp_path / "scan.ply", "-o", "a.json").exit_code == 0
+    assert invoke("skeletonize", tmp_path / "scan.ply", "-o", "b.json", "--labelled", "l.npz").exit_code == 0
+    a, b = read_skeleton("a.json"), read_skeleton("b.json")
+    assert a.report.n_input == b.report.n_input == 1000
+    np.testing.assert_array_equal(a.vertices, b.vertices)
+    np.testing.assert_array_equal(np.load("l.npz")["sample_count"], cloud.point.sample_count.numpy())
+
+
 def test_a_sample_that_cannot_be_taken(refused, scans):
     words = ("skeletonize", scans / "sample.ply", "--stream", "-o", "s.json")
     assert "this pipeline takes all points of a cloud" in refused(2, *words, "--pipeline", "wen2024")

@@ -4,9 +4,9 @@ import sys
 import numpy as np
 import pytest
 
-from glsk_o3d import samples, skeletonize
+from glsk_o3d import RingBuilder, samples, skeletonize
 from glsk_o3d.errors import InvalidCloudError
-from glsk_o3d.interop.clouds import Cloud, cloud_points, to_point_cloud
+from glsk_o3d.interop.clouds import Cloud, cloud_counts, cloud_points, to_point_cloud
 from glsk_o3d.interop.packages import import_open3d
 from glsk_o3d.recipes.catalogue import catalogue
 
@@ -118,6 +118,41 @@ def test_empty_clouds_are_refused(o3d):
     for cloud in (*geometries, [], np.empty((0, 3)), np.empty((0, 3), int)):
         with pytest.raises(InvalidCloudError, match="empty"):
             cloud_points(cloud)
+
+
+@pytest.mark.parametrize(
+    "counts",
+    [
+        [[np.inf]],
+        [[np.nan]],
+        [[1e-4]],
+        [[0]],
+        [[-3]],
+        [[1e300]],
+        [[2.0**63]],
+        [[2.0**60]],  # nine times are too many
+        [[1, 1]],
+    ],
+    ids=str,
+)
+def test_counts_that_are_none_are_refused(o3d, counts):
+    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(XYZ))
+    cloud.point.sample_count = o3d.core.Tensor(np.repeat(np.array(counts, float), len(XYZ), axis=0))
+    with pytest.raises(InvalidCloudError, match=r"attribute sample_count .*must .*rename"):
+        RingBuilder()(cloud)
+
+
+def test_counts_are_of_any_real_type(o3d):
+    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(XYZ))
+    some = np.arange(9) < 6
+    assert cloud_counts(cloud, some) == (None, 6, 3)
+    for dtype in ("i4", "u1", "i8", "f4"):
+        cloud.point.sample_count = o3d.core.Tensor(np.arange(1, 10).astype(dtype)[:, None])
+        counts, n, others = cloud_counts(cloud, some)
+        np.testing.assert_array_equal(counts, np.arange(1, 7))
+        assert (n, others) == (21, 24)
+    cloud.point.sample_count = o3d.core.Tensor(np.full((9, 1), 2.0**59))
+    assert RingBuilder()(cloud).report.n_input == 9 * 2**59
 
 
 def test_an_array_does_not_import_open3d():

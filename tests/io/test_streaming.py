@@ -15,7 +15,7 @@ from glsk_o3d import (
     skeletonize,
 )
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
-from glsk_o3d.io import streaming
+from glsk_o3d.io import streamed_labels, streaming
 from glsk_o3d.io.clouds import blocks
 from glsk_o3d.samples import torus, y_junction
 
@@ -116,6 +116,23 @@ def test_points_that_are_not_finite(tmp_path, points):
         read_sample(tmp_path / "none.ply", drop_invalid=True)
 
 
+def test_a_report_counts_what_was_dropped(tmp_path, points):
+    import open3d as o3d
+
+    spoilt = points.copy()
+    spoilt[::260] = np.nan
+    save_tensor_cloud(o3d.t.geometry.PointCloud(o3d.core.Tensor(spoilt)), tmp_path / "c.ply")
+    pipeline = pipelines.default().with_options(drop_invalid=True)
+    whole = pipeline(read_cloud(tmp_path / "c.ply"))
+    skeleton = pipeline(streaming.sample_for(pipeline, tmp_path / "c.ply", stream=True))
+    for report in (whole.report, skeleton.report):
+        assert (report.n_input, report.n_dropped) == (N, 500)
+    assert skeleton.report.n_sampled == whole.report.n_sampled == len(skeleton.points) - 1
+    assert skeleton.vertex_of_point[-1] == -1
+    np.testing.assert_allclose(skeleton.vertices, whole.vertices, rtol=0, atol=1e-9)
+    assert annotate_file(skeleton, tmp_path / "c.ply", tmp_path / "out.ply") == N
+
+
 @pytest.mark.parametrize("ending", ["ply", "pcd", "laz"])
 @pytest.mark.parametrize("where", [None, "classification == 5"])
 def test_labels_are_those_of_annotate(scans, tmp_path, ending, where):
@@ -196,6 +213,25 @@ def test_a_scan_that_breaks_off_leaves_nothing_behind(scans, tmp_path):
     assert sorted(each.suffix for each in tmp_path.iterdir()) == [".las", ".laz", ".pcd", ".ply"]
 
 
+@pytest.mark.parametrize("change", ["more points", "fewer points", "no classification"])
+def test_a_scan_that_changes_meanwhile_leaves_nothing_behind(scans, tmp_path, monkeypatch, change):
+    cloud, skeleton = read_tensor_cloud(scans / "scan.ply"), skeletonize(torus(1000).points)
+    path, survey = tmp_path / "scan.ply", streamed_labels._survey
+    save_tensor_cloud(cloud, path)
+
+    def changes_then(*given):
+        told = survey(*given)
+        if change == "no classification":
+            del cloud.point["classification"]
+        save_tensor_cloud(cloud.append(cloud) if change == "more points" else cloud.select_by_index([*range(99)]), path)
+        return told
+
+    monkeypatch.setattr(streamed_labels, "_survey", changes_then)
+    with pytest.raises(FileFormatError, match=r"scan\.ply: has changed while it was read"):
+        annotate_file(skeleton, path, tmp_path / "out.ply")
+    assert [each.name for each in tmp_path.iterdir()] == ["scan.ply"]
+
+
 def test_an_error_while_writing_keeps_the_old_file(scans, tmp_path, monkeypatch):
     skeleton = skeletonize(torus(1000).points)
     (tmp_path / "out.ply").write_text("old")
@@ -206,8 +242,8 @@ def test_an_error_while_writing_keeps_the_old_file(scans, tmp_path, monkeypatch)
             raise OSError(28, "No space left on device")
         return real(*args)
 
-    real = streaming._table
-    monkeypatch.setattr(streaming, "_table", fails)
+    real = streamed_labels._table
+    monkeypatch.setattr(streamed_labels, "_table", fails)
     with pytest.raises(OSError, match="No space left"):
         annotate_file(skeleton, scans / "scan.ply", tmp_path / "out.ply")
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]

@@ -134,6 +134,20 @@ def test_limbs_that_pass_each_other_do_not_move_their_junction():
     np.testing.assert_allclose(move_junctions(raw).vertices, raw.vertices, atol=1e-12)
 
 
+def test_axes_that_meet_outside_of_the_cloud_do_not_move_their_junction():
+    """Three limbs of a fan that ends before its ribs meet."""
+    ways = [towards(180 + angle) for angle in (-20, 0, 20)]
+    meet = np.array([3.5 * R, 0, 0])
+    raw = drawn(
+        [[(0, 0, 0), meet + 0.38 * way, meet + way] for way in ways], [(meet + 0.5 * w, meet + w) for w in ways]
+    )
+    limbs = Limbs(raw, joined=False)
+    meeting = limbs.meeting(limbs.at[raw.junctions[0]], np.zeros(3))
+    assert (meeting.fits & meeting.ahead).all()
+    assert meeting.place[0] > 2 * R > 2 * R + raw.points[:, 0].max()
+    np.testing.assert_array_equal(move_junctions(raw).vertices, raw.vertices)
+
+
 def test_a_junction_is_as_thick_as_its_thickest_limb():
     """A right-angled junction owns points of everything around: what it measured itself does not count."""
     paths, struts, _ = webbed([0, 90, 180])

@@ -186,9 +186,23 @@ def test_points_that_are_packed_as_longer_ones_are_refused(las):
 def test_more_points_than_a_packed_file_holds_are_refused(las):
     pytest.importorskip("lazrs")
     path = las("c.laz")
-    packed(path, 247, 100 * path.stat().st_size, 8)
+    packed(path, 247, 1000 * path.stat().st_size, 8)
     with pytest.raises(FileFormatError, match="header promises more than its"):
         read_scan(path)
+
+
+@pytest.mark.parametrize("point_format", [0, 6])
+def test_a_flat_grid_is_packed_well_and_read(tmp_path, point_format):
+    laspy = pytest.importorskip("laspy")
+    pytest.importorskip("lazrs")
+    header = laspy.LasHeader(point_format=point_format, version="1.4")
+    header.scales = [0.01] * 3
+    scan = laspy.LasData(header)
+    scan.x, scan.y = np.indices((600, 600)).reshape(2, -1) * 1.0
+    scan.z = np.zeros(600 * 600)
+    scan.write(tmp_path / "s.laz")
+    assert (tmp_path / "s.laz").stat().st_size < 600 * 600 / 32
+    assert len(read_scan(tmp_path / "s.laz").positions) == 600 * 600
 
 
 @pytest.mark.parametrize("point_format", [0, 1, 3, 6, 7, 8, 9, 10])
