@@ -32,7 +32,7 @@ def read_sample(
     Parameters
     ----------
     path : path-like
-        As for `read_cloud`. What `glsk_o3d.io.clouds.blocks.read_blocks` cannot read in blocks is read whole.
+        As for `read_cloud`. What ``glsk_o3d.io.clouds.blocks.read_blocks`` cannot read in blocks is read whole.
     n : int, optional
         About how many points; all, if they are not more than twice as many. By default what `RingBuilder` takes: twice
         25000 or, from 152588 points on, 128 times the square root of their number, 1.28 of 100 million.
