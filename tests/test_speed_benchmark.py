@@ -378,7 +378,7 @@ class TestCommands:
 
     def test_all_fill_a_page(self, call, tmp_path, root):
         page = tmp_path / "speed.md"
-        page.write_text((root / "docs" / "speed.md").read_text().partition("## Large clouds")[0])
+        page.write_text((root / "docs" / "speed.md").read_text().partition("## Clouds as scanners")[0])
         (tmp_path / "images").mkdir()
         words = ("--sizes", "256,512", "--figure-sizes", "256", "--pipeline", "default", "--shapes", "tube")
         printed = call("all", page, "--builtin", *words, "--repeat", 1, "--jobs", 0, "--markdown")

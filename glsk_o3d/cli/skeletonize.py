@@ -161,7 +161,7 @@ def _read(
         raise WrongUsage(f"{labelled}: --stream writes a cloud with labels as {STREAMED_ENDING} alone")
     with holding_interrupts():
         read = read_scan(scan, where)  # what it is skeletonised from is the same, whether it is labelled or not
-        cloud, whole = read.to_legacy(), None if labelled is None else read.to_tensor()
+    cloud, whole = read.to_legacy(), None if labelled is None else read.to_tensor()
     return cloud, lambda skeleton, path: save_tensor_cloud(_labelled(skeleton, whole), path)
 
 

@@ -145,12 +145,12 @@ def test_ctrl_c(refused, scans, monkeypatch):
 def test_ctrl_c_while_open3d_loads(refused, scans, monkeypatch):
     import glsk_o3d.io.scans as clouds
 
-    def slow(path, **_):
+    def slow(path, *_):
         signal.raise_signal(signal.SIGINT)
         held.append(Path(path).name)  # not before this is done
 
     held = []
-    monkeypatch.setattr(clouds, "read_cloud", slow)
+    monkeypatch.setattr(clouds, "read_scan", slow)
     before = signal.getsignal(signal.SIGINT)
     assert "interrupted" in refused(130, "skeletonize", scans / "sample.ply", "-o", "s.ply")
     assert held == ["sample.ply"]
