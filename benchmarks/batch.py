@@ -27,6 +27,7 @@ from _common.results import save
 from _common.tables import number, show
 
 from glsk_o3d import samples
+from glsk_o3d.io.formats import ply_rows
 
 SHAPES = (
     *(samples.tube, samples.torus, samples.y_junction, samples.two_rings, samples.helix),
@@ -38,9 +39,8 @@ app = typer.Typer(add_completion=False)
 
 def write_ply(path: Path, points) -> None:
     """Write points as binary PLY."""
-    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
-    header += "property double x\nproperty double y\nproperty double z\nend_header\n"
-    path.write_bytes(header.encode() + np.asarray(points, "<f8").tobytes())
+    rows = ply_rows.table(dict(zip("xyz", np.asarray(points, float).T, strict=True)))
+    path.write_bytes(ply_rows.header(rows.dtype, len(rows)) + rows.tobytes())
 
 
 def make_scans(folder: Path, count: int, smallest: int, largest: int) -> None:

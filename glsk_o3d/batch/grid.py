@@ -15,9 +15,7 @@ from ..errors import InvalidParameterError
 Tile = tuple[int, int, int]
 
 OVERLAP_SHARE = 1 / 8  # fitted: of the size of a tile, how far it looks beyond itself unless told
-MOST_OVERLAP = (
-    1 / 4
-)  # derived: of the size: tiles may be half as wide, and a point belongs to two along an axis at most
+MOST_OVERLAP = 1 / 4  # derived: of the size; tiles may be half as wide: a point is of two along an axis at most
 SEAM_SHARE = 1 / 4  # fitted: of the overlap, how far beyond a tile its skeleton counts: more than tiles differ
 CUT_REACH = 2.0  # measured: radii from a cut through a tube up to which its skeleton strays by over 1 % of the radius
 

@@ -77,17 +77,17 @@ def finished(joint: Joint, grid: Grid) -> tuple[Skeleton, Seams]:
     same[one] = other
     values[other] = (values[other] + values[one]) / 2
     alive = same == np.arange(len(values))
-    edges, loose = _tied(simple_edges(same[edges]), same[np.array(joint.touching, np.int64).reshape(-1, 2)], alive)
+    touching = np.array(joint.touching, np.int64).reshape(-1, 2)
+    edges, loose = _tied(simple_edges(same[edges]), same[touching], alive)
     ends = np.concatenate([np.array(joint.open, np.int64), loose])
     ends = ends[np.bincount(edges.ravel(), minlength=len(values))[ends] < 2]  # where curves fork, some go on
     gone, ends = _stubs(values, edges, ends)
     alive[gone] = False
     edges = edges[alive[edges].all(axis=1)]
     ends = ends[_unmet(values[ends], joint.met)]
-    touching = np.array(joint.touching, np.int64).reshape(-1, 2)
     radii = np.concatenate([values[np.concatenate([other, touching[:, 0], ends]), 3], *joint.short])
     seams = Seams(
-        joined=len(other) + len(joint.touching) - len(loose),
+        joined=len(other) + len(touching) - len(loose),
         unmatched=len(ends),
         thick=int((radii > grid.thickest).sum()),
         thickest=float(np.nanmax(radii, initial=0)),

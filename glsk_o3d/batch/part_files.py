@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import BatchError
 from ..io.clouds.scanned import COLOR_CHANNELS, Scan
+from ..io.formats import ply_rows
 
 _COUNT_WIDTH = 20  # derived: digits of the largest 64-bit number: the header is written before the count is known
-_PROPERTY_WORDS = {"<f8": "double", "<f4": "float"}
 
 
 class PartFiles:
@@ -76,9 +76,7 @@ class PartFiles:
 
     def _header(self, count: int) -> bytes:
         assert self._row is not None
-        fields = "".join(f"property {_PROPERTY_WORDS[self._row[name].str]} {name}\n" for name in self._row.names or ())
-        vertices = f"element vertex {count:{_COUNT_WIDTH}d}"
-        return f"ply\nformat binary_little_endian 1.0\n{vertices}\n{fields}end_header\n".encode()
+        return ply_rows.header(self._row, count, width=_COUNT_WIDTH)
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -18,13 +18,13 @@ from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from .annotation import labels
 from .clouds.blocks import read_blocks
 from .clouds.scanned import COLOR_CHANNELS, Scan
+from .formats import ply_rows
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 STREAMED_ENDING = ".ply"
 """Of files that labels are streamed to."""
-_PLY_KINDS = {"u1": "uchar", "i4": "int", "f4": "float", "f8": "double"}
 
 
 def annotate_file(
@@ -94,9 +94,9 @@ def annotate_file(
             for block in read_blocks(path, where=where):
                 if not kinds.keys() <= block.attributes.keys():
                     raise _changed(path)
-                table = _table(_columns(block, kinds, owner.labels(block.positions)))
+                table = ply_rows.table(_columns(block, kinds, owner.labels(block.positions)))
                 if row is None:
-                    _write_header(stream, table.dtype, n)
+                    stream.write(ply_rows.header(table.dtype, n))
                 elif row != table.dtype:
                     raise _changed(path)
                 written, row = written + len(table), table.dtype
@@ -161,16 +161,3 @@ def _columns(block: Scan, kinds: dict[str, np.dtype], found: dict[str, np.ndarra
     if (shades := block.shades) is not None:
         columns |= {f"scan_{name}": shades[:, i].astype(np.int32) for i, name in enumerate(COLOR_CHANNELS)}
     return columns | found | dict(zip(COLOR_CHANNELS, colors.T, strict=True))
-
-
-def _table(columns: dict[str, np.ndarray]) -> np.ndarray:
-    kinds = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
-    table = np.empty(len(columns["x"]), kinds)
-    for name, values in columns.items():
-        table[name] = values
-    return table
-
-
-def _write_header(stream: BinaryIO, row: np.dtype, n: int) -> None:
-    properties = "".join(f"property {_PLY_KINDS[row[name].str[1:]]} {name}\n" for name in row.names or ())
-    stream.write(f"ply\nformat binary_little_endian 1.0\nelement vertex {n}\n{properties}end_header\n".encode())

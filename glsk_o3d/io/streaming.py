@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import SAMPLE_COUNT
 from ..interop.packages import import_open3d
+from ..preparation.frame import not_finite
 from ..preparation.streaming import sample_blocks
 from ..ring_builder import RingBuilder
 from .clouds.blocks import promised_points, read_blocks
@@ -94,10 +95,7 @@ def _sampled(
         for block in read_blocks(path, where=where, bare=True):
             finite = np.isfinite(block.positions).all(axis=1)
             if not (drop_invalid or finite.all()):
-                raise InvalidCloudError(
-                    f"points have NaN or infinite coordinates, the first at index {at + int(np.argmin(finite))}: "
-                    "drop them with drop_invalid=True, or remove them first"
-                )
+                raise not_finite("points", at + int(np.argmin(finite)))
             dropped += len(finite) - int(finite.sum())
             if finite.any():
                 yield block.positions if finite.all() else block.positions[finite]

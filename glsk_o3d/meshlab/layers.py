@@ -15,6 +15,8 @@ from ..errors import FileFormatError
 from ..interop.atomic import write_atomically
 from ..interop.clouds import cloud_points
 from ..interop.packages import import_open3d, require
+from ..io.clouds.scanned import COLOR_CHANNELS
+from ..io.formats import ply_rows
 from ..io.formats.graphs import graph_skeleton
 from ..io.formats.ply import ply_elements
 from ..io.scans import check_scan, read_scan
@@ -201,25 +203,21 @@ class Layer:
         write_atomically(path, writers.get(path.suffix.lower(), self._write_open3d))
 
     def _write_ply(self, path: Path) -> None:
-        columns = [(self.vertices, "f8", "x y z"), (self.normals, "f8", "nx ny nz")]
+        columns = dict(zip("xyz", self.vertices.T.astype(float), strict=True))
+        if self.normals is not None:
+            columns |= dict(zip(("nx", "ny", "nz"), self.normals.T.astype(float), strict=True))
         if self.colors is not None:
-            columns.append((np.round(255 * self.colors[:, :3]), "u1", "red green blue"))
-        columns = [(array, kind, names.split()) for array, kind, names in columns if array is not None]
+            shades = np.round(255 * self.colors[:, :3]).astype(np.uint8)
+            columns |= dict(zip(COLOR_CHANNELS, shades.T, strict=True))
         if self.scalars is not None:
-            columns.append((self.scalars[:, None], "f8", ["quality"]))
-        fields = [(name, f"<{kind}") for _, kind, names in columns for name in names]
-        vertices = np.empty(len(self.vertices), fields)
-        for array, _, names in columns:
-            for name, column in zip(names, array.T, strict=True):
-                vertices[name] = column
-        said = {"f8": "double", "u1": "uchar"}
-        header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
-        header += [f"property {said[kind[1:]]} {name}" for name, kind in fields]
+            columns["quality"] = np.asarray(self.scalars, float)
+        vertices, said = ply_rows.table(columns), ""
         faces = np.empty(0 if self.faces is None else len(self.faces), [("n", "u1"), ("corners", "<i4", 3)])
         if len(faces):
             faces["n"], faces["corners"] = 3, self.faces
-            header += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
-        path.write_bytes("\n".join([*header, "end_header\n"]).encode() + vertices.tobytes() + faces.tobytes())
+            said = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
+        header = ply_rows.header(vertices.dtype, len(vertices), more=said)
+        path.write_bytes(header + vertices.tobytes() + faces.tobytes())
 
     def _write_open3d(self, path: Path) -> None:
         o3d = import_open3d()

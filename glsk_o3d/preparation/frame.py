@@ -132,15 +132,15 @@ def finite_points(points: np.ndarray, drop: bool) -> np.ndarray:
     finite = np.isfinite(points).all(axis=1)
     dropped = int(len(points) - finite.sum())
     if dropped and not drop:
-        raise not_finite(dropped, len(points), int(np.argmin(finite)))
+        raise not_finite(f"{dropped} of {len(points)} points", int(np.argmin(finite)))
     return finite
 
 
-def not_finite(invalid: int, points: int, first: int) -> InvalidCloudError:
-    """The error that tells how many of the points have no finite coordinates, and the index of the first."""
+def not_finite(which: str, first: int) -> InvalidCloudError:
+    """The error that tells which points have no finite coordinates, as "3 of 9 points", and the index of the first."""
     return InvalidCloudError(
-        f"{invalid} of {points} points have NaN or infinite coordinates, the first at index {first}: drop them with "
-        "drop_invalid=True, or remove them first"
+        f"{which} have NaN or infinite coordinates, the first at index {first}: drop them with drop_invalid=True, or "
+        "remove them first"
     )
 
 

@@ -14,8 +14,6 @@ GRID_TAIL = 0.001  # fitted: share of the points that may be far off, at either 
 TAIL_POINTS = 100000  # fitted: points by which that is told
 # derived: odd numbers with bits everywhere, by which coordinates are mixed
 MIXING = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
-
-
 ALL_BITS = np.uint64(2**64 - 1)  # derived
 
 
@@ -98,12 +96,12 @@ class Extent:
         InvalidCloudError
             See `check_extent`.
         """
-        if self.n:
-            check_extent(np.stack([self._low, self._high]), self.n)
-        some = self._some if len(self._some) else np.stack([self._low, self._high])  # nothing but copies
+        ends = np.stack([self._low, self._high])
+        check_extent(ends, self.n)
+        some = self._some if len(self._some) else ends  # nothing but copies
         low, high = np.quantile(some, [GRID_TAIL, 1 - GRID_TAIL], axis=0)
         low, high = 2 * low - high, 2 * high - low
-        corner, top = (np.clip(ends, low, high) for ends in (self._low, self._high))
+        corner, top = np.clip(ends, low, high)
         return Grid(low, high, corner, float((top - corner).max()))
 
 

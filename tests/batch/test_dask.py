@@ -52,7 +52,20 @@ def worker(row):
     return int(re.search(r"process (\d+)$", row["worker"])[1])
 
 
-def test_a_worker_is_killed_and_then_the_scheduler(cluster, until, gate, saboteur, write, rows, tmp_path):
+@pytest.fixture
+def kill_first(until, gate):
+    """Kill the first of the workers as soon as all wait at the gate; the others may go on."""
+
+    def kill(workers):
+        until(lambda: gate.waiting(*workers) == {worker.pid for worker in workers}, *workers)
+        workers[0].kill()
+        workers[0].wait()
+        gate.open()
+
+    return kill
+
+
+def test_a_worker_is_killed_and_then_the_scheduler(cluster, kill_first, saboteur, write, rows, tmp_path):
     for i in range(16):
         write(tmp_path / "in" / f"{i:02}.ply", seed=i, order=4000 * (i >= 4))
     (tmp_path / "in" / "bad.ply").write_text("no")
@@ -60,14 +73,8 @@ def test_a_worker_is_killed_and_then_the_scheduler(cluster, until, gate, saboteu
     pids = [process.pid for process in processes]
     seen = []
 
-    def kill_one():
-        until(lambda: gate.waiting(*processes) == set(pids), *processes)  # both are in the middle of a scan
-        processes[0].kill()
-        processes[0].wait()
-        gate.open()
-
     with ThreadPoolExecutor(1) as aside:
-        killing = aside.submit(kill_one)
+        killing = aside.submit(kill_first, processes)  # when both are in the middle of a scan
         result = run_batch(tmp_path / "in", tmp_path / "out", pipeline=saboteur, scheduler=file, on_result=seen.append)
         killing.result()
     found = rows(tmp_path / "out")
@@ -101,21 +108,15 @@ def test_a_scan_that_kills_its_workers(cluster, until, saboteur, write, rows, tm
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # of work done in this process
-def test_a_worker_is_killed_in_the_midst_of_a_scene(cluster, until, gate, saboteur, rows, write_points, tmp_path):
+def test_a_worker_is_killed_in_the_midst_of_a_scene(cluster, kill_first, saboteur, rows, write_points, tmp_path):
     ring = torus(4000, radius=0.05).points + [4500, 0, 0]  # wherever it is cut, workers wait at the gate
     scene = write_points(tmp_path / "scene.ply", ring)
     what = dict(pipeline=saboteur, tiles=0.5, overlap=0.12)
     file, processes = cluster(2)
     pids = [process.pid for process in processes]
 
-    def kill_one():
-        until(lambda: gate.waiting(*processes) == set(pids), *processes)  # both are in the middle of a tile
-        processes[0].kill()
-        processes[0].wait()
-        gate.open()
-
     with ThreadPoolExecutor(1) as aside:
-        killing = aside.submit(kill_one)
+        killing = aside.submit(kill_first, processes)  # when both are in the middle of a tile
         result = run_batch(scene, tmp_path / "out", scheduler=file, **what)
         killing.result()
     found = rows(tmp_path / "out")

@@ -242,8 +242,8 @@ def test_an_error_while_writing_keeps_the_old_file(scans, tmp_path, monkeypatch)
             raise OSError(28, "No space left on device")
         return real(*args)
 
-    real = streamed_labels._table
-    monkeypatch.setattr(streamed_labels, "_table", fails)
+    real = streamed_labels.ply_rows.table
+    monkeypatch.setattr(streamed_labels.ply_rows, "table", fails)
     with pytest.raises(OSError, match="No space left"):
         annotate_file(skeleton, scans / "scan.ply", tmp_path / "out.ply")
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]

@@ -1,0 +1,28 @@
+"""Rows of points as binary PLY files hold them, and the header before them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+_WORDS = {"u1": "uchar", "i4": "int", "f4": "float", "f8": "double"}
+
+
+def table(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Columns of equal length, (n,) arrays by name, side by side: a structured array of little-endian rows."""
+    n = len(next(iter(columns.values())))
+    rows = np.empty(n, [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()])
+    for name, values in columns.items():
+        rows[name] = values
+    return rows
+
+
+def header(row: np.dtype, n: int, *, width: int = 0, more: str = "") -> bytes:
+    """What stands before n such rows.
+
+    The count can be padded to a width, so that another one fits in its place; `more` are lines of elements that follow.
+    """
+    properties = "".join(f"property {_WORDS[row[name].str[1:]]} {name}\n" for name in row.names or ())
+    vertices = f"element vertex {n:{width}d}\n"
+    return f"ply\nformat binary_little_endian 1.0\n{vertices}{properties}{more}end_header\n".encode()
