@@ -66,29 +66,30 @@ def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple
     ahead = 1j * q[line, here]
     widest = 2 * np.abs(ahead)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        way, turn = _seen(q, line, here, ahead)
         for step in range(1, k + 2):
-            way = q - q[line, here][:, None]
             shut[line, first] = 0
             shut[line, here] = -np.inf
             # The cotangent of the turn: falls on ]0, pi[, and is exact for small turns. 0 / 0 is where we are.
-            turn = way * ahead.conj()[:, None]
             cotangent = turn.real / np.maximum(turn.imag, 0) + shut
             best = np.argmax(np.fmax(cotangent, -np.inf), axis=1)
             best = np.where(cotangent[line, best] > -np.inf, best, first)  # straight back, along a line
             ahead = way[line, best]
-            aside = np.abs((way * ahead.conj()[:, None]).imag)
-            beside = aside <= (COLLINEAR_SINE * widest * np.abs(ahead))[:, None]
+            onward, turn = _seen(q, line, best, ahead)
+            beside = np.abs(turn.imag) <= (COLLINEAR_SINE * widest * np.abs(ahead))[:, None]
             if np.count_nonzero(beside) > 2 * len(line):  # more than where we are and where we go
                 several = np.flatnonzero(beside.sum(axis=1) > 2)
                 best[several] = _farthest(way[several], shut[several] == 0, best[several])
                 ahead = way[line, best]
+                onward[several], turn[several] = _seen(q[several], line[: len(several)], best[several], ahead[several])
             going = best != first
             if not going.any():
                 break
             if not going.all():
-                rows, first, best, ahead, widest = (a[going] for a in (rows, first, best, ahead, widest))
-                q, shut, line = q[going], shut[going], line[: len(rows)]
+                rows, first, best, widest = (a[going] for a in (rows, first, best, widest))
+                q, shut, onward, turn, line = q[going], shut[going], onward[going], turn[going], line[: len(rows)]
             walk[rows, step] = here = best
+            way = onward
 
     # Cut the walk at the origin, where it meets it.
     size = (walk >= 0).sum(axis=1)
@@ -101,6 +102,12 @@ def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple
     source = (cut[:, None] + column) % np.maximum(size, 1)[:, None]
     ring = np.where(column < length[:, None], np.take_along_axis(walk, source, axis=1), -1)
     return ring, closed
+
+
+def _seen(q: np.ndarray, line: np.ndarray, here: np.ndarray, ahead: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The images from where each walk is, and the same turned back by the way it came."""
+    way = q - q[line, here][:, None]
+    return way, way * ahead.conj()[:, None]
 
 
 def _farthest(way: np.ndarray, usable: np.ndarray, best: np.ndarray) -> np.ndarray:

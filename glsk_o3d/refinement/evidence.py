@@ -17,14 +17,14 @@ from .axis_fit import incident_edges, nearest_on_edges
 
 # fitted: winding number below which an axis is in nothing; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
-ENOUGH_EVIDENCE = 16384  # measured: points beyond which the same is said of the topology, only later
+ENOUGH_EVIDENCE = 4096  # measured: points beyond which the same is said of the topology, only later
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """The points that support a skeleton, as an oriented surface; it holds while the graph is changed.
 
-    Of many points it takes every so-manieth, about 16384: they should be in Morton order, see `in_order`.
+    Of many points it takes every so-manieth, about 4096: they should be in Morton order, see `in_order`.
 
     Attributes
     ----------

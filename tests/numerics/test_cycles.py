@@ -181,4 +181,5 @@ def test_distance_counts_sides_and_not_only_corners():
 
 def test_curves_without_an_inside():
     line = np.outer([0, 1, 2, 3, 2, 1], [1.0, 2, 3])
-    assert inscribed_circle(line)[1] == pytest.approx(0, abs=1e-9)
+    # the distance is the root of a difference of squares, which rounding leaves, on some processors, of their size
+    assert inscribed_circle(line)[1] < np.sqrt(np.finfo(float).eps) * np.linalg.norm(np.ptp(line, axis=0))
