@@ -100,6 +100,8 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
         return np.zeros(m, bool)
     vertex = cloud.vertex
     count = np.bincount(vertex, minlength=m)
+    if (_share_around(skeleton.vertices, count, thin) <= 1 - least).all():
+        return np.zeros(m, bool)
     facts = np.column_stack([link_growth(cloud.links), one_direction(cloud.normals, cloud.links)])
     growth, flat = (group_sum(facts, vertex, m) / np.maximum(count, 1)[:, None]).T
     thin &= growth < np.where(flat < SHEET_SHARE, SURFACE_GROWTH, SHEET_GROWTH)
