@@ -106,7 +106,7 @@ def _check_header(path: Path) -> int:
         points, start, length = _promised(head, size, packed)
         if packed:
             records = int.from_bytes(head[100:104], "little")
-            _check_packed(stream, size, int.from_bytes(head[94:96], "little"), records, start, length)
+            _check_packed(stream, size, int.from_bytes(head[94:96], "little"), records, start, points, length)
     if not packed and size - start < points * length:
         raise _broken_off(points, (size - start) // length)
     return points
@@ -133,19 +133,23 @@ def _broken_off(points: int, found: int) -> ValueError:
     return ValueError(f"it promises {points} points and holds {found}: it breaks off")
 
 
-def _check_packed(stream: BinaryIO, size: int, at: int, records: int, start: int, point_bytes: int) -> None:
+def _check_packed(
+    stream: BinaryIO, size: int, at: int, records: int, start: int, points: int, point_bytes: int
+) -> None:
     """The same of what LASzip says: the bytes of a point, the number of chunks, and how long their layers are."""
 
     def number(length: int) -> int:
         return int.from_bytes(stream.read(length), "little")
 
-    layers = 0
+    layers, together = 0, 1
     for _ in range(records):
         stream.seek(at + 18)
         kind, length = number(2), number(2)
         if kind == PACKED_RECORD:
             stream.seek(at + VLR_BYTES)
             layered = number(2) == LAYERED
+            stream.seek(at + VLR_BYTES + 12)
+            together = max(number(4), 1)  # points of a chunk; the largest number if each has its own
             stream.seek(at + VLR_BYTES + 32)
             items = np.frombuffer(stream.read(6 * number(2)), "<u2").reshape(-1, 3)  # type, size, version
             if items[:, 1].sum() != point_bytes:
@@ -159,7 +163,8 @@ def _check_packed(stream: BinaryIO, size: int, at: int, records: int, start: int
         table = number(8)
     stream.seek(min(table, size) + 4)
     chunks = number(4)
-    place, sound = start + 8, start < table < size and chunks * max(point_bytes, 1) <= size  # each has a whole point
+    # each has a whole point; of those that the table does not have lazrs would believe all
+    place, sound = start + 8, start < table < size and -(-points // together) <= chunks <= size / max(point_bytes, 1)
     for _ in range(chunks * (layers > 0) * sound):
         stream.seek(place + point_bytes + 4)
         lengths = np.frombuffer(stream.read(4 * layers), "<u4")

@@ -156,6 +156,20 @@ def test_chunks_that_no_file_holds_are_refused_before_memory_is_taken(las, count
         read_scan(path)
 
 
+@pytest.mark.parametrize(("n", "count"), [(3, 0), (130_000, 2)])
+def test_fewer_chunks_than_hold_the_points_are_refused(tmp_path, n, count):
+    """lazrs would go on behind the last one, and take what memory it finds asked for there."""
+    laspy = pytest.importorskip("laspy")
+    pytest.importorskip("lazrs")
+    scan = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    scan.x, scan.y, scan.z = np.random.default_rng(0).normal(size=(3, n))
+    path = tmp_path / "c.laz"
+    scan.write(path)
+    packed(path, chunks(path)[1] + 4, count)
+    with pytest.raises(FileFormatError, match="table of chunks"):
+        read_scan(path)
+
+
 @pytest.mark.parametrize("place", [0, 1, 2**40, 2**63])
 def test_a_table_of_chunks_that_is_elsewhere_is_refused(las, place):
     pytest.importorskip("lazrs")
