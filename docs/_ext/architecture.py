@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
 ROWS = (
     {"command line": ("cli", "__main__")},
     {"cross-check": ("crosscheck",), "batches": ("batch",), "MeshLab": ("meshlab",)},
-    {"pictures and windows": ("viewing",)},
+    {"benchmark": ("benchmark",), "pictures and windows": ("viewing",)},
     {"files": ("io",), "driver": ("driver",)},
     {"analysis": ("analysis", "editing"), "recipes and plugins": ("recipes",)},
     {"named pipelines": ("pipelines",)},
