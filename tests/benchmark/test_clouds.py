@@ -247,7 +247,7 @@ def test_depth_noise_is_along_the_ray_and_grows_at_grazing_angles(ball):
         assert error[ring].std() == pytest.approx(expected, rel=0.12)
     flying = error > 0.02
     assert 40 <= flying.sum() <= 60  # half a percent are, some of them less far
-    assert np.median(cosine[flying]) < 0.4  # beside the rim
+    assert np.median(cosine[flying]) < 0.5 < np.median(cosine)  # beside the rim
     assert error[flying].max() < 0.2
 
 
