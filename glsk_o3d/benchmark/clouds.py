@@ -62,7 +62,7 @@ def cloud(shape: Shape, variant: str, n: int = 4096, seed: int = 0) -> np.ndarra
     >>> scan.shape, coverage(tube, scan) > 0.97
     ((1024, 3), True)
     """
-    if variant not in DRAWN_FOR:
+    if not isinstance(variant, str) or variant not in DRAWN_FOR:
         raise InvalidParameterError(did_you_mean(str(variant), VARIANTS, "variant of clouds"))
     check(n, 0)
     check_seed(seed)

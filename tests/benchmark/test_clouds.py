@@ -97,6 +97,7 @@ def test_points_of_the_surface_are_each_taken_once(family, variant, drawn):
     [
         (("scan",), "no variant of clouds is called 'scan': did you mean 'scan2'"),
         ((None,), "no variant of clouds is called 'None'"),
+        ((["clean"],), "no variant of clouds is called"),
         (("clean", 0), "n = 0: must be an int of at least 1"),
         (("clean", 10.0), "n = 10.0"),
         (("clean", 10, -1), "seed = -1: must be an int of at least 0"),

@@ -29,7 +29,7 @@ FAMILIES = tuple(DRAWN_BY)
 SURFACE_POINTS = 50_000  # fitted: of the whole surface, of which clouds are drawn: a dozen times as many as one has
 JUDGED_CLOUD = 4096  # fitted: points of the cloud that must be able to show the shape
 AREA_POINTS = 2000  # fitted: tell the area of a draw to a few percent
-MOST_DRAWS = 3000  # fitted: a hundred times what any seed has needed
+MOST_DRAWS = 3000  # fitted: hundreds of times what any seed has needed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,7 +118,7 @@ def shape(family: str, seed: int) -> Shape:
     >>> tree.facts["cycle_rank"], tree.points.shape
     (0, (50000, 3))
     """
-    if family not in DRAWN_BY:
+    if not isinstance(family, str) or family not in DRAWN_BY:
         raise InvalidParameterError(did_you_mean(str(family), FAMILIES, "family of shapes"))
     check_seed(seed)
     refused: Counter[str] = Counter()
