@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[1] / "glsk_o3d"
-ROOMS = ("numerics", "preparation", "refinement", "analysis", "crosscheck")
+ROOMS = (
+    *("numerics", "preparation", "refinement", "analysis", "crosscheck"),
+    *("benchmark", "benchmark/shapes"),
+)
 FILTERS = ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "stopping")
 NUMERIC = sorted(
     [*(PACKAGE / f"{name}.py" for name in FILTERS), *(p for room in ROOMS for p in (PACKAGE / room).glob("*.py"))]

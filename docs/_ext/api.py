@@ -35,6 +35,8 @@ PACKAGES = {
     "glsk_o3d.crosscheck": "Cross-check",
     "glsk_o3d.batch": "Batches",
     "glsk_o3d.samples": "Sample clouds",
+    "glsk_o3d.benchmark.shapes": "Shapes of the benchmark",
+    "glsk_o3d.benchmark.clouds": "Clouds of the benchmark",
 }
 """What users import from."""
 MODULES = {

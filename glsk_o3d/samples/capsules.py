@@ -29,20 +29,23 @@ def signed_distance(points: np.ndarray, nodes: np.ndarray, edges: np.ndarray, ra
     for node in np.setdiff1d(np.arange(len(nodes)), edges):
         best = np.minimum(best, np.linalg.norm(points - nodes[node], axis=1) - radii[node])
     for i, j in edges:
-        a, span, length = nodes[i], nodes[j] - nodes[i], np.linalg.norm(nodes[j] - nodes[i])
-        slope = (radii[i] - radii[j]) / length
-        if abs(slope) >= 1:  # one ball holds the other
-            big = i if slope > 0 else j
-            best = np.minimum(best, np.linalg.norm(points - nodes[big], axis=1) - radii[big])
-            continue
-        offset = points - a
-        along = offset @ span / length
-        across = np.sqrt(np.maximum((offset**2).sum(axis=1) - along**2, 0))
-        # the sphere that touches the surface nearest to the point has its centre `foot` along the axis
-        foot = np.clip(along - across * slope / np.sqrt(1 - slope**2), 0, length)
-        distance = np.hypot(along - foot, across) - (radii[i] - slope * foot)
-        best = np.minimum(best, distance)
+        best = np.minimum(best, capsule_distance(points, nodes[i], nodes[j], radii[i], radii[j]))
     return best
+
+
+def capsule_distance(points: np.ndarray, a: np.ndarray, b: np.ndarray, radius_a: float, radius_b: float) -> np.ndarray:
+    """Signed distance of points, (n, 3) array, to the convex hull of two balls around `a` and `b`, (3,) arrays."""
+    span, length = b - a, np.linalg.norm(b - a)
+    slope = (radius_a - radius_b) / length
+    if abs(slope) >= 1:  # one ball holds the other
+        big, radius = (a, radius_a) if slope > 0 else (b, radius_b)
+        return np.linalg.norm(points - big, axis=1) - radius
+    offset = points - a
+    along = offset @ span / length
+    across = np.sqrt(np.maximum((offset**2).sum(axis=1) - along**2, 0))
+    # the sphere that touches the surface nearest to the point has its centre `foot` along the axis
+    foot = np.clip(along - across * slope / np.sqrt(1 - slope**2), 0, length)
+    return np.hypot(along - foot, across) - (radius_a - slope * foot)
 
 
 def union_sample(name, nodes, edges, radii, n, noise, seed, cameras=None) -> Sample:

@@ -1,0 +1,13 @@
+"""A benchmark of random shapes with exactly known axes, and clouds of them as scanners give them.
+
+Everything follows from a family, a seed, a variant and a number of points, so that nothing needs to be downloaded. The
+shapes and the clouds need NumPy and SciPy alone.
+
+Examples
+--------
+>>> from glsk_o3d.benchmark.clouds import cloud
+>>> from glsk_o3d.benchmark.shapes import shape
+>>> tree = shape("trees", 7)
+>>> cloud(tree, "depth2", n=2048).shape
+(2048, 3)
+"""

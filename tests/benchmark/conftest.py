@@ -1,0 +1,28 @@
+"""Shapes of the benchmark, each drawn once."""
+
+import hashlib
+from functools import cache
+
+import numpy as np
+import pytest
+
+from glsk_o3d.benchmark.shapes import shape
+
+
+@pytest.fixture(scope="session")
+def drawn():
+    """Like `shape`."""
+    return cache(shape)
+
+
+@pytest.fixture(scope="session")
+def fingerprint():
+    """A few letters that tell arrays apart: numbers to six decimals, so that roundings do not count."""
+
+    def take(*arrays):
+        found = hashlib.sha256()
+        for array in arrays:
+            found.update(np.round(array * 1e6).astype("<i8").tobytes())
+        return found.hexdigest()[:16]
+
+    return take

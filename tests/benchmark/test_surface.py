@@ -1,0 +1,84 @@
+"""Points on the boundary of round cones, against distances and areas in closed form."""
+
+import numpy as np
+import pytest
+
+from glsk_o3d.benchmark.randomness import generator
+from glsk_o3d.benchmark.shapes import FAMILIES
+from glsk_o3d.benchmark.shapes.surface import INSIDE, buried, surface
+from glsk_o3d.samples.capsules import capsule_distance, signed_distance
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_all_points_are_on_the_surface_and_normals_point_outward(family, seed, drawn):
+    one = drawn(family, seed)
+    axis = one.nodes, one.edges, one.radii
+    distance = signed_distance(one.points, *axis)
+    assert distance.max() < 1e-12
+    assert distance.min() >= -INSIDE
+    assert np.mean(distance < -1e-9) < 0.1  # where cones bend by less than a degree
+    np.testing.assert_allclose(np.linalg.norm(one.normals, axis=1), 1, atol=1e-12)
+    points, normals = one.points[::20], one.normals[::20]
+    assert signed_distance(points - 1e-4 * normals, *axis).max() < -0.99e-4
+    outside = signed_distance(points + 1e-4 * normals, *axis)
+    assert np.mean(outside > 0.9e-4) > 0.97  # but in creases
+
+
+@pytest.mark.parametrize("radii", [(0.3, 0.3), (0.4, 0.1), (0.05, 0.2), (1.5, 0.2), (0.2, 1.7)])
+def test_the_distance_is_that_of_the_nearest_ball_between(radii):
+    a, b = np.array([0.1, -0.2, 0.3]), np.array([0.7, 0.5, -0.1])
+    points = np.random.default_rng(0).uniform(-2, 2, (500, 3))
+    t = np.linspace(0, 1, 20001)[:, None]
+    balls, sizes = a + t * (b - a), radii[0] + t[:, 0] * (radii[1] - radii[0])
+    nearest = [(np.linalg.norm(balls - point, axis=1) - sizes).min() for point in points]
+    np.testing.assert_allclose(capsule_distance(points, a, b, *radii), nearest, atol=1e-6)
+
+
+def cone(ra, rb, pieces=1):
+    """A cone of length 1 along x, in so many pieces."""
+    t = np.linspace(0, 1, pieces + 1)
+    start = np.arange(pieces)
+    return np.column_stack([t, 0 * t, 0 * t]), np.column_stack([start, start + 1]), ra + t * (rb - ra)
+
+
+def hull_area(ra, rb):
+    """Of the convex hull of two balls a length of 1 apart: the caps, and the cone between the circles of contact."""
+    sine = ra - rb
+    caps = 2 * np.pi * (ra**2 * (1 + sine) + rb**2 * (1 - sine))
+    return caps + np.pi * (ra + rb) * (1 - sine**2)
+
+
+@pytest.mark.parametrize("pieces", [1, 7])
+@pytest.mark.parametrize(("ra", "rb"), [(0.2, 0.2), (0.3, 0.1), (0.05, 0.4)])
+def test_points_are_uniform_by_area(ra, rb, pieces):
+    found = surface(*cone(ra, rb, pieces), 40_000, generator("area", pieces))
+    area, sine = hull_area(ra, rb), ra - rb
+    assert found.area == pytest.approx(area, rel=0.02)
+    # the caps end at the circles where the cone touches the balls
+    x, low, high = found.points[:, 0], ra * sine, 1 + rb * sine
+    for share, cap in ((x < low, ra**2 * (1 + sine)), (x > high, rb**2 * (1 - sine))):
+        expected = 2 * np.pi * cap / area
+        assert share.mean() == pytest.approx(expected, abs=5 * np.sqrt(expected / 40_000))
+    # between them by radius, which changes from ra to rb, both times the cosine
+    mean = low + (high - low) * (ra + 2 * rb) / (3 * (ra + rb))
+    assert x[(x > low) & (x < high)].mean() == pytest.approx(mean, abs=0.01)
+
+
+def test_a_ball_at_a_bend_shows_and_one_between_straight_cones_is_not_drawn():
+    nodes, edges, radii = cone(0.1, 0.1, 2)
+    straight = surface(nodes, edges, radii, 20_000, generator("bend"))
+    on_ball = np.abs(np.linalg.norm(straight.points - nodes[1], axis=1) - 0.1) < 1e-9
+    assert on_ball.sum() < 5
+    nodes[2] = [0.5, 0.5, 0]
+    bent = surface(nodes, edges, radii, 20_000, generator("bend"))
+    offset = bent.points - nodes[1]
+    on_ball = (np.abs(np.linalg.norm(offset, axis=1) - 0.1) < 1e-9) & (offset[:, 0] > 1e-3) & (offset[:, 1] < -1e-3)
+    quarter = np.pi * 0.1**2  # of a ball
+    assert on_ball.mean() == pytest.approx(quarter / bent.area, rel=0.15)
+
+
+def test_what_is_inside_is_buried():
+    nodes, edges, radii = cone(0.2, 0.2)
+    points = np.array([[0.5, 0, 0], [0.5, 0, 0.2], [0.5, 0, 0.19], [0.5, 0, 0.3], [-0.19, 0, 0], [-0.21, 0, 0]])
+    np.testing.assert_array_equal(buried(nodes, edges, radii, points), [True, False, True, False, True, False])
