@@ -72,12 +72,12 @@ def cloud(shape: Shape, variant: str, n: int = 4096, seed: int = 0) -> np.ndarra
 
 
 def _picked(shape, weights, n, rng):
-    """Rows of n points, each at most once, with chances in proportion to their weights."""
+    """Rows of n points, each at most once, with chances in proportion to their weights, in random order."""
     fit = np.flatnonzero(weights > 0)
     if len(fit) < n:
         raise InvalidParameterError(f"{shape.name} has {len(fit)} points for a cloud of {n}: ask for fewer points")
     score = np.log(weights[fit]) + rng.gumbel(size=len(fit))
-    return fit[np.argpartition(-score, n - 1)[:n]]
+    return fit[np.argsort(-score, kind="stable")[:n]]  # all in order: a partition differs between processors
 
 
 def _clean(shape, n, rng, look):
