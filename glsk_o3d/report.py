@@ -9,12 +9,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any, TypeAlias
+from types import UnionType
+from typing import Any, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from .errors import SkeletonWarning
 from .interop.verbosity import QUIET, open3d_is
 
 Place: TypeAlias = tuple[float, float, float]
+_Record = TypeVar("_Record", bound="Report | IterationRecord | Judgement")
 
 NOT_CONTRACTED = "not contracted"
 STOPPED_BY_CALLER = "stopped by the caller"
@@ -144,9 +146,29 @@ def coordinates(place: Iterable[float]) -> str:
     return ", ".join(f"{c:.4g}" if abs(c) < 1000 or not abs(c) < 1e8 else f"{c:.2f}" for c in place)
 
 
-def _known(cls: type[Report] | type[IterationRecord] | type[Judgement], data: Mapping[str, Any]) -> dict[str, Any]:
-    names = {field.name for field in dataclasses.fields(cls)}
-    return {name: value for name, value in data.items() if name in names}
+def _made(cls: type[_Record], data: Mapping[str, Any]) -> _Record:
+    """A record from its entries, but for unknown ones; ValueError where one is not of its type."""
+    hints = get_type_hints(cls)
+    values = {name: value for name, value in data.items() if name in hints}
+    for name, value in values.items():
+        if not _fits(value, hints[name]):
+            raise ValueError(f"{name} in its report is {repr(value)[:80]}")
+    return cls(**values)
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    """Whether a value is of a type; whole numbers that are not too large are floats, too."""
+    kind, inner = get_origin(hint) or hint, get_args(hint)
+    if kind in (Union, UnionType):
+        return any(_fits(value, each) for each in inner)
+    if kind in (int, float):
+        return (type(value) is int and abs(value) <= sys.maxsize) or (kind is float and isinstance(value, float))
+    if kind is tuple and isinstance(value, tuple):
+        hints = inner[:1] * len(value) if Ellipsis in inner else [each for each in inner if each != ()]
+        return len(value) == len(hints) and all(map(_fits, value, hints))
+    if kind is dict and isinstance(value, dict):
+        return all(_fits(each, inner[1]) for each in value.values())
+    return kind is Any or isinstance(value, kind)
 
 
 def outside() -> int:
@@ -262,18 +284,17 @@ class Report:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Report:
         """Inverse of `to_dict`; entries of a later version that this one does not know are passed over."""
-        values = _known(cls, data)
-        recipe = values.get("recipe", {})
-        if not isinstance(recipe, dict) or not isinstance(recipe.get("pipeline", []), list):
-            raise ValueError("its recipe is none")
-        values["iterations"] = tuple(
-            IterationRecord(**_known(IterationRecord, record)) for record in values.get("iterations", ())
-        )
+        values = dict(data)
+        values["iterations"] = tuple(_made(IterationRecord, record) for record in values.get("iterations", ()))
         values["judgements"] = tuple(
-            Judgement(**(_known(Judgement, found) | {"place": tuple(found["place"])}))
-            for found in values.get("judgements", ())
+            _made(Judgement, found | {"place": tuple(found["place"])}) for found in values.get("judgements", ())
         )
+        if not all(found.about in _OUTCOMES for found in values["judgements"]):
+            raise ValueError("a judgement in its report is about nothing that is known")
         values["joined"] = tuple((tuple(start), tuple(stop)) for start, stop in values.get("joined", ()))
-        for name in ("stages", "warnings", "root"):
-            values[name] = tuple(values.get(name, ()))
-        return cls(**values)
+        lists = ("stages", "warnings", "root")
+        values |= {name: tuple(values[name]) for name in lists if isinstance(values.get(name), list)}
+        report = _made(cls, values)
+        if not isinstance(report.recipe.get("pipeline", []), list):
+            raise ValueError("its recipe is none")
+        return report

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..io.clouds.text_tables import holds_points
-from ..io.paths import SCAN_ENDINGS
+from ..io.paths import SCAN_ENDINGS, check_ends
 from .grid import TooManyParts
 from .splitting import Split, Splitter
 
@@ -96,6 +96,8 @@ def find_inputs(
 
     Raises
     ------
+    FileFormatError
+        A list is a pipe or a device.
     FileNotFoundError
         A file is not there, a folder or pattern has no cloud, or nothing that a list names is there.
     InvalidParameterError
@@ -202,6 +204,7 @@ def _why_not(path: str) -> str:
 
 def _listed(path: str) -> list[str]:
     """The files that a list names, one a line, from the working folder; blank lines and comments are skipped."""
+    check_ends(path)
     lines = [os.fsdecode(line.strip()) for line in Path(path).read_bytes().removeprefix(b"\xef\xbb\xbf").splitlines()]
     lines = [line for line in lines if line and not line.startswith("#")]
     if any("\0" in line for line in lines):

@@ -144,7 +144,9 @@ def _cell(value: Any) -> Any:
 
 
 def file_hash(path: str | os.PathLike) -> str:
-    """SHA-256 of the bytes of a file, as ``sha256sum`` prints it."""
+    """SHA-256 of the bytes of a file, as ``sha256sum`` prints it; OSError for a pipe, which may never end."""
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise OSError(f"{os.fspath(path)}: is no file")
     digest = hashlib.sha256()
     with open(path, "rb") as stream:
         while chunk := stream.read(1 << 20):

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..analysis.truth import Truth
 from ..errors import FileFormatError, InvalidParameterError
+from .paths import existing_file
 from .skeletons import read_skeleton
 
 
@@ -42,7 +43,7 @@ def read_truth(path: str | os.PathLike) -> Truth:
     >>> len(truth.edges) == len(ring.edges)
     True
     """
-    path = Path(path)
+    path = existing_file(path)
     try:
         return _from_archive(path) or _from_skeleton(path)
     except InvalidParameterError as error:

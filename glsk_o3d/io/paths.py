@@ -27,11 +27,16 @@ def existing_file(path: str | os.PathLike) -> Path:
         raise FileFormatError(f"{path}: is a folder, not a file")
     if not path.exists():
         raise FileNotFoundError(f"{path}: no such file")
-    if not path.is_file():  # it may never end
-        raise FileFormatError(f"{path}: is a pipe or a device, not a file: write what it gives to one first")
+    check_ends(path)
     if path.stat().st_size == 0:
         raise FileFormatError(f"{path}: the file is empty")
     return path
+
+
+def check_ends(path: str | os.PathLike) -> None:
+    """Raise FileFormatError for a pipe or a device: what it gives may never end."""
+    if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
+        raise FileFormatError(f"{path}: is a pipe or a device, not a file: write what it gives to one first")
 
 
 def unknown_ending(what: object, known: Iterable[str]) -> FileFormatError:

@@ -40,7 +40,7 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     OSError
         The file cannot be read.
     RecipeError
-        It is no recipe, or a wrong one; the message names the file and the place in it.
+        It is no file, no recipe, or a wrong one; the message names the file and the place in it.
 
     Examples
     --------
@@ -52,6 +52,8 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     12
     """
     ending = recipe_ending(path)
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise RecipeError(f"{os.fspath(path)}: is no file but a folder, or a pipe or a device, which may never end")
     data = Path(path).read_bytes()
     try:
         recipe = _READERS[ending](data.decode("utf-8-sig"))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from glsk_o3d import InvalidParameterError
+from glsk_o3d import FileFormatError, InvalidParameterError
 from glsk_o3d.batch.inputs import find_inputs
 from glsk_o3d.batch.ledger import file_hash
 from glsk_o3d.batch.splitting import Cut, Splitter
@@ -116,6 +116,13 @@ def test_folders_that_go_away_are_told(touch, here, monkeypatch):
 def test_a_list_with_a_nul(here):
     (here / "list.txt").write_bytes(b"scan\0.ply\n")
     with pytest.raises(FileNotFoundError, match="it holds a NUL"):
+        names("list.txt")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
+def test_a_list_that_may_never_end(here):
+    os.mkfifo(here / "list.txt")
+    with pytest.raises(FileFormatError, match=r"list\.txt: is a pipe or a device"):
         names("list.txt")
 
 

@@ -127,6 +127,13 @@ def test_hash(tmp_path):
     assert file_hash(tmp_path / "a") == hashlib.sha256(data).hexdigest()
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
+def test_a_pipe_has_no_hash(tmp_path):
+    os.mkfifo(tmp_path / "pipe.ply")
+    with pytest.raises(OSError, match=r"pipe\.ply: is no file"):
+        file_hash(tmp_path / "pipe.ply")
+
+
 def test_the_lock(tmp_path):
     with (
         locked(tmp_path),

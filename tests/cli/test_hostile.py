@@ -168,3 +168,18 @@ def test_what_a_plugin_prints_is_no_result(install, capfd):
     result = CliRunner().invoke(app, ["filters", "--json"])
     assert "loud" in [made["name"] for made in json.loads(result.stdout)["pipelines"]]
     assert "hello" in result.stderr
+
+
+def test_mistakes_that_typer_finds_are_told_with_visible_words(capfd):
+    """Whatever its version makes of them itself."""
+    from glsk_o3d.cli.console import VisibleGroup
+
+    class Mistaken(VisibleGroup):
+        def parse_args(self, *_):
+            error = RuntimeError("a mistake")
+            error.message = NASTY
+            raise error
+
+    with pytest.raises(RuntimeError) as raised:
+        Mistaken(name="glsk").make_context("glsk", [])
+    assert raised.value.message == HARMLESS

@@ -104,6 +104,30 @@ def test_a_run_with_a_filter_that_is_not_installed_cannot_be_repeated(told, skel
     assert told("s.json")["repeatable"] is False
 
 
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("stages", 0), 7),
+        (("warnings",), [{}]),
+        (("versions",), [1]),
+        (("iterations", 0, "n_points"), "many"),
+        (("iterations", 0, "explained"), 10**400),
+        (("judgements", 0, "probability"), "x"),
+        (("judgements", 0, "about"), "x"),
+        (("judgements", 0, "place"), ["a", "b", "c"]),
+    ],
+)
+def test_a_wrong_entry_of_the_report_is_no_traceback(skeleton, refused, tmp_path, place, value):
+    data = json.loads((tmp_path / "s.json").read_text())
+    call = {"about": "limb", "place": [0.5, 0, 1], "probability": 0.7, "changed": False}
+    entry = data["report"] = {**data["report"], "judgements": [call]}
+    for step in place[:-1]:
+        entry = entry[step]
+    entry[place[-1]] = value
+    (tmp_path / "s.json").write_text(json.dumps(data))
+    assert "s.json: not a valid .json skeleton" in refused(1, "info", "s.json")
+
+
 def test_a_mesh_is_a_cloud(told, invoke, tmp_path):
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     facts = told("m.obj")

@@ -3,6 +3,8 @@ import os
 import pytest
 
 from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.axes import read_truth
+from glsk_o3d.io.clouds.text_tables import holds_points
 from glsk_o3d.io.scans import read_cloud
 from glsk_o3d.io.skeletons import read_skeleton
 
@@ -17,8 +19,23 @@ def test_what_is_not_a_file(tmp_path, read):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
-@pytest.mark.parametrize("read", [read_skeleton, read_cloud])
-def test_a_pipe_is_not_waited_for(tmp_path, read):
-    os.mkfifo(tmp_path / "pipe.ply")
-    with pytest.raises(FileFormatError, match=r"pipe\.ply: is a pipe or a device"):
-        read(tmp_path / "pipe.ply")
+@pytest.mark.parametrize(
+    ("read", "ending"),
+    [(read_skeleton, "ply"), (read_cloud, "ply"), *((read_skeleton, ending) for ending in ("json", "npz", "swc"))]
+    + [(read_truth, "npz")],
+)
+def test_what_may_never_end_is_not_waited_for(tmp_path, read, ending):
+    path = tmp_path / f"pipe.{ending}"
+    os.mkfifo(path)
+    with pytest.raises(FileFormatError, match=rf"pipe\.{ending}: is a pipe or a device"):
+        read(path)
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    with pytest.raises(FileFormatError, match=rf"pipe\.{ending}: is a pipe or a device"):
+        read(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
+def test_a_pipe_is_not_asked_for_points(tmp_path):
+    os.mkfifo(tmp_path / "pipe.txt")
+    assert not holds_points(tmp_path / "pipe.txt")

@@ -1,5 +1,6 @@
 """The fit to the axis: closed forms of tubes and tori, and what it must not mind."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -565,3 +566,17 @@ def test_normals_that_mean_nothing_do_not_lead_far_out_of_the_cloud():
     assert beyond <= FIT_BEYOND * (1 + 1e-9)
     third = tube(arc=2 * np.pi / 3)  # of a tube ten radii long and more has an axis
     assert np.abs(fit_axis(third, 9)[0][:, 1:]).max() < 0.1 * R
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_points_far_off_along_an_edge_say_no_more_than_they_can(seed):
+    """How far they are from its line is a difference of squares, and less than its roundings."""
+    rng = np.random.default_rng(seed)
+    way = rng.normal(size=3)
+    x, p = np.array([0 * way, way]), 1e60 * np.outer([2, 3, 5], way)
+    ends = np.array([[0, 1]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        near = axis_fit._nearest(x, ends, incident_edges(ends, 2)[[1, 1, 1]], p, rng.normal(size=(3, 3)))
+    assert (near.apart >= 0).all()
+    assert ((near.doubt >= 0) & (near.doubt <= 1)).all()

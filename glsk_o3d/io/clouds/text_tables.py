@@ -69,6 +69,8 @@ class Layout(NamedTuple):
 
 def holds_points(path: Path) -> bool:
     """Whether a file of text looks like a cloud: a line has three numbers, and columns with names have x, y and z."""
+    if not path.is_file():  # a pipe may never end
+        return False
     try:
         with _opened(path) as stream:
             _layout(stream)
