@@ -78,6 +78,8 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_js_files = ["site.js"]
 html_theme = "furo"
+html_use_index = html_domain_indices = False  # the reference goes by task, and words are searched for
+pygments_dark_style = "github-dark"
 html_title = f"glsk-o3d {release}"
 html_search_scorer = str(ROOT / "docs" / "_static" / "scorer.js")
 html_additional_pages = {"index": "index.html"}  # leads to docs/index.html

@@ -99,7 +99,7 @@ def test_equations_are_set_in_the_font_that_comes_with_the_site(visit):
     assert used == {"Glsk Math"}
     lower = """[...document.querySelectorAll("math msub")].map((sub) => [...sub.children].map((part) =>
         part.getBoundingClientRect().bottom)).map(([letter, index]) => index - letter)"""
-    assert min(tab.evaluate(lower)) > 1  # pixels
+    assert min(tab.evaluate(lower)) > 0.5  # pixels
 
 
 def listed(tab):
@@ -147,7 +147,8 @@ def test_the_first_page_leads_on(width, visit):
     cards = tab.locator("article td img")
     assert cards.count() == 3
     boxes = [cards.nth(number).bounding_box() for number in range(3)]
-    assert len({round(box["x" if width == 390 else "y"]) for box in boxes}) == 1  # below or beside each other
+    places = [box["x" if width == 390 else "y"] for box in boxes]
+    assert max(places) - min(places) < 2  # below or beside each other
     assert min(box["width"] for box in boxes) > 180
     assert tab.locator("article td a:has(img)").evaluate_all("(links) => links.map((each) => each.href)") == [
         (tab.evaluate("document.baseURI").rpartition("/")[0] + f"/generated/gallery/plot_{name}.html")

@@ -1,4 +1,4 @@
-"""What readers search for, and the page that they want: entries of the search, which show on no page."""
+"""What readers search for, and the page that they want: entries of an index that only the search uses."""
 
 from sphinx.addnodes import index
 

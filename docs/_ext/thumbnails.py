@@ -1,26 +1,32 @@
 """The small pictures of the gallery: of every script the panel that shows what one gets, cropped, and large enough."""
 
+import math
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from PIL import Image
 from sphinx_gallery.scrapers import matplotlib_scraper
 
 SIZE = (480, 360)
 MARGIN = 12  # pixels around the drawing
 SHARPNESS = 250  # dots per inch before it is made smaller
+THICK = 5  # pixels of a curve
 LAST = (0, (-1,))
 CHOSEN = {
+    "plot_02_five_filters": (0, (0, 1, 2, 3)),
     "plot_05_libigl_crosscheck": (1, (0,)),
     "plot_06_noise_and_missing_data": (0, (1,)),
     "plot_07_tree_branches": (0, (0,)),
-    "plot_11_baseline_paper_ours": (0, (0, 3, 6)),
-    "plot_13_batch_with_dask": (0, (0,)),
-    "plot_14_grasps": (1, (0,)),
+    "plot_11_baseline_paper_ours": (0, (2, 5, 8)),
+    "plot_13_batch_with_dask": (0, (0, 1, 2, 3, 4, 5)),
+    "plot_14_grasps": (1, (1,)),
 }
 """Which figure, and which of its panels, where it is not the last panel of the first figure."""
+PART = {"plot_05_libigl_crosscheck": (0.38, 0.16, 0.78, 0.8)}
+"""Left, top, right and bottom, as shares, of what is shown of a panel that is a picture itself."""
 
 
 def scrape(block, block_vars, gallery_conf):
@@ -33,29 +39,59 @@ def scrape(block, block_vars, gallery_conf):
     if 0 <= number - before < len(figures):
         folder = Path(block_vars["image_path_iterator"].image_path).parent / "panels"
         folder.mkdir(parents=True, exist_ok=True)
-        drawn(figures[number - before], panels).save(folder / f"{script}.png", optimize=True)
+        figure = figures[number - before]
+        FigureCanvasAgg(figure)  # the gallery has closed it
+        figure.canvas.draw()
+        figure.set_layout_engine("none")
+        drawings = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
+        pictures = [panel(figure, drawings[place], len(panels), PART.get(script)) for place in panels]
+        joined(pictures).save(folder / f"{script}.png", optimize=True)
     return rst
 
 
-def drawn(figure, panels):
-    """These panels alone, without titles, scales and white edges."""
-    FigureCanvasAgg(figure)  # the gallery has closed the figure
-    figure.canvas.draw()
-    figure.set_layout_engine("none")
-    drawings = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
-    chosen = [drawings[panel] for panel in panels]
-    for axes in figure.axes:
-        axes.set_visible(axes in chosen)
-        axes.set_title("")
+def columns(n):
+    """Of so many pictures."""
+    return min(n, 3) if n in (3, 5, 6) else math.ceil(math.sqrt(n))
+
+
+def panel(figure, axes, n, part):
+    """One of n panels, alone, without title and scales, as large as fits; its curves are as thick in every picture."""
+    room = (SIZE[0] // columns(n) - 2 * MARGIN, SIZE[1] // math.ceil(n / columns(n)) - 2 * MARGIN)
+    for each in figure.axes:
+        each.set_visible(each is axes)
+    axes.set_title("")
     figure.set_dpi(SHARPNESS)
+    cropped = inked(figure, part)
+    scale = min(side / length for side, length in zip(room, cropped.size, strict=True))
+    curves = [each for each in axes.collections if isinstance(each, LineCollection)]
+    thickest = max((max(each.get_linewidth()) for each in curves), default=1)
+    for each in curves:
+        each.set_linewidth(
+            np.array(each.get_linewidth()) * THICK * 72 / SHARPNESS / scale / math.sqrt(columns(n)) / thickest
+        )
+    cropped = inked(figure, part)
+    cropped.thumbnail(room, Image.Resampling.LANCZOS)
+    return cropped
+
+
+def inked(figure, part):
+    """What is not white."""
     figure.canvas.draw()
     picture = np.asarray(figure.canvas.buffer_rgba())[..., :3]
-    rows, columns = np.nonzero((picture < 250).any(axis=2))
-    cropped = Image.fromarray(picture[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1])
-    scale = min((side - 2 * MARGIN) / length for side, length in zip(SIZE, cropped.size, strict=True))
-    cropped = cropped.resize([max(1, round(scale * length)) for length in cropped.size], Image.Resampling.LANCZOS)
-    whole = Image.new("RGB", SIZE, "white")
-    whole.paste(cropped, [(side - length) // 2 for side, length in zip(SIZE, cropped.size, strict=True)])
+    rows, across = np.nonzero((picture < 250).any(axis=2))
+    cropped = Image.fromarray(picture[rows.min() : rows.max() + 1, across.min() : across.max() + 1])
+    return cropped.crop([round(p * side) for p, side in zip(part, 2 * cropped.size, strict=True)]) if part else cropped
+
+
+def joined(pictures):
+    """Pictures on a white one, in rows."""
+    whole, wide = Image.new("RGB", SIZE, "white"), columns(len(pictures))
+    cell = (SIZE[0] // wide, SIZE[1] // math.ceil(len(pictures) / wide))
+    for number, picture in enumerate(pictures):
+        corner = [
+            cell[i] * place + (cell[i] - picture.size[i]) // 2 for i, place in enumerate(divmod(number, wide)[::-1])
+        ]
+        whole.paste(picture, corner)
     return whole
 
 

@@ -6,7 +6,7 @@ var Scorer = {
     if (kind === "index") return score;
     if (docname === "CHANGELOG") return score - 14;
     if (docname === api + "extending" || /api\/glsk_o3d\.\w+\.\w+\./.test(docname)) return score - 12;
-    if (docname.startsWith(api)) return score - 4;
+    if (docname.startsWith(api)) return kind === "text" ? score - 4 : score;
     if (docname.startsWith("docs/generated/gallery/")) return score - 2;
     if (/^(docs\/(architecture|releasing)|CONTRIBUTING|benchmarks|filters)/.test(docname)) return score - 8;
     return score;
