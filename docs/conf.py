@@ -31,6 +31,7 @@ extensions = [
     "mathml",
     "options",
     "sidebar",
+    "tables",
     "thumbnails",
 ]
 root_doc = "docs/index"

@@ -83,7 +83,7 @@ def test_no_page_is_wider_than_a_phone_and_no_word_of_a_table_is_broken(site, vi
 
 
 def test_equations_are_set_in_the_font_that_comes_with_the_site(visit):
-    tab = visit("docs/method.html")
+    tab = visit("docs/filters/contractor.html")
     tab.evaluate("document.fonts.ready")
     session = tab.context.new_cdp_session(tab)
     for domain in ("DOM", "CSS"):
@@ -97,6 +97,8 @@ def test_equations_are_set_in_the_font_that_comes_with_the_site(visit):
             font["familyName"] for font in session.send("CSS.getPlatformFontsForNode", {"nodeId": letter})["fonts"]
         }
     assert used == {"Glsk Math"}
+    raised = "[...document.querySelectorAll('math :is(msup, msubsup) > :last-child')].map((part) => part.textContent)"
+    assert "′" not in "".join(tab.evaluate(raised))  # fonts have it raised already
     lower = """[...document.querySelectorAll("math msub")].map((sub) => [...sub.children].map((part) =>
         part.getBoundingClientRect().bottom)).map(([letter, index]) => index - letter)"""
     assert min(tab.evaluate(lower)) > 0.5  # pixels
@@ -139,6 +141,15 @@ def test_the_menu_shows_where_one_is(page, title, visit):
     assert tab.locator(".sidebar-tree details[open]").count() == 1
     assert tab.locator(".sidebar-tree a:visible").count() < 50
     assert tab.locator(".sidebar-tree summary:visible").count() > 4
+
+
+def test_pictures_on_white_do_not_dazzle_in_the_dark(visit):
+    changed = "(picture) => getComputedStyle(picture).filter"
+    for page, pictures in (("docs/index.html", "article img"), ("docs/method.html", "article img")):
+        assert visit(page).locator(pictures).first.evaluate(changed) == "none"
+        shown = visit(page, scheme="dark").locator(pictures).evaluate_all(f"(all) => all.map({changed})")
+        assert shown
+        assert "none" not in shown
 
 
 @pytest.mark.parametrize("width", [390, 1400])

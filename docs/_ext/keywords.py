@@ -54,6 +54,12 @@ def add(app, doctree):
         doctree.insert(0, index(entries=[("single", word, "", "main", None) for word in words]))
 
 
+def every_page(app, env):
+    """All pages are written at every build, since Sphinx forgets the entries of those that are not."""
+    return list(env.all_docs)
+
+
 def setup(app):
     app.connect("doctree-read", add)
+    app.connect("env-updated", every_page)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
