@@ -253,6 +253,14 @@ def test_names_in_coming_from_are_parameters():
         assert set(named) <= {field.name for field in dataclasses.fields(BUILTIN[cls])}, (cls, words)
 
 
+def test_the_search_knows_words_for_every_page():
+    words = dict(re.findall(r'^    "([\w/]+)": "(.+)",$', (ROOT / "docs/_ext/keywords.py").read_text(), re.MULTILINE))
+    pages = {str(path.relative_to(ROOT).with_suffix("")) for path in PAGES if path.is_relative_to(ROOT / "docs")}
+    assert pages - {*words} == {"docs/index"}
+    every = [word.strip() for told in words.values() for word in told.split(",")]
+    assert len(every) == len(set(every))
+
+
 def test_every_work_is_cited_and_every_citation_is_in_the_bibliography():
     works = set(re.findall(r"^@\w+\{(\w+),", (ROOT / "docs" / "references.bib").read_text(), re.MULTILINE))
     cited = {name for path in PAGES for name in re.findall(r"\{cite:\w+\}`(\w+)`", path.read_text())}

@@ -24,6 +24,7 @@ KEYWORDS = {
     "docs/accuracy": "accuracy, accurate, error, ablation, benchmark of accuracy",
     "docs/speed": "speed, fast, performance, time, runtime, memory use, scaling",
     "docs/comparison": "comparison, compare, other tools, pygel3d, versus, alternatives",
+    "docs/benchmark": "benchmark, benchmarks, score, scores",
     "docs/evaluation": "evaluate, evaluation, measures, metrics, truth, assess",
     "docs/crosscheck": "crosscheck, cross-check, cross check, libigl, mesh, density",
     "docs/differences": "differences, paper, published code",
