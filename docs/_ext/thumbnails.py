@@ -13,7 +13,7 @@ from sphinx_gallery.scrapers import matplotlib_scraper
 SIZE = (480, 360)
 MARGIN = 12  # pixels around the drawing
 SHARPNESS = 250  # dots per inch before it is made smaller
-THICK = 5  # pixels of a curve
+USUAL, THICK = 2, 5  # points that a curve is thick in the scripts, and pixels here
 LAST = (0, (-1,))
 CHOSEN = {
     "plot_02_five_filters": (0, (0, 1, 2, 3)),
@@ -63,12 +63,9 @@ def panel(figure, axes, n, part):
     figure.set_dpi(SHARPNESS)
     cropped = inked(figure, part)
     scale = min(side / length for side, length in zip(room, cropped.size, strict=True))
-    curves = [each for each in axes.collections if isinstance(each, LineCollection)]
-    thickest = max((max(each.get_linewidth()) for each in curves), default=1)
-    for each in curves:
-        each.set_linewidth(
-            np.array(each.get_linewidth()) * THICK * 72 / SHARPNESS / scale / math.sqrt(columns(n)) / thickest
-        )
+    wider = THICK / math.sqrt(columns(n)) / (USUAL * SHARPNESS / 72 * scale)
+    for curve in (each for each in axes.collections if isinstance(each, LineCollection)):
+        curve.set_linewidth(wider * np.array(curve.get_linewidth()))
     cropped = inked(figure, part)
     cropped.thumbnail(room, Image.Resampling.LANCZOS)
     return cropped
