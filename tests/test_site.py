@@ -59,7 +59,7 @@ def visit(launch, site, patience):
 
 def pages(site):
     """Every page that was written by hand, all tasks of the API, the gallery, and where names are longest."""
-    written = [path for path in site.rglob("*.html") if not {"generated", "_static"} & {*path.parts}]
+    written = [path for path in site.rglob("*.html") if not {"generated", "_static"} & {*path.relative_to(site).parts}]
     api = [path for path in site.glob("docs/generated/api/*.html") if not path.stem.startswith("glsk_o3d")]
     long = sorted(site.glob("docs/generated/api/glsk_o3d*.html"), key=lambda path: -len(path.stem))[:8]
     gallery = [site / "docs/generated/gallery" / f"{name}.html" for name in ("index", "plot_03_open3d_pipeline")]
