@@ -26,9 +26,13 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
     "sphinxcontrib.bibtex",
-    "generated",  # these three are in _ext
+    "generated",  # these are in _ext
+    "keywords",
     "mathml",
     "options",
+    "sidebar",
+    "tables",
+    "thumbnails",
 ]
 root_doc = "docs/index"
 include_patterns = ["*.md", "docs/**", "benchmarks/README.md", "filters/README.md"]
@@ -48,6 +52,7 @@ html_math_renderer = "mathml"  # browsers draw MathML themselves: no script, no 
 
 autodoc_typehints = "none"  # the docstrings say more: shapes, dtypes, units
 autodoc_member_order = "bysource"
+maximum_signature_line_length = 72  # longer ones have a parameter a line
 autosummary_generate = False
 numpydoc_show_class_members = False
 bibtex_bibfiles = ["references.bib"]
@@ -63,6 +68,8 @@ sphinx_gallery_conf = dict(
     show_memory=False,
     show_signature=False,
     within_subsection_order="FileNameSortKey",
+    image_scrapers=("thumbnails.scrape",),
+    thumbnail_size=(480, 360),
     write_computation_times=False,
 )
 
@@ -70,8 +77,12 @@ smartquotes = False
 templates_path = ["_templates"]
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
 html_theme = "furo"
+html_use_index = html_domain_indices = False  # the reference goes by task, and words are searched for
+pygments_dark_style = "github-dark"
 html_title = f"glsk-o3d {release}"
+html_search_scorer = str(ROOT / "docs" / "_static" / "scorer.js")
 html_additional_pages = {"index": "index.html"}  # leads to docs/index.html
 html_copy_source = html_show_sourcelink = False
 html_show_sphinx = html_show_copyright = False

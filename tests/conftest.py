@@ -3,6 +3,7 @@
 import importlib
 import math
 import os
+import shutil
 import sys
 from contextlib import contextmanager
 from dataclasses import fields, replace
@@ -87,6 +88,27 @@ def call(tool):
 def patience() -> float:
     """Seconds, where somebody else's function must be told how long to wait: more than any busy machine needs."""
     return 900.0
+
+
+@pytest.fixture(scope="module")
+def launch(patience):
+    """Start a headless Chromium with other flags than the usual ones."""
+    names = (os.environ.get("GLSK_CHROMIUM", ""), "chromium", "chromium-browser", "google-chrome", "chrome")
+    browser = next(filter(None, map(shutil.which, names)), None)
+    if browser is None:
+        pytest.skip("needs Chromium: apt-get install chromium, or set GLSK_CHROMIUM to where it is")
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright, of the extra 'dev'")
+    with playwright.sync_playwright() as driver:
+        running = []
+
+        def start(*flags):
+            flags = ("--no-sandbox", "--disable-background-networking", *flags)  # root may not have a sandbox
+            running.append(driver.chromium.launch(executable_path=browser, args=flags, timeout=1e3 * patience))
+            return running[-1]
+
+        yield start
+        for each in running:
+            each.close()
 
 
 @pytest.fixture(scope="session")

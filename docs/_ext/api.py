@@ -1,43 +1,89 @@
-"""The pages of the API reference, one per public name: from the stubs, the lists ``__all__`` and the modules."""
+"""The pages of the API reference: one per task, one per public name: from the stubs, ``__all__`` and the modules."""
 
 import importlib
 import inspect
 from pathlib import Path
 
 TASKS = {
-    "From a cloud to its skeleton": (
-        *("skeletonize", "Skeleton", "Report", "IterationRecord", "Judgement"),
-        "remove_redundant_points",
-    ),
-    "Filters and stopping rules": (
-        *("RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner"),
-        *("ExplainedScore", "RingSizeRatio"),
-    ),
-    "Pipelines, and what runs in them": ("Pipeline", "Filter", "Cloud", "Contraction", "annotate_contraction"),
-    "Pipelines as files": ("to_recipe", "from_recipe", "save_recipe", "load_recipe", "rerun"),
-    "Reading and writing": (
-        *("read_cloud", "read_tensor_cloud", "read_sample", "read_skeleton", "read_truth"),
-        *("save_skeleton", "save_cylinders", "save_rig", "save_mesh", "save_tensor_cloud", "annotate_file"),
-    ),
-    "Looking": ("plot_skeleton", "save_preview", "save_report", "save_assessment", "ContractionRecorder"),
-    "In MeshLab's way": ("MeshSet",),
-    "Errors and warnings": (
-        *("GlskError", "BatchError", "DisplayError", "FileFormatError", "InvalidCloudError", "InvalidParameterError"),
-        *("MissingPackageError", "RecipeError", "ScriptError", "StageError", "PluginWarning", "SkeletonWarning"),
-    ),
+    "skeletons": ("From a cloud to its skeleton", "glsk_o3d"),
+    "filters": ("Filters and stopping rules", "glsk_o3d"),
+    "pipelines": ("Pipelines", "glsk_o3d"),
+    "named_pipelines": ("Named pipelines", "glsk_o3d.pipelines"),
+    "recipes": ("Pipelines as files", "glsk_o3d"),
+    "io": ("Reading and writing", "glsk_o3d"),
+    "viewing": ("Looking", "glsk_o3d"),
+    "analysis": ("Analysis", "glsk_o3d.analysis"),
+    "editing": ("After the skeleton", "glsk_o3d.editing"),
+    "batch": ("Many clouds", "glsk_o3d.batch"),
+    "crosscheck": ("Cross-check with a mesh", "glsk_o3d.crosscheck"),
+    "samples": ("Sample clouds", "glsk_o3d.samples"),
+    "benchmark_shapes": ("Shapes of the benchmark", "glsk_o3d.benchmark.shapes"),
+    "benchmark_clouds": ("Clouds of the benchmark", "glsk_o3d.benchmark.clouds"),
+    "meshlab": ("In MeshLab's way", "glsk_o3d"),
+    "errors": ("Errors and warnings", "glsk_o3d"),
 }
-"""The names of the package itself, by what they are for."""
-PACKAGES = {
-    "glsk_o3d": "The package",
-    "glsk_o3d.pipelines": "Named pipelines",
-    "glsk_o3d.analysis": "Analysis",
-    "glsk_o3d.editing": "After the skeleton",
-    "glsk_o3d.crosscheck": "Cross-check",
-    "glsk_o3d.batch": "Batches",
-    "glsk_o3d.samples": "Sample clouds",
-    "glsk_o3d.benchmark.shapes": "Shapes of the benchmark",
-    "glsk_o3d.benchmark.clouds": "Clouds of the benchmark",
+"""The pages, in the order of the menu: what they are for, and the package that users import from."""
+NAMES = {
+    "skeletons": {
+        "One call": ("skeletonize", "Skeleton"),
+        "What it says about itself": ("Report", "IterationRecord", "Judgement"),
+        "Fewer points, without a skeleton": ("remove_redundant_points",),
+    },
+    "filters": {
+        "The five filters": ("RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner"),
+        "When to stop": ("ExplainedScore", "RingSizeRatio"),
+    },
+    "pipelines": {
+        "Joining filters": ("Pipeline", "Filter"),
+        "What runs through them": ("Cloud", "Contraction", "annotate_contraction"),
+    },
+    "named_pipelines": {"To work with": ("default", "tree"), "As they were published": ("wen2024", "cao2010")},
+    "recipes": {
+        "Writing and reading": ("save_recipe", "load_recipe", "to_recipe", "from_recipe"),
+        "The same result again": ("rerun",),
+    },
+    "io": {
+        "Clouds": ("read_cloud", "read_tensor_cloud", "read_sample", "save_tensor_cloud", "annotate_file"),
+        "Skeletons": ("read_skeleton", "save_skeleton", "read_truth"),
+        "For other programs": ("save_cylinders", "save_rig", "save_mesh"),
+    },
+    "viewing": {
+        "Pictures and pages": ("plot_skeleton", "save_preview", "save_report", "save_assessment"),
+        "What happened on the way": ("ContractionRecorder",),
+    },
+    "analysis": {
+        "Branches": ("branch_table", "BranchTable", "segment", "curvature_torsion", "Loop"),
+        "Trees": ("tree_measures", "TreeMeasures", "cylinders", "Cylinders"),
+        "Grasps": ("grasp_candidates", "GraspCandidates", "Gripper"),
+        "How good is it?": ("assess", "Assessment", "LoopWidth", "thickness"),
+        "How far is it from a known axis?": ("compare", "Comparison", "Truth"),
+    },
+    "editing": {
+        "Leave out": ("prune", "largest_component", "cut_loops"),
+        "Fewer vertices, smoother curves": ("simplify", "smooth"),
+        "Another root": ("reroot",),
+    },
+    "batch": {"Running": ("run_batch", "BatchResult"), "Looking before": ("plan_batch", "Plan", "Task")},
+    "crosscheck": {"The check": ("cross_check", "CrossCheck"), "Its picture": ("save_crosscheck_picture",)},
+    "samples": {
+        "By name, and what they hold": ("sample_object", "Sample"),
+        "With limbs": ("sauropod", "tree", "y_junction"),
+        "Tubes and rings": ("tube", "helix", "torus", "two_rings"),
+        "Without an axis": ("sphere", "sheet"),
+        "Distances": ("signed_distance",),
+    },
+    "benchmark_shapes": {"Drawing one": ("shape", "Shape")},
+    "benchmark_clouds": {"Drawing one": ("cloud",), "How much it shows": ("coverage",)},
+    "meshlab": {"A session": ("MeshSet",)},
+    "errors": {
+        "All errors": ("GlskError",),
+        "Wrong input": ("InvalidCloudError", "InvalidParameterError", "FileFormatError", "RecipeError", "ScriptError"),
+        "What went wrong later": ("StageError", "BatchError", "DisplayError", "MissingPackageError"),
+        "Warnings": ("SkeletonWarning", "PluginWarning"),
+    },
 }
+"""The names on each page, by what they are for."""
+PACKAGES = tuple(dict.fromkeys(module for _, module in TASKS.values()))
 """What users import from."""
 MODULES = {
     "glsk_o3d.io.annotation": "Attributes on clouds",
@@ -56,7 +102,7 @@ MODULES = {
 
 
 def names(module):
-    """The public functions and classes of a module: those in ``__all__``, or else all that it defines.
+    """The public functions and classes of a module: those that have a task, or else all that it defines.
 
     Parameters
     ----------
@@ -66,38 +112,87 @@ def names(module):
     -------
     list of str
     """
-    if module == "glsk_o3d":
-        return [name for told in TASKS.values() for name in told]
+    if module in PACKAGES:
+        pages = [page for page, (_, package) in TASKS.items() if package == module]
+        return [name for page in pages for told in NAMES[page].values() for name in told]
+    return found(module)
+
+
+def found(module):
+    """The names in ``__all__``, or else those of all that the module defines, in its order."""
     loaded = importlib.import_module(module)
     own = [name for name, thing in vars(loaded).items() if getattr(thing, "__module__", None) == module]
-    found = getattr(loaded, "__all__", [name for name in own if not name.startswith("_")])
-    return sorted((name for name in found if callable(getattr(loaded, name))), key=str.lower)
+    public = getattr(loaded, "__all__", [name for name in own if not name.startswith("_")])
+    return [name for name in public if callable(getattr(loaded, name))]
+
+
+def heading(title, line):
+    return (title, line * len(title), "")
 
 
 def listed(module, names):
-    """Lines of a list of names with the first sentence of each, and for the menu."""
-    yield from (f".. currentmodule:: {module}", "", ".. autosummary::", "", *(f"   {name}" for name in names), "")
-    yield from (".. toctree::", "   :hidden:", "", *(f"   {module}.{name}" for name in names), "")
+    """Lines of a list of names with the first sentence of each."""
+    yield from (f".. currentmodule:: {module}", "", ".. autosummary::", "   :nosignatures:", "")
+    yield from (*(f"   {name}" for name in names), "")
+
+
+def menu(pages):
+    """Lines of a list of pages that only the menu shows."""
+    yield from (".. toctree::", "   :hidden:", "", *(f"   {page}" for page in pages), "")
+
+
+def task_pages():
+    """A page per task, and one for what the package's own parts import."""
+    for page, (title, module) in TASKS.items():
+        lines = [*heading(title, "="), *((f".. automodule:: {module}", "") if module != "glsk_o3d" else ())]
+        for task, told in NAMES[page].items():
+            lines += [*heading(task, "-"), *listed(module, told)]
+        yield page, [*lines, *menu(f"{module}.{name}" for told in NAMES[page].values() for name in told)]
+    lines = [*heading("For those who extend it", "="), "What the package's own parts use, and plugins may.", ""]
+    for module, title in MODULES.items():
+        lines += [*heading(title, "-"), f".. automodule:: {module}", "", *listed(module, own(module))]
+    yield "extending", [*lines, *menu(f"{module}.{name}" for module in MODULES for name in own(module))]
+
+
+def own(module):
+    """The names of a module that users do not import from anywhere else, nor from a module before it."""
+    order = [*PACKAGES, *MODULES]
+    before = [getattr(importlib.import_module(m), name) for m in order[: order.index(module)] for name in names(m)]
+    loaded = importlib.import_module(module)
+    return [name for name in names(module) if not any(getattr(loaded, name) is other for other in before)]
+
+
+def name_pages():
+    """A page per name."""
+    for module in (*PACKAGES, *MODULES):
+        for name in own(module):
+            kind = "class" if inspect.isclass(getattr(importlib.import_module(module), name)) else "function"
+            members = ("   :members:", "   :show-inheritance:") if kind == "class" else ()
+            lines = (*heading(name, "="), f".. currentmodule:: {module}", f".. auto{kind}:: {module}.{name}", *members)
+            yield f"{module}.{name}", [*lines, ""]
+
+
+def overview():
+    """The first page: everything, by task."""
+    lines = [
+        *heading("API reference", "="),
+        "Every public name, by what it is for.",
+        "",
+        ".. automodule:: glsk_o3d",
+        "",
+    ]
+    for page, (title, module) in TASKS.items():
+        link = f":doc:`{title} <{page}>`"
+        lines += [*heading(link, "-"), f"``{module}``", ""]
+        lines += listed(module, [name for told in NAMES[page].values() for name in told])
+    lines += [*heading(":doc:`For those who extend it <extending>`", "-")]
+    lines += [*(f"- ``{module}``: {title.lower()}" for module, title in MODULES.items()), ""]
+    return [*lines, *menu([*TASKS, "extending"])]
 
 
 def write(folder: Path) -> None:
-    """Write ``api/index.rst`` and a page per name."""
-    pages, done = {}, {}
-    index = ["API reference", "=============", "", "Every public name, from its docstring.", ""]
-    for module, title in {**PACKAGES, **MODULES}.items():
-        loaded = importlib.import_module(module)
-        new = [name for name in names(module) if done.setdefault(id(getattr(loaded, name)), module) == module]
-        index += [title, "-" * len(title), "", f".. automodule:: {module}", ""]
-        if module == "glsk_o3d":
-            for task, told in TASKS.items():
-                index += [task, "^" * len(task), "", *listed(module, told)]
-        else:
-            index += listed(module, new)
-        for name in new:
-            full, kind = f"{module}.{name}", "class" if inspect.isclass(getattr(loaded, name)) else "function"
-            members = "   :members:\n   :show-inheritance:\n" if kind == "class" else ""
-            pages[full] = f"{name}\n{'=' * len(name)}\n\n.. currentmodule:: {module}\n.. auto{kind}:: {full}\n{members}"
-    pages["index"] = "\n".join(index)
+    """Write ``api/index.rst``, a page per task and a page per name."""
+    pages = {page: "\n".join(lines) for page, lines in [("index", overview()), *task_pages(), *name_pages()]}
     folder = folder / "api"
     folder.mkdir(parents=True, exist_ok=True)
     for old in set(folder.glob("*.rst")) - {folder / f"{name}.rst" for name in pages}:

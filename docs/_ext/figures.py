@@ -21,6 +21,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 import glsk_o3d as glsk
 from glsk_o3d import pipelines, samples
+from glsk_o3d.analysis import Gripper, grasp_candidates
 from glsk_o3d.analysis.segmentation import branch_of_edge
 from glsk_o3d.io.colors import shades
 from glsk_o3d.numerics.cycles import inscribed_circle, minimum_cycle_basis
@@ -29,6 +30,7 @@ from glsk_o3d.refinement.triangles import collapse_triangles
 
 INK, RED, GREY, BLUE, ORANGE = "#333333", "#d0121f", "#b4b4b4", "#1f5fa8", "#e07b00"
 SIDE = 3.2  # inches of a panel
+CARD = (4.0, 3.0)  # inches of a picture on the first page
 
 # ------------------------------------------------------------------------------------------------------------ drawing
 
@@ -104,25 +106,74 @@ def showcase():
     left = 0.1
     for name, wide, points, angles in objects:
         skeleton = skeletonised(points)
-        cloud, vertices = view(points, **angles), view(skeleton.vertices, **angles)
-        box = np.array([wide, height - foot])
-        low, high = np.percentile(cloud[:, :2], [0.8, 99.2], axis=0)  # a few points may stand out
-        low, high = np.minimum(low, vertices[:, :2].min(axis=0)), np.maximum(high, vertices[:, :2].max(axis=0))
-        room = (0.94 * box / (high - low)).min()
-        limits = (low + high) / 2 + np.array([[-0.5], [0.5]]) * box / room
         axes = figure.add_axes([left / total, foot / height, wide / total, 1 - foot / height])
-        axes.set(xlim=limits[:, 0], ylim=limits[:, 1])
-        axes.set_axis_off()
-        order = np.argsort(cloud[:, 2])
-        greys = np.linspace(0.88, 0.55, len(order))  # the far ones lighter
-        axes.scatter(*cloud[order, :2].T, s=1.8, c=greys, cmap="gray", vmin=0, vmax=1, linewidths=0, clip_on=False)
-        colors = shades(skeleton, "branch", branch_of_edge(skeleton), skeleton.edges)
-        for edge in np.argsort(vertices[skeleton.edges, 2].mean(axis=1)):  # what is in front crosses what is behind
-            across, up = vertices[skeleton.edges[edge], :2].T
-            axes.plot(across, up, color="white", linewidth=4.2, solid_capstyle="butt")
-            axes.plot(across, up, color=colors[edge], linewidth=2.5, solid_capstyle="round")
+        portrait(axes, skeleton, points, np.array([wide, height - foot]), **angles)
         figure.text((left + wide / 2) / total, 0.12 / height, name, ha="center", fontsize=12.5, color=INK)
         left += wide + 0.2
+    return figure
+
+
+def portrait(axes, skeleton, points, box, colors=None, width=2.5, beside=(), **angles):
+    """A cloud and its skeleton in a box of so many inches, with room for what is beside; points are grey, or not."""
+    cloud, vertices = view(points, **angles), view(skeleton.vertices, **angles)
+    low, high = np.percentile(cloud[:, :2], [0.8, 99.2], axis=0)  # a few points may stand out
+    also = np.concatenate([vertices[:, :2], *(view(ends, **angles)[:, :2] for ends in beside)])
+    low, high = np.minimum(low, also.min(axis=0)), np.maximum(high, also.max(axis=0))
+    room = (0.94 * box / (high - low)).min()
+    limits = (low + high) / 2 + np.array([[-0.5], [0.5]]) * box / room
+    axes.set(xlim=limits[:, 0], ylim=limits[:, 1])
+    axes.set_axis_off()
+    order = np.argsort(cloud[:, 2])
+    greys = np.linspace(0.88, 0.55, len(order))  # the far ones lighter
+    shown = dict(c=greys, cmap="gray", vmin=0, vmax=1) if colors is None else dict(c=colors[order])
+    axes.scatter(*cloud[order, :2].T, s=1.8, linewidths=0, clip_on=False, **shown)
+    branches = shades(skeleton, "branch", branch_of_edge(skeleton), skeleton.edges)
+    for edge in np.argsort(vertices[skeleton.edges, 2].mean(axis=1)):  # what is in front crosses what is behind
+        across, up = vertices[skeleton.edges[edge], :2].T
+        axes.plot(across, up, color="white", linewidth=width + 1.7, solid_capstyle="butt")
+        axes.plot(
+            across, up, color=INK if colors is not None else branches[edge], linewidth=width, solid_capstyle="round"
+        )
+
+
+def card():
+    """A figure of the size of the three on the first page, and its axes."""
+    figure = Figure(CARD, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure, figure.add_axes([0, 0, 1, 1])
+
+
+def card_robots():
+    """The best grasp of each of four limbs, from above."""
+    scan = samples.sample_object(6000).points
+    skeleton = skeletonised(scan)
+    grasps = grasp_candidates(skeleton, Gripper(0.25), cone=((0, 0, -1), 60), around=16)
+    first = np.sort(np.unique(grasps.branch, return_index=True)[1])[:4]
+    lines = grasps[first].to_line_set()
+    figure, axes = card()
+    angles = dict(azimuth=-62, elevation=16)
+    ends = np.asarray(lines.points)
+    portrait(axes, skeleton, scan, np.array(CARD), beside=[ends], **angles)
+    forks = view(ends, **angles)[np.asarray(lines.lines), :2]
+    axes.add_collection(LineCollection(forks, colors=INK, linewidths=3, capstyle="round", zorder=5))
+    return figure
+
+
+def card_trees():
+    cloud = samples.tree(16000, forks=4, length=1.0, radius=0.09, seed=4).points
+    skeleton = skeletonised(cloud, pipelines.tree(root="z"))
+    colors = shades(skeleton, "order", skeleton.segment(cloud), skeleton.vertex_of_point)
+    figure, axes = card()
+    portrait(axes, skeleton, cloud, np.array(CARD), colors, 1.2, azimuth=-60, elevation=8)
+    return figure
+
+
+def card_shapes():
+    scan = samples.sample_object(12000).points
+    skeleton = skeletonised(scan)
+    colors = shades(skeleton, "branch", skeleton.segment(scan), skeleton.vertex_of_point)
+    figure, axes = card()
+    portrait(axes, skeleton, scan, np.array(CARD), colors, 1.2, [scan], azimuth=-62, elevation=16)
     return figure
 
 
@@ -420,7 +471,8 @@ def limits():
 
 
 FIGURES = (
-    *(showcase, ring_builder, contractor, lpr_reducer, connector, refiner, stopping),
+    *(showcase, card_robots, card_trees, card_shapes),
+    *(ring_builder, contractor, lpr_reducer, connector, refiner, stopping),
     *(hull, contraction, reduction, mass, centring, loop_test, limits),
 )
 
@@ -430,7 +482,7 @@ def write(folder: Path) -> None:
     architecture.write(folder)
     for draw in FIGURES:
         drawn = io.BytesIO()
-        draw().savefig(drawn, dpi=150, bbox_inches=None if draw is showcase else "tight")
+        draw().savefig(drawn, dpi=150, bbox_inches=None if draw in FIGURES[:4] else "tight")
         picture = Image.open(drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE)
         picture.save(folder / f"{draw.__name__}.png", optimize=True)
 

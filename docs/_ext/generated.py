@@ -22,7 +22,15 @@ def link(app, what, name, thing, options, lines):
     lines[:] = [re.sub(r"docs/filters/(\w+)\.md", r":doc:`/docs/filters/\1`", line) for line in lines]
 
 
+def lead_to_pages(app, docname, source):
+    """On GitHub a link into the gallery opens a script; here it leads to the page with its pictures."""
+    here = "../" * docname.count("/") + "docs/generated/gallery/"
+    told = source[0].replace("](gallery/README.rst)", f"]({here}index.rst)")
+    source[0] = re.sub(r"\]\(gallery/(plot_\w+)\.py\)", rf"]({here}\1.rst)", told)
+
+
 def setup(app):
+    app.connect("source-read", lead_to_pages)
     app.connect("autodoc-process-docstring", link)
     app.connect("missing-reference", plain)
     app.connect("config-inited", write)

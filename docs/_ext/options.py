@@ -4,6 +4,7 @@ import dataclasses
 
 from docutils import nodes
 from docutils.parsers.rst import Directive
+from sphinx.addnodes import index
 
 from glsk_o3d import pipelines
 from glsk_o3d.cli.filters import limits
@@ -54,7 +55,9 @@ class Options(Directive):
         shown = nodes.definition_list(classes=["options"])
         for field in fields:
             facts, default = field.metadata, [f"default {plain(field.default)}"]
-            term = nodes.term("", "", nodes.literal(text=field.name), nodes.Text("  "))
+            place = f"{cls.__name__}.{field.name}"
+            entry = index(entries=[("single", field.name, place, "main", None)])  # whom the search leads here
+            term = nodes.term("", "", entry, nodes.literal(text=field.name), nodes.Text("  "))
             words = "; ".join([kind(facts), *default, *published(cls, field.name, field.default)])
             term += nodes.inline(text=words, classes=["kind"])
             text, _ = self.state.inline_text(facts["doc"], self.lineno)
@@ -64,7 +67,7 @@ class Options(Directive):
                 "",
                 term,
                 nodes.definition("", nodes.paragraph("", "", *text), told),
-                ids=[f"{cls.__name__}.{field.name}"],
+                ids=[place],
             )
         return [shown]
 

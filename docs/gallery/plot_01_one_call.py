@@ -1,6 +1,6 @@
 """
-One call
-========
+A skeleton in one call
+======================
 
 A cloud in, a curve skeleton out. The cloud is a toy dinosaur with a handle on its back, scanned by two cameras: belly
 and parts of the legs are missing.

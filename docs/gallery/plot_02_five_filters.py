@@ -1,5 +1,5 @@
 """
-The five filters by hand
+What the five filters do
 ========================
 
 The one call is a pipeline of filters. Here each runs by itself, so that you can look at what lies between.
@@ -47,11 +47,18 @@ plt.show()
 
 once = glsk.Contractor(max_iterations=1)(rings)
 reduced = glsk.LPRReducer()(once)
-print(f"{len(once)} points before, {len(reduced)} after one pass; together they speak for {reduced.mass.sum():.0f}")
+print(
+    f"{len(once)} points before, {len(reduced)} after one pass; together they speak for {reduced.mass.sum():.0f}"
+)
 
 # %%
 # Joined with ``|`` the filters are the recommended pipeline, and give the same to the last bit.
 
-pipeline = glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector() | glsk.Refiner()
+pipeline = (
+    glsk.RingBuilder()
+    | glsk.Contractor(reducer=glsk.LPRReducer())
+    | glsk.Connector()
+    | glsk.Refiner()
+)
 assert pipeline == glsk.pipelines.default()
 assert np.array_equal(pipeline(cloud).vertices, skeleton.vertices)

@@ -1,6 +1,6 @@
 """
-Dropped into an Open3D pipeline
-===============================
+Two objects on a table, with Open3D
+===================================
 
 A scene with two objects on a table: Open3D thins, cleans, finds the table and the clusters; we make one skeleton per
 object and give it back as what Open3D works with.
@@ -18,7 +18,9 @@ from glsk_o3d import samples
 # The scene: a Y, a torus, the table, and outliers.
 
 rng = np.random.default_rng(0)
-table = np.column_stack([rng.uniform([-0.7, -0.6], [1.9, 0.6], (6000, 2)), rng.normal(scale=0.002, size=6000)])
+table = np.column_stack(
+    [rng.uniform([-0.7, -0.6], [1.9, 0.6], (6000, 2)), rng.normal(scale=0.002, size=6000)]
+)
 scene = o3d.geometry.PointCloud()
 scene.points = o3d.utility.Vector3dVector(
     np.concatenate(
@@ -40,7 +42,9 @@ plane, on_table = scene.segment_plane(distance_threshold=0.02, ransac_n=3, num_i
 objects = scene.select_by_index(on_table, invert=True)
 objects, _ = objects.remove_statistical_outlier(nb_neighbors=16, std_ratio=3.0)
 labels = np.asarray(objects.cluster_dbscan(eps=0.06, min_points=8))
-clusters = [objects.select_by_index(np.flatnonzero(labels == label)) for label in range(labels.max() + 1)]
+clusters = [
+    objects.select_by_index(np.flatnonzero(labels == label)) for label in range(labels.max() + 1)
+]
 clusters = [cluster for cluster in clusters if len(cluster.points) > 300]
 print(f"table {plane.round(2)}, {len(clusters)} objects")
 
@@ -65,5 +69,7 @@ glsk.plot_skeleton(None, right, cloud=objects).set_title("objects and skeletons"
 for skeleton in skeletons:
     lines = skeleton.to_line_set(color="branch")
     ends, colours = np.asarray(lines.points)[np.asarray(lines.lines)], np.asarray(lines.colors)
-    right.add_collection(Line3DCollection(ends, colors=colours, linewidths=2, zorder=2, clip_on=False))
+    right.add_collection(
+        Line3DCollection(ends, colors=colours, linewidths=2, zorder=2, clip_on=False)
+    )
 plt.show()

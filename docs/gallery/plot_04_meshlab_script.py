@@ -1,6 +1,6 @@
 """
-A MeshLab script
-================
+A MeshLab filter script
+=======================
 
 Filter scripts (``.mlx``) may mix MeshLab's filters with ours. This one removes duplicates and outliers with MeshLab's,
 then makes the skeleton with ours. It needs the extra ``meshlab``.
@@ -34,7 +34,9 @@ SCRIPT = """\
 
 rng = np.random.default_rng(1)
 spring = helix(6000).points
-scan = np.concatenate([spring, spring[:400], rng.uniform(spring.min(axis=0), spring.max(axis=0), (80, 3))])
+scan = np.concatenate(
+    [spring, spring[:400], rng.uniform(spring.min(axis=0), spring.max(axis=0), (80, 3))]
+)
 
 # %%
 # Script and session are MeshLab's own; everything is checked before anything runs. On the command line the same is

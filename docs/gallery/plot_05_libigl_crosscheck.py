@@ -1,6 +1,6 @@
 """
-Cross-check with libigl
-=======================
+Is the cloud good enough? A mesh says
+=====================================
 
 Everything starts with the rings. On a mesh they are known: so reconstruct one, let libigl compute the same Laplacian on
 it, and see where the two disagree. No truth is needed.

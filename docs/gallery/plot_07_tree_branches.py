@@ -1,5 +1,5 @@
 """
-A tree and its branches
+Every branch in numbers
 =======================
 
 Length, thickness, angle and order of every branch: what one measures on plants, vessels and cave systems.
@@ -40,12 +40,17 @@ parts = []
 for number, (start, end) in enumerate(edges):
     way = nodes[end] - nodes[start]
     length = np.linalg.norm(way)
-    points = samples.tube(int(25_000 * length * radii[end]), length=length, radius=radii[end], seed=number).points
+    points = samples.tube(
+        int(25_000 * length * radii[end]), length=length, radius=radii[end], seed=number
+    ).points
     frame = np.linalg.svd(way[None])[2]  # its rows: along the branch, and two directions across
     parts.append((nodes[start] + nodes[end]) / 2 + points @ frame)
 cloud = np.concatenate(parts)
 for (start, end), radius in zip(edges, radii[1:], strict=True):
-    cloud = cloud[samples.signed_distance(cloud, nodes[[start, end]], np.array([[0, 1]]), np.full(2, radius)) > -1e-9]
+    cloud = cloud[
+        samples.signed_distance(cloud, nodes[[start, end]], np.array([[0, 1]]), np.full(2, radius))
+        > -1e-9
+    ]
 print(f"{len(cloud)} points")
 
 # %%
@@ -69,6 +74,8 @@ for order in range(table.level.max() + 1):
 
 figure = plt.figure(figsize=(10, 6), layout="constrained")
 left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))
-glsk.plot_skeleton(skeleton, left, color="branch", view=(10, -50)).set_title(f"{len(table)} branches")
+glsk.plot_skeleton(skeleton, left, color="branch", view=(10, -50)).set_title(
+    f"{len(table)} branches"
+)
 glsk.plot_skeleton(skeleton, right, color="radius", view=(10, -50)).set_title("radius")
 plt.show()

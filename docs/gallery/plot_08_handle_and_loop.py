@@ -1,6 +1,6 @@
 """
-A handle and its loop
-=====================
+Which loops are handles
+=======================
 
 A loop in a skeleton is real only if something can pass through it: no disc that spans it stays inside the object. This
 is how false loops are told from handles.
@@ -21,7 +21,11 @@ graph = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.
 
 published = glsk.Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(graph)
 skeleton = glsk.Refiner()(graph)
-for name, each in (("raw graph", graph), ("without triangles", published), ("recommended", skeleton)):
+for name, each in (
+    ("raw graph", graph),
+    ("without triangles", published),
+    ("recommended", skeleton),
+):
     print(f"{name:17} {each.n_loops:4} loops")
 
 # %%
@@ -36,7 +40,9 @@ for it in skeleton.report.judgements:
 # a handle.
 
 (loop,) = skeleton.loops
-print(f"{len(loop.vertices)} vertices, opening {loop.opening:.3f}, a handle with probability {loop.probability:.2f}")
+print(
+    f"{len(loop.vertices)} vertices, opening {loop.opening:.3f}, a handle with probability {loop.probability:.2f}"
+)
 
 # %%
 # The loop is the handle: its two feet meet in the trunk.
@@ -44,9 +50,17 @@ print(f"{len(loop.vertices)} vertices, opening {loop.opening:.3f}, a handle with
 figure = plt.figure(figsize=(12, 3), layout="constrained")
 left, middle, right = (figure.add_subplot(1, 3, place, projection="3d") for place in (1, 2, 3))
 glsk.plot_skeleton(graph, left, line_width=1).set_title(f"raw graph: {graph.n_loops} loops")
-glsk.plot_skeleton(published, middle, line_width=1.5).set_title(f"without triangles: {published.n_loops}")
-glsk.plot_skeleton(skeleton, right, color=(0.6, 0.6, 0.6)).set_title(f"recommended: {skeleton.n_loops}")
+glsk.plot_skeleton(published, middle, line_width=1.5).set_title(
+    f"without triangles: {published.n_loops}"
+)
+glsk.plot_skeleton(skeleton, right, color=(0.6, 0.6, 0.6)).set_title(
+    f"recommended: {skeleton.n_loops}"
+)
 right.plot(
-    *skeleton.vertices[[*loop.vertices, loop.vertices[0]]].T, color="crimson", linewidth=3, zorder=3, clip_on=False
+    *skeleton.vertices[[*loop.vertices, loop.vertices[0]]].T,
+    color="crimson",
+    linewidth=3,
+    zorder=3,
+    clip_on=False,
 )
 plt.show()

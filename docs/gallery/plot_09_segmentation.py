@@ -1,6 +1,6 @@
 """
-Segmentation
-============
+A cloud cut into its limbs
+==========================
 
 Every point belongs to a vertex, every vertex to a branch: so a skeleton divides its cloud into parts.
 """
@@ -22,7 +22,9 @@ skeleton = glsk.skeletonize(thinned)
 label = skeleton.segment(scan)
 table = skeleton.branch_table()
 for row in np.argsort(-table.points)[:5]:
-    print(f"branch {row}: {table.kind[row]}, {(label == row).sum()} points, radius {table.mean_radius[row]:.3f}")
+    print(
+        f"branch {row}: {table.kind[row]}, {(label == row).sum()} points, radius {table.mean_radius[row]:.3f}"
+    )
 
 # %%
 # The colours of the parts are those of the branches. Around a junction a point goes to the branch whose curve is

@@ -1,5 +1,5 @@
 """
-Animating the contraction
+A film of the contraction
 =========================
 
 Watch a cloud contract onto its skeleton, solve by solve.
@@ -53,7 +53,9 @@ class Film(bytes):
 
 axes = glsk.plot_skeleton(None, cloud=recorder.positions[0])
 dots = axes.collections[0]
-steps = [solve + part for solve in range(solves) for part in (0, 0, 0, 0, 0.2, 0.4, 0.6, 0.8)] + [solves] * 8
+steps = [solve + part for solve in range(solves) for part in (0, 0, 0, 0, 0.2, 0.4, 0.6, 0.8)] + [
+    solves
+] * 8
 
 
 def draw(step):
@@ -64,7 +66,9 @@ def draw(step):
 
 
 with TemporaryDirectory() as folder:
-    FuncAnimation(axes.figure, draw, frames=steps).save(Path(folder, "film.gif"), writer="pillow", fps=10, dpi=70)
+    FuncAnimation(axes.figure, draw, frames=steps).save(
+        Path(folder, "film.gif"), writer="pillow", fps=10, dpi=70
+    )
     film = Film(Path(folder, "film.gif").read_bytes())
 plt.close(axes.figure)
 film

@@ -1,6 +1,6 @@
 """
-Baseline, paper, ours
-=====================
+Three pipelines side by side
+============================
 
 Three named pipelines on the same clouds, in the spirit of figure 7 of Wen et al. (2024): the baseline of Cao et al.
 (2010), GLSkeleton as published, and what we recommend.

@@ -1,8 +1,8 @@
 """
-Noise of 5, 10 and 20 %
-=======================
+Three pipelines in growing noise
+================================
 
-The same pipelines under growing noise, in the spirit of figure 8 of Wen et al. (2024).
+The pipelines of the page before under noise of 5, 10 and 20 %, in the spirit of figure 8 of Wen et al. (2024).
 
 A percentage means nothing without what it is of. Here it is the standard deviation of the noise on every coordinate
 over the median radius of the object's parts: at 20 % points stray by a fifth of a leg's radius. Elsewhere in this
@@ -32,10 +32,8 @@ for row, pipeline in enumerate(("cao2010", "wen2024", "default")):
         found = compare(skeleton, truth)
         axes = figure.add_subplot(3, 4, 4 * row + column + 1, projection="3d")
         glsk.plot_skeleton(skeleton, axes, line_width=1.5)
-        title = (
-            f"{pipeline}, {level:.0%}\nerror {found.error:.2f}, loops {skeleton.n_loops}, ends {len(skeleton.leaves)}"
-        )
-        axes.set_title(title, fontsize=9)
+        counts = f"loops {skeleton.n_loops}, ends {len(skeleton.leaves)}"
+        axes.set_title(f"{pipeline}, {level:.0%}\nerror {found.error:.2f}, {counts}", fontsize=9)
 plt.show()
 
 # %%

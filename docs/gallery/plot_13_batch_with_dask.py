@@ -1,6 +1,6 @@
 """
-A batch with Dask
-=================
+Many scans at once, with Dask
+=============================
 
 Many scans, a cluster, a ledger: what is done is not done again, and one bad file does not stop the others. It needs the
 extra ``cluster``.
@@ -24,7 +24,9 @@ folder = TemporaryDirectory()
 scans, results = Path(folder.name, "scans"), Path(folder.name, "skeletons")
 scans.mkdir()
 for name in ("sauropod", "tube", "torus", "helix", "y_junction", "two_rings"):
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(SAMPLES[name](n=3000, noise=0.002, seed=1).points))
+    cloud = o3d.geometry.PointCloud(
+        o3d.utility.Vector3dVector(SAMPLES[name](n=3000, noise=0.002, seed=1).points)
+    )
     o3d.io.write_point_cloud(str(scans / f"{name}.ply"), cloud)
 (scans / "broken.ply").write_text("this is no cloud")
 
@@ -47,7 +49,11 @@ for run in (first, again):
 # The ledger has a row for each, also for what failed.
 
 for name, row in first.rows.items():
-    facts = row["error"] if row["status"] == "failed" else f"{row['vertices']} vertices, {row['loops']} loops"
+    facts = (
+        row["error"]
+        if row["status"] == "failed"
+        else f"{row['vertices']} vertices, {row['loops']} loops"
+    )
     print(f"{name:10} {row['status']:6} {row['seconds']:6.2f} s  {facts}")
 
 # %%
@@ -57,6 +63,8 @@ figure = plt.figure(figsize=(10, 6.5), layout="constrained")
 done = [row for row in first.rows.values() if row["status"] == "done"]
 for place, row in enumerate(done, start=1):
     axes = figure.add_subplot(2, 3, place, projection="3d")
-    glsk.plot_skeleton(glsk.read_skeleton(results / row["outputs"][0]), axes, color="branch").set_title(row["name"])
+    glsk.plot_skeleton(
+        glsk.read_skeleton(results / row["outputs"][0]), axes, color="branch"
+    ).set_title(row["name"])
 plt.show()
 folder.cleanup()

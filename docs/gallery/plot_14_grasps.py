@@ -1,6 +1,6 @@
 """
-A mug on a table: from depth images to grasps
-=============================================
+Where a gripper takes a mug
+===========================
 
 What a robot does with two depth images: find the table and the mug on it, the mug's skeleton, and where its gripper can
 take the mug without touching anything else.
@@ -21,14 +21,27 @@ from glsk_o3d.analysis import Gripper, grasp_candidates
 def turned(outline, angle, axis):
     """The surface that an outline sweeps about an axis."""
     row = np.arange(len(outline) - 1)
-    lines = o3d.t.geometry.LineSet(np.float32(outline), np.column_stack([row, row + 1]).astype(np.int32))
+    lines = o3d.t.geometry.LineSet(
+        np.float32(outline), np.column_stack([row, row + 1]).astype(np.int32)
+    )
     return lines.extrude_rotation(angle, axis, resolution=64)
 
 
 ring = np.linspace(0, 2 * np.pi, 25)
-wall = [[0, 0, 0], [0.04, 0, 0], [0.04, 0, 0.095], [0.036, 0, 0.095], [0.036, 0, 0.006], [0, 0, 0.006]]  # in metres
+wall = [
+    [0, 0, 0],
+    [0.04, 0, 0],
+    [0.04, 0, 0.095],
+    [0.036, 0, 0.095],
+    [0.036, 0, 0.006],
+    [0, 0, 0.006],
+]  # in metres
 mug = turned(wall, 360, [0, 0, 1])
-handle = turned(np.stack([0 * ring, 0.006 * np.sin(ring), -0.033 - 0.006 * np.cos(ring)], axis=1), -180, [0, 1, 0])
+handle = turned(
+    np.stack([0 * ring, 0.006 * np.sin(ring), -0.033 - 0.006 * np.cos(ring)], axis=1),
+    -180,
+    [0, 1, 0],
+)
 handle.translate([0.036, 0, 0.048])
 table = o3d.t.geometry.TriangleMesh.create_box(0.6, 0.6, 0.02).translate([-0.3, -0.3, -0.02])
 
@@ -82,7 +95,9 @@ for column, (grasps, color) in enumerate(((blind[:15], "#c0504d"), (safe[:15], "
     glsk.plot_skeleton(skeleton, axes, cloud=around, view=(40, -75))
     lines = grasps.to_line_set()
     ends = np.asarray(lines.points)[np.asarray(lines.lines)]
-    axes.add_collection(Line3DCollection(ends, colors=color, linewidths=1.2, zorder=3, clip_on=False))
+    axes.add_collection(
+        Line3DCollection(ends, colors=color, linewidths=1.2, zorder=3, clip_on=False)
+    )
 plt.show()
 
 # %%

@@ -1,6 +1,6 @@
 """
-A sparse tree
-=============
+A tree from sparse points
+=========================
 
 A trunk that a scanner saw as a surface, and twigs that it saw as rows of points: one tree, and what foresters read.
 """
@@ -22,11 +22,17 @@ print(f"{len(cloud)} points, {2**6} tips")
 # ``default`` and ``tree`` trace the twigs along shortest paths; without that they are drawn together.
 
 with warnings.catch_warnings():
-    warnings.simplefilter("ignore", glsk.SkeletonWarning)  # it says that the crown is weakly supported
+    warnings.simplefilter(
+        "ignore", glsk.SkeletonWarning
+    )  # it says that the crown is weakly supported
     before = glsk.pipelines.default().with_options({"Refiner.surface": 0})(cloud)
 tree = glsk.pipelines.tree()(cloud)
 print(before)
-print(tree, f"{tree.report.n_traced} points traced, {len(tree.report.joined)} gaps joined", sep=chr(10))
+print(
+    tree,
+    f"{tree.report.n_traced} points traced, {len(tree.report.joined)} gaps joined",
+    sep=chr(10),
+)
 
 # %%
 # What foresters read. The radius of a traced twig is the scatter of its points: it knows no better.
@@ -40,5 +46,7 @@ for order, volume in enumerate(measures.volume):
 figure = plt.figure(figsize=(10, 6), layout="constrained")
 left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))
 glsk.plot_skeleton(before, left, color="confidence", view=(10, -50)).set_title("not traced")
-glsk.plot_skeleton(tree, right, color="confidence", view=(10, -50)).set_title("tree: colour is confidence")
+glsk.plot_skeleton(tree, right, color="confidence", view=(10, -50)).set_title(
+    "tree: colour is confidence"
+)
 plt.show()

@@ -1,6 +1,6 @@
 """
-A plant and its leaves
-======================
+Stem and leaves of a plant
+==========================
 
 Where leaves leave the stem, at which angle, how long they are: a young maize plant, as phenotyping measures it.
 """
@@ -30,9 +30,13 @@ def leaf(height, length, turn):
     t, side = t[inside], side[inside]
     steps = np.linspace(0, 1, 200)
     tilt = np.deg2rad(35 + 95 * steps)
-    out, up = (np.interp(t, steps, length * np.cumsum(way) / 200) for way in (np.sin(tilt), np.cos(tilt)))
+    out, up = (
+        np.interp(t, steps, length * np.cumsum(way) / 200) for way in (np.sin(tilt), np.cos(tilt))
+    )
     points = np.column_stack([0.008 + out, side, height + up + 0.25 * np.abs(side)])
-    return points @ np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    return points @ np.array(
+        [[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]]
+    )
 
 
 stem = samples.tube(6000, length=0.8, radius=0.008).points[:, [1, 2, 0]] + [0, 0, 0.4]
@@ -70,7 +74,11 @@ for row, height, length in zip(leaves, HEIGHTS, LENGTHS, strict=True):
 with TemporaryDirectory() as folder:
     plant.save(f"{folder}/maize.plant.csv")
     nodes = Path(folder, "maize.plant.csv").read_text().splitlines()
-print(*nodes[:3], f"{sum(',+,' in line for line in nodes)} of {len(nodes) - 1} nodes begin a leaf", sep="\n")
+print(
+    *nodes[:3],
+    f"{sum(',+,' in line for line in nodes)} of {len(nodes) - 1} nodes begin a leaf",
+    sep="\n",
+)
 
 figure = plt.figure(figsize=(10, 6), layout="constrained")
 left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))
@@ -78,5 +86,7 @@ left.scatter(*cloud.T, s=0.3, color="0.6")
 left.set(aspect="equal", title="the scan")
 left.view_init(10, -60)
 left.set_axis_off()
-glsk.plot_skeleton(plant, right, color="confidence", view=(10, -60)).set_title("confidence: 0 on sheets")
+glsk.plot_skeleton(plant, right, color="confidence", view=(10, -60)).set_title(
+    "confidence: 0 on sheets"
+)
 plt.show()

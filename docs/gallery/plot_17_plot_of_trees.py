@@ -25,11 +25,14 @@ rng = np.random.default_rng(0)
 places = np.array([[0.0, 0, 0.1], [6, 1, -0.05]])
 lidar = np.array([[20, 2, 1.7], [-11, 17, 1.7], [-9, -18, 1.7]])  # its three places
 trees = [
-    samples.tree(20000, forks=4, length=1.8, radius=0.12, seed=seed, noise=0.001, cameras=lidar) for seed in (3, 8)
+    samples.tree(20000, forks=4, length=1.8, radius=0.12, seed=seed, noise=0.001, cameras=lidar)
+    for seed in (3, 8)
 ]
 x, y = rng.uniform([-3, -3], [9, 4], (8000, 2)).T
 ground = np.column_stack([x, y, 0.02 * np.sin(x) + rng.normal(scale=0.005, size=len(x))])
-points = np.concatenate([ground, *(tree.points + place for tree, place in zip(trees, places, strict=True))])
+points = np.concatenate(
+    [ground, *(tree.points + place for tree, place in zip(trees, places, strict=True))]
+)
 sizes = [len(ground), *(len(tree.points) for tree in trees)]
 
 folder = TemporaryDirectory()
@@ -57,11 +60,18 @@ print(tree)
 measures = glsk.analysis.tree_measures(tree, unit="m")
 truth = trees[0]
 ends, radii = truth.nodes[truth.edges], truth.radii[truth.edges]
-pieces = np.pi / 3 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) * ((radii**2).sum(axis=1) + radii.prod(axis=1))
+pieces = (
+    np.pi
+    / 3
+    * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    * ((radii**2).sum(axis=1) + radii.prod(axis=1))
+)
 trunk = np.argsort(truth.nodes[:, 2])[:8]
 breast = 2 * np.interp(1.3, truth.nodes[trunk, 2], truth.radii[trunk])
 print(f"volume {1000 * sum(measures.volume):.1f} litres ({1000 * pieces.sum():.1f})")
-print(f"diameter at 1.3 m {100 * measures.stem_diameter:.1f} cm ({100 * breast:.1f}), height {measures.height:.2f} m")
+print(
+    f"diameter at 1.3 m {100 * measures.stem_diameter:.1f} cm ({100 * breast:.1f}), height {measures.height:.2f} m"
+)
 
 # %%
 # Cylinders: our own table, rTwig's and TreeQSM's, treetools'. And the tree's points with class, number, branch and
@@ -79,6 +89,8 @@ left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1,
 left.scatter(*points[::4].T, s=0.3, c=np.repeat(["0.7", "tab:green", "tab:brown"], sizes)[::4])
 left.set(aspect="equal", title="the plot: ground, and two trees")
 left.set_axis_off()
-glsk.plot_skeleton(tree, right, color="radius", view=(10, -60)).set_title("tree 17: colour is radius")
+glsk.plot_skeleton(tree, right, color="radius", view=(10, -60)).set_title(
+    "tree 17: colour is radius"
+)
 plt.show()
 folder.cleanup()

@@ -1,6 +1,6 @@
 """
-An animal that moves
-====================
+A scan that moves: bones and skin
+=================================
 
 A rigger's day: a scanned animal without bones becomes a mesh with an armature, in a file that Blender opens.
 """
@@ -52,9 +52,13 @@ def array(number):
 
 
 primitive = file.meshes[0].primitives[0]
-place, joints, weights = (array(getattr(primitive.attributes, name)) for name in ("POSITION", "JOINTS_0", "WEIGHTS_0"))
+place, joints, weights = (
+    array(getattr(primitive.attributes, name)) for name in ("POSITION", "JOINTS_0", "WEIGHTS_0")
+)
 triangles = array(primitive.indices).reshape(-1, 3)
-print(f"{len(file.skins[0].joints)} joints, {len(place)} vertices, {(weights > 0).sum(axis=1).mean():.2f} joints each")
+print(
+    f"{len(file.skins[0].joints)} joints, {len(place)} vertices, {(weights > 0).sum(axis=1).mean():.2f} joints each"
+)
 
 # %%
 # Pose it: every joint on the way to the end of the neck turns by a few degrees about the axis across the body. That is
@@ -85,7 +89,9 @@ def posed(angle):
 
 
 figure = plt.figure(figsize=(10, 4), layout="constrained")
-for number, (angle, title) in enumerate([(0.0, "at rest"), (-0.15, "the neck turned up"), (0.15, "and down")], 1):
+for number, (angle, title) in enumerate(
+    [(0.0, "at rest"), (-0.15, "the neck turned up"), (0.15, "and down")], 1
+):
     axes = figure.add_subplot(1, 3, number, projection="3d")
     axes.plot_trisurf(*posed(angle).T, triangles=triangles, color="0.8", linewidth=0)
     axes.set(aspect="equal", title=title)

@@ -1,8 +1,6 @@
 """A skeleton with its record, and a browser to look at pages with."""
 
 import io
-import os
-import shutil
 
 import numpy as np
 import pytest
@@ -19,27 +17,6 @@ def run():
     """A skeleton of the sample object, and the record of its contraction."""
     recorder = glsk.ContractionRecorder()
     return glsk.skeletonize(sample_object(1500).points, on_state=recorder), recorder
-
-
-@pytest.fixture(scope="module")
-def launch(patience):
-    """Start a headless Chromium with other flags than the usual ones."""
-    names = (os.environ.get("GLSK_CHROMIUM", ""), "chromium", "chromium-browser", "google-chrome", "chrome")
-    browser = next(filter(None, map(shutil.which, names)), None)
-    if browser is None:
-        pytest.skip("needs Chromium: apt-get install chromium, or set GLSK_CHROMIUM to where it is")
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright, of the extra 'dev'")
-    with playwright.sync_playwright() as driver:
-        running = []
-
-        def start(*flags):
-            flags = ("--no-sandbox", "--disable-background-networking", *flags)  # root may not have a sandbox
-            running.append(driver.chromium.launch(executable_path=browser, args=flags, timeout=1e3 * patience))
-            return running[-1]
-
-        yield start
-        for each in running:
-            each.close()
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,17 @@
+"""Cells with sentences are marked, so that on a phone they keep a width that can be read, and the table scrolls."""
+
+from docutils import nodes
+
+SENTENCE = 40  # characters and more
+
+
+def mark(app, doctree):
+    for cell in doctree.findall(nodes.entry):
+        words = [text for text in cell.findall(nodes.Text) if not isinstance(text.parent, nodes.literal)]
+        if len("".join(words)) >= SENTENCE:
+            cell["classes"].append("sentence")
+
+
+def setup(app):
+    app.connect("doctree-read", mark)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
