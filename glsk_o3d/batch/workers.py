@@ -49,6 +49,12 @@ def died(error: BaseException | None) -> bool:
 # ------------------------------------------------------------------------------------------------------ this machine
 
 
+def _load() -> None:
+    """What every skeleton needs, and takes its time."""
+    import_open3d()
+    importlib.import_module("glsk_o3d.recipes")
+
+
 class LocalWorkers:
     """Processes of this machine with one BLAS thread each.
 
@@ -57,10 +63,12 @@ class LocalWorkers:
     Parameters
     ----------
     count : int
+    prepare : callable, optional
+        What each loads when it starts: by default what skeletons need.
     """
 
-    def __init__(self, count: int):
-        self._seats = [_Seat() for _ in range(count)]
+    def __init__(self, count: int, prepare: Callable[[], object] | None = _load):
+        self._seats = [_Seat(prepare) for _ in range(count)]
         self._free = list(self._seats)
         self._stillborn = 0
 
@@ -106,13 +114,16 @@ class _Seat:
     pool: ProcessPoolExecutor | None = None
     process: _Process | None = None
 
+    def __init__(self, prepare: Callable[[], object] | None):
+        self._prepare = prepare
+
     def submit(self, function, *arguments) -> Future:
         if self.pool is not None:
             with suppress(BrokenExecutor):  # died while it was idle
                 return self.pool.submit(function, *arguments)
             self.close(wait=False)
         context = _Context()
-        self.pool = ProcessPoolExecutor(1, context, _begin)
+        self.pool = ProcessPoolExecutor(1, context, _begin, (self._prepare,))
         self._first = self.pool.submit(os.getpid)
         self.process = context.process
         return self.pool.submit(function, *arguments)
@@ -176,15 +187,15 @@ def _without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin() -> None:
+def _begin(prepare: Callable[[], object] | None) -> None:
     """Make a new process ready."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_follow, daemon=True).start()
     for category in (SkeletonWarning, PluginWarning):  # the report has the one, the first process tells the other
         warnings.simplefilter("ignore", category)
-    with suppress(Exception):  # every job will say what is wrong
-        import_open3d()
-        importlib.import_module("glsk_o3d.recipes")
+    if prepare is not None:
+        with suppress(Exception):  # every job will say what is wrong
+            prepare()
 
 
 def _follow() -> None:

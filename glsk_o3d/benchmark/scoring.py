@@ -142,7 +142,7 @@ def _check_size(axis: Truth, vertices: np.ndarray, edges: np.ndarray) -> None:
     places = length / (PLACE_SPACING * np.median(axis.radii)) + len(edges) + len(vertices)
     if not places <= MOST_PLACES:
         raise InvalidParameterError(
-            f"the skeleton is {length:.3g} long and has {len(edges)} edges, too much to be an answer: is it in the units "
+            f"the skeleton is {length:.3g} long and has {len(edges)} edges, too much for an answer: is it in the units "
             "of the cloud?"
         )
     junctions = int((np.bincount(simple_edges(edges).ravel(), minlength=1) > 2).sum())
