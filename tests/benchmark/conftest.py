@@ -1,9 +1,11 @@
-"""Axes made by hand, and a benchmark that is small."""
+"""Axes made by hand, and a benchmark that is small and quickly made."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+from glsk_o3d import Skeleton
 
 
 def path(*places, radius=0.1):
@@ -32,3 +34,27 @@ def square():
     """A closed path of four sides of length 1, radius 0.1."""
     nodes = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     return SimpleNamespace(nodes=nodes, edges=np.array([[0, 1], [1, 2], [2, 3], [0, 3]]), radii=np.full(4, 0.1))
+
+
+@pytest.fixture
+def small(drawn, tmp_path):
+    """A benchmark of four shapes and eight clouds, of which seven are scored."""
+    from glsk_o3d.benchmark import make
+
+    choice = dict(families=["tubes", "trees"], seeds=[100, 101], variants=["clean", "scan2"])
+    return make(tmp_path / "bench", **choice, jobs=1)
+
+
+def axis_of(made, cloud):
+    truth = made.truth(cloud.shape)
+    return Skeleton(truth.nodes, truth.edges, truth.radii, (), (), ())
+
+
+@pytest.fixture
+def perfect(small, tmp_path):
+    """A folder with the true axes as answers."""
+    place = tmp_path / "perfect"
+    place.mkdir()
+    for cloud in small.scored:
+        axis_of(small, cloud).save(place / f"{cloud.name}.obj")
+    return place

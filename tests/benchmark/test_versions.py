@@ -1,0 +1,90 @@
+"""What is fixed for ever, and what tells clouds apart."""
+
+import json
+
+import numpy as np
+import pytest
+
+from glsk_o3d.benchmark import version, versions
+from glsk_o3d.benchmark.versions import fingerprint, fingerprints, sameness
+from glsk_o3d.errors import InvalidParameterError
+
+
+@pytest.fixture
+def points():
+    return np.random.default_rng(0).uniform(-0.5, 0.5, (4096, 3)).astype(np.float32)
+
+
+def test_the_first_version_never_changes():
+    first = version("v1")
+    assert first.families == ("tubes", "trees", "frames", "figures", "handles", "groups")
+    assert first.seeds == (100, 101, 102, 103, 104, 105, 106, 107, 108, 109, 110, 111)
+    assert " ".join(first.variants) == "clean density holes outliers noise05 noise1 noise2 scan2 depth2 misreg lidar"
+    assert (first.points, first.draw, first.least_coverage) == (4096, 0, 0.97)
+    assert " ".join(first.whole) == "clean outliers noise05 noise1 noise2"
+
+
+def test_an_unknown_version():
+    with pytest.raises(InvalidParameterError, match="did you mean 'v1'"):
+        version("v")
+
+
+def test_what_a_fingerprint_is_never_changes(points):
+    assert fingerprint(np.zeros((2, 3))) == "9d908ecf 0 0"  # SHA-256 of 24 zeros
+    assert fingerprint(np.arange(12.0).reshape(4, 3)).split()[1:] == ["82249263", "837992698"]
+    assert fingerprint(points) == fingerprint(points.astype(float)) == fingerprint(np.asfortranarray(points))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_roundings_are_told_from_other_clouds(points, seed):
+    known, rng = fingerprint(points), np.random.default_rng(seed)
+    assert sameness(points, known) == "bits"
+    there = np.where(rng.random(points.shape) < 0.5, -np.inf, np.inf).astype(np.float32)
+    assert sameness(np.nextafter(points, there), known) == "rounding"
+    one = points.copy()
+    one[7, 1] = np.nextafter(one[7, 1], np.float32(1))
+    assert sameness(one, known) == "rounding"
+
+
+def test_the_worst_that_roundings_can_do(points):
+    known = fingerprint(points)
+    for end in (-np.inf, np.inf):
+        assert sameness(np.nextafter(points, np.float32(end)), known) == "rounding"
+    signs = np.sign([versions._sums(np.eye(1, points.size, k)[0].reshape(-1, 3))[0] for k in range(3 * 200)])
+    worst = points.copy()
+    worst[:200] = np.nextafter(worst[:200], (signs * np.inf).astype(np.float32).reshape(-1, 3))
+    assert sameness(worst, known) == "rounding"
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_one_point_elsewhere_is_another_cloud(points, seed):
+    known, rng = fingerprint(points), np.random.default_rng(seed)
+    moved, swapped = points.copy(), points.copy()
+    moved[rng.integers(4096)] = rng.uniform(-0.5, 0.5, 3)
+    assert sameness(moved, known) == "other"
+    pair = rng.choice(4096, 2, replace=False)
+    swapped[pair] = swapped[pair[::-1]]
+    assert sameness(swapped, known) == "other"
+
+
+def test_other_clouds_are_others(points):
+    known = fingerprint(points)
+    for other in (points[::-1], -points, points[:-1], points + np.float32(1e-3), points[:, ::-1]):
+        assert sameness(other, known) == "other"
+
+
+def test_fingerprints_are_read_as_they_were_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(versions, "_file", lambda name: tmp_path / f"{name}.json")
+    assert fingerprints("v1") == {}
+    versions.write_fingerprints(
+        "v1", {"tubes_100": {"clean": "a 1 2"}, "trees_7": {"clean": "b 3 4", "lidar": "c 5 6"}}
+    )
+    assert fingerprints("v1") == {"trees_7_clean": "b 3 4", "trees_7_lidar": "c 5 6", "tubes_100_clean": "a 1 2"}
+
+
+def test_the_package_knows_all_clouds_of_a_version_or_none():
+    for asked in versions.VERSIONS.values():
+        known = fingerprints(asked.name)
+        shapes = [f"{family}_{seed}" for family in asked.families for seed in asked.seeds]
+        assert not known or sorted(known) == sorted(f"{shape}_{each}" for shape in shapes for each in asked.variants)
+        assert len(json.dumps(known)) < 50_000
