@@ -35,6 +35,7 @@ PACKAGES = {
     "glsk_o3d.crosscheck": "Cross-check",
     "glsk_o3d.batch": "Batches",
     "glsk_o3d.samples": "Sample clouds",
+    "glsk_o3d.benchmark": "The benchmark",
 }
 """What users import from."""
 MODULES = {

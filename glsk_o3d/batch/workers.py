@@ -49,12 +49,6 @@ def died(error: BaseException | None) -> bool:
 # ------------------------------------------------------------------------------------------------------ this machine
 
 
-def _load() -> None:
-    """What every skeleton needs, and takes its time."""
-    import_open3d()
-    importlib.import_module("glsk_o3d.recipes")
-
-
 class LocalWorkers:
     """Processes of this machine with one BLAS thread each.
 
@@ -63,12 +57,12 @@ class LocalWorkers:
     Parameters
     ----------
     count : int
-    prepare : callable, optional
-        What each loads when it starts: by default what skeletons need.
+    load : bool
+        Load what every skeleton needs, and takes its time, when they start.
     """
 
-    def __init__(self, count: int, prepare: Callable[[], object] | None = _load):
-        self._seats = [_Seat(prepare) for _ in range(count)]
+    def __init__(self, count: int, load: bool = True):
+        self._seats = [_Seat(load) for _ in range(count)]
         self._free = list(self._seats)
         self._stillborn = 0
 
@@ -114,8 +108,8 @@ class _Seat:
     pool: ProcessPoolExecutor | None = None
     process: _Process | None = None
 
-    def __init__(self, prepare: Callable[[], object] | None):
-        self._prepare = prepare
+    def __init__(self, load: bool):
+        self._load = load
 
     def submit(self, function, *arguments) -> Future:
         if self.pool is not None:
@@ -123,7 +117,7 @@ class _Seat:
                 return self.pool.submit(function, *arguments)
             self.close(wait=False)
         context = _Context()
-        self.pool = ProcessPoolExecutor(1, context, _begin, (self._prepare,))
+        self.pool = ProcessPoolExecutor(1, context, _begin, (self._load,))
         self._first = self.pool.submit(os.getpid)
         self.process = context.process
         return self.pool.submit(function, *arguments)
@@ -187,15 +181,17 @@ def _without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin(prepare: Callable[[], object] | None) -> None:
+def _begin(load: bool) -> None:
     """Make a new process ready."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_follow, daemon=True).start()
     for category in (SkeletonWarning, PluginWarning):  # the report has the one, the first process tells the other
         warnings.simplefilter("ignore", category)
-    if prepare is not None:
-        with suppress(Exception):  # every job will say what is wrong
-            prepare()
+    if not load:
+        return
+    with suppress(Exception):  # every job will say what is wrong
+        import_open3d()
+        importlib.import_module("glsk_o3d.recipes")
 
 
 def _follow() -> None:

@@ -146,7 +146,7 @@ def _work(todo: Mapping[str, Callable[[], Told]], jobs: int, keep: Callable[[str
         for name, job in todo.items():
             keep(name, job())
         return
-    workers, waiting = LocalWorkers(min(jobs, max(len(todo), 1)), prepare=None), list(todo.items())
+    workers, waiting = LocalWorkers(min(jobs, max(len(todo), 1)), load=False), list(todo.items())
     running: dict[Future, str] = {}
     try:
         while waiting or running:

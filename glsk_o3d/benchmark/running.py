@@ -23,7 +23,10 @@ from .commands import CAN_LIMIT_MEMORY, Outcome, Runner, filled, words_of
 from .folders import BenchmarkFolder, CloudFile, read_folder
 
 TIME_LIMIT = 600.0  # fitted: seconds; the slowest of the programs that we know take a tenth of it
-_OURS = (sys.executable, "-m", "glsk_o3d", "skeletonize", "{cloud}", "-o", "{skeleton}", "--quiet", "--pipeline")
+_PIPELINE_WORDS = (
+    *(sys.executable, "-m", "glsk_o3d", "skeletonize", "{cloud}", "-o", "{skeleton}"),
+    *("--quiet", "--pipeline"),
+)
 Told = dict[str, Any]
 
 
@@ -153,7 +156,7 @@ def _program(pipeline: str | None, command: str | Sequence[str] | None, ending: 
             raise InvalidParameterError("a pipeline and a command are given: give one of them")
         return words_of(command), {"command": command if isinstance(command, str) else [*command], "ending": ending}
     named_pipeline(pipeline or "default").check_complete()
-    return [*_OURS, pipeline or "default"], {"pipeline": pipeline or "default", "ending": ending}
+    return [*_PIPELINE_WORDS, pipeline or "default"], {"pipeline": pipeline or "default", "ending": ending}
 
 
 def _check_limits(time_limit: float, memory_limit: float | None, jobs: int) -> None:

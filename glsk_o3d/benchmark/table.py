@@ -16,7 +16,7 @@ from ..interop.atomic import write_atomically, write_json
 from .answers import MEASURES, Results
 from .intervals import mean_with_interval, told
 
-_SHOWN = MEASURES[:7]  # in Markdown; JSON has them all
+_COLUMNS = MEASURES[:7]  # in Markdown; JSON has them all
 _HEADS = {"tips_f1": "tips F1", "junctions_f1": "junctions F1"}
 _DIGITS = {"error": 3}
 Cell = dict[str, Any]
@@ -81,7 +81,7 @@ class Leaderboard:
         -------
         str
         """
-        parts = [f"Benchmark {self.benchmark}{'' if self.whole else ', not all of it, or other shapes'}. {_EXPLAINED}"]
+        parts = [f"Benchmark {self.benchmark}{'' if self.whole else ', not all of it, or other shapes'}. {_CAPTION}"]
         if self.entries:
             first = self.entries[0]["all"]
             title = f"{first['clouds']} clouds of {first['shapes']} shapes"
@@ -90,7 +90,7 @@ class Leaderboard:
         return "\n\n".join(parts) + "\n"
 
 
-_EXPLAINED = (
+_CAPTION = (
     "Means, and in brackets 95 % intervals from drawing the shapes anew. A failure is neither perfect nor right in its "
     "topology, and its F1 are 0; what comes after these are means over the answers that could be scored. Seconds are "
     "medians."
@@ -167,13 +167,13 @@ def _cell(rows: Sequence[dict[str, Any]]) -> Cell:
 
 
 def _table(title: str, first: str, lines: Iterable[tuple[str, Cell]]) -> str:
-    heads = [first, "clouds", "failures", *(_HEADS.get(measure, measure) for measure in _SHOWN), "s"]
+    heads = [first, "clouds", "failures", *(_HEADS.get(measure, measure) for measure in _COLUMNS), "s"]
     shown = [_line(heads), _line(["---", *["--:"] * (len(heads) - 1)])]
     return "\n".join([f"**{_plain(title)}**", "", *shown, *(_line(_words(name, cell)) for name, cell in lines)])
 
 
 def _words(name: str, cell: Cell) -> list[str]:
-    means = (told(*_ends(cell[measure]), digits=_DIGITS.get(measure, 2)) for measure in _SHOWN)
+    means = (told(*_ends(cell[measure]), digits=_DIGITS.get(measure, 2)) for measure in _COLUMNS)
     seconds = "-" if cell["seconds"] is None else f"{cell['seconds']:.2f}"
     return [_plain(name), str(cell["clouds"]), str(cell["failures"]), *means, seconds]
 

@@ -15,7 +15,7 @@ from ..interop.atomic import write_atomically
 SUM_UNIT = 1e-8  # derived: a tenth of what all roundings together can make of a sum
 # derived: twice what they make, of 3 coordinates a point, below 1 and rounded to 2^-24, with weights of 1/2 in the mean
 SUM_TOLERANCE = 2 * 3 * 2.0**-24 / 2
-MIXING = (0x85EBCA6B, 0xC2B2AE35)  # published: of MurmurHash3's finalizer (Appleby 2008)
+HASH_FACTORS = (0x85EBCA6B, 0xC2B2AE35)  # published: of MurmurHash3's finalizer (Appleby 2008)
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def _sums(rows: np.ndarray) -> np.ndarray:
     points.
     """
     mixed = np.arange(1, 2 * rows.size + 1, dtype=np.uint64)
-    for shift, factor in zip((16, 13), MIXING, strict=True):  # whole numbers: the same weights on all processors
+    for shift, factor in zip((16, 13), HASH_FACTORS, strict=True):  # whole numbers: the same weights on all processors
         mixed = (mixed ^ (mixed >> np.uint64(shift))) * np.uint64(factor) % np.uint64(2**32)
     weights = (mixed ^ (mixed >> np.uint64(16))).astype(float).reshape(2, -1) / 2**31 - 1
     return weights @ rows.ravel().astype(float) / max(len(rows), 1)

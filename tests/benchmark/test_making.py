@@ -197,8 +197,8 @@ def test_in_two_processes_it_is_the_same(tmp_path):
 class Here:
     """Workers that do their work at once, or die of it."""
 
-    def __init__(self, count, prepare):
-        assert prepare is None  # nothing that loads Open3D
+    def __init__(self, count, load):
+        assert not load  # nothing that loads Open3D
 
     def capacity(self):
         return 1

@@ -1,11 +1,13 @@
 """What is fixed for ever, and what tells clouds apart."""
 
+import importlib.util
 import json
 
 import numpy as np
 import pytest
 
-from glsk_o3d.benchmark import version, versions
+from glsk_o3d import read_cloud
+from glsk_o3d.benchmark import make, version, versions
 from glsk_o3d.benchmark.versions import fingerprint, fingerprints, sameness
 from glsk_o3d.errors import InvalidParameterError
 
@@ -88,3 +90,23 @@ def test_the_package_knows_all_clouds_of_a_version_or_none():
         shapes = [f"{family}_{seed}" for family in asked.families for seed in asked.seeds]
         assert not known or sorted(known) == sorted(f"{shape}_{each}" for shape in shapes for each in asked.variants)
         assert len(json.dumps(known)) < 50_000
+
+
+def test_the_script_writes_a_whole_version_once(drawn, tmp_path, monkeypatch, root):
+    spec = importlib.util.spec_from_file_location("script", root / "scripts" / "write_fingerprints.py")
+    spec.loader.exec_module(script := importlib.util.module_from_spec(spec))
+    short = versions.Version("v1", ("tubes",), (100, 101), ("clean",), 64, 0, ("clean",), 0.97)
+    monkeypatch.setitem(versions.VERSIONS, "v1", short)
+    monkeypatch.setattr(versions, "_file", lambda name: tmp_path / f"{name}.json")
+    make(tmp_path / "bench", seeds=[100], jobs=1)
+    with pytest.raises(SystemExit, match="not the whole of v1"):
+        script.main(tmp_path / "bench")
+    made = make(tmp_path / "bench", jobs=1)
+    assert script.main(tmp_path / "bench") == script.main(tmp_path / "bench") == tmp_path / "v1.json"
+    known = fingerprints("v1")
+    assert known == {cloud.name: fingerprint(read_cloud(cloud.path).points) for cloud in made.clouds}
+    again = make(tmp_path / "again", jobs=1)
+    assert {told["clouds"]["clean"]["sameness"] for told in again.shapes.values()} == {"bits"}
+    versions.write_fingerprints("v1", {"tubes_100": {"clean": "other 1 2"}, "tubes_101": {"clean": "other 1 2"}})
+    with pytest.raises(SystemExit, match="2 clouds are not those of v1"):
+        script.main(tmp_path / "bench")
