@@ -17,6 +17,7 @@ import tomlkit
 from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
+from glsk_o3d.benchmark import make as make_benchmark
 from glsk_o3d.recipes.plugins import forget_plugins
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.ring_builder import RingBuilder
@@ -267,7 +268,7 @@ def example(install, root):
 
 
 def straight(family, seed):
-    """A rod in the place of a shape that is drawn: longer with the seed, and bent in one family."""
+    """A rod in the place of a shape that is rods: longer with the seed, and bent in one family."""
     bend = 0.1 if family == "trees" else 0.0
     nodes = np.array([[-0.4, 0, 0], [0, bend, 0], [0.003 * seed, 0, 0]])
     axis = dict(nodes=nodes, edges=np.array([[0, 1], [1, 2]]), radii=np.full(3, 0.05))
@@ -280,8 +281,8 @@ def straight(family, seed):
 
 
 @pytest.fixture
-def drawn(monkeypatch):
-    """Rods instead of the shapes of the benchmark, which take seconds; gives the names of those that are drawn."""
+def rods(monkeypatch):
+    """Rods instead of the shapes of the benchmark, which take seconds; gives the names of those that are rods."""
     names = []
 
     def shape(family, seed):
@@ -299,6 +300,28 @@ def drawn(monkeypatch):
     monkeypatch.setitem(sys.modules, "glsk_o3d.benchmark.shapes", shapes)
     monkeypatch.setitem(sys.modules, "glsk_o3d.benchmark.clouds", clouds)
     return names
+
+
+@pytest.fixture
+def small(rods, tmp_path):
+    """A benchmark of four shapes and eight clouds, of which seven are scored."""
+    choice = dict(families=["tubes", "trees"], seeds=[100, 101], variants=["clean", "scan2"])
+    return make_benchmark(tmp_path / "bench", **choice, jobs=1)
+
+
+def axis_of(made, cloud):
+    truth = made.truth(cloud.shape)
+    return Skeleton(truth.nodes, truth.edges, truth.radii, (), (), ())
+
+
+@pytest.fixture
+def perfect(small, tmp_path):
+    """A folder with the true axes as answers."""
+    place = tmp_path / "perfect"
+    place.mkdir()
+    for cloud in small.scored:
+        axis_of(small, cloud).save(place / f"{cloud.name}.obj")
+    return place
 
 
 @pytest.fixture

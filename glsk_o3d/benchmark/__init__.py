@@ -1,4 +1,16 @@
-"""A public benchmark: shapes with exactly known axes, clouds of them, and scores for any program's skeletons."""
+"""A benchmark of random shapes with exactly known axes, clouds of them as scanners give them, and scores.
+
+Everything follows from a family, a seed, a variant and a number of points, so that nothing needs to be downloaded. The
+shapes, the clouds and the scores need NumPy and SciPy alone.
+
+Examples
+--------
+>>> from glsk_o3d.benchmark.clouds import cloud
+>>> from glsk_o3d.benchmark.shapes import shape
+>>> tree = shape("trees", 7)
+>>> cloud(tree, "depth2", n=2048).shape
+(2048, 3)
+"""
 
 import lazy_loader as _lazy
 

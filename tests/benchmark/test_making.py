@@ -37,7 +37,7 @@ def test_what_is_in_the_folder(small):
     assert (again.version, again.shapes, again.complete) == ("v1", small.shapes, True)
 
 
-def test_clouds_and_axes_are_those_drawn(small, drawn):
+def test_clouds_and_axes_are_those_drawn(small, rods):
     tube = sys.modules["glsk_o3d.benchmark.shapes"].shape("tubes", 101)
     points = sys.modules["glsk_o3d.benchmark.clouds"].cloud(tube, "scan2", n=4096, seed=0).astype(np.float32)
     path = small.path / "clouds" / "tubes_101_scan2.ply"
@@ -54,15 +54,15 @@ def test_clouds_and_axes_are_those_drawn(small, drawn):
         np.testing.assert_array_equal(getattr(truth, name), getattr(tube, name))
 
 
-def test_the_same_again_makes_nothing_and_changes_nothing(small, drawn):
-    before, times = everything(small.path), len(drawn)
+def test_the_same_again_makes_nothing_and_changes_nothing(small, rods):
+    before, times = everything(small.path), len(rods)
     make(small.path, **CHOICE)
-    assert (everything(small.path), len(drawn)) == (before, times)
+    assert (everything(small.path), len(rods)) == (before, times)
 
 
-def test_an_interrupted_one_goes_on(small, drawn, tmp_path):
+def test_an_interrupted_one_goes_on(small, rods, tmp_path):
     expected = everything(small.path)
-    drawn.clear()
+    rods.clear()
 
     def interrupt(name, done, total):
         assert total == 4
@@ -72,34 +72,34 @@ def test_an_interrupted_one_goes_on(small, drawn, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         make(tmp_path / "again", **CHOICE, on_shape=interrupt)
     assert not read_folder(tmp_path / "again").complete
-    assert drawn == ["tubes_100", "tubes_101"]
+    assert rods == ["tubes_100", "tubes_101"]
     told = []
     make(tmp_path / "again", **CHOICE, on_shape=lambda *words: told.append(words))
-    assert drawn == ["tubes_100", "tubes_101", "trees_100", "trees_101"]
+    assert rods == ["tubes_100", "tubes_101", "trees_100", "trees_101"]
     assert told == [("trees_100", 1, 2), ("trees_101", 2, 2)]
     assert everything(tmp_path / "again") == expected
 
 
 @pytest.mark.parametrize("lost", ["clouds/tubes_100_scan2.ply", "truth/tubes_100.npz"])
-def test_what_is_lost_is_made_again(small, drawn, lost):
+def test_what_is_lost_is_made_again(small, rods, lost):
     before = everything(small.path)
     (small.path / lost).unlink()
-    drawn.clear()
+    rods.clear()
     make(small.path, **CHOICE)
-    assert drawn == ["tubes_100"]
+    assert rods == ["tubes_100"]
     assert everything(small.path) == before
 
 
-def test_more_of_it_is_added(small, drawn):
-    drawn.clear()
+def test_more_of_it_is_added(small, rods):
+    rods.clear()
     made = make(small.path, families=["tubes"], seeds=[101, 7], variants=["lidar", "clean"], jobs=1)
-    assert drawn == ["tubes_101", "tubes_7"]
+    assert rods == ["tubes_101", "tubes_7"]
     assert len(made.clouds) == 8 + 1 + 2
     assert list(made.shapes["tubes_101"]["clouds"]) == ["clean", "scan2", "lidar"]
     assert [cloud.variant for cloud in made.clouds if cloud.shape == "tubes_101"] == ["clean", "scan2", "lidar"]
 
 
-def test_the_whole_version(drawn, tmp_path, monkeypatch):
+def test_the_whole_version(rods, tmp_path, monkeypatch):
     short = versions.Version("v1", ("tubes",), (100, 101), ("clean",), 64, 0, ("clean",), 0.97)
     monkeypatch.setitem(versions.VERSIONS, "v1", short)
     assert not make(tmp_path / "a", seeds=[100], jobs=1).whole
@@ -107,7 +107,7 @@ def test_the_whole_version(drawn, tmp_path, monkeypatch):
     assert not make(tmp_path / "a", seeds=[7], jobs=1).whole
 
 
-def test_sameness_is_told(drawn, tmp_path, monkeypatch):
+def test_sameness_is_told(rods, tmp_path, monkeypatch):
     made = make(tmp_path / "a", families=["tubes"], seeds=[100, 101], variants=["clean"], jobs=1)
     words = made.shapes["tubes_100"]["clouds"]["clean"]["fingerprint"]
     near = " ".join(["00000000", *words.split()[1:]])
@@ -130,10 +130,10 @@ def test_sameness_is_told(drawn, tmp_path, monkeypatch):
         (dict(jobs=0), "1 or more"),
     ],
 )
-def test_wrong_words(drawn, tmp_path, wrong, said):
+def test_wrong_words(rods, tmp_path, wrong, said):
     with pytest.raises(InvalidParameterError, match=said):
         make(tmp_path / "new", **{**CHOICE, **wrong})
-    assert drawn == []
+    assert rods == []
 
 
 def test_another_version_is_not_mixed_in(small, monkeypatch):
@@ -216,7 +216,7 @@ class Here:
 
 
 @pytest.mark.parametrize(("fault", "raised"), [(BrokenProcessPool(), BatchError), (OSError("full"), OSError)])
-def test_a_process_that_fails_is_told(drawn, tmp_path, monkeypatch, fault, raised):
+def test_a_process_that_fails_is_told(rods, tmp_path, monkeypatch, fault, raised):
     import glsk_o3d.benchmark.making as making
 
     def work(folder, version, family, seed, variants):

@@ -184,7 +184,7 @@ def test_names_with_spaces_and_quotes(small, program, tmp_path):
     assert run(small, place, command=text, ending=".obj").failed == 0
 
 
-def test_our_pipelines_run_as_commands(drawn, tmp_path):
+def test_our_pipelines_run_as_commands(rods, tmp_path):
     from glsk_o3d import read_cloud
     from glsk_o3d.benchmark import make
 

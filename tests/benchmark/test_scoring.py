@@ -16,6 +16,34 @@ BEST = dict(
 )
 
 
+def path(*places, radius=0.1):
+    """An axis: a path through places."""
+    n = len(places)
+    edges = np.column_stack([np.arange(n - 1), np.arange(1, n)])
+    return SimpleNamespace(nodes=np.array(places, float), edges=edges, radii=np.full(n, radius))
+
+
+@pytest.fixture
+def rod():
+    """A straight axis from 0 to 1 along x, radius 0.1."""
+    return path((0, 0, 0), (1, 0, 0))
+
+
+@pytest.fixture
+def star():
+    """Four arms of length 1 around a junction, radius 0.1."""
+    arms = [[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
+    edges = np.array([[0, 1], [0, 2], [0, 3], [0, 4]])
+    return SimpleNamespace(nodes=np.array(arms, float), edges=edges, radii=np.full(5, 0.1))
+
+
+@pytest.fixture
+def square():
+    """A closed path of four sides of length 1, radius 0.1."""
+    nodes = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    return SimpleNamespace(nodes=nodes, edges=np.array([[0, 1], [1, 2], [2, 3], [0, 3]]), radii=np.full(4, 0.1))
+
+
 def numbers(scores, *names):
     told = scores.as_dict()
     return [told[name] for name in names]

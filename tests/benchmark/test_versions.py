@@ -92,7 +92,7 @@ def test_the_package_knows_all_clouds_of_a_version_or_none():
         assert len(json.dumps(known)) < 50_000
 
 
-def test_the_script_writes_a_whole_version_once(drawn, tmp_path, monkeypatch, root):
+def test_the_script_writes_a_whole_version_once(rods, tmp_path, monkeypatch, root):
     spec = importlib.util.spec_from_file_location("script", root / "scripts" / "write_fingerprints.py")
     spec.loader.exec_module(script := importlib.util.module_from_spec(spec))
     short = versions.Version("v1", ("tubes",), (100, 101), ("clean",), 64, 0, ("clean",), 0.97)

@@ -12,7 +12,7 @@ CHOICE = ("--families", "tubes,trees", "--seeds", "100:102", "--variants", "clea
 
 
 @pytest.fixture
-def bench(invoke, drawn):
+def bench(invoke, rods):
     """The name of a folder with a benchmark."""
     assert invoke("benchmark", "make", "bench", *CHOICE, "-q").exit_code == 0
     return "bench"
@@ -22,7 +22,7 @@ def quoted(words):
     return " ".join(f"'{word}'" for word in words)
 
 
-def test_from_nothing_to_a_table(invoke, drawn, program, tmp_path):
+def test_from_nothing_to_a_table(invoke, rods, program, tmp_path):
     made = invoke("benchmark", "make", "bench", *CHOICE)
     assert (made.exit_code, made.stderr) == (0, "")
     rows = dict(line.split(maxsplit=1) for line in made.stdout.splitlines())
@@ -51,7 +51,7 @@ def test_from_nothing_to_a_table(invoke, drawn, program, tmp_path):
     assert json.loads((tmp_path / "t.json").read_text())["entries"][0]["name"] == "good"
 
 
-def test_json(invoke, drawn, program):
+def test_json(invoke, rods, program):
     made = json.loads(invoke("benchmark", "make", "bench", *CHOICE, "--json").stdout)
     assert (made["clouds"], made["scored"], made["whole"]) == (8, 7, False)
     words = quoted(program("if name == 'tubes_100_clean': sys.exit(1)\nwrite(skeleton)"))
@@ -69,12 +69,12 @@ def test_json(invoke, drawn, program):
     assert table["entries"][0]["all"]["perfect"] == scored["perfect"]
 
 
-def test_seeds_in_words(invoke, drawn):
+def test_seeds_in_words(invoke, rods):
     invoke("benchmark", "make", "a", "--families", "tubes", "--variants", "clean", "--seeds", "7, 100", "--jobs", 1)
-    assert drawn == ["tubes_7", "tubes_100"]
+    assert rods == ["tubes_7", "tubes_100"]
 
 
-def test_another_cloud_than_is_meant_is_told(invoke, drawn, monkeypatch):
+def test_another_cloud_than_is_meant_is_told(invoke, rods, monkeypatch):
     from glsk_o3d.benchmark import versions
 
     monkeypatch.setattr(versions, "fingerprints", lambda name: {"tubes_100_clean": "00000000 1 2"})
