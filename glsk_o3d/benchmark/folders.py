@@ -35,6 +35,12 @@ class CloudFile:
     family : str
     path : Path
     scored : bool
+        Whether answers to it count.
+
+    Examples
+    --------
+    >>> CloudFile("tubes_100", "clean", "tubes", Path("bench/clouds/tubes_100_clean.ply"), scored=True).name
+    'tubes_100_clean'
     """
 
     shape: str

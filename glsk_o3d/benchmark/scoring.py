@@ -14,8 +14,8 @@ from ..errors import InvalidParameterError
 from ..skeleton import Skeleton
 
 # Where an answer is refused, so that no program can fill the memory of who scores it.
-MOST_PLACES = 2_000_000  # fitted: along an answer; axes of the benchmark have a thousand to ten thousand
-MOST_JUNCTIONS = 5000  # fitted: of which all pairs are compared; axes have up to some twenty
+MOST_ANSWER_PLACES = 2_000_000  # fitted: along an answer; axes of the benchmark have a thousand to ten thousand
+MOST_ANSWER_JUNCTIONS = 5000  # fitted: of which all pairs are compared; axes have up to some twenty
 
 
 @dataclass(frozen=True)
@@ -140,13 +140,13 @@ def _check_size(axis: Truth, vertices: np.ndarray, edges: np.ndarray) -> None:
     with np.errstate(over="ignore"):
         length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1).sum()
     places = length / (PLACE_SPACING * np.median(axis.radii)) + len(edges) + len(vertices)
-    if not places <= MOST_PLACES:
+    if not places <= MOST_ANSWER_PLACES:
         raise InvalidParameterError(
             f"the skeleton is {length:.3g} long and has {len(edges)} edges, too much for an answer: is it in the units "
             "of the cloud?"
         )
     junctions = int((np.bincount(simple_edges(edges).ravel(), minlength=1) > 2).sum())
-    if junctions > MOST_JUNCTIONS:
+    if junctions > MOST_ANSWER_JUNCTIONS:
         raise InvalidParameterError(
-            f"the skeleton has {junctions} junctions, more than {MOST_JUNCTIONS}: is it a mesh?"
+            f"the skeleton has {junctions} junctions, more than {MOST_ANSWER_JUNCTIONS}: is it a mesh?"
         )

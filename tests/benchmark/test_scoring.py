@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.analysis import Truth
-from glsk_o3d.benchmark.scoring import MOST_JUNCTIONS, Scores, score
+from glsk_o3d.benchmark.scoring import MOST_ANSWER_JUNCTIONS, Scores, score
 from glsk_o3d.errors import InvalidParameterError
 
 BEST = dict(
@@ -184,7 +184,7 @@ def test_what_is_no_skeleton_is_refused(rod, vertices, edges, said):
 
 
 def test_a_mesh_is_no_skeleton(rod):
-    n = MOST_JUNCTIONS + 10
+    n = MOST_ANSWER_JUNCTIONS + 10
     ring = np.arange(n)
     edges = np.vstack([np.column_stack([ring, (ring + step) % n]) for step in (1, 2)])
     places = np.column_stack([np.cos(ring), np.sin(ring), ring]) * 0.001
