@@ -40,7 +40,8 @@ def main(folder: Path) -> Path:
     if known and known != new:
         changed = sum(known.get(name) != words for name, words in new.items())
         raise SystemExit(f"{changed} clouds are not those of {made.version}, which never changes: make a new version")
-    return write_fingerprints(made.version, found)
+    unscored = [cloud.name for cloud in made.clouds if not cloud.scored]
+    return write_fingerprints(made.version, found, unscored)
 
 
 if __name__ == "__main__":

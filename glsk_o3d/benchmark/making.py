@@ -174,10 +174,11 @@ def _make_shape(folder: Path, name: str, family: str, seed: int, variants: Seque
     for variant in variants:
         points = np.asarray(cloud(drawn, variant, n=asked.points, seed=asked.draw), np.float32)
         share = 1.0 if variant in asked.whole else float(coverage(drawn, points))
-        file, expected = f"clouds/{drawn.name}_{variant}.ply", known.get(f"{drawn.name}_{variant}")
+        called = f"{drawn.name}_{variant}"
+        file, expected = f"clouds/{called}.ply", known.get(called)
         write_atomically(folder / file, partial(_write_ply, points))
         clouds[variant] = {
-            **{"file": file, "scored": share >= asked.least_coverage, "coverage": round(share, 4)},
+            **{"file": file, "scored": versions.is_scored(asked, called, share), "coverage": round(share, 4)},
             **{"fingerprint": versions.fingerprint(points)},
             "sameness": versions.sameness(points, expected) if expected else None,
         }

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -188,27 +190,60 @@ def fingerprints(name: str) -> dict[str, str]:
     >>> fingerprints("none")
     {}
     """
-    path = _file(name)
-    shapes = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    shapes = _known(name)["clouds"]
     return {f"{shape}_{variant}": words for shape, clouds in shapes.items() for variant, words in clouds.items()}
 
 
-def write_fingerprints(name: str, found: dict[str, dict[str, str]]) -> Path:
-    """Write the fingerprints of a version into the package: by shape, by variant. For whoever makes a version, once.
+def is_scored(asked: Version, cloud: str, coverage: float) -> bool:
+    """Whether answers to a cloud count: as is fixed for the version, so that roundings of its coverage do not decide.
+
+    Parameters
+    ----------
+    asked : Version
+    cloud : str
+        Its name.
+    coverage : float
+        Decides where the package does not know the cloud.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> is_scored(version("v1"), "tubes_7_holes", 0.98)
+    True
+    """
+    if cloud in fingerprints(asked.name):
+        return cloud not in _known(asked.name)["unscored"]
+    return coverage >= asked.least_coverage
+
+
+def write_fingerprints(name: str, found: dict[str, dict[str, str]], unscored: Iterable[str]) -> Path:
+    """Write the fingerprints of a version into the package. For whoever makes a version, once.
 
     Parameters
     ----------
     name : str
     found : dict of str to dict of str to str
+        By shape, by variant.
+    unscored : iterable of str
+        Names of clouds of which answers do not count.
 
     Returns
     -------
     Path
         The file.
     """
-    lines = ",\n".join(f" {json.dumps(shape)}: {json.dumps(clouds)}" for shape, clouds in sorted(found.items()))
-    write_atomically(_file(name), lambda temporary: temporary.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8"))
+    clouds = ",\n".join(f"  {json.dumps(shape)}: {json.dumps(words)}" for shape, words in sorted(found.items()))
+    text = f'{{\n "unscored": {json.dumps(sorted(unscored))},\n "clouds": {{\n{clouds}\n }}\n}}\n'
+    write_atomically(_file(name), lambda temporary: temporary.write_text(text, encoding="utf-8"))
     return _file(name)
+
+
+def _known(name: str) -> dict[str, Any]:
+    path = _file(name)
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"clouds": {}, "unscored": []}
 
 
 def _file(name: str) -> Path:

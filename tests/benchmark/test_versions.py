@@ -78,10 +78,18 @@ def test_other_clouds_are_others(points):
 def test_fingerprints_are_read_as_they_were_written(tmp_path, monkeypatch):
     monkeypatch.setattr(versions, "_file", lambda name: tmp_path / f"{name}.json")
     assert fingerprints("v1") == {}
-    versions.write_fingerprints(
-        "v1", {"tubes_100": {"clean": "a 1 2"}, "trees_7": {"clean": "b 3 4", "lidar": "c 5 6"}}
-    )
+    found = {"tubes_100": {"clean": "a 1 2"}, "trees_7": {"clean": "b 3 4", "lidar": "c 5 6"}}
+    versions.write_fingerprints("v1", found, ["trees_7_lidar"])
     assert fingerprints("v1") == {"trees_7_clean": "b 3 4", "trees_7_lidar": "c 5 6", "tubes_100_clean": "a 1 2"}
+
+
+def test_what_is_scored_is_fixed_for_the_clouds_that_are_known(tmp_path, monkeypatch):
+    monkeypatch.setattr(versions, "_file", lambda name: tmp_path / f"{name}.json")
+    versions.write_fingerprints("v1", {"trees_7": {"clean": "b 3 4", "lidar": "c 5 6"}}, ["trees_7_lidar"])
+    asked = version("v1")
+    assert [versions.is_scored(asked, "trees_7_clean", share) for share in (0.9699, 0.97)] == [True, True]
+    assert [versions.is_scored(asked, "trees_7_lidar", share) for share in (0.9699, 0.97)] == [False, False]
+    assert [versions.is_scored(asked, "trees_8_clean", share) for share in (0.9699, 0.97)] == [False, True]
 
 
 def test_the_package_knows_all_clouds_of_a_version_or_none():
@@ -107,6 +115,6 @@ def test_the_script_writes_a_whole_version_once(rods, tmp_path, monkeypatch, roo
     assert known == {cloud.name: fingerprint(read_cloud(cloud.path).points) for cloud in made.clouds}
     again = make(tmp_path / "again", jobs=1)
     assert {told["clouds"]["clean"]["sameness"] for told in again.shapes.values()} == {"bits"}
-    versions.write_fingerprints("v1", {"tubes_100": {"clean": "other 1 2"}, "tubes_101": {"clean": "other 1 2"}})
+    versions.write_fingerprints("v1", {"tubes_100": {"clean": "other 1 2"}, "tubes_101": {"clean": "other 1 2"}}, [])
     with pytest.raises(SystemExit, match="2 clouds are not those of v1"):
         script.main(tmp_path / "bench")
