@@ -18,6 +18,7 @@ from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
 from glsk_o3d.benchmark import make as make_benchmark
+from glsk_o3d.benchmark import versions
 from glsk_o3d.recipes.plugins import forget_plugins
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.ring_builder import RingBuilder
@@ -299,6 +300,7 @@ def rods(monkeypatch):
     clouds.coverage = lambda shape, points: 0.5 if shape.name == "trees_101" else 0.99
     monkeypatch.setitem(sys.modules, "glsk_o3d.benchmark.shapes", shapes)
     monkeypatch.setitem(sys.modules, "glsk_o3d.benchmark.clouds", clouds)
+    monkeypatch.setattr(versions, "_file", lambda name: ROOT / "none")  # what the package knows is not of rods
     return names
 
 
