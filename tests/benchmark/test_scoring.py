@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.analysis import Truth
-from glsk_o3d.benchmark.scoring import MOST_ANSWER_JUNCTIONS, Scores, score
+from glsk_o3d.benchmark.scoring import MOST_ANSWER_JUNCTIONS, MOST_ANSWER_PLACES, Scores, score
 from glsk_o3d.errors import InvalidParameterError
 
 BEST = dict(
@@ -176,6 +176,8 @@ def test_a_truth_is_a_truth_however_it_is_held(rod):
         (["here"], [[0, 0]], "of no use"),
         ([[0, 0, 0], [1e9, 0, 0]], [[0, 1]], "units"),
         ([[0, 0, 0], [1e308, 1e308, 0]], [[0, 1]], "units"),
+        (np.zeros((MOST_ANSWER_PLACES + 1, 3)), [], "too much for an answer"),
+        (np.zeros((2, 3)), np.tile([0, 1], (MOST_ANSWER_PLACES, 1)), "too much for an answer"),
     ],
 )
 def test_what_is_no_skeleton_is_refused(rod, vertices, edges, said):
