@@ -34,6 +34,10 @@ rig s.json -o rig.glb --cut-loops
 edit t.json -o e.json --prune-order 1
 convert t.json t.swc t.glb t.urdf
 evaluate s.json demo/cloud.ply
+benchmark make bench --families tubes --seeds 100:101 --variants clean
+benchmark run bench ours
+benchmark score bench ours -o ours.json
+benchmark table ours.json
 rerun s.json -o again.json
 run glskeleton demo/cloud.ply -o g.ply
 run scan_cleanup demo/cloud.ply -o c.ply

@@ -5,10 +5,12 @@ import math
 import os
 import shutil
 import sys
+import textwrap
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
 from time import sleep
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +18,8 @@ import tomlkit
 from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
+from glsk_o3d.benchmark import make as make_benchmark
+from glsk_o3d.benchmark import versions
 from glsk_o3d.recipes.plugins import forget_plugins
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.ring_builder import RingBuilder
@@ -284,3 +288,75 @@ def example(install, root):
         for group, entries in groups.items()
     )
     return install("glsk-example", "0.3", (source / "glsk_example.py").read_text(), entries)
+
+
+def straight(family, seed):
+    """A rod in the place of a shape that is rods: longer with the seed, and bent in one family."""
+    bend = 0.1 if family == "trees" else 0.0
+    nodes = np.array([[-0.4, 0, 0], [0, bend, 0], [0.003 * seed, 0, 0]])
+    axis = dict(nodes=nodes, edges=np.array([[0, 1], [1, 2]]), radii=np.full(3, 0.05))
+    rng = np.random.default_rng(seed)
+    part, turn = rng.random(20_000), rng.uniform(0, 2 * np.pi, 20_000)
+    along, beside = (np.interp(part, [0, 0.5, 1], nodes[:, column]) for column in (0, 1))
+    points = np.column_stack([along, beside + 0.05 * np.cos(turn), 0.05 * np.sin(turn)])
+    facts = dict(length=np.float64(0.8), loops=np.int64(0), many=np.arange(2))
+    return SimpleNamespace(name=f"{family}_{seed}", family=family, seed=seed, points=points, facts=facts, **axis)
+
+
+@pytest.fixture
+def rods(monkeypatch):
+    """Rods instead of the shapes of the benchmark, which take seconds; gives the names of those that are rods."""
+    names = []
+
+    def shape(family, seed):
+        names.append(f"{family}_{seed}")
+        return straight(family, seed)
+
+    def cloud(shape, variant, n=4096, seed=0):
+        rng = np.random.default_rng([len(variant), shape.seed, seed])
+        return shape.points[rng.permutation(len(shape.points))[:n]]
+
+    shapes, clouds = ModuleType("shapes"), ModuleType("clouds")
+    shapes.shape = shape
+    clouds.cloud = cloud
+    clouds.coverage = lambda shape, points: 0.5 if shape.name == "trees_101" else 0.99
+    monkeypatch.setitem(sys.modules, "glsk_o3d.benchmark.shapes", shapes)
+    monkeypatch.setitem(sys.modules, "glsk_o3d.benchmark.clouds", clouds)
+    monkeypatch.setattr(versions, "_file", lambda name: ROOT / "none")  # what the package knows is not of rods
+    return names
+
+
+@pytest.fixture
+def small(rods, tmp_path):
+    """A benchmark of four shapes and eight clouds, of which seven are scored."""
+    choice = dict(families=["tubes", "trees"], seeds=[100, 101], variants=["clean", "scan2"])
+    return make_benchmark(tmp_path / "bench", **choice, jobs=1)
+
+
+def axis_of(made, cloud):
+    truth = made.truth(cloud.shape)
+    return Skeleton(truth.nodes, truth.edges, truth.radii, (), (), ())
+
+
+@pytest.fixture
+def perfect(small, tmp_path):
+    """A folder with the true axes as answers."""
+    place = tmp_path / "perfect"
+    place.mkdir()
+    for cloud in small.scored:
+        axis_of(small, cloud).save(place / f"{cloud.name}.obj")
+    return place
+
+
+@pytest.fixture
+def program(tmp_path):
+    """The words of a command for a program of this source, which has the names `cloud` and `skeleton`."""
+
+    def write(source, *options):
+        path = tmp_path / "program.py"
+        head = "import os, sys, time\ncloud, skeleton = sys.argv[1:3]\nname = os.path.basename(cloud)[:-4]\n"
+        rod = 'def write(path, more=""):\n    open(path, "w").write("v 0 0 0\\nv 1 0 0\\nl 1 2\\n" + more)\n'
+        path.write_text(head + rod + textwrap.dedent(source))
+        return [sys.executable, "-S", "-E", str(path), "{cloud}", "{skeleton}", *options]
+
+    return write

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from _common.intervals import mean_with_interval, told
 from _common.results import summary
 from _common.tables import Table, Tables, number
+
+from glsk_o3d.benchmark.intervals import mean_with_interval, told
 
 from .measuring import by_family, by_pipeline, by_variant
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from _common.intervals import mean_with_interval, told
 from _common.tables import Table, Tables, number
 from scipy.stats import rankdata
+
+from glsk_o3d.benchmark.intervals import mean_with_interval, told
 
 from .fitting import Answered, fitted, said
 

@@ -14,8 +14,9 @@ PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
 
 ROWS = (
     {"command line": ("cli", "__main__")},
+    {"benchmark": ("benchmark",)},
     {"cross-check": ("crosscheck",), "batches": ("batch",), "MeshLab": ("meshlab",)},
-    {"benchmark": ("benchmark",), "pictures and windows": ("viewing",)},
+    {"pictures and windows": ("viewing",)},
     {"files": ("io",), "driver": ("driver",)},
     {"analysis": ("analysis", "editing"), "recipes and plugins": ("recipes",)},
     {"named pipelines": ("pipelines",)},
@@ -30,7 +31,7 @@ ROWS = (
 
 ASIDE = {
     **dict.fromkeys(("cross-check", "pictures and windows", "files", "analysis", "refinement", "numerics"), -3.3),
-    **{"MeshLab": 3.3, "benchmark": 3.7, "preparation": -1.2, "other packages, and files": 1.2, "samples": 3.7},
+    **{"MeshLab": 3.3, "preparation": -1.2, "other packages, and files": 1.2, "samples": 3.7},
 }
 """Where in the drawing the boxes are that are not in its middle."""
 

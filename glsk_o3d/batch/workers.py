@@ -57,10 +57,12 @@ class LocalWorkers:
     Parameters
     ----------
     count : int
+    load : bool
+        Load what every skeleton needs, and takes its time, when they start.
     """
 
-    def __init__(self, count: int):
-        self._seats = [_Seat() for _ in range(count)]
+    def __init__(self, count: int, load: bool = True):
+        self._seats = [_Seat(load) for _ in range(count)]
         self._free = list(self._seats)
         self._stillborn = 0
 
@@ -106,13 +108,16 @@ class _Seat:
     pool: ProcessPoolExecutor | None = None
     process: _Process | None = None
 
+    def __init__(self, load: bool):
+        self._load = load
+
     def submit(self, function, *arguments) -> Future:
         if self.pool is not None:
             with suppress(BrokenExecutor):  # died while it was idle
                 return self.pool.submit(function, *arguments)
             self.close(wait=False)
         context = _Context()
-        self.pool = ProcessPoolExecutor(1, context, _begin)
+        self.pool = ProcessPoolExecutor(1, context, _begin, (self._load,))
         self._first = self.pool.submit(os.getpid)
         self.process = context.process
         return self.pool.submit(function, *arguments)
@@ -176,12 +181,14 @@ def _without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin() -> None:
+def _begin(load: bool) -> None:
     """Make a new process ready."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_follow, daemon=True).start()
     for category in (SkeletonWarning, PluginWarning):  # the report has the one, the first process tells the other
         warnings.simplefilter("ignore", category)
+    if not load:
+        return
     with suppress(Exception):  # every job will say what is wrong
         import_open3d()
         importlib.import_module("glsk_o3d.recipes")

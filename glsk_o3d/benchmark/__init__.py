@@ -1,7 +1,7 @@
-"""A benchmark of random shapes with exactly known axes, and clouds of them as scanners give them.
+"""A benchmark of random shapes with exactly known axes, clouds of them as scanners give them, and scores.
 
 Everything follows from a family, a seed, a variant and a number of points, so that nothing needs to be downloaded. The
-shapes and the clouds need NumPy and SciPy alone.
+shapes, the clouds and the scores need NumPy and SciPy alone.
 
 Examples
 --------
@@ -11,3 +11,7 @@ Examples
 >>> cloud(tree, "depth2", n=2048).shape
 (2048, 3)
 """
+
+import lazy_loader as _lazy
+
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from . import benchmark
 from .batch import batch
 from .branches import branches
 from .console import VisibleGroup, echo
@@ -60,6 +61,7 @@ for command in (
     info,
 ):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
+app.add_typer(benchmark.app, name="benchmark")
 
 
 def _version(wanted: bool) -> None:

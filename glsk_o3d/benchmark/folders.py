@@ -1,0 +1,192 @@
+"""The folder of a benchmark: clouds, true axes, and ``benchmark.json``, which says what there is."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..analysis.truth import Truth
+from ..errors import FileFormatError
+from ..interop.atomic import write_json
+from ..io.axes import read_truth
+from .versions import VERSIONS
+
+INDEX_NAME = "benchmark.json"
+_EXPLAINED = {
+    "clouds/SHAPE_VARIANT.ply": "a cloud: binary PLY, little-endian, float x, y, z; the shape's box has the diagonal 1",
+    "truth/SHAPE.npz": "its true axis, an archive of NumPy's: nodes (V, 3), edges (E, 2), radii (V,)",
+    "scored": "whether answers to this cloud count: it shows enough of the shape",
+    "coverage": "the share of the axis that the cloud shows",
+    "sameness": "to the cloud that is meant: bits, rounding or other; null where the package knows none",
+}
+
+
+@dataclass(frozen=True)
+class CloudFile:
+    """A cloud of a benchmark.
+
+    Attributes
+    ----------
+    shape, variant : str
+    family : str
+    path : Path
+    scored : bool
+        Whether answers to it count.
+
+    Examples
+    --------
+    >>> CloudFile("tubes_100", "clean", "tubes", Path("bench/clouds/tubes_100_clean.ply"), scored=True).name
+    'tubes_100_clean'
+    """
+
+    shape: str
+    variant: str
+    family: str
+    path: Path
+    scored: bool
+
+    @property
+    def name(self) -> str:
+        """What an answer to it is called, before the ending."""
+        return f"{self.shape}_{self.variant}"
+
+
+@dataclass(frozen=True)
+class BenchmarkFolder:
+    """A folder that `make` has written, or is writing.
+
+    Attributes
+    ----------
+    path : Path
+    version : str
+    shapes : dict of str to dict
+        What ``benchmark.json`` says of each shape: family, seed, truth, facts, and clouds by variant.
+    complete : bool
+        Whether all that was asked for is made.
+
+    Examples
+    --------
+    >>> BenchmarkFolder(Path("empty"), "v1").clouds
+    []
+    """
+
+    path: Path
+    version: str
+    shapes: dict[str, dict[str, Any]] = field(default_factory=dict)
+    complete: bool = False
+
+    @property
+    def clouds(self) -> list[CloudFile]:
+        """All clouds, by shape and then in the order of the variants."""
+        return list(self._clouds())
+
+    @property
+    def scored(self) -> list[CloudFile]:
+        """The clouds of which answers count."""
+        return [cloud for cloud in self._clouds() if cloud.scored]
+
+    def _clouds(self) -> Iterator[CloudFile]:
+        order = VERSIONS[self.version].variants
+        for shape, told in sorted(self.shapes.items()):
+            for variant in sorted(told["clouds"], key=order.index):
+                cloud = told["clouds"][variant]
+                place = self.path / cloud["file"]
+                yield CloudFile(shape, variant, told["family"], place, bool(cloud["scored"]))
+
+    @property
+    def whole(self) -> bool:
+        """Whether these are all shapes and variants of the version, and no others."""
+        asked = VERSIONS[self.version]
+        names = {f"{family}_{seed}" for family in asked.families for seed in asked.seeds}
+        variants = set(asked.variants)
+        return names == self.shapes.keys() and all(variants == told["clouds"].keys() for told in self.shapes.values())
+
+    def truth(self, shape: str) -> Truth:
+        """The true axis of a shape.
+
+        Parameters
+        ----------
+        shape : str
+
+        Returns
+        -------
+        Truth
+
+        Raises
+        ------
+        FileNotFoundError
+        FileFormatError
+            What there is, is no axis.
+        """
+        return read_truth(self.path / self.shapes[shape]["truth"])
+
+    def save(self) -> None:
+        """Write ``benchmark.json``."""
+        asked = VERSIONS[self.version]
+        told = {
+            "benchmark": "curve skeletons of point clouds",
+            **{"version": self.version, "complete": self.complete, "whole": self.whole},
+            **{"points": asked.points, "draw": asked.draw, "least_coverage": asked.least_coverage},
+            "explained": _EXPLAINED,
+            "shapes": dict(sorted(self.shapes.items())),
+        }
+        write_json(self.path / INDEX_NAME, told)
+
+
+def read_folder(path: str | os.PathLike) -> BenchmarkFolder:
+    """The benchmark in a folder.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    BenchmarkFolder
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no ``benchmark.json``.
+    FileFormatError
+        It is damaged, or of a version that this package does not know.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     BenchmarkFolder(Path(folder), "v1").save()
+    ...     read_folder(folder).shapes
+    {}
+    """
+    index = Path(path) / INDEX_NAME
+    if not index.is_file():
+        raise FileNotFoundError(f"{index}: no such file: make a benchmark with 'glsk benchmark make {path}' first")
+    try:
+        told = json.loads(index.read_text(encoding="utf-8"))
+        name = told["version"]
+        if name not in VERSIONS:
+            raise FileFormatError(f"{index}: is of version {name!r}: this package knows {', '.join(VERSIONS)}")
+        found = BenchmarkFolder(Path(path), name, told["shapes"], bool(told["complete"]))
+        _check(found)
+    except FileFormatError:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise FileFormatError(f"{index}: is damaged ({type(error).__name__}: {error}): make it anew") from None
+    return found
+
+
+def _check(folder: BenchmarkFolder) -> None:
+    """Raise ValueError for names that lead out of the folder; KeyError and the like for what is not there at all."""
+    for cloud in folder.clouds:
+        truth = folder.shapes[cloud.shape]["truth"]
+        for name in (cloud.path.relative_to(folder.path).as_posix(), truth):
+            place, _, last = name.partition("/")
+            if place not in ("clouds", "truth") or not last or "/" in last or "\\" in last:
+                raise ValueError(f"{name!r} is no file of a benchmark")
+        if cloud.name != Path(cloud.name).name:
+            raise ValueError(f"{cloud.name!r} is no name of a cloud")

@@ -1,0 +1,203 @@
+"""Making a benchmark: the clouds and true axes of a version, as files that any program reads."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..batch.workers import LocalWorkers, died
+from ..errors import BatchError, InvalidParameterError, did_you_mean
+from ..interop.atomic import write_atomically
+from ..io.formats.ply_rows import header, table
+from ..numerics.cores import cores
+from . import versions
+from .folders import INDEX_NAME, BenchmarkFolder, read_folder
+from .versions import Version
+
+Told = dict[str, Any]
+
+
+def make(
+    folder: str | os.PathLike,
+    version: str = "v1",
+    *,
+    families: Iterable[str] | None = None,
+    seeds: Iterable[int] | None = None,
+    variants: Iterable[str] | None = None,
+    jobs: int | None = None,
+    on_shape: Callable[[str, int, int], object] | None = None,
+) -> BenchmarkFolder:
+    """Make a benchmark, or go on where it was left.
+
+    Parameters
+    ----------
+    folder : path-like
+        Made if it is not there. What it has of the same version stays, and is not made again.
+    version : str
+    families : iterable of str, optional
+        Of shapes; by default all of the version.
+    seeds : iterable of int, optional
+        Of the shapes of each family; by default those of the version. Others make other shapes, to develop with.
+    variants : iterable of str, optional
+        Of the clouds; by default all of the version.
+    jobs : int, optional
+        Processes; by default one for each core.
+    on_shape : callable, optional
+        Called with the name of each shape that is done, how many are, and of how many.
+
+    Returns
+    -------
+    BenchmarkFolder
+
+    Raises
+    ------
+    InvalidParameterError
+        An unknown version, family or variant, a seed below 0, or a folder with another version.
+    FileFormatError
+        The folder's ``benchmark.json`` is damaged.
+    BatchError
+        A process died.
+    OSError
+        A file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     made = make(folder, families=["tubes"], seeds=[100], variants=["clean"], jobs=1)
+    ...     made.clouds[0].path.name
+    'tubes_100_clean.ply'
+    """
+    asked = versions.version(version)
+    wanted = _known(families, asked.families, "family"), _known(variants, asked.variants, "variant")
+    numbers = asked.seeds if seeds is None else tuple(dict.fromkeys(seeds))
+    if not numbers or not all(isinstance(each, int | np.integer) and each >= 0 for each in numbers):
+        raise InvalidParameterError(f"seeds must be whole numbers from 0, not {numbers!r}")
+    made = _begun(Path(folder), asked)
+    todo = {}
+    for family in wanted[0]:
+        for seed in map(int, numbers):
+            missing = _missing(made, f"{family}_{seed}", wanted[1])
+            if missing:
+                todo[f"{family}_{seed}"] = partial(_make_shape, made.path, version, family, seed, missing)
+    made = replace(made, complete=False) if todo else made
+    done = 0
+
+    def keep(name: str, told: Told) -> None:
+        nonlocal done
+        before = made.shapes.get(name, {"clouds": {}})
+        made.shapes[name] = told | {"clouds": before["clouds"] | told["clouds"]}
+        made.save()
+        done += 1
+        if on_shape is not None:
+            on_shape(name, done, len(todo))
+
+    _work(todo, cores() if jobs is None else jobs, keep)
+    made = replace(made, complete=True)
+    made.save()
+    return made
+
+
+def _known(words: Iterable[str] | None, known: Sequence[str], what: str) -> list[str]:
+    """The words, each once, or by default all that are known."""
+    found = list(known if words is None else dict.fromkeys(words))
+    for word in found:
+        if word not in known:
+            raise InvalidParameterError(did_you_mean(word, known, f"{what} of the benchmark"))
+    if not found:
+        raise InvalidParameterError(f"no {what} is given: there are {', '.join(known)}")
+    return found
+
+
+def _begun(folder: Path, asked: Version) -> BenchmarkFolder:
+    """The folder as it is, made if it is not there."""
+    for place in ("clouds", "truth"):
+        (folder / place).mkdir(parents=True, exist_ok=True)
+    if not (folder / INDEX_NAME).exists():
+        return BenchmarkFolder(folder, asked.name)
+    found = read_folder(folder)
+    if found.version != asked.name:
+        raise InvalidParameterError(f"{folder}: has version {found.version}, not {asked.name}: give another folder")
+    return found
+
+
+def _missing(made: BenchmarkFolder, name: str, variants: Sequence[str]) -> list[str]:
+    """The variants of a shape of which there is no cloud; all of them where there is no truth."""
+    told = made.shapes.get(name)
+    if told is None or not (made.path / told["truth"]).is_file():
+        made.shapes.pop(name, None)
+        return list(variants)
+    there = {variant for variant, each in told["clouds"].items() if (made.path / each["file"]).is_file()}
+    return [variant for variant in variants if variant not in there]
+
+
+def _work(todo: Mapping[str, Callable[[], Told]], jobs: int, keep: Callable[[str, Told], None]) -> None:
+    """Do the jobs, several at a time, and keep what comes of each."""
+    if jobs < 1:
+        raise InvalidParameterError(f"jobs must be 1 or more, not {jobs}")
+    if jobs == 1:
+        for name, job in todo.items():
+            keep(name, job())
+        return
+    workers, waiting = LocalWorkers(min(jobs, max(len(todo), 1)), load=False), list(todo.items())
+    running: dict[Future, str] = {}
+    try:
+        while waiting or running:
+            while waiting and len(running) < workers.capacity():
+                name, job = waiting.pop(0)
+                running[workers.submit(job)] = name
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                name, error = running.pop(future), future.exception()
+                if error is not None:
+                    raise BatchError(f"{name}: the process died: out of memory?") if died(error) else error
+                keep(name, future.result())
+    finally:
+        workers.close(at_once=False)  # what is in work takes seconds, and then leaves no temporary file
+
+
+def _make_shape(folder: Path, name: str, family: str, seed: int, variants: Sequence[str]) -> Told:
+    """Write a shape's true axis and clouds; gives what ``benchmark.json`` is to say of it."""
+    from .clouds import cloud, coverage
+    from .shapes import shape
+
+    asked, known, drawn = versions.version(name), versions.fingerprints(name), shape(family, seed)
+    truth = f"truth/{drawn.name}.npz"
+    write_atomically(folder / truth, partial(_write_truth, drawn))
+    clouds = {}
+    for variant in variants:
+        points = np.asarray(cloud(drawn, variant, n=asked.points, seed=asked.draw), np.float32)
+        share = 1.0 if variant in asked.whole else float(coverage(drawn, points))
+        called = f"{drawn.name}_{variant}"
+        file, expected = f"clouds/{called}.ply", known.get(called)
+        write_atomically(folder / file, partial(_write_ply, points))
+        clouds[variant] = {
+            **{"file": file, "scored": versions.is_scored(asked, called, share), "coverage": round(share, 4)},
+            **{"fingerprint": versions.fingerprint(points)},
+            "sameness": versions.sameness(points, expected) if expected else None,
+        }
+    return {"family": family, "seed": seed, "truth": truth, "facts": _plain(drawn.facts), "clouds": clouds}
+
+
+def _write_truth(drawn: Any, path: Path) -> None:
+    np.savez(path, nodes=drawn.nodes, edges=drawn.edges, radii=drawn.radii)
+
+
+def _write_ply(points: np.ndarray, path: Path) -> None:
+    rows = table(dict(zip("xyz", points.T, strict=True)))
+    path.write_bytes(header(rows.dtype, len(rows)) + rows.tobytes())
+
+
+def _plain(value: Any) -> Any:
+    """What JSON holds, of facts with numbers and arrays of NumPy's."""
+    if isinstance(value, dict):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(each) for each in value]
+    return value.item() if isinstance(value, np.generic) else value

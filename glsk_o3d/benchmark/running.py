@@ -1,0 +1,230 @@
+"""Running a program over the clouds of a benchmark: our pipelines, or any command."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..errors import FileFormatError, InvalidParameterError, brief
+from ..interop.atomic import write_json
+from ..io.skeletons import READABLE, read_skeleton
+from ..recipes.catalogue import named_pipeline
+from .answers import TIMES_NAME, answer_files, read_times
+from .commands import CAN_LIMIT_MEMORY, Outcome, Runner, filled, words_of
+from .folders import BenchmarkFolder, CloudFile, read_folder
+
+TIME_LIMIT = 600.0  # fitted: seconds; the slowest of the programs that we know take a tenth of it
+_PIPELINE_WORDS = (
+    *(sys.executable, "-m", "glsk_o3d", "skeletonize", "{cloud}", "-o", "{skeleton}"),
+    *("--quiet", "--pipeline"),
+)
+Told = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What came of a run.
+
+    Attributes
+    ----------
+    done, failed : int
+        Clouds with and without an answer, those of earlier runs too.
+    skipped : int
+        Of these, clouds that an earlier run had done.
+    failures : dict of str to str
+        Why there is no answer, by the name of the cloud.
+
+    Examples
+    --------
+    >>> RunResult(1, 0, 0).failures
+    {}
+    """
+
+    done: int
+    failed: int
+    skipped: int
+    failures: dict[str, str] = field(default_factory=dict)
+
+
+def run(
+    folder: BenchmarkFolder | str | os.PathLike,
+    answers: str | os.PathLike,
+    *,
+    pipeline: str | None = None,
+    command: str | Sequence[str] | None = None,
+    ending: str = ".ply",
+    time_limit: float = TIME_LIMIT,
+    memory_limit: float | None = None,
+    jobs: int = 1,
+    retry: bool = False,
+    on_cloud: Callable[[str, Outcome, int, int], object] | None = None,
+) -> RunResult:
+    """Run a program over all clouds that are scored, or go on where a run was left.
+
+    Each cloud has a process of its own. What it writes is taken if it ends well, and if that can be read. Answers are
+    called SHAPE_VARIANT, with the ending; ``times.json`` has the seconds, from the start of each process to its end,
+    and why there is no answer.
+
+    Parameters
+    ----------
+    folder : BenchmarkFolder or path-like
+    answers : path-like
+        A folder, made if it is not there.
+    pipeline : str, optional
+        One of ours by name; "default" if there is no command.
+    command : str or sequence of str, optional
+        Any program, such as ``"mytool {cloud} {skeleton}"``: the places are for the files that it reads and writes.
+    ending : str
+        Of the files that the command writes, one that `read_skeleton` reads.
+    time_limit : float
+        Seconds for each cloud.
+    memory_limit : float, optional
+        GB of address space for each process, on Linux.
+    jobs : int
+        Clouds at a time. More than one disturb the seconds.
+    retry : bool
+        Run again what failed before.
+    on_cloud : callable, optional
+        Called with the name of each cloud that is done, the `Outcome`, how many are, and of how many.
+
+    Returns
+    -------
+    RunResult
+
+    Raises
+    ------
+    InvalidParameterError
+        The command has no place for a file, or there is no such program or pipeline; a limit is wrong; or the folder
+        has answers of another program.
+    FileFormatError
+        The ending is not one of a skeleton, or a file in a folder is damaged.
+    OSError
+
+    Examples
+    --------
+    >>> from glsk_o3d.benchmark import make
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as place:
+    ...     made = make(f"{place}/bench", families=["tubes"], seeds=[100], variants=["clean"], jobs=1)
+    ...     result = run(made, f"{place}/none", command=[sys.executable, "-c", "exit(3)", "{cloud}", "{skeleton}"])
+    >>> result.failures
+    {'tubes_100_clean': 'exit code 3'}
+    """
+    made = folder if isinstance(folder, BenchmarkFolder) else read_folder(folder)
+    words, program = _program(pipeline, command, ending)
+    _check_limits(time_limit, memory_limit, jobs)
+    program |= {"time_limit": time_limit, "memory_limit": memory_limit}
+    place = Path(answers)
+    place.mkdir(parents=True, exist_ok=True)
+    times = _times(place, made, program)
+    done = {name for name, told in times.items() if not (retry and told["failure"] is not None)}
+    todo = [cloud for cloud in made.scored if cloud.name not in done]
+    record = {"benchmark": made.version, "program": program, "machine": _machine(jobs), "clouds": times}
+    count = 0
+
+    def keep(cloud: CloudFile, outcome: Outcome) -> None:
+        nonlocal count
+        times[cloud.name] = {"seconds": round(outcome.seconds, 4), "failure": outcome.failure}
+        write_json(place / TIMES_NAME, record)
+        count += 1
+        if on_cloud is not None:
+            on_cloud(cloud.name, outcome, count, len(todo))
+
+    runner = Runner(time_limit, memory_limit)
+    with tempfile.TemporaryDirectory(prefix=".run_", dir=place, ignore_cleanup_errors=True) as work:
+        _each(todo, jobs, lambda cloud: _answer(runner, words, cloud, Path(work), place, ending), keep, runner)
+    known = {cloud.name: times[cloud.name]["failure"] for cloud in made.scored}
+    failures = {name: failure for name, failure in known.items() if failure is not None}
+    return RunResult(len(known) - len(failures), len(failures), len(known) - len(todo), failures)
+
+
+def _program(pipeline: str | None, command: str | Sequence[str] | None, ending: str) -> tuple[list[str], Told]:
+    """The words of the command to run, and what ``times.json`` says of it."""
+    if ending not in READABLE:
+        raise FileFormatError(f"{ending!r} is no ending of a skeleton: there are {', '.join(READABLE)}")
+    if command is not None:
+        if pipeline is not None:
+            raise InvalidParameterError("a pipeline and a command are given: give one of them")
+        return words_of(command), {"command": command if isinstance(command, str) else [*command], "ending": ending}
+    named_pipeline(pipeline or "default").check_complete()
+    return [*_PIPELINE_WORDS, pipeline or "default"], {"pipeline": pipeline or "default", "ending": ending}
+
+
+def _check_limits(time_limit: float, memory_limit: float | None, jobs: int) -> None:
+    if not 0 < time_limit < float("inf") or jobs < 1:
+        raise InvalidParameterError(f"the time limit must be above 0 and jobs 1 or more, not {time_limit:g} and {jobs}")
+    if memory_limit is not None and not memory_limit > 0:
+        raise InvalidParameterError(f"the memory limit must be above 0, not {memory_limit:g}")
+    if memory_limit is not None and not CAN_LIMIT_MEMORY:
+        raise InvalidParameterError("this system cannot limit the memory of a process: leave the limit out")
+
+
+def _times(place: Path, made: BenchmarkFolder, program: Told) -> dict[str, Told]:
+    """What earlier runs of the same program tell of each cloud."""
+    files, times, path = answer_files(place), read_times(place), place / TIMES_NAME
+    before = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    same = (before.get("benchmark"), before.get("program")) == (made.version, json.loads(json.dumps(program)))
+    if not same and (before or any(cloud.name in files for cloud in made.scored)):
+        raise InvalidParameterError(f"{place}: has answers of another program, or with other limits: give another one")
+    return {name: told for name, told in times.items() if told["failure"] is not None or name in files}
+
+
+def _machine(jobs: int) -> Told:
+    return {"system": platform.platform(), "cores": os.cpu_count(), "jobs": jobs}
+
+
+def _each(
+    todo: Sequence[CloudFile],
+    jobs: int,
+    job: Callable[[CloudFile], Outcome],
+    keep: Callable[[CloudFile, Outcome], None],
+    runner: Runner,
+) -> None:
+    """Do a job for each cloud, several at a time, and keep the outcomes; end all of them when something goes wrong."""
+    pool, waiting = ThreadPoolExecutor(jobs), [*todo]
+    running: dict[Future[Outcome], CloudFile] = {}
+    try:
+        while waiting or running:
+            while waiting and len(running) < jobs:
+                cloud = waiting.pop(0)
+                running[pool.submit(job, cloud)] = cloud
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                keep(running.pop(future), future.result())
+    finally:
+        runner.stop()
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _answer(runner: Runner, words: list[str], cloud: CloudFile, work: Path, place: Path, ending: str) -> Outcome:
+    """Run the program on a cloud, and take its answer if it is one."""
+    skeleton = work.resolve() / f"{cloud.name}{ending}"
+    said = work / f"{cloud.name}.log"
+    outcome = runner.run(filled(words, cloud.path.resolve(), skeleton), said)
+    said.unlink(missing_ok=True)
+    failure = outcome.failure or _fault(skeleton)
+    if failure is None:
+        os.replace(skeleton, place / skeleton.name)
+    else:
+        (place / skeleton.name).unlink(missing_ok=True)
+        shutil.rmtree(skeleton) if skeleton.is_dir() else skeleton.unlink(missing_ok=True)
+    return outcome._replace(failure=failure)
+
+
+def _fault(skeleton: Path) -> str | None:
+    """Why the file that a program wrote is no answer."""
+    if not skeleton.is_file():
+        return "it wrote no skeleton"
+    try:
+        found = read_skeleton(skeleton)
+    except (FileFormatError, OSError, MemoryError) as error:
+        return f"it wrote no skeleton: {brief(error).removeprefix(f'{skeleton}: ')}"
+    return None if len(found.vertices) else "it wrote an empty skeleton"

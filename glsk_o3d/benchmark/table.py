@@ -1,0 +1,203 @@
+"""The table of the benchmark: means with intervals, for all clouds and for each kind, of one or several programs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from ..errors import InvalidParameterError
+from ..interop.atomic import write_atomically, write_json
+from .answers import MEASURES, Results
+from .intervals import mean_with_interval, told
+
+_COLUMNS = MEASURES[:7]  # in Markdown; JSON has them all
+_HEADS = {"tips_f1": "tips F1", "junctions_f1": "junctions F1"}
+_DIGITS = {"error": 3}
+Cell = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Leaderboard:
+    """Means with intervals of several programs, the best first.
+
+    Attributes
+    ----------
+    benchmark : str
+        The version.
+    whole : bool
+        Whether the clouds are all of the version, and no others.
+    entries : list of dict
+        For each program its `name`, what holds for `all` its answers, and by variant in `variants`: how many `clouds`
+        and `shapes`, how many `failures`, the median `seconds` or None, and for each measure its mean and the ends of
+        its 95 % interval, or None.
+
+    Examples
+    --------
+    >>> Leaderboard("v1", True, []).as_dict()
+    {'benchmark': 'v1', 'whole': True, 'entries': []}
+    """
+
+    benchmark: str
+    whole: bool
+    entries: list[dict[str, Any]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it, as JSON holds it.
+
+        Returns
+        -------
+        dict
+        """
+        return {"benchmark": self.benchmark, "whole": self.whole, "entries": self.entries}
+
+    def to_json(self, path: str | os.PathLike) -> None:
+        """Write all numbers.
+
+        Parameters
+        ----------
+        path : path-like
+        """
+        write_json(path, self.as_dict())
+
+    def to_markdown(self, path: str | os.PathLike) -> None:
+        """Write the tables.
+
+        Parameters
+        ----------
+        path : path-like
+        """
+        write_atomically(path, lambda temporary: temporary.write_text(self.markdown(), encoding="utf-8"))
+
+    def markdown(self) -> str:
+        """The tables in Markdown: all programs over all clouds, and each program by variant.
+
+        Returns
+        -------
+        str
+        """
+        parts = [f"Benchmark {self.benchmark}{'' if self.whole else ', not all of it, or other shapes'}. {_CAPTION}"]
+        if self.entries:
+            first = self.entries[0]["all"]
+            title = f"{first['clouds']} clouds of {first['shapes']} shapes"
+            parts.append(_table(title, "program", ((each["name"], each["all"]) for each in self.entries)))
+        parts += [_table(each["name"], "variant", each["variants"].items()) for each in self.entries]
+        return "\n\n".join(parts) + "\n"
+
+
+_CAPTION = (
+    "Means, and in brackets 95 % intervals from drawing the shapes anew. A failure is neither perfect nor right in its "
+    "topology, and its F1 are 0; what comes after these are means over the answers that could be scored. Seconds are "
+    "medians."
+)
+
+
+def leaderboard(results: Iterable[Results]) -> Leaderboard:
+    """Means with intervals of the results of several programs, the best first: by `perfect`, and then by `topology`.
+
+    Shapes are drawn anew, each with all its clouds, since clouds of one shape are no independent evidence.
+
+    Parameters
+    ----------
+    results : iterable of Results
+        Of the same clouds, with different names.
+
+    Returns
+    -------
+    Leaderboard
+
+    Raises
+    ------
+    InvalidParameterError
+        They are of different clouds, or two have the same name, or there are none.
+
+    Examples
+    --------
+    >>> from glsk_o3d.benchmark import Results
+    >>> from glsk_o3d.benchmark.scoring import Scores
+    >>> rows = [dict(shape="tubes_100", variant="clean", seconds=None, **Scores.of_failure("no answer").as_dict())]
+    >>> leaderboard([Results("v1", "mine", False, rows)]).entries[0]["all"]["failures"]
+    1
+    """
+    found = list(results)
+    if not found or not found[0].rows:
+        raise InvalidParameterError("there are no scores to make a table of")
+    first = found[0]
+    for each in found[1:]:
+        if each.benchmark != first.benchmark or _clouds(each) != _clouds(first):
+            raise InvalidParameterError(
+                f"{each.name!r} and {first.name!r} were scored on different clouds: make one benchmark for both"
+            )
+    names = [each.name for each in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidParameterError(f"two programs are called {name!r}: score one with another name")
+    entries = [_entry(each) for each in found]
+    entries.sort(key=lambda entry: [-entry["all"][measure][0] for measure in ("perfect", "topology")])
+    return Leaderboard(first.benchmark, first.whole, entries)
+
+
+def _clouds(results: Results) -> set[tuple[str, str]]:
+    return {(row["shape"], row["variant"]) for row in results.rows}
+
+
+def _entry(results: Results) -> dict[str, Any]:
+    """The means of a program: over all clouds, and by variant in the order in which they come."""
+    variants = dict.fromkeys(row["variant"] for row in results.rows)
+    parts = {variant: [row for row in results.rows if row["variant"] == variant] for variant in variants}
+    by_variant = {variant: _cell(rows) for variant, rows in parts.items()}
+    return {"name": results.name, "all": _cell(results.rows), "variants": by_variant}
+
+
+def _cell(rows: Sequence[dict[str, Any]]) -> Cell:
+    cell: Cell = {"clouds": len(rows), "shapes": len({row["shape"] for row in rows})}
+    cell["failures"] = sum(row["failure"] is not None for row in rows)
+    for measure in MEASURES:
+        known = [row for row in rows if row[measure] is not None]
+        found = mean_with_interval([row["shape"] for row in known], [row[measure] for row in known])
+        cell[measure] = list(found) if known else None
+    seconds = [row["seconds"] for row in rows if row["seconds"] is not None and row["failure"] is None]
+    cell["seconds"] = median(seconds) if seconds else None
+    return cell
+
+
+def _table(title: str, first: str, lines: Iterable[tuple[str, Cell]]) -> str:
+    heads = [first, "clouds", "failures", *(_HEADS.get(measure, measure) for measure in _COLUMNS), "s"]
+    shown = [_line(heads), _line(["---", *["--:"] * (len(heads) - 1)])]
+    return "\n".join([f"**{_plain(title)}**", "", *shown, *(_line(_words(name, cell)) for name, cell in lines)])
+
+
+def _words(name: str, cell: Cell) -> list[str]:
+    means = (told(*_ends(cell[measure]), digits=_DIGITS.get(measure, 2)) for measure in _COLUMNS)
+    seconds = "-" if cell["seconds"] is None else f"{cell['seconds']:.2f}"
+    return [_plain(name), str(cell["clouds"]), str(cell["failures"]), *means, seconds]
+
+
+def _ends(found: list[float] | None) -> tuple[float, float, float]:
+    mean, low, high = found or (np.nan, np.nan, np.nan)
+    return mean, low, high
+
+
+def _line(words: Iterable[str]) -> str:
+    return f"| {' | '.join(words)} |"
+
+
+def _plain(name: str) -> str:
+    """A name that breaks no table."""
+    return " ".join(name.split()).replace("|", "\\|")
+
+
+def save_leaderboard(board: Leaderboard, path: str | os.PathLike) -> None:
+    """Write a leaderboard: Markdown or JSON, by the ending.
+
+    Parameters
+    ----------
+    board : Leaderboard
+    path : path-like
+    """
+    {".md": board.to_markdown, ".json": board.to_json}[Path(path).suffix.lower()](path)

@@ -1,0 +1,223 @@
+"""``glsk benchmark``: shapes with known axes, and how well any program finds them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .console import VisibleGroup, echo, print_json, print_rows, progress, say
+from .options import Json, Quiet, Verbose
+from .reporting import WrongUsage, reporting
+
+if TYPE_CHECKING:
+    from ..benchmark.commands import Outcome
+
+app = typer.Typer(
+    cls=VisibleGroup,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["--help", "-h"]},
+    help="Score any program on shapes with known axes.",
+)
+
+Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Of the benchmark, as 'glsk benchmark make' made it.")]
+Answers = Annotated[Path, typer.Argument(metavar="ANSWERS", help="A folder of skeletons named SHAPE_VARIANT.")]
+Jobs = Annotated[
+    int | None, typer.Option("--jobs", metavar="N", min=1, help="Processes; by default one for each core.")
+]
+
+
+@app.command()
+def make(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Made if needed; what it has is not made again.")],
+    families: Annotated[
+        str | None, typer.Option(metavar="NAMES", help="Of shapes, with commas; by default all of the version.")
+    ] = None,
+    seeds: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FIRST:BEYOND", help="Or numbers with commas; others than the version's make other shapes."
+        ),
+    ] = None,
+    variants: Annotated[
+        str | None, typer.Option(metavar="NAMES", help="Of clouds, with commas; by default all of the version.")
+    ] = None,
+    version: Annotated[str, typer.Option(metavar="NAME", help="Of the benchmark.")] = "v1",
+    jobs: Jobs = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Make the clouds and true axes. The same command again goes on where it was left."""
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..benchmark import make as make_folder
+
+        with progress(not quiet, remaining=True) as update:
+            update("drawing shapes")
+            made = make_folder(
+                folder,
+                version,
+                families=_words(families),
+                seeds=_seeds(seeds),
+                variants=_words(variants),
+                jobs=jobs,
+                on_shape=update,
+            )
+        cells = [cloud for told in made.shapes.values() for cloud in told["clouds"].values()]
+        same = [cell["sameness"] for cell in cells]
+        sameness = {kind: same.count(kind) for kind in ("bits", "rounding", "other")}
+        told = {
+            **{"folder": str(folder), "version": made.version, "shapes": len(made.shapes), "clouds": len(cells)},
+            **{"scored": len(made.scored), "whole": made.whole},
+            "sameness": sameness,
+        }
+        if as_json:
+            print_json(told)
+        elif not quiet:
+            words = ", ".join(f"{count} {kind}" for kind, count in sameness.items() if count)
+            print_rows({**told, "whole": "yes" if made.whole else "no", "sameness": words or None})
+        if same.count("other") and not quiet:
+            say("warning", f"{same.count('other')} clouds are not those that {made.version} means: see benchmark.json")
+
+
+@app.command()
+def run(
+    folder: Folder,
+    answers: Answers,
+    pipeline: Annotated[
+        str | None, typer.Option(metavar="NAME", help="One of ours; default, if there is no command.")
+    ] = None,
+    command: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WORDS", help="Any program: 'mytool {cloud} {skeleton}', the files that it reads and writes."
+        ),
+    ] = None,
+    ending: Annotated[str, typer.Option(metavar="ENDING", help="Of the files that the command writes.")] = ".ply",
+    time_limit: Annotated[float, typer.Option(metavar="SECONDS", help="For each cloud.")] = 600.0,
+    memory_limit: Annotated[
+        float | None, typer.Option(metavar="GB", help="Of address space for each process, on Linux.")
+    ] = None,
+    jobs: Annotated[int, typer.Option(metavar="N", min=1, help="Clouds at a time; several disturb the seconds.")] = 1,
+    retry: Annotated[bool, typer.Option("--retry", help="Run again what failed before.")] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Run a program over all clouds, each in a process of its own. The same command again goes on where it was left.
+
+    Failures are counted, and do not change the exit code: ANSWERS/times.json says why there is no answer.
+    """
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..benchmark import run as run_program
+
+        with progress(not quiet, remaining=True) as update:
+
+            def step(name: str, outcome: Outcome, done: int, total: int) -> None:
+                update(name, done, total)
+                if outcome.failure is not None and not quiet:
+                    say("warning", f"{name}: {outcome.failure}")
+                elif verbose:
+                    say("info", f"{name}: {outcome.seconds:.2f} s")
+
+            update("starting")
+            result = run_program(
+                folder,
+                answers,
+                pipeline=pipeline,
+                command=command,
+                ending=ending,
+                time_limit=time_limit,
+                memory_limit=memory_limit,
+                jobs=jobs,
+                retry=retry,
+                on_cloud=step,
+            )
+        told = {"answers": str(answers), "done": result.done, "failed": result.failed, "skipped": result.skipped}
+        if as_json:
+            print_json({**told, "failures": result.failures})
+        elif not quiet:
+            print_rows(told)
+
+
+@app.command()
+def score(
+    folder: Folder,
+    answers: Answers,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="JSON", help="Where to write the scores.")],
+    name: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of the program, for the table; by default that of its folder.")
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Score the answers of a program. What is missing or unreadable counts as a failure."""
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..benchmark import leaderboard, score_answers
+        from .outputs import REPORT_FILE, check_findings
+
+        check_findings([(output, *REPORT_FILE)])
+        with progress(not quiet, remaining=True) as update:
+            update("reading")
+            results = score_answers(folder, answers, name=name, on_cloud=update)
+        results.save(output)
+        found = leaderboard([results]).entries[0]["all"]
+        if as_json:
+            print_json({"name": results.name, **found, "files": [str(output)]})
+        elif not quiet:
+            means = {measure: told[0] for measure, told in found.items() if isinstance(told, list)}
+            print_rows({"name": results.name, "clouds": found["clouds"], "failures": found["failures"], **means})
+            echo(f"wrote {output}")
+
+
+@app.command()
+def table(
+    scores: Annotated[list[Path], typer.Argument(metavar="SCORES...", help="What 'glsk benchmark score' wrote.")],
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="Write it: md or json; may be repeated. Else it is printed."
+        ),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Compare programs: means with intervals, for all clouds and by kind."""
+    with reporting(quiet=quiet, verbose=verbose):
+        from ..benchmark import leaderboard, read_results
+        from ..benchmark.table import save_leaderboard
+        from .outputs import check_findings
+
+        files = output or []
+        check_findings([(path, (".md", ".json"), "table is Markdown or JSON") for path in files], *scores)
+        board = leaderboard(map(read_results, scores))
+        for path in files:
+            save_leaderboard(board, path)
+        if as_json:
+            print_json({**board.as_dict(), "files": [str(path) for path in files]})
+        elif files and not quiet:
+            for path in files:
+                echo(f"wrote {path}")
+        elif not quiet:
+            echo(board.markdown().rstrip())
+
+
+def _words(text: str | None) -> list[str] | None:
+    return None if text is None else [word.strip() for word in text.split(",") if word.strip()]
+
+
+def _seeds(text: str | None) -> list[int] | None:
+    """What ``--seeds`` says: ``100:112``, or ``100,105``."""
+    if text is None:
+        return None
+    try:
+        if ":" in text:
+            first, beyond = map(int, text.split(":"))
+            return list(range(first, beyond))
+        return [int(word) for word in text.split(",")]
+    except ValueError:
+        raise WrongUsage(f"--seeds {text}: write FIRST:BEYOND, or numbers with commas between them") from None

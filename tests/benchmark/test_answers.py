@@ -1,0 +1,168 @@
+"""Folders of answers: every format, every way to fail, and nothing dropped."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glsk_o3d import Skeleton
+from glsk_o3d.benchmark import Results, read_results, score, score_answers
+from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.skeletons import READABLE
+
+CLOUD = "tubes_100_clean"
+
+
+def rows_of(results):
+    return {f"{row['shape']}_{row['variant']}": row for row in results.rows}
+
+
+@pytest.fixture
+def answer(small, tmp_path):
+    """Score one answer to the first tube: a skeleton, bytes, or a function of the path; gives its row."""
+    place = tmp_path / "answers"
+    place.mkdir()
+
+    def found(content, ending=".ply", name=CLOUD):
+        (place / "tubes_101_clean.obj").write_text("v 0 0 0\nv 1 0 0\nl 1 2\n")
+        path = place / f"{name}{ending}"
+        if isinstance(content, bytes):
+            path.write_bytes(content)
+        else:
+            content(path)
+        results = score_answers(small, place)
+        assert len(results.rows) == 7
+        return rows_of(results)[CLOUD]
+
+    return found
+
+
+@pytest.mark.parametrize("ending", READABLE)
+def test_every_format_that_is_read(answer, small, ending):
+    axis = small.truth("tubes_100")
+    found = answer(Skeleton(axis.nodes, axis.edges, axis.radii, (), (), ()).save, ending)
+    assert (found["perfect"], found["failure"], found["seconds"]) == (True, None, None)
+    assert found["error"] < 1e-6
+
+
+def test_scores_are_those_of_score(answer, small):
+    axis = small.truth("tubes_100")
+    bent = axis.nodes + [[0, 0.02, 0], [0, 0, 0], [0, 0, 0.03]]
+    found = answer(Skeleton(bent, axis.edges, axis.radii, (), (), ()).save, ".json")
+    expected = score(axis, bent, axis.edges).as_dict()
+    facts = dict(shape="tubes_100", family="tubes", variant="clean", seconds=None)
+    assert found == {**facts, **expected}
+
+
+NO_EDGES = b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+NO_EDGES += b"end_header\n0 0 0\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "ending", "said"),
+    [
+        (b"", ".ply", "unreadable"),
+        (b"", ".json", "unreadable"),
+        (b"rubbish", ".obj", "unreadable"),
+        (b"\x00\xff" * 1000, ".swc", "unreadable"),
+        (NO_EDGES, ".ply", "is a cloud"),
+        (b"v nan 0 0\nv 1 0 0\nl 1 2\n", ".obj", "unreadable"),
+        (b"v 0 0 0\nv 1 0 0\nl 1 3\n", ".obj", "unreadable"),
+        (b"v 0 0 0\nv 1e300 0 0\nl 1 2\n", ".obj", "units"),
+    ],
+)
+def test_what_is_no_skeleton_is_a_failure(answer, tmp_path, content, ending, said):
+    found = answer(content, ending)
+    assert said in found["failure"]
+    assert str(tmp_path) not in found["failure"]
+    told = {name: value for name, value in found.items() if value is not None}
+    del told["failure"], told["shape"], told["family"], told["variant"]
+    assert told == dict(perfect=False, topology=False, tips_f1=0, junctions_f1=0)
+
+
+def test_a_folder_or_a_link_to_nothing_is_a_failure(answer, tmp_path):
+    assert "unreadable" in answer(lambda path: path.mkdir())["failure"]
+    (tmp_path / "answers" / f"{CLOUD}.ply").rmdir()
+    assert "unreadable" in answer(lambda path: path.symlink_to(tmp_path / "none.ply"))["failure"]
+
+
+def test_what_is_missing_is_a_failure(perfect, small):
+    (perfect / f"{CLOUD}.obj").unlink()
+    results = score_answers(small, perfect)
+    assert [name for name, row in rows_of(results).items() if row["failure"] == "no answer"] == [CLOUD]
+    assert (results.failures, len(results.rows), results.name, results.whole) == (1, 7, "perfect", False)
+    assert rows_of(results)["trees_100_scan2"]["perfect"]
+
+
+def test_other_files_do_not_count(perfect, small):
+    before = score_answers(small, perfect).rows
+    for name in ("notes.txt", "trees_101_scan2.obj", "tubes_100_clean.log", "else.ply", ".hidden.ply"):
+        (perfect / name).write_text("rubbish")
+    assert score_answers(small, perfect).rows == before
+
+
+def test_capitals_in_the_ending(perfect, small):
+    (perfect / f"{CLOUD}.obj").rename(perfect / f"{CLOUD}.OBJ")
+    assert score_answers(small, perfect).failures == 0
+
+
+def test_two_answers_are_refused(perfect, small):
+    (perfect / f"{CLOUD}.swc").write_text("1 0 0 0 0 1 -1\n")
+    with pytest.raises(FileFormatError, match=f"{CLOUD}.swc answers the same cloud: keep one"):
+        score_answers(small, perfect)
+
+
+def test_a_folder_without_any_answer_is_refused(small, tmp_path):
+    with pytest.raises(FileNotFoundError, match="no such folder"):
+        score_answers(small, tmp_path / "none")
+    (tmp_path / "none").mkdir()
+    with pytest.raises(FileFormatError, match=r"such as trees_100_clean\.ply"):
+        score_answers(small, tmp_path / "none")
+
+
+def test_times_are_taken_over(perfect, small):
+    (perfect / f"{CLOUD}.obj").unlink()
+    clouds = {CLOUD: dict(seconds=600.1, failure="not done after 600 s"), "trees_100_clean": dict(seconds=1.5)}
+    (perfect / "times.json").write_text(json.dumps({"clouds": clouds}))
+    rows = rows_of(score_answers(small, perfect, name="mine"))
+    assert (rows[CLOUD]["failure"], rows[CLOUD]["seconds"]) == ("no answer: not done after 600 s", 600.1)
+    assert (rows["trees_100_clean"]["failure"], rows["trees_100_clean"]["seconds"]) == (None, 1.5)
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"clouds": [1]}', '{"clouds": {"a": 1}}'])
+def test_damaged_times(perfect, small, text):
+    (perfect / "times.json").write_text(text)
+    with pytest.raises(FileFormatError, match="is damaged"):
+        score_answers(small, perfect)
+
+
+def test_results_are_read_as_they_were_written(perfect, small, tmp_path):
+    (perfect / f"{CLOUD}.obj").unlink()
+    results = score_answers(str(small.path), perfect, name="Größe | 1")
+    results.save(tmp_path / "scores.json")
+    assert read_results(tmp_path / "scores.json") == results
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"benchmark": "v1", "name": "a", "whole": true, "clouds": [{}]}'])
+def test_damaged_results(tmp_path, text):
+    (tmp_path / "scores.json").write_text(text)
+    with pytest.raises(FileFormatError, match=r"scores\.json: not the scores"):
+        read_results(tmp_path / "scores.json")
+
+
+def test_results_with_words_for_numbers(perfect, small, tmp_path):
+    results = score_answers(small, perfect)
+    rows = [{**row, "error": "best"} for row in results.rows]
+    replace(results, rows=rows).save(tmp_path / "scores.json")
+    with pytest.raises(FileFormatError, match="no number"):
+        read_results(tmp_path / "scores.json")
+    with pytest.raises(FileNotFoundError):
+        read_results(tmp_path / "none.json")
+
+
+def test_progress_is_told(perfect, small):
+    told = []
+    score_answers(small, perfect, on_cloud=lambda *words: told.append(words))
+    assert [words[1:] for words in told] == [(done, 7) for done in np.arange(1, 8)]
+    assert isinstance(score_answers(small, perfect), Results)

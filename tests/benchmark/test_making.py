@@ -1,0 +1,240 @@
+"""Making a benchmark: what is in the folder, going on, and what is refused."""
+
+import json
+import sys
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+
+import numpy as np
+import pytest
+
+from glsk_o3d import read_cloud
+from glsk_o3d.benchmark import make, read_folder, versions
+from glsk_o3d.benchmark.folders import INDEX_NAME
+from glsk_o3d.errors import BatchError, FileFormatError, InvalidParameterError
+
+CHOICE = dict(families=["tubes", "trees"], seeds=[100, 101], variants=["clean", "scan2"], jobs=1)
+
+
+def everything(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_what_is_in_the_folder(small):
+    shapes = ["trees_100", "trees_101", "tubes_100", "tubes_101"]
+    clouds = [f"clouds/{shape}_{variant}.ply" for shape in shapes for variant in ("clean", "scan2")]
+    assert sorted(everything(small.path)) == [INDEX_NAME, *clouds, *(f"truth/{shape}.npz" for shape in shapes)]
+    assert [cloud.path.relative_to(small.path).as_posix() for cloud in small.clouds] == clouds
+    assert [cloud.name for cloud in small.clouds if not cloud.scored] == ["trees_101_scan2"]
+    told = json.loads((small.path / INDEX_NAME).read_text())
+    assert (told["version"], told["complete"], told["whole"], told["points"]) == ("v1", True, False, 4096)
+    tree = told["shapes"]["trees_101"]
+    assert (tree["family"], tree["seed"]) == ("trees", 101)
+    assert tree["facts"] == {"length": 0.8, "loops": 0, "many": [0, 1]}
+    assert [tree["clouds"][variant]["coverage"] for variant in ("clean", "scan2")] == [1.0, 0.5]
+    assert tree["clouds"]["clean"]["sameness"] is None
+    again = read_folder(small.path)
+    assert (again.version, again.shapes, again.complete) == ("v1", small.shapes, True)
+
+
+def test_clouds_and_axes_are_those_drawn(small, rods):
+    tube = sys.modules["glsk_o3d.benchmark.shapes"].shape("tubes", 101)
+    points = sys.modules["glsk_o3d.benchmark.clouds"].cloud(tube, "scan2", n=4096, seed=0).astype(np.float32)
+    path = small.path / "clouds" / "tubes_101_scan2.ply"
+    np.testing.assert_array_equal(np.asarray(read_cloud(path).points, np.float32), points)
+    header, _, rows = path.read_bytes().partition(b"end_header\n")
+    assert header == b"ply\nformat binary_little_endian 1.0\nelement vertex 4096\n" + b"".join(
+        b"property float %s\n" % name for name in (b"x", b"y", b"z")
+    )
+    assert rows == points.astype("<f4").tobytes()
+    cell = small.shapes["tubes_101"]["clouds"]["scan2"]
+    assert versions.sameness(points, cell["fingerprint"]) == "bits"
+    truth = small.truth("tubes_101")
+    for name in ("nodes", "edges", "radii"):
+        np.testing.assert_array_equal(getattr(truth, name), getattr(tube, name))
+
+
+def test_the_same_again_makes_nothing_and_changes_nothing(small, rods):
+    before, times = everything(small.path), len(rods)
+    make(small.path, **CHOICE)
+    assert (everything(small.path), len(rods)) == (before, times)
+
+
+def test_an_interrupted_one_goes_on(small, rods, tmp_path):
+    expected = everything(small.path)
+    rods.clear()
+
+    def interrupt(name, done, total):
+        assert total == 4
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make(tmp_path / "again", **CHOICE, on_shape=interrupt)
+    assert not read_folder(tmp_path / "again").complete
+    assert rods == ["tubes_100", "tubes_101"]
+    told = []
+    make(tmp_path / "again", **CHOICE, on_shape=lambda *words: told.append(words))
+    assert rods == ["tubes_100", "tubes_101", "trees_100", "trees_101"]
+    assert told == [("trees_100", 1, 2), ("trees_101", 2, 2)]
+    assert everything(tmp_path / "again") == expected
+
+
+@pytest.mark.parametrize("lost", ["clouds/tubes_100_scan2.ply", "truth/tubes_100.npz"])
+def test_what_is_lost_is_made_again(small, rods, lost):
+    before = everything(small.path)
+    (small.path / lost).unlink()
+    rods.clear()
+    make(small.path, **CHOICE)
+    assert rods == ["tubes_100"]
+    assert everything(small.path) == before
+
+
+def test_more_of_it_is_added(small, rods):
+    rods.clear()
+    made = make(small.path, families=["tubes"], seeds=[101, 7], variants=["lidar", "clean"], jobs=1)
+    assert rods == ["tubes_101", "tubes_7"]
+    assert len(made.clouds) == 8 + 1 + 2
+    assert list(made.shapes["tubes_101"]["clouds"]) == ["clean", "scan2", "lidar"]
+    assert [cloud.variant for cloud in made.clouds if cloud.shape == "tubes_101"] == ["clean", "scan2", "lidar"]
+
+
+def test_the_whole_version(rods, tmp_path, monkeypatch):
+    short = versions.Version("v1", ("tubes",), (100, 101), ("clean",), 64, 0, ("clean",), 0.97)
+    monkeypatch.setitem(versions.VERSIONS, "v1", short)
+    assert not make(tmp_path / "a", seeds=[100], jobs=1).whole
+    assert make(tmp_path / "a", jobs=1).whole
+    assert not make(tmp_path / "a", seeds=[7], jobs=1).whole
+
+
+def test_sameness_is_told(rods, tmp_path, monkeypatch):
+    made = make(tmp_path / "a", families=["tubes"], seeds=[100, 101], variants=["clean"], jobs=1)
+    words = made.shapes["tubes_100"]["clouds"]["clean"]["fingerprint"]
+    near = " ".join(["00000000", *words.split()[1:]])
+    known = {"tubes_100_clean": words, "tubes_101_clean": words, "tubes_102_clean": near}
+    monkeypatch.setattr(versions, "fingerprints", lambda name: known)
+    again = make(tmp_path / "b", families=["tubes"], seeds=[100, 101, 103], variants=["clean"], jobs=1)
+    said = [told["clouds"]["clean"]["sameness"] for told in again.shapes.values()]
+    assert said == ["bits", "other", None]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (dict(version="v9"), "no version of the benchmark is called 'v9'"),
+        (dict(families=["tube"]), "did you mean 'tubes'"),
+        (dict(variants=["claen"]), "did you mean 'clean'"),
+        (dict(variants=[]), "no variant is given"),
+        (dict(seeds=[-1]), "whole numbers from 0"),
+        (dict(seeds=[]), "whole numbers from 0"),
+        (dict(jobs=0), "1 or more"),
+    ],
+)
+def test_wrong_words(rods, tmp_path, wrong, said):
+    with pytest.raises(InvalidParameterError, match=said):
+        make(tmp_path / "new", **{**CHOICE, **wrong})
+    assert rods == []
+
+
+def test_another_version_is_not_mixed_in(small, monkeypatch):
+    monkeypatch.setitem(versions.VERSIONS, "v0", versions.VERSIONS["v1"].__class__("v0", *[()] * 3, 1, 0, (), 1))
+    told = json.loads((small.path / INDEX_NAME).read_text())
+    (small.path / INDEX_NAME).write_text(json.dumps({**told, "version": "v0", "shapes": {}}))
+    with pytest.raises(InvalidParameterError, match="has version v0, not v1"):
+        make(small.path, **CHOICE)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"version": "v9", "complete": true, "shapes": {}}',
+        '{"version": "v1", "complete": true, "shapes": {"a": {}}}',
+        '{"version": "v1", "complete": true, "shapes": 3}',
+        "[" * 100_000,
+    ],
+)
+def test_a_damaged_index(tmp_path, text):
+    (tmp_path / INDEX_NAME).write_text(text)
+    with pytest.raises(FileFormatError, match=INDEX_NAME):
+        read_folder(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("part", "name"),
+    [
+        ("file", "../secret.ply"),
+        ("file", "clouds/../../secret.ply"),
+        ("file", "/etc/passwd"),
+        ("truth", "truth/../x.npz"),
+        ("truth", "x"),
+    ],
+)
+def test_an_index_leads_nowhere_else(small, part, name):
+    told = json.loads((small.path / INDEX_NAME).read_text())
+    tube = told["shapes"]["tubes_100"]
+    (tube if part == "truth" else tube["clouds"]["clean"])[part] = name
+    (small.path / INDEX_NAME).write_text(json.dumps(told))
+    with pytest.raises(FileFormatError, match="damaged"):
+        read_folder(small.path)
+
+
+def test_no_benchmark(tmp_path):
+    with pytest.raises(FileNotFoundError, match="glsk benchmark make"):
+        read_folder(tmp_path)
+
+
+def test_in_two_processes_it_is_the_same(tmp_path):
+    pytest.importorskip("glsk_o3d.benchmark.shapes")  # what is drawn, not the rods of the other tests
+    choice = dict(families=["tubes"], seeds=[100, 101], variants=["clean", "density"])
+    alone, together = (make(tmp_path / str(jobs), **choice, jobs=jobs) for jobs in (1, 2))
+    assert everything(alone.path) == everything(together.path)
+    assert len(together.clouds) == 4
+
+
+def test_what_is_drawn_is_what_the_package_knows(tmp_path):
+    pytest.importorskip("glsk_o3d.benchmark.shapes")
+    made = make(tmp_path, seeds=[100], variants=["noise1", "depth2"], jobs=2)
+    same = [cloud["sameness"] for told in made.shapes.values() for cloud in told["clouds"].values()]
+    assert len(same) == 12
+    assert set(same) <= {"bits", "rounding"}
+
+
+class Here:
+    """Workers that do their work at once, or die of it."""
+
+    def __init__(self, count, load):
+        assert not load  # nothing that loads Open3D
+
+    def capacity(self):
+        return 1
+
+    def submit(self, job):
+        done = Future()
+        try:
+            done.set_result(job())
+        except Exception as error:
+            done.set_exception(error)
+        return done
+
+    def close(self, at_once):
+        assert not at_once  # no temporary file is left
+
+
+@pytest.mark.parametrize(("fault", "raised"), [(BrokenProcessPool(), BatchError), (OSError("full"), OSError)])
+def test_a_process_that_fails_is_told(rods, tmp_path, monkeypatch, fault, raised):
+    import glsk_o3d.benchmark.making as making
+
+    def work(folder, version, family, seed, variants):
+        if seed == 101:
+            raise fault
+        return before(folder, version, family, seed, variants)
+
+    before = making._make_shape
+    monkeypatch.setattr(making, "LocalWorkers", Here)
+    monkeypatch.setattr(making, "_make_shape", work)
+    with pytest.raises(raised, match="tubes_101: the process died" if raised is BatchError else "full"):
+        make(tmp_path, **{**CHOICE, "jobs": 2})
+    assert list(read_folder(tmp_path).shapes) == ["tubes_100"]

@@ -1,0 +1,113 @@
+"""The table: its numbers, its words, and what cannot be compared."""
+
+import json
+
+import pytest
+
+from glsk_o3d.benchmark import Results, Scores, leaderboard
+from glsk_o3d.benchmark.intervals import mean_with_interval
+from glsk_o3d.errors import InvalidParameterError
+
+BEST = Scores(True, True, 1.0, 1.0, 0.1, 1.0, 1.0, 1.0, None, 0, 0, 0, 0)
+WRONG = Scores(False, False, 0.5, 0.0, 0.3, 0.8, 0.9, 1.2, 0.4, 1, 0, 0, 0)
+FAILED = Scores.of_failure("no answer")
+
+GOLDEN = """\
+Benchmark v1, not all of it, or other shapes. Means, and in brackets 95 % intervals from drawing the shapes anew. A \
+failure is neither perfect nor right in its topology, and its F1 are 0; what comes after these are means over the \
+answers that could be scored. Seconds are medians.
+
+**4 clouds of 2 shapes**
+
+| program | clouds | failures | perfect | topology | tips F1 | junctions F1 | error | inside | completeness | s |
+| --- | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |
+| good | 4 | 0 | 0.75 [0.50, 1.00] | 0.75 [0.50, 1.00] | 0.88 [0.75, 1.00] | 0.75 [0.50, 1.00] | \
+0.150 [0.100, 0.200] | 0.95 [0.90, 1.00] | 0.97 [0.95, 1.00] | 2.50 |
+| a \\| bad | 4 | 3 | 0.25 [0.00, 0.50] | 0.25 [0.00, 0.50] | 0.25 [0.00, 0.50] | 0.25 [0.00, 0.50] | \
+0.100 [0.100, 0.100] | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | - |
+
+**good**
+
+| variant | clouds | failures | perfect | topology | tips F1 | junctions F1 | error | inside | completeness | s |
+| --- | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |
+| clean | 2 | 0 | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | \
+0.100 [0.100, 0.100] | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | 2.00 |
+| scan2 | 2 | 0 | 0.50 [0.00, 1.00] | 0.50 [0.00, 1.00] | 0.75 [0.50, 1.00] | 0.50 [0.00, 1.00] | \
+0.200 [0.100, 0.300] | 0.90 [0.80, 1.00] | 0.95 [0.90, 1.00] | 3.00 |
+
+**a \\| bad**
+
+| variant | clouds | failures | perfect | topology | tips F1 | junctions F1 | error | inside | completeness | s |
+| --- | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |
+| clean | 2 | 1 | 0.50 [0.00, 1.00] | 0.50 [0.00, 1.00] | 0.50 [0.00, 1.00] | 0.50 [0.00, 1.00] | \
+0.100 [0.100, 0.100] | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | - |
+| scan2 | 2 | 2 | 0.00 [0.00, 0.00] | 0.00 [0.00, 0.00] | 0.00 [0.00, 0.00] | 0.00 [0.00, 0.00] | - | - | - | - |
+"""
+
+
+def results(name, *scores, seconds=(None,) * 4, whole=False):
+    places = [(shape, variant) for shape in ("tubes_100", "tubes_101") for variant in ("clean", "scan2")]
+    rows = [
+        {"shape": shape, "family": "tubes", "variant": variant, **each.as_dict(), "seconds": time}
+        for (shape, variant), each, time in zip(places, scores, seconds, strict=True)
+    ]
+    return Results("v1", name, whole, rows)
+
+
+@pytest.fixture
+def two():
+    good = results("good", BEST, BEST, BEST, WRONG, seconds=(1.0, 2.0, 3.0, 4.0))
+    return [results("a | bad", BEST, FAILED, FAILED, FAILED, seconds=(None, 9.0, None, None)), good]
+
+
+def test_in_markdown(two, tmp_path):
+    board = leaderboard(two)
+    assert board.markdown() == GOLDEN
+    board.to_markdown(tmp_path / "table.md")
+    assert (tmp_path / "table.md").read_text() == GOLDEN
+
+
+def test_in_json(two, tmp_path):
+    board = leaderboard(two)
+    board.to_json(tmp_path / "table.json")
+    told = json.loads((tmp_path / "table.json").read_text())
+    assert told == board.as_dict()
+    good, bad = told["entries"]
+    assert (good["name"], bad["name"]) == ("good", "a | bad")
+    assert (bad["all"]["failures"], bad["all"]["clouds"], bad["all"]["shapes"]) == (3, 4, 2)
+    assert bad["variants"]["scan2"]["error"] is bad["variants"]["scan2"]["seconds"] is None
+    assert good["all"]["ends"] == [0.4, 0.4, 0.4]  # of those that have one
+    assert good["all"]["length"][0] == pytest.approx(1.05)
+
+
+def test_intervals_are_over_shapes(two):
+    shapes = ["tubes_100", "tubes_100", "tubes_101", "tubes_101"]
+    expected = mean_with_interval(shapes, [1, 1, 1, 0])
+    assert leaderboard(two).entries[0]["all"]["perfect"] == list(expected)
+
+
+def test_the_order_is_by_perfect_then_by_topology():
+    close = Scores(False, True, 0.5, 1.0, 0.1, 1.0, 1.0)
+    made = [results(name, *[scores] * 4) for name, scores in (("c", FAILED), ("b", close), ("a", WRONG), ("d", BEST))]
+    assert [entry["name"] for entry in leaderboard(made).entries] == ["d", "b", "c", "a"]
+
+
+def test_seconds_of_failures_do_not_count():
+    made = results("a", BEST, FAILED, BEST, FAILED, seconds=(1.0, 600.0, 3.0, 600.0))
+    assert leaderboard([made]).entries[0]["all"]["seconds"] == 2
+
+
+def test_the_whole_version_is_told():
+    assert leaderboard([results("a", *[BEST] * 4, whole=True)]).markdown().startswith("Benchmark v1. Means")
+
+
+def test_what_cannot_be_compared(two):
+    bad, good = two
+    for other in (Results("v1", "fewer", False, good.rows[1:]), Results("v2", "other", False, good.rows)):
+        with pytest.raises(InvalidParameterError, match="scored on different clouds"):
+            leaderboard([bad, other])
+    with pytest.raises(InvalidParameterError, match="two programs are called 'good'"):
+        leaderboard([good, bad, good])
+    for none in ([], [Results("v1", "a", False, [])]):
+        with pytest.raises(InvalidParameterError, match="no scores"):
+            leaderboard(none)

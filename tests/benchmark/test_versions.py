@@ -1,0 +1,119 @@
+"""What is fixed for ever, and what tells clouds apart."""
+
+import importlib.util
+import json
+
+import numpy as np
+import pytest
+
+from glsk_o3d import read_cloud
+from glsk_o3d.benchmark import make, version, versions
+from glsk_o3d.benchmark.versions import fingerprint, fingerprints, sameness
+from glsk_o3d.errors import InvalidParameterError
+
+
+@pytest.fixture
+def points():
+    return np.random.default_rng(0).uniform(-0.5, 0.5, (4096, 3)).astype(np.float32)
+
+
+def test_the_first_version_never_changes():
+    first = version("v1")
+    assert first.families == ("tubes", "trees", "frames", "figures", "handles", "groups")
+    assert first.seeds == (100, 101, 102, 103, 104, 105, 106, 107, 108, 109, 110, 111)
+    assert " ".join(first.variants) == "clean density holes outliers noise05 noise1 noise2 scan2 depth2 misreg lidar"
+    assert (first.points, first.draw, first.least_coverage) == (4096, 0, 0.97)
+    assert " ".join(first.whole) == "clean outliers noise05 noise1 noise2"
+
+
+def test_an_unknown_version():
+    with pytest.raises(InvalidParameterError, match="did you mean 'v1'"):
+        version("v")
+
+
+def test_what_a_fingerprint_is_never_changes(points):
+    assert fingerprint(np.zeros((2, 3))) == "9d908ecf 0 0"  # SHA-256 of 24 zeros
+    assert fingerprint(np.arange(12.0).reshape(4, 3)).split()[1:] == ["82249263", "837992698"]
+    assert fingerprint(points) == fingerprint(points.astype(float)) == fingerprint(np.asfortranarray(points))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_roundings_are_told_from_other_clouds(points, seed):
+    known, rng = fingerprint(points), np.random.default_rng(seed)
+    assert sameness(points, known) == "bits"
+    there = np.where(rng.random(points.shape) < 0.5, -np.inf, np.inf).astype(np.float32)
+    assert sameness(np.nextafter(points, there), known) == "rounding"
+    one = points.copy()
+    one[7, 1] = np.nextafter(one[7, 1], np.float32(1))
+    assert sameness(one, known) == "rounding"
+
+
+def test_the_worst_that_roundings_can_do(points):
+    few = points[:256]
+    weights = [versions._sums(np.eye(1, few.size, place)[0].reshape(-1, 3))[0] for place in range(few.size)]
+    worst = np.nextafter(few, (np.sign(weights) * np.inf).astype(np.float32).reshape(-1, 3))
+    moved = np.abs(versions._sums(worst) - versions._sums(few)).max()
+    assert versions.SUM_TOLERANCE / 10 < moved < versions.SUM_TOLERANCE / 2
+    assert sameness(worst, fingerprint(few)) == "rounding"
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_one_point_elsewhere_is_another_cloud(points, seed):
+    known, rng = fingerprint(points), np.random.default_rng(seed)
+    moved, swapped = points.copy(), points.copy()
+    moved[rng.integers(4096)] = rng.uniform(-0.5, 0.5, 3)
+    assert sameness(moved, known) == "other"
+    pair = rng.choice(4096, 2, replace=False)
+    swapped[pair] = swapped[pair[::-1]]
+    assert sameness(swapped, known) == "other"
+
+
+def test_other_clouds_are_others(points):
+    known = fingerprint(points)
+    for other in (points[::-1], -points, points[:-1], points + np.float32(1e-3), points[:, ::-1]):
+        assert sameness(other, known) == "other"
+
+
+def test_fingerprints_are_read_as_they_were_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(versions, "_file", lambda name: tmp_path / f"{name}.json")
+    assert fingerprints("v1") == {}
+    found = {"tubes_100": {"clean": "a 1 2"}, "trees_7": {"clean": "b 3 4", "lidar": "c 5 6"}}
+    versions.write_fingerprints("v1", found, ["trees_7_lidar"])
+    assert fingerprints("v1") == {"trees_7_clean": "b 3 4", "trees_7_lidar": "c 5 6", "tubes_100_clean": "a 1 2"}
+
+
+def test_what_is_scored_is_fixed_for_the_clouds_that_are_known(tmp_path, monkeypatch):
+    monkeypatch.setattr(versions, "_file", lambda name: tmp_path / f"{name}.json")
+    versions.write_fingerprints("v1", {"trees_7": {"clean": "b 3 4", "lidar": "c 5 6"}}, ["trees_7_lidar"])
+    asked = version("v1")
+    assert [versions.is_scored(asked, "trees_7_clean", share) for share in (0.9699, 0.97)] == [True, True]
+    assert [versions.is_scored(asked, "trees_7_lidar", share) for share in (0.9699, 0.97)] == [False, False]
+    assert [versions.is_scored(asked, "trees_8_clean", share) for share in (0.9699, 0.97)] == [False, True]
+
+
+def test_the_package_knows_all_clouds_of_a_version_or_none():
+    for asked in versions.VERSIONS.values():
+        known = fingerprints(asked.name)
+        shapes = [f"{family}_{seed}" for family in asked.families for seed in asked.seeds]
+        assert not known or sorted(known) == sorted(f"{shape}_{each}" for shape in shapes for each in asked.variants)
+        assert len(json.dumps(known)) < 50_000
+
+
+def test_the_script_writes_a_whole_version_once(rods, tmp_path, monkeypatch, root):
+    spec = importlib.util.spec_from_file_location("script", root / "scripts" / "write_fingerprints.py")
+    spec.loader.exec_module(script := importlib.util.module_from_spec(spec))
+    short = versions.Version("v1", ("tubes",), (100, 101), ("clean",), 64, 0, ("clean",), 0.97)
+    monkeypatch.setitem(versions.VERSIONS, "v1", short)
+    monkeypatch.setattr(versions, "_file", lambda name: tmp_path / f"{name}.json")
+    make(tmp_path / "bench", seeds=[100], jobs=1)
+    with pytest.raises(SystemExit, match="not the whole of v1"):
+        script.main(tmp_path / "bench")
+    made = make(tmp_path / "bench", jobs=1)
+    assert script.main(tmp_path / "bench") == script.main(tmp_path / "bench") == tmp_path / "v1.json"
+    known = fingerprints("v1")
+    assert known == {cloud.name: fingerprint(read_cloud(cloud.path).points) for cloud in made.clouds}
+    again = make(tmp_path / "again", jobs=1)
+    assert {told["clouds"]["clean"]["sameness"] for told in again.shapes.values()} == {"bits"}
+    versions.write_fingerprints("v1", {"tubes_100": {"clean": "other 1 2"}, "tubes_101": {"clean": "other 1 2"}}, [])
+    with pytest.raises(SystemExit, match="2 clouds are not those of v1"):
+        script.main(tmp_path / "bench")
