@@ -4,6 +4,7 @@ import importlib
 import json
 import math
 import re
+import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import pipelines
+from glsk_o3d import pipelines, read_skeleton
 from glsk_o3d.analysis import compare
 from glsk_o3d.batch import run_batch
 from glsk_o3d.cli.overrides import override
@@ -512,6 +513,15 @@ class TestPeers:
         del sys.modules["bad_tools"]
         again = call(*few, "--from", out)  # nothing is measured
         assert "torus (not done after 1 s)" in again
+
+    def test_the_adapter_goes_from_a_file_to_a_file(self, root, tmp_path):
+        np.savetxt(tmp_path / "c.xyz", torus(700).points)
+        call = [sys.executable, str(root / "benchmarks" / "adapter.py")]
+        subprocess.run([*call, "default", tmp_path / "c.xyz", tmp_path / "s.obj"], check=True, capture_output=True)
+        assert read_skeleton(tmp_path / "s.obj").n_loops == 1
+        wrong = subprocess.run([*call, "magic", "c.xyz", "s.obj"], capture_output=True, text=True)
+        assert wrong.returncode == 2
+        assert "no tool magic: there are default, cao2010" in wrong.stderr
 
     def test_picture(self, call, tmp_path):
         few = ("--builtin", "--shapes", "tube", "--variant", "clean_256", "--tool", "default", "--jobs", 1)

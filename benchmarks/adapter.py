@@ -1,0 +1,41 @@
+"""One of the other tools on one cloud: what `glsk benchmark run --command` calls, from a file to a file.
+
+The README beside this file says how, docs/comparison.md how each tool is called. No tool is warmed up.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MPLBACKEND="Agg")  # before NumPy
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from _peers import PEERS, installed, one_thread, silence, skeleton_of
+
+from glsk_o3d import read_cloud, save_skeleton
+from glsk_o3d.interop.clouds import cloud_points
+
+app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False)
+
+
+@app.command(help=__doc__)
+def main(
+    tool: Annotated[str, typer.Argument(metavar="TOOL", help=f"One of {', '.join(PEERS)}.")],
+    cloud: Annotated[Path, typer.Argument(metavar="CLOUD", help="As for glsk skeletonize.")],
+    skeleton: Annotated[Path, typer.Argument(metavar="SKELETON", help="Any format of skeletons.")],
+) -> None:
+    if tool not in PEERS:
+        raise typer.BadParameter(f"no tool {tool}: there are {', '.join(PEERS)}")
+    (peer,) = installed(PEERS, tool).values()
+    one_thread()
+    points = cloud_points(read_cloud(cloud))
+    with silence():
+        vertices, edges = peer(points)
+    save_skeleton(skeleton_of(vertices, edges), skeleton)
+
+
+if __name__ == "__main__":
+    app()
