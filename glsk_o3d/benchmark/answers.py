@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +20,9 @@ from .scoring import Scores, score
 MEASURES = ("perfect", "topology", "tips_f1", "junctions_f1", "error", "inside", "completeness", "length", "ends")
 """What is averaged: shares and F1 over all clouds, what comes after them over the answers that could be scored."""
 TIMES_NAME = "times.json"
+MOST_RESULTS = 1 << 28  # derived: bytes, far more than any version has, so that a few bytes cannot fill the memory
 _FACTS = ("benchmark", "name", "whole", "clouds")
+_BROKEN = (EOFError, zlib.error, gzip.BadGzipFile)  # what is not packed as it should be
 
 
 @dataclass(frozen=True)
@@ -192,6 +196,7 @@ def read_results(path: str | os.PathLike) -> Results:
     Parameters
     ----------
     path : path-like
+        Also packed by gzip, if its name ends in ``.gz``.
 
     Returns
     -------
@@ -215,13 +220,17 @@ def read_results(path: str | os.PathLike) -> Results:
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such file")
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as stream:
+            data = stream.read(MOST_RESULTS + 1)
+        if len(data) > MOST_RESULTS:
+            raise ValueError("it is too large")
+        told = json.loads(data)
         benchmark, name, whole, rows = (told[fact] for fact in _FACTS)
         known = {"shape", "variant", "seconds", *Scores.__dataclass_fields__}
         if not all(isinstance(fact, str) for fact in (benchmark, name)) or any(known - row.keys() for row in rows):
             raise ValueError("a part is missing")
         if not all(isinstance(row[measure], int | float | None) for row in rows for measure in (*MEASURES, "seconds")):
             raise ValueError("a measure is no number")
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, *_BROKEN) as error:
         raise FileFormatError(f"{path}: not the scores of a benchmark ({type(error).__name__}: {error})") from None
     return Results(benchmark, name, bool(whole), rows)

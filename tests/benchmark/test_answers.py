@@ -1,5 +1,6 @@
 """Folders of answers: every format, every way to fail, and nothing dropped."""
 
+import gzip
 import json
 from dataclasses import replace
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Skeleton
-from glsk_o3d.benchmark import Results, read_results, score, score_answers
+from glsk_o3d.benchmark import Results, answers, read_results, score, score_answers
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.skeletons import READABLE
 
@@ -142,6 +143,20 @@ def test_results_are_read_as_they_were_written(perfect, small, tmp_path):
     results = score_answers(str(small.path), perfect, name="Größe | 1")
     results.save(tmp_path / "scores.json")
     assert read_results(tmp_path / "scores.json") == results
+    packed = tmp_path / "scores.json.gz"
+    packed.write_bytes(gzip.compress((tmp_path / "scores.json").read_bytes()))
+    assert read_results(packed) == results
+
+
+def test_packed_results_that_are_damaged_or_fill_the_memory(tmp_path, monkeypatch):
+    packed, whole = tmp_path / "scores.json.gz", gzip.compress(b" " * 100_000)
+    for data in (b"", b"no gzip", whole[:-9], whole[:40] + b"\xff" * 9 + whole[49:], whole):
+        packed.write_bytes(data)
+        with pytest.raises(FileFormatError, match=r"scores\.json\.gz: not the scores"):
+            read_results(packed)
+    monkeypatch.setattr(answers, "MOST_RESULTS", 1000)
+    with pytest.raises(FileFormatError, match="it is too large"):
+        read_results(packed)
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"benchmark": "v1", "name": "a", "whole": true, "clouds": [{}]}'])
