@@ -17,14 +17,16 @@ from .axis_fit import incident_edges, nearest_on_edges
 
 # fitted: winding number below which an axis is in nothing; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
-ENOUGH_EVIDENCE = 4096  # measured: points beyond which the same is said of the topology, only later
+ENOUGH_EVIDENCE = 4096  # measured: points of one object beyond which the same is said of its topology, only later
+VERTEX_EVIDENCE = 32  # derived: points to a vertex of a tube with 20 around it, whose vertices are half a radius apart
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """The points that support a skeleton, as an oriented surface; it holds while the graph is changed.
 
-    Of many points it takes every so-manieth, about 4096: they should be in Morton order, see `in_order`.
+    Of many points it takes every so-manieth, 4096 or more, and 32 for every vertex: an object of many parts takes more.
+    They should be in Morton order, see `in_order`.
 
     Attributes
     ----------
@@ -50,7 +52,8 @@ class Evidence:
     def of(cls, skeleton: Skeleton) -> Evidence:
         """The evidence for a skeleton that has edges and was fitted to its points."""
         supporting = skeleton.supporting_points
-        supporting = supporting[:: max(len(supporting) // ENOUGH_EVIDENCE, 1)]
+        enough = max(ENOUGH_EVIDENCE, VERTEX_EVIDENCE * len(skeleton.vertices))
+        supporting = supporting[:: max(len(supporting) // enough, 1)]
         points = skeleton.points[supporting]
         edge, t = _nearest_edges(skeleton, supporting)
         start, stop = skeleton.vertices[skeleton.edges[edge]].transpose(1, 0, 2)

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glsk_o3d import Skeleton
+from glsk_o3d import Skeleton, skeletonize
 from glsk_o3d.refinement.evidence import Evidence
+from glsk_o3d.samples.capsules import union_sample
 
 X, Y, Z = np.eye(3)
 TUBE = [[(-1, 0, 0), (1, 0, 0)]]
@@ -145,3 +146,16 @@ def test_bonds_go_with_the_skeleton(random_skeleton, seed):
     (pairs, weight), (same, as_much) = (Evidence.of(each).bonds(each) for each in (raw, moved))
     np.testing.assert_array_equal(pairs, same)
     np.testing.assert_allclose(weight, as_much, atol=1e-9)
+
+
+@pytest.mark.parametrize(("rungs", "points"), [(8, 16000), (28, 50000)])
+def test_an_object_of_many_parts_keeps_them_however_many_there_are(rungs, points):
+    """What is enough for a figure leaves a ladder's rungs a few points each, and no inside."""
+    height = 0.3 * np.arange(rungs)
+    nodes = np.concatenate([np.column_stack([np.full(rungs, x), np.zeros(rungs), height]) for x in (0, 0.4)])
+    up = np.column_stack([np.arange(rungs - 1), np.arange(1, rungs)])
+    edges = np.concatenate([up, up + rungs, np.column_stack([np.arange(rungs), rungs + np.arange(rungs)])])
+    ladder = union_sample("ladder", nodes, edges, np.full(2 * rungs, 0.025), points, 0, 0)
+    skeleton = skeletonize(ladder.points)
+    assert (skeleton.n_loops, skeleton.n_components) == (rungs - 1, 1)
+    assert not (skeleton.degree == 1).any()
