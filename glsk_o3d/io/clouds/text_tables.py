@@ -166,7 +166,8 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
             continue
         words = (text.replace(",", ".") if layout.decimal_comma else text).split(layout.delimiter)
         row = [_number(words[i]) if i < len(words) else np.nan for i in layout.columns]
-        if all(i < len(words) and _is_number(words[i]) for i in layout.columns[:3]):
+        broken_off = not line.endswith("\n") and len(words) <= layout.columns[-1]  # its last number may be cut
+        if not broken_off and all(i < len(words) and _is_number(words[i]) for i in layout.columns[:3]):
             found.append(row)
         else:
             lost += 1

@@ -87,6 +87,14 @@ def test_lines_that_are_not_like_the_others(tmp_path, caplog):
     assert "c.csv: 2 of 5 lines hold no point" in caplog.text
 
 
+def test_a_last_line_that_breaks_off_is_no_point(tmp_path, caplog):
+    """Its last number may have been longer; with an end, or all its columns, it is as it was meant."""
+    for last, points in (("7,8,1", 2), ("7,8,1\n", 3), ("7,8,1,4", 3), ("7,8,1,", 3)):
+        (tmp_path / "c.csv").write_text(f"x,y,z,i\n1,2,3,4\n2,3,4,5\n{last}")
+        assert len(read_scan(tmp_path / "c.csv").positions) == points
+    assert caplog.text.count("c.csv: 1 of 3 lines hold no point") == 1
+
+
 def test_attributes_become_those_of_a_tensor_cloud(tmp_path):
     (tmp_path / "c.csv").write_text("x,y,z,Tree ID,x,7,class\n1,2,3,4,5.5,6,oak\n4,5,6,7,8.5,9,ash\n")
     point = read_tensor_cloud(tmp_path / "c.csv").point
