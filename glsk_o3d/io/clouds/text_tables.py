@@ -134,7 +134,7 @@ def _layout(stream: TextIO) -> Layout:
                 names = called
             elif not comment and delimiter and not names:
                 strange = called
-    raise NoPoints(f"no line of its beginning has three numbers, such as {first[:60]!r}")
+    raise NoPoints(f"no line of its beginning has three numbers: it begins with {first[:60]!r}")
 
 
 def _parted(line: str) -> tuple[list[str], str | None, bool]:
