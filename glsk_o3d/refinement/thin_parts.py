@@ -100,12 +100,13 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
         return np.zeros(m, bool)
     vertex = cloud.vertex
     count = np.bincount(vertex, minlength=m)
-    if (_share_around(skeleton.vertices, count, thin) <= 1 - least).all():
+    _, near = nearest_neighbours(skeleton.vertices, min(REGION_VERTICES, m))
+    if (_share_around(near, count, thin) <= 1 - least).all():
         return np.zeros(m, bool)
     facts = np.column_stack([link_growth(cloud.links), one_direction(cloud.normals, cloud.links)])
     growth, flat = (group_sum(facts, vertex, m) / np.maximum(count, 1)[:, None]).T
     thin &= growth < np.where(flat < SHEET_SHARE, SURFACE_GROWTH, SHEET_GROWTH)
-    return (_share_around(skeleton.vertices, count, thin) > 1 - least) & ~_firm(skeleton)
+    return (_share_around(near, count, thin) > 1 - least) & ~_firm(skeleton)
 
 
 def one_direction(normals: np.ndarray, links: csr_matrix) -> np.ndarray:
@@ -121,9 +122,8 @@ def one_direction(normals: np.ndarray, links: csr_matrix) -> np.ndarray:
     return largest_eigenvalue(along.T) / np.maximum(total, TINY)
 
 
-def _share_around(vertices: np.ndarray, count: np.ndarray, some: np.ndarray) -> np.ndarray:
-    """Share that some vertices have in the points of the region around every vertex."""
-    _, near = nearest_neighbours(vertices, min(REGION_VERTICES, len(vertices)))
+def _share_around(near: np.ndarray, count: np.ndarray, some: np.ndarray) -> np.ndarray:
+    """Share that some vertices have in the points of the region around every vertex, by its nearest ones."""
     points = count[near]
     points[np.cumsum(points, axis=1) - points >= REGION_POINTS] = 0
     return (points * some[near]).sum(axis=1) / np.maximum(points.sum(axis=1), 1)
