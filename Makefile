@@ -8,7 +8,7 @@ PIP    := $(BIN)/python -m pip --disable-pip-version-check -qq
 PYTEST_ARGS ?= -n 2
 # See benchmarks/README.md for what else there is.
 ACCURACY_ARGS ?= truth --builtin
-PEERS_ARGS ?= --builtin --picture benchmarks/results/peers.png -o benchmarks/results/peers.json
+PEERS_ARGS ?= run benchmarks/results
 FUZZ_ARGS ?= both --minutes 1
 BENCH_ARGS ?= all --builtin --pictures benchmarks/results -o benchmarks/results/speed.json
 
@@ -32,6 +32,7 @@ docs: $(VENV)/.installed-docs ## build the site into build/docs/index.html (SPHI
 
 figures: $(VENV)/.installed-demo ## draw the pictures of the README and of the pages anew, into docs/images
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/_ext/figures.py docs/images
+	$(BIN)/python benchmarks/leaderboard.py page docs/comparison.md
 
 accuracy: $(VENV)/.installed-demo ## how far skeletons are from known axes (ACCURACY_ARGS="ablation --builtin" for more)
 	$(BIN)/python benchmarks/accuracy.py $(ACCURACY_ARGS)
@@ -43,9 +44,9 @@ bench: $(VENV)/.installed-demo ## how fast skeletons are, stage by stage (BENCH_
 fuzz: $(VENV)/.installed-test ## a minute of degenerate clouds and damaged files (FUZZ_ARGS="arrays --runs 20000" for more)
 	$(BIN)/python benchmarks/fuzz.py $(FUZZ_ARGS)
 
-peers: $(PEERS)/.installed ## what other tools make of the same clouds; they get a virtual environment of their own
+peers: $(PEERS)/.installed ## other tools on the public benchmark, 3 hours (PEERS_ARGS="run DIR --tool cgal" for one)
 	@mkdir -p benchmarks/results
-	$(PEERS)/bin/python benchmarks/peers.py $(PEERS_ARGS)
+	$(PEERS)/bin/python benchmarks/leaderboard.py $(PEERS_ARGS)
 
 lint: $(VENV)/.installed-test ## ruff and mypy
 	$(BIN)/ruff check .

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 from _accuracy.differences import difference_tables, paired
-from _accuracy.ideas import IDEAS, ablation_tables, write_effects
+from _accuracy.ideas import IDEAS, ablation_tables, worth_tables, write_effects
 from _accuracy.known_axes import details, overview
 from _accuracy.measuring import measured
 from _accuracy.pictures import draw_ablation, draw_stop, draw_truth
@@ -38,7 +38,7 @@ from _common.command_line import (
 )
 from _common.results import read, save
 from _common.runs import run
-from _common.tables import Tables, fill, present
+from _common.tables import Tables, fill, markdown_table, present
 
 from glsk_o3d import Pipeline
 from glsk_o3d.cli.overrides import override
@@ -225,6 +225,17 @@ def page(
     folder.mkdir(exist_ok=True)
     for command, rows in told.items():
         PAGE[command][1](rows, folder)
+
+
+@app.command()
+def worth(
+    file: Annotated[Path, typer.Argument(metavar="PAGE", exists=True, dir_okay=False)],
+    results: Annotated[Path, typer.Argument(metavar="JSON", exists=True, dir_okay=False)],
+) -> None:
+    """Put what each idea is worth into a Markdown page: saved results of ablation, cloud by cloud, with intervals."""
+    found = read(results)
+    where = f"Measured with commit {found['commit']}."
+    fill(file, {"worth": "\n".join([where, "", *(markdown_table(*table) for table in worth_tables(found["rows"]))])})
 
 
 if __name__ == "__main__":

@@ -1,10 +1,8 @@
 """The accuracy benchmark: its clouds, its arithmetic, and its commands on tiny shapes."""
 
-import importlib
 import json
 import math
 import re
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
@@ -14,12 +12,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import pipelines, read_skeleton
-from glsk_o3d.analysis import compare
+from glsk_o3d import pipelines
 from glsk_o3d.batch import run_batch
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.samples import torus
-from glsk_o3d.skeleton import Skeleton
 
 
 @pytest.fixture(scope="module")
@@ -433,22 +429,6 @@ def test_scans_for_batches(benchmark, tmp_path):
     assert 256 <= min(sizes) < max(sizes) <= 400
 
 
-BAD = """
-import os, signal, time
-import numpy as np
-
-def crash(points):
-    os.kill(os.getpid(), signal.SIGSEGV)
-
-def hang(points):
-    while True:
-        time.sleep(600)
-
-def nothing(points):
-    return np.empty((0, 3)), np.empty((0, 2), int)
-"""
-
-
 class TestOptions:
     @pytest.fixture
     def tool(self, benchmark):
@@ -480,76 +460,3 @@ class TestOptions:
         assert row["leaves"] == 0
         assert 20 < row["vertices"] < 50
         assert page.read_text().count("| `torus` |") == 3
-
-
-class TestPeers:
-    @pytest.fixture
-    def tool(self, benchmark):
-        with benchmark("peers") as module:
-            yield module
-
-    def test_one_that_crashes_or_hangs_is_a_failure_and_ends_nothing(self, tool, call, tmp_path, monkeypatch):
-        (tmp_path / "bad_tools.py").write_text(BAD)
-        monkeypatch.syspath_prepend(tmp_path)
-        module = importlib.import_module("bad_tools")
-        names = ("crash", "hang", "nothing")
-        bad = {name: tool.Peer(name, (), "points", getattr(module, name)) for name in names}
-        monkeypatch.setattr(tool, "PEERS", bad | {"default": tool.PEERS["default"]})
-        page, out = tmp_path / "page.md", tmp_path / "out.json"
-        page.write_text("<!-- builtin -->\n<!-- end -->\n<!-- folder -->\nkept\n<!-- end -->\n")
-        few = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--jobs", 2, "-o", out)
-        call(*few, "--tool", "crash,nothing,default", "--limit", 0)
-        call(*few, "--tool", "hang", "--limit", 1, "--from", out, "--page", page)
-        rows = {row["tool"]: row for row in json.loads(out.read_text())["rows"]}
-        assert rows["crash"]["failure"] == "its process died: SIGSEGV"
-        assert rows["hang"]["failure"] == "not done after 1 s"
-        assert rows["nothing"]["failure"].startswith("InvalidParameterError: the skeleton is empty")
-        assert rows["default"]["topology"]
-        assert 0 < rows["default"]["error"] < 0.2
-        lines = page.read_text().splitlines()
-        assert "kept" in lines
-        assert any(line.startswith("| crash | points | - / 0 | - |") for line in lines)
-        assert any(line.endswith("| torus (not done after 1 s) |") for line in lines)
-        del sys.modules["bad_tools"]
-        again = call(*few, "--from", out)  # nothing is measured
-        assert "torus (not done after 1 s)" in again
-
-    def test_the_adapter_goes_from_a_file_to_a_file(self, root, tmp_path):
-        np.savetxt(tmp_path / "c.xyz", torus(700).points)
-        call = [sys.executable, str(root / "benchmarks" / "adapter.py")]
-        subprocess.run([*call, "default", tmp_path / "c.xyz", tmp_path / "s.obj"], check=True, capture_output=True)
-        assert read_skeleton(tmp_path / "s.obj").n_loops == 1
-        wrong = subprocess.run([*call, "magic", "c.xyz", "s.obj"], capture_output=True, text=True)
-        assert wrong.returncode == 2
-        assert "no tool magic: there are default, cao2010" in wrong.stderr
-
-    def test_picture(self, call, tmp_path):
-        few = ("--builtin", "--shapes", "tube", "--variant", "clean_256", "--tool", "default", "--jobs", 1)
-        call(*few, "--limit", 0, "--picture", tmp_path / "peers.png")
-        assert (tmp_path / "peers.png").read_bytes().startswith(b"\x89PNG")
-
-    @pytest.mark.filterwarnings("ignore")  # theirs
-    def test_tools_that_are_installed(self, tool):
-        there = {name: peer for name, peer in tool.PEERS.items() if None not in peer.versions().values()}
-        others = [name for name, peer in there.items() if peer.packages]
-        if not others:
-            pytest.skip("none of the other tools is installed: make peers")
-        points, axis = importlib.import_module("_common.clouds").builtin("tube", "clean_4096")
-        for name in others:
-            vertices, edges = there[name](points)
-            found = compare(Skeleton(vertices, edges, [math.nan] * len(vertices), (), (), ()), axis)
-            assert found.topology, name
-            assert found.error < 0.5, name
-
-    @pytest.mark.parametrize(
-        "wrong", [("--tool", "magic"), ("--page", "no_such_page.md"), ("--picture", "no_such_folder/p.png")]
-    )
-    def test_wrong_usage_is_found_at_once(self, call, wrong):
-        assert "Invalid value" in call("--builtin", *wrong, code=2)
-
-    def test_one_that_is_absent_is_named(self, tool, call, monkeypatch):
-        absent = tool.Peer("gone", ("no-such-package",), "points", None)
-        monkeypatch.setattr(tool, "PEERS", {"gone": absent, "default": tool.PEERS["default"]})
-        assert "not installed: gone" in call("--builtin", "--tool", "gone", code=2)
-        few = ("--builtin", "--shapes", "tube", "--variant", "clean_256", "--jobs", 1)
-        assert "not installed: gone" in call(*few)

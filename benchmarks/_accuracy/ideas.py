@@ -9,6 +9,7 @@ from _common.command_line import PUBLISHED
 from _common.results import pick, summary
 from _common.tables import Tables, number
 
+from glsk_o3d.benchmark.intervals import mean_with_interval, told
 from glsk_o3d.interop.atomic import write_atomically
 
 from .measuring import by_pipeline, by_variant
@@ -43,6 +44,10 @@ IDEAS = {
 }
 """What `default` adds to the publications, and the settings that switch it off. All of them together (but for the
 reduction and the stop rule, which are published) are `wen2024`."""
+
+
+WORTH = dict(perfect=2, topology=2, error=3)
+"""The digits of what is compared cloud by cloud."""
 
 
 def lost(mean: dict, whole: dict) -> float:
@@ -81,6 +86,51 @@ def losses(rows: list[dict]) -> tuple[dict[str, dict], list[str]]:
     mean = {name: summary(here) for name, here in by_pipeline(rows).items()}
     ideas = (name for name in mean if name in IDEAS)
     return mean, sorted(ideas, key=lambda name: lost(mean[name], mean["default"]), reverse=True)
+
+
+def worth_tables(rows: list[dict]) -> Tables:
+    """How `default` changes without each idea, cloud by cloud, with intervals; the most that is lost first."""
+    whole, lines = {_cloud(row): row for row in pick(rows, pipeline="default")}, []
+    for name in losses(rows)[1] + [name for name in PUBLISHED if pick(rows, pipeline=name)]:
+        pairs = [(whole[_cloud(row)], row) for row in pick(rows, pipeline=name)]
+        changes = [_change(pairs, measure, digits) for measure, digits in WORTH.items()]
+        lines.append([f"without {name}" if name in IDEAS else f"`{name}`", *changes, *_most(pairs), _setting(name)])
+    first = ["`default`", *(number(_mean(whole.values(), it), digits) for it, digits in WORTH.items()), "", "", ""]
+    header = ["", *WORTH, "most in", "topology there", "setting"]
+    return [(f"what {len(whole)} clouds lose without each idea", header, [first, *lines])]
+
+
+def _change(pairs, measure, digits):
+    """The mean difference from with to without, with its interval."""
+    known = [(old, new) for old, new in pairs if "failure" not in old and "failure" not in new]
+    shapes = [old["shape"] for old, _ in known]
+    return told(*mean_with_interval(shapes, [new[measure] - old[measure] for old, new in known]), digits, sign="+")
+
+
+def _most(pairs):
+    """The variant in which most topologies are lost, and the shares there."""
+    groups: dict[str, list] = {}
+    for pair in pairs:
+        groups.setdefault(pair[0]["variant"], []).append(pair)
+    shares = {name: [_mean(side, "topology") for side in zip(*group, strict=True)] for name, group in groups.items()}
+    name = min(shares, key=lambda it: shares[it][1] - shares[it][0])
+    return name, " → ".join(number(share, 2) for share in shares[name])
+
+
+def _mean(rows, measure):
+    """Over what was measured; a failure has the wrong topology, and no error."""
+    missing = None if measure == "error" else False
+    values = [row.get(measure, missing) for row in rows]
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known)
+
+
+def _setting(name):
+    return f"`{IDEAS[name]}`" if name in IDEAS else ""
+
+
+def _cloud(row):
+    return row["variant"], row["shape"], row["draw"]
 
 
 def ablation_tables(rows: list[dict]) -> Tables:

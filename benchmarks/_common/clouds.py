@@ -19,8 +19,11 @@ import open3d as o3d
 import typer
 from scipy.spatial import cKDTree
 
-from glsk_o3d import read_truth, samples
+from glsk_o3d import read_cloud, read_truth, samples
 from glsk_o3d.analysis import Truth
+from glsk_o3d.benchmark import read_folder
+from glsk_o3d.benchmark.folders import INDEX_NAME
+from glsk_o3d.interop.clouds import cloud_points
 
 from .results import ROOT
 
@@ -73,6 +76,10 @@ class Case:
         """The points and the axis."""
         if self.folder is None:
             return builtin(self.shape, self.variant, self.draw)
+        if (self.folder / INDEX_NAME).is_file():
+            made = read_folder(self.folder)
+            (path,) = (it.path for it in made.scored if (it.shape, it.variant) == (self.shape, self.variant))
+            return cloud_points(read_cloud(path)), made.truth(self.shape)
         path = self.folder / f"{self.shape}.npz"
         with np.load(path) as archive:
             return archive[self.variant].astype(float), read_truth(path)
@@ -183,6 +190,11 @@ def folder_or(folder: Path | None, variable: str, beside: str) -> Path:
 
 def _offers(folder: Path) -> dict[str, list[str] | None]:
     """The variants to be scored of each shape with a meaningful skeleton; None if its file cannot be read."""
+    if (folder / INDEX_NAME).is_file():  # a public benchmark
+        offers: dict[str, list[str] | None] = {}
+        for cloud in read_folder(folder).scored:
+            offers.setdefault(cloud.shape, []).append(cloud.variant)
+        return offers
     if not (folder / "manifest.json").exists():
         return {path.stem: _variants(path, {}) for path in sorted(folder.glob("*.npz"))}
     shapes = json.loads((folder / "manifest.json").read_text())["shapes"]

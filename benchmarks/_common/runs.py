@@ -24,6 +24,7 @@ def run(
     processes: int,
     fresh: bool = False,
     limit: float | None = None,
+    preload: Sequence[str] = (),
 ) -> list[dict]:
     """Work through jobs in parallel.
 
@@ -39,6 +40,9 @@ def run(
         job alone.
     limit : float, optional
         How long such a process may take, everything included [s]; one that takes longer is ended, and has failed.
+    preload : sequence of str
+        Modules that are loaded once for all such processes, which are then copies of one that has done nothing else;
+        there is no warm-up.
 
     Returns
     -------
@@ -53,7 +57,7 @@ def run(
     os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
     pool = ThreadPoolExecutor(processes) if fresh else ProcessPoolExecutor(processes, get_context("spawn"), _warm_up)
     with pool:
-        rows = pool.map(partial(_alone, limit, work) if fresh else partial(_row, work), jobs)
+        rows = pool.map(partial(_alone, preload, limit, work) if fresh else partial(_row, work), jobs)
         return list(track(rows, "", len(jobs), console=Console(stderr=True), transient=True))
 
 
@@ -62,10 +66,12 @@ def _warm_up() -> None:
     pipelines.default()(samples.tube(256).points)  # loads what is imported when first needed, so that it is not timed
 
 
-def _alone(limit, work, job):
-    context = get_context("spawn")
+def _alone(preload, limit, work, job):
+    context = get_context("forkserver" if preload else "spawn")
+    if preload:
+        context.set_forkserver_preload([*preload])
     receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_send, args=(sender, work, job), daemon=True)
+    process = context.Process(target=_send, args=(sender, work, job, not preload), daemon=True)
     process.start()
     sender.close()  # so that the end of the process is the end of the pipe
     try:
@@ -83,8 +89,9 @@ def _alone(limit, work, job):
         process.join()
 
 
-def _send(sender, work, job):
-    _warm_up()
+def _send(sender, work, job, warm_up):
+    if warm_up:
+        _warm_up()
     sender.send(_row(work, job))
 
 

@@ -18,7 +18,8 @@ from glsk_o3d.interop.atomic import write_atomically
 Table = tuple[str, list[str], list[list[str]]]  # title, header, lines
 Tables = list[Table]
 # columns that are not numbers, besides the first
-TEXT = {"pipeline", "setting", "takes", "worst", "wrong", "failed", "note", "now right", "now wrong"}
+TEXT = {"pipeline", "setting", "takes", "worst", "wrong", "note", "now right", "now wrong"}
+TEXT |= {"measure", "to", "why", "which", "failed", "most in"}
 
 
 def number(value: float | None, digits: int = 3) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -36,9 +37,15 @@ def mean_with_interval(shapes: Sequence[str], values: Sequence[float]) -> tuple[
         return np.nan, np.nan, np.nan
     names, of = np.unique(shapes, return_inverse=True)
     total, count = np.bincount(of, np.asarray(values, float)), np.bincount(of)
-    times = np.random.default_rng(0).multinomial(len(names), np.full(len(names), 1 / len(names)), RESAMPLES)
+    times = _drawn(len(names))
     low, high = np.percentile((times @ total) / (times @ count), [50 - LEVEL / 2, 50 + LEVEL / 2])
     return float(total.sum() / count.sum()), float(low), float(high)
+
+
+@lru_cache(maxsize=16)
+def _drawn(n: int) -> np.ndarray:
+    """(RESAMPLES, n) array: how often each of n shapes is drawn, which takes longer than all that follows."""
+    return np.random.default_rng(0).multinomial(n, np.full(n, 1 / n), RESAMPLES)
 
 
 def told(mean: float, low: float, high: float, digits: int = 2, sign: str = "") -> str:

@@ -1,0 +1,1 @@
+"""What other tools make of the public benchmark: kept scores, tables, a picture."""

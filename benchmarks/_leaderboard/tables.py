@@ -1,0 +1,117 @@
+"""The tables of docs/comparison.md: all tools over all clouds, losses, variants, families, failures."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from _common.tables import Table, number
+from _peers import PEERS
+
+from glsk_o3d.benchmark import leaderboard
+from glsk_o3d.benchmark.intervals import mean_with_interval, told
+
+from .kept import Entry
+
+OURS = "default"
+PUBLISHED = ("cao2010", "wen2024")
+MEASURES = {  # what may be lost, its digits, and whether more of it is better
+    "perfect": ("perfect", 2, True),
+    "topology": ("topology", 2, True),
+    "tips_f1": ("tips F1", 2, True),
+    "junctions_f1": ("junctions F1", 2, True),
+    "error": ("error", 3, False),
+    "inside": ("inside", 3, True),
+    "completeness": ("completeness", 3, True),
+    "ends": ("ends", 2, False),
+}
+Row = dict[str, Any]
+
+
+def overview(entries: Sequence[Entry], cpu: dict[str, float]) -> Table:
+    """All tools over all clouds, the best first."""
+    lines = []
+    for entry in leaderboard(each.results for each in entries).entries:
+        name, mean = entry["name"], entry["all"]
+        shares = [told(*mean[measure]) for measure in ("perfect", "topology")]
+        plain = [number(mean[measure][0], 2) for measure in ("tips_f1", "junctions_f1")]
+        error = told(*mean["error"], 3) if mean["error"] else "-"
+        rest = [number(mean[measure] and mean[measure][0], 3) for measure in ("inside", "completeness")]
+        took = number(cpu.get(name), 2)
+        lines.append([*_label(name), *shares, *plain, error, *rest, str(mean["failures"]), took])
+    heads = ["tips F1", "junctions F1", "error", "inside", "complete", "failures", "CPU s"]
+    count = len(entries[0].results.rows) if entries else 0
+    return f"{count} clouds of 72 random shapes", ["", "takes", "perfect", "topology", *heads], lines
+
+
+def losses(entries: Sequence[Entry]) -> Table:
+    """Where `default` is worse than another tool, by a difference whose interval does not hold 0."""
+    by_name = {entry.tool: _by_cloud(entry) for entry in entries}
+    ours, lines = by_name[OURS], []
+    for variant in ("all", *dict.fromkeys(row["variant"] for row in ours.values())):
+        for name, theirs in by_name.items():
+            if name != OURS:
+                lines += _lost(variant, name, ours, theirs)
+    return "where `default` loses", ["clouds", "measure", "to", "theirs", "`default`", "difference"], lines
+
+
+def _lost(variant: str, name: str, ours: dict, theirs: dict) -> Iterable[list[str]]:
+    here = [key for key in ours if variant in ("all", key[1])]
+    for measure, (words, digits, more) in MEASURES.items():
+        pairs = [(key[0], ours[key][measure], theirs[key][measure]) for key in here]
+        known = [(shape, mine, other) for shape, mine, other in pairs if mine is not None and other is not None]
+        if not known:
+            continue
+        shapes, mine, other = zip(*known, strict=True)
+        mean, low, high = mean_with_interval(shapes, [b - a for a, b in zip(mine, other, strict=True)])
+        if low > 0 if more else high < 0:
+            means = [number(sum(each) / len(known), digits) for each in (other, mine)]
+            yield [variant, words, " of ".join(_label(name)), *means, told(mean, low, high, digits, sign="+")]
+
+
+def by_group(entries: Sequence[Entry], group: str, measure: str, digits: int, title: str) -> Table:
+    """The mean of a measure for each tool, by variant or by family."""
+    rows = entries[0].results.rows
+    names = list(dict.fromkeys(row[group] for row in rows))
+    sizes = Counter(row[group] for row in rows)
+    lines = []
+    for entry in entries:
+        cells = []
+        for name in names:
+            values = [row[measure] for row in entry.results.rows if row[group] == name and row[measure] is not None]
+            cells.append(number(sum(values) / len(values) if values else None, digits))
+        lines.append([*_label(entry.tool), *cells])
+    return title, ["", "takes", *(f"{name} ({sizes[name]})" for name in names)], lines
+
+
+def failures(entries: Sequence[Entry]) -> Table:
+    """Which clouds have no answer, by tool and reason."""
+    lines = []
+    for entry in entries:
+        reasons: dict[str, list[str]] = {}
+        for row in entry.results.rows:
+            if row["failure"] is not None:
+                reasons.setdefault(_reason(row["failure"]), []).append(f"{row['shape']}_{row['variant']}")
+        lines += [[*_label(entry.tool), why, str(len(names)), ", ".join(names)] for why, names in reasons.items()]
+    return "failures", ["", "takes", "why", "clouds", "which"], lines
+
+
+def runs(entries: Sequence[Entry]) -> Table:
+    """What the runs took, and what of."""
+    lines = [[*_label(it.tool), number(it.made["hours"], 2), str(it.made["commit"])] for it in entries]
+    hours = sum(it.made["hours"] for it in entries)
+    return "runs", ["", "takes", "hours", "commit"], [*lines, ["all", "", number(hours, 1), ""]]
+
+
+def _by_cloud(entry: Entry) -> dict[tuple[str, str], Row]:
+    return {(row["shape"], row["variant"]): row for row in entry.results.rows}
+
+
+def _label(name: str) -> tuple[str, str]:
+    return PEERS[name].label, PEERS[name].takes
+
+
+def _reason(failure: str) -> str:
+    """Without what differs from cloud to cloud."""
+    return failure.removeprefix("no answer: ").replace("|", "/").split("\n")[0]

@@ -1,0 +1,152 @@
+"""What other tools make of the public benchmark: runs, CPU seconds, and the tables of docs/comparison.md.
+
+The README beside this file says what each command shows.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from statistics import median
+from typing import Annotated
+
+import typer
+from _common.command_line import Markdown, application, writable
+from _common.results import machine
+from _common.runs import run as in_processes
+from _common.tables import fill, markdown_table, page_with, present
+from _leaderboard import recorded, tables
+from _leaderboard.kept import SECONDS, keep, kept, seconds
+from _leaderboard.pictures import board, draw
+from _peers import PEERS, Peer, installed, one_thread, silence, skeleton_of, versions
+
+from glsk_o3d import read_cloud, save_skeleton
+from glsk_o3d.benchmark import make, read_folder, score_answers
+from glsk_o3d.benchmark.answers import TIMES_NAME, read_times
+from glsk_o3d.benchmark.clouds import cloud
+from glsk_o3d.benchmark.shapes import FAMILIES, shape
+from glsk_o3d.interop.atomic import write_json
+from glsk_o3d.interop.clouds import cloud_points
+
+BENCH = "bench"  # the clouds, in the folder that a run is given; beside it a folder of answers for each tool
+TIMED = [(family, variant) for family in FAMILIES for variant in ("clean", "depth2")]  # with the seed 100
+KEPT_AFTER = 20  # skeletons, so that little is lost when a run is stopped
+PRELOADED = (  # by all processes at once, since imports take longer than some skeletons
+    *("glsk_o3d.pipelines", "glsk_o3d.benchmark.answers", "glsk_o3d.benchmark.making", "glsk_o3d.benchmark.table"),
+    *("glsk_o3d.refiner", "glsk_o3d.io.scans", "glsk_o3d.viewing.preview", "open3d", "typer", "trimesh", "skeletor"),
+    *("pc_skeletor", "pygel3d.graph", "compas_cgal.skeletonization", "compas_cgal.meshing", "skan"),
+)
+PARTS = ("leaderboard", "losses", "topologies", "errors", "families", "failures", "runs", "recorded")
+
+app = application(__doc__)
+Place = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the clouds and of all answers.")]
+Tool = Annotated[str, typer.Option("--tool", metavar="NAMES", help="With commas; else all that are installed.")]
+
+
+@app.command("run")
+def run_(
+    place: Place,
+    tool: Tool = "",
+    limit: Annotated[float, typer.Option("--limit", help="Seconds for a skeleton.")] = 60.0,
+    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes at once.")] = 2,
+) -> None:
+    """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/v1."""
+    peers = installed(PEERS, tool)
+    bench = make(place / BENCH, jobs=jobs)
+    one_thread()
+    for name, peer in peers.items():
+        (place / name).mkdir(exist_ok=True)
+        times = read_times(place / name)
+        todo = [it for it in bench.scored if it.name not in times]
+        for some in batched(todo, KEPT_AFTER):
+            work = [(dict(cloud=it.name), (it.path, peer, place / name / f"{it.name}.npz")) for it in some]
+            for row in in_processes(answer, work, jobs, fresh=True, limit=limit, preload=PRELOADED):
+                times[row["cloud"]] = {"seconds": row.get("seconds"), "failure": row.get("failure")}
+            write_json(place / name / TIMES_NAME, {"clouds": times})
+        results = score_answers(bench, place / name, name=name)
+        typer.echo(f"{keep(results, limit)}: {results.failures} failures")
+
+
+def batched(items: list, n: int) -> Iterable[list]:
+    """So many at a time."""
+    return (items[i : i + n] for i in range(0, len(items), n))
+
+
+def answer(cloud: Path, peer: Peer, path: Path) -> dict:
+    """Write the skeleton of a cloud, nothing said; gives the seconds."""
+    points = cloud_points(read_cloud(cloud))
+    start = time.perf_counter()
+    with silence():
+        vertices, edges = peer(points)
+    seconds = time.perf_counter() - start
+    save_skeleton(skeleton_of(vertices, edges), path)
+    return dict(seconds=round(seconds, 3))
+
+
+@app.command("seconds")
+def seconds_(tool: Tool = "") -> None:
+    """CPU seconds of each tool on twelve clouds, one at a time; kept in benchmarks/v1. The machine should be idle."""
+    peers = installed(PEERS, tool)
+    one_thread()
+    found = seconds()["tools"] | {
+        row["tool"]: round(row["cpu"], 3)
+        for row in in_processes(timed, [(dict(tool=name), (peer,)) for name, peer in peers.items()], 1, fresh=True)
+        if "failure" not in row
+    }
+    write_json(SECONDS, {"where": f"{machine()} {versions(peers.values())}", "tools": found})
+    present([("CPU s", ["", "CPU s"], [[PEERS[name].label, f"{it:.2f}"] for name, it in found.items()])], False)
+
+
+def timed(peer: Peer) -> dict:
+    """The median CPU seconds of a tool, after a first call."""
+    clouds = [cloud(shape(family, 100), variant) for family, variant in TIMED]
+    return dict(cpu=median(peer.timed(points)[1] for points in clouds))
+
+
+@app.command()
+def page(
+    path: Annotated[Path | None, typer.Argument(metavar="MD", callback=page_with(*PARTS))] = None,
+    markdown: Markdown = False,
+) -> None:
+    """The tables of the scores that are kept, printed; or put into a page, with a picture in images beside it."""
+    found = pieces()
+    if path is None:
+        present([table for part in found.values() for table in part], markdown)
+    else:
+        fill(path, {name: "\n".join(markdown_table(*table) for table in part) for name, part in found.items()})
+        (path.parent / "images").mkdir(exist_ok=True)
+        board(kept(), path.parent / "images")
+
+
+def pieces() -> dict[str, list]:
+    """The tables by the names of their places in the page."""
+    entries = kept()
+    return {
+        "leaderboard": [tables.overview(entries, seconds()["tools"])],
+        "losses": [tables.losses(entries)],
+        "topologies": [tables.by_group(entries, "variant", "topology", 2, "right topology, by kind of cloud")],
+        "errors": [tables.by_group(entries, "variant", "error", 3, "error, by kind of cloud")],
+        "families": [tables.by_group(entries, "family", "topology", 2, "right topology, by family of shapes")],
+        "failures": [tables.failures(entries)],
+        "runs": [tables.runs(entries)],
+        "recorded": [recorded.table()],
+    }
+
+
+@app.command()
+def picture(
+    place: Place,
+    path: Annotated[Path, typer.Argument(metavar="PNG", callback=writable)],
+    name: Annotated[str, typer.Option("--cloud", help="One of the benchmark.")] = "handles_103_scan2",
+    tool: Tool = "default,pc-skeletor,pygel-points,cgal,skeletor-contraction,thinning-poisson",
+) -> None:
+    """Draw the answers of some tools to one cloud, side by side."""
+    entries = {entry.tool: entry for entry in kept()}
+    draw(read_folder(place / BENCH), place, name, [entries[it] for it in tool.split(",") if it in entries], path)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("MPLBACKEND", "Agg")
+    app()
