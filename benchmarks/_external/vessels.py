@@ -43,7 +43,7 @@ def vessels(path: Path, name: str, variants: Sequence[str], points: int) -> Entr
         if shown >= asked.least_coverage:
             clouds[variant] = drawn
         else:
-            left_out.append(f"{path}: {variant} shows {shown:.2f} of its axis: try more --points")
+            left_out.append(f"{path}: {variant} shows {shown:.2f} of its axis, less than {asked.least_coverage}")
     return Entry("vessels", clouds, (shape.nodes, shape.edges, shape.radii), tuple(left_out))
 
 

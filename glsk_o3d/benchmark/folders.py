@@ -211,7 +211,7 @@ def _check(folder: BenchmarkFolder) -> None:
     not there at all.
     """
     names = [cloud.name for cloud in folder.clouds]
-    if len(set(names)) < len(names):
+    if len(set(names)) < len(names) or not folder.name:  # which takes all fingerprints of one's own
         raise ValueError("two clouds have one name")
     for cloud in folder.clouds:
         truth = folder.shapes[cloud.shape]["truth"]

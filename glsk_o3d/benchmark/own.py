@@ -49,6 +49,7 @@ def add_shape(
     nodes : (M, 3) array_like of float
         Of the true axis, in the units of the clouds.
     edges : (E, 2) array_like of int
+        Nodes in one place that no edge joins are apart: weld them before.
     radii : (M,) array_like of float, optional
         Distance to the surface at each node. By default measured in the first of the clouds: at each node the median
         distance of the points whose nearest place on the axis belongs to it, and where fewer than three do, the radius

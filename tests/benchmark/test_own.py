@@ -147,6 +147,14 @@ class TestRefusals:
         with pytest.raises(InvalidCloudError):
             add_shape(tmp_path, "fork", {"a": "scan.ply"}, *AXIS)
 
+    @pytest.mark.parametrize("part", ["fingerprint", "truth", "clouds", "family"])
+    def test_an_index_that_lacks_a_part(self, own, part):
+        told = json.loads((own.path / INDEX_NAME).read_text())
+        del told["shapes"]["zig"][part]
+        (own.path / INDEX_NAME).write_text(json.dumps(told))
+        with pytest.raises(FileFormatError, match="damaged"):
+            read_folder(own.path)
+
     def test_a_damaged_index(self, own):
         (own.path / INDEX_NAME).write_text('{"version": "own", "complete": true, "shapes": {"a": {"clouds": 3}}}')
         with pytest.raises(FileFormatError, match="damaged"):
