@@ -353,6 +353,15 @@ class TestUsage:
         out = call("vessels", tmp_path / "data", "-o", small.path, code=2)
         assert "has version v1, not own" in " ".join(out.split())
 
+    def test_places_that_are_one(self, parts):
+        """With the largest radius; what no edge joins to another place goes."""
+        places = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0], [9, 9, 9]], float)
+        nodes, edges, radii = parts.entries.welded(
+            places, np.array([[1, 0], [1, 2], [2, 3]]), np.array([1, 2, 5, 3, 4])
+        )
+        assert nodes.tolist() == [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
+        assert (edges.tolist(), radii.tolist()) == ([[0, 1], [1, 2]], [1, 5, 3])
+
     def test_names(self, parts):
         from pathlib import Path
 
