@@ -12,29 +12,38 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MPLBACKEND="Agg
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 from _peers import PEERS, installed, one_thread, silence, skeleton_of
+from _trees.clouds import upright
+from _trees.tools import TOOLS
 
 from glsk_o3d import read_cloud, save_skeleton
 from glsk_o3d.interop.clouds import cloud_points
 
+KNOWN = PEERS | {name: tool for name, tool in TOOLS.items() if name not in PEERS}
+"""All tools; those of trees take z for up, and others do not mind."""
 app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False)
 
 
 @app.command(help=__doc__)
 def main(
-    tool: Annotated[str, typer.Argument(metavar="TOOL", help=f"One of {', '.join(PEERS)}.")],
+    tool: Annotated[str, typer.Argument(metavar="TOOL", help=f"One of {', '.join(KNOWN)}.")],
     cloud: Annotated[Path, typer.Argument(metavar="CLOUD", help="As for glsk skeletonize.")],
     skeleton: Annotated[Path, typer.Argument(metavar="SKELETON", help="Any format of skeletons.")],
+    up: Annotated[str, typer.Option("--up", metavar="AXIS", help="That points up, for tools of trees: x, y, z.")] = "z",
 ) -> None:
-    if tool not in PEERS:
-        raise typer.BadParameter(f"no tool {tool}: there are {', '.join(PEERS)}")
-    (peer,) = installed(PEERS, tool).values()
+    if tool not in KNOWN:
+        raise typer.BadParameter(f"no tool {tool}: there are {', '.join(KNOWN)}")
+    if up not in ("x", "y", "z"):
+        raise typer.BadParameter(f"--up {up}: there are x, y and z")
+    (peer,) = installed(KNOWN, tool).values()
+    turn = upright(up)
     one_thread()
     points = cloud_points(read_cloud(cloud))
     with silence():
-        vertices, edges = peer(points)
-    save_skeleton(skeleton_of(vertices, edges), skeleton)
+        vertices, edges = peer(np.ascontiguousarray(points[:, turn]))
+    save_skeleton(skeleton_of(vertices[:, np.argsort(turn)], edges), skeleton)
 
 
 if __name__ == "__main__":

@@ -195,6 +195,21 @@ class TestTools:
         assert wrong.returncode == 2
         assert "no tool magic: there are default, cao2010" in wrong.stderr
 
+    def test_the_adapter_knows_the_tools_of_trees_and_what_points_up(self, root, tmp_path):
+        """They begin at the lowest point: turned with the cloud, level sets are the same."""
+        points = np.random.default_rng(0).normal(scale=[0.05, 0.05, 1.0], size=(500, 3))
+        call, found = [sys.executable, str(root / "benchmarks" / "adapter.py"), "levels"], {}
+        for up, turn in (("x", [2, 0, 1]), ("y", [1, 2, 0]), ("z", [0, 1, 2])):
+            cloud, skeleton = tmp_path / f"{up}.xyz", tmp_path / f"{up}.obj"
+            np.savetxt(cloud, points[:, turn])
+            words = [*call, cloud, skeleton, *(() if up == "z" else ("--up", up))]
+            subprocess.run(words, check=True, capture_output=True)
+            found[up] = read_skeleton(skeleton).vertices[:, np.argsort(turn)]
+        np.testing.assert_allclose(found["x"], found["z"], atol=1e-12)
+        np.testing.assert_allclose(found["y"], found["z"], atol=1e-12)
+        wrong = subprocess.run([*call, "c.xyz", "s.obj", "--up", "w"], capture_output=True, text=True)
+        assert (wrong.returncode, "there are x, y and z" in wrong.stderr) == (2, True)
+
     @pytest.mark.filterwarnings("ignore")  # theirs
     def test_those_that_are_installed(self, parts):
         there = {name: peer for name, peer in parts.peers.PEERS.items() if None not in peer.versions().values()}

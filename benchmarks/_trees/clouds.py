@@ -34,9 +34,14 @@ class SparseTree:
         """Points (n, 3), nodes (M, 3) and edges (E, 2)."""
         if self.path is None:
             return builtin(int(self.name), self.condition)
-        turn = np.roll(np.arange(3), 2 - "xyz".index(self.up))
+        turn = upright(self.up)
         with np.load(self.path) as archive:
             return archive[self.condition][:, turn].astype(float), archive["nodes"][:, turn], archive["edges"]
+
+
+def upright(up: str) -> np.ndarray:
+    """The axes x, y and z, turned round so that the one that points up is the last: (3,) int array."""
+    return np.roll(np.arange(3), 2 - "xyz".index(up))
 
 
 def sparse_trees(folder: Path | None, up: str, trees: int) -> list[SparseTree]:

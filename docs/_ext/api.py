@@ -75,6 +75,7 @@ NAMES = {
     },
     "benchmark": {
         "Its clouds": ("make", "version", "Version", "read_folder", "BenchmarkFolder", "CloudFile"),
+        "Clouds of your own": ("add_shape",),
         "Answers": ("run", "RunResult"),
         "Scores": ("score", "Scores", "score_answers", "Results", "read_results", "leaderboard", "Leaderboard"),
     },

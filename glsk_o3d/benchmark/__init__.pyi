@@ -1,6 +1,7 @@
 from .answers import Results, read_results, score_answers
 from .folders import BenchmarkFolder, CloudFile, read_folder
 from .making import make
+from .own import add_shape
 from .running import RunResult, run
 from .scoring import Scores, score
 from .table import Leaderboard, leaderboard
@@ -14,6 +15,7 @@ __all__ = [
     "RunResult",
     "Scores",
     "Version",
+    "add_shape",
     "leaderboard",
     "make",
     "read_folder",

@@ -32,7 +32,7 @@ class Results:
     Attributes
     ----------
     benchmark : str
-        The version.
+        The version; of somebody's own clouds "own" and digits that differ where clouds or axes do.
     name : str
         Of the program, as the table shows it.
     whole : bool
@@ -133,7 +133,7 @@ def score_answers(
         rows.append({**facts, **scores.as_dict(), "seconds": told.get("seconds")})
         if on_cloud is not None:
             on_cloud(cloud.name, done, len(clouds))
-    return Results(made.version, name or place.resolve().name, made.whole, rows)
+    return Results(made.name, name or place.resolve().name, made.whole, rows)
 
 
 def answer_files(place: Path) -> dict[str, list[Path]]:

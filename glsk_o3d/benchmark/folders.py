@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..analysis.truth import Truth
-from ..errors import FileFormatError
-from ..interop.atomic import write_json
+from ..errors import FileFormatError, InvalidParameterError
+from ..interop.atomic import write_atomically, write_json
 from ..io.axes import read_truth
-from .versions import VERSIONS
+from ..io.formats.ply_rows import header, table
+from .versions import OWN, VERSIONS
 
 INDEX_NAME = "benchmark.json"
 _EXPLAINED = {
@@ -22,6 +27,11 @@ _EXPLAINED = {
     "scored": "whether answers to this cloud count: it shows enough of the shape",
     "coverage": "the share of the axis that the cloud shows",
     "sameness": "to the cloud that is meant: bits, rounding or other; null where the package knows none",
+}
+_EXPLAINED_OF_OWN = {
+    "clouds/SHAPE_VARIANT.ply": "a cloud: binary PLY, little-endian, float or double x, y, z, in units of its own",
+    "truth/SHAPE.npz": _EXPLAINED["truth/SHAPE.npz"],
+    "radii": "given with the axis, or the variant of the cloud in which they were measured",
 }
 
 
@@ -57,12 +67,13 @@ class CloudFile:
 
 @dataclass(frozen=True)
 class BenchmarkFolder:
-    """A folder that `make` has written, or is writing.
+    """A folder that `make` or `add_shape` has written, or is writing.
 
     Attributes
     ----------
     path : Path
     version : str
+        "own" where the clouds are somebody's own.
     shapes : dict of str to dict
         What ``benchmark.json`` says of each shape: family, seed, truth, facts, and clouds by variant.
     complete : bool
@@ -81,7 +92,7 @@ class BenchmarkFolder:
 
     @property
     def clouds(self) -> list[CloudFile]:
-        """All clouds, by shape and then in the order of the variants."""
+        """All clouds, by shape and then in the order of the variants: of one's own clouds, as they were added."""
         return list(self._clouds())
 
     @property
@@ -90,9 +101,10 @@ class BenchmarkFolder:
         return [cloud for cloud in self._clouds() if cloud.scored]
 
     def _clouds(self) -> Iterator[CloudFile]:
-        order = VERSIONS[self.version].variants
+        own = self.version == OWN
         for shape, told in sorted(self.shapes.items()):
-            for variant in sorted(told["clouds"], key=order.index):
+            names = [*told["clouds"]]
+            for variant in names if own else sorted(names, key=VERSIONS[self.version].variants.index):
                 cloud = told["clouds"][variant]
                 place = self.path / cloud["file"]
                 yield CloudFile(shape, variant, told["family"], place, bool(cloud["scored"]))
@@ -100,10 +112,23 @@ class BenchmarkFolder:
     @property
     def whole(self) -> bool:
         """Whether these are all shapes and variants of the version, and no others."""
+        if self.version == OWN:
+            return False
         asked = VERSIONS[self.version]
         names = {f"{family}_{seed}" for family in asked.families for seed in asked.seeds}
         variants = set(asked.variants)
         return names == self.shapes.keys() and all(variants == told["clouds"].keys() for told in self.shapes.values())
+
+    @property
+    def name(self) -> str:
+        """What it is called where scores are compared: its version, and of one's own clouds and axes eight digits that
+        differ where these do.
+        """
+        if self.version != OWN:
+            return self.version
+        prints = [[name, self.shapes[name]["fingerprint"]] for name in sorted(self.shapes)]
+        prints += [[each.name, self.shapes[each.shape]["clouds"][each.variant]["fingerprint"]] for each in self.clouds]
+        return f"{OWN} {zlib.crc32(json.dumps(sorted(prints)).encode()):08x}"
 
     def truth(self, shape: str) -> Truth:
         """The true axis of a shape.
@@ -126,12 +151,13 @@ class BenchmarkFolder:
 
     def save(self) -> None:
         """Write ``benchmark.json``."""
-        asked = VERSIONS[self.version]
+        asked = VERSIONS.get(self.version)
+        choice = asked and {"points": asked.points, "draw": asked.draw, "least_coverage": asked.least_coverage}
         told = {
             "benchmark": "curve skeletons of point clouds",
             **{"version": self.version, "complete": self.complete, "whole": self.whole},
-            **{"points": asked.points, "draw": asked.draw, "least_coverage": asked.least_coverage},
-            "explained": _EXPLAINED,
+            **(choice or {}),
+            "explained": _EXPLAINED if asked else _EXPLAINED_OF_OWN,
             "shapes": dict(sorted(self.shapes.items())),
         }
         write_json(self.path / INDEX_NAME, told)
@@ -169,8 +195,8 @@ def read_folder(path: str | os.PathLike) -> BenchmarkFolder:
     try:
         told = json.loads(index.read_text(encoding="utf-8"))
         name = told["version"]
-        if name not in VERSIONS:
-            raise FileFormatError(f"{index}: is of version {name!r}: this package knows {', '.join(VERSIONS)}")
+        if name not in (*VERSIONS, OWN):
+            raise FileFormatError(f"{index}: is of version {name!r}: this package knows {', '.join([*VERSIONS, OWN])}")
         found = BenchmarkFolder(Path(path), name, told["shapes"], bool(told["complete"]))
         _check(found)
     except FileFormatError:
@@ -181,7 +207,12 @@ def read_folder(path: str | os.PathLike) -> BenchmarkFolder:
 
 
 def _check(folder: BenchmarkFolder) -> None:
-    """Raise ValueError for names that lead out of the folder; KeyError and the like for what is not there at all."""
+    """Raise ValueError for names that lead out of the folder or that two clouds have; KeyError and the like for what is
+    not there at all.
+    """
+    names = [cloud.name for cloud in folder.clouds]
+    if len(set(names)) < len(names) or not folder.name:  # which takes all fingerprints of one's own
+        raise ValueError("two clouds have one name")
     for cloud in folder.clouds:
         truth = folder.shapes[cloud.shape]["truth"]
         for name in (cloud.path.relative_to(folder.path).as_posix(), truth):
@@ -190,3 +221,28 @@ def _check(folder: BenchmarkFolder) -> None:
                 raise ValueError(f"{name!r} is no file of a benchmark")
         if cloud.name != Path(cloud.name).name:
             raise ValueError(f"{cloud.name!r} is no name of a cloud")
+
+
+def begun(path: Path, version: str) -> BenchmarkFolder:
+    """The folder as it is, made if it is not there; InvalidParameterError if it has another version."""
+    for place in ("clouds", "truth"):
+        (path / place).mkdir(parents=True, exist_ok=True)
+    if not (path / INDEX_NAME).exists():
+        return BenchmarkFolder(path, version)
+    found = read_folder(path)
+    if found.version != version:
+        has = "clouds of somebody's own" if found.version == OWN else f"version {found.version}"
+        raise InvalidParameterError(f"{path}: has {has}, not {version}: give another folder")
+    return found
+
+
+def write_axis(path: Path, axis: Any) -> None:
+    """Write the `nodes`, `edges` and `radii` of anything that has them."""
+    parts = {"nodes": axis.nodes, "edges": axis.edges, "radii": axis.radii}
+    write_atomically(path, lambda temporary: np.savez(temporary, **parts))
+
+
+def write_points(path: Path, points: np.ndarray) -> None:
+    """Write a cloud, (n, 3) float32 or float64 array."""
+    rows = table(dict(zip("xyz", points.T, strict=True)))
+    write_atomically(path, partial(Path.write_bytes, data=header(rows.dtype, len(rows)) + rows.tobytes()))

@@ -14,12 +14,9 @@ import numpy as np
 
 from ..batch.workers import LocalWorkers, died
 from ..errors import BatchError, InvalidParameterError, did_you_mean
-from ..interop.atomic import write_atomically
-from ..io.formats.ply_rows import header, table
 from ..numerics.cores import cores
 from . import versions
-from .folders import INDEX_NAME, BenchmarkFolder, read_folder
-from .versions import Version
+from .folders import BenchmarkFolder, begun, write_axis, write_points
 
 Told = dict[str, Any]
 
@@ -80,7 +77,7 @@ def make(
     numbers = asked.seeds if seeds is None else tuple(dict.fromkeys(seeds))
     if not numbers or not all(isinstance(each, int | np.integer) and each >= 0 for each in numbers):
         raise InvalidParameterError(f"seeds must be whole numbers from 0, not {numbers!r}")
-    made = _begun(Path(folder), asked)
+    made = begun(Path(folder), asked.name)
     todo = {}
     for family in wanted[0]:
         for seed in map(int, numbers):
@@ -113,18 +110,6 @@ def _known(words: Iterable[str] | None, known: Sequence[str], what: str) -> list
             raise InvalidParameterError(did_you_mean(word, known, f"{what} of the benchmark"))
     if not found:
         raise InvalidParameterError(f"no {what} is given: there are {', '.join(known)}")
-    return found
-
-
-def _begun(folder: Path, asked: Version) -> BenchmarkFolder:
-    """The folder as it is, made if it is not there."""
-    for place in ("clouds", "truth"):
-        (folder / place).mkdir(parents=True, exist_ok=True)
-    if not (folder / INDEX_NAME).exists():
-        return BenchmarkFolder(folder, asked.name)
-    found = read_folder(folder)
-    if found.version != asked.name:
-        raise InvalidParameterError(f"{folder}: has version {found.version}, not {asked.name}: give another folder")
     return found
 
 
@@ -169,29 +154,20 @@ def _make_shape(folder: Path, name: str, family: str, seed: int, variants: Seque
 
     asked, known, drawn = versions.version(name), versions.fingerprints(name), shape(family, seed)
     truth = f"truth/{drawn.name}.npz"
-    write_atomically(folder / truth, partial(_write_truth, drawn))
+    write_axis(folder / truth, drawn)
     clouds = {}
     for variant in variants:
         points = np.asarray(cloud(drawn, variant, n=asked.points, seed=asked.draw), np.float32)
         share = 1.0 if variant in asked.whole else float(coverage(drawn, points))
         called = f"{drawn.name}_{variant}"
         file, expected = f"clouds/{called}.ply", known.get(called)
-        write_atomically(folder / file, partial(_write_ply, points))
+        write_points(folder / file, points)
         clouds[variant] = {
             **{"file": file, "scored": versions.is_scored(asked, called, share), "coverage": round(share, 4)},
             **{"fingerprint": versions.fingerprint(points)},
             "sameness": versions.sameness(points, expected) if expected else None,
         }
     return {"family": family, "seed": seed, "truth": truth, "facts": _plain(drawn.facts), "clouds": clouds}
-
-
-def _write_truth(drawn: Any, path: Path) -> None:
-    np.savez(path, nodes=drawn.nodes, edges=drawn.edges, radii=drawn.radii)
-
-
-def _write_ply(points: np.ndarray, path: Path) -> None:
-    rows = table(dict(zip("xyz", points.T, strict=True)))
-    path.write_bytes(header(rows.dtype, len(rows)) + rows.tobytes())
 
 
 def _plain(value: Any) -> Any:

@@ -15,6 +15,7 @@ from ..errors import InvalidParameterError
 from ..interop.atomic import write_atomically, write_json
 from .answers import MEASURES, Results
 from .intervals import mean_with_interval, told
+from .versions import OWN
 
 _COLUMNS = MEASURES[:7]  # in Markdown; JSON has them all
 _HEADS = {"tips_f1": "tips F1", "junctions_f1": "junctions F1"}
@@ -29,7 +30,7 @@ class Leaderboard:
     Attributes
     ----------
     benchmark : str
-        The version.
+        As of `Results`.
     whole : bool
         Whether the clouds are all of the version, and no others.
     entries : list of dict
@@ -81,7 +82,8 @@ class Leaderboard:
         -------
         str
         """
-        parts = [f"Benchmark {self.benchmark}{'' if self.whole else ', not all of it, or other shapes'}. {_CAPTION}"]
+        part = "" if self.whole or self.benchmark.startswith(f"{OWN} ") else ", not all of it, or other shapes"
+        parts = [f"Benchmark {self.benchmark}{part}. {_CAPTION}"]
         if self.entries:
             first = self.entries[0]["all"]
             title = f"{first['clouds']} clouds of {first['shapes']} shapes"

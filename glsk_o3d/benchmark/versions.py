@@ -77,6 +77,8 @@ VERSIONS = {
     )
 }
 """All versions by name. One that has been published is never changed."""
+OWN = "own"
+"""What stands for the version where clouds and axes are somebody's own."""
 
 
 def version(name: str) -> Version:

@@ -1,0 +1,244 @@
+"""A benchmark of somebody's own clouds and axes: what is written, what is refused, radii from clouds, and scores."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from glsk_o3d import Skeleton, read_cloud, samples
+from glsk_o3d.analysis.curves import radii_from_points
+from glsk_o3d.benchmark import add_shape, leaderboard, make, read_folder, run, score_answers
+from glsk_o3d.benchmark.folders import INDEX_NAME
+from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
+
+FORK = samples.y_junction(900)
+AXIS = (FORK.nodes, FORK.edges, FORK.radii)
+COPY = "import shutil, sys; shutil.copy(sys.argv[3], sys.argv[2])"
+
+
+@pytest.fixture
+def own(tmp_path):
+    """Two shapes, in units of their own."""
+    add_shape(tmp_path / "own", "zig", {"scan": 40 * FORK.points}, 40 * FORK.nodes, FORK.edges, 40 * FORK.radii)
+    clouds = {"late": FORK.points[::2], "early": FORK.points}
+    return add_shape(tmp_path / "own", "a.fork", clouds, *AXIS, family="forks")
+
+
+def everything(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+class TestFolder:
+    def test_what_is_in_it(self, own):
+        clouds = ["a.fork_late", "a.fork_early", "zig_scan"]  # variants as they were added
+        files = [INDEX_NAME, *(f"clouds/{name}.ply" for name in clouds), "truth/a.fork.npz", "truth/zig.npz"]
+        assert sorted(everything(own.path)) == sorted(files)
+        again = read_folder(own.path)
+        assert [cloud.name for cloud in again.clouds] == [cloud.name for cloud in again.scored] == clouds
+        assert [cloud.family for cloud in again.clouds] == ["forks", "forks", "own"]
+        assert (again.version, again.whole, again.complete, again.name) == ("own", False, True, own.name)
+        told = json.loads((own.path / INDEX_NAME).read_text())
+        assert not {"points", "draw", "least_coverage"} & told.keys()
+        assert told["shapes"]["zig"]["radii"] == "given"
+
+    def test_clouds_and_axes_keep_their_units(self, own):
+        np.testing.assert_array_equal(
+            np.asarray(read_cloud(own.path / "clouds/zig_scan.ply").points, np.float32), np.float32(40 * FORK.points)
+        )
+        truth = own.truth("zig")
+        np.testing.assert_array_equal(truth.nodes, 40 * FORK.nodes)
+        np.testing.assert_array_equal(truth.radii, 40 * FORK.radii)
+
+    def test_coordinates_on_a_map_keep_their_digits(self, tmp_path):
+        place = np.array([5e5, 5e6, 0])
+        add_shape(tmp_path, "far", {"scan": FORK.points + place}, FORK.nodes + place, FORK.edges)
+        path = tmp_path / "clouds/far_scan.ply"
+        assert b"property double x" in path.read_bytes()[:200]
+        np.testing.assert_array_equal(np.asarray(read_cloud(path).points), FORK.points + place)
+
+    def test_the_same_again_changes_nothing(self, own):
+        before = everything(own.path)
+        add_shape(own.path, "a.fork", {"late": FORK.points[::2]}, *AXIS, family="forks")
+        assert everything(own.path) == before
+
+    def test_more_variants_of_a_shape(self, own):
+        made = add_shape(own.path, "a.fork", {"thin": FORK.points[::3]}, *AXIS[:2], family="forks")
+        assert [cloud.variant for cloud in made.clouds] == ["late", "early", "thin", "scan"]
+        np.testing.assert_array_equal(made.truth("a.fork").radii, FORK.radii)  # those that it had
+        assert made.name != own.name
+
+    def test_names_tell_other_clouds_and_axes(self, own, tmp_path):
+        again = add_shape(tmp_path / "b", "zig", {"scan": 40 * FORK.points}, 40 * FORK.nodes, FORK.edges)
+        both = add_shape(tmp_path / "b", "a.fork", {"late": FORK.points[::2], "early": FORK.points}, *AXIS)
+        assert both.name != own.name  # radii of zig were measured
+        assert again.name.startswith("own ")
+
+
+class TestRefusals:
+    @pytest.mark.parametrize("name", ["", ".hidden", "a/b", "../a", "a\\b", "a b", "a\n", "-a", "a:b", 3, None])
+    def test_names_that_are_not_plain(self, tmp_path, name):
+        for words in ((name, {"scan": FORK.points}, "own"), ("a", {name: FORK.points}, "own"), ("a", {"b": []}, name)):
+            with pytest.raises(InvalidParameterError, match="no plain name"):
+                add_shape(tmp_path / "own", words[0], words[1], *AXIS, family=words[2])
+        assert not (tmp_path / "own").exists()
+
+    @pytest.mark.parametrize(
+        ("shape", "variant", "said"),
+        [
+            ("a.fork_late", "x", None),
+            ("a.fork", "late_x", None),
+            ("A.fork", "x", "one file"),
+            ("a.fork", "Late", "name of two clouds"),
+        ],
+    )
+    def test_names_of_other_clouds(self, own, shape, variant, said):
+        if said is None:
+            add_shape(own.path, shape, {variant: FORK.points}, *AXIS)
+            return
+        with pytest.raises(InvalidParameterError, match=said):
+            add_shape(own.path, shape, {variant: FORK.points}, *AXIS)
+
+    def test_one_name_of_two_clouds(self, own):
+        add_shape(own.path, "a.fork_late", {"x": FORK.points}, *AXIS)
+        with pytest.raises(InvalidParameterError, match=r"a\.fork_late_x would be the name of two clouds"):
+            add_shape(own.path, "a.fork", {"late_x": FORK.points}, *AXIS)
+        told = json.loads((own.path / INDEX_NAME).read_text())
+        told["shapes"]["a.fork"]["clouds"]["late_x"] = told["shapes"]["a.fork"]["clouds"]["late"]
+        (own.path / INDEX_NAME).write_text(json.dumps(told))
+        with pytest.raises(FileFormatError, match="two clouds have one name"):
+            read_folder(own.path)
+
+    def test_other_points_or_another_axis(self, own):
+        before = everything(own.path)
+        with pytest.raises(InvalidParameterError, match=r"other points for a\.fork_late"):
+            add_shape(own.path, "a.fork", {"late": FORK.points[1::2]}, *AXIS)
+        for axis in ((2 * AXIS[0], *AXIS[1:]), (*AXIS[:2], 2 * AXIS[2]), (AXIS[0] + 1e-3, AXIS[1])):
+            with pytest.raises(InvalidParameterError, match=r"a\.fork with another axis"):
+                add_shape(own.path, "a.fork", {"new": FORK.points}, *axis)
+        assert everything(own.path) == before
+
+    def test_versions_are_not_mixed(self, own, small):
+        with pytest.raises(InvalidParameterError, match="has clouds of somebody's own, not v1"):
+            make(own.path, families=["tubes"], seeds=[100], variants=["clean"], jobs=1)
+        with pytest.raises(InvalidParameterError, match="has version v1, not own"):
+            add_shape(small.path, "fork", {"scan": FORK.points}, *AXIS)
+
+    @pytest.mark.parametrize(
+        ("clouds", "axis", "said"),
+        [
+            ({}, AXIS, "no cloud is given"),
+            ({"a": FORK.points * np.nan}, AXIS, "not finite"),
+            ({"a": FORK.points * 1e300}, AXIS, "not finite, or beyond"),
+            ({"a": FORK.points}, (AXIS[0], [[0, 99]]), "fork: .*not there"),
+            ({"a": FORK.points}, ("nodes", []), "fork: the axis has nodes"),
+            ({"a": FORK.points}, (np.empty((0, 3)), []), "fork: .*empty"),
+            ({"a": FORK.points}, (*AXIS[:2], 0 * AXIS[2]), "fork: .*positive"),
+            ({"a": FORK.points}, (AXIS[0] + 99, AXIS[1]), "fork: the axis has no points near"),
+            ({"a": FORK.points[:2]}, AXIS[:2], "fork: no node of the axis has 3 points"),
+        ],
+    )
+    def test_clouds_and_axes_of_no_use(self, tmp_path, clouds, axis, said):
+        with pytest.raises(InvalidParameterError, match=said):
+            add_shape(tmp_path, "fork", clouds, *axis)
+        assert not (tmp_path / INDEX_NAME).exists()
+
+    def test_no_cloud(self, tmp_path):
+        with pytest.raises(InvalidCloudError):
+            add_shape(tmp_path, "fork", {"a": "scan.ply"}, *AXIS)
+
+    @pytest.mark.parametrize("part", ["fingerprint", "truth", "clouds", "family"])
+    def test_an_index_that_lacks_a_part(self, own, part):
+        told = json.loads((own.path / INDEX_NAME).read_text())
+        del told["shapes"]["zig"][part]
+        (own.path / INDEX_NAME).write_text(json.dumps(told))
+        with pytest.raises(FileFormatError, match="damaged"):
+            read_folder(own.path)
+
+    def test_a_damaged_index(self, own):
+        (own.path / INDEX_NAME).write_text('{"version": "own", "complete": true, "shapes": {"a": {"clouds": 3}}}')
+        with pytest.raises(FileFormatError, match="damaged"):
+            add_shape(own.path, "b", {"a": FORK.points}, *AXIS)
+
+
+class TestRadii:
+    def test_of_a_tube_that_widens(self):
+        """Around each node the points are as far as the cone is thick, whatever part of the edges they are beside."""
+        t, turn = np.random.default_rng(0).random((2, 4000)) * [[10], [2 * np.pi]]
+        radius = 0.5 + 0.1 * t
+        points = np.column_stack([t, radius * np.cos(turn), radius * np.sin(turn)])
+        nodes = np.column_stack([np.arange(11.0), np.zeros((11, 2))])
+        found = radii_from_points(nodes, np.column_stack([np.arange(10), np.arange(1, 11)]), points)
+        np.testing.assert_allclose(found[1:-1], 0.5 + 0.1 * nodes[1:-1, 0], rtol=0.02)
+
+    def test_one_long_edge_is_no_ball(self):
+        turn = np.linspace(0, 20, 500)
+        points = np.column_stack([np.linspace(0, 50, 500), np.cos(turn), np.sin(turn)])
+        found = radii_from_points(np.array([[0, 0, 0], [50.0, 0, 0]]), np.array([[0, 1]]), points)
+        np.testing.assert_allclose(found, 1)
+
+    def test_nodes_without_points_have_those_of_the_next_along_the_axis(self):
+        """A twig beside a trunk: its bare tip is as thick as its foot, not as the trunk that it comes near to."""
+        turn = np.linspace(0, 60, 600)
+        trunk = np.column_stack([2 * np.cos(turn), 2 * np.sin(turn), np.linspace(0, 10, 600)])
+        twig = np.column_stack([8 + 0.1 * np.cos(turn), 0.1 * np.sin(turn), np.linspace(0, 3, 600)])
+        nodes = np.array([[0, 0, 0], [0, 0, 10], [8, 0, 0], [8, 0, 3], [4.5, 0, 9], [60, 0, 0]], float)
+        edges = np.array([[0, 1], [2, 3], [3, 4]])
+        found = radii_from_points(nodes, edges, np.vstack([trunk, twig]))
+        np.testing.assert_allclose(found, [2, 2, 0.1, 0.1, 0.1, 0.1], atol=0.01)  # the last has no edge: straight
+
+    def test_a_ball(self):
+        ball = samples.sphere(500).points
+        np.testing.assert_allclose(radii_from_points(np.zeros((1, 3)), np.empty((0, 2), int), ball), [0.5], rtol=0.01)
+
+    def test_points_on_the_axis(self):
+        nodes = np.array([[0, 0, 0], [1.0, 0, 0]])
+        line = np.linspace(nodes[0], nodes[1], 50)
+        with pytest.raises(InvalidParameterError, match="radii cannot be measured"):
+            radii_from_points(nodes, np.array([[0, 1]]), line)
+
+    def test_where_in_space_and_how_large_it_is_does_not_matter(self):
+        found = radii_from_points(FORK.nodes, FORK.edges, FORK.points)
+        np.testing.assert_allclose(found, FORK.radii, rtol=0.1)
+        moved = radii_from_points(1e3 * FORK.nodes + 1e5, FORK.edges, 1e3 * FORK.points + 1e5)
+        np.testing.assert_allclose(moved, 1e3 * found, rtol=1e-6)
+
+
+class TestScores:
+    def test_from_a_command_to_the_table(self, own, tmp_path):
+        for cloud in own.clouds:
+            truth = own.truth(cloud.shape)
+            Skeleton(truth.nodes, truth.edges, truth.radii, (), (), ()).save(tmp_path / f"{cloud.shape}.obj")
+        words = [sys.executable, "-S", "-c", COPY, "{cloud}", "{skeleton}", str(tmp_path / "a.fork.obj")]
+        assert run(own.path, tmp_path / "mine", command=words, ending=".obj").failures == {}
+        results = score_answers(own.path, tmp_path / "mine")
+        perfect = {f"{row['shape']}_{row['variant']}": row["perfect"] for row in results.rows}
+        assert perfect == {"a.fork_late": True, "a.fork_early": True, "zig_scan": False}  # the last is larger
+        assert (results.benchmark, results.whole) == (own.name, False)
+        board = leaderboard([results])
+        assert list(board.entries[0]["variants"]) == ["late", "early", "scan"]
+        text = board.markdown()
+        assert text.startswith(f"Benchmark {own.name}. Means")
+        assert "3 clouds of 2 shapes" in text
+
+    def test_scores_do_not_depend_on_the_size(self, tmp_path):
+        errors = []
+        for scale in (1, 1000):
+            place = tmp_path / str(scale)
+            made = add_shape(place, "fork", {"scan": scale * FORK.points}, scale * FORK.nodes, FORK.edges)
+            (place / "mine").mkdir()
+            bent = scale * (FORK.nodes + 0.02 * np.sin(7 * FORK.nodes[:, ::-1]))
+            Skeleton(bent, FORK.edges, FORK.radii, (), (), ()).save(place / "mine" / "fork_scan.json")
+            errors += [row["error"] for row in score_answers(made, place / "mine").rows]
+        assert errors == pytest.approx([errors[0]] * 2, rel=1e-5)
+        assert errors[0] > 0.01
+
+    def test_scores_of_other_clouds_are_not_compared(self, own, tmp_path):
+        other = add_shape(tmp_path / "b", "zig", {"scan": FORK.points}, *AXIS)
+        add_shape(tmp_path / "c", "zig", {"scan": FORK.points[::2]}, *AXIS)
+        (tmp_path / "mine").mkdir()
+        Skeleton(*AXIS, (), (), ()).save(tmp_path / "mine" / "zig_scan.obj")
+        results = [score_answers(tmp_path / each, tmp_path / "mine", name=each) for each in "bc"]
+        assert other.name == results[0].benchmark
+        with pytest.raises(InvalidParameterError, match="different clouds"):
+            leaderboard(results)
