@@ -83,6 +83,9 @@ def test_points_that_are_not_finite(glsk, scans, tmp_path):
     line = failed(glsk("skeletonize", scans / "nan.ply", "-o", "s.npz"), 1)
     assert f"{scans / 'nan.ply'}: 2 of 1000 points" in line
     assert line.rstrip().endswith("the first at index 3: drop them with --drop-invalid")
+    (tmp_path / "none.xyz").write_text("nan nan nan\n" * 20)
+    line = failed(glsk("skeletonize", "none.xyz", "-o", "s.npz"), 1)
+    assert line.endswith("none.xyz: none of its 20 points has finite coordinates: there is no cloud to work with\n")
     run = glsk("skeletonize", scans / "nan.ply", "-o", "s.npz", "--drop-invalid", "--json")
     assert run.returncode == 0, run.stderr
     facts = json.loads(run.stdout)

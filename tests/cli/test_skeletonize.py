@@ -285,12 +285,14 @@ def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, monkeypatch):
     assert result.exit_code == 0, result.output
     facts = json.loads(result.stdout)
     assert (facts["points"], facts["loops"]) == (120000, 1)
-    assert f"read in blocks: the skeleton is that of a sample of {facts['sampled']} points" in result.stderr
+    assert f"read in blocks: the skeleton is that of a sample of {facts['sampled']} of 120000 points" in result.stderr
     np.testing.assert_allclose(read_skeleton("s.json").vertices, read_skeleton("whole.json").vertices, atol=1e-9)
     assert len(read_tensor_cloud("l.ply").point.branch) == 120000
     again = invoke("rerun", "s.json", "--json")
     assert "it holds a sample of a large cloud, and not how many points each stands for: give the scan" in again.stderr
     assert json.loads(invoke("rerun", "s.json", tmp_path / "scan.ply", "--json").stdout)["identical"]
+    few = invoke("skeletonize", tmp_path / "scan.ply", "-o", "s.json", "--stream", "--where", "x > 0.2")
+    assert re.search(r"scan\.ply: read in blocks: all \d+ points are taken\n", few.stderr)
     assert invoke("skeletonize", tmp_path / "scan.ply", "-o", "s.json", "--quiet").stderr == ""
     assert invoke("skeletonize", tmp_path / "scan.ply", "-o", "s.json", "--no-stream").stderr == ""
 

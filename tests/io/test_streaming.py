@@ -102,7 +102,7 @@ def test_points_that_are_not_finite(tmp_path, points):
     spoilt = points.copy()
     spoilt[20000:20010] = np.nan
     save_tensor_cloud(o3d.t.geometry.PointCloud(o3d.core.Tensor(spoilt)), tmp_path / "c.ply")
-    with pytest.raises(InvalidCloudError, match="the first at index 20000: drop them"):
+    with pytest.raises(InvalidCloudError, match=f"10 of {N} points .*, the first at index 20000: drop them"):
         read_sample(tmp_path / "c.ply")
     sample = read_sample(tmp_path / "c.ply", drop_invalid=True)
     assert int(sample.point.sample_count.numpy().sum()) == N - 10
@@ -115,6 +115,8 @@ def test_points_that_are_not_finite(tmp_path, points):
     save_tensor_cloud(o3d.t.geometry.PointCloud(o3d.core.Tensor(spoilt)), tmp_path / "none.ply")
     with pytest.raises(InvalidCloudError, match="no point with finite coordinates"):
         read_sample(tmp_path / "none.ply", drop_invalid=True)
+    with pytest.raises(InvalidCloudError, match=f"none of its {N} points has finite coordinates"):
+        read_sample(tmp_path / "none.ply")
 
 
 def test_a_report_counts_what_was_dropped(tmp_path, points):
