@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glsk_o3d import read_skeleton, read_tensor_cloud, samples
+from glsk_o3d import Judgement, read_skeleton, read_tensor_cloud, samples
+from glsk_o3d.cli import running
 from glsk_o3d.cli.options import PipelineName
 from glsk_o3d.io.meshes import read_mesh
 from glsk_o3d.pipelines import PIPELINES
@@ -317,3 +318,9 @@ def test_a_sample_that_cannot_be_taken(refused, scans):
     words = ("skeletonize", scans / "sample.ply", "--stream", "-o", "s.json")
     assert "this pipeline takes all points of a cloud" in refused(2, *words, "--pipeline", "wen2024")
     assert "--stream writes a cloud with labels as .ply alone" in refused(2, *words, "--labelled", "l.npz")
+
+
+def test_a_close_call_comes_with_the_option_that_answers_otherwise():
+    call = Judgement("gap", (1.0, 2.0, 3.0), 0.42, changed=False)
+    told = "the object goes on across the gap at (1, 2, 3): 0.42, gap left; if that is wrong: --set Refiner.bridge=0.41"
+    assert running._close_call(call) == told
