@@ -244,6 +244,8 @@ def _call(made: Any) -> str:
 def _in_words(told: dict[str, Any]) -> dict[str, Any]:
     """Facts as the table shows them: coordinates with as many digits as the size of the cloud asks for."""
     told = dict(told)
+    if told.get("radii"):
+        told["radii"] = " to ".join(f"{radius:.6g}" for radius in told["radii"])
     if told["kind"] == "cloud":
         diagonal = told["diagonal"]
         fine = math.isfinite(diagonal) and diagonal > 0

@@ -86,6 +86,7 @@ def test_the_report_of_the_run(told, skeleton, invoke):
     assert [each["n_points"] for each in facts["iterations"]] == [each.n_points for each in report.iterations]
     table = invoke("info", "s.npz").stdout
     assert "Connector(radius='4%')\n" in table  # what is not the default of the filter
+    assert re.search(r"^radii +[\d.]+ to [\d.]+$", table, re.MULTILINE)
     assert re.search(r"^stages +RingBuilder\n +Contractor", table, re.MULTILINE)
     assert all(f"{each.explained:.4f}" in table for each in report.iterations)
 

@@ -158,3 +158,10 @@ def test_ctrl_c_while_open3d_loads(refused, scans, monkeypatch):
     assert "interrupted" in refused(130, "skeletonize", scans / "sample.ply", "-o", "s.ply")
     assert held == ["sample.ply"]
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_an_output_without_its_option_is_told_of(glsk, scans, tmp_path):
+    run = glsk("skeletonize", scans / "sample.ply", "s.ply")
+    assert run.returncode == 2
+    assert "(s.ply): a file to write comes after -o" in run.stderr
+    assert "-o" not in glsk("info", scans / "sample.ply", "s.ply").stderr
