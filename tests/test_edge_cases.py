@@ -84,7 +84,7 @@ REFUSED = {
     "zeros": (np.zeros((9, 3)), "coincide"),
     "7 distinct ones": (np.repeat(FEW[:7], 20, axis=0), "7 distinct"),
     "NaN and infinity": (NAN, "index 2.*drop_invalid"),
-    "nothing but NaN": (np.full((20, 3), np.nan), "20 of 20"),
+    "nothing but NaN": (np.full((20, 3), np.nan), "none of its 20 points"),
     "too wide for float64": (np.concatenate([Y, [[1.5e308, 0, 0], [-1.5e308, 0, 0]]]), "rescale"),
     "two columns": (Y[:, :2], r"\(300, 2\)"),
     "six columns": (np.hstack([Y, Y]), r"\(300, 6\)"),

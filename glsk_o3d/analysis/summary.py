@@ -55,6 +55,11 @@ def ending(facts: Mapping[str, Any]) -> str | None:
     return told if facts["converged"] else f"not {told}: {reason}"
 
 
+def point_count(skeleton: Skeleton) -> int:
+    """How many points the cloud has: all, where the skeleton holds a sample of them, or none; 0 if it is not known."""
+    return skeleton.report.n_input or len(skeleton.points)
+
+
 def structure(skeleton: Skeleton) -> dict[str, Any]:
     """The counts of a skeleton's graph, and its length."""
     return {

@@ -218,7 +218,7 @@ def _grid(path: Path, cut: Cut) -> Grid:
         low = np.minimum(low, scan.positions[finite].min(axis=0, initial=np.inf))
         high = np.maximum(high, scan.positions[finite].max(axis=0, initial=-np.inf))
     if invalid and not cut.drop_invalid:
-        raise not_finite(f"{invalid} of {points} points", first)
+        raise not_finite(invalid, points, first)
     if not (low <= high).all():
         raise InvalidCloudError("none of its points is finite")
     return Grid.over(low, high, cut.tiles, cut.overlap)

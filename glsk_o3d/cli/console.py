@@ -79,8 +79,15 @@ def _visible_mistakes() -> Iterator[None]:
             if message.endswith("is not readable."):
                 say("error", message.removesuffix("."))
                 raise typer.Exit(1) from None
-            error.message = visible(message)  # type: ignore[attr-defined]
+            told = visible(message)
+            if message.startswith("Got unexpected extra argument") and _takes_outputs(getattr(error, "ctx", None)):
+                told = f"{told.rstrip('.')}: a file to write comes after -o"
+            error.message = told  # type: ignore[attr-defined]
         raise
+
+
+def _takes_outputs(context: Any) -> bool:
+    return context is not None and any("-o" in parameter.opts for parameter in context.command.params)
 
 
 def print_table(table: Any, *, stderr: bool = False, whole: bool = False) -> None:

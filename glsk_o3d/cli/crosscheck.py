@@ -102,9 +102,12 @@ def crosscheck(
 
 def _rows(told: dict[str, Any]) -> dict[str, Any]:
     """What the check found, in words."""
+    from ..crosscheck.verdict import MEANINGS
+
     rows, skeletons, mesh = told["rows"], told["skeletons"], told["mesh"]
     shown = {
         "because": "\n".join(told["reasons"]) or None,
+        "which is": MEANINGS[told["verdict"]],
         "points": "{used} of {given}; {turned} turned by more than 30 degrees, {not_compared} not compared".format(
             **told["points"]
         ),

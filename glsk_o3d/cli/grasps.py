@@ -141,18 +141,23 @@ def _print(best: GraspCandidates, found: int) -> None:
     for reason, times in best.left_out.items():
         limit = " (confidence below --min-confidence)" if reason == "uncertain" else ""
         echo(f"left out: {times} {reason}{limit}")
-    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, header_style="")
+    if not len(best):
+        return
+    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="")
     for name in PRINTED_GRASP:
         shown.add_column(name, justify="right")
-    for columns in zip(*(getattr(best, name) for name in PRINTED_GRASP), strict=True):
-        cells = zip(columns, PRINTED_GRASP.values(), strict=True)
-        shown.add_row(*(_cell(cell, form) for cell, form in cells))
-    if len(best):
-        print_table(shown, whole=True)
+    for cells in zip(*(_cells(getattr(best, name), form) for name, form in PRINTED_GRASP.items()), strict=True):
+        shown.add_row(*cells)
+    print_table(shown, whole=True)
 
 
-def _cell(values: np.ndarray, form: str) -> str:
+def _cells(values: np.ndarray, form: str) -> list[str]:
+    """A column of the table; numbers of one direction stand below each other."""
     from ..report import coordinates
 
-    numbers = values.reshape(-1).tolist()
-    return " ".join(f"{value:{form}}" for value in numbers) if form else coordinates(numbers)
+    rows = [
+        [f"{value:{form}}" for value in row] if form else coordinates(row).split(", ")
+        for row in values.reshape(len(values), -1).tolist()
+    ]
+    widths = [max(map(len, numbers)) for numbers in zip(*rows, strict=True)]
+    return [" ".join(number.rjust(width) for number, width in zip(row, widths, strict=True)) for row in rows]

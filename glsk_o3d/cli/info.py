@@ -62,6 +62,8 @@ def info(
             return
         if quiet:
             return
+        if told.get("repeatable"):
+            told["stages"] = _in_short(told["stages"], skeleton.report.recipe)
         print_rows({name: _words(value, name) for name, value in _in_words(told).items()}, title=str(file))
         if records:
             print_iterations(records)
@@ -216,9 +218,34 @@ def _repeatable(recipe) -> bool:
         return False
 
 
+def _in_short(stages: list[str], recipe: dict[str, Any]) -> list[str]:
+    """The filters of a run with those options alone that are not the default of the filter."""
+    from ..recipes import from_recipe
+
+    short = {repr(stage): _call(stage) for stage in from_recipe(recipe).stages}
+    return [short.get(stage, stage) for stage in stages]
+
+
+def _call(made: Any) -> str:
+    """A filter or stopping rule as its name, and its options that are not the default."""
+    from dataclasses import fields, is_dataclass
+
+    if not is_dataclass(made):
+        return repr(made)
+    given = {field.name: getattr(made, field.name) for field in fields(made) if field.init}
+    chosen = [
+        f"{field.name}={_call(given[field.name])}"
+        for field in fields(made)
+        if given.get(field.name, field.default) != field.default
+    ]
+    return type(made).__name__ + f"({', '.join(chosen)})" * bool(chosen)
+
+
 def _in_words(told: dict[str, Any]) -> dict[str, Any]:
     """Facts as the table shows them: coordinates with as many digits as the size of the cloud asks for."""
     told = dict(told)
+    if told.get("radii"):
+        told["radii"] = " to ".join(f"{radius:.6g}" for radius in told["radii"])
     if told["kind"] == "cloud":
         diagonal = told["diagonal"]
         fine = math.isfinite(diagonal) and diagonal > 0

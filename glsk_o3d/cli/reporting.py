@@ -34,6 +34,7 @@ _SAID_HERE = {
     "branches have an order in a tree; see cut_loops()": "branches have an order in a tree: add --cut-loops",
     "keep one with editing.largest_component()": "keep one with 'glsk edit --largest'",
     "pass unit=, such as 'mm'": "say --unit, such as --unit mm",
+    "is wrong, set ": "is wrong, add --set ",
     "give min_confidence=0": "add --min-confidence 0",
     "give cloud=points, or cloud=() to check nothing": "give the scan with --cloud",
     "max_opening = ": "--opening ",

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..analysis.summary import ENDING_FACTS, ending, summary
+from ..report import Judgement
 from ..skeleton import Skeleton
 from .console import echo, print_iterations, print_json, print_rows
 
@@ -69,12 +70,19 @@ def print_results(
             hidden["sampled"] = None
         hidden["loops_closed"] = None  # most clouds have some, true ones are hardly ever among them
         hidden |= {name: None for name in ("outliers", "cuts", "bridges", "traced", "joined") if not facts[name]}
-        hidden["uncertain"] = "\n".join(map(str, skeleton.report.uncertain)) or None
+        hidden["uncertain"] = "\n".join(map(_close_call, skeleton.report.uncertain)) or None
         if facts["contracted"] == facts["distinct"]:
             hidden["contracted"] = None
         words = {name: "yes" if value else "no" for name, value in told.items() if isinstance(value, bool)}
         print_rows({**told, **words, **hidden, "contraction": ending(facts), "seconds": f"{seconds:.2f}"})
     tell_files(written, problems, quiet=quiet or as_json)
+
+
+def _close_call(call: Judgement) -> str:
+    """A close call, and what to do where the answer is wrong."""
+    from ..refinement.diagnostics import otherwise
+
+    return f"{call}; if that is wrong: --set {otherwise(call)}"
 
 
 def tell_files(written: Sequence[Path], problems: Sequence[str] = (), *, quiet: bool) -> None:

@@ -154,8 +154,10 @@ def _read(
         sample = sample_for(pipeline, scan, where, stream)
         if sample is not None:
             if not quiet:
-                n = int(np.isfinite(sample.point.positions.numpy()).all(axis=1).sum())
-                echo(f"{scan}: read in blocks: the skeleton is that of a sample of {n} points", err=True)
+                finite = np.isfinite(sample.point.positions.numpy()).all(axis=1)
+                n, total = int(finite.sum()), int(sample.point.sample_count.numpy()[finite].sum(dtype=np.int64))
+                taken = f"the skeleton is that of a sample of {n} of {total} points"
+                echo(f"{scan}: read in blocks: {taken if n < total else f'all {n} points are taken'}", err=True)
             return sample, lambda skeleton, path: annotate_file(skeleton, scan, path, where=where)
     elif stream:
         raise WrongUsage(f"{labelled}: --stream writes a cloud with labels as {STREAMED_ENDING} alone")

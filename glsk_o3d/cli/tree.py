@@ -85,13 +85,31 @@ def tree(
                 echo(f"wrote {path}, in {told}")
 
 
+def _why_not(name: str, measures: TreeMeasures) -> str:
+    """Why a measure is not known."""
+    from ..analysis.forestry import BREAST_HEIGHT
+    from ..report import coordinates
+
+    if name == "crown_base":
+        return "no branch leaves the stem"
+    if name == "traced":
+        return "the file has no confidence: JSON and npz files of a run do"
+    if measures.height < BREAST_HEIGHT:
+        return f"the tree is lower than {BREAST_HEIGHT} m, if a unit of the file is {measures.unit:g} m (--unit)"
+    return (
+        f"the stem does not pass {BREAST_HEIGHT} m above the root, "
+        f"if {measures.up} points up (--up), and {coordinates(measures.root)} is the root (--root)"
+    )
+
+
 def _print(measures: TreeMeasures) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     for name, unit in UNITS.items():
         value = getattr(measures, name)
-        echo(f"{name.replace('_', ' ')}: " + (f"{value:.4g} {unit}" if math.isfinite(value) else "not known"))
+        told = f"{value:.4g} {unit}" if math.isfinite(value) else f"not known: {_why_not(name, measures)}"
+        echo(f"{name.replace('_', ' ')}: {told}")
     shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="")
     for name in ("order", "length m", "area m2", "volume m3"):
         shown.add_column(name, justify="right")

@@ -10,6 +10,14 @@ from .surfaces import COVERED_SHARE
 
 AGREES, IN_PART, DISTRUST, UNTOLD = VERDICTS = "agrees", "agrees in part", "do not trust", "cannot tell"
 
+MEANINGS = {
+    AGREES: "as of clean, dense clouds; gaps that cloud and mesh share, as of scans from one or two sides, do not show",
+    IN_PART: "usual with noise, even little: of 48 test clouds 43 had a good skeleton all the same; look at --picture",
+    DISTRUST: "rare, and a call to look at --picture: of 8 test clouds 4 had a good skeleton all the same",
+    UNTOLD: "usual with much noise or few points: no word against the skeleton; look at --picture, or 'glsk evaluate'",
+}
+"""What to expect of each verdict; the numbers are measured, see docs/crosscheck.md."""
+
 # All measured: what separates clean, dense samples of known shapes from sparse and noisy ones; see docs/crosscheck.md.
 TURNED_ANGLE = 30.0  # degrees
 NEAR_RADII, FAR_RADII = 0.2, 0.5  # mean distance, in local radii

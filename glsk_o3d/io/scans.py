@@ -238,6 +238,8 @@ def refused_where_damaged(path: Path) -> Iterator[None]:
 def holds_no_points(path: Path) -> FileFormatError:
     """The error for a file without points."""
     ending = path.suffix.lower()
+    if ending in _SAY_HOW_MANY:
+        return FileFormatError(f"{path}: it has no points: by its header there are 0: export it again")
     return FileFormatError(f"{path}: no points could be read: it is damaged, empty, or not a {ending} file")
 
 
@@ -253,6 +255,7 @@ def _read_mesh(path: Path) -> Scan:
 
 
 _LOOK_THEMSELVES = (".ply", ".pcd")  # whether files are complete: they would be read twice
+_SAY_HOW_MANY = (".ply", ".pcd", ".las", ".laz")  # read here: where they hold less than they promise, it is an error
 _CLOUD_READERS = {
     **dict.fromkeys(MESH_ENDINGS, _read_mesh),
     **dict.fromkeys(TEXT_ENDINGS, text_tables.read),

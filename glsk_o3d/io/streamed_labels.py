@@ -16,7 +16,7 @@ from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from .annotation import labels
-from .clouds.blocks import read_blocks
+from .clouds.blocks import held_types, read_blocks
 from .clouds.scanned import COLOR_CHANNELS, Scan
 from .formats import ply_rows
 
@@ -33,7 +33,8 @@ def annotate_file(
     """Write a scan with labels to a file, block by block, in memory that does not grow with it.
 
     `Skeleton.annotate` for files: the same attributes, coloured by branch. The scan's own colours are attributes
-    ``scan_red``, ``scan_green`` and ``scan_blue``.
+    ``scan_red``, ``scan_green`` and ``scan_blue``. What a binary PLY file holds as float, double, uchar or int stays
+    so, and radius, confidence and thickness are float where the coordinates are. All else becomes int, or double.
 
     Parameters
     ----------
@@ -86,6 +87,7 @@ def annotate_file(
     if Path(output).exists() and Path(path).exists() and os.path.samefile(path, output):
         raise FileFormatError(f"{os.fspath(output)}: is the scan itself: give another name")
     owner = _Owner(skeleton)
+    held = {name: kind for name, kind in held_types(path).items() if ply_rows.is_written(kind)}
     n, kinds = _survey(path, where)
 
     def write(temporary: Path) -> None:
@@ -94,7 +96,7 @@ def annotate_file(
             for block in read_blocks(path, where=where):
                 if not kinds.keys() <= block.attributes.keys():
                     raise _changed(path)
-                table = ply_rows.table(_columns(block, kinds, owner.labels(block.positions)))
+                table = ply_rows.table(_columns(block, kinds, held, owner.labels(block.positions)))
                 if row is None:
                     stream.write(ply_rows.header(table.dtype, n))
                 elif row != table.dtype:
@@ -151,13 +153,19 @@ def _changed(path: str | os.PathLike) -> FileFormatError:
     return FileFormatError(f"{os.fspath(path)}: has changed while it was read: label it again when it is complete")
 
 
-def _columns(block: Scan, kinds: dict[str, np.dtype], found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Columns of a PLY file, by name: those of a scan, and labels."""
+def _columns(
+    block: Scan, kinds: dict[str, np.dtype], held: dict[str, np.dtype], found: dict[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Columns of a PLY file, by name: those of a scan, of the types that its file holds, and labels."""
     columns = dict(zip("xyz", block.positions.T, strict=True))
     if block.normals is not None:
         columns |= {f"n{axis}": values for axis, values in zip("xyz", block.normals.T, strict=True)}
     columns |= {name: block.attributes[name].astype(kind) for name, kind in kinds.items()}
+    columns = {name: values.astype(held.get(name, values.dtype), copy=False) for name, values in columns.items()}
     colors = found.pop("colors")
     if (shades := block.shades) is not None:
-        columns |= {f"scan_{name}": shades[:, i].astype(np.int32) for i, name in enumerate(COLOR_CHANNELS)}
+        shade = np.uint8 if held.get("red") == np.uint8 else np.int32
+        columns |= {f"scan_{name}": shades[:, i].astype(shade) for i, name in enumerate(COLOR_CHANNELS)}
+    if columns["x"].dtype == np.float32:
+        found = {name: values.astype(np.float32) if values.dtype == float else values for name, values in found.items()}
     return columns | found | dict(zip(COLOR_CHANNELS, colors.T, strict=True))

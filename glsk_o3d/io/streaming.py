@@ -91,15 +91,17 @@ def _sampled(
 
     def blocks() -> Iterator[np.ndarray]:
         nonlocal dropped
-        at = dropped = 0
+        at = first = dropped = 0
         for block in read_blocks(path, where=where, bare=True):
             finite = np.isfinite(block.positions).all(axis=1)
-            if not (drop_invalid or finite.all()):
-                raise not_finite("points", at + int(np.argmin(finite)))
+            if not (dropped or finite.all()):
+                first = at + int(np.argmin(finite))
             dropped += len(finite) - int(finite.sum())
             if finite.any():
                 yield block.positions if finite.all() else block.positions[finite]
             at += len(block)
+        if dropped and not drop_invalid:
+            raise not_finite(dropped, at, first)
 
     if promised_points(path) is None:  # it is one block: no need to read it again and again
         whole = list(blocks())

@@ -232,6 +232,8 @@ def scripts() -> dict[str, Path]:
 def find_script(name: str | os.PathLike) -> Path:
     """The file of a script: a path that ends in .mlx or names a folder, or the name of one that comes with the package.
 
+    Such a name may end in .mlx, too, where no such file is in the working folder.
+
     Parameters
     ----------
     name : str or path-like
@@ -247,7 +249,7 @@ def find_script(name: str | os.PathLike) -> Path:
     """
     path, known = Path(name), scripts()
     if path.suffix.lower() == ".mlx" or str(name) != path.name:
-        return path
+        return known.get(path.stem, path) if str(name) == path.name and not path.exists() else path
     if str(name) not in known:
         raise InvalidParameterError(f"{did_you_mean(str(name), known, 'filter script')} (a file's name ends in .mlx)")
     return known[str(name)]

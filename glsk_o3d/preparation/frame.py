@@ -132,15 +132,17 @@ def finite_points(points: np.ndarray, drop: bool) -> np.ndarray:
     finite = np.isfinite(points).all(axis=1)
     dropped = int(len(points) - finite.sum())
     if dropped and not drop:
-        raise not_finite(f"{dropped} of {len(points)} points", int(np.argmin(finite)))
+        raise not_finite(dropped, len(points), int(np.argmin(finite)))
     return finite
 
 
-def not_finite(which: str, first: int) -> InvalidCloudError:
-    """The error that tells which points have no finite coordinates, as "3 of 9 points", and the index of the first."""
+def not_finite(n: int, total: int, first: int) -> InvalidCloudError:
+    """The error for n of all points, the first at an index, that have no finite coordinates."""
+    if n == total:
+        return InvalidCloudError(f"none of its {n} points has finite coordinates: there is no cloud to work with")
     return InvalidCloudError(
-        f"{which} have NaN or infinite coordinates, the first at index {first}: drop them with drop_invalid=True, or "
-        "remove them first"
+        f"{n} of {total} points have NaN or infinite coordinates, the first at index {first}: drop them with "
+        "drop_invalid=True, or remove them first"
     )
 
 

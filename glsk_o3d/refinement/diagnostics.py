@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..numerics.components import component_labels
 from ..numerics.groups import group_median, group_sum
 from ..numerics.vectors import dot, norm
-from ..report import coordinates
+from ..report import Judgement, coordinates
 from ..skeleton import Skeleton
 
 # All fitted; what tubes and balls have is derived.
@@ -19,6 +21,9 @@ STUB_LENGTH = 3.3
 MAJORITY = 0.5  # derived: of the points, from which on a cloud is called what they are
 LOW_CONFIDENCE = 0.1  # below which a vertex is not to be trusted
 LOW_CONFIDENCE_SHARE = 0.25  # of the points around such vertices that is worth a warning
+
+_DECIDED_BY = {"loop": ("handle", False), "air": ("air", True), "gap": ("bridge", True), "limb": ("limb", False)}
+"""The option that decides, and whether the graph is changed where the probability reaches it."""
 
 
 def diagnose(skeleton: Skeleton) -> list[str]:
@@ -85,8 +90,33 @@ def _close_calls(skeleton: Skeleton) -> list[str]:
     asked = sum(it.about != "limb" for it in skeleton.report.judgements)
     return [
         f"uncertain topology: {len(close)} of {asked} questions about loops, air and gaps were close calls, above all "
-        f"whether {close[0].question} (probability {close[0].probability:.2f})"
+        f"whether {close[0].question} (probability {close[0].probability:.2f}): look there; "
+        f"if '{close[0].outcome}' is wrong, set {otherwise(close[0])}"
     ]
+
+
+def otherwise(call: Judgement) -> str:
+    """The option with which the Refiner would have answered otherwise, to two digits.
+
+    Parameters
+    ----------
+    call : Judgement
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> otherwise(Judgement("limb", (0.0, 0.0, 0.0), 0.55, changed=False))
+    'Refiner.limb=0.56'
+    >>> otherwise(Judgement("gap", (0.0, 0.0, 0.0), 0.42, changed=False))
+    'Refiner.bridge=0.41'
+    """
+    option, changes = _DECIDED_BY[call.about]
+    reached = call.changed == changes
+    hundredths = math.ceil(100 * call.probability + 0.5) if reached else math.floor(100 * call.probability - 0.5)
+    return f"Refiner.{option}={hundredths / 100:.2f}"
 
 
 def _weak_region(skeleton: Skeleton, count: np.ndarray) -> list[str]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..analysis.summary import point_count
 from ..io.colors import shades
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ _WIDTH, _HEIGHT, _LEFT, _TOP, _BOTTOM = 320, 150, 46, 12, 22  # of a chart and o
 
 def figures(skeleton: Skeleton) -> str:
     """The run in a few numbers."""
-    told = {"Points": f"{len(skeleton.points):,}"} if len(skeleton.points) else {}
+    told = {"Points": f"{point_count(skeleton):,}"} if point_count(skeleton) else {}
     if len(skeleton.vertices):
         told |= {
             "Vertices": f"{len(skeleton.vertices):,}",

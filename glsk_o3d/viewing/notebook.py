@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..analysis.summary import point_count
 from ..errors import MissingPackageError
 from ..interop.packages import require
 from .preview import DPI, draw
@@ -45,7 +46,7 @@ def to_html(skeleton: Skeleton) -> str:
     """
     report = skeleton.report
     told = {
-        "points": f"{len(skeleton.points):,}",
+        "points": f"{point_count(skeleton):,}",
         "vertices": f"{len(skeleton.vertices):,}",
         "edges": f"{len(skeleton.edges):,}",
         "components": f"{skeleton.n_components:,}",

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.segmentation import branch_of_edge, branch_of_point, branch_of_vertex
+from ..analysis.summary import point_count
 from ..errors import InvalidParameterError
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
@@ -171,7 +172,7 @@ def _packed(array, dtype) -> str:
 
 
 def _captions(skeleton, n_solves) -> list[str]:
-    told = [f"Input: {len(skeleton.points):,} points"]
+    told = [f"Input: {point_count(skeleton):,} points"]
     for record in skeleton.report.iterations[:n_solves]:
         left = record.n_points - record.n_merged
         told.append(f"After solve {record.iteration} of {n_solves}: {left:,} points left")

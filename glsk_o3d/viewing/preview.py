@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analysis.summary import point_count
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
 from ..numerics.vectors import norm
@@ -189,8 +190,9 @@ def _warned(warnings: Sequence[str], width: float, room: int) -> list[str]:
 
 
 def _caption(skeleton: Skeleton) -> str:
+    n_points = point_count(skeleton)
     counts = (
-        (len(skeleton.points), "point"),
+        *[(n_points, "point")] * (n_points > 0),
         (len(skeleton.vertices), "vertex"),
         (len(skeleton.edges), "edge"),
         (skeleton.n_components, "component"),

@@ -50,6 +50,7 @@ def test_what_it_says_and_writes(glsk, scans, tmp_path, check):
     assert f"rings compared {check.rows.compared} of {check.rows.closed} closed ones" in words
     assert "loops 1 and 1" in words
     assert "because" not in words
+    assert "which is as of clean, dense clouds;" in words
     assert lines[-2:] == ["wrote r.json", "wrote p.png"]
     assert imread(tmp_path / "p.png").shape[:2] == (860, 1800)
 

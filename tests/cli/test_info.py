@@ -1,6 +1,7 @@
 """`glsk info`: what is in a file."""
 
 import json
+import re
 import sys
 from dataclasses import replace
 
@@ -84,7 +85,9 @@ def test_the_report_of_the_run(told, skeleton, invoke):
     assert facts["repeatable"] is True
     assert [each["n_points"] for each in facts["iterations"]] == [each.n_points for each in report.iterations]
     table = invoke("info", "s.npz").stdout
-    assert "Connector(radius='4%'" in table
+    assert "Connector(radius='4%')\n" in table  # what is not the default of the filter
+    assert re.search(r"^radii +[\d.]+ to [\d.]+$", table, re.MULTILINE)
+    assert re.search(r"^stages +RingBuilder\n +Contractor", table, re.MULTILINE)
     assert all(f"{each.explained:.4f}" in table for each in report.iterations)
 
 

@@ -83,6 +83,9 @@ def test_points_that_are_not_finite(glsk, scans, tmp_path):
     line = failed(glsk("skeletonize", scans / "nan.ply", "-o", "s.npz"), 1)
     assert f"{scans / 'nan.ply'}: 2 of 1000 points" in line
     assert line.rstrip().endswith("the first at index 3: drop them with --drop-invalid")
+    (tmp_path / "none.xyz").write_text("nan nan nan\n" * 20)
+    line = failed(glsk("skeletonize", "none.xyz", "-o", "s.npz"), 1)
+    assert line.endswith("none.xyz: none of its 20 points has finite coordinates: there is no cloud to work with\n")
     run = glsk("skeletonize", scans / "nan.ply", "-o", "s.npz", "--drop-invalid", "--json")
     assert run.returncode == 0, run.stderr
     facts = json.loads(run.stdout)
@@ -155,3 +158,10 @@ def test_ctrl_c_while_open3d_loads(refused, scans, monkeypatch):
     assert "interrupted" in refused(130, "skeletonize", scans / "sample.ply", "-o", "s.ply")
     assert held == ["sample.ply"]
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_an_output_without_its_option_is_told_of(glsk, scans, tmp_path):
+    run = glsk("skeletonize", scans / "sample.ply", "s.ply")
+    assert run.returncode == 2
+    assert "(s.ply): a file to write comes after -o" in run.stderr
+    assert "-o" not in glsk("info", scans / "sample.ply", "s.ply").stderr

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glsk_o3d import read_skeleton, read_tensor_cloud, samples
+from glsk_o3d import Judgement, read_skeleton, read_tensor_cloud, samples
+from glsk_o3d.cli import running
 from glsk_o3d.cli.options import PipelineName
 from glsk_o3d.io.meshes import read_mesh
 from glsk_o3d.pipelines import PIPELINES
@@ -285,12 +286,14 @@ def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, monkeypatch):
     assert result.exit_code == 0, result.output
     facts = json.loads(result.stdout)
     assert (facts["points"], facts["loops"]) == (120000, 1)
-    assert f"read in blocks: the skeleton is that of a sample of {facts['sampled']} points" in result.stderr
+    assert f"read in blocks: the skeleton is that of a sample of {facts['sampled']} of 120000 points" in result.stderr
     np.testing.assert_allclose(read_skeleton("s.json").vertices, read_skeleton("whole.json").vertices, atol=1e-9)
     assert len(read_tensor_cloud("l.ply").point.branch) == 120000
     again = invoke("rerun", "s.json", "--json")
     assert "it holds a sample of a large cloud, and not how many points each stands for: give the scan" in again.stderr
     assert json.loads(invoke("rerun", "s.json", tmp_path / "scan.ply", "--json").stdout)["identical"]
+    few = invoke("skeletonize", tmp_path / "scan.ply", "-o", "s.json", "--stream", "--where", "x > 0.2")
+    assert re.search(r"scan\.ply: read in blocks: all \d+ points are taken\n", few.stderr)
     assert invoke("skeletonize", tmp_path / "scan.ply", "-o", "s.json", "--quiet").stderr == ""
     assert invoke("skeletonize", tmp_path / "scan.ply", "-o", "s.json", "--no-stream").stderr == ""
 
@@ -315,3 +318,9 @@ def test_a_sample_that_cannot_be_taken(refused, scans):
     words = ("skeletonize", scans / "sample.ply", "--stream", "-o", "s.json")
     assert "this pipeline takes all points of a cloud" in refused(2, *words, "--pipeline", "wen2024")
     assert "--stream writes a cloud with labels as .ply alone" in refused(2, *words, "--labelled", "l.npz")
+
+
+def test_a_close_call_comes_with_the_option_that_answers_otherwise():
+    call = Judgement("gap", (1.0, 2.0, 3.0), 0.42, changed=False)
+    told = "the object goes on across the gap at (1, 2, 3): 0.42, gap left; if that is wrong: --set Refiner.bridge=0.41"
+    assert running._close_call(call) == told

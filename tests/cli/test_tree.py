@@ -20,6 +20,8 @@ def test_lines_file_and_json_agree(invoke, tmp_path, y):
     measures, table = tree_measures(skeleton, (0, 0, -0.5)), cylinders(skeleton, (0, 0, -0.5))
     lines = result.stdout.splitlines()
     assert lines[0] == f"height: {measures.height:.4g} m"
+    assert "stem diameter: not known: the tree is lower than 1.3 m, if a unit of the file is 1 m (--unit)" in lines
+    assert "traced: not known: the file has no confidence: JSON and npz files of a run do" in lines
     assert lines[-1] == "wrote c.csv, in the units of y.ply"
     told = [line.split() for line in lines if line.strip()[:1].isdigit()]
     assert [row[0] for row in told] == ["0", "1"]
@@ -35,6 +37,17 @@ def test_lines_file_and_json_agree(invoke, tmp_path, y):
     assert (facts["unit"], facts["up"]) == (1, "z")
     np.testing.assert_allclose(facts["root"], measures.root)
     assert invoke("tree", y, "-q").stdout == ""
+
+
+def test_why_a_stem_has_no_diameter(invoke, tmp_path):
+    points = [[0, 0, 0], [0, 0, 1], [3, 0, 1], [0, 0, 2.5]]
+    bent = Skeleton(points, [[0, 1], [1, 2], [1, 3]], [0.2, 0.2, 0.2, 0.01], (), (), ())
+    bent.save(tmp_path / "t.json")
+    said = invoke("tree", "t.json", "--root", "z", "--up", "x").stdout.splitlines()
+    cause = "if x points up (--up), and 0, 0, 0 is the root (--root)"
+    assert f"stem diameter: not known: the stem does not pass 1.3 m above the root, {cause}" in said
+    Skeleton(points[:2], [[0, 1]], [0.2, 0.2], (), (), ()).save(tmp_path / "s.json")
+    assert "crown base: not known: no branch leaves the stem" in invoke("tree", "s.json", "--root", "z").stdout
 
 
 def test_units_and_what_is_up(invoke, y):

@@ -1,6 +1,8 @@
 """What the numbers of a cross-check say about a cloud."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from glsk_o3d.crosscheck.agreement import (
     mesh_fit,
 )
 from glsk_o3d.crosscheck.reconstruction import spacing
-from glsk_o3d.crosscheck.verdict import judge
+from glsk_o3d.crosscheck.verdict import DISTRUST, IN_PART, MEANINGS, VERDICTS, judge
 from glsk_o3d.report import REFUSED, Report
 
 
@@ -111,3 +113,12 @@ def test_a_crumb_is_no_excuse(ring, check):
         assert judge(rows(), apart(components=components), fit=fit)[0] == verdict  # a crumb has a skeleton of its own
     shattered = np.arange(3 * len(check.faces)).reshape(-1, 3)
     assert mesh_fit(state, vertices[check.faces.ravel()], shattered).torn > 0.99
+
+
+def test_what_to_expect_is_said_of_every_verdict_with_the_numbers_of_the_page():
+    assert set(MEANINGS) == set(VERDICTS)
+    page = (Path(__file__).parents[2] / "docs" / "crosscheck.md").read_text("utf-8")
+    counts = re.findall(r"(\d+) / (\d+)", re.search(r"^\| all \|.*$", page, re.MULTILINE)[0])
+    for verdict, (good, all_) in zip(VERDICTS, counts, strict=True):
+        if verdict in (IN_PART, DISTRUST):
+            assert f"of {all_} test clouds {good} had a good skeleton" in MEANINGS[verdict]

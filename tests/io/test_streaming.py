@@ -17,6 +17,7 @@ from glsk_o3d import (
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.io import streamed_labels, streaming
 from glsk_o3d.io.clouds import blocks
+from glsk_o3d.io.formats import ply_tables
 from glsk_o3d.samples import torus, y_junction
 
 N = 130000
@@ -101,7 +102,7 @@ def test_points_that_are_not_finite(tmp_path, points):
     spoilt = points.copy()
     spoilt[20000:20010] = np.nan
     save_tensor_cloud(o3d.t.geometry.PointCloud(o3d.core.Tensor(spoilt)), tmp_path / "c.ply")
-    with pytest.raises(InvalidCloudError, match="the first at index 20000: drop them"):
+    with pytest.raises(InvalidCloudError, match=f"10 of {N} points .*, the first at index 20000: drop them"):
         read_sample(tmp_path / "c.ply")
     sample = read_sample(tmp_path / "c.ply", drop_invalid=True)
     assert int(sample.point.sample_count.numpy().sum()) == N - 10
@@ -114,6 +115,8 @@ def test_points_that_are_not_finite(tmp_path, points):
     save_tensor_cloud(o3d.t.geometry.PointCloud(o3d.core.Tensor(spoilt)), tmp_path / "none.ply")
     with pytest.raises(InvalidCloudError, match="no point with finite coordinates"):
         read_sample(tmp_path / "none.ply", drop_invalid=True)
+    with pytest.raises(InvalidCloudError, match=f"none of its {N} points has finite coordinates"):
+        read_sample(tmp_path / "none.ply")
 
 
 def test_a_report_counts_what_was_dropped(tmp_path, points):
@@ -198,6 +201,35 @@ def test_an_attribute_that_needs_more_than_int32_in_a_late_block(tmp_path):
         assert found[name].dtype == cloud[name].dtype
         np.testing.assert_array_equal(found[name].numpy(), cloud[name].numpy())
     assert "intensity" not in found
+
+
+WORDS = {"f4": "float", "f8": "double", "u1": "uchar", "i1": "char", "u2": "ushort", "i4": "int", "u4": "uint"}
+
+
+@pytest.mark.parametrize(("order", "endian"), [("<", "little"), (">", "big")])
+def test_columns_of_a_ply_file_keep_their_types_where_open3d_reads_these(tmp_path, order, endian):
+    kinds = dict.fromkeys(["x", "y", "z", "nx", "ny", "nz"], "f4") | dict.fromkeys(["red", "green", "blue"], "u1")
+    kinds |= {"intensity": "u2", "id": "u4", "class": "u1", "level": "i1", "time": "f8", "row": "i4"}
+    points, rng = torus(30000).points, np.random.default_rng(3)
+    rows = np.zeros(len(points), [(name, order + kind) for name, kind in kinds.items()])
+    for name, kind in kinds.items():
+        rows[name] = rng.uniform(size=len(points)) if kind[0] == "f" else rng.integers(0, 100, len(points))
+    for axis, values in zip("xyz", points.T, strict=True):
+        rows[axis] = values
+    rows["id"] += 4 * 10**9
+    head = "".join(f"property {WORDS[kind]} {name}\n" for name, kind in kinds.items())
+    head = f"ply\nformat binary_{endian}_endian 1.0\nelement vertex {len(rows)}\n{head}end_header\n"
+    (tmp_path / "scan.ply").write_bytes(head.encode() + rows.tobytes())
+    annotate_file(skeletonize(torus(1000).points), tmp_path / "scan.ply", tmp_path / "out.ply")
+    with (tmp_path / "out.ply").open("rb") as stream:
+        row, n = ply_tables.find_rows(stream, "vertex")
+        found = np.frombuffer(stream.read(n * row.itemsize), row)
+    renamed = {"red": "scan_red", "green": "scan_green", "blue": "scan_blue", "class": "class_"}
+    for name, kind in kinds.items():
+        values = found[renamed.get(name, name)]
+        assert values.dtype == {"u2": "<i4", "i1": "<i4", "u4": "<f8"}.get(kind, f"<{kind}"), name
+        np.testing.assert_array_equal(values, rows[name], name)
+    assert {found[name].dtype for name in ("radius", "confidence", "thickness")} == {np.dtype("<f4")}
 
 
 def test_a_scan_that_breaks_off_leaves_nothing_behind(scans, tmp_path):

@@ -382,6 +382,8 @@ def test_a_new_filter_is_a_verb_by_itself(monkeypatch, tmp_path):
 
 def test_scripts_are_found_by_name_or_path():
     assert find_script("glskeleton").name == "glskeleton.mlx"
+    assert find_script("glskeleton.mlx") == find_script("glskeleton")
+    assert str(find_script("mine.mlx")) == "mine.mlx"
     assert str(find_script("here/glskeleton")) == os.path.join("here", "glskeleton")
     with pytest.raises(glsk_o3d.InvalidParameterError) as caught:
         find_script("glskeletn")
@@ -395,6 +397,8 @@ def test_a_file_does_not_hide_a_script_of_that_name(tmp_path, monkeypatch):
     (tmp_path / "glskeleton").write_text("mine")
     assert find_script("glskeleton").suffix == ".mlx"
     assert find_script(f".{os.sep}glskeleton").read_text() == "mine"
+    (tmp_path / "glskeleton.mlx").write_text("my script")
+    assert find_script("glskeleton.mlx").read_text() == "my script"
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from glsk_o3d import Judgement, Skeleton
 from glsk_o3d.cli.reporting import said_here
-from glsk_o3d.refinement.diagnostics import LOW_CONFIDENCE, LOW_CONFIDENCE_SHARE, diagnose
+from glsk_o3d.refinement.diagnostics import LOW_CONFIDENCE, LOW_CONFIDENCE_SHARE, diagnose, otherwise
 
 
 def unit(n, seed=0):
@@ -173,6 +173,17 @@ def test_points_without_a_say_do_not_count():
     assert diagnose(replace(skeleton, normals=np.full_like(normals, np.nan))) == []
 
 
+@pytest.mark.parametrize("about", ["loop", "air", "gap", "limb"])
+@pytest.mark.parametrize("changed", [False, True])
+def test_the_option_that_answers_otherwise_is_beyond_the_probability(about, changed):
+    for probability in (0.25, 0.414, 0.57, 0.7499):
+        option, value = otherwise(Judgement(about, (0.0, 0.0, 0.0), probability, changed)).split("=")
+        assert option == {"loop": "Refiner.handle", "gap": "Refiner.bridge"}.get(about, f"Refiner.{about}")
+        reached = probability >= float(value)
+        assert (reached if about in ("air", "gap") else not reached) != changed
+        assert 0.004 < abs(probability - float(value)) < 0.02
+
+
 def test_names_the_closest_call():
     calls = [
         Judgement("loop", (0.0, 1.0, 2.0), 0.55, changed=False),
@@ -184,7 +195,7 @@ def test_names_the_closest_call():
     judged = replace(skeleton, report=replace(skeleton.report, judgements=tuple(calls)))
     assert diagnose(judged) == [
         "uncertain topology: 2 of 3 questions about loops, air and gaps were close calls, above all whether the loop "
-        "at (0, 1, 2) is a handle (probability 0.55)"
+        "at (0, 1, 2) is a handle (probability 0.55): look there; if 'loop kept' is wrong, set Refiner.handle=0.56"
     ]
     clear = replace(skeleton, report=replace(skeleton.report, judgements=tuple(calls[2:])))
     assert diagnose(skeleton) == diagnose(clear) == []

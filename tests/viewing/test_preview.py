@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from glsk_o3d.errors import FileFormatError, MissingPackageError
+from glsk_o3d.report import Report
 from glsk_o3d.viewing import preview
 from glsk_o3d.viewing.preview import save_preview
 
 matplotlib = pytest.importorskip("matplotlib")
 from matplotlib.image import imread  # noqa: E402
+
+WITHOUT_POINTS = {"points": (), "vertex_of_point": (), "normals": ()}
 
 
 def is_red(image):
@@ -151,6 +154,14 @@ def test_caption_counts(tree, forest):
         ["7 points", "6 vertices", "5 edges", "1 component", "0 loops", "3 leaves", "1 junction"]
     )
     assert "3 components" in preview._caption(forest)
+
+
+def test_caption_counts_the_cloud_and_not_what_the_skeleton_holds_of_it(tree):
+    known = dataclasses.replace(tree.report, n_input=90000)
+    sampled, joined = (dataclasses.replace(tree, report=known, **more) for more in ({}, WITHOUT_POINTS))
+    for skeleton in (sampled, joined):
+        assert preview._caption(skeleton).startswith("90000 points ")
+    assert preview._caption(dataclasses.replace(tree, report=Report(), **WITHOUT_POINTS)).startswith("6 vertices ")
 
 
 def test_failure_leaves_nothing(tree, tmp_path, monkeypatch):

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...errors import InvalidParameterError
 from ..scans import holds_no_points, read_whole, refused_where_damaged, scan_file
 from . import las, pcd, ply_points
@@ -83,6 +85,16 @@ def promised_points(path: str | os.PathLike) -> int | None:
     reader = _BLOCK_READERS.get(path.suffix.lower())
     with refused_where_damaged(path):
         return None if reader is None else reader.promised(path)
+
+
+def held_types(path: str | os.PathLike) -> dict[str, np.dtype]:
+    """Of what type a binary PLY file has its columns, by name: coordinates, normals, colours and attributes.
+
+    Empty for all else. Errors as `read_blocks`.
+    """
+    path = scan_file(path)
+    with refused_where_damaged(path):
+        return (ply_points.types(path) or {}) if path.suffix.lower() == ".ply" else {}
 
 
 def _watched(path: Path, blocks: Iterator[Scan]) -> Iterator[Scan]:

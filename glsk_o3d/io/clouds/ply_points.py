@@ -44,6 +44,20 @@ def promised(path: Path) -> int | None:
     return None if found is None else found[2]
 
 
+def types(path: Path) -> dict[str, np.dtype] | None:
+    """Of what type a file has each column that it gives, by name; None where the points have to be read whole."""
+    found = _found(path)
+    if found is None:
+        return None
+    row = found[1]
+    columns = {name: np.empty(0, row[name].newbyteorder("=")) for name in row.names or ()}
+    scan = _scan(dict(columns))
+    together = [*"xyz", *(scan.normals is not None) * _PLY_NORMALS, *(scan.colors is not None) * COLOR_CHANNELS]
+    return {name: columns[name].dtype for name in together} | {
+        name: values.dtype for name, values in scan.attributes.items()
+    }
+
+
 def _found(path: Path) -> tuple[int, np.dtype, int] | None:
     """Where vertices begin, what a row of them is, and how many there are."""
     with path.open("rb") as stream:

@@ -123,7 +123,7 @@ def _layout(stream: TextIO) -> Layout:
             following = [_parted(next_line) for next_line in islice(stream, LOOK_AHEAD)]
             decimal_comma |= delimiter != "," and any(comma for _, _, comma in following)
             if strange and len(strange) == len(words):
-                raise NoPoints(f"none of its columns is called x, y or z: they are {', '.join(strange)}")
+                raise NoPoints(f"its columns are called {', '.join(strange)}: call three of them x, y and z")
             return Layout(skip, delimiter, decimal_comma, names if len(names) == len(words) else [], columns)
         strange, first = [], first or line.strip()
         if words[:1] == ["ncols"]:

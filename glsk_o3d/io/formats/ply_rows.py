@@ -6,7 +6,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
-_WORDS = {"u1": "uchar", "i4": "int", "f4": "float", "f8": "double"}
+_WORDS = {"u1": "uchar", "i4": "int", "f4": "float", "f8": "double"}  # those that Open3D reads
+
+
+def is_written(kind: np.dtype) -> bool:
+    """Whether there is a word for a type: of PLY's others Open3D leaves the whole column out.
+
+    Examples
+    --------
+    >>> is_written(np.dtype(np.uint8)), is_written(np.dtype(np.uint16))
+    (True, False)
+    """
+    return kind.str[1:] in _WORDS
 
 
 def table(columns: Mapping[str, np.ndarray]) -> np.ndarray:

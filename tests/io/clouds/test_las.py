@@ -5,6 +5,7 @@ import pytest
 
 from glsk_o3d import read_cloud, read_tensor_cloud
 from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.clouds.blocks import read_blocks
 from glsk_o3d.io.scans import read_scan
 
 PLACES = np.array([[471234.5678, 5612345.6789, 123.4567], [471235.5, 5612346.25, 130.0], [471236.0, 5612347.0, 131.5]])
@@ -72,6 +73,16 @@ def test_damaged_files(las, e57, tmp_path, name):
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(FileFormatError, match=rf"{name}: (not a valid|no points could be read)"):
         read_cloud(path)
+
+
+@pytest.mark.parametrize("name", ["c.las", "c.laz"])
+def test_a_file_without_points_is_not_called_damaged(tmp_path, name):
+    laspy = pytest.importorskip("laspy")
+    laspy.LasData(laspy.LasHeader(point_format=3, version="1.2")).write(tmp_path / name)
+    with pytest.raises(FileFormatError, match=rf"{name}: it has no points: by its header there are 0"):
+        read_cloud(tmp_path / name)
+    with pytest.raises(FileFormatError, match=rf"{name}: it has no points: by its header there are 0"):
+        next(read_blocks(tmp_path / name))
 
 
 def test_a_file_that_breaks_off(las):

@@ -110,7 +110,7 @@ def test_attributes_become_those_of_a_tensor_cloud(tmp_path):
     ("text", "why"),
     [
         ("these are\nwords alone, and no more\n", "no line of its beginning has three numbers"),
-        ("length,radius,angle\n1,2,3\n", "none of its columns is called x, y or z: they are length, radius, angle"),
+        ("length,radius,angle\n1,2,3\n", "its columns are called length, radius, angle: call three of them x, y and z"),
     ],
 )
 def test_text_that_is_no_cloud(tmp_path, text, why):
