@@ -14,9 +14,9 @@ from typing import Annotated
 
 import typer
 from _common.command_line import Markdown, application, writable
-from _common.results import machine
+from _common.results import ROOT, machine
 from _common.runs import run as in_processes
-from _common.tables import fill, markdown_table, page_with, present
+from _common.tables import fill, markdown_table, present
 from _leaderboard import recorded, tables
 from _leaderboard.kept import SECONDS, keep, kept, seconds
 from _leaderboard.pictures import board, draw
@@ -38,7 +38,8 @@ PRELOADED = (  # by all processes at once, since imports take longer than some s
     *("glsk_o3d.refiner", "glsk_o3d.io.scans", "glsk_o3d.viewing.preview", "open3d", "typer", "trimesh", "skeletor"),
     *("pc_skeletor", "pygel3d.graph", "compas_cgal.skeletonization", "compas_cgal.meshing", "skan"),
 )
-PARTS = ("leaderboard", "losses", "topologies", "errors", "families", "failures", "runs", "recorded")
+IMAGES = ROOT / "docs" / "images"
+PARTS = ("short", "leaderboard", "losses", "topologies", "errors", "families", "failures", "runs", "recorded")
 
 app = application(__doc__)
 Place = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the clouds and of all answers.")]
@@ -105,25 +106,39 @@ def timed(peer: Peer) -> dict:
     return dict(cpu=median(peer.timed(points)[1] for points in clouds))
 
 
+def with_parts(path: Path | None) -> Path | None:
+    """A page that has places for tables."""
+    if path is not None and not (path.is_file() and parts_of(path)):
+        raise typer.BadParameter(f"there is no page {path} with a line <!-- NAME -->: {', '.join(PARTS)}")
+    return path
+
+
+def parts_of(path: Path) -> list[str]:
+    """The tables for which a page has a place."""
+    text = path.read_text(encoding="utf-8")
+    return [name for name in PARTS if f"<!-- {name} -->\n" in text]
+
+
 @app.command()
 def page(
-    path: Annotated[Path | None, typer.Argument(metavar="MD", callback=page_with(*PARTS))] = None,
-    markdown: Markdown = False,
+    paths: Annotated[list[Path] | None, typer.Argument(metavar="MD...")] = None, markdown: Markdown = False
 ) -> None:
-    """The tables of the scores that are kept, printed; or put into a page, with a picture in images beside it."""
+    """The tables of the scores that are kept, printed; or put into pages, with a picture in docs/images."""
+    pages = [with_parts(path) for path in paths or ()]
     found = pieces()
-    if path is None:
+    if not pages:
         present([table for part in found.values() for table in part], markdown)
-    else:
-        fill(path, {name: "\n".join(markdown_table(*table) for table in part) for name, part in found.items()})
-        (path.parent / "images").mkdir(exist_ok=True)
-        board(kept(), path.parent / "images")
+        return
+    for path in pages:
+        fill(path, {name: "\n".join(markdown_table(*table) for table in found[name]) for name in parts_of(path)})
+    board(kept(), IMAGES)
 
 
 def pieces() -> dict[str, list]:
     """The tables by the names of their places in the page."""
     entries = kept()
     return {
+        "short": [tables.short(entries, seconds()["tools"])],
         "leaderboard": [tables.overview(entries, seconds()["tools"])],
         "losses": [tables.losses(entries)],
         "topologies": [tables.by_group(entries, "variant", "topology", 2, "right topology, by kind of cloud")],

@@ -114,10 +114,10 @@ class TestKept:
             assert {(each["shape"], each["variant"]) for each in entry.results.rows} == clouds
         assert len(clouds) == 779
 
-    def test_the_page_has_what_is_kept(self, tool, root):
-        page = (root / "docs" / "comparison.md").read_text(encoding="utf-8")
+    def test_the_pages_have_what_is_kept(self, tool, root):
+        pages = "".join((root / name).read_text(encoding="utf-8") for name in ("README.md", "docs/comparison.md"))
         for name, tables in tool.pieces().items():
-            there = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", page, re.S)[1].strip()
+            there = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", pages, re.S)[1].strip()
             if name != "recorded":  # late solves of wen2024 round otherwise elsewhere
                 assert there == "\n".join(tool.markdown_table(*table) for table in tables).strip()
 
@@ -160,11 +160,16 @@ class TestCommands:
         monkeypatch.setattr(tool, "cloud", lambda shape, variant: len(variant))
         assert tool.timed(SimpleNamespace(timed=lambda points: (None, float(points)))) == dict(cpu=5.0)
 
-    def test_page_is_printed_or_filled(self, tool, call, tmp_path):
-        page = tmp_path / "page.md"
-        page.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in tool.PARTS))
-        call("page", page)
-        assert page.read_text().count("| `default` | points |") >= 5
+    def test_pages_are_filled_or_all_is_printed(self, tool, call, tmp_path, monkeypatch):
+        monkeypatch.setattr(tool, "IMAGES", tmp_path)
+        one, many = tmp_path / "one.md", tmp_path / "many.md"
+        one.write_text("<!-- short -->\n<!-- end -->\n<!-- another -->\nkept\n<!-- end -->\n")
+        many.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in tool.PARTS))
+        call("page", one, many)
+        assert one.read_text().count("| `default` | points |") == 1
+        assert "kept" in one.read_text()
+        assert many.read_text().count("| `default` | points |") >= 5
+        assert (tmp_path / "leaderboard.png").is_file()
         assert "right topology, by kind of cloud" in call("page")
 
     @pytest.mark.parametrize(

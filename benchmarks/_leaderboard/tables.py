@@ -26,6 +26,8 @@ MEASURES = {  # what may be lost, its digits, and whether more of it is better
     "completeness": ("completeness", 3, True),
     "ends": ("ends", 2, False),
 }
+SHORT = {"clean": "clean", "scan2": "two cameras", "depth2": "two depth cameras", "lidar": "lidar"}
+SHORT |= {"noise1": "1 % noise"}
 Row = dict[str, Any]
 
 
@@ -43,6 +45,19 @@ def overview(entries: Sequence[Entry], cpu: dict[str, float]) -> Table:
     heads = ["tips F1", "junctions F1", "error", "inside", "complete", "failures", "CPU s"]
     count = len(entries[0].results.rows) if entries else 0
     return f"{count} clouds of 72 random shapes", ["", "takes", "perfect", "topology", *heads], lines
+
+
+def short(entries: Sequence[Entry], cpu: dict[str, float]) -> Table:
+    """The same in few columns, with right topologies of some kinds of clouds."""
+    lines = []
+    for entry in leaderboard(each.results for each in entries).entries:
+        name, mean, groups = entry["name"], entry["all"], entry["variants"]
+        shares = [number(groups[it]["topology"][0], 2) for it in SHORT]
+        error = number(mean["error"] and mean["error"][0], 2)
+        cells = [*shares, number(mean["topology"][0], 2), number(mean["perfect"][0], 2), error]
+        lines.append([*_label(name), *cells, number(cpu.get(name), 2)])
+    heads = ["", "takes", *SHORT.values(), "all 11 kinds", "perfect", "error", "CPU s"]
+    return "right parts and loops, share of the clouds", heads, lines
 
 
 def losses(entries: Sequence[Entry]) -> Table:
