@@ -60,7 +60,7 @@ class TestTables:
         found = entries(parts, default=ours, cgal=better, pygel=now_and_then)
         lines = parts.tables.losses(found)[2]
         told = ["error", "CGAL of wrap", "0.100", "0.200", "-0.100 [-0.100, -0.100]"]
-        assert lines == [["all", *told], ["clean", *told]]
+        assert lines == [["all", *told], ["clean", *told], ["tubes", *told]]
 
     def test_a_failure_is_a_loss_of_topology_and_no_error(self, parts):
         shapes = [f"tubes_{seed}" for seed in range(100, 104)]

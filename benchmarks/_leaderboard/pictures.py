@@ -31,8 +31,8 @@ def board(entries: list[Entry], folder: Path) -> Path:
             means, low, high = np.transpose([row["all"][measure] or [np.nan] * 3 for row in rows])
             style = dict(color=ORANGE if measure == "perfect" else BLUE)
             axes.hlines(places, low, high, linewidth=2, **style)
-            axes.plot(means, places, "o", markersize=5, label=measure, **style)
-    left.set(xlabel="share of all clouds", xlim=(0, 1), ylim=(len(rows) - 0.5, -0.5))
+            axes.plot(means, places, "o", markersize=5, label=measure if axes is left else None, **style)
+    left.set(xlabel="share of all clouds", xlim=(-0.02, 1), ylim=(len(rows) - 0.5, -0.5))
     left.set_yticks(places, [title(row["name"]) for row in rows])
     right.set(xlabel="mean error, local radii", xlim=(0, None))
     figure.legend(loc="outside upper center", ncols=3, frameon=False)
@@ -42,7 +42,7 @@ def board(entries: list[Entry], folder: Path) -> Path:
 def title(name: str) -> str:
     """A tool as pictures name it."""
     peer = PEERS[name]
-    return peer.label.strip("`") if peer.takes == "points" else f"{peer.label}, {peer.takes}"
+    return peer.label.strip("`") if peer.takes == "points" else f"{peer.label}, {peer.takes.split()[-1]}"
 
 
 def draw(bench: BenchmarkFolder, answers: Path, cloud: str, entries: list[Entry], path: Path) -> None:

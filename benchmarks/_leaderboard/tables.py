@@ -63,26 +63,29 @@ def short(entries: Sequence[Entry], cpu: dict[str, float]) -> Table:
 def losses(entries: Sequence[Entry]) -> Table:
     """Where `default` is worse than another tool, by a difference whose interval does not hold 0."""
     by_name = {entry.tool: _by_cloud(entry) for entry in entries}
-    ours, lines = by_name[OURS], []
-    for variant in ("all", *dict.fromkeys(row["variant"] for row in ours.values())):
+    ours, lines = by_name.pop(OURS), []
+    groups: dict[str, list] = {"all": [*ours]}
+    for part in ("variant", "family"):
+        for key, row in ours.items():
+            groups.setdefault(row[part], []).append(key)
+    for group, here in groups.items():
         for name, theirs in by_name.items():
-            if name != OURS:
-                lines += _lost(variant, name, ours, theirs)
+            lines += [[group, *cells] for cells in _lost(name, [(ours[key], theirs[key]) for key in here])]
     return "where `default` loses", ["clouds", "measure", "to", "theirs", "`default`", "difference"], lines
 
 
-def _lost(variant: str, name: str, ours: dict, theirs: dict) -> Iterable[list[str]]:
-    here = [key for key in ours if variant in ("all", key[1])]
+def _lost(name: str, pairs: Sequence[tuple[Row, Row]]) -> Iterable[list[str]]:
     for measure, (words, digits, more) in MEASURES.items():
-        pairs = [(key[0], ours[key][measure], theirs[key][measure]) for key in here]
-        known = [(shape, mine, other) for shape, mine, other in pairs if mine is not None and other is not None]
+        known = [(mine, other) for mine, other in pairs if mine[measure] is not None and other[measure] is not None]
         if not known:
             continue
-        shapes, mine, other = zip(*known, strict=True)
-        mean, low, high = mean_with_interval(shapes, [b - a for a, b in zip(mine, other, strict=True)])
+        shapes = [mine["shape"] for mine, _ in known]
+        mean, low, high = mean_with_interval(shapes, [other[measure] - mine[measure] for mine, other in known])
         if low > 0 if more else high < 0:
-            means = [number(sum(each) / len(known), digits) for each in (other, mine)]
-            yield [variant, words, " of ".join(_label(name)), *means, told(mean, low, high, digits, sign="+")]
+            means = [
+                number(sum(row[measure] for row in side) / len(known), digits) for side in zip(*known, strict=True)
+            ]
+            yield [words, " of ".join(_label(name)), *means[::-1], told(mean, low, high, digits, sign="+")]
 
 
 def by_group(entries: Sequence[Entry], group: str, measure: str, digits: int, title: str) -> Table:
