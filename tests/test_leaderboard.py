@@ -52,15 +52,19 @@ def entries(parts, **rows):
 
 
 class TestTables:
-    def test_losses_are_those_whose_interval_leaves_0_out(self, parts):
+    def test_losses_are_worse_means_with_their_intervals(self, parts):
         shapes = [f"tubes_{seed}" for seed in range(100, 112)]
         ours = [row(it, error=0.2, ends=None) for it in shapes]
         better = [row(it, error=0.1, topology=0.0, ends=0.1) for it in shapes]
-        now_and_then = [row(it, error=0.1 if i % 2 else 0.3) for i, it in enumerate(shapes)]
-        found = entries(parts, default=ours, cgal=better, pygel=now_and_then)
+        now_and_then = [row(it, error=0.1 if i % 3 else 0.35) for i, it in enumerate(shapes)]
+        hardly = [row(it, error=0.1999) for it in shapes]
+        found = entries(parts, default=ours, cgal=better, pygel=now_and_then, thinning=hardly)
         lines = parts.tables.losses(found)[2]
-        told = ["error", "CGAL of wrap", "0.100", "0.200", "-0.100 [-0.100, -0.100]"]
-        assert lines == [["all", *told], ["clean", *told], ["tubes", *told]]
+        assert [line[0] for line in lines] == ["all", "all", "clean", "clean", "tubes", "tubes"]
+        assert lines[0][1:] == ["error", "CGAL of wrap", "0.100", "0.200", "-0.100 [-0.100, -0.100]"]
+        assert lines[1][1:5] == ["error", "PyGEL3D of coarser wrap", "0.183", "0.200"]
+        low, high = map(float, re.search(r"\[(.+), (.+)\]", lines[1][5]).groups())
+        assert low < -0.017 < 0 < high
 
     def test_a_failure_is_a_loss_of_topology_and_no_error(self, parts):
         shapes = [f"tubes_{seed}" for seed in range(100, 104)]

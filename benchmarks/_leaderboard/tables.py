@@ -61,7 +61,7 @@ def short(entries: Sequence[Entry], cpu: dict[str, float]) -> Table:
 
 
 def losses(entries: Sequence[Entry]) -> Table:
-    """Where `default` is worse than another tool, by a difference whose interval does not hold 0."""
+    """Where the mean of `default` is worse than that of another tool; intervals that hold 0 show no difference."""
     by_name = {entry.tool: _by_cloud(entry) for entry in entries}
     ours, lines = by_name.pop(OURS), []
     groups: dict[str, list] = {"all": [*ours]}
@@ -71,7 +71,8 @@ def losses(entries: Sequence[Entry]) -> Table:
     for group, here in groups.items():
         for name, theirs in by_name.items():
             lines += [[group, *cells] for cells in _lost(name, [(ours[key], theirs[key]) for key in here])]
-    return "where `default` loses", ["clouds", "measure", "to", "theirs", "`default`", "difference"], lines
+    header = ["clouds", "measure", "to", "theirs", "`default`", "difference"]
+    return "where the mean of `default` is worse", header, lines
 
 
 def _lost(name: str, pairs: Sequence[tuple[Row, Row]]) -> Iterable[list[str]]:
@@ -81,11 +82,10 @@ def _lost(name: str, pairs: Sequence[tuple[Row, Row]]) -> Iterable[list[str]]:
             continue
         shapes = [mine["shape"] for mine, _ in known]
         mean, low, high = mean_with_interval(shapes, [other[measure] - mine[measure] for mine, other in known])
-        if low > 0 if more else high < 0:
-            means = [
-                number(sum(row[measure] for row in side) / len(known), digits) for side in zip(*known, strict=True)
-            ]
-            yield [words, " of ".join(_label(name)), *means[::-1], told(mean, low, high, digits, sign="+")]
+        if round(mean if more else -mean, digits) > 0:
+            means = [sum(row[measure] for row in side) / len(known) for side in zip(*known, strict=True)]
+            cells = [number(value, digits) for value in means[::-1]]
+            yield [words, " of ".join(_label(name)), *cells, told(mean, low, high, digits, sign="+")]
 
 
 def by_group(entries: Sequence[Entry], group: str, measure: str, digits: int, title: str) -> Table:
