@@ -10,6 +10,7 @@ from _peers import PEERS
 
 from glsk_o3d import plot_skeleton, read_cloud, read_skeleton
 from glsk_o3d.benchmark import BenchmarkFolder, leaderboard
+from glsk_o3d.benchmark.answers import answer_files
 from glsk_o3d.interop.atomic import write_atomically
 from glsk_o3d.interop.clouds import cloud_points
 
@@ -58,9 +59,9 @@ def draw(bench: BenchmarkFolder, answers: Path, cloud: str, entries: list[Entry]
     canvas = FigureCanvasAgg(figure)
     for i, entry in enumerate(entries):
         axes = figure.add_subplot(lines, COLUMNS, i + 1, projection="3d")
-        answer = answers / entry.tool / f"{cloud}.npz"
-        plot_skeleton(read_skeleton(answer) if answer.is_file() else None, axes, cloud=points, view=VIEW)
-        axes.set_title(caption(entry, cloud), fontsize=9, y=0.97)
+        found = answer_files(answers / entry.tool).get(cloud)
+        plot_skeleton(read_skeleton(found[0]) if found else None, axes, cloud=points, view=VIEW)
+        axes.set_title(caption(entry, cloud), fontsize=9)
     canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba())[:, :, :3]
     image = Image.fromarray(pixels).quantize(32)  # a fifth of the size of a figure's
