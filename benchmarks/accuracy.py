@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 from _accuracy.differences import difference_tables, paired
-from _accuracy.ideas import IDEAS, ablation_tables, worth_tables, write_effects
+from _accuracy.ideas import IDEAS, ablation_tables, of_worth, worth_tables, write_effects
 from _accuracy.known_axes import details, overview
 from _accuracy.measuring import measured
 from _accuracy.pictures import draw_ablation, draw_stop, draw_truth
@@ -36,7 +36,7 @@ from _common.command_line import (
     named,
     with_solves,
 )
-from _common.results import read, save
+from _common.results import ROOT, read, read_packed, save, write_packed
 from _common.runs import run
 from _common.tables import Tables, fill, markdown_table, present
 
@@ -47,6 +47,7 @@ from glsk_o3d.pipelines import default
 
 EVERY = "clean_1024,clean_4096,density_4096,holes_4096,scan2_4096,noise1_4096,noise2_4096,outliers_4096"
 SOLVES = range(7)
+WORTH_KEPT = ROOT / "benchmarks" / "v1" / "ablation.json.gz"
 Changed = Annotated[
     list[str] | None, typer.Option("--set", metavar="FILTER.PARAMETER=VALUE", help="Change it; may be repeated.")
 ]
@@ -230,12 +231,20 @@ def page(
 @app.command()
 def worth(
     file: Annotated[Path, typer.Argument(metavar="PAGE", exists=True, dir_okay=False)],
-    results: Annotated[Path, typer.Argument(metavar="JSON", exists=True, dir_okay=False)],
+    results: Annotated[Path | None, typer.Argument(metavar="JSON", exists=True, dir_okay=False)] = None,
 ) -> None:
-    """Put what each idea is worth into a Markdown page: saved results of ablation, cloud by cloud, with intervals."""
-    found = read(results)
-    where = f"Measured with commit {found['commit']}."
-    fill(file, {"worth": "\n".join([where, "", *(markdown_table(*table) for table in worth_tables(found["rows"]))])})
+    """Put what each idea is worth, cloud by cloud, into a page: of results of ablation, which are kept, or of those."""
+    if results is not None:
+        found = read(results)
+        write_packed(WORTH_KEPT, {"commit": found["commit"], "rows": of_worth(found["rows"])})
+    fill(file, {"worth": worth_text()})
+
+
+def worth_text() -> str:
+    """The table of what is kept, and the commit that it is of."""
+    found = read_packed(WORTH_KEPT)
+    tables = "\n".join(markdown_table(*table) for table in worth_tables(found["rows"]))
+    return f"Measured with commit {found['commit']}.\n\n{tables}"
 
 
 if __name__ == "__main__":

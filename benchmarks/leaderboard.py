@@ -13,14 +13,14 @@ from statistics import median
 from typing import Annotated
 
 import typer
-from _common.command_line import Markdown, application, writable
-from _common.results import ROOT, machine
+from _common.command_line import application, writable
+from _common.results import ROOT, machine, read, surroundings
 from _common.runs import run as in_processes
-from _common.tables import fill, markdown_table, present
+from _common.tables import fill, markdown_table
 from _leaderboard import recorded, tables
 from _leaderboard.kept import SECONDS, keep, kept, seconds
 from _leaderboard.pictures import board, draw
-from _peers import PEERS, Peer, installed, one_thread, silence, skeleton_of, versions
+from _peers import PEERS, Peer, installed, one_thread, silence, skeleton_of
 
 from glsk_o3d import read_cloud, save_skeleton
 from glsk_o3d.benchmark import make, read_folder, score_answers
@@ -52,22 +52,36 @@ def run_(
     tool: Tool = "",
     limit: Annotated[float, typer.Option("--limit", help="Seconds for a skeleton.")] = 60.0,
     jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes at once.")] = 2,
+    retry: Annotated[bool, typer.Option("--retry", help="Run again what failed.")] = False,
 ) -> None:
     """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/v1."""
     peers = installed(PEERS, tool)
     bench = make(place / BENCH, jobs=jobs)
     one_thread()
     for name, peer in peers.items():
-        (place / name).mkdir(exist_ok=True)
-        times = read_times(place / name)
-        todo = [it for it in bench.scored if it.name not in times]
+        made, times = begun(place / name, peer, limit)
+        todo = [it for it in bench.scored if it.name not in times or (retry and times[it.name]["failure"])]
         for some in batched(todo, KEPT_AFTER):
             work = [(dict(cloud=it.name), (it.path, peer, place / name / f"{it.name}.npz")) for it in some]
             for row in in_processes(answer, work, jobs, fresh=True, limit=limit, preload=PRELOADED):
-                times[row["cloud"]] = {"seconds": row.get("seconds"), "failure": row.get("failure")}
-            write_json(place / name / TIMES_NAME, {"clouds": times})
+                spent = limit if "not done" in row.get("failure", "") else None
+                times[row["cloud"]] = {"seconds": row.get("seconds", spent), "failure": row.get("failure")}
+            write_json(place / name / TIMES_NAME, {"made": made, "clouds": times})
         results = score_answers(bench, place / name, name=name)
-        typer.echo(f"{keep(results, limit)}: {results.failures} failures")
+        typer.echo(f"{keep(results, made)}: {results.failures} failures")
+
+
+def begun(folder: Path, peer: Peer, limit: float) -> tuple[dict, dict]:
+    """What a tool's answers are made with, and what is known of those that are there; they must be of the same."""
+    folder.mkdir(exist_ok=True)
+    made = {**surroundings(), "packages": peer.versions(), "limit": limit}
+    if not (folder / TIMES_NAME).is_file():
+        return made, {}
+    before = read(folder / TIMES_NAME)["made"]
+    same = ("packages", "limit") if peer.packages else ("commit", "limit")
+    if other := [f"{before[it]}" for it in same if before[it] != made[it]]:
+        raise typer.BadParameter(f"{folder} has answers of {', '.join(other)}: remove it, or give another folder")
+    return before, read_times(folder)
 
 
 def batched(items: list, n: int) -> Iterable[list]:
@@ -90,14 +104,13 @@ def answer(cloud: Path, peer: Peer, path: Path) -> dict:
 def seconds_(tool: Tool = "") -> None:
     """CPU seconds of each tool on twelve clouds, one at a time; kept in benchmarks/v1. The machine should be idle."""
     peers = installed(PEERS, tool)
+    where = machine()
     one_thread()
-    found = seconds()["tools"] | {
-        row["tool"]: round(row["cpu"], 3)
-        for row in in_processes(timed, [(dict(tool=name), (peer,)) for name, peer in peers.items()], 1, fresh=True)
-        if "failure" not in row
-    }
-    write_json(SECONDS, {"where": f"{machine()} {versions(peers.values())}", "tools": found})
-    present([("CPU s", ["", "CPU s"], [[PEERS[name].label, f"{it:.2f}"] for name, it in found.items()])], False)
+    rows = in_processes(timed, [(dict(tool=name), (peer,)) for name, peer in peers.items()], 1, fresh=True)
+    found = seconds() | {row["tool"]: dict(cpu=round(row["cpu"], 3), where=where) for row in rows if "cpu" in row}
+    write_json(SECONDS, found)
+    for row in rows:
+        typer.echo(f"{row['tool']}: " + (row["failure"] if "failure" in row else f"{row['cpu']:.2f} s"))
 
 
 def timed(peer: Peer) -> dict:
@@ -120,34 +133,35 @@ def parts_of(path: Path) -> list[str]:
 
 
 @app.command()
-def page(
-    paths: Annotated[list[Path] | None, typer.Argument(metavar="MD...")] = None, markdown: Markdown = False
-) -> None:
+def page(paths: Annotated[list[Path] | None, typer.Argument(metavar="MD...")] = None) -> None:
     """The tables of the scores that are kept, printed; or put into pages, with a picture in docs/images."""
     pages = [with_parts(path) for path in paths or ()]
     found = pieces()
     if not pages:
-        present([table for part in found.values() for table in part], markdown)
+        typer.echo("\n".join(found.values()))
         return
     for path in pages:
-        fill(path, {name: "\n".join(markdown_table(*table) for table in found[name]) for name in parts_of(path)})
+        fill(path, {name: found[name] for name in parts_of(path)})
     board(kept(), IMAGES)
 
 
-def pieces() -> dict[str, list]:
-    """The tables by the names of their places in the page."""
-    entries = kept()
-    return {
-        "short": [tables.short(entries, seconds()["tools"])],
-        "leaderboard": [tables.overview(entries, seconds()["tools"])],
-        "losses": [tables.losses(entries)],
-        "topologies": [tables.by_group(entries, "variant", "topology", 2, "right topology, by kind of cloud")],
-        "errors": [tables.by_group(entries, "variant", "error", 3, "error, by kind of cloud")],
-        "families": [tables.by_group(entries, "family", "topology", 2, "right topology, by family of shapes")],
-        "failures": [tables.failures(entries)],
-        "runs": [tables.runs(entries)],
-        "recorded": [recorded.table()],
+def pieces() -> dict[str, str]:
+    """What stands at the places of the pages, by their names."""
+    entries, cpu = kept(), seconds()
+    found = {
+        "short": tables.short(entries, cpu),
+        "leaderboard": tables.overview(entries, cpu),
+        "losses": tables.losses(entries),
+        "topologies": tables.by_group(entries, "variant", "topology", 2, "right topology, by kind of cloud"),
+        "errors": tables.by_group(entries, "variant", "error", 3, "error, by kind of cloud"),
+        "families": tables.by_group(entries, "family", "topology", 2, "right topology, by family of shapes"),
+        "failures": tables.failures(entries),
+        "runs": tables.runs(entries),
+        "recorded": recorded.table(),
     }
+    told = {name: markdown_table(*table) for name, table in found.items()}
+    told["leaderboard"] += "".join(f"\nCPU seconds: {where}\n" for where in {it["where"]: None for it in cpu.values()})
+    return told
 
 
 @app.command()

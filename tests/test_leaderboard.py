@@ -20,6 +20,7 @@ from glsk_o3d.benchmark.scoring import Scores
 from glsk_o3d.samples import torus
 from glsk_o3d.skeleton import Skeleton
 
+FAILED = dict(failure="not done after 5 s")
 SHARES = ("perfect", "topology", "tips_f1", "junctions_f1")
 
 
@@ -61,19 +62,19 @@ class TestTables:
         found = entries(parts, default=ours, cgal=better, pygel=now_and_then, thinning=hardly)
         lines = parts.tables.losses(found)[2]
         assert [line[0] for line in lines] == ["all", "all", "clean", "clean", "tubes", "tubes"]
-        assert lines[0][1:] == ["error", "CGAL of wrap", "0.100", "0.200", "-0.100 [-0.100, -0.100]"]
-        assert lines[1][1:5] == ["error", "PyGEL3D of coarser wrap", "0.183", "0.200"]
-        low, high = map(float, re.search(r"\[(.+), (.+)\]", lines[1][5]).groups())
+        assert lines[0][1:] == ["12", "error", "CGAL of wrap", "0.100", "0.200", "-0.100 [-0.100, -0.100]"]
+        assert lines[1][1:6] == ["12", "error", "PyGEL3D of coarser wrap", "0.183", "0.200"]
+        low, high = map(float, re.search(r"\[(.+), (.+)\]", lines[1][6]).groups())
         assert low < -0.017 < 0 < high
 
     def test_a_failure_is_a_loss_of_topology_and_no_error(self, parts):
         shapes = [f"tubes_{seed}" for seed in range(100, 104)]
         found = entries(parts, default=[failed("no", shape=it) for it in shapes], cgal=[row(it) for it in shapes])
-        assert {line[1] for line in parts.tables.losses(found)[2]} == {"perfect", "topology", "tips F1", "junctions F1"}
+        assert {line[2] for line in parts.tables.losses(found)[2]} == {"perfect", "topology", "tips F1", "junctions F1"}
 
     def test_overview_is_sorted_and_has_seconds(self, parts):
         good, bad = [row(), row("trees_100")], [failed("gone"), row("trees_100", perfect=0.0, error=0.4)]
-        title, header, lines = parts.tables.overview(entries(parts, cgal=bad, default=good), {"cgal": 2.345})
+        title, header, lines = parts.tables.overview(entries(parts, cgal=bad, default=good), {"cgal": dict(cpu=2.345)})
         assert title.startswith("2 clouds")
         assert [line[0] for line in lines] == ["`default`", "CGAL"]
         cells = dict(zip(header, lines[1], strict=True))
@@ -85,10 +86,10 @@ class TestTables:
     def test_groups(self, parts):
         rows = [row(), row("trees_100", topology=0.0), row("trees_100", "holes", error=None)]
         (line,) = parts.tables.by_group(entries(parts, cgal=rows), "family", "topology", 2, "")[2]
-        assert line == ["CGAL", "wrap", "1.00", "0.50"]
+        assert line == ["CGAL", "wrap", "1.00 [1.00, 1.00]", "0.50 [0.50, 0.50]"]
         _, header, (line,) = parts.tables.by_group(entries(parts, cgal=rows), "variant", "error", 3, "")
         assert header[2:] == ["clean (2)", "holes (1)"]
-        assert line[2:] == ["0.100", "-"]
+        assert line[2:] == ["0.100 [0.100, 0.100]", "-"]
 
     def test_failures_by_reason_and_name(self, parts):
         rows = [failed("no answer: a|b"), failed("no answer: a|b", variant="holes"), failed("late", shape="trees_100")]
@@ -103,11 +104,11 @@ class TestKept:
     def test_scores_are_written_packed_and_read(self, parts, monkeypatch, tmp_path):
         monkeypatch.setattr(parts.kept, "KEPT", tmp_path)
         results = Results("v1", "default", True, [row(error=0.123456, seconds=7200.0)])
-        first = parts.kept.keep(results, 60.0)
+        first = parts.kept.keep(results, dict(limit=60.0))
         (entry,) = parts.kept.kept()
         assert entry.results.rows[0]["error"] == 0.1235
-        assert (entry.tool, entry.made["hours"], entry.made["limit"]) == ("default", 2.0, 60.0)
-        assert first.read_bytes() == parts.kept.keep(results, 60.0).read_bytes()
+        assert (entry.tool, entry.made) == ("default", dict(limit=60.0, hours=2.0))
+        assert first.read_bytes() == parts.kept.keep(results, dict(limit=60.0)).read_bytes()
 
     def test_those_of_the_package_are_whole(self, parts):
         found = parts.kept.kept()
@@ -120,10 +121,10 @@ class TestKept:
 
     def test_the_pages_have_what_is_kept(self, tool, root):
         pages = "".join((root / name).read_text(encoding="utf-8") for name in ("README.md", "docs/comparison.md"))
-        for name, tables in tool.pieces().items():
+        for name, text in tool.pieces().items():
             there = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", pages, re.S)[1].strip()
             if name != "recorded":  # late solves of wen2024 round otherwise elsewhere
-                assert there == "\n".join(tool.markdown_table(*table) for table in tables).strip()
+                assert there == text.strip()
 
     def test_what_is_recorded_of_the_authors_code(self, parts):
         _, header, lines = parts.recorded.table()
@@ -147,16 +148,32 @@ class TestCommands:
         call("picture", tmp_path, tmp_path / "p.png", "--cloud", "tubes_100_clean", "--tool", "default,cgal")
         assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 
-    def test_seconds_are_kept_and_added_to(self, tool, call, rods, tmp_path, monkeypatch):
-        module = sys.modules["_leaderboard.kept"]
-        for it in (tool, module):
+    def test_answers_of_other_settings_are_not_gone_on_with(self, tool, parts, call, small, tmp_path, monkeypatch):
+        monkeypatch.setattr(tool, "make", lambda place, jobs: read_folder(place))
+        monkeypatch.setattr(parts.kept, "KEPT", tmp_path)
+        monkeypatch.setattr(tool, "in_processes", lambda answer, work, *_, **__: [job[0] | FAILED for job in work])
+        assert "7 failures" in call("run", tmp_path, "--tool", "default", "--limit", 5)
+        (entry,) = parts.kept.kept()
+        assert {each["failure"] for each in entry.results.rows} == {"no answer: not done after 5 s"}
+        assert (entry.made["limit"], entry.made["hours"]) == (5, round(7 * 5 / 3600, 2))
+        assert "has answers of 5" in call("run", tmp_path, "--tool", "default", "--limit", 6, code=2)
+        monkeypatch.setattr(tool, "in_processes", lambda *_, **__: pytest.fail("they are known"))
+        call("run", tmp_path, "--tool", "default", "--limit", 5)
+        monkeypatch.undo()
+        monkeypatch.setattr(tool, "make", lambda place, jobs: read_folder(place))
+        monkeypatch.setattr(parts.kept, "KEPT", tmp_path)
+        assert "0 failures" in call("run", tmp_path, "--tool", "default", "--limit", 5, "--retry")
+
+    def test_seconds_are_kept_and_added_to(self, tool, parts, call, tmp_path, monkeypatch):
+        for it in (tool, parts.kept):
             monkeypatch.setattr(it, "SECONDS", tmp_path / "seconds.json")
-        (tmp_path / "seconds.json").write_text('{"where": "", "tools": {"cgal": 2.5}}')
-        monkeypatch.setattr(tool, "in_processes", lambda work, jobs, *_, **__: [dict(tool="default", cpu=0.125)])
-        call("seconds", "--tool", "default")
-        found = module.seconds()
-        assert found["tools"] == {"cgal": 2.5, "default": 0.125}
-        assert "one thread" in found["where"]
+        (tmp_path / "seconds.json").write_text('{"cgal": {"cpu": 2.5, "where": "there"}}')
+        rows = [dict(tool="default", cpu=0.125), dict(tool="cgal", failure="gone")]
+        monkeypatch.setattr(tool, "in_processes", lambda work, jobs, *_, **__: rows)
+        assert "cgal: gone" in call("seconds", "--tool", "default")
+        found = parts.kept.seconds()
+        assert (found["cgal"], found["default"]["cpu"]) == (dict(cpu=2.5, where="there"), 0.125)
+        assert "one thread" in found["default"]["where"]
 
     def test_seconds_are_medians_over_the_clouds(self, tool, parts, monkeypatch):
         monkeypatch.setattr(tool, "TIMED", [("tubes", "clean"), ("tubes", "holes"), ("tubes", "scan2")])

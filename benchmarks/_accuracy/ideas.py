@@ -89,10 +89,12 @@ def losses(rows: list[dict]) -> tuple[dict[str, dict], list[str]]:
 
 
 def worth_tables(rows: list[dict]) -> Tables:
-    """How `default` changes without each idea, cloud by cloud, with intervals; the most that is lost first."""
-    whole, lines = {_cloud(row): row for row in pick(rows, pipeline="default")}, []
-    for name in losses(rows)[1] + [name for name in PUBLISHED if pick(rows, pipeline=name)]:
-        pairs = [(whole[_cloud(row)], row) for row in pick(rows, pipeline=name)]
+    """How `default` changes without each idea, cloud by cloud, with intervals; by the topologies that are lost."""
+    groups, lines = by_pipeline(rows), []
+    whole = {_cloud(row): row for row in groups["default"]}
+    ideas = sorted(IDEAS.keys() & groups.keys(), key=lambda name: (_mean(groups[name], "topology"), name))
+    for name in [*ideas, *(name for name in PUBLISHED if name in groups)]:
+        pairs = [(whole[_cloud(row)], row) for row in groups[name]]
         changes = [_change(pairs, measure, digits) for measure, digits in WORTH.items()]
         lines.append([f"without {name}" if name in IDEAS else f"`{name}`", *changes, *_most(pairs), _setting(name)])
     first = ["`default`", *(number(_mean(whole.values(), it), digits) for it, digits in WORTH.items()), "", "", ""]
@@ -100,28 +102,39 @@ def worth_tables(rows: list[dict]) -> Tables:
     return [(f"what {len(whole)} clouds lose without each idea", header, [first, *lines])]
 
 
+def of_worth(rows: list[dict]) -> list[dict]:
+    """Of each row no more than `worth_tables` needs."""
+    names = ("pipeline", "variant", "shape", "draw", *WORTH, "failure")
+    short = [{name: row[name] for name in names if name in row} for row in rows]
+    return [row | {"error": round(row["error"], 4)} if "error" in row else row for row in short]
+
+
+def _value(row, measure):
+    """A failure has the wrong topology, and no error."""
+    return row.get(measure, None if measure == "error" else False)
+
+
 def _change(pairs, measure, digits):
     """The mean difference from with to without, with its interval."""
-    known = [(old, new) for old, new in pairs if "failure" not in old and "failure" not in new]
-    shapes = [old["shape"] for old, _ in known]
-    return told(*mean_with_interval(shapes, [new[measure] - old[measure] for old, new in known]), digits, sign="+")
+    values = [(old["shape"], _value(old, measure), _value(new, measure)) for old, new in pairs]
+    shapes, before, after = zip(*(it for it in values if None not in it), strict=True)
+    return told(*mean_with_interval(shapes, [b - a for a, b in zip(before, after, strict=True)]), digits, sign="+")
 
 
 def _most(pairs):
-    """The variant in which most topologies are lost, and the shares there."""
+    """The variant in which most topologies are lost, and the shares there; dashes if none is."""
     groups: dict[str, list] = {}
     for pair in pairs:
         groups.setdefault(pair[0]["variant"], []).append(pair)
     shares = {name: [_mean(side, "topology") for side in zip(*group, strict=True)] for name, group in groups.items()}
     name = min(shares, key=lambda it: shares[it][1] - shares[it][0])
+    if shares[name][1] >= shares[name][0]:
+        return "-", "-"
     return name, " → ".join(number(share, 2) for share in shares[name])
 
 
 def _mean(rows, measure):
-    """Over what was measured; a failure has the wrong topology, and no error."""
-    missing = None if measure == "error" else False
-    values = [row.get(measure, missing) for row in rows]
-    known = [value for value in values if value is not None]
+    known = [value for row in rows if (value := _value(row, measure)) is not None]
     return sum(known) / len(known)
 
 

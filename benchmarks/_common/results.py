@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 import platform
@@ -12,6 +13,7 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
+from glsk_o3d.interop.atomic import write_atomically
 from glsk_o3d.report import Report
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,6 +45,17 @@ def save(path: Path | None, rows: list[dict]) -> None:
 def read(path: Path) -> dict[str, Any]:
     """What `save` has written."""
     return json.loads(path.read_text(encoding="utf-8"))
+
+
+def write_packed(path: Path, told: dict[str, Any]) -> None:
+    """Write packed JSON: the same bytes for the same content."""
+    packed = gzip.compress(json.dumps(told, ensure_ascii=False).encode(), mtime=0)
+    write_atomically(path, lambda temporary: Path(temporary).write_bytes(packed))
+
+
+def read_packed(path: Path) -> dict[str, Any]:
+    """What `write_packed` has written."""
+    return json.loads(gzip.decompress(path.read_bytes()))
 
 
 def surroundings() -> dict[str, Any]:

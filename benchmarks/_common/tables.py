@@ -19,7 +19,7 @@ Table = tuple[str, list[str], list[list[str]]]  # title, header, lines
 Tables = list[Table]
 # columns that are not numbers, besides the first
 TEXT = {"pipeline", "setting", "takes", "worst", "wrong", "note", "now right", "now wrong"}
-TEXT |= {"measure", "to", "why", "which", "failed", "most in"}
+TEXT |= {"measure", "to", "why", "which", "failed", "most in", "packages", "commit"}
 
 
 def number(value: float | None, digits: int = 3) -> str:

@@ -15,7 +15,6 @@ from glsk_o3d.benchmark.intervals import mean_with_interval, told
 from .kept import Entry
 
 OURS = "default"
-PUBLISHED = ("cao2010", "wen2024")
 MEASURES = {  # what may be lost, its digits, and whether more of it is better
     "perfect": ("perfect", 2, True),
     "topology": ("topology", 2, True),
@@ -29,9 +28,10 @@ MEASURES = {  # what may be lost, its digits, and whether more of it is better
 SHORT = {"clean": "clean", "scan2": "two cameras", "depth2": "two depth cameras", "lidar": "lidar"}
 SHORT |= {"noise1": "1 % noise"}
 Row = dict[str, Any]
+Seconds = dict[str, dict[str, Any]]
 
 
-def overview(entries: Sequence[Entry], cpu: dict[str, float]) -> Table:
+def overview(entries: Sequence[Entry], cpu: Seconds) -> Table:
     """All tools over all clouds, the best first."""
     lines = []
     for entry in leaderboard(each.results for each in entries).entries:
@@ -40,14 +40,14 @@ def overview(entries: Sequence[Entry], cpu: dict[str, float]) -> Table:
         plain = [number(mean[measure][0], 2) for measure in ("tips_f1", "junctions_f1")]
         error = told(*mean["error"], 3) if mean["error"] else "-"
         rest = [number(mean[measure] and mean[measure][0], 3) for measure in ("inside", "completeness")]
-        took = number(cpu.get(name), 2)
+        took = _cpu(cpu, name)
         lines.append([*_label(name), *shares, *plain, error, *rest, str(mean["failures"]), took])
     heads = ["tips F1", "junctions F1", "error", "inside", "complete", "failures", "CPU s"]
     count = len(entries[0].results.rows) if entries else 0
     return f"{count} clouds of 72 random shapes", ["", "takes", "perfect", "topology", *heads], lines
 
 
-def short(entries: Sequence[Entry], cpu: dict[str, float]) -> Table:
+def short(entries: Sequence[Entry], cpu: Seconds) -> Table:
     """The same in few columns, with right topologies of some kinds of clouds."""
     lines = []
     for entry in leaderboard(each.results for each in entries).entries:
@@ -55,7 +55,7 @@ def short(entries: Sequence[Entry], cpu: dict[str, float]) -> Table:
         shares = [number(groups[it]["topology"][0], 2) for it in SHORT]
         error = number(mean["error"] and mean["error"][0], 2)
         cells = [*shares, number(mean["topology"][0], 2), number(mean["perfect"][0], 2), error]
-        lines.append([*_label(name), *cells, number(cpu.get(name), 2)])
+        lines.append([*_label(name), *cells, _cpu(cpu, name)])
     heads = ["", "takes", *SHORT.values(), "all 11 kinds", "perfect", "error", "CPU s"]
     return "right parts and loops, share of the clouds", heads, lines
 
@@ -71,7 +71,7 @@ def losses(entries: Sequence[Entry]) -> Table:
     for group, here in groups.items():
         for name, theirs in by_name.items():
             lines += [[group, *cells] for cells in _lost(name, [(ours[key], theirs[key]) for key in here])]
-    header = ["clouds", "measure", "to", "theirs", "`default`", "difference"]
+    header = ["clouds", "shapes", "measure", "to", "theirs", "`default`", "difference"]
     return "where the mean of `default` is worse", header, lines
 
 
@@ -85,11 +85,17 @@ def _lost(name: str, pairs: Sequence[tuple[Row, Row]]) -> Iterable[list[str]]:
         if round(mean if more else -mean, digits) > 0:
             means = [sum(row[measure] for row in side) / len(known) for side in zip(*known, strict=True)]
             cells = [number(value, digits) for value in means[::-1]]
-            yield [words, " of ".join(_label(name)), *cells, told(mean, low, high, digits, sign="+")]
+            yield [
+                str(len({*shapes})),
+                words,
+                " of ".join(_label(name)),
+                *cells,
+                told(mean, low, high, digits, sign="+"),
+            ]
 
 
 def by_group(entries: Sequence[Entry], group: str, measure: str, digits: int, title: str) -> Table:
-    """The mean of a measure for each tool, by variant or by family."""
+    """The mean of a measure for each tool, by variant or by family, with intervals."""
     rows = entries[0].results.rows
     names = list(dict.fromkeys(row[group] for row in rows))
     sizes = Counter(row[group] for row in rows)
@@ -97,8 +103,9 @@ def by_group(entries: Sequence[Entry], group: str, measure: str, digits: int, ti
     for entry in entries:
         cells = []
         for name in names:
-            values = [row[measure] for row in entry.results.rows if row[group] == name and row[measure] is not None]
-            cells.append(number(sum(values) / len(values) if values else None, digits))
+            known = [row for row in entry.results.rows if row[group] == name and row[measure] is not None]
+            found = mean_with_interval([row["shape"] for row in known], [row[measure] for row in known])
+            cells.append(told(*found, digits))
         lines.append([*_label(entry.tool), *cells])
     return title, ["", "takes", *(f"{name} ({sizes[name]})" for name in names)], lines
 
@@ -116,10 +123,18 @@ def failures(entries: Sequence[Entry]) -> Table:
 
 
 def runs(entries: Sequence[Entry]) -> Table:
-    """What the runs took, and what of."""
-    lines = [[*_label(it.tool), number(it.made["hours"], 2), str(it.made["commit"])] for it in entries]
-    hours = sum(it.made["hours"] for it in entries)
-    return "runs", ["", "takes", "hours", "commit"], [*lines, ["all", "", number(hours, 1), ""]]
+    """What the runs took, and what was run."""
+    lines = []
+    for entry in entries:
+        made = entry.made
+        packages = ", ".join(f"{name} {version}" for name, version in made["packages"].items()) or "glsk-o3d"
+        lines.append([*_label(entry.tool), packages, str(made["commit"]), number(made["hours"], 2)])
+    hours = sum(entry.made["hours"] for entry in entries)
+    return "runs", ["", "takes", "packages", "commit", "hours"], [*lines, ["all", "", "", "", number(hours, 1)]]
+
+
+def _cpu(cpu: Seconds, name: str) -> str:
+    return number(cpu[name]["cpu"], 2) if name in cpu else "-"
 
 
 def _by_cloud(entry: Entry) -> dict[tuple[str, str], Row]:
