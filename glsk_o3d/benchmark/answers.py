@@ -22,6 +22,7 @@ MEASURES = ("perfect", "topology", "tips_f1", "junctions_f1", "error", "inside",
 TIMES_NAME = "times.json"
 MOST_RESULTS = 1 << 28  # derived: bytes, far more than any version has, so that a few bytes cannot fill the memory
 _FACTS = ("benchmark", "name", "whole", "clouds")
+_PARTS = ("seconds", "failure", "digits")
 _BROKEN = (EOFError, zlib.error, gzip.BadGzipFile)  # what is not packed as it should be
 
 
@@ -128,7 +129,7 @@ def score_answers(
     rows = []
     for done, cloud in enumerate(clouds, 1):
         told = times.get(cloud.name, {})
-        scores = _score(made, cloud, files.get(cloud.name, []), told.get("failure"))
+        scores = _score(made, cloud, files.get(cloud.name, []), told)
         facts = {"shape": cloud.shape, "family": cloud.family, "variant": cloud.variant}
         rows.append({**facts, **scores.as_dict(), "seconds": told.get("seconds")})
         if on_cloud is not None:
@@ -146,8 +147,11 @@ def answer_files(place: Path) -> dict[str, list[Path]]:
     return found
 
 
-def _score(made: BenchmarkFolder, cloud: CloudFile, files: list[Path], failure: str | None) -> Scores:
+def _score(made: BenchmarkFolder, cloud: CloudFile, files: list[Path], told: dict[str, Any]) -> Scores:
     """The scores of the answer to a cloud: that of a failure if there is none."""
+    failure = told.get("failure")
+    if told.get("digits") not in (None, made.digits(cloud)):
+        return Scores.of_failure("no answer: what is there answers another cloud of this name")
     if len(files) > 1:
         raise FileFormatError(f"{files[0]}: {files[1].name} answers the same cloud: keep one of them")
     if not files:
@@ -163,7 +167,7 @@ def _score(made: BenchmarkFolder, cloud: CloudFile, files: list[Path], failure: 
 
 
 def read_times(place: Path) -> dict[str, dict[str, Any]]:
-    """What ``times.json`` in a folder of answers says of each cloud: seconds, and why there is no answer.
+    """What ``times.json`` in a folder of answers says of each cloud: seconds, why there is no answer, and its `digits`.
 
     Parameters
     ----------
@@ -184,7 +188,7 @@ def read_times(place: Path) -> dict[str, dict[str, Any]]:
         return {}
     try:
         told = json.loads(path.read_text(encoding="utf-8"))["clouds"]
-        return {str(name): {part: each.get(part) for part in ("seconds", "failure")} for name, each in told.items()}
+        return {str(name): {part: each.get(part) for part in _PARTS if part in each} for name, each in told.items()}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         message = f"is damaged ({type(error).__name__}: {error}): remove it, and seconds are not known"
         raise FileFormatError(f"{path}: {message}") from None

@@ -95,6 +95,22 @@ class BenchmarkFolder:
         """All clouds, by shape and then in the order of the variants: of one's own clouds, as they were added."""
         return list(self._clouds())
 
+    def digits(self, cloud: CloudFile) -> str | None:
+        """What tells a cloud of somebody's own from another of its name; None in a version, whose names say all.
+
+        Parameters
+        ----------
+        cloud : CloudFile
+
+        Returns
+        -------
+        str or None
+        """
+        shape = self.shapes[cloud.shape]
+        if self.version != OWN:
+            return None
+        return f"{shape['fingerprint']} {shape['clouds'][cloud.variant]['fingerprint']}"
+
     @property
     def scored(self) -> list[CloudFile]:
         """The clouds of which answers count."""

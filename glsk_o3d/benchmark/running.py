@@ -126,14 +126,15 @@ def run(
     place = Path(answers)
     place.mkdir(parents=True, exist_ok=True)
     times = _times(place, made, program)
-    done = {name for name, told in times.items() if not (retry and told["failure"] is not None)}
+    done = {name for name, told in times.items() if not (retry and told.get("failure") is not None)}
     todo = [cloud for cloud in made.scored if cloud.name not in done]
     record = {"benchmark": made.version, "program": program, "machine": _machine(jobs), "clouds": times}
     count = 0
 
     def keep(cloud: CloudFile, outcome: Outcome) -> None:
         nonlocal count
-        times[cloud.name] = {"seconds": round(outcome.seconds, 4), "failure": outcome.failure}
+        told = {"seconds": round(outcome.seconds, 4), "failure": outcome.failure, "digits": made.digits(cloud)}
+        times[cloud.name] = {part: value for part, value in told.items() if part != "digits" or value}
         write_json(place / TIMES_NAME, record)
         count += 1
         if on_cloud is not None:
@@ -142,7 +143,7 @@ def run(
     runner = Runner(time_limit, memory_limit)
     with tempfile.TemporaryDirectory(prefix=".run_", dir=place, ignore_cleanup_errors=True) as work:
         _each(todo, jobs, lambda cloud: _answer(runner, words, cloud, Path(work), place, ending), keep, runner)
-    known = {cloud.name: times[cloud.name]["failure"] for cloud in made.scored}
+    known = {cloud.name: times[cloud.name].get("failure") for cloud in made.scored}
     failures = {name: failure for name, failure in known.items() if failure is not None}
     return RunResult(len(known) - len(failures), len(failures), len(known) - len(todo), failures)
 
@@ -175,7 +176,9 @@ def _times(place: Path, made: BenchmarkFolder, program: Told) -> dict[str, Told]
     same = (before.get("benchmark"), before.get("program")) == (made.version, json.loads(json.dumps(program)))
     if not same and (before or any(cloud.name in files for cloud in made.scored)):
         raise InvalidParameterError(f"{place}: has answers of another program, or with other limits: give another one")
-    return {name: told for name, told in times.items() if told["failure"] is not None or name in files}
+    digits = {cloud.name: made.digits(cloud) for cloud in made.scored}
+    there = [name for name, told in times.items() if told.get("failure") is not None or name in files]
+    return {name: times[name] for name in there if times[name].get("digits") == digits.get(name)}
 
 
 def _machine(jobs: int) -> Told:

@@ -161,6 +161,31 @@ class TestRefusals:
             add_shape(own.path, "b", {"a": FORK.points}, *AXIS)
 
 
+class TestAnswers:
+    def test_to_another_cloud_of_the_same_name_do_not_count(self, tmp_path):
+        """What was answered in one folder is no answer to what is called the same in another."""
+        turned = FORK.points[:, [1, 2, 0]], FORK.nodes[:, [1, 2, 0]]
+        one = add_shape(tmp_path / "one", "fork", {"scan": FORK.points}, *AXIS)
+        two = add_shape(tmp_path / "two", "fork", {"scan": turned[0]}, turned[1], FORK.edges, FORK.radii)
+        command = [sys.executable, "-c", COPIES, "{cloud}", "{skeleton}"]
+        options = dict(command=command, ending=".obj")
+        assert run(one, tmp_path / "answers", **options).skipped == 0
+        assert score_answers(one, tmp_path / "answers").failures == 0
+        (row,) = score_answers(two, tmp_path / "answers").rows
+        assert row["failure"] == "no answer: what is there answers another cloud of this name"
+        assert run(two, tmp_path / "answers", **options).skipped == 0
+        assert score_answers(two, tmp_path / "answers").failures == 0
+        assert run(two, tmp_path / "answers", **options).skipped == 1
+        add_shape(tmp_path / "two", "fork", {"more": turned[0][:500]}, turned[1], FORK.edges, FORK.radii)
+        assert run(tmp_path / "two", tmp_path / "answers", **options).skipped == 1
+
+
+COPIES = """
+import sys
+open(sys.argv[2], "w").write("v 0 0 0\\nv 1 0 0\\nl 1 2\\n")
+"""
+
+
 class TestRadii:
     def test_of_a_tube_that_widens(self):
         """Around each node the points are as far as the cone is thick, whatever part of the edges they are beside."""
