@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import pipelines
+from glsk_o3d import pipelines, read_cloud
 from glsk_o3d.batch import run_batch
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.samples import torus
@@ -117,6 +117,15 @@ class TestFolders:
         found = parts.clouds.cases(zoo[0], False, "s*_512,*_512,clean_512")
         assert list(dict.fromkeys(case.variant for case in found)) == ["scan2_512", "clean_512"]
 
+    def test_a_public_benchmark(self, parts, small):
+        found = parts.clouds.cases(small.path, False, "*")
+        assert [(case.shape, case.variant) for case in found[:2]] == [("trees_100", "clean"), ("trees_101", "clean")]
+        assert {(case.shape, case.variant) for case in found} == {(it.shape, it.variant) for it in small.scored}
+        points, axis = found[0].load()
+        np.testing.assert_array_equal(points, read_cloud(small.scored[0].path).points)
+        assert len(axis.radii) == 3
+        assert (found[0].size, found[0].facts["family"], found[0].facts["seed"]) == (len(points), "trees", 100)
+
     def test_draws_are_of_built_in_shapes_alone(self, parts, zoo):
         assert [it.draw for it in parts.clouds.cases(None, True, "clean_512", "tube,torus", 3)] == [0, 1, 2] * 2
         assert [it.draw for it in parts.clouds.cases(zoo[0], False, "clean_512", "rings_0", 3)] == [0]
@@ -195,6 +204,44 @@ class TestArithmetic:
         names = [line[0] for line in lines[1:]]
         assert names == ["without denoising", "without air cut", "without spurs cut", "cao2010"]
         assert lines[1] == ["without denoising", "0.500 / 1", "0.100 / 1", "0.300 / 2", "`RingBuilder.denoise=0`"]
+
+    def test_what_ideas_are_worth(self, parts):
+        """Pairs of the same cloud; a failure has the wrong topology, and no error to compare."""
+        names = [f"tubes_{seed}" for seed in range(4)]
+        rows = [row(name, error=0.1) for name in names]
+        rows += [row(name, "holes_512", error=0.1) for name in names]
+        rows += [row(name, pipeline="air cut", error=0.3, perfect=False) for name in names[:3]]
+        rows += [dict(shape="tubes_3", variant="clean_512", pipeline="air cut", draw=0, failure="ValueError: no")]
+        rows += [row(name, "holes_512", "air cut", error=0.1) for name in names]
+        rows += [row(name, variant, "denoising") for name in names for variant in ("clean_512", "holes_512")]
+        ((title, header, (first, air, denoising)),) = parts.ideas.worth_tables(parts.ideas.of_worth(rows))
+        assert title.startswith("what 8 clouds lose")
+        assert first[:4] == ["`default`", "1.00", "1.00", "0.100"]
+        cells = dict(zip(header, air, strict=True))
+        assert cells["perfect"].startswith("-0.50 [")
+        assert cells["topology"].startswith("-0.12 [")  # one of eight
+        assert cells["error"].startswith("+0.086 [")  # three of seven
+        assert (cells["most in"], cells["topology there"]) == ("clean_512", "1.00 → 0.75")
+        assert cells["setting"] == "`Refiner.air=0`"
+        assert denoising[1:6] == ["+0.00 [+0.00, +0.00]"] * 2 + ["+0.000 [+0.000, +0.000]", "-", "-"]
+
+    def test_the_paper_has_what_ideas_are_worth(self, tool, root):
+        page = (root / "docs" / "paper.md").read_text(encoding="utf-8")
+        assert f"<!-- worth -->\n\n{tool.worth_text()}" in page
+
+    def test_worth_keeps_results_and_fills_a_page(self, tool, call, tmp_path, monkeypatch):
+        monkeypatch.setattr(tool, "WORTH_KEPT", tmp_path / "kept.json.gz")
+        rows = [row(pipeline=name) for name in ("default", "air cut")]
+        (tmp_path / "a.json").write_text(json.dumps(dict(commit="abc", rows=rows)))
+        page = tmp_path / "page.md"
+        page.write_text("<!-- worth -->\n<!-- end -->\n")
+        call("worth", page, tmp_path / "a.json")
+        filled = page.read_text()
+        assert "commit abc" in filled
+        assert "| without air cut |" in filled
+        page.write_text("<!-- worth -->\n<!-- end -->\n")
+        call("worth", page)  # of what is kept
+        assert page.read_text() == filled
 
     def test_effects_go_behind_the_settings_of_a_page(self, parts, tmp_path):
         rows = [row(), row(variant="noise1_512", error=0.3)]
