@@ -17,6 +17,16 @@ BROKEN = """[...document.querySelectorAll("article :is(td, th)")].flatMap((cell)
     return broken;
 })"""
 """Words in tables that go over more than one line."""
+INTERVALS = """[...document.querySelectorAll("article td")].flatMap((cell) => {
+    const found = cell.innerText.match(/\\[[-+.\\d]+,\\s[-+.\\d]+\\]/);
+    if (!found || cell.childNodes.length != 1 || cell.querySelector("p *")) return [];
+    const text = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT).nextNode(), range = document.createRange();
+    const start = text.data.indexOf("[");
+    range.setStart(text, start);
+    range.setEnd(text, text.data.indexOf("]", start) + 1);
+    return [new Set([...range.getClientRects()].map((box) => Math.round(box.top))).size];
+})"""
+"""How many lines each interval in a table takes."""
 SEARCHES = {
     "ring builder": "docs/filters/ring_builder.html",
     "noise": "docs/parameters.html",
@@ -80,6 +90,13 @@ def test_no_page_is_wider_than_a_phone_and_no_word_of_a_table_is_broken(site, vi
             broken[page] = words
     assert wide == {}
     assert broken == {}
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_intervals_in_tables_stay_on_one_line(visit, width):
+    lines = visit("docs/comparison.html", width).evaluate(INTERVALS)
+    assert len(lines) > 100
+    assert {*lines} == {1}
 
 
 def test_equations_are_set_in_the_font_that_comes_with_the_site(visit):
