@@ -15,6 +15,7 @@ from _calibration.fitting import WEIGHTS, by_question, fitted, packaged, said
 from _calibration.pictures import draw_reliability
 from _calibration.questions import questions
 from _calibration.reliability import tables, without_family
+from _calibration.transfer import SEEN, UNSEEN, measure, table, weights_of
 from _common.clouds import cases
 from _common.command_line import Jobs, Markdown, Output, Own, Shapes, Variants, application
 from _common.results import read, save
@@ -102,6 +103,33 @@ def check(
     if page is not None:
         fill(page, {"check": shown[:2]})
         draw_reliability(told, page.parent / "images")
+
+
+@app.command()
+def transfer(
+    learnt: Annotated[Path, typer.Argument(metavar="JSON", exists=True, dir_okay=False, help="Questions, of -o.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", exists=True, file_okay=False, help="Other shapes.")],
+    variant: Variants = "*",
+    shapes: Shapes = "",
+    page: Annotated[
+        Path | None, typer.Option("--page", help="Put the table into this page.", callback=page_with("transfer"))
+    ] = None,
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Right topologies with weights fitted to all families, and for each family with those fitted to the others."""
+    answered = by_question(read(learnt)["rows"])
+    found = cases(folder, False, variant, shapes)
+    seen = weights_of(answered)
+    unseen = {family: weights_of(answered, family) for family in {case.facts["family"] for case in found}}
+    work = [(dict(weights=SEEN, **case.facts), (case, seen)) for case in found]
+    work += [(dict(weights=UNSEEN, **case.facts), (case, unseen[case.facts["family"]])) for case in found]
+    rows = run(measure, work, jobs)
+    save(output, rows)
+    present([table(rows)], markdown)
+    if page is not None:
+        fill(page, {"transfer": [table(rows)]})
 
 
 if __name__ == "__main__":

@@ -188,3 +188,52 @@ def test_asks_what_the_refiner_asks(parts):
     found = [(it.about, it.probability) for it in report.judgements]
     assert len(found) >= 6
     assert sorted(asked) == sorted(found)
+
+
+class TestTransfer:
+    def test_weights_are_used_and_put_back(self, parts, benchmark):
+        case = sys.modules["_common.clouds"].Case("torus", "clean_512")
+        before = {name: dict(getattr(scores, name)) for name in parts.fitting.WEIGHTS.values()}
+        whole = parts.transfer.measure(case, {"HANDLE_WEIGHTS": before["HANDLE_WEIGHTS"]})
+        never = parts.transfer.measure(case, {"HANDLE_WEIGHTS": before["HANDLE_WEIGHTS"] | {"constant": -99.0}})
+        assert (whole["loops"], never["loops"]) == (0, -1)
+        assert before == {name: getattr(scores, name) for name in before}
+
+    def test_a_family_is_left_out(self, parts):
+        names, facts = ["f"], np.array([[1.0], [2.0], [3.0], [-1.0], [-2.0], [-3.0]] * 4)
+        families = np.array(["a"] * 12 + ["b"] * 12)
+        is_so = (facts[:, 0] > 0) == (families == "a")  # of b the other way round
+        answered = {"limb": parts.fitting.Answered(names, facts, is_so, families, families)}
+        found = {without: parts.transfer.weights_of(answered, without)["LIMB_WEIGHTS"]["f"] for without in "ab"}
+        assert found["a"] < -0.5 < 0.5 < found["b"]
+        assert abs(parts.transfer.weights_of(answered)["LIMB_WEIGHTS"]["f"]) < 0.1
+
+    def test_table(self, parts):
+        rows = [
+            dict(
+                family=family,
+                shape=f"{family}_{seed}",
+                variant="clean",
+                weights=weights,
+                topology=topology,
+                perfect=0.0,
+            )
+            for family in ("rings", "knots")
+            for seed in range(4)
+            for weights, topology in ((parts.transfer.SEEN, 1.0), (parts.transfer.UNSEEN, float(family == "rings")))
+        ]
+        rows[-1] = {name: value for name, value in rows[-1].items() if name != "topology"} | {"failure": "no"}
+        _, header, lines = parts.transfer.table(rows)
+        assert [line[:2] for line in lines] == [["rings", "4"], ["knots", "4"], ["all", "8"]]
+        assert lines[0][2:5] == ["1.00", "1.00", "+0.00 [+0.00, +0.00]"]
+        assert lines[1][2:5] == ["1.00", "0.00", "-1.00 [-1.00, -1.00]"]
+        assert lines[2][4].startswith("-0.50 [")
+        assert len(header) == len(lines[0])
+
+    def test_command(self, tool, call, small, tmp_path):
+        call("fit", *TINY, "-o", tmp_path / "asked.json")
+        page = tmp_path / "page.md"
+        page.write_text("<!-- transfer -->\n<!-- end -->\n")
+        call("transfer", tmp_path / "asked.json", small.path, "--jobs", 0, "--page", page)
+        assert "| trees | 3 | 1.00 | 1.00 |" in page.read_text()
+        assert "| all | 7 |" in page.read_text()
