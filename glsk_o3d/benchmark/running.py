@@ -175,7 +175,9 @@ def _times(place: Path, made: BenchmarkFolder, program: Told) -> dict[str, Told]
     before = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     same = (before.get("benchmark"), before.get("program")) == (made.version, json.loads(json.dumps(program)))
     if not same and (before or any(cloud.name in files for cloud in made.scored)):
-        raise InvalidParameterError(f"{place}: has answers of another program, or with other limits: give another one")
+        raise InvalidParameterError(
+            f"{place}: has answers of another program, or with other limits: give another folder"
+        )
     digits = {cloud.name: made.digits(cloud) for cloud in made.scored}
     there = [name for name, told in times.items() if told.get("failure") is not None or name in files]
     return {name: times[name] for name in there if times[name].get("digits") == digits.get(name)}
