@@ -55,9 +55,7 @@ def check_outputs(
         raise WrongUsage(f"{page}: the report is a page and its name ends in .html")
     files = [*outputs, *(path for path in (preview, page, tubes, labelled) if path is not None)]
     if not files:
-        raise WrongUsage(
-            "nothing to write: give an output with -o, --tubes, --labelled, a picture with --preview, a page with --report"
-        )
+        raise WrongUsage("nothing to write: give an output with -o, --tubes or --labelled, a --preview or a --report")
     files += others
     sources = {"scan": scan, **inputs}
     seen = {os.path.realpath(path): f"is the {what} itself" for what, path in sources.items() if path is not None}
