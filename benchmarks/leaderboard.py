@@ -18,12 +18,12 @@ from _common.results import ROOT, machine, read, surroundings
 from _common.runs import run as in_processes
 from _common.tables import fill, markdown_table
 from _leaderboard import recorded, tables
-from _leaderboard.kept import SECONDS, keep, kept, seconds
+from _leaderboard.kept import SECONDS, Entry, keep, kept, seconds
 from _leaderboard.pictures import board, draw
 from _peers import PEERS, Peer, installed, one_thread, silence, skeleton_of
 
 from glsk_o3d import read_cloud, save_skeleton
-from glsk_o3d.benchmark import make, read_folder, score_answers
+from glsk_o3d.benchmark import leaderboard, make, read_folder, score_answers
 from glsk_o3d.benchmark.answers import TIMES_NAME, read_times
 from glsk_o3d.benchmark.clouds import cloud
 from glsk_o3d.benchmark.shapes import FAMILIES, shape
@@ -119,9 +119,9 @@ def timed(peer: Peer) -> dict:
     return dict(cpu=median(peer.timed(points)[1] for points in clouds))
 
 
-def with_parts(path: Path | None) -> Path | None:
+def with_parts(path: Path) -> Path:
     """A page that has places for tables."""
-    if path is not None and not (path.is_file() and parts_of(path)):
+    if not (path.is_file() and parts_of(path)):
         raise typer.BadParameter(f"there is no page {path} with a line <!-- NAME -->: {', '.join(PARTS)}")
     return path
 
@@ -136,21 +136,23 @@ def parts_of(path: Path) -> list[str]:
 def page(paths: Annotated[list[Path] | None, typer.Argument(metavar="MD...")] = None) -> None:
     """The tables of the scores that are kept, printed; or put into pages, with a picture in docs/images."""
     pages = [with_parts(path) for path in paths or ()]
-    found = pieces()
+    entries = kept()
+    rows = leaderboard(entry.results for entry in entries).entries
+    found = pieces(entries, rows)
     if not pages:
         typer.echo("\n".join(found.values()))
         return
     for path in pages:
         fill(path, {name: found[name] for name in parts_of(path)})
-    board(kept(), IMAGES)
+    board(rows, IMAGES)
 
 
-def pieces() -> dict[str, str]:
-    """What stands at the places of the pages, by their names."""
-    entries, cpu = kept(), seconds()
+def pieces(entries: list[Entry], rows: list[dict]) -> dict[str, str]:
+    """What stands at the places of the pages, by their names; of what is kept, and its leaderboard's entries."""
+    cpu = seconds()
     found = {
-        "short": tables.short(entries, cpu),
-        "leaderboard": tables.overview(entries, cpu),
+        "short": tables.short(rows, cpu),
+        "leaderboard": tables.overview(rows, cpu),
         "losses": tables.losses(entries),
         "topologies": tables.by_group(entries, "variant", "topology", 2, "right topology, by kind of cloud"),
         "errors": tables.by_group(entries, "variant", "error", 3, "error, by kind of cloud"),

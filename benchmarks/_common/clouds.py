@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fnmatch import filter as matching
-from functools import partial
+from functools import lru_cache, partial
 from itertools import chain, product
 from pathlib import Path
 from zipfile import BadZipFile
@@ -78,8 +78,8 @@ class Case:
         if self.folder is None:
             return builtin(self.shape, self.variant, self.draw)
         if (self.folder / INDEX_NAME).is_file():
-            made = read_folder(self.folder)
-            (path,) = (it.path for it in made.scored if (it.shape, it.variant) == (self.shape, self.variant))
+            made = _benchmark(self.folder)
+            path = made.path / made.shapes[self.shape]["clouds"][self.variant]["file"]
             return cloud_points(read_cloud(path)), made.truth(self.shape)
         path = self.folder / f"{self.shape}.npz"
         with np.load(path) as archive:
@@ -193,7 +193,7 @@ def _offers(folder: Path) -> dict[str, list[str] | None]:
     """The variants to be scored of each shape with a meaningful skeleton; None if its file cannot be read."""
     if (folder / INDEX_NAME).is_file():  # a public benchmark
         offers: dict[str, list[str] | None] = {}
-        for cloud in read_folder(folder).scored:
+        for cloud in _benchmark(folder).scored:
             offers.setdefault(cloud.shape, []).append(cloud.variant)
         return offers
     if not (folder / "manifest.json").exists():
@@ -204,6 +204,9 @@ def _offers(folder: Path) -> dict[str, list[str] | None]:
         for shape in shapes
         if shape["meaningful_skeleton"]
     }
+
+
+_benchmark = lru_cache(maxsize=4)(read_folder)  # once, and not for every cloud
 
 
 def _variants(path: Path, coverage: dict[str, float]) -> list[str] | None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from _common.plots import BLUE, ORANGE, keep, sheet
 from _peers import PEERS
 
 from glsk_o3d import plot_skeleton, read_cloud, read_skeleton
-from glsk_o3d.benchmark import BenchmarkFolder, leaderboard
+from glsk_o3d.benchmark import BenchmarkFolder
 from glsk_o3d.benchmark.answers import answer_files
 from glsk_o3d.interop.atomic import write_atomically
 from glsk_o3d.interop.clouds import cloud_points
@@ -20,9 +21,8 @@ COLUMNS = 3
 VIEW = (14, -60)  # elevation and azimuth, in degrees
 
 
-def board(entries: list[Entry], folder: Path) -> Path:
-    """All tools over all clouds, with intervals: right topologies and perfect ones, and errors."""
-    rows = leaderboard(entry.results for entry in entries).entries
+def board(rows: list[dict[str, Any]], folder: Path) -> Path:
+    """The entries of a `Leaderboard`, with intervals: right topologies and perfect ones, and errors."""
     places = np.arange(len(rows))
     figure, (left, right) = sheet(1.1 + 0.27 * len(rows), columns=2, sharey=True, width=7.0)
     for axes, measures in ((left, ("topology", "perfect")), (right, ("error",))):

@@ -32,8 +32,7 @@ def table() -> Table:
 
 
 def _counts(skeleton: Skeleton) -> tuple[int, int, int]:
-    degree = np.bincount(skeleton.edges.ravel(), minlength=len(skeleton.vertices))
-    return skeleton.n_components, skeleton.n_loops, int((degree == 1).sum())
+    return skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)
 
 
 def _told(counts: tuple[int, int, int]) -> str:

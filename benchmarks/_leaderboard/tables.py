@@ -9,7 +9,6 @@ from typing import Any
 from _common.tables import Table, number
 from _peers import PEERS
 
-from glsk_o3d.benchmark import leaderboard
 from glsk_o3d.benchmark.intervals import mean_with_interval, told
 
 from .kept import Entry
@@ -31,26 +30,26 @@ Row = dict[str, Any]
 Seconds = dict[str, dict[str, Any]]
 
 
-def overview(entries: Sequence[Entry], cpu: Seconds) -> Table:
-    """All tools over all clouds, the best first."""
+def overview(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
+    """All tools over all clouds, the best first: the entries of a `Leaderboard`."""
     lines = []
-    for entry in leaderboard(each.results for each in entries).entries:
+    for entry in board:
         name, mean = entry["name"], entry["all"]
         shares = [told(*mean[measure]) for measure in ("perfect", "topology")]
         plain = [number(mean[measure][0], 2) for measure in ("tips_f1", "junctions_f1")]
         error = told(*mean["error"], 3) if mean["error"] else "-"
         rest = [number(mean[measure] and mean[measure][0], 3) for measure in ("inside", "completeness")]
-        took = _cpu(cpu, name)
-        lines.append([*_label(name), *shares, *plain, error, *rest, str(mean["failures"]), took])
+        lines.append([*_label(name), *shares, *plain, error, *rest, str(mean["failures"]), _cpu(cpu, name)])
     heads = ["tips F1", "junctions F1", "error", "inside", "complete", "failures", "CPU s"]
-    count = len(entries[0].results.rows) if entries else 0
-    return f"{count} clouds of 72 random shapes", ["", "takes", "perfect", "topology", *heads], lines
+    first = board[0]["all"]
+    title = f"{first['clouds']} clouds of {first['shapes']} random shapes"
+    return title, ["", "takes", "perfect", "topology", *heads], lines
 
 
-def short(entries: Sequence[Entry], cpu: Seconds) -> Table:
+def short(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
     """The same in few columns, with right topologies of some kinds of clouds."""
     lines = []
-    for entry in leaderboard(each.results for each in entries).entries:
+    for entry in board:
         name, mean, groups = entry["name"], entry["all"], entry["variants"]
         shares = [number(groups[it]["topology"][0], 2) for it in SHORT]
         error = number(mean["error"] and mean["error"][0], 2)
