@@ -21,6 +21,7 @@ from .folders import BenchmarkFolder, begun, write_axis, write_points
 from .versions import OWN, fingerprint
 
 FLOAT_ROUNDING = 1e-6  # fitted: how far float32 may move a point, in the diagonal: less than scanners tell apart
+OTHER_UNITS = 30.0  # fitted: ratio of the boxes' diagonals beyond which axis and cloud are not in one unit
 _PLAIN = re.compile(r"\w[\w.+-]*")  # on every system the name of a file, in the folder where it is written
 
 
@@ -64,8 +65,8 @@ def add_shape(
     Raises
     ------
     InvalidParameterError
-        A name is not plain, or another cloud's; the axis is none, or has no points near; the folder has a version of
-        the benchmark, or this shape with another axis, or this cloud with other points.
+        A name is not plain, or another cloud's; the axis is none, has no points near, or is in other units; the folder
+        has a version of the benchmark, or this shape with another axis, or this cloud with other points.
     InvalidCloudError
         A cloud is none.
     FileFormatError
@@ -89,6 +90,8 @@ def add_shape(
     if not clouds:
         raise InvalidParameterError(f"{shape}: no cloud is given")
     points = {variant: _points(f"{shape}_{variant}", cloud) for variant, cloud in clouds.items()}
+    for variant, each in points.items():
+        _check_units(f"{shape}_{variant}", each, nodes)
     made = begun(Path(folder), OWN)
     _check_names(made, shape, points)
     axis, told = _axis(made, shape, points, nodes, edges, radii)
@@ -118,6 +121,19 @@ def _points(name: str, cloud: Any) -> np.ndarray:
         raise InvalidParameterError(f"{name}: has coordinates that are not finite, or beyond those of float32")
     moved = np.abs(short - points).max()
     return short if moved <= FLOAT_ROUNDING * np.linalg.norm(np.ptp(points, axis=0)) else points
+
+
+def _check_units(name: str, points: np.ndarray, nodes: Any) -> None:
+    """Raise InvalidParameterError where axis and cloud cannot be in the same units."""
+    try:
+        wide = np.linalg.norm(np.ptp(np.asarray(nodes, float).reshape(-1, 3), axis=0))
+    except ValueError:  # no nodes, or none in space, which is said later
+        return
+    around = np.linalg.norm(np.ptp(points, axis=0))
+    if wide > 0 and not 1 / OTHER_UNITS < around / wide < OTHER_UNITS:
+        raise InvalidParameterError(
+            f"{name}: the cloud is {around:.3g} wide and the axis {wide:.3g}: are they in the same units?"
+        )
 
 
 def _check_names(made: BenchmarkFolder, shape: str, variants: Mapping[str, Any]) -> None:

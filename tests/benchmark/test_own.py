@@ -161,6 +161,13 @@ class TestRefusals:
             add_shape(own.path, "b", {"a": FORK.points}, *AXIS)
 
 
+@pytest.mark.parametrize("factor", [0.001, 1000.0])
+def test_an_axis_in_other_units_is_refused(tmp_path, factor):
+    with pytest.raises(InvalidParameterError, match=r"fork_scan: the cloud is .* the same units"):
+        add_shape(tmp_path, "fork", {"scan": factor * FORK.points}, *AXIS)
+    assert not list(tmp_path.iterdir())
+
+
 class TestAnswers:
     def test_to_another_cloud_of_the_same_name_do_not_count(self, tmp_path):
         """What was answered in one folder is no answer to what is called the same in another."""
