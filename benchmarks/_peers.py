@@ -32,9 +32,13 @@ Mesh = tuple[np.ndarray, np.ndarray]  # vertices (V, 3) and triangles (F, 3)
 
 
 def without_outliers(points: np.ndarray) -> o3d.geometry.PointCloud:
-    """The cloud as the tutorials of Open3D prepare it; all that follow start here, for none of them drops outliers."""
+    """The cloud without outliers; all that follow start here, for none of them drops any.
+
+    Open3D's tutorials take a ratio of 2, which takes away the sparse end of uneven clouds. Of none, 2, 3, 4 and 6,
+    tried with CGAL on a wrap of seven random shapes as five kinds of clouds, 3 was best.
+    """
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    return cloud.remove_statistical_outlier(nb_neighbors=20, std_ratio=2.0)[0]
+    return cloud.remove_statistical_outlier(nb_neighbors=20, std_ratio=3.0)[0]
 
 
 def wrap(points: np.ndarray, fineness: float = 100.0) -> Mesh:
