@@ -94,10 +94,12 @@ class TestTables:
 
     def test_failures_by_reason_and_name(self, parts):
         rows = [failed("no answer: a|b"), failed("no answer: a|b", variant="holes"), failed("late", shape="trees_100")]
+        rows += [failed(f"no answer: {n} of 10 parts", shape=f"groups_{n}") for n in (7, 3, 5)]
         lines = parts.tables.failures(entries(parts, cgal=rows, default=[row()]))[2]
         assert lines == [
             ["CGAL", "wrap", "a/b", "2", "tubes_100_clean, tubes_100_holes"],
             ["CGAL", "wrap", "late", "1", "trees_100_clean"],
+            ["CGAL", "wrap", "3 to 7 of 10 parts", "3", "groups_7_clean, groups_3_clean, groups_5_clean"],
         ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -26,6 +27,7 @@ MEASURES = {  # what may be lost, its digits, and whether more of it is better
 }
 SHORT = {"clean": "clean", "scan2": "two cameras", "depth2": "two depth cameras", "lidar": "lidar"}
 SHORT |= {"noise1": "1 % noise"}
+NUMBER = re.compile(r"\d+")
 Row = dict[str, Any]
 Seconds = dict[str, dict[str, Any]]
 
@@ -113,11 +115,14 @@ def failures(entries: Sequence[Entry]) -> Table:
     """Which clouds have no answer, by tool and reason."""
     lines = []
     for entry in entries:
-        reasons: dict[str, list[str]] = {}
+        groups: dict[str, list[tuple[str, str]]] = {}  # by the words of the reason, whatever its numbers
         for row in entry.results.rows:
             if row["failure"] is not None:
-                reasons.setdefault(_reason(row["failure"]), []).append(f"{row['shape']}_{row['variant']}")
-        lines += [[*_label(entry.tool), why, str(len(names)), ", ".join(names)] for why, names in reasons.items()]
+                reason = _reason(row["failure"])
+                groups.setdefault(NUMBER.sub("", reason), []).append((reason, f"{row['shape']}_{row['variant']}"))
+        for group in groups.values():
+            reasons, names = zip(*group, strict=True)
+            lines.append([*_label(entry.tool), _span(reasons), str(len(names)), ", ".join(names)])
     return "failures", ["", "takes", "why", "clouds", "which"], lines
 
 
@@ -147,3 +152,10 @@ def _label(name: str) -> tuple[str, str]:
 def _reason(failure: str) -> str:
     """Without what differs from cloud to cloud."""
     return failure.removeprefix("no answer: ").replace("|", "/").split("\n")[0]
+
+
+def _span(reasons: Sequence[str]) -> str:
+    """What all say in the same words, with the least and the most of each number."""
+    columns = zip(*(map(int, NUMBER.findall(reason)) for reason in reasons), strict=True)
+    spans = iter([" to ".join(map(str, sorted({min(column), max(column)}))) for column in columns])
+    return NUMBER.sub(lambda _: next(spans), reasons[0])
