@@ -35,7 +35,10 @@ def board(rows: list[dict[str, Any]], folder: Path) -> Path:
             axes.plot(means, places, "o", markersize=5, label=measure if axes is left else None, **style)
     left.set(xlabel="share of all clouds", xlim=(-0.02, 1), ylim=(len(rows) - 0.5, -0.5))
     left.set_yticks(places, [title(row["name"]) for row in rows])
-    right.set(xlabel="mean error, local radii", xlim=(0, None))
+    right.set(xlabel="mean error, local radii", xscale="log")
+    ticks = [0.1, 0.2, 0.5, 1, 2, 5]
+    right.set_xticks(ticks, map(str, ticks))
+    right.minorticks_off()
     figure.legend(loc="outside upper center", ncols=3, frameon=False)
     return keep(figure, folder, "leaderboard")
 
