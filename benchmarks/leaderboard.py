@@ -171,7 +171,7 @@ def picture(
     place: Place,
     path: Annotated[Path, typer.Argument(metavar="PNG", callback=writable)],
     name: Annotated[str, typer.Option("--cloud", help="One of the benchmark.")] = "figures_100_scan2",
-    tool: Tool = "default,pc-skeletor,pygel,cgal,cgal-poisson,skeletor-wavefront",
+    tool: Tool = "default,pygel-points,cgal,pc-skeletor,cgal-poisson,skeletor-wavefront",
 ) -> None:
     """Draw the answers of some tools to one cloud, side by side."""
     entries = {entry.tool: entry for entry in kept()}
