@@ -39,7 +39,18 @@ PRELOADED = (  # by all processes at once, since imports take longer than some s
     *("pc_skeletor", "pygel3d.graph", "compas_cgal.skeletonization", "compas_cgal.meshing", "skan"),
 )
 IMAGES = ROOT / "docs" / "images"
-PARTS = ("short", "leaderboard", "losses", "topologies", "errors", "families", "failures", "runs", "recorded")
+PARTS = (
+    "short",
+    "leaderboard",
+    "losses",
+    "unclear",
+    "topologies",
+    "errors",
+    "families",
+    "failures",
+    "runs",
+    "recorded",
+)
 
 app = application(__doc__)
 Place = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the clouds and of all answers.")]
@@ -154,6 +165,7 @@ def pieces(entries: list[Entry], rows: list[dict]) -> dict[str, str]:
         "short": tables.short(rows, cpu),
         "leaderboard": tables.overview(rows, cpu),
         "losses": tables.losses(entries),
+        "unclear": tables.unclear(entries),
         "topologies": tables.by_group(entries, "variant", "topology", 2, "right topology, by kind of cloud"),
         "errors": tables.by_group(entries, "variant", "error", 3, "error, by kind of cloud"),
         "families": tables.by_group(entries, "family", "topology", 2, "right topology, by family of shapes"),

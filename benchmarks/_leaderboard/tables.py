@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from itertools import product
 from typing import Any
 
 from _common.tables import Table, number
@@ -27,7 +28,7 @@ MEASURES = {  # what may be lost, its digits, and whether more of it is better
 }
 SHORT = {"clean": "clean", "scan2": "two cameras", "depth2": "two depth cameras", "lidar": "lidar"}
 SHORT |= {"noise1": "1 % noise"}
-NUMBER = re.compile(r"\d+")
+NUMBER = re.compile(r"(?<!code )(?<!signal )\d+(?:\.\d+)?")  # of a reason; those of codes and signals are names
 Row = dict[str, Any]
 Seconds = dict[str, dict[str, Any]]
 
@@ -62,37 +63,50 @@ def short(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
 
 
 def losses(entries: Sequence[Entry]) -> Table:
-    """Where the mean of `default` is worse than that of another tool; intervals that hold 0 show no difference."""
+    """Where `default` is worse than another tool, whatever shapes are drawn: intervals without 0."""
+    lines = [
+        [
+            group,
+            str(shapes),
+            words,
+            _from(name),
+            *(number(mean, digits) for mean in means),
+            told(*found, digits, sign="+"),
+        ]
+        for group, name, (words, digits, _), shapes, means, found in _worse(entries)
+        if _clear(found, digits)
+    ]
+    header = ["clouds", "shapes", "measure", "to", "theirs", "`default`", "difference"]
+    return "where `default` is worse", header, lines
+
+
+def unclear(entries: Sequence[Entry]) -> Table:
+    """Where the mean of `default` is worse, and other shapes could turn it: intervals with 0."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for group, name, (words, digits, _), _, _, found in _worse(entries):
+        if not _clear(found, digits):
+            groups.setdefault((words, _from(name)), []).append(f"{group} ({found[0]:+.{digits}f})")
+    lines = [[*key, ", ".join(places)] for key, places in groups.items()]
+    return "where only the mean of `default` is worse", ["measure", "to", "which"], lines
+
+
+def _worse(entries: Sequence[Entry]) -> Iterable[tuple]:
+    """Clouds, tool, measure, how many shapes, both means, and the mean difference with its interval."""
     by_name = {entry.tool: _by_cloud(entry) for entry in entries}
-    ours, lines = by_name.pop(OURS), []
+    ours = by_name.pop(OURS)
     groups: dict[str, list] = {"all": [*ours]}
     for part in ("variant", "family"):
         for key, row in ours.items():
             groups.setdefault(row[part], []).append(key)
-    for group, here in groups.items():
-        for name, theirs in by_name.items():
-            lines += [[group, *cells] for cells in _lost(name, [(ours[key], theirs[key]) for key in here])]
-    header = ["clouds", "shapes", "measure", "to", "theirs", "`default`", "difference"]
-    return "where the mean of `default` is worse", header, lines
-
-
-def _lost(name: str, pairs: Sequence[tuple[Row, Row]]) -> Iterable[list[str]]:
-    for measure, (words, digits, more) in MEASURES.items():
-        known = [(mine, other) for mine, other in pairs if mine[measure] is not None and other[measure] is not None]
-        if not known:
-            continue
-        shapes = [mine["shape"] for mine, _ in known]
-        mean, low, high = mean_with_interval(shapes, [other[measure] - mine[measure] for mine, other in known])
-        if round(mean if more else -mean, digits) > 0:
-            means = [sum(row[measure] for row in side) / len(known) for side in zip(*known, strict=True)]
-            cells = [number(value, digits) for value in means[::-1]]
-            yield [
-                str(len({*shapes})),
-                words,
-                " of ".join(_label(name)),
-                *cells,
-                told(mean, low, high, digits, sign="+"),
-            ]
+    for (group, here), (name, theirs), (measure, told_as) in product(groups.items(), by_name.items(), MEASURES.items()):
+        pairs = [(theirs[key][measure], ours[key][measure]) for key in here]
+        known = [(key[0], pair) for key, pair in zip(here, pairs, strict=True) if None not in pair]
+        if known:
+            shapes, both = zip(*known, strict=True)
+            found = mean_with_interval(shapes, [other - mine for other, mine in both])
+            if round(found[0] if told_as[2] else -found[0], told_as[1]) > 0:
+                means = [sum(side) / len(both) for side in zip(*both, strict=True)]
+                yield group, name, told_as, len({*shapes}), means, found
 
 
 def by_group(entries: Sequence[Entry], group: str, measure: str, digits: int, title: str) -> Table:
@@ -119,7 +133,7 @@ def failures(entries: Sequence[Entry]) -> Table:
         for row in entry.results.rows:
             if row["failure"] is not None:
                 reason = _reason(row["failure"])
-                groups.setdefault(NUMBER.sub("", reason), []).append((reason, f"{row['shape']}_{row['variant']}"))
+                groups.setdefault(NUMBER.sub("#", reason), []).append((reason, f"{row['shape']}_{row['variant']}"))
         for group in groups.values():
             reasons, names = zip(*group, strict=True)
             lines.append([*_label(entry.tool), _span(reasons), str(len(names)), ", ".join(names)])
@@ -145,17 +159,28 @@ def _by_cloud(entry: Entry) -> dict[tuple[str, str], Row]:
     return {(row["shape"], row["variant"]): row for row in entry.results.rows}
 
 
+def _clear(found: tuple[float, float, float], digits: int) -> bool:
+    """Whether an interval leaves out 0 as it is told."""
+    return round(found[1], digits) * round(found[2], digits) > 0
+
+
+def _from(name: str) -> str:
+    return " of ".join(_label(name))
+
+
 def _label(name: str) -> tuple[str, str]:
     return PEERS[name].label, PEERS[name].takes
 
 
 def _reason(failure: str) -> str:
-    """Without what differs from cloud to cloud."""
+    """Its first line, as a table can hold it."""
     return failure.removeprefix("no answer: ").replace("|", "/").split("\n")[0]
 
 
 def _span(reasons: Sequence[str]) -> str:
     """What all say in the same words, with the least and the most of each number."""
-    columns = zip(*(map(int, NUMBER.findall(reason)) for reason in reasons), strict=True)
-    spans = iter([" to ".join(map(str, sorted({min(column), max(column)}))) for column in columns])
+    columns = zip(*map(NUMBER.findall, reasons), strict=True)
+    spans = iter(
+        [" to ".join(sorted({min(column, key=float), max(column, key=float)}, key=float)) for column in columns]
+    )
     return NUMBER.sub(lambda _: next(spans), reasons[0])
