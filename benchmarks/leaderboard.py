@@ -160,12 +160,12 @@ def page(paths: Annotated[list[Path] | None, typer.Argument(metavar="MD...")] = 
 
 def pieces(entries: list[Entry], rows: list[dict]) -> dict[str, str]:
     """What stands at the places of the pages, by their names; of what is kept, and its leaderboard's entries."""
-    cpu = seconds()
+    cpu, worse = seconds(), tables.worse(entries)
     found = {
         "short": tables.short(rows, cpu),
         "leaderboard": tables.overview(rows, cpu),
-        "losses": tables.losses(entries),
-        "unclear": tables.unclear(entries),
+        "losses": tables.losses(worse),
+        "unclear": tables.unclear(worse),
         "topologies": tables.by_group(entries, "variant", "topology", 2, "right topology, by kind of cloud"),
         "errors": tables.by_group(entries, "variant", "error", 3, "error, by kind of cloud"),
         "families": tables.by_group(entries, "family", "topology", 2, "right topology, by family of shapes"),

@@ -59,17 +59,21 @@ class TestTables:
         better = [row(it, error=0.1, topology=0.0, ends=0.1) for it in shapes]
         now_and_then = [row(it, error=0.1 if i % 3 else 0.35) for i, it in enumerate(shapes)]
         hardly = [row(it, error=0.1999) for it in shapes]
-        found = entries(parts, default=ours, cgal=better, pygel=now_and_then, thinning=hardly)
+        found = parts.tables.worse(entries(parts, default=ours, cgal=better, pygel=now_and_then, thinning=hardly))
         lines = parts.tables.losses(found)[2]
         assert [line[0] for line in lines] == ["all", "clean", "tubes"]
         assert lines[0][1:] == ["12", "error", "CGAL of wrap", "0.100", "0.200", "-0.100 [-0.100, -0.100]"]
+        _, low, high = found[1].difference
+        assert found[1][:4] == ("all", "pygel", "error", 12)
+        assert low < -0.017 < 0 < high
         assert parts.tables.unclear(found)[2] == [
             ["error", "PyGEL3D of coarser wrap", "all (-0.017), clean (-0.017), tubes (-0.017)"]
         ]
 
     def test_a_failure_is_a_loss_of_topology_and_no_error(self, parts):
         shapes = [f"tubes_{seed}" for seed in range(100, 104)]
-        found = entries(parts, default=[failed("no", shape=it) for it in shapes], cgal=[row(it) for it in shapes])
+        both = entries(parts, default=[failed("no", shape=it) for it in shapes], cgal=[row(it) for it in shapes])
+        found = parts.tables.worse(both)
         assert {line[2] for line in parts.tables.losses(found)[2]} == {"perfect", "topology", "tips F1", "junctions F1"}
 
     def test_overview_is_sorted_and_has_seconds(self, parts):

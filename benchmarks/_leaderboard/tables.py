@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 from _common.tables import Table, number
 from _peers import PEERS
@@ -62,51 +62,67 @@ def short(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
     return "right parts and loops, share of the clouds", heads, lines
 
 
-def losses(entries: Sequence[Entry]) -> Table:
-    """Where `default` is worse than another tool, whatever shapes are drawn: intervals without 0."""
-    lines = [
-        [
-            group,
-            str(shapes),
-            words,
-            _from(name),
-            *(number(mean, digits) for mean in means),
-            told(*found, digits, sign="+"),
-        ]
-        for group, name, (words, digits, _), shapes, means, found in _worse(entries)
-        if _clear(found, digits)
-    ]
-    header = ["clouds", "shapes", "measure", "to", "theirs", "`default`", "difference"]
-    return "where `default` is worse", header, lines
+class Worse(NamedTuple):
+    """Where the mean of `default` is worse than that of another tool."""
+
+    clouds: str  # all, a variant or a family
+    tool: str
+    measure: str
+    shapes: int
+    means: list[float]  # theirs, ours
+    difference: tuple[float, float, float]  # with its interval
+
+    @property
+    def clear(self) -> bool:
+        """Whether the interval leaves out 0 as it is told."""
+        _, low, high = self.difference
+        digits = MEASURES[self.measure][1]
+        return round(low, digits) * round(high, digits) > 0
 
 
-def unclear(entries: Sequence[Entry]) -> Table:
-    """Where the mean of `default` is worse, and other shapes could turn it: intervals with 0."""
-    groups: dict[tuple[str, str], list[str]] = {}
-    for group, name, (words, digits, _), _, _, found in _worse(entries):
-        if not _clear(found, digits):
-            groups.setdefault((words, _from(name)), []).append(f"{group} ({found[0]:+.{digits}f})")
-    lines = [[*key, ", ".join(places)] for key, places in groups.items()]
-    return "where only the mean of `default` is worse", ["measure", "to", "which"], lines
-
-
-def _worse(entries: Sequence[Entry]) -> Iterable[tuple]:
-    """Clouds, tool, measure, how many shapes, both means, and the mean difference with its interval."""
+def worse(entries: Sequence[Entry]) -> list[Worse]:
+    """All of these, by clouds, tool and measure."""
     by_name = {entry.tool: _by_cloud(entry) for entry in entries}
-    ours = by_name.pop(OURS)
+    ours, found = by_name.pop(OURS), []
     groups: dict[str, list] = {"all": [*ours]}
     for part in ("variant", "family"):
         for key, row in ours.items():
             groups.setdefault(row[part], []).append(key)
-    for (group, here), (name, theirs), (measure, told_as) in product(groups.items(), by_name.items(), MEASURES.items()):
+    for (group, here), (name, theirs), measure in product(groups.items(), by_name.items(), MEASURES):
         pairs = [(theirs[key][measure], ours[key][measure]) for key in here]
         known = [(key[0], pair) for key, pair in zip(here, pairs, strict=True) if None not in pair]
         if known:
             shapes, both = zip(*known, strict=True)
-            found = mean_with_interval(shapes, [other - mine for other, mine in both])
-            if round(found[0] if told_as[2] else -found[0], told_as[1]) > 0:
+            difference = mean_with_interval(shapes, [other - mine for other, mine in both])
+            _, digits, more = MEASURES[measure]
+            if round(difference[0] if more else -difference[0], digits) > 0:
                 means = [sum(side) / len(both) for side in zip(*both, strict=True)]
-                yield group, name, told_as, len({*shapes}), means, found
+                found.append(Worse(group, name, measure, len({*shapes}), means, difference))
+    return found
+
+
+def losses(found: Sequence[Worse]) -> Table:
+    """Where `default` is worse than another tool, whatever shapes are drawn: intervals without 0."""
+    lines = []
+    for it in found:
+        if it.clear:
+            words, digits, _ = MEASURES[it.measure]
+            means = [number(mean, digits) for mean in it.means]
+            difference = told(*it.difference, digits, sign="+")
+            lines.append([it.clouds, str(it.shapes), words, _from(it.tool), *means, difference])
+    header = ["clouds", "shapes", "measure", "to", "theirs", "`default`", "difference"]
+    return "where `default` is worse", header, lines
+
+
+def unclear(found: Sequence[Worse]) -> Table:
+    """Where the mean of `default` is worse, and other shapes could turn it: intervals with 0."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for it in found:
+        if not it.clear:
+            words, digits, _ = MEASURES[it.measure]
+            groups.setdefault((words, _from(it.tool)), []).append(f"{it.clouds} ({it.difference[0]:+.{digits}f})")
+    lines = [[*key, ", ".join(places)] for key, places in groups.items()]
+    return "where only the mean of `default` is worse", ["measure", "to", "which"], lines
 
 
 def by_group(entries: Sequence[Entry], group: str, measure: str, digits: int, title: str) -> Table:
@@ -159,11 +175,6 @@ def _by_cloud(entry: Entry) -> dict[tuple[str, str], Row]:
     return {(row["shape"], row["variant"]): row for row in entry.results.rows}
 
 
-def _clear(found: tuple[float, float, float], digits: int) -> bool:
-    """Whether an interval leaves out 0 as it is told."""
-    return round(found[1], digits) * round(found[2], digits) > 0
-
-
 def _from(name: str) -> str:
     return " of ".join(_label(name))
 
@@ -179,8 +190,9 @@ def _reason(failure: str) -> str:
 
 def _span(reasons: Sequence[str]) -> str:
     """What all say in the same words, with the least and the most of each number."""
-    columns = zip(*map(NUMBER.findall, reasons), strict=True)
-    spans = iter(
-        [" to ".join(sorted({min(column, key=float), max(column, key=float)}, key=float)) for column in columns]
-    )
-    return NUMBER.sub(lambda _: next(spans), reasons[0])
+    spans = []
+    for column in zip(*map(NUMBER.findall, reasons), strict=True):
+        least, most = min(column, key=float), max(column, key=float)
+        spans.append(least if least == most else f"{least} to {most}")
+    each = iter(spans)
+    return NUMBER.sub(lambda _: next(each), reasons[0])
