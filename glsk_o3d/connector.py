@@ -16,6 +16,7 @@ from .numerics.radii import plane_distance_radii
 from .numerics.vectors import norm
 from .parameters import documented, parameter, resolve_length
 from .pipeline import Filter, Watch
+from .refinement.merging import some_vertices
 from .skeleton import Skeleton
 from .state import Contraction
 
@@ -182,10 +183,8 @@ def drop_unsupported(skeleton: Skeleton, count: np.ndarray, noisy: np.ndarray, s
     vertex = skeleton.vertex_of_point
     return replace(
         skeleton,
-        vertices=skeleton.vertices[left],
+        **some_vertices(skeleton, left),
         edges=representative[edges[~dropped[edges].any(axis=1)]],
-        radii=skeleton.radii[left],
-        confidence=skeleton.confidence[left],
         vertex_of_point=np.where(vertex >= 0, representative[vertex], -1),
         normals=np.where(((vertex >= 0) & dropped[vertex])[:, None], np.nan, skeleton.normals),
     )

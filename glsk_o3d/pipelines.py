@@ -28,7 +28,7 @@ def cao2010() -> Pipeline[Skeleton]:
         RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
         | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0, line_hold=1, keep_last=False, retries=0)
         | Connector(radius="2%", thickness=0, links="nearest", min_support=0)
-        | Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0, surface=0)
+        | Refiner(collapse="degree", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0, surface=0)
     )
 
 
@@ -55,7 +55,7 @@ def wen2024() -> Pipeline[Skeleton]:
             retries=0,
         )
         | Connector(radius="2%", thickness=0, links="nearest", min_support=0)
-        | Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0, surface=0)
+        | Refiner(collapse="degree", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0, surface=0)
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -15,13 +15,16 @@ from .refinement.air import cut_air
 from .refinement.axis_fit import fit_axis
 from .refinement.bridging import bridge_gaps
 from .refinement.diagnostics import diagnose
+from .refinement.ends import regrow_ends
 from .refinement.evidence import Evidence, in_order
-from .refinement.junctions import level_tips, move_junctions
+from .refinement.junctions import move_junctions
 from .refinement.loops import close_loops, zip_narrow_loops
-from .refinement.reattachment import reattach_limbs
+from .refinement.merging import binary_size, scaled
 from .refinement.runaways import recall_runaways
+from .refinement.sections import measure_sections
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
+from .refinement.surface_graph import SurfaceGraph
 from .refinement.tracing import trace
 from .refinement.triangles import collapse_triangles
 from .report import Judgement
@@ -33,18 +36,18 @@ from .skeleton import Skeleton
 class Refiner(Filter[Skeleton]):
     """Make the graph one-dimensional, close false loops, prune spurs, and centre it in the surface around it.
 
-    1. Edges that lie on a triangle are collapsed, those with the least mean degree of their ends first, and among these
-       the shortest, until there is no triangle.
+    1. Edges that lie on a triangle are collapsed, the shortest first, until there is no triangle.
     2. Loops that open less than their tube is thick, two strands in one part, are zipped up.
     3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
        corners.
     4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
        side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
     5. The topology is judged by what the surface around the curve says: loops that are probably no handles are closed;
-       limbs that run beside another one inside its tube begin where they leave it, and branches that are probably no
-       limbs are pruned; branches that probably cross air are cut, and gaps across which the object probably goes on are
-       bridged.
-    6. Junctions move to where limbs meet.
+       branches that are probably no limbs are pruned; branches that probably cross air are cut, and gaps across which
+       the object probably goes on are bridged.
+    6. Junctions move to where limbs meet, and those within one radius become one. Ends, which flat faces have pulled
+       into their edges, grow anew along their limbs to where these stop: half a radius inside a flat face, or the
+       centre of a round cap.
     7. Where the cloud shows no surface, parts thinner than its points are far apart, what the steps before made of them
        is replaced by shortest paths through the points.
     8. With a `root`, all is made one tree that grows from there: gaps are joined where they are narrowest, and loops
@@ -81,6 +84,13 @@ class Refiner(Filter[Skeleton]):
     consumes: ClassVar[type] = Skeleton
     produces: ClassVar[type] = Skeleton
 
+    collapse: Literal["length", "degree"] = parameter(
+        "length",
+        "Which edge of a triangle collapses first: the shortest, or, as published, that with the least mean degree of "
+        "its ends, which changes with every sample of the points.",
+        type="choice",
+        choices=("length", "degree"),
+    )
     handle: float = parameter(
         0.5,
         "Least probability that a loop is a handle of the object; others are closed. 0 keeps all.",
@@ -150,43 +160,45 @@ class Refiner(Filter[Skeleton]):
         return replace(skeleton, points=given.points, normals=normals, vertex_of_point=vertex)
 
     def _refined(self, skeleton: Skeleton) -> Skeleton:
-        skeleton = self._fit(skeleton)
+        skeleton, surface = self._fit(skeleton)
         asks = self.handle or self.limb or self.air or self.bridge
         if len(skeleton.edges) and len(skeleton.supporting_points) and (asks or self.recentre):
-            skeleton = self._judge(skeleton)
+            skeleton = self._judge(skeleton, surface)
         if self.recentre:
-            skeleton = level_tips(move_junctions(skeleton))
+            size = binary_size(skeleton)  # fourth powers of lengths must not overflow
+            skeleton = scaled(regrow_ends(move_junctions(scaled(skeleton, 1 / size))), size)
         if self.surface or self.root is not None:
             skeleton = trace(skeleton, self.surface, self.root)
-        report = skeleton.report
+        report, sections = skeleton.report, measure_sections(skeleton)
         for message in diagnose(skeleton):
             report = report.with_warning(message)
-        return replace(skeleton, report=report)
+        return replace(skeleton, report=report, half_width=sections.half_width, half_thickness=sections.half_thickness)
 
-    def _fit(self, skeleton: Skeleton) -> Skeleton:
-        """Make the graph one-dimensional and centre it."""
-        skeleton = collapse_triangles(skeleton)
+    def _fit(self, skeleton: Skeleton) -> tuple[Skeleton, SurfaceGraph]:
+        """Make the graph one-dimensional and centre it in the surface around it."""
+        skeleton = collapse_triangles(skeleton, by_degree=self.collapse == "degree")
         if self.handle:
             skeleton = zip_narrow_loops(skeleton)
         if self.recentre:
             skeleton = recall_runaways(skeleton)
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
-        return fit_axis(skeleton, self.recentre)
+        surface = SurfaceGraph.of(skeleton)
+        return fit_axis(skeleton, self.recentre, surface), surface
 
-    def _judge(self, skeleton: Skeleton) -> Skeleton:
+    def _judge(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
         """Close false loops, prune spurs, cut what crosses air, bridge gaps; then ask for loops and limbs anew."""
-        evidence = Evidence.of(skeleton)
+        evidence = Evidence.of(skeleton, surface)
         skeleton, loops = self._close(skeleton, evidence)
-        skeleton, limbs = self._settle(skeleton)
+        skeleton, limbs = self._prune(skeleton, evidence)
         skeleton, cuts = self._cut(skeleton, evidence)
         if _changed(cuts):
-            limbs, (skeleton, more) = _of_changes(limbs), self._prune(skeleton)
+            limbs, (skeleton, more) = _of_changes(limbs), self._prune(skeleton, evidence)
             limbs += more
         skeleton, gaps = self._bridge(skeleton, evidence)
         if _changed([*cuts, *gaps]):
-            loops, (skeleton, again) = _of_changes(loops), self._close(self._refit(skeleton), evidence)
-            limbs, (skeleton, more) = _of_changes(limbs), self._settle(skeleton)
+            loops, (skeleton, again) = _of_changes(loops), self._close(self._refit(skeleton, evidence), evidence)
+            limbs, (skeleton, more) = _of_changes(limbs), self._prune(skeleton, evidence)
             loops, limbs = loops + again, limbs + more
         closed, cut, bridged = (len(_of_changes(found)) for found in (loops, cuts, gaps))
         report = replace(
@@ -202,16 +214,10 @@ class Refiner(Filter[Skeleton]):
         if not self.handle:
             return skeleton, []
         skeleton, loops = close_loops(skeleton, evidence, self.handle)
-        return (self._refit(skeleton) if _changed(loops) else skeleton), loops
+        return (self._refit(skeleton, evidence) if _changed(loops) else skeleton), loops
 
-    def _settle(self, skeleton: Skeleton) -> tuple[Skeleton, list[Judgement]]:
-        """Let limbs begin where they leave others, and prune what is none."""
-        if self.recentre:
-            skeleton = reattach_limbs(skeleton)
-        return self._prune(skeleton)
-
-    def _prune(self, skeleton: Skeleton) -> tuple[Skeleton, list[Judgement]]:
-        return prune_spurs(skeleton, self.limb) if self.limb else (skeleton, [])
+    def _prune(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
+        return prune_spurs(skeleton, evidence, self.limb) if self.limb else (skeleton, [])
 
     def _cut(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
         return cut_air(skeleton, evidence, skeleton.report.noise, self.air) if self.air else (skeleton, [])
@@ -219,10 +225,10 @@ class Refiner(Filter[Skeleton]):
     def _bridge(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
         return bridge_gaps(skeleton, evidence, self.bridge) if self.bridge else (skeleton, [])
 
-    def _refit(self, skeleton: Skeleton) -> Skeleton:
+    def _refit(self, skeleton: Skeleton, evidence: Evidence) -> Skeleton:
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
-        return fit_axis(skeleton, min(2, self.recentre))
+        return fit_axis(skeleton, self.recentre, evidence)
 
 
 def _of_changes(judgements: list[Judgement]) -> list[Judgement]:

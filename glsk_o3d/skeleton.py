@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 Root = int | str | Sequence[float] | np.ndarray | None
 
+OF_VERTICES = ("radii", "confidence", "half_width", "half_thickness")
+"""What is known of every vertex but its place."""
+
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
@@ -54,6 +57,9 @@ class Skeleton:
     confidence : (M,) float64 array
         How well its points support each vertex, from 0 to 1: the share of what they say about where the axis is that
         they agree on, less where they are few; 0 where there is no surface. NaN where nobody has measured it.
+    half_width, half_thickness : (M,) float64 array
+        Half axes of the part's section at every vertex, the longer and the shorter one: of a bar half its width and
+        half its thickness. The radius where nobody has measured them.
 
     Examples
     --------
@@ -75,17 +81,20 @@ class Skeleton:
     points: np.ndarray
     normals: np.ndarray
     report: Report = field(default_factory=Report)
-    confidence: np.ndarray = field(default_factory=lambda: np.empty(0))
+    confidence: np.ndarray = None  # type: ignore[assignment]
+    half_width: np.ndarray = None  # type: ignore[assignment]
+    half_thickness: np.ndarray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         # steps that merge or add vertices pass on what was measured before them: it means nothing any more
-        if len(self.confidence) != len(self.vertices):
-            object.__setattr__(self, "confidence", np.full(len(self.vertices), np.nan))
+        unknown = np.full(len(self.vertices), np.nan)
+        for name, otherwise in zip(OF_VERTICES[1:], (unknown, self.radii, self.radii), strict=True):
+            if np.shape(getattr(self, name))[:1] != unknown.shape:
+                object.__setattr__(self, name, otherwise)
         for name, dtype, columns in (
             ("vertices", float, 3),
             ("edges", np.int64, 2),
-            ("radii", float, None),
-            ("confidence", float, None),
+            *((name, float, None) for name in OF_VERTICES),
             ("vertex_of_point", np.int64, None),
             ("points", float, 3),
             ("normals", float, 3),
@@ -222,20 +231,21 @@ class Skeleton:
         Returns
         -------
         networkx.Graph
-            Nodes have ``position`` (3-tuple), ``radius``, ``confidence``, ``curvature`` and ``torsion``; edges
-            ``length`` and ``branch``. ``graph.graph["branches"]`` is the branch table, a list of dicts, with a row for
-            every value of ``branch``.
+            Nodes have ``position`` (3-tuple), ``radius``, ``confidence``, ``half_width``, ``half_thickness``,
+            ``curvature`` and ``torsion``; edges ``length`` and ``branch``. ``graph.graph["branches"]`` is the branch
+            table, a list of dicts, with a row for every value of ``branch``.
         """
         import networkx
 
         from .analysis.curvature import curvature_torsion
         from .analysis.segmentation import branch_of_edge
 
-        names = ("radius", "confidence", "curvature", "torsion")
-        values = np.stack([self.radii, self.confidence, *curvature_torsion(self)], axis=1).tolist()
+        names = ("position", "radius", *OF_VERTICES[1:], "curvature", "torsion")
+        values = [*(getattr(self, name) for name in OF_VERTICES), *curvature_torsion(self)]
         graph = networkx.Graph(branches=list(self.branch_table(root)) if len(self.vertices) else [])
-        for i, (position, facts) in enumerate(zip(self.vertices.tolist(), values, strict=True)):
-            graph.add_node(i, position=tuple(position), **dict(zip(names, facts, strict=True)))
+        places = map(tuple, self.vertices.tolist())
+        for i, facts in enumerate(zip(places, *(each.tolist() for each in values), strict=True)):
+            graph.add_node(i, **dict(zip(names, facts, strict=True)))
         facts = zip(self.edges.tolist(), self.edge_lengths.tolist(), branch_of_edge(self).tolist(), strict=True)
         for (a, b), length, branch in facts:
             graph.add_edge(a, b, length=length, branch=branch)
@@ -254,13 +264,7 @@ class Skeleton:
         return to_line_set(self, color)
 
     def to_tensor_line_set(self, color: ColorChoice | None = None) -> open3d.t.geometry.LineSet:
-        """The skeleton as an ``open3d.t.geometry.LineSet`` with the point attributes ``radius`` and ``confidence``.
-
-        Parameters
-        ----------
-        color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1], optional
-            What the colours of the edges show, or the one colour of all; by default there are none.
-        """
+        """The skeleton as an ``open3d.t.geometry.LineSet``. See `glsk_o3d.io.line_sets.to_tensor_line_set`."""
         from .io.line_sets import to_tensor_line_set
 
         return to_tensor_line_set(self, color)

@@ -360,3 +360,24 @@ def program(tmp_path):
         return [sys.executable, "-S", "-E", str(path), "{cloud}", "{skeleton}", *options]
 
     return write
+
+
+@pytest.fixture(scope="session")
+def flat_bar():
+    """A bar along z of length 4 with a rectangular section, half axes along x and y, and its axis of radius 0.3."""
+
+    def make(width, thickness, seen=(0, 0, 0), n=6000):
+        rng = np.random.default_rng(0)
+        side, sign, place = rng.integers(0, 2, n), rng.choice([-1, 1], n), rng.uniform(-1, 1, (n, 2))
+        normals = np.zeros((n, 3))
+        normals[np.arange(n), side] = sign
+        points = np.column_stack([place[:, 0], place[:, 0], 2 * place[:, 1]])
+        points[np.arange(n), side] = sign
+        kept = normals @ seen >= 0
+        points, normals = points[kept] * [width, thickness, 1], normals[kept] * rng.choice([-1, 1], (kept.sum(), 1))
+        vertices = np.outer(np.linspace(-2, 2, 41), [0, 0, 1])
+        edges = np.column_stack([np.arange(40), np.arange(1, 41)])
+        owner = np.rint((points[:, 2] + 2) * 10).astype(int)
+        return Skeleton(vertices, edges, np.full(41, 0.3), owner, points, normals)
+
+    return make

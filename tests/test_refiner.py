@@ -114,6 +114,7 @@ def test_random_graphs(assert_sound, m, edges, seed):
         assert all(len(after) == 1 for after in parts.values())
 
 
+@pytest.mark.filterwarnings("ignore:uncertain topology")  # whether they touch is a close call
 @pytest.mark.parametrize("seed", [6, 8])
 def test_a_loop_that_is_cut_leaves_no_spurs(seed):
     """Two legs of a scan touch; the ends of the cut loop are no ends of the animal."""

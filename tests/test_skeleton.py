@@ -111,6 +111,8 @@ def test_random_graphs_against_networkx(m, edges):
             "position": tuple(skeleton.vertices[i]),
             "radius": skeleton.radii[i],
             "confidence": skeleton.confidence[i],
+            "half_width": skeleton.half_width[i],
+            "half_thickness": skeleton.half_thickness[i],
         }
     rows = back.graph["branches"]
     assert len(rows) == len(skeleton.branches) + degree.count(0)
@@ -154,6 +156,20 @@ def test_confidence_is_unknown_until_it_is_measured():
     assert dataclasses.replace(measured, vertices=measured.vertices + 1).confidence.tolist() == [1, 0.5]
     one = dataclasses.replace(measured, vertices=[[0, 0, 0]], edges=[], radii=[1])
     assert np.isnan(one.confidence).tolist() == [True]
+
+
+def test_half_axes_are_the_radii_until_they_are_measured():
+    plain = Skeleton([[0, 0, 0], [1, 0, 0]], [(0, 1)], [1, 2], (), (), ())
+    assert plain.half_width.tolist() == plain.half_thickness.tolist() == [1, 2]
+    measured = dataclasses.replace(plain, half_width=[2, 4], half_thickness=[1, 1])
+    assert measured.half_width.dtype == np.float64
+    moved = dataclasses.replace(measured, vertices=measured.vertices + 1)
+    assert (moved.half_width.tolist(), moved.half_thickness.tolist()) == ([2, 4], [1, 1])
+    for one in (
+        dataclasses.replace(measured, vertices=[[0, 0, 0]], edges=[], radii=[3]),  # other vertices are not the same
+        Skeleton([[0, 0, 0]], [], [3], (), (), (), half_width=None, half_thickness=None),
+    ):
+        assert one.half_width.tolist() == one.half_thickness.tolist() == [3]
 
 
 def test_nothing():

@@ -34,6 +34,7 @@ IDEAS = {
     "sampling by thickness": "Connector.radius=2% Connector.thickness=0",
     "all ring links": "Connector.links=nearest",
     "unsupported vertices dropped": "Connector.min_support=0",
+    "shortest edge first": "Refiner.collapse=degree",
     "false loops closed": "Refiner.handle=0",
     "air cut": "Refiner.air=0",
     "gaps bridged": "Refiner.bridge=0",

@@ -15,7 +15,6 @@ from glsk_o3d.refinement.air import branch_facts
 from glsk_o3d.refinement.bridging import gap_facts
 from glsk_o3d.refinement.evidence import Evidence, in_order
 from glsk_o3d.refinement.loops import loop_facts
-from glsk_o3d.refinement.reattachment import reattach_limbs
 from glsk_o3d.refinement.spurs import limb_facts
 from glsk_o3d.skeleton import Skeleton
 
@@ -37,16 +36,16 @@ def questions(case: Case, pipeline: Pipeline) -> dict:
 def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tuple[str, dict[str, float], bool]]:
     """The questions in the order in which a pipeline's refiner asks them, each of the skeleton that it has then."""
     *stages, refiner = pipeline.stages
-    skeleton = refiner._fit(in_order(Pipeline(*stages)(points))[0])
+    skeleton, surface = refiner._fit(in_order(Pipeline(*stages)(points))[0])
     if not len(skeleton.edges):
         return
-    evidence = Evidence.of(skeleton)
+    evidence = Evidence.of(skeleton, surface)
     yield from _loops(skeleton, evidence, truth)
     skeleton, _ = refiner._close(skeleton, evidence)
-    yield from _limbs(reattach_limbs(skeleton), truth)
-    skeleton, _ = refiner._settle(skeleton)
+    yield from _limbs(skeleton, evidence, truth)
+    skeleton, _ = refiner._prune(skeleton, evidence)
     yield from _branches(skeleton, evidence, truth)
-    skeleton, _ = refiner._prune(refiner._cut(skeleton, evidence)[0])
+    skeleton, _ = refiner._prune(refiner._cut(skeleton, evidence)[0], evidence)
     yield from _gaps(skeleton, evidence, truth)
 
 
@@ -71,10 +70,10 @@ def _gaps(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tupl
         yield "gap", facts, bool(placed.joined(leaf, other))
 
 
-def _limbs(skeleton: Skeleton, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
+def _limbs(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
     leaves = np.flatnonzero(skeleton.degree == 1)
     tips = np.flatnonzero(np.bincount(truth.edges.ravel(), minlength=len(truth.nodes)) == 1)
     pairs = matched(skeleton.vertices[leaves], truth.nodes[tips], TIP_REACH * truth.radii[tips])
     right = set(leaves[[leaf for leaf, _ in pairs]].tolist())
-    for leaf, facts in limb_facts(skeleton):
+    for leaf, facts in limb_facts(skeleton, evidence):
         yield "limb", facts, leaf in right

@@ -55,7 +55,7 @@ class Joint:
         A cut end that found none, and the earlier vertex that is nearest.
     open : list of int
         Cut ends that nobody has gone on from.
-    met : list of (k, 6) array
+    met : list of (k, 8) array
         Ends of the object that lie on what others brought: there a cut end has nothing to meet.
     short : list of (k,) array
         Radii at ends that are so near to where the points of a tile were cut off that they may be no ends.
@@ -70,12 +70,12 @@ class Joint:
     short: list[np.ndarray] = field(default_factory=list)
 
     def values(self, vertices: Sequence[int] | np.ndarray) -> np.ndarray:
-        """The values of numbered vertices, (k, 6) float array."""
+        """The values of numbered vertices, (k, 8) float array."""
         parts = np.searchsorted(self.first, vertices, side="right") - 1
         rows = [
             self.strands[part].values[at - self.first[part]] for part, at in zip(parts.tolist(), vertices, strict=True)
         ]
-        return np.array(rows).reshape(-1, 6)
+        return np.array(rows).reshape(-1, 8)
 
     def bring(self, strands: Strands) -> tuple[Samples, np.ndarray]:
         """Add strands; gives them as samples, and the numbers of their inner cut ends."""
@@ -120,7 +120,8 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
     Returns
     -------
     Skeleton
-        Vertices, edges, radii and confidence; it has no points. It does not depend on the order of the mapping.
+        Vertices, edges, and what is known of the vertices; it has no points. It does not depend on the order of the
+        mapping.
     Seams
         How the cut ends met.
 
@@ -187,7 +188,7 @@ def _sampled(strands: Strands, first: int) -> Samples:
     scale = np.fmax(np.fmin(*strands.values[edges, 5].T), np.finfo(float).tiny)
     step = np.fmax(SAMPLE_STEP * scale, norm(places[edges[:, 1]] - places[edges[:, 0]]) / MOST_SAMPLES)
     row, part = pieces(places, edges, step) if len(edges) else (np.empty(0, int), np.empty(0))
-    between = along(edges, row, part, strands.values) if len(edges) else np.empty((0, 6))
+    between = along(edges, row, part, strands.values) if len(edges) else np.empty((0, 8))
     values = np.concatenate([strands.values, between])
     vertex = np.concatenate([np.arange(len(places)), edges[row, (part > 0.5).astype(int)]])
     outward = np.concatenate([strands.outward(), np.zeros((len(row), 3))])

@@ -67,7 +67,7 @@ class Seams:
 
 def finished(joint: Joint, grid: Grid) -> tuple[Skeleton, Seams]:
     """The skeleton that was brought together, and how."""
-    values = np.concatenate([np.empty((0, 6)), *(strands.values for strands in joint.strands)])
+    values = np.concatenate([np.empty((0, 8)), *(strands.values for strands in joint.strands)])
     edges = np.concatenate(
         [np.empty((0, 2), np.int64)]
         + [strands.edges + at for strands, at in zip(joint.strands, joint.first, strict=False)]
@@ -94,7 +94,8 @@ def finished(joint: Joint, grid: Grid) -> tuple[Skeleton, Seams]:
     )
     number, kept, none = np.cumsum(alive) - 1, values[alive], np.empty((0, 3))
     edges = simple_edges(number[edges])
-    return Skeleton(kept[:, :3], edges, kept[:, 3], none, none, none, confidence=kept[:, 4]), seams
+    known = dict(zip(("radii", "confidence", "half_width", "half_thickness"), kept.T[[3, 4, 6, 7]], strict=True))
+    return Skeleton(kept[:, :3], edges, vertex_of_point=none, points=none, normals=none, **known), seams
 
 
 def _tied(edges: np.ndarray, touching: np.ndarray, alive: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -137,7 +138,7 @@ def _stubs(values: np.ndarray, edges: np.ndarray, ends: np.ndarray) -> tuple[lis
 
 def _unmet(ends: np.ndarray, met: list[np.ndarray]) -> np.ndarray:
     """Which cut ends have no end of the object beside them that another tile saw."""
-    others = np.concatenate([np.empty((0, 6)), *met])
+    others = np.concatenate([np.empty((0, 8)), *met])
     if not len(ends) or not len(others):
         return np.ones(len(ends), bool)
     distance, nearest = cKDTree(others[:, :3]).query(ends[:, :3])

@@ -21,9 +21,9 @@ class Strands:
 
     Attributes
     ----------
-    values : (n, 6) float array
-        x, y, z, radius, confidence and scale of every vertex. The scale is how far another skeleton of the same part
-        may be away: the radius, or the longest edge there, whatever is more.
+    values : (n, 8) float array
+        x, y, z, radius, confidence, scale, half width and half thickness of every vertex. The scale is how far another
+        skeleton of the same part may be away: the radius, or the longest edge there, whatever is more.
     edges : (e, 2) int array
     marks : (n, 3) bool array
     """
@@ -38,12 +38,12 @@ class Strands:
         longest = np.zeros(len(skeleton.vertices))
         np.maximum.at(longest, skeleton.edges, skeleton.edge_lengths[:, None])
         facts = skeleton.radii, skeleton.confidence, np.fmax(skeleton.radii, longest)
-        values = np.column_stack([skeleton.vertices, *facts])
+        values = np.column_stack([skeleton.vertices, *facts, skeleton.half_width, skeleton.half_thickness])
         return cls(values, skeleton.edges, np.zeros((len(values), 3), bool))
 
     @property
     def middles(self) -> np.ndarray:
-        """The values half-way along every edge, (e, 6) float array."""
+        """The values half-way along every edge, (e, 8) float array."""
         return self.values[self.edges].mean(axis=1)
 
     @property

@@ -128,4 +128,4 @@ def smooth(skeleton: Skeleton, *, passes: int = 10) -> Skeleton:
     vertices = skeleton.vertices.copy()
     for factor in (SHRINK, SWELL) * passes:
         vertices[inner] += factor * (vertices[beside].mean(axis=1) - vertices[inner])
-    return replace(skeleton, vertices=vertices, confidence=skeleton.confidence)
+    return replace(skeleton, vertices=vertices)

@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from ..errors import InvalidParameterError
 from ..numerics.near_links import linked
+from ..refinement.merging import some_vertices
 from ..refinement.rooted import RootPlace, numbered_from, root_among
 from ..skeleton import Skeleton
 
@@ -41,10 +42,8 @@ def largest_component(skeleton: Skeleton) -> Skeleton:
     vertex = skeleton.vertex_of_point
     return replace(
         skeleton,
-        vertices=skeleton.vertices[stays],
+        **some_vertices(skeleton, stays),
         edges=index[skeleton.edges[stays[skeleton.edges[:, 0]]]],
-        radii=skeleton.radii[stays],
-        confidence=skeleton.confidence[stays],
         vertex_of_point=np.where(vertex >= 0, index[vertex], -1),
     )
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..analysis.segmentation import branch_of_edge
 from ..interop.packages import import_open3d
+from ..skeleton import OF_VERTICES
 from .colors import ColorChoice, shades
 
 if TYPE_CHECKING:
@@ -54,8 +55,9 @@ def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> 
     Returns
     -------
     open3d.t.geometry.LineSet
-        On the CPU: ``point.positions`` (M, 3), ``point.radius`` and ``point.confidence`` (M, 1) float64, and
-        ``line.indices`` (E, 2) int64 and ``line.branch`` (E, 1) int32; with a color, ``line.colors`` (E, 3) float64.
+        On the CPU: ``point.positions`` (M, 3), ``point.radius``, ``point.confidence``, ``point.half_width`` and
+        ``point.half_thickness`` (M, 1) float64, and ``line.indices`` (E, 2) int64 and ``line.branch`` (E, 1) int32;
+        with a color, ``line.colors`` (E, 3) float64.
 
     Raises
     ------
@@ -67,7 +69,8 @@ def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> 
     lines = o3d.t.geometry.LineSet()
     lines.point.positions = o3d.core.Tensor(_rows(skeleton.vertices, float, 3))
     lines.point.radius = o3d.core.Tensor(_rows(skeleton.radii, float, 1))
-    lines.point.confidence = o3d.core.Tensor(_rows(skeleton.confidence, float, 1))
+    for name in OF_VERTICES[1:]:
+        lines.point[name] = o3d.core.Tensor(_rows(getattr(skeleton, name), float, 1))
     lines.line.indices = o3d.core.Tensor(_rows(skeleton.edges, np.int64, 2))
     lines.line.branch = o3d.core.Tensor(_rows(branch_of_edge(skeleton), np.int32, 1))
     if color is not None:

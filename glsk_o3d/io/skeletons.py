@@ -74,7 +74,7 @@ def save_skeleton(
     ending                holds                                           opens in
     ===================== =============================================== =======================================
     .json, .npz           everything, to the last bit                     `read_skeleton`
-    .ply                  vertices, edges, radii                          Open3D (``read_line_set``), MeshLab
+    .ply                  vertices, edges, radii, half axes               Open3D (``read_line_set``), MeshLab
     .obj                  vertices, edges as ``l`` lines; no radii        MeshLab, Blender, CloudCompare
     .swc                  trees, with radii                               neuron and plant tools
     .graphml              x, y, z, radius of nodes, length of edges       networkx, Gephi, Cytoscape

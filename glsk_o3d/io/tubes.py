@@ -10,7 +10,8 @@ import numpy as np
 from ..errors import InvalidParameterError
 from ..interop.packages import import_open3d
 from ..numerics.neighbourhoods import plane_axes
-from ..numerics.vectors import TINY
+from ..numerics.vectors import TINY, dot, unit
+from ..refinement.sections import measure_sections
 from .colors import ColorChoice, shades
 
 if TYPE_CHECKING:
@@ -20,8 +21,9 @@ if TYPE_CHECKING:
 def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
     """A skeleton as a mesh of tubes, one for every branch, closed by half balls.
 
-    The tubes have the radius of the vertices, linear between them. They overlap at the junctions, where the half balls
-    of all branches make one ball. Their cross-sections do not twist along the curve.
+    The tubes have the sections of the vertices, linear between them: ellipses with their half axes, or circles of their
+    radius where the skeleton has no points to say where the width is. They overlap at the junctions, where the half
+    balls of all branches make one ball if they are round. Their cross-sections do not twist along the curve.
 
     Parameters
     ----------
@@ -30,7 +32,7 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1]
         See `glsk_o3d.io.colors.shades`.
     radius : float, optional
-        One radius for all, in the cloud's units, instead of those of the vertices.
+        One radius for all, in the cloud's units, instead of the sections of the vertices.
     sides : int
         Corners of a cross-section, at least 3.
 
@@ -55,7 +57,10 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     if unknown.any():
         raise InvalidParameterError(f"{unknown.sum()} of {len(radii)} vertices have no radius: give one, radius=...")
     paths = [*skeleton.branches, *np.flatnonzero(skeleton.degree == 0)[:, None]]
-    vertices, triangles, row = sweep(skeleton.vertices, radii, paths, sides)
+    sections = None
+    if radius is None and len(skeleton.supporting_points):
+        sections = skeleton.half_width, skeleton.half_thickness, measure_sections(skeleton).across
+    vertices, triangles, row = sweep(skeleton.vertices, radii, paths, sides, sections)
     flat, branch = np.concatenate([*paths, np.empty(0, int)]), np.repeat(np.arange(len(paths)), list(map(len, paths)))
     o3d = import_open3d()
     mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(triangles))
@@ -65,9 +70,13 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
 
 
 def sweep(
-    vertices: np.ndarray, radii: np.ndarray, paths: Sequence[np.ndarray], sides: int
+    vertices: np.ndarray,
+    radii: np.ndarray,
+    paths: Sequence[np.ndarray],
+    sides: int,
+    sections: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Closed surfaces around curves: circles swept along them, and half balls at the ends.
+    """Closed surfaces around curves: circles or ellipses swept along them, and half balls at the ends.
 
     Parameters
     ----------
@@ -76,6 +85,8 @@ def sweep(
     paths : sequence of int arrays
         Vertices in order.
     sides : int
+    sections : ((M,) float array, (M,) float array, (M, 3) float array), optional
+        Half axes of ellipses, and the unit direction of the first. By default there are circles of the radii.
 
     Returns
     -------
@@ -104,7 +115,11 @@ def sweep(
     angle = turn[row, None] + np.arange(sides) * 2 * np.pi / sides
     across = np.einsum("rij,jrs->rsi", axes[row], np.stack([np.cos(angle), np.sin(angle)]))
     middle = centre[row] + (radius[row] * np.sin(latitude))[:, None] * tangent[row]
-    circles = middle[:, None] + (radius[row] * np.cos(latitude))[:, None, None] * across
+    width, thickness, wide = sections or (radii, radii, np.zeros_like(vertices))
+    wide = unit(wide[flat] - dot(wide[flat], tangent)[:, None] * tangent)[row]
+    more = (width - thickness)[flat][row, None] * np.einsum("rsi,ri->rs", across, wide)
+    across = thickness[flat][row, None, None] * across + more[:, :, None] * wide[:, None]  # a circle made an ellipse
+    circles = middle[:, None] + np.cos(latitude)[:, None, None] * across
     poles = [centre[end] + sign * radius[end, None] * tangent[end] for end, sign in ((first, -1), (last, 1))]
     points = np.concatenate([circles.reshape(-1, 3), *poles])
 

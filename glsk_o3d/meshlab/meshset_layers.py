@@ -79,7 +79,7 @@ class LayeredMeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             return layer
         flow = known.flow
         if isinstance(flow, Skeleton) and not np.array_equal(scalars, flow.radii, equal_nan=True):
-            flow = replace(flow, radii=scalars)
+            flow = replace(flow, radii=scalars, half_width=scalars, half_thickness=scalars)
         return replace(layer, edges=known.edges, flow=flow, source=known.source)
 
     def current_skeleton(self) -> Skeleton:

@@ -2,63 +2,72 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import bsr_array, csc_array
 
-from ..numerics.groups import group_median, group_sum
+from ..numerics.groups import group_sum
+from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
 from ..numerics.vectors import COLUMNS, ROWS, TINY, dot, norm, unit
 from ..skeleton import Skeleton
+from .sections import HalfAxes, half_axes, normal_moments
+from .surface_graph import SurfaceGraph
 
-# All fitted, on the shapes with known axes.
-FIT_BENDING = 2.0  # weight of a vertex's distance from the chord of its neighbours, per point
-FIT_SMOOTHING = 0.3  # how much more of that where there is doubt, over the squared ratio of noise to spacing
-FIT_WIDEST = 100.0  # that ratio at most: vertices in one place have none
-FIT_STAY = 0.1  # weight of staying where it was, per point
-FIT_OUTLYING = 0.5  # distance from the axis, in radii, at which a point's normal counts half
-FIT_CENTROID = 0.5  # weight of the points themselves where their normals say nothing
+FIT_STIFFNESS = 1.0  # fitted: length over which the curve hardly bends, over the half width of its section
+FIT_DIFFUSION = 0.6  # fitted: length over which the places of points are smoothed on the surface, over that
+FIT_WIDEST = 10.0  # fitted: half width over the spacing of the vertices, at most: those in one place have none
+FIT_STAY = 0.1  # fitted: weight of staying where it was, per point
+FIT_CENTROID = 0.5  # fitted: weight of the points themselves where their normals say nothing
+FIT_WALK = 3  # measured: vertices by which a point may move along the curve in a pass
 # derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
 FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
-HALF_SUPPORT = 8  # points that support a vertex half
+HALF_SUPPORT = 8  # fitted: points that support a vertex half
 NEAREST_TIE = 1e-9  # derived: of roundings, which must not choose between the edges of a vertex
-ENTRIES = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # the upper triangle of a symmetric matrix, spread out
+ENTRIES = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # derived: the upper triangle of a symmetric matrix, spread out
 
 
-def fit_axis(skeleton: Skeleton, passes: int) -> Skeleton:
+def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = None) -> Skeleton:
     r"""Move the vertices to the axis of the surface; measure how well the points say where it is, and how far it is.
 
-    The plane through a point p of a tube, spanned by its normal n and the tangent t of the axis, contains the axis:
-    b (x(p) - p) = 0 with b = n x t and x(p) the place of the curve nearest to p. Each pass minimises, over all vertices
-    at once,
+    The plane through a point p of a limb, spanned by its normal n and the tangent t of the axis, contains the axis:
+    b (x(p) - p) = 0 with b = n x t and x(p) the place of the curve that p belongs to. On a flat section, where the
+    normals of a face do not meet, the same sum of squares has its minimum at the middle of the width. Each pass
+    minimises, over all vertices at once,
 
-    .. math:: \sum_p w (b \cdot (x(p) - p))^2 + \mu d |(x(p) - p)_\perp|^2
+    .. math:: \sum_p (b \cdot (x(p) - p))^2 + \mu d |(x(p) - p)_\perp|^2
         + \sum_v c (\lambda |x_v - chord|^2 + \epsilon |x_v - old|^2 + ((x_v - old) \cdot t)^2)
 
-    with c the number of points at a vertex. w = 1 / (1 + (2 r)^2), where r is the distance of the curve from that plane
-    in local radii, is small for points of something else. The doubt d, from 0 to 1, is the share of the distance from
-    the curve that the normals do not explain; where it is large, noise is as wide as the part and the points say more
-    than their normals, and the curve may not bend within less than the points' spread s around it:
-    :math:`\lambda = 2 (1 + 0.3 (d s^2 / h^2)^2)` with the spacing h of the vertices, so that the length over which the
-    curve is smoothed grows with s and not with h. A half tube, scanned from one side, has an axis, but the centroid of
-    its points is off it. So the first pass takes the normals alone, w = 1 and d = 0: it finds the axis from wherever
-    the contraction left the curve.
+    with c the number of points at a vertex. The doubt d, from 0 to 1, is the share of the distance from the curve that
+    the normals do not explain; where it is large, noise is as wide as the part and the
+    points say more than their normals. :math:`\lambda = (w / h)^4` with the half width w and the spacing h of the
+    vertices keeps the curve from bending within a half width, however many vertices there are. A half tube, scanned
+    from one side, has an axis, but the centroid of its points is off it. So the first pass takes the normals alone.
+
+    **The place of a point is smoothed on the surface.** The nearest place of a wiggly curve has its wiggle, and a curve
+    fitted to the points that its own wiggle gave it keeps it. So the nearest places, as positions in space, are
+    diffused over the surface by .6 half widths, and x(p) is the place nearest to that. Points may move along the curve
+    by three vertices in every pass.
 
     Parameters
     ----------
     skeleton : Skeleton
     passes : int
         0 leaves the vertices where they are.
+    surface : SurfaceGraph, optional
+        Of this skeleton's points; made anew unless given.
 
     Returns
     -------
     Skeleton
         With the confidence (1 - d) c / (c + 8), where c counts over the vertex and its neighbours: near 1 on the axis
-        of a tube, near 0 where the normals have no axis in common or points are few; and with radii, see
-        `robust_radii`, or without passes `plane_distance_radii`.
+        of a limb, near 0 where the normals have no axis in common or points are few; and with radii, those of circles
+        with the area of the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to
+        the vertex nearest to their place.
     """
     m, ends = len(skeleton.vertices), skeleton.edges
     points = skeleton.supporting_points
@@ -67,27 +76,60 @@ def fit_axis(skeleton: Skeleton, passes: int) -> Skeleton:
         return replace(skeleton, confidence=np.zeros(m), radii=_plane_radii(skeleton, skeleton.vertices))
     centre = skeleton.vertices.mean(axis=0)
     x, p, n = skeleton.vertices - centre, skeleton.points[points] - centre, skeleton.normals.take(points, axis=0)
-    edges_at = incident_edges(ends, m)
-    around = edges_at[skeleton.vertex_of_point[points]]
+    vertex, edges_at = skeleton.vertex_of_point[points], incident_edges(ends, m)
     pattern = _Pattern(skeleton, edges_at)
     low, high = axis_box(p)
+    near, place = _nearest(x, ends, edges_at[vertex], p, n, p, skeleton.radii), p
+    smooth = _smoother((surface or SurfaceGraph.of(skeleton)) if passes else None, points, p)
     for step in range(passes):
-        near = _nearest(x, ends, around, p, n)
-        weight, pull = np.ones(len(p)), np.zeros(len(p))
-        if step:
-            radius = group_median(norm(near.offset), near.edge, len(ends))[near.edge]
-            weight = 1 / (1 + near.miss / np.maximum((FIT_OUTLYING * radius) ** 2, TINY))
-            pull = FIT_CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1)
-        x = _solve(x, near, p, weight, pull, pattern, FIT_SMOOTHING if step else 0)
+        edge, t = nearest_on_edges(x, ends, edges_at[vertex], p)
+        place = x[ends[edge, 0]] + t[:, None] * (x[ends[edge, 1]] - x[ends[edge, 0]])
+        place = smooth(place, FIT_DIFFUSION * near.sections.half_width[vertex])
+        for _ in range(FIT_WALK):
+            edge, t = nearest_on_edges(x, ends, edges_at[vertex], place)
+            vertex = ends[edge, (t > 0.5).astype(int)]
+        near = _nearest(x, ends, edges_at[vertex], p, n, place, skeleton.radii)
+        pull = FIT_CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1) if step else np.zeros(len(p))
+        x = _solve(x, near, p, pull, pattern)
         # normals that mean nothing may meet anywhere
         x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low, high), x)
-    near = _nearest(x, ends, around, p, n)
+    if passes:
+        near = _nearest(x, ends, edges_at[vertex], p, n, place, skeleton.radii)
+        owner = skeleton.vertex_of_point.copy()
+        owner[points] = vertex
+        skeleton = replace(skeleton, vertex_of_point=owner)
     radii = _plane_radii(skeleton, x + centre)
     if passes:  # the distance from a curve that nobody has centred is no radius
-        vertex = skeleton.vertex_of_point[points]
-        radii = robust_radii(radii, norm(near.offset), near.doubt, n, vertex)
+        equal = np.where(near.support > 0, np.sqrt(near.sections.half_width * near.sections.half_thickness), radii)
+        radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
     confidence = (1 - near.doubt) * near.support / (near.support + HALF_SUPPORT)
     return replace(skeleton, vertices=x + centre, confidence=confidence, radii=radii)
+
+
+def _smoother(
+    surface: SurfaceGraph | None, points: np.ndarray, p: np.ndarray
+) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """What smooths places of points on the surface, each over a length of its own.
+
+    Points that the surface leaves out move as far as the one nearest to them.
+    """
+    if surface is None:
+        return lambda place, length: place
+    diffusion, node = surface.diffusion, np.searchsorted(points, surface.supporting)
+    node = np.minimum(node, len(points) - 1)
+    there = points[node] == surface.supporting  # points of vertices without edges have no place
+    nearest = np.arange(len(points))
+    if there.sum() < len(points):
+        nearest = node[there][nearest_neighbours(p[node[there]], 1, of=p)[1][:, 0]]
+    start = surface.points + (p[node[:1]] - surface.points[:1])
+
+    def smooth(place: np.ndarray, length: np.ndarray) -> np.ndarray:
+        values = np.where(there[:, None], place[node], start)
+        moved = np.zeros_like(place)
+        moved[node[there]] = (diffusion(values, np.where(there, length[node], 0)) - values)[there]
+        return place + moved[nearest]
+
+    return smooth
 
 
 def _plane_radii(skeleton: Skeleton, vertices: np.ndarray) -> np.ndarray:
@@ -155,14 +197,22 @@ class _Nearest(NamedTuple):
     tangent: np.ndarray  # of every edge
     across: np.ndarray  # b
     offset: np.ndarray  # x(p) - p
-    miss: np.ndarray  # (b (x(p) - p))^2
     doubt: np.ndarray  # d, of every vertex
-    apart: np.ndarray  # mean squared distance of the points around every vertex
     support: np.ndarray  # points at every vertex and its neighbours
+    sections: HalfAxes  # at every vertex
 
 
-def _nearest(x: np.ndarray, ends: np.ndarray, around: np.ndarray, p: np.ndarray, n: int) -> _Nearest:
-    edge, t = nearest_on_edges(x, ends, around, p)
+def _nearest(
+    x: np.ndarray,
+    ends: np.ndarray,
+    around: np.ndarray,
+    p: np.ndarray,
+    n: np.ndarray,
+    place: np.ndarray,
+    radii: np.ndarray,
+) -> _Nearest:
+    """Of every point the place of the curve nearest to `place`; the radii are half axes in directions nobody saw."""
+    edge, t = nearest_on_edges(x, ends, around, place)
     share = np.column_stack([1 - t, t])
     start, way = x[ends[:, 0]], x[ends[:, 1]] - x[ends[:, 0]]
     tangent = unit(way)
@@ -172,34 +222,28 @@ def _nearest(x: np.ndarray, ends: np.ndarray, around: np.ndarray, p: np.ndarray,
     miss = dot(across, offset) ** 2
     apart = dot(offset, offset) - dot(offset, along) ** 2
     a, b = ends.T
-    at = group_sum(np.column_stack([miss, apart, np.full(len(p), 0.5)]), edge, len(ends))
+    facts = np.column_stack([miss, apart, np.full(len(p), 0.5), normal_moments(n, offset)])
+    at = group_sum(facts, edge, len(ends))
     at = group_sum(np.concatenate([at, at]), np.concatenate([a, b]), len(x))
-    miss_at, apart_at, support = (at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))).T
+    at = at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))
+    miss_at, apart_at, support = at[:, :3].T
+    sections = half_axes(at[:, 3:], radii)
     apart_at = np.maximum(apart_at, 0)  # but for rounding, a difference of squares
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
     doubt = np.where(apart_at > 0, np.minimum(2 * miss_at, apart_at) / np.maximum(apart_at, TINY), 1)
-    return _Nearest(edge, share, tangent, across, offset, miss, doubt, apart_at / np.maximum(support, TINY), support)
+    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections)
 
 
-def _solve(
-    x: np.ndarray,
-    near: _Nearest,
-    p: np.ndarray,
-    weight: np.ndarray,
-    pull: np.ndarray,
-    pattern: _Pattern,
-    smoothing: float,
-) -> np.ndarray:
+def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pull: np.ndarray, pattern: _Pattern) -> np.ndarray:
     """The minimum of the energy in `fit_axis`: one sparse, symmetric, positive definite system."""
     ends, inner, beside = pattern.ends, pattern.inner, pattern.beside
     m, e = len(x), len(ends)
     along = near.tangent[:, :, None] * near.tangent[:, None]
     upright = np.eye(3) - along
-    # Of every point w b b^T by its six different entries, and the pull, once for each pair of ends of its edge; and
-    # what they say of its place, and that it is there, once for each end.
-    weighted = weight[:, None] * near.across
-    matrix = np.column_stack([weighted[:, ROWS] * near.across[:, COLUMNS], pull])
-    target = dot(near.across, p)[:, None] * weighted
+    # Of every point b b^T by its six different entries, and the pull, once for each pair of ends of its edge; and what
+    # they say of its place, and that it is there, once for each end.
+    matrix = np.column_stack([near.across[:, ROWS] * near.across[:, COLUMNS], pull])
+    target = dot(near.across, p)[:, None] * near.across
     target = np.column_stack([target, pull[:, None] * p, np.ones(len(p))])
     share, pairs = near.share, near.share[:, [0, 0, 1]] * near.share[:, [0, 1, 1]]
     at_pairs = group_sum(matrix, near.edge[:, None] + e * np.arange(3), 3 * e, pairs)
@@ -217,8 +261,8 @@ def _solve(
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
     stencil = np.column_stack([np.ones(len(inner)), -chord])
     squared = np.maximum(reach.prod(axis=1), TINY)
-    width = np.minimum((near.doubt * near.apart)[inner], FIT_WIDEST * squared) / squared
-    bend = FIT_BENDING * (1 + smoothing * width**2) * np.maximum(count[inner], 1)
+    width = np.minimum(near.sections.half_width[inner] ** 2, FIT_WIDEST**2 * squared) / squared
+    bend = FIT_STIFFNESS**4 * width**2 * np.maximum(count[inner], 1)
     bend = bend[:, None, None] * stencil[:, :, None] * stencil[:, None]  # the same for all three coordinates
     blocks = np.concatenate(
         [at_edges[0], at_edges[1], at_edges[1], at_edges[2], stay, bend.reshape(-1, 1, 1) * np.eye(3)]

@@ -9,56 +9,41 @@ from typing import Any
 import numpy as np
 
 from ..numerics.morton import morton_order
-from ..numerics.neighbourhoods import nearest_neighbours, uprightness
+from ..numerics.neighbourhoods import uprightness
 from ..numerics.vectors import TINY, dot
-from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
+from ..numerics.winding import orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton
 from .axis_fit import incident_edges, nearest_on_edges
+from .surface_graph import SurfaceGraph
 
 # fitted: winding number below which an axis is in nothing; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
-ENOUGH_EVIDENCE = 4096  # measured: points of one object beyond which the same is said of its topology, only later
-VERTEX_EVIDENCE = 32  # derived: points to a vertex of a tube with 20 around it, whose vertices are half a radius apart
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class Evidence(SurfaceGraph):
     """The points that support a skeleton, as an oriented surface; it holds while the graph is changed.
-
-    Of many points it takes every so-manieth, 4096 or more, and 32 for every vertex: an object of many parts takes more.
-    They should be in Morton order, see `in_order`.
 
     Attributes
     ----------
-    supporting : (n,) int array
-        Which input points.
-    points : (n, 3) float array
-    neighbours : (n, k) int array
-        Nearest points, itself first.
     normals : (n, 3) float array
         Unit vectors that point outward.
     areas : (n,) float array
         What every point stands for.
     """
 
-    supporting: np.ndarray
-    points: np.ndarray
-    neighbours: np.ndarray
     normals: np.ndarray
     areas: np.ndarray
     _said: dict[str, tuple[Skeleton, Any]] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, skeleton: Skeleton) -> Evidence:
-        """The evidence for a skeleton that has edges and was fitted to its points."""
-        supporting = skeleton.supporting_points
-        enough = max(ENOUGH_EVIDENCE, VERTEX_EVIDENCE * len(skeleton.vertices))
-        supporting = supporting[:: max(len(supporting) // enough, 1)]
-        points = skeleton.points[supporting]
+    def of(cls, skeleton: Skeleton, surface: SurfaceGraph | None = None) -> Evidence:
+        """The evidence for a skeleton that has edges and was fitted to its points, or to their `surface`."""
+        surface = surface or SurfaceGraph.of(skeleton)
+        supporting, points, neighbours = surface.supporting, surface.points, surface.neighbours
         edge, t = _nearest_edges(skeleton, supporting)
         start, stop = skeleton.vertices[skeleton.edges[edge]].transpose(1, 0, 2)
         axis = np.where(edge[:, None] >= 0, start + t[:, None] * (stop - start), points)
-        _, neighbours = nearest_neighbours(points, min(AREA_NEIGHBOURS + 1, len(points)))
         normals = orient_from_axis(points, skeleton.normals[supporting], axis, neighbours)
         return cls(supporting, points, neighbours, normals, point_areas(points, neighbours))
 

@@ -15,10 +15,10 @@ from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
 from .axis_fit import axis_box
 from .loops import surface_distance
+from .meeting import AXIS_LEAVES, AXIS_LENGTH, Line, limb_line, meet
+from .merging import merge_into
 
 # All fitted.
-AXIS_LEAVES = 1.3  # distance from the other limbs, over that from them to the surface, from which a limb is undisturbed
-AXIS_LENGTH = 2.5  # radii from there over which its axis is taken
 AXIS_SHORT = 2.0  # length in radii, from each junction, below which a branch has no undisturbed place
 MEETING_STAY = 0.1  # weight of where the junction was, per meeting: lines that are nearly one meet anywhere
 
@@ -124,55 +124,100 @@ class Limbs:
         return Meeting(place, anchor, anchor + np.maximum(along, 0)[:, None] * way, start, say, fits, along >= 0)
 
 
-def move_junctions(skeleton: Skeleton) -> Skeleton:
-    """Move junctions to where the axes of their limbs meet, and make the limbs straight from there on.
+class _Place(NamedTuple):
+    """Where a junction belongs."""
 
-    The contraction draws limbs together before they meet: the junction of a sharp corner lies inside it, and limbs that
-    leave a part bend. Where a limb has left the others its curve is undisturbed; the axes taken there meet where the
-    limbs do. A junction stays if they do not: if one passes by farther away than the thickest limb's radius, or they
-    meet outside of the cloud, as those of limbs that are nearly parallel may, farther than an axis can be.
+    place: np.ndarray
+    radius: float  # of the sphere that touches the surface there
+    lines: list[Line]  # of its limbs, as in `Limbs.at`
+
+
+def move_junctions(skeleton: Skeleton) -> Skeleton:
+    """Move junctions to where their limbs meet, merge those within one radius, and make the limbs straight from there.
+
+    The contraction draws limbs together before they meet: the junction of a sharp corner lies inside it, limbs that
+    leave a part bend, and limbs that enter a thick part nearly at one place have junctions of their own, in any order.
+    The lines of limbs where they are undisturbed, and the surface around, say where they meet, see `meet`; all by
+    weights, so that the place moves little if the points do. Of two junctions that are then less than a radius apart,
+    nearest first, one is made, unless a loop would close.
 
     Returns
     -------
     Skeleton
-        With other places of the junctions and of the vertices beside them.
+        With other places of the junctions and of the vertices beside them, perhaps fewer.
     """
-    if not len(skeleton.junctions):
-        return skeleton
-    limbs = Limbs(skeleton, joined=False)
-    vertices, radii = skeleton.vertices.copy(), skeleton.radii.copy()
-    supporting = skeleton.points[skeleton.supporting_points]
-    low, high = axis_box(supporting if len(supporting) else vertices)
+    while len(skeleton.junctions):
+        limbs = Limbs(skeleton, joined=False)
+        places = _places(skeleton, limbs)
+        merged = _merged(skeleton, limbs, places)
+        if merged is None:
+            return _straightened(skeleton, limbs, places)
+        skeleton = merged
+    return skeleton
+
+
+def _places(skeleton: Skeleton, limbs: Limbs) -> dict[int, _Place]:
+    """Where every junction belongs."""
+    supporting = skeleton.supporting_points
+    points, normals = skeleton.points[supporting], skeleton.normals.take(supporting, axis=0)
+    order = np.argsort(skeleton.vertex_of_point[supporting], kind="stable")
+    stop = np.cumsum(np.bincount(skeleton.vertex_of_point[supporting], minlength=len(skeleton.vertices)))
+    low, high = axis_box(points if len(points) else skeleton.vertices)
+    found = {}
     for junction in skeleton.junctions.tolist():
-        here = limbs.at[junction]
-        meeting = limbs.meeting(here, skeleton.vertices[junction])
-        inside = (low <= meeting.place).all() and (meeting.place <= high).all()
-        if not (inside and (meeting.fits & meeting.ahead).all()):
-            continue
-        vertices[junction] = meeting.place
+        here, lines, radius, around = limbs.at[junction], [], 0.0, []
+        for limb in here:
+            path, along = limbs.paths[limb], arc_lengths(limbs.vertices[limbs.paths[limb]])
+            others = [limbs.paths[k] for k in here if limbs.branch[k] != limbs.branch[limb]]
+            line = limb_line(limbs.vertices, limbs.surface, path, limbs.radius[limbs.branch[limb]], others)
+            lines.append(line)
+            radius = max(radius, float(np.interp(line.start, along, limbs.surface[path])))
+            around.append(path[along <= along[-1] / 2])
+        owned = [order[stop[v - 1] if v else 0 : stop[v]] for v in np.unique(np.concatenate(around)).tolist()]
+        own = np.concatenate(owned)
+        place, touching = meet(lines, skeleton.vertices[junction], radius, points[own], normals[own])
+        # normals that mean nothing may meet anywhere
+        found[junction] = _Place(np.clip(place, low, high), touching, lines)
+    return found
+
+
+def _merged(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -> Skeleton | None:
+    """Merge pairs of junctions, each the other's nearest, that a branch joins and a radius parts; None if none are."""
+    ends = [tuple(sorted(branch[[0, -1]].tolist())) for branch in limbs.branches]
+    near: dict[int, tuple[float, int]] = {}
+    for k in np.flatnonzero(limbs.inner).tolist():
+        (a, b) = (places[v] for v in ends[k])
+        apart = float(np.linalg.norm(a.place - b.place)) / max(a.radius, b.radius, TINY)
+        if apart < 1 and ends.count(ends[k]) == 1:
+            for v in ends[k]:
+                near[v] = min(near.get(v, (np.inf, k)), (apart, k))
+    pairs = [k for k in {k for _, k in near.values()} if all(near[v][1] == k for v in ends[k])]
+    if not pairs:
+        return None
+    group, vertices, radii = np.arange(len(skeleton.vertices)), skeleton.vertices.copy(), skeleton.radii.copy()
+    for k in pairs:
+        stays = ends[k][0]
+        group[limbs.branches[k]] = stays
+        vertices[stays] = np.mean([places[v].place for v in ends[k]], axis=0)
+        radii[stays] = radii[list(ends[k])].max()
+    merged = merge_into(replace(skeleton, vertices=vertices, radii=radii), group)
+    return merged if merged.n_loops == skeleton.n_loops else None
+
+
+def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -> Skeleton:
+    """Put junctions in their places, and the disturbed parts of limbs on straight lines from there."""
+    vertices, radii = skeleton.vertices.copy(), skeleton.radii.copy()
+    for junction, (place, _, lines) in places.items():
+        vertices[junction] = place
         radii[junction] = 0
-        for limb, anchor, start in zip(here, meeting.anchor, meeting.start, strict=True):
-            along = arc_lengths(skeleton.vertices[limbs.paths[limb]])
-            moved = np.flatnonzero((along > 0) & (along < start))
-            share = (along[moved] / start)[:, None]
-            vertices[limbs.paths[limb][moved]] = (1 - share) * meeting.place + share * anchor
-            radius = np.interp(start, along, skeleton.radii[limbs.paths[limb]])
-            radii[limbs.paths[limb][moved]] = radius
+        for limb, line in zip(limbs.at[junction], lines, strict=True):
+            path = limbs.paths[limb]
+            along = arc_lengths(skeleton.vertices[path])
+            moved = np.flatnonzero((along > 0) & (along < line.start))
+            share = (along[moved] / max(line.start, TINY))[:, None]
+            vertices[path[moved]] = (1 - share) * place + share * line.anchor
+            # a junction owns points of everything around: what it measured itself does not count
+            radius = np.interp(line.start, along, skeleton.radii[path])
+            radii[path[moved]] = radius
             radii[junction] = max(radii[junction], radius)
     return replace(skeleton, vertices=vertices, radii=radii)
-
-
-def level_tips(skeleton: Skeleton) -> Skeleton:
-    """Give every leaf the radius that its branch has one radius back, or half-way if it is shorter.
-
-    A leaf owns few points, and those of the end that closes the tube: they say little about its radius.
-    """
-    radii = skeleton.radii.copy()
-    for branch in skeleton.branches:
-        along = arc_lengths(skeleton.vertices[branch])
-        own = skeleton.radii[branch]
-        back = min(np.median(own), along[-1] / 2)
-        for end, place in ((0, back), (-1, along[-1] - back)):
-            if skeleton.degree[branch[end]] == 1:
-                radii[branch[end]] = np.interp(place, along, own)
-    return replace(skeleton, radii=radii)

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..numerics.groups import group_sum
-from ..skeleton import Skeleton
+from ..skeleton import OF_VERTICES, Skeleton
 
 
 def support(skeleton: Skeleton) -> np.ndarray:
     """Input points that each vertex owns, at least 1, (M,) float array."""
     vertex = skeleton.vertex_of_point[skeleton.supporting_points]
     return np.maximum(np.bincount(vertex, minlength=len(skeleton.vertices)), 1).astype(float)
+
+
+def some_vertices(skeleton: Skeleton, which: np.ndarray) -> dict[str, Any]:
+    """The arrays of some vertices, by name, for `replace`: their places and all that is known of them."""
+    return {name: getattr(skeleton, name)[which] for name in ("vertices", *OF_VERTICES)}
 
 
 def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
@@ -33,20 +39,15 @@ def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
         Points of merged vertices belong to the merged one.
     """
     label, group = np.unique(group, return_inverse=True)
-    n, weight = len(label), support(skeleton)[:, None]
+    n, weight = len(label), support(skeleton)
     total = group_sum(weight, group, n)
     edges = np.sort(group[skeleton.edges], axis=1)
     vertex = skeleton.vertex_of_point
-    radii, confidence = (
-        group_sum(weight * values[:, None], group, n)[:, 0] / total[:, 0]
-        for values in (skeleton.radii, skeleton.confidence)
-    )
+    known = some_vertices(skeleton, np.arange(len(group)))
     return replace(
         skeleton,
-        vertices=group_sum(weight * skeleton.vertices, group, n) / total,
+        **{name: (group_sum((weight * values.T).T, group, n).T / total).T for name, values in known.items()},
         edges=np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0),
-        radii=radii,
-        confidence=confidence,
         vertex_of_point=np.where(vertex >= 0, group[vertex], -1),
     )
 
@@ -66,8 +67,7 @@ def merge_into(skeleton: Skeleton, into: np.ndarray) -> Skeleton:
         Vertices that stay keep their order. Points of merged vertices belong to the one that stays.
     """
     stay = np.unique(into)
-    kept = {name: getattr(skeleton, name)[stay] for name in ("vertices", "radii", "confidence")}
-    return replace(merge_vertices(skeleton, into), **kept)
+    return replace(merge_vertices(skeleton, into), **some_vertices(skeleton, stay))
 
 
 def drop_edges(skeleton: Skeleton, gone: ArrayLike) -> Skeleton:
@@ -86,9 +86,19 @@ def drop_lone_vertices(skeleton: Skeleton) -> Skeleton:
     vertex = skeleton.vertex_of_point
     return replace(
         skeleton,
-        vertices=skeleton.vertices[left],
+        **some_vertices(skeleton, left),
         edges=representative[skeleton.edges],
-        radii=skeleton.radii[left],
-        confidence=skeleton.confidence[left],
         vertex_of_point=np.where(vertex >= 0, representative[vertex], -1),
     )
+
+
+def binary_size(skeleton: Skeleton) -> float:
+    """The power of two next to the extent of a skeleton, so that scaling by it rounds nothing; 1 if it has none."""
+    extent = np.ptp(skeleton.vertices, axis=0).max(initial=0)
+    return float(2.0 ** np.round(np.log2(extent))) if extent > 0 else 1.0
+
+
+def scaled(skeleton: Skeleton, factor: float) -> Skeleton:
+    """The same in another unit of length: vertices, radii and points."""
+    vertices, points, radii = (factor * values for values in (skeleton.vertices, skeleton.points, skeleton.radii))
+    return replace(skeleton, vertices=vertices, points=points, radii=radii)

@@ -13,6 +13,7 @@ from ..numerics.near_links import linked
 from ..numerics.vectors import AXES, along_axis, norm
 from ..parameters import resolve_point
 from ..skeleton import Skeleton
+from .merging import some_vertices
 
 RootPlace = str | int | Sequence[float] | np.ndarray
 
@@ -87,9 +88,7 @@ def numbered_from(skeleton: Skeleton, root: int) -> Skeleton:
     edges, vertex = np.sort(index[skeleton.edges], axis=1), skeleton.vertex_of_point
     return replace(
         skeleton,
-        vertices=skeleton.vertices[order],
+        **some_vertices(skeleton, order),
         edges=edges[np.lexsort((edges[:, 1], edges[:, 0]))],
-        radii=skeleton.radii[order],
-        confidence=skeleton.confidence[order],
         vertex_of_point=np.where(vertex >= 0, index[vertex], -1),
     )

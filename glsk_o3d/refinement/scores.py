@@ -19,7 +19,7 @@ AIR_WEIGHTS = {
 }
 HANDLE_WEIGHTS = {"constant": 1.9, "opening": 3.5, "winding": -4.0, "bonds": 0.8, "confidence": 2.8}
 BRIDGE_WEIGHTS = {"constant": -3.7, "winding": 5.8, "straightness": 2.5, "cap": -0.7}
-LIMB_WEIGHTS = {"constant": -2.5, "reach": 4.4}
+LIMB_WEIGHTS = {"constant": -0.8, "reach": 3.2, "web": -4.0}
 
 
 def probability(weights: Mapping[str, float], facts: Mapping[str, float]) -> float:

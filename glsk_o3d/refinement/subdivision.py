@@ -10,6 +10,7 @@ from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
 from .axis_fit import incident_edges
 from .merging import support
+from .sections import measure_sections
 
 POINTS_PER_PIECE = 8  # fitted: an edge is cut into at most one piece for every so many input points, begun ones counted
 SUBDIVISION_CHUNK = 65536  # measured: points at a time: memory stays flat
@@ -26,7 +27,8 @@ def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
     """
     ends = skeleton.edges
     m = len(skeleton.vertices)
-    length = np.maximum(spacing * skeleton.radii[ends].mean(axis=1), np.maximum(1e-3 * skeleton.edge_lengths, TINY))
+    radii = measure_sections(skeleton).radius
+    length = np.maximum(spacing * radii[ends].mean(axis=1), np.maximum(1e-3 * skeleton.edge_lengths, TINY))
     points = (support(skeleton) / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
     most = np.maximum(points / POINTS_PER_PIECE, 1)
     pieces = np.ceil(np.clip(skeleton.edge_lengths / length, 1, most)).astype(int)  # also edges of no length are one

@@ -12,8 +12,17 @@ from ..skeleton import Skeleton
 from .merging import merge_vertices, support
 
 
-def collapse_triangles(skeleton: Skeleton) -> Skeleton:
-    """Merge the two ends of edges that lie on a triangle, cheapest first, until there is no triangle.
+def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
+    """Merge the two ends of edges that lie on a triangle, the shortest edge first, until there is no triangle.
+
+    The published order, least mean degree of the two ends first, is a combinatorial one: another sample of the same
+    surface has another, and finer vertices make it worse. Lengths converge with the vertices' spacing.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    by_degree : bool
+        The published order; length breaks ties.
 
     Returns
     -------
@@ -27,7 +36,8 @@ def collapse_triangles(skeleton: Skeleton) -> Skeleton:
         around[b].add(a)
 
     def cost(a: int, b: int) -> tuple[float, float]:
-        return (len(around[a]) + len(around[b])) / 2, math.dist(position[a], position[b])
+        degree = (len(around[a]) + len(around[b])) / 2 if by_degree else 0.0
+        return degree, math.dist(position[a], position[b])
 
     queue = [(*cost(a, b), a, b) for a, b in skeleton.edges.tolist() if around[a] & around[b]]
     heapq.heapify(queue)

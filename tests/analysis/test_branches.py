@@ -98,10 +98,10 @@ def test_y_junction_exactly_and_from_its_cloud():
     np.testing.assert_allclose(table.angle[1:], 40)
     np.testing.assert_allclose(table.mean_radius, [0.09, 0.08, 0.08])
     found = skeletonize(sample.points).branch_table(root=(0, 0, -1))
-    assert found.level.tolist() == [0, 1, 1]
-    np.testing.assert_allclose(found.angle[1:], 40, atol=4)
+    assert sorted(found.level.tolist()) == [0, 1, 1]
+    np.testing.assert_allclose(found.angle[found.level == 1], 40, atol=4)
     np.testing.assert_allclose(found.length, 0.5, atol=0.1)
-    np.testing.assert_allclose(found.mean_radius, table.mean_radius, rtol=0.1)
+    np.testing.assert_allclose(found.mean_radius, np.where(found.level == 0, 0.09, 0.08), rtol=0.1)
     assert found.points.sum() == 4096
 
 

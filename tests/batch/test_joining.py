@@ -101,6 +101,10 @@ def test_a_curve_without_errors_comes_out_as_it_was():
     assert (seams.joined, seams.unmatched, seams.thick) == (2, 0, 0)
     assert structure(joined) == (1, 0, 2)
     assert joined.length == pytest.approx(axis.length, rel=1e-12)
+    flat = {tile: replace(part, half_width=3 * part.radii) for tile, part in seen(axis, three_tiles()).items()}
+    sections = join_tiles(flat, three_tiles())[0]
+    np.testing.assert_allclose(sections.half_width, 3 * joined.radii)
+    np.testing.assert_allclose(sections.half_thickness, joined.radii)
     cut = joined.vertices[~np.isin(joined.vertices[:, 0], axis.vertices[:, 0])]
     assert sorted(cut[:, 0]) == pytest.approx([1.05, 2.05])  # a quarter of the overlap beyond the faces
 

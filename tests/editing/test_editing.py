@@ -219,3 +219,24 @@ class TestGraphs:
             reroot(ring, "x")
         with pytest.raises(InvalidParameterError, match="empty"):
             reroot(graph(np.empty((0, 3)), []), "x")
+
+
+EDITS = [
+    lambda it: prune(it, length=0.2, order=2),
+    lambda it: simplify(it, tolerance=0.01),
+    lambda it: reroot(it, "x"),
+    largest_component,
+    lambda it: cut_loops(it)[0],
+    lambda it: smooth(it, passes=0),
+]
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_half_axes_stay_with_their_vertices(grown, edit):
+    two = largest_component(grown)
+    two = replace(two, edges=np.delete(two.edges, 5, axis=0))  # two components
+    two = replace(two, half_width=two.vertices[:, 0] + 9, half_thickness=two.vertices[:, 1])
+    left = edit(two)
+    assert 0 < len(left.vertices) <= len(two.vertices)
+    np.testing.assert_array_equal(left.half_width, left.vertices[:, 0] + 9)
+    np.testing.assert_array_equal(left.half_thickness, left.vertices[:, 1])

@@ -7,6 +7,7 @@ import pytest
 
 from glsk_o3d import InvalidParameterError, Skeleton, samples
 from glsk_o3d.io.tubes import sweep
+from glsk_o3d.refinement.sections import measure_sections
 
 
 def axis_of(sample):
@@ -71,6 +72,20 @@ def test_a_helix_of_wire_has_its_volume_and_does_not_twist():
     step = np.linalg.norm(np.diff(across, axis=0), axis=1)
     turned = np.linalg.norm(np.diff(spring.vertices[1:-1], axis=0), axis=1) / 0.3
     assert (step < 1.1 * turned).all()
+
+
+def test_tubes_of_a_flat_bar_are_flat(flat_bar):
+    bar = flat_bar(0.4, 0.2)
+    sections = measure_sections(bar)
+    bar = dataclasses.replace(bar, half_width=sections.half_width, half_thickness=sections.half_thickness)
+    mesh = bar.to_tubes(sides=32)
+    assert mesh.is_watertight()
+    assert np.abs(np.asarray(mesh.vertices)).max(axis=0) == pytest.approx([0.4, 0.2, 2 + 0.3])
+    round_bar = dataclasses.replace(bar, half_width=None, half_thickness=None)
+    bare = dataclasses.replace(bar, vertex_of_point=(), points=(), normals=())  # nobody knows where the width is
+    for other in (round_bar, bare):
+        points = np.asarray(other.to_tubes(sides=32).vertices)
+        np.testing.assert_array_equal(points, sweep(bar.vertices, bar.radii, bar.branches, 32)[0])
 
 
 def test_sharp_turns_and_coincident_vertices():

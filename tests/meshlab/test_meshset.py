@@ -411,6 +411,7 @@ def test_scalars_of_a_skeleton_are_its_radii(meshes, tmp_path):
         meshes.compute_scalar_by_function_per_vertex(q=f"{factor}*q")
         after = meshes.current_skeleton()
         np.testing.assert_allclose(after.radii, factor * before.radii, rtol=1e-6)
+        np.testing.assert_array_equal([after.half_width, after.half_thickness], [after.radii] * 2)
         assert after.report is before.report
         np.testing.assert_array_equal(after.points, before.points)
         for save in (meshes.save, meshes.save_current_mesh):

@@ -33,6 +33,7 @@ from glsk_o3d import (
     save_recipe,
     skeletonize,
 )
+from glsk_o3d.io.formats.fields import ARRAYS
 from glsk_o3d.pipeline import Filter, after, recipe_of, with_stage
 from glsk_o3d.recipes import from_recipe, to_recipe
 from glsk_o3d.recipes.catalogue import BUILTIN
@@ -431,7 +432,7 @@ def test_results_repeat_to_the_last_bit(tmp_path, name, ending):
     read = glsk.read_skeleton(tmp_path / f"s.{ending}")
     assert read.report.recipe == skeleton.report.recipe
     for again in (rerun(read), rerun(read, points), rerun(rerun(skeleton))):
-        for field in ("vertices", "edges", "radii", "confidence", "vertex_of_point", "points", "normals"):
+        for field in ARRAYS:
             np.testing.assert_array_equal(getattr(again, field), getattr(skeleton, field))
         assert again.report.recipe == skeleton.report.recipe
 

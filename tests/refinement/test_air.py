@@ -31,7 +31,7 @@ def test_an_edge_between_two_tubes_is_cut(piped, noise):
     assert false.probability > 0.5
     np.testing.assert_allclose(false.place, [0, 0.25, 0], atol=0.16)
     # what stays lies in the tubes, but for stubs, and has all points
-    skeleton, _ = prune_spurs(skeleton, 0.5)
+    skeleton, _ = prune_spurs(skeleton, Evidence.of(skeleton), 0.5)
     off_axis = np.minimum(np.abs(skeleton.vertices[:, 1]), np.abs(skeleton.vertices[:, 1] - 0.5))
     assert off_axis.max() < 0.16
     assert skeleton.vertex_of_point.min() >= 0

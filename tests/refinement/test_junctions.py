@@ -1,6 +1,8 @@
 """Junctions lie where the axes of straight limbs meet, and nothing else is left of a corner."""
 
+from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,22 +10,27 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
 from glsk_o3d.numerics.polylines import arc_lengths
-from glsk_o3d.refinement.junctions import Limbs, level_tips, move_junctions
-from glsk_o3d.refinement.reattachment import reattach_limbs
+from glsk_o3d.refinement.evidence import Evidence
+from glsk_o3d.refinement.junctions import Limbs, move_junctions
+from glsk_o3d.refinement.meeting import limb_line, meet
 from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from glsk_o3d.refinement.spurs import prune_spurs
 
 R = 0.1
 
+# a surface that says nothing of what hangs together: the reach alone decides
+UNBONDED = SimpleNamespace(bonds=lambda skeleton: (np.empty((0, 2), int), np.empty(0)))
+
 
 def pruned(skeleton, reach):
-    """Without the branches that reach less far."""
-    return prune_spurs(skeleton, probability(LIMB_WEIGHTS, {"reach": np.log(reach + 0.1)}))[0]
+    """Without the branches that reach less far, even of those that hang together with no others."""
+    least = probability(LIMB_WEIGHTS, {"reach": np.log(reach + 0.1), "web": 0.0})
+    return prune_spurs(skeleton, Evidence.of(skeleton), least)[0]
 
 
 def capsules(ends, per=3000):
-    """Points on the surface of struts of radius R with round ends, but not inside another, (N, 3)."""
-    rng, points = np.random.default_rng(0), []
+    """Points on the surface of struts of radius R with round ends, but not inside another, and normals, (N, 3) each."""
+    rng, points, normals = np.random.default_rng(0), [], []
     for a, b in ends:
         a, b = np.array(a, float), np.array(b, float)
         t = rng.uniform(-R, np.linalg.norm(b - a) + R, per)
@@ -32,13 +39,16 @@ def capsules(ends, per=3000):
         side = np.cross(way, rng.normal(size=(per, 3)))
         side /= np.linalg.norm(side, axis=1, keepdims=True)
         along = t - foot
-        points.append(a + t[:, None] * way + np.sqrt(R**2 - along**2)[:, None] * side)
-    points = np.concatenate(points)
+        out = along[:, None] * way + np.sqrt(R**2 - along**2)[:, None] * side
+        points.append(a + foot[:, None] * way + out)
+        normals.append(out / R)
+    points, normals = np.concatenate(points), np.concatenate(normals)
     for a, b in ends:
         a, way = np.array(a, float), np.subtract(b, a)
         t = np.clip((points - a) @ way / (way @ way), 0, 1)
-        points = points[np.linalg.norm(a + t[:, None] * way - points, axis=1) > R * (1 - 1e-6)]
-    return points
+        outside = np.linalg.norm(a + t[:, None] * way - points, axis=1) > R * (1 - 1e-6)
+        points, normals = points[outside], normals[outside]
+    return points, normals
 
 
 def drawn(paths, struts):
@@ -55,10 +65,10 @@ def drawn(paths, struts):
                 vertices.append(place)
             numbers.append(places[key])
         edges += [sorted(pair) for pair in pairwise(numbers)]
-    points = capsules(struts)
+    points, normals = capsules(struts)
     owner = cKDTree(vertices).query(points)[1]
     m = len(vertices)
-    return Skeleton(vertices, sorted(edges), np.full(m, R), owner, points, np.ones_like(points), confidence=np.ones(m))
+    return Skeleton(vertices, sorted(edges), np.full(m, R), owner, points, normals, confidence=np.ones(m))
 
 
 def towards(angle, length=1.0):
@@ -128,13 +138,13 @@ def test_junctions_of_one_corner_become_one(apart, junctions):
     assert len(skeleton.leaves) == 4
 
 
-def test_limbs_that_pass_each_other_do_not_move_their_junction():
+def test_limbs_that_pass_each_other_hardly_move_their_junction():
     paths = [[(0, 0, 0), (0.3, 0, 3 * R * s), (1, 0, 3 * R * s)] for s in (-1, 1)] + [[(0, 0, 0), (-1, 0, 0)]]
     raw = drawn(paths, [tuple(path[1:]) for path in paths[:2]] + [tuple(paths[2])])
-    np.testing.assert_allclose(move_junctions(raw).vertices, raw.vertices, atol=1e-12)
+    np.testing.assert_allclose(move_junctions(raw).vertices, raw.vertices, atol=0.1 * R)
 
 
-def test_axes_that_meet_outside_of_the_cloud_do_not_move_their_junction():
+def test_axes_that_meet_outside_of_the_cloud_hardly_move_their_junction():
     """Three limbs of a fan that ends before its ribs meet."""
     ways = [towards(180 + angle) for angle in (-20, 0, 20)]
     meet = np.array([3.5 * R, 0, 0])
@@ -145,7 +155,7 @@ def test_axes_that_meet_outside_of_the_cloud_do_not_move_their_junction():
     meeting = limbs.meeting(limbs.at[raw.junctions[0]], np.zeros(3))
     assert (meeting.fits & meeting.ahead).all()
     assert meeting.place[0] > 2 * R > 2 * R + raw.points[:, 0].max()
-    np.testing.assert_array_equal(move_junctions(raw).vertices, raw.vertices)
+    np.testing.assert_allclose(move_junctions(raw).vertices, raw.vertices, atol=R)
 
 
 def test_a_junction_is_as_thick_as_its_thickest_limb():
@@ -159,41 +169,133 @@ def test_a_junction_is_as_thick_as_its_thickest_limb():
     assert skeleton.radii.max() == pytest.approx(0.1)
 
 
-def test_a_limb_beside_another_begins_where_it_leaves_it():
-    """It grows from the middle of a strut, but its curve runs 5 radii along inside it."""
-    struts = [((-1, 0, 0), (1, 0, 0)), ((0.5, 0, 0), (0.5, 1, 0))]
-    aside = [(0, 0, 0), (0.05, R / 2, 0), (0.5, R / 2, 0), (0.5, 1, 0)]
-    raw = drawn([[(-1, 0, 0), (0, 0, 0)], [(0, 0, 0), (1, 0, 0)], aside], struts)
-    np.testing.assert_allclose(raw.vertices[raw.junctions], [[0, 0, 0]], atol=1e-12)
-    skeleton = move_junctions(pruned(reattach_limbs(raw), 1.5))
-    assert (len(skeleton.leaves), skeleton.n_components, skeleton.n_loops) == (3, 1, 0)
-    np.testing.assert_allclose(skeleton.vertices[skeleton.junctions], [[0.5, 0, 0]], atol=0.5 * R)
-    assert skeleton.length == pytest.approx(3, abs=R)
-    assert len(skeleton.vertex_of_point) == len(raw.points)
-    assert (skeleton.vertex_of_point >= 0).all()
-
-
-def test_a_plain_branch_is_not_reattached():
-    paths, struts, _ = webbed([-20, 20, 180])
-    raw = drawn(paths, struts)
-    assert reattach_limbs(raw) is raw
-
-
 def test_graphs_without_junctions_stay():
     raw = drawn([[(0, 0, 0), (1, 0, 0)]], [((0, 0, 0), (1, 0, 0))])
-    assert reattach_limbs(raw) is raw
     np.testing.assert_array_equal(move_junctions(raw).vertices, raw.vertices)
+    assert pruned(raw, 1.5) is raw
     none = Skeleton([[0, 0, 0]], [], [1], [0], [[0, 0, 1]], [[0, 0, 1]])
     assert Limbs(none, joined=True).paths == []
-    assert pruned(none, 1.5) is none
+    np.testing.assert_array_equal(move_junctions(none).vertices, none.vertices)
 
 
-def test_tips_are_as_thick_as_their_branch():
-    """A cone from 0.1 to 0.2 whose leaves measured nonsense, one radius back on either side."""
-    raw = drawn([[(0, 0, 0), (1, 0, 0)]], [((0, 0, 0), (1, 0, 0))])
-    raw.radii[:] = 0.1 + 0.1 * raw.vertices[:, 0]
-    raw.radii[raw.leaves] = [0.7, 0.01]
-    found = level_tips(raw).radii
-    np.testing.assert_allclose(found[raw.leaves], [0.115, 0.185], atol=1e-3)
-    inner = np.setdiff1d(np.arange(len(found)), raw.leaves)
-    np.testing.assert_array_equal(found[inner], raw.radii[inner])
+@pytest.mark.parametrize("angles", [[0, 90, 180], [90, 210, 330], [45, 135, 225, 315], [0, 90, 180, 270]])
+def test_t_y_x_and_plus_meet_in_their_centres(angles):
+    """Wherever the contraction left the junction."""
+    paths, struts, _ = webbed(angles)
+    for shift in ([0, 0, 0], [0.5 * R, 0, 0], [0, -0.5 * R, 0.5 * R]):
+        raw = drawn([[meet + shift, *rest] for meet, *rest in paths], struts)
+        skeleton = move_junctions(raw)
+        assert len(skeleton.junctions) == 1
+        assert np.linalg.norm(skeleton.vertices[skeleton.junctions[0]]) < 0.15 * R
+
+
+def quadruped(bent=0.0, apart=0.0):
+    """A trunk along x with a pair of legs at either end.
+
+    Those in front are `apart`, and the contraction has put their junctions farther from each other by `bent`.
+    """
+    back, front, shift = np.array([-0.5, 0, 0]), np.array([0.5, 0, 0]), np.array([0.5, 0, 0])
+    hips = [back, back, front - apart * shift, front + apart * shift]
+    feet = [hip + [0, y, -0.8] for hip, y in zip(hips, [-0.4, 0.4, -0.4, 0.4], strict=True)]
+    roots = [back, back, hips[2] - bent * shift, hips[3] + bent * shift]
+    struts = [((-1, 0, 0), (1, 0, 0)), *zip(hips, feet, strict=True)]
+    ends = [(-1, 0, 0), back, *roots[2:], (1, 0, 0)]
+    paths = [pair for pair in pairwise(ends) if not np.array_equal(*pair)]
+    paths += [(r, h + 0.2 * (f - h), f) for r, h, f in zip(roots, hips, feet, strict=True)]
+    return drawn(paths, struts)
+
+
+def test_limbs_that_meet_a_trunk_within_a_radius_share_a_junction():
+    """Two legs whose junctions are .8 radii apart, in either order of the branches."""
+    raw = quadruped(bent=0.8 * R)
+    assert len(raw.junctions) == 3
+    skeleton = move_junctions(raw)
+    assert (len(skeleton.junctions), len(skeleton.leaves), skeleton.n_components, skeleton.n_loops) == (2, 6, 1, 0)
+    found = skeleton.vertices[skeleton.junctions]
+    np.testing.assert_allclose(found[np.argsort(found[:, 0])], [[-0.5, 0, 0], [0.5, 0, 0]], atol=0.15 * R)
+    assert np.isin(skeleton.vertex_of_point, np.arange(len(skeleton.vertices))).all()
+    assert len(skeleton.radii) == len(skeleton.confidence) == len(skeleton.vertices)
+
+
+def test_limbs_that_meet_a_trunk_farther_apart_do_not():
+    assert len(move_junctions(quadruped(apart=3 * R)).junctions) == 3
+
+
+def test_a_symmetric_body_has_a_symmetric_skeleton():
+    raw = quadruped(bent=0.8 * R)
+    skeleton, image = (move_junctions(it) for it in (raw, replace(
+        raw, vertices=raw.vertices * [1, -1, 1], points=raw.points * [1, -1, 1], normals=raw.normals * [1, -1, 1]
+    )))  # fmt: skip
+    np.testing.assert_allclose(image.vertices, skeleton.vertices * [1, -1, 1], atol=1e-9)
+    a, b = skeleton.vertices[skeleton.edges].transpose(1, 0, 2)
+    curve = np.concatenate([(1 - t) * a + t * b for t in np.linspace(0, 1, 21)])
+    assert cKDTree(curve).query(skeleton.vertices * [1, -1, 1])[0].max() < 0.2 * R
+
+
+def test_two_limbs_side_by_side_do_not_close_a_loop():
+    """A ring no wider than the radius of its limbs keeps both its sides."""
+    ring = [((0, 0, 0), (R / 4, s * R, 0), (R / 2, 0, 0)) for s in (-1, 1)]
+    tails = [((0, 0, 0), (-1, 0, 0)), ((R / 2, 0, 0), (1, 0, 0))]
+    raw = drawn([*ring, *tails], tails)
+    assert move_junctions(raw).n_loops == raw.n_loops == 1
+
+
+def test_junctions_turn_and_grow_with_the_shape():
+    raw = quadruped(bent=0.8 * R)
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    turn[:, 0] *= np.sign(np.linalg.det(turn))
+    moved = replace(
+        raw,
+        vertices=7 * raw.vertices @ turn.T,
+        points=7 * raw.points @ turn.T,
+        normals=raw.normals @ turn.T,
+        radii=7 * raw.radii,
+    )
+    expected, found = move_junctions(raw), move_junctions(moved)
+    np.testing.assert_array_equal(found.edges, expected.edges)
+    np.testing.assert_allclose(found.vertices, 7 * expected.vertices @ turn.T, atol=1e-8)
+    np.testing.assert_allclose(found.radii, 7 * expected.radii, rtol=1e-9)
+
+
+def test_junctions_do_not_hang_on_the_order_of_points_and_vertices():
+    raw = quadruped(bent=0.8 * R)
+    rng = np.random.default_rng(5)
+    points, name = rng.permutation(len(raw.points)), rng.permutation(len(raw.vertices))
+    back = np.argsort(name)  # vertex v is now called name[v]
+    shuffled = replace(
+        raw,
+        vertices=raw.vertices[back],
+        radii=raw.radii[back],
+        confidence=raw.confidence[back],
+        edges=np.unique(np.sort(name[raw.edges], axis=1), axis=0),
+        points=raw.points[points],
+        normals=raw.normals[points],
+        vertex_of_point=name[raw.vertex_of_point[points]],
+    )
+    expected, found = move_junctions(raw), move_junctions(shuffled)
+    apart, which = cKDTree(expected.vertices).query(found.vertices)
+    assert apart.max() < 1e-9
+    assert len(set(which.tolist())) == len(expected.vertices) == len(found.vertices)
+
+
+def test_sphere_centres_of_a_ball():
+    """Without lines the surface alone says where the middle is."""
+    normals = np.random.default_rng(0).normal(size=(2000, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    place, radius = meet([], np.array([0.3, 0.2, 0]), 1.0, normals, normals)
+    assert np.linalg.norm(place) < 0.05
+    assert radius == pytest.approx(1, abs=0.02)
+    nowhere, same = meet([], np.array([0.3, 0.2, 0]), 1.0, np.empty((0, 3)), np.empty((0, 3)))
+    assert (nowhere.tolist(), same) == ([0.3, 0.2, 0], 1.0)
+
+
+def test_a_limbs_line_is_taken_where_it_has_left_the_others():
+    """A limb that bends at 2 radii: its line is the straight part beyond."""
+    path = np.array([[0, 0, 0], [R, 0, 0], [R, 10 * R, 0]])
+    other = np.array([[-10 * R, 0, 0], [10 * R, 0, 0]])
+    vertices, surface = np.concatenate([path, other]), np.full(5, R)
+    line = limb_line(vertices, surface, np.arange(3), R, [np.array([3, 4])])
+    np.testing.assert_allclose(line.way, [0, -1, 0], atol=1e-9)
+    assert line.middle[0] == pytest.approx(R)
+    assert line.bend == pytest.approx(0, abs=1e-9)
+    assert 2 * R < line.start < 2.5 * R

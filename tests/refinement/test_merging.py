@@ -23,13 +23,15 @@ def test_support_counts_supporting_points_and_is_at_least_one(ringed):
 @given(st.integers(0, 10**6), st.lists(st.integers(-3, 5), min_size=12, max_size=12), st.booleans())
 def test_by_its_definition(random_skeleton, seed, labels, every):
     raw, group = random_skeleton(seed, every=every), np.array(labels)
+    raw = replace(raw, half_width=2 * raw.radii)
     skeleton = merge_vertices(raw, group)
     names = sorted(set(labels))
     weight = support(raw)
     for v, name in enumerate(names):
         inside = group == name
-        for merged, own in ((skeleton.vertices, raw.vertices), (skeleton.radii, raw.radii)):
+        for merged, own in ((skeleton.vertices, raw.vertices), (skeleton.half_width, raw.half_width)):
             np.testing.assert_allclose(merged[v], np.average(own[inside], axis=0, weights=weight[inside]), atol=1e-12)
+    np.testing.assert_allclose(skeleton.half_width, 2 * skeleton.radii)
     new = [names.index(label) for label in labels]
     expected = [-1 if v < 0 else new[v] for v in raw.vertex_of_point.tolist()]
     np.testing.assert_array_equal(skeleton.vertex_of_point, expected)

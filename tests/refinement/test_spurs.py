@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,10 +16,13 @@ from glsk_o3d.refinement.spurs import SPUR_QUANTILE, limb_facts, prune_spurs
 N = 21  # vertices of the trunk
 PER = 60  # points of each: many, so that a cut spur does not change the thickness of its junction
 
+# a surface that says nothing of what hangs together: the reach alone decides
+UNBONDED = SimpleNamespace(bonds=lambda skeleton: (np.empty((0, 2), int), np.empty(0)))
+
 
 def pruned(skeleton, reach):
     """Without the branches that reach less far."""
-    return prune_spurs(skeleton, probability(LIMB_WEIGHTS, {"reach": np.log(reach + 0.1)}))[0]
+    return prune_spurs(skeleton, UNBONDED, probability(LIMB_WEIGHTS, {"reach": np.log(reach + 0.1), "web": 0}))[0]
 
 
 def directions(n, seed=0):
@@ -161,7 +165,7 @@ def test_far_points_in_chunks(monkeypatch):
 
 def test_lines_have_no_thickness():
     """Whatever is off a line leaves it."""
-    raw = tree((10, 50.0), radius=0.0)
+    raw = tree((10, 0.5), radius=0.0)
     assert pruned(raw, 1.3) is raw
 
 
@@ -212,7 +216,7 @@ def test_two_ways_between_two_junctions_stay(ringed):
 
 
 def test_reach_is_that_of_the_points_over_the_surface():
-    found = {leaf: np.exp(facts["reach"]) - 0.1 for leaf, facts in limb_facts(tree((5, 0.3), (12, 0.5)))}
+    found = {leaf: np.exp(facts["reach"]) - 0.1 for leaf, facts in limb_facts(tree((5, 0.3), (12, 0.5)), UNBONDED)}
     assert set(found) >= {N + 1, N + 3}
     for tip, reach in ((N + 1, 0.3), (N + 3, 0.5)):
         assert found[tip] == pytest.approx(reach / 0.1, rel=0.15)
@@ -220,7 +224,7 @@ def test_reach_is_that_of_the_points_over_the_surface():
 
 def test_what_is_pruned_was_judged():
     raw = tree((5, 0.05), (12, 0.5))
-    skeleton, limbs = prune_spurs(raw, 0.5)
+    skeleton, limbs = prune_spurs(raw, UNBONDED, 0.5)
     gone = [it for it in limbs if it.changed]
     assert len(raw.leaves) - len(skeleton.leaves) == len(gone) == 1
     assert gone[0].place == tuple(raw.vertices[N + 1].tolist())
@@ -229,7 +233,7 @@ def test_what_is_pruned_was_judged():
 
 
 def test_the_farther_a_limb_reaches_the_more_probable_it_is():
-    skeleton, limbs = prune_spurs(tree((5, 0.17), (12, 0.5)), 0)
+    skeleton, limbs = prune_spurs(tree((5, 0.17), (12, 0.5)), UNBONDED, 0)
     found = {it.place: it for it in limbs}
     assert {(it.about, it.changed) for it in limbs} == {("limb", False)}
     short, far = (found[tuple(skeleton.vertices[tip])].probability for tip in (N + 1, N + 3))
@@ -237,7 +241,7 @@ def test_the_farther_a_limb_reaches_the_more_probable_it_is():
 
 
 def test_a_part_with_two_ends_has_no_limbs():
-    assert prune_spurs(tree(), 1.0)[1] == []
+    assert prune_spurs(tree(), UNBONDED, 1.0)[1] == []
 
 
 def test_distance_of_a_point_that_is_a_vertex_to_a_line_without_thickness():

@@ -9,7 +9,7 @@ from glsk_o3d.refinement.merging import support
 from glsk_o3d.refinement.triangles import collapse_triangles
 
 
-def slow(skeleton):
+def slow(skeleton, by_degree=False):
     """All prices anew before every merge: members, positions and edges of what is left."""
     position, weight = dict(enumerate(skeleton.vertices)), dict(enumerate(support(skeleton)))
     members = {v: {v} for v in position}
@@ -23,7 +23,10 @@ def slow(skeleton):
             break
         a, b = min(
             on_triangle,
-            key=lambda e: ((len(links[e[0]]) + len(links[e[1]])) / 2, np.linalg.norm(position[e[0]] - position[e[1]])),
+            key=lambda e: (
+                (len(links[e[0]]) + len(links[e[1]])) / 2 if by_degree else 0,
+                np.linalg.norm(position[e[0]] - position[e[1]]),
+            ),
         )
         position[a] = (weight[a] * position[a] + weight[b] * position[b]) / (weight[a] + weight[b])
         weight[a] += weight.pop(b)
@@ -38,11 +41,11 @@ def slow(skeleton):
 
 
 @settings(max_examples=150)
-@given(st.integers(0, 10**6), st.integers(3, 25), st.floats(0.3, 1.2), st.booleans())
-def test_always_the_cheapest_edge(random_skeleton, seed, m, reach, every):
+@given(st.integers(0, 10**6), st.integers(3, 25), st.floats(0.3, 1.2), st.booleans(), st.booleans())
+def test_always_the_cheapest_edge(random_skeleton, seed, m, reach, every, by_degree):
     raw = random_skeleton(seed, m, reach, every=every)
-    skeleton = collapse_triangles(raw)
-    members, position, links = slow(raw)
+    skeleton = collapse_triangles(raw, by_degree)
+    members, position, links = slow(raw, by_degree)
     assert len(skeleton.vertices) == len(members)
     # merged vertices are numbered by any member: find them by place
     left = sorted(members)
@@ -76,19 +79,30 @@ def test_what_is_left(random_skeleton, seed, m, reach):
         np.testing.assert_allclose(skeleton.vertices[v], mean, atol=1e-12)
 
 
-def test_degree_goes_before_length(ringed):
-    """The long edge between two free corners is cheaper than the short one at the corner with a tail."""
-    skeleton = collapse_triangles(
-        ringed([[0, 0, 0], [5, 0, 0], [0, 0.1, 0], [0, 1, 0]], [(0, 1), (1, 2), (0, 2), (2, 3)])
-    )
+def kite(ringed):
+    """A triangle with a tail: its long edge is between two free corners, its short one at the corner with the tail."""
+    return ringed([[0, 0, 0], [5, 0, 0], [0, 0.1, 0], [0, 1, 0]], [(0, 1), (1, 2), (0, 2), (2, 3)])
+
+
+def test_length_goes_before_degree(ringed):
+    skeleton = collapse_triangles(kite(ringed))
+    kept = skeleton.vertex_of_point[::12].tolist()
+    assert kept[0] == kept[2]
+    assert len(set(kept)) == 3
+    np.testing.assert_allclose(skeleton.vertices[kept[0]], [0, 0.05, 0])
+
+
+def test_degree_goes_before_length_in_the_published_order(ringed):
+    skeleton = collapse_triangles(kite(ringed), by_degree=True)
     kept = skeleton.vertex_of_point[::12].tolist()
     assert kept[0] == kept[1]
     assert len(set(kept)) == 3
     np.testing.assert_allclose(skeleton.vertices[kept[0]], [2.5, 0, 0])
 
 
-def test_shortest_among_equal_degrees(ringed):
-    skeleton = collapse_triangles(ringed([[0, 0, 0], [1, 0, 0], [0.9, 2, 0]], [(0, 1), (1, 2), (0, 2)]))
+@pytest.mark.parametrize("by_degree", [False, True])
+def test_shortest_among_equal_degrees(ringed, by_degree):
+    skeleton = collapse_triangles(ringed([[0, 0, 0], [1, 0, 0], [0.9, 2, 0]], [(0, 1), (1, 2), (0, 2)]), by_degree)
     assert skeleton.vertex_of_point[::12].tolist() in ([0, 0, 1], [1, 1, 0])
     np.testing.assert_allclose(sorted(skeleton.vertices.tolist()), [[0.5, 0, 0], [0.9, 2, 0]])
 

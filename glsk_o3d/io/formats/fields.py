@@ -21,8 +21,12 @@ ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {
     "vertex_of_point": ((), int),
     "points": ((3,), float),
     "normals": ((3,), float),
+    "half_width": ((), float),
+    "half_thickness": ((), float),
 }
 """The arrays of a skeleton: the shape of a row and the type of each. The one field more is ``report``."""
+LATER = ("half_width", "half_thickness")
+"""Those that older files lack: there they are the radii."""
 
 
 def decode(values: Any) -> Skeleton:
@@ -43,6 +47,7 @@ def decode(values: Any) -> Skeleton:
     if values.get("format_version") != FORMAT_VERSION:
         found = values.get("format_version")
         raise ValueError(f"it has format_version {found!r} and this release reads {FORMAT_VERSION}: update glsk-o3d")
+    values = {name: values.get("radii") for name in LATER} | values
     missing = [name for name in (*ARRAYS, "report") if name not in values]
     if missing:
         raise ValueError(f"it lacks {', '.join(missing)}")
@@ -54,8 +59,9 @@ def decode(values: Any) -> Skeleton:
         if array.shape[1:] != columns or array.dtype.kind not in ("iu" if kind is int else "f"):
             raise ValueError(f"{name} has shape {array.shape} and dtype {array.dtype}")
         arrays[name] = array
-    if len(arrays["confidence"]) != len(arrays["vertices"]):
-        raise ValueError(f"{len(arrays['confidence'])} confidences for {len(arrays['vertices'])} vertices")
+    for name, words in (("confidence", "confidences"), *((name, name) for name in LATER)):
+        if len(arrays[name]) != len(arrays["vertices"]):
+            raise ValueError(f"{len(arrays[name])} {words} for {len(arrays['vertices'])} vertices")
     return checked(Skeleton(**arrays, report=Report.from_dict(_with_nan(values["report"]))))
 
 

@@ -12,7 +12,9 @@ class NoEdges(Exception):
     """A file in a format that clouds have too holds no edges, and was not written as a skeleton."""
 
 
-def graph_skeleton(vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | None = None) -> Skeleton:
+def graph_skeleton(
+    vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | None = None, **known: ArrayLike
+) -> Skeleton:
     """A skeleton without a cloud, its edges sorted and each once.
 
     Parameters
@@ -22,6 +24,8 @@ def graph_skeleton(vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | Non
         In any order; repeated ones and those from a vertex to itself are dropped.
     radii : (M,) array_like, optional
         By default unknown: NaN.
+    **known : (M,) array_like
+        What else is known of the vertices, by the name of the field.
 
     Raises
     ------
@@ -33,7 +37,7 @@ def graph_skeleton(vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | Non
     edges = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0)
     radii = np.full(len(vertices), np.nan) if radii is None else np.asarray(radii)
     none = np.empty(0)
-    return checked(Skeleton(vertices, edges, radii, vertex_of_point=none, points=none, normals=none))
+    return checked(Skeleton(vertices, edges, radii, vertex_of_point=none, points=none, normals=none, **known))  # type: ignore[arg-type]
 
 
 def checked(skeleton: Skeleton) -> Skeleton:
@@ -51,7 +55,12 @@ def checked(skeleton: Skeleton) -> Skeleton:
         raise ValueError("points, normals and vertex_of_point differ in length")
     if not np.isfinite(skeleton.vertices).all():
         raise ValueError("a vertex has coordinates that are not finite")
-    for name, values, high in (("radius", skeleton.radii, np.inf), ("confidence", skeleton.confidence, 1.0)):
+    for name, values, high in (
+        ("radius", skeleton.radii, np.inf),
+        ("confidence", skeleton.confidence, 1.0),
+        ("half_width", skeleton.half_width, np.inf),
+        ("half_thickness", skeleton.half_thickness, skeleton.half_width),
+    ):
         wrong = values[(values < 0) | (values > high)]
         if len(wrong):
             raise ValueError(f"a {name} is {wrong[0]:g}")

@@ -1,4 +1,5 @@
-"""PLY: keeps vertices and edges to the last bit, and the radii as ``radius`` and ``quality``; loses all else.
+"""PLY: keeps vertices and edges to the last bit, and the radii as ``radius`` and ``quality``, and the half
+axes of the sections; loses all else.
 
 Open3D's ``read_line_set`` and MeshLab open it; by quality MeshLab colours. Scans are PLY files, too: a skeleton is one
 that has edges.
@@ -16,6 +17,8 @@ import numpy as np
 from ...skeleton import Skeleton
 from .graphs import NoEdges, graph_skeleton
 from .ply_tables import read_header, read_tables
+
+SECTION = ("half_width", "half_thickness")
 
 
 def ply_elements(path: str | os.PathLike) -> dict[str, list[str]]:
@@ -35,7 +38,8 @@ def holds_lines(stream: BinaryIO) -> bool:
 
 def write(skeleton: Skeleton) -> bytes:
     """The content of a PLY file."""
-    vertices = np.column_stack([skeleton.vertices, skeleton.radii, skeleton.radii]).astype("<f8")
+    section = [getattr(skeleton, name) for name in SECTION]
+    vertices = np.column_stack([skeleton.vertices, skeleton.radii, skeleton.radii, *section]).astype("<f8")
     header = f"""ply
 format binary_little_endian 1.0
 comment curve skeleton written by glsk-o3d
@@ -45,6 +49,8 @@ property double y
 property double z
 property double radius
 property double quality
+property double half_width
+property double half_thickness
 element edge {len(skeleton.edges)}
 property int vertex1
 property int vertex2
@@ -65,4 +71,5 @@ def read(data: bytes) -> Skeleton:
     vertex, edge = tables["vertex"], tables["edge"]
     xyz = np.column_stack([vertex[axis] for axis in "xyz"]).astype(float)
     radii = np.array(vertex["radius"], float) if "radius" in vertex else None
-    return graph_skeleton(xyz, np.column_stack([edge["vertex1"], edge["vertex2"]]), radii)
+    known = {name: vertex[name] for name in SECTION if set(SECTION) <= vertex.keys()}
+    return graph_skeleton(xyz, np.column_stack([edge["vertex1"], edge["vertex2"]]), radii, **known)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -29,6 +31,16 @@ def test_meshlab_opens_it(skeleton, tmp_path):
     np.testing.assert_array_equal(mesh.vertex_matrix(), skeleton.vertices)
     np.testing.assert_array_equal(mesh.edge_matrix().reshape(-1, 2), skeleton.edges)
     np.testing.assert_array_equal(mesh.vertex_scalar_array(), skeleton.radii)  # by which it colours
+
+
+def test_the_half_axes_come_back(tree, tmp_path):
+    flat = replace(tree, half_width=2 * tree.radii, half_thickness=tree.radii / 2)
+    flat.save(tmp_path / "s.ply")
+    back = read_skeleton(tmp_path / "s.ply")
+    for name in ("radii", "half_width", "half_thickness"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(flat, name))
+    (tmp_path / "s.ply").write_bytes((tmp_path / "s.ply").read_bytes().replace(b" half_", b" some_"))
+    np.testing.assert_array_equal(read_skeleton(tmp_path / "s.ply").half_width, tree.radii)
 
 
 def test_ply_written_by_open3d(tree, tmp_path):

@@ -1,0 +1,63 @@
+"""Diffusion over a surface that is known by its points."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from .vectors import TINY, dot
+
+DIFFUSION_STEPS = 10  # measured: conjugate gradients, after which places along a curve stand still
+LEAST_BEND = 1e-12  # derived: of what a step may gain, that is more than roundings: points in one place have none
+
+
+class Diffusion:
+    r"""Implicit diffusion over the links between near points.
+
+    One step of backward Euler, :math:`(I + \ell^2 L) u' = u`, with the Laplacian of the links: on a plane their
+    lengths have a mean square :math:`\rho^2` at every point, and :math:`L = 4 / \rho^2 (I - D^{-1} W)` tends to
+    :math:`-\Delta` as points grow. What varies over less than the length :math:`\ell` is smoothed; constants stay.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    neighbours : (n, k) int array
+        As from `nearest_neighbours`, itself first.
+    """
+
+    def __init__(self, points: np.ndarray, neighbours: np.ndarray) -> None:
+        n, k = neighbours.shape
+        row, column = np.repeat(np.arange(n), k - 1), neighbours[:, 1:].ravel()
+        links = csr_array((np.full(len(row), 0.5), (row, column)), shape=(n, n))
+        self._links = (links + links.T).tocsr()
+        offset = points[row] - points[column]
+        squared = dot(offset, offset) / 2
+        squared = np.bincount(row, squared, n) + np.bincount(column, squared, n)
+        self._degree = np.asarray(self._links.sum(axis=1)).ravel()
+        self._stiffness = squared / 4  # degree times mean square, over 4
+
+    def __call__(self, values: np.ndarray, length: np.ndarray) -> np.ndarray:
+        """Diffuse values of the points, (n, c) float array, over a length of each point, (n,) float array.
+
+        By conjugate gradients from the values themselves.
+        """
+        # over less than a thousandth of its links a value stays what it is
+        hold = self._stiffness / np.maximum(length**2, 1e-6 * np.maximum(self._stiffness, TINY))
+        diagonal = np.maximum(hold + self._degree, TINY)[:, None]
+        mean = values.mean(axis=0)  # what is far from the origin would lose digits
+        found = values - mean
+        residual = self._links @ found - self._degree[:, None] * found
+        ahead = step = residual / diagonal
+        size = (residual * step).sum()  # of all columns: those of positions turn with them
+        for _ in range(DIFFUSION_STEPS):
+            curved = diagonal * ahead - self._links @ ahead
+            bend = (ahead * curved).sum()
+            if not bend > LEAST_BEND * size:
+                break
+            share = size / bend
+            found = found + share * ahead
+            residual = residual - share * curved
+            step = residual / diagonal
+            before, size = size, (residual * step).sum()
+            ahead = step + size / before * ahead
+        return found + mean

@@ -1,0 +1,290 @@
+"""Grow ends anew along their limbs, to where the limbs stop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..numerics.polylines import arc_lengths, place_at
+from ..numerics.vectors import TINY, dot, norm
+from ..skeleton import Skeleton
+from .axis_fit import axis_box
+from .sections import measure_sections
+
+END_CUT = 1.75  # fitted: distance from where the points stop, in larger half widths, within which a cap bends the curve
+END_RUN = 2.0  # fitted: radii behind the cut over which the direction of a limb is taken
+END_SIZE = 4.0  # fitted: radii behind the cut over which it is seen how wide a limb is, and how fast it gets thinner
+END_REACH = 0.98  # fitted: share of an end's points within its reach: normals and noise throw the others farther
+END_WINDOW = 1.25  # fitted: radii before the reach from which on points say where the limb stops
+END_BENDING = 0.1  # fitted: weight of going straight on, per point
+END_BENT = 1 / 3  # fitted: curvature at most, over the inverse radius: a tube cannot bend as sharply as its wall
+END_TIP = 1.0  # fitted: last radii of a curve that go wherever it stops: a hook is as long
+END_LEFT = 0.25  # fitted: share of a branch from a junction that is left, at least, to say where it leads
+END_POINTS = 4  # derived: fewer say nothing about a curvature and a length
+WAY_SAMPLES = 16  # derived: places along a run that say its direction, several on each of its few edges
+# For points weighted by the cube of c, the cosine of their normals with the axis: on a round cap of radius 1, where c
+# is the height over its centre and every height has the same area,
+CAP_POWER = 3  # fitted: the power; lower ones let the sides have a say
+ROUND_MEAN = 4 / 5  # derived: mean height,
+ROUND_VARIANCE = 2 / 75  # derived: its variance,
+ROUND_AREA = 1 / 2  # derived: and the weight over that of a flat cap
+
+
+def regrow_ends(skeleton: Skeleton) -> Skeleton:
+    r"""Cut every end where a cap may have bent it, and let it grow along its limb to where this stops.
+
+    Contraction draws the end of a limb into an edge or a corner of the face that closes it, and the fit follows: the
+    normals of a cap lead along the axis and do not say where it is. So vertices within 1.75 half widths of where the
+    points of the limb stop, and the last radius of the curve wherever it stops, are cut. The limb goes on in the
+    direction of the two radii behind, with the curvature k that the normals n of its sides ask for:
+
+    .. math:: \sum_p w (b \cdot (s t + s^2 k / 2 - p))^2 + \lambda s^4 |k|^2 / 4, \quad b = n \times t
+
+    with p and its length s along t seen from the last vertex left; caps, with b = 0, have no say.
+
+    It stops half a radius inside a flat cap and at the centre of a round one. Let c be the cosine of an outward normal
+    with the axis. The mean of s with the weights c^3 is on a flat cap, and .8 radii beyond the centre of a round one;
+    the variance is 0 there and 2/75 squared radii here, so mean - r / 2 - 45/4 variance / r is right in both. Averages
+    do not follow single points, as extremes do in noise. What is missing of the cap, of an open pipe all of it, counts
+    as if it were where the sides stop: twice as far as their mean. The radius r is the sections', of a circle of their
+    area, and goes on getting smaller if it does behind: a cone ends in its point. No end leaves its points.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    Skeleton
+        With new vertices at the ends, behind all others and as far apart as those that they follow, with the radius and
+        the confidence of the run behind. Points of a vertex that was cut belong to the nearest one of the same end.
+        Loops and vertices without edges stay.
+    """
+    if not len(skeleton.leaves):
+        return skeleton
+    cloud, grown = _Cloud(skeleton), list[tuple[np.ndarray, _Grown]]()
+    for path, first, other in _ends(skeleton):
+        found = _grow(cloud, path, first, other)
+        if found is not None:
+            grown.append((path, found))
+    return _replanted(skeleton, cloud, grown) if grown else skeleton
+
+
+class _Grown(NamedTuple):
+    """An end that has grown anew."""
+
+    cut: int  # number along the path of the first vertex that goes
+    places: np.ndarray  # (k, 3), of the new vertices, outwards
+    run: np.ndarray  # vertices behind the cut
+
+
+def _ends(skeleton: Skeleton) -> Iterator[tuple[np.ndarray, int, bool]]:
+    """Every branch that has a leaf, seen towards it, the first vertex that may go, and whether it begins with a leaf.
+
+    The vertex in the middle of a branch with two ends stays, and the junction of another, with a quarter of the branch.
+    """
+    for branch in skeleton.branches:
+        leaf, along = skeleton.degree[branch[[0, -1]]] == 1, arc_lengths(skeleton.vertices[branch])
+        if not along[-1] > 0 or (leaf.all() and len(branch) < 3):
+            continue
+        middle = 1 + np.argmin(np.abs(along[1:-1] - along[-1] / 2)) if leaf.all() else 0
+        for path, ends, stays in ((branch[::-1], leaf[0], len(branch) - 1 - middle), (branch, leaf[1], middle)):
+            if ends:
+                short = np.searchsorted(arc_lengths(skeleton.vertices[path]), END_LEFT * along[-1])
+                yield path, int(stays + 1 if leaf.all() else max(short, 1)), bool(leaf.all())
+
+
+class _Cloud:
+    """The points of every vertex, and how wide they say the section is.
+
+    Attributes
+    ----------
+    radius : (M,) float array
+        Of a circle of the section's area.
+    wide : (M,) float array
+        The larger half width of the section.
+    """
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
+        sections = measure_sections(skeleton)
+        self.radius, self.wide = sections.radius, sections.half_width
+        vertex = skeleton.vertex_of_point
+        self._order = np.argsort(vertex, kind="stable")
+        self._first = np.searchsorted(vertex[self._order], np.arange(len(skeleton.vertices) + 1))
+
+    def of(self, vertices: np.ndarray) -> np.ndarray:
+        """Points that belong to some vertices, at least one, int array."""
+        return np.concatenate([self._order[self._first[v] : self._first[v + 1]] for v in vertices.tolist()])
+
+    def surface(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Those of them that have normals, (n, 3) float array, and these."""
+        points = self.of(vertices)
+        points = points[np.isfinite(self.skeleton.normals[points]).all(axis=1)]
+        return self.skeleton.points[points], self.skeleton.normals[points]
+
+
+def _grow(cloud: _Cloud, path: np.ndarray, first: int, other: bool) -> _Grown | None:
+    """Cut the end of a path, and let it grow anew; None if too few points say where."""
+    places = cloud.skeleton.vertices[path]
+    along = arc_lengths(places)
+    length = along[-1]
+    run, cut, way = _within(along, length, END_SIZE * np.median(cloud.radius[path])), len(path), np.zeros(3)
+    for _ in range(2):  # how far the points reach is seen along a run that is no part of the cap itself
+        radius, wide = np.median(cloud.radius[path[run]]), np.median(cloud.wide[path[run]])
+        stop = max(length - END_CUT * wide, length / 2)
+        start = max(stop - END_RUN * radius, 0)
+        way, anchor = _way(places, along, start, stop), place_at(places, along, stop)
+        # the points of a junction are other limbs', too
+        points, _ = cloud.surface(path[max(np.searchsorted(along, start), 0 if other else 1) :])
+        if len(points) < END_POINTS:
+            return None
+        reach = np.quantile((points - anchor) @ way, END_REACH)
+        close = ((places - anchor) @ way > reach - END_CUT * wide) | (along > length - END_TIP * radius)
+        close = np.flatnonzero(close & (along > start))
+        cut = max(close[0] if len(close) else len(path), first)
+        stop = along[cut - 1]
+        run = _within(along, stop, END_SIZE * radius)
+    radius, anchor = np.median(cloud.radius[path[run]]), places[cut - 1]
+    if stop > radius / 2:  # of a stub there is no run: it goes on as it was
+        way = _way(places, along, max(stop - END_RUN * radius, 0), stop)
+    points, normals = cloud.surface(path[max(cut - 2, 0 if other else min(1, len(path) - 1)) :])
+    points = points - anchor
+    ahead = points @ way > 0
+    if ahead.sum() < END_POINTS:
+        return None
+    end = _End.of(points[ahead], normals[ahead], way, radius)
+    behind = _within(along, stop, END_SIZE * radius)
+    tip = end.tip(_Taper.of(along[behind] - stop, cloud.radius[path[behind]], radius))
+    steps = np.diff(along[run])
+    step = np.median(steps) if len(steps) else length / (len(path) - 1)
+    tip = max(tip, step / 2)
+    # edges of no length are those of no limb
+    number = max(round(min(tip / max(step, TINY), len(points))), 1)
+    return _Grown(cut, anchor + end.curve(np.arange(1, number + 1) / number * tip), path[run])
+
+
+def _within(along: np.ndarray, stop: float, length: float) -> np.ndarray:
+    """Numbers of the vertices of a path in a run that ends at `stop`, at least one, int array."""
+    last = max(np.searchsorted(along, stop, side="right") - 1, 0)
+    return np.arange(min(np.searchsorted(along, stop - length), last), last + 1)
+
+
+def _way(places: np.ndarray, along: np.ndarray, start: float, stop: float) -> np.ndarray:
+    """Direction of a path from one length along it to another, (3,) float array, by least squares."""
+    lengths = np.linspace(start, stop, WAY_SAMPLES)
+    way = (lengths - lengths.mean()) @ place_at(places, along, lengths)
+    return way / max(np.linalg.norm(way), TINY)
+
+
+class _Taper(NamedTuple):
+    """The radius of a limb as it goes on: it may get smaller, but nobody knows of a limb that it gets thicker."""
+
+    radius: float  # where the limb is cut
+    slope: float
+
+    @classmethod
+    def of(cls, along: np.ndarray, radii: np.ndarray, radius: float) -> _Taper:
+        """From radii behind the cut, (k,) float arrays, and that of the run."""
+        away = along - along.mean()
+        spread = away @ away
+        # a run shorter than its radius says nothing
+        slope = (away @ radii) / spread if len(along) > 3 and np.ptp(along) > radius else 0.0
+        slope = float(np.clip(slope, -1, 0))
+        return cls(radius * (1 + slope * END_RUN / 2), slope)
+
+    def at(self, length: float) -> float:
+        return max(self.radius + self.slope * length, 0.0)
+
+
+class _End(NamedTuple):
+    """What lies ahead of the last vertex that is left of a limb, seen from there."""
+
+    points: np.ndarray  # (n, 3)
+    normals: np.ndarray  # (n, 3), of either sign
+    way: np.ndarray  # (3,)
+    bend: np.ndarray  # (3,), curvature
+    length: np.ndarray  # (n,), along the curve to the place nearest to each point
+
+    @classmethod
+    def of(cls, points: np.ndarray, normals: np.ndarray, way: np.ndarray, radius: float) -> _End:
+        """The curve through the origin in a direction that suits the points best."""
+        length = points @ way
+        across, off = np.cross(normals, way), points - length[:, None] * way
+        miss = dot(across, points)
+        weight = (length < np.quantile(length, END_REACH)) / (1 + (2 * miss / max(radius, TINY)) ** 2)
+        # as in the fit of all axes: normals that miss the axis by as much as anything does are noise
+        doubt = min(2 * (weight * miss**2) @ np.ones(len(miss)) / max(weight @ dot(off, off), TINY), 1)
+        frame = np.linalg.svd(way[None])[2][1:]
+        ask = across @ frame.T * (length**2 / 2)[:, None]
+        stiff = END_BENDING * weight.sum() / 2 * np.mean(length**4 / 4)
+        bend = np.linalg.solve((weight[:, None] * ask).T @ ask + (stiff + TINY) * np.eye(2), (weight * miss) @ ask)
+        bend = (1 - doubt) * bend @ frame
+        bend *= min(1, END_BENT / max(radius * np.linalg.norm(bend), TINY))
+        # inside of a bend the way is shorter than along the curve
+        aside = (off - (length**2 / 2)[:, None] * bend) @ bend
+        return cls(points, normals, way, bend, length * (1 + np.clip(aside, -0.5, 0.5)))
+
+    def curve(self, length: np.ndarray) -> np.ndarray:
+        """Places so far ahead, (k, 3) float array."""
+        return length[:, None] * self.way + (length**2 / 2)[:, None] * self.bend
+
+    def tip(self, taper: _Taper) -> float:
+        """How far the limb goes on."""
+        reach = np.quantile(self.length, END_REACH)
+        start = max(reach - END_WINDOW * taper.at(reach - taper.radius), 0.0)
+        late = self.length > start
+        if late.sum() < END_POINTS:
+            return max(reach - taper.at(reach) / 2, 0.0)
+        length = self.length[late] - start
+        tangent = self.way + self.length[late, None] * self.bend
+        normals, points = self.normals[late], self.points[late] - self.curve(np.array([start]))
+        outward = np.where(dot(normals, points) < 0, -1, 1) * dot(normals, tangent) / norm(tangent)
+        # those of a cone lean outwards, too
+        cap = np.maximum(outward + taper.slope / np.hypot(1, taper.slope), 0) ** CAP_POWER
+        side = np.maximum(1 - outward**2, 0)
+        stop = 2 * (side @ length) / max(side.sum(), TINY)
+        weight, radius = cap.sum(), taper.at(start + stop)
+        mean = cap @ length / max(weight, TINY)
+        variance = max(cap @ length**2 / max(weight, TINY) - mean**2, 0)
+        # the cap of a tube has half a radius times the area of a unit of its length
+        owed = ROUND_AREA * side.sum() * taper.radius / (2 * max(stop, TINY))
+        seen = min(weight / max(owed, TINY), 1)
+        inside = (ROUND_MEAN - 1 / 2) * min(variance / max(ROUND_VARIANCE * radius**2, TINY), 1)
+        tip = start + seen * mean + (1 - seen) * stop - (1 / 2 + seen * inside) * radius
+        return min(max(tip, 0.0), reach)
+
+
+def _replanted(skeleton: Skeleton, cloud: _Cloud, grown: list[tuple[np.ndarray, _Grown]]) -> Skeleton:
+    """With new ends instead of those that were cut."""
+    m = len(skeleton.vertices)
+    keep, owner = np.ones(m, bool), skeleton.vertex_of_point.copy()
+    low, high = axis_box(skeleton.points[skeleton.supporting_points])
+    edges, radii, confidence = [skeleton.edges], [skeleton.radii], [skeleton.confidence]
+    planted = [np.clip(found.places, low, high) for _, found in grown]
+    for (path, (cut, _, run)), places in zip(grown, planted, strict=True):
+        gone, names = path[cut:], m + np.arange(len(places))
+        m += len(places)
+        keep[gone] = False
+        chain = np.concatenate([path[cut - 1 : cut], names])
+        edges.append(np.column_stack([chain[:-1], chain[1:]]))
+        radii.append(np.full(len(places), np.median(skeleton.radii[run])))
+        confidence.append(np.full(len(places), np.median(skeleton.confidence[run])))
+        lost = cloud.of(gone) if len(gone) else np.empty(0, int)
+        near = cKDTree(np.concatenate([skeleton.vertices[chain[:1]], places])).query(skeleton.points[lost])[1]
+        owner[lost] = chain[near]
+    keep = np.concatenate([keep, np.ones(m - len(keep), bool)])
+    number, links = np.cumsum(keep) - 1, np.concatenate(edges)
+    links = np.sort(number[links[keep[links].all(axis=1)]], axis=1)
+    return replace(
+        skeleton,
+        vertices=np.concatenate([skeleton.vertices, *planted])[keep],
+        edges=links[np.lexsort((links[:, 1], links[:, 0]))],
+        radii=np.concatenate(radii)[keep],
+        confidence=np.concatenate(confidence)[keep],
+        vertex_of_point=np.where(owner >= 0, number[owner], -1),
+    )

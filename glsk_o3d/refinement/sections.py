@@ -1,0 +1,138 @@
+"""Sections: how wide and how thick the part is across the curve at every vertex."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..numerics.groups import group_sum
+from ..numerics.vectors import COLUMNS, ROWS, TINY, dot, norm, unit
+from ..skeleton import Skeleton
+
+LEAST_SHARE = 1e-5  # fitted: of the squared normals, above which they say something of a direction: 1/300 of a radian
+_FULL = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]  # derived: the entries of a symmetric 3 x 3 matrix, by row and column
+
+
+class Sections(NamedTuple):
+    """The section of the part at every vertex.
+
+    Attributes
+    ----------
+    half_width, half_thickness : (M,) float64 array
+        Its half axes, in the cloud's units; the width is never less than the thickness.
+    across : (M, 3) float64 array
+        Unit vectors in the direction of the width, up to their sign.
+    radius : (M,) float64 array
+        The geometric mean of the half axes.
+    closed : (M,) float64 array
+        How far the points lie all around, from 0 to 1: 1 around a whole section, 0.36 around half a tube, 0 where a
+        plane is all that was seen, or nothing.
+    """
+
+    half_width: np.ndarray
+    half_thickness: np.ndarray
+    across: np.ndarray
+    radius: np.ndarray
+    closed: np.ndarray
+
+
+def measure_sections(skeleton: Skeleton) -> Sections:
+    r"""Measure the sections by the tangent planes of the points around every vertex.
+
+    With the points p of a vertex and of those beside it, their unit normals n, and the vertex x that each belongs to,
+
+    .. math:: N = \sum n n^T, \quad M = \sum |n \cdot (p - x)|\, n n^T, \quad h(e) = \frac{e^T M e}{e^T N e}.
+
+    h(e) is the mean distance of the tangent planes, each with the weight that its normal has in the direction e. The
+    half axes are the largest and the least h(e) across the limb, that is in the plane of the two eigenvectors of N with
+    the largest eigenvalues: along the limb normals have the least share. Around a circle, or any part of it, h is the
+    radius, and around a rectangle, or two sides of it, they are its half axes, however the points are spread.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    Sections
+        Vertices without points have the skeleton's radius for both half axes; where only one side was seen, others have
+        it in the direction that nobody knows.
+
+    Notes
+    -----
+    `closed` is 1 less the length of the sum of the outward unit normals, without what they have along the limb, over
+    the sum of their lengths. A normal is outward if it points from the vertex to its point's tangent plane.
+    """
+    points = skeleton.supporting_points
+    vertex, normals = skeleton.vertex_of_point[points], skeleton.normals[points]
+    offset = skeleton.points[points] - skeleton.vertices[vertex]
+    m = len(skeleton.vertices)
+    found = half_axes(_around(skeleton, vertex, normal_moments(normals, offset)), skeleton.radii)
+    none = np.bincount(vertex, minlength=m) == 0
+    wide, thick = (np.where(none, skeleton.radii, half) for half in found[:2])
+
+    along = found.along[vertex]
+    outward = np.where(dot(normals, offset) < 0, -1, 1)[:, None] * normals
+    outward -= dot(outward, along)[:, None] * along
+    sums = _around(skeleton, vertex, np.column_stack([outward, norm(outward)]))
+    one_sided = np.where(sums[:, 3] > 0, norm(sums[:, :3]) / np.maximum(sums[:, 3], TINY), 1)
+    return Sections(wide, thick, found.across, np.sqrt(wide * thick), np.clip(1 - one_sided, 0, 1))
+
+
+def normal_moments(normals: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """What every point adds to N and M of its section, the six different entries of either, (n, 12) float array.
+
+    Parameters
+    ----------
+    normals : (n, 3) float array
+        Unit vectors, up to their sign.
+    offset : (n, 3) float array
+        From each point to its place on the curve, or from there.
+    """
+    squares = normals[:, ROWS] * normals[:, COLUMNS]
+    return np.concatenate([squares, np.abs(dot(normals, offset))[:, None] * squares], axis=1)
+
+
+class HalfAxes(NamedTuple):
+    """What the normals around vertices say of their sections.
+
+    Attributes
+    ----------
+    half_width, half_thickness : (m,) float array
+    across, along : (m, 3) float array
+        Unit vectors in the direction of the width, and along the limb.
+    """
+
+    half_width: np.ndarray
+    half_thickness: np.ndarray
+    across: np.ndarray
+    along: np.ndarray
+
+
+def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> HalfAxes:
+    """The half axes of sections, see `measure_sections`, from sums of `normal_moments`.
+
+    Parameters
+    ----------
+    moments : (m, 12) float array
+    otherwise : (m,) float array
+        The half axis in a direction that nobody saw.
+    """
+    share, axes = np.linalg.eigh(moments[:, :6][:, _FULL])
+    known = share[:, 1:] > LEAST_SHARE * share.sum(axis=1, keepdims=True)
+    # in units in which N is 1 the extremes of h are eigenvalues
+    plane = axes[:, :, 1:] / np.sqrt(np.where(known, share[:, 1:], 1))[:, None]
+    reach = known[:, :, None] * known[:, None] * np.einsum("mik,mij,mjl->mkl", plane, moments[:, 6:][:, _FULL], plane)
+    unseen = np.where(known, 0, np.nan_to_num(otherwise)[:, None])
+    half, turn = np.linalg.eigh(reach + unseen[:, None] * np.eye(2))
+    half = np.maximum(half, 0)  # rounding may leave less than nothing
+    across = unit(np.einsum("mik,mk->mi", plane, turn[:, :, 1]))
+    return HalfAxes(half[:, 1], half[:, 0], across, axes[:, :, 0])
+
+
+def _around(skeleton: Skeleton, vertex: np.ndarray, facts: np.ndarray) -> np.ndarray:
+    """Sums of the facts of every vertex's points, and of those of the vertices beside it."""
+    m, (a, b) = len(skeleton.vertices), skeleton.edges.T
+    sums = group_sum(facts, vertex, m)
+    return sums + group_sum(sums[np.concatenate([b, a])], np.concatenate([a, b]), m)
