@@ -264,7 +264,7 @@ class Skeleton:
         return to_line_set(self, color)
 
     def to_tensor_line_set(self, color: ColorChoice | None = None) -> open3d.t.geometry.LineSet:
-        """The skeleton as an ``open3d.t.geometry.LineSet``. See `glsk_o3d.io.line_sets.to_tensor_line_set`."""
+        """The skeleton as an ``open3d.t.geometry.LineSet``. See ``glsk_o3d.io.line_sets.to_tensor_line_set``."""
         from .io.line_sets import to_tensor_line_set
 
         return to_tensor_line_set(self, color)
