@@ -54,8 +54,10 @@ class PluginWarning(UserWarning):
     """A plugin of another distribution is broken and was left out."""
 
 
-def brief(error: BaseException) -> str:
-    """What an error of another library says, but no more than the beginning: some repeat the whole file.
+def brief(error: object) -> str:
+    """What an error of another library says, or a name in a file, but no more than the beginning.
+
+    Some repeat the whole file, and so does a name where its end is damaged.
 
     Examples
     --------
@@ -81,7 +83,7 @@ def did_you_mean(word: str, known: Iterable[str], what: str) -> str:
     >>> did_you_mean("radios", ["radius", "links"], "parameter of Connector")
     "no parameter of Connector is called 'radios': did you mean 'radius'?"
     """
-    names = {name.lower(): name for name in known}
+    names, word = {name.lower(): name for name in known}, brief(word)
     close = difflib.get_close_matches(word.lower(), names, n=1)
     listed = f"there are {', '.join(names.values()) or 'none'}" if len(names) <= 40 else "and none is like it"
     hint = f"did you mean {names[close[0]]!r}?" if close else listed

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ..errors import InvalidParameterError, RecipeError, did_you_mean
+from ..errors import InvalidParameterError, RecipeError, brief, did_you_mean
 from ..parameters import FROM, NONE, Parameters, problem_with
 from ..pipeline import RECIPE_VERSION, Pipeline
 from .catalogue import catalogue, find, named_pipeline, serves
@@ -128,10 +128,11 @@ def _check_head(recipe: Any) -> None:
         raise RecipeError(f"glsk_o3d.version: is {version} and this release reads {RECIPE_VERSION}: update glsk-o3d")
     for key in head:
         if key != "version":
-            raise RecipeError(f"glsk_o3d.{key}: there is only 'version' in this table")
+            raise RecipeError(f"glsk_o3d.{brief(key)}: there is only 'version' in this table")
     for key in recipe:
         if key not in ("glsk_o3d", "pipeline", "extends", "set"):
-            raise RecipeError(f"{key}: {did_you_mean(str(key), ('pipeline', 'extends', 'set'), 'key of a recipe')}")
+            hint = did_you_mean(str(key), ("pipeline", "extends", "set"), "key of a recipe")
+            raise RecipeError(f"{brief(key)}: {hint}")
     if ("pipeline" in recipe) == ("extends" in recipe):
         both = "has both" if "pipeline" in recipe else "lacks both"
         raise RecipeError(f"a recipe has either 'pipeline' or 'extends', and this one {both}")
@@ -150,7 +151,7 @@ def _extended(name: Any, changes: Any) -> Pipeline:
     for owner, values in changes.items():
         cls = find(owner)
         if cls is None:
-            raise RecipeError(f"set.{owner}: {did_you_mean(str(owner), catalogue(), 'filter or rule')}")
+            raise RecipeError(f"set.{brief(owner)}: {did_you_mean(str(owner), catalogue(), 'filter or rule')}")
         read |= {f"{owner}.{field}": value for field, value in _values(cls, values, f"set.{owner}").items()}
     return _valid(lambda: pipeline.with_options(read), "set")
 
@@ -181,7 +182,8 @@ def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
     values = {}
     for name, value in table.items():
         if name not in fields:
-            raise RecipeError(f"{path}.{name}: {did_you_mean(str(name), fields, f'parameter of {cls.__name__}')}")
+            hint = did_you_mean(str(name), fields, f"parameter of {cls.__name__}")
+            raise RecipeError(f"{path}.{brief(name)}: {hint}")
         facts = fields[name]
         kind = facts["type"]
         if kind.endswith("?") and value == NONE and NONE not in facts["choices"]:

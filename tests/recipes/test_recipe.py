@@ -539,3 +539,22 @@ def test_what_may_never_end_is_not_waited_for(tmp_path, name):
     os.mkfifo(tmp_path / name)
     with pytest.raises(RecipeError, match=rf"{name}: is no file .*which may never end"):
         load_recipe(tmp_path / name)
+
+
+@pytest.mark.parametrize("place", ["head", "top", "set", "parameter"])
+def test_an_unknown_name_is_not_repeated_at_length(place):
+    name = "long" * 10_000
+    recipe = {"glsk_o3d": {"version": 1}, "extends": "default"}
+    match place:
+        case "head":
+            recipe["glsk_o3d"][name] = 1
+        case "top":
+            recipe[name] = 1
+        case "set":
+            recipe["set"] = {name: {}}
+        case _:
+            recipe["set"] = {"RingBuilder": {name: 1}}
+    with pytest.raises(RecipeError) as refused:
+        from_recipe(recipe)
+    assert "longlong" in str(refused.value)
+    assert len(str(refused.value)) < 1500
