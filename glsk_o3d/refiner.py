@@ -113,7 +113,7 @@ class Refiner(Filter[Skeleton]):
         high=1,
     )
     limb: float = parameter(
-        0.5,
+        0.25,
         "Least probability that a branch is a limb of the object; others, spurs, are pruned. 0 keeps all.",
         type="float",
         low=0,
@@ -177,13 +177,13 @@ class Refiner(Filter[Skeleton]):
     def _fit(self, skeleton: Skeleton) -> tuple[Skeleton, SurfaceGraph]:
         """Make the graph one-dimensional and centre it in the surface around it."""
         skeleton = collapse_triangles(skeleton, by_degree=self.collapse == "degree")
+        surface = SurfaceGraph.of(skeleton)
         if self.handle:
-            skeleton = zip_narrow_loops(skeleton)
+            skeleton = zip_narrow_loops(skeleton, surface)
         if self.recentre:
             skeleton = recall_runaways(skeleton)
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
-        surface = SurfaceGraph.of(skeleton)
         return fit_axis(skeleton, self.recentre, surface), surface
 
     def _judge(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
@@ -217,7 +217,10 @@ class Refiner(Filter[Skeleton]):
         return (self._refit(skeleton, evidence) if _changed(loops) else skeleton), loops
 
     def _prune(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
-        return prune_spurs(skeleton, evidence, self.limb) if self.limb else (skeleton, [])
+        if not self.limb:
+            return skeleton, []
+        skeleton, limbs = prune_spurs(skeleton, evidence, self.limb)
+        return (self._refit(skeleton, evidence) if _changed(limbs) else skeleton), limbs
 
     def _cut(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
         return cut_air(skeleton, evidence, skeleton.report.noise, self.air) if self.air else (skeleton, [])

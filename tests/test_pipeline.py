@@ -412,6 +412,7 @@ def test_cao2010_on_shapes_with_a_known_axis(shape, loops):
     assert found.inside == found.completeness == 1
 
 
+@pytest.mark.filterwarnings("ignore:uncertain topology:glsk_o3d.SkeletonWarning")  # a cut may be a close call
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("gap", [1, 2])
 def test_thin_parts_side_by_side_stay_apart(gap, seed):

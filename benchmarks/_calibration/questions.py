@@ -6,10 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 from _common.clouds import Case
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import maximum_bipartite_matching
+from scipy.spatial.distance import cdist
 
 from glsk_o3d import Pipeline
 from glsk_o3d.analysis import Truth
-from glsk_o3d.analysis.matching import TIP_REACH, matched
+from glsk_o3d.analysis.matching import TIP_REACH
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
 from glsk_o3d.refinement.air import branch_facts
 from glsk_o3d.refinement.bridging import gap_facts
@@ -71,9 +74,14 @@ def _gaps(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tupl
 
 
 def _limbs(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
+    """A branch is a limb if a true tip is lost without it: of two prongs in one end either may go, and is none."""
     leaves = np.flatnonzero(skeleton.degree == 1)
     tips = np.flatnonzero(np.bincount(truth.edges.ravel(), minlength=len(truth.nodes)) == 1)
-    pairs = matched(skeleton.vertices[leaves], truth.nodes[tips], TIP_REACH * truth.radii[tips])
-    right = set(leaves[[leaf for leaf, _ in pairs]].tolist())
+    near = cdist(skeleton.vertices[leaves], truth.nodes[tips]) <= TIP_REACH * truth.radii[tips]
     for leaf, facts in limb_facts(skeleton, evidence):
-        yield "limb", facts, leaf in right
+        yield "limb", facts, _served(near[leaves != leaf]) < _served(near)
+
+
+def _served(near: np.ndarray) -> int:
+    """Most true tips that can have a leaf of their own near them."""
+    return int((maximum_bipartite_matching(csr_array(near.astype(np.int8)), perm_type="column") >= 0).sum())

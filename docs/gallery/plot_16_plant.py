@@ -16,7 +16,7 @@ import glsk_o3d as glsk
 from glsk_o3d import samples
 
 # %%
-# A plant in metres, scanned with 0.7 mm of noise: a stem 16 mm thick, and seven leaves, each a strip up to 6 cm wide,
+# A plant in metres, scanned with 0.7 mm of noise: a stem 24 mm thick, and seven leaves, each a strip up to 6 cm wide,
 # folded along its middle, that leaves the stem at 35 degrees and bends over by 95 more.
 
 rng = np.random.default_rng(0)
@@ -33,13 +33,13 @@ def leaf(height, length, turn):
     out, up = (
         np.interp(t, steps, length * np.cumsum(way) / 200) for way in (np.sin(tilt), np.cos(tilt))
     )
-    points = np.column_stack([0.008 + out, side, height + up + 0.25 * np.abs(side)])
+    points = np.column_stack([0.012 + out, side, height + up + 0.25 * np.abs(side)])
     return points @ np.array(
         [[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]]
     )
 
 
-stem = samples.tube(6000, length=0.8, radius=0.008).points[:, [1, 2, 0]] + [0, 0, 0.4]
+stem = samples.tube(6000, length=0.8, radius=0.012).points[:, [1, 2, 0]] + [0, 0, 0.4]
 turns = np.pi * np.arange(7) + rng.normal(scale=0.3, size=7)
 cloud = np.concatenate([stem, *map(leaf, HEIGHTS, LENGTHS, turns)])
 cloud += rng.normal(scale=0.0007, size=cloud.shape)

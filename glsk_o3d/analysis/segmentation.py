@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
-from ..refinement.axis_fit import nearest_on_edges
+from ..numerics.nearest_edges import nearest_on_edges
 from .curves import along, pieces
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..refinement.axis_fit import nearest_on_edges
+from ..numerics.nearest_edges import nearest_on_edges
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton

@@ -39,6 +39,20 @@ def relative_distance(
     (n,) float array
         Over the distance to the surface at the nearest place of that edge.
     """
+    return _over_surface(points, vertices, surface, paths)[0]
+
+
+def beyond_surface(
+    points: np.ndarray, vertices: np.ndarray, surface: np.ndarray, paths: Sequence[np.ndarray]
+) -> np.ndarray:
+    """How far points are out of the surface around some paths, negative inside: as `relative_distance`, in length."""
+    ratio, there = _over_surface(points, vertices, surface, paths)
+    return (ratio - 1) * there
+
+
+def _over_surface(
+    points: np.ndarray, vertices: np.ndarray, surface: np.ndarray, paths: Sequence[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
     a, b = (np.concatenate([path[part] for path in paths]) for part in (slice(-1), slice(1, None)))
     start, step = vertices[a], vertices[b] - vertices[a]
     length, tiny = norm(step), TINY
@@ -47,7 +61,7 @@ def relative_distance(
     points, start = points - start[0], start - start[0]
     size = max(np.abs(points).max(), np.abs(start).max())
     least = max(np.finfo(float).eps * size, tiny)  # of a line, which has no thickness but roundings
-    found = np.empty(len(points))
+    ratio, nearest = np.empty(len(points)), np.empty(len(points))
     rows = max(POLYLINE_CHUNK // len(a), 1)
     for first in range(0, len(points), rows):
         p = points[first : first + rows]
@@ -55,6 +69,9 @@ def relative_distance(
         squared = (p**2).sum(axis=1)[:, None] - 2 * p @ start.T + (start**2).sum(axis=1)
         foot = np.clip(along, 0, length)
         distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
-        there = surface[a] + foot / np.maximum(length, tiny) * (surface[b] - surface[a])
-        found[first : first + rows] = (distance / np.maximum(there, least)).min(axis=1)
-    return found
+        there = np.maximum(surface[a] + foot / np.maximum(length, tiny) * (surface[b] - surface[a]), least)
+        over = distance / there
+        edge = over.argmin(axis=1)[:, None]
+        ratio[first : first + rows] = np.take_along_axis(over, edge, axis=1)[:, 0]
+        nearest[first : first + rows] = np.take_along_axis(there, edge, axis=1)[:, 0]
+    return ratio, nearest

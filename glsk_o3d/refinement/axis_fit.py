@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import bsr_array, csc_array
 
 from ..numerics.groups import group_sum
+from ..numerics.nearest_edges import incident_edges, nearest_on_edges
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
@@ -27,7 +28,6 @@ FIT_WALK = 3  # measured: vertices by which a point may move along the curve in 
 # derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
 FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
 HALF_SUPPORT = 8  # fitted: points that support a vertex half
-NEAREST_TIE = 1e-9  # derived: of roundings, which must not choose between the edges of a vertex
 ENTRIES = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # derived: the upper triangle of a symmetric matrix, spread out
 
 
@@ -45,8 +45,10 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     with c the number of points at a vertex. The doubt d, from 0 to 1, is the share of the distance from the curve that
     the normals do not explain; where it is large, noise is as wide as the part and the
     points say more than their normals. :math:`\lambda = (w / h)^4` with the half width w and the spacing h of the
-    vertices keeps the curve from bending within a half width, however many vertices there are. A half tube, scanned
-    from one side, has an axis, but the centroid of its points is off it. So the first pass takes the normals alone.
+    vertices keeps the curve from bending within a half width, however many vertices there are. The normals say how
+    wide a section is, see `half_axes`, and as far as there is doubt the second moments of its points. A half tube,
+    scanned from one side, has an axis, but the centroid of its points is off it. So the first pass takes the normals
+    alone.
 
     **The place of a point is smoothed on the surface.** The nearest place of a wiggly curve has its wiggle, and a curve
     fitted to the points that its own wiggle gave it keeps it. So the nearest places, as positions in space, are
@@ -84,7 +86,7 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     for step in range(passes):
         edge, t = nearest_on_edges(x, ends, edges_at[vertex], p)
         place = x[ends[edge, 0]] + t[:, None] * (x[ends[edge, 1]] - x[ends[edge, 0]])
-        place = smooth(place, FIT_DIFFUSION * near.sections.half_width[vertex])
+        place = smooth(place, FIT_DIFFUSION * near.width[vertex])
         for _ in range(FIT_WALK):
             edge, t = nearest_on_edges(x, ends, edges_at[vertex], place)
             vertex = ends[edge, (t > 0.5).astype(int)]
@@ -143,52 +145,6 @@ def axis_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return low - slack, high + slack
 
 
-def incident_edges(edges: np.ndarray, m: int) -> np.ndarray:
-    """Edges at every vertex, (m, most) int array, filled up with -1."""
-    vertex, edge = edges.ravel(), np.repeat(np.arange(len(edges)), 2)
-    order = np.argsort(vertex, kind="stable")
-    vertex, edge = vertex[order], edge[order]
-    degree = np.bincount(vertex, minlength=m)
-    table = np.full((m, max(degree.max(initial=0), 2)), -1)
-    table[vertex, np.arange(len(vertex)) - np.repeat(np.cumsum(degree) - degree, degree)] = edge
-    return table
-
-
-def nearest_on_edges(
-    x: np.ndarray, edges: np.ndarray, candidates: np.ndarray, p: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The place nearest to each point among some edges.
-
-    Parameters
-    ----------
-    x : (m, 3) float array
-    edges : (e, 2) int array
-    candidates : (n, c) int array
-        Edges to look at for each point, -1 for none; at least one.
-    p : (n, 3) float array
-
-    Returns
-    -------
-    edge : (n,) int array
-    t : (n,) float array
-        From 0 at the first end of the edge to 1 at the second.
-    """
-    starts, ways = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
-    lengths = np.maximum(dot(ways, ways), TINY)  # squared
-    edge, t, best = np.zeros(len(p), int), np.zeros(len(p)), np.full(len(p), np.inf)
-    for column in candidates.T:
-        some = np.flatnonzero(column >= 0)
-        column = column[some]
-        along, offset = ways.take(column, axis=0), p.take(some, axis=0) - starts.take(column, axis=0)
-        part = np.clip(dot(along, offset) / lengths.take(column), 0, 1)
-        offset -= part[:, None] * along
-        squared = dot(offset, offset)
-        nearer = squared < (1 - NEAREST_TIE) * best[some]  # a vertex belongs to all its edges: rounding must not choose
-        some = some[nearer]
-        edge[some], t[some], best[some] = column[nearer], part[nearer], squared[nearer]
-    return edge, t
-
-
 class _Nearest(NamedTuple):
     """What the points are to the place of the curve nearest to them."""
 
@@ -200,6 +156,7 @@ class _Nearest(NamedTuple):
     doubt: np.ndarray  # d, of every vertex
     support: np.ndarray  # points at every vertex and its neighbours
     sections: HalfAxes  # at every vertex
+    width: np.ndarray  # half of the section's, at every vertex
 
 
 def _nearest(
@@ -222,16 +179,31 @@ def _nearest(
     miss = dot(across, offset) ** 2
     apart = dot(offset, offset) - dot(offset, along) ** 2
     a, b = ends.T
-    facts = np.column_stack([miss, apart, np.full(len(p), 0.5), normal_moments(n, offset)])
+    aside = offset - dot(offset, along)[:, None] * along
+    squares = aside[:, ROWS] * aside[:, COLUMNS]
+    facts = np.column_stack([miss, apart, np.full(len(p), 0.5), normal_moments(n, offset), squares])
     at = group_sum(facts, edge, len(ends))
     at = group_sum(np.concatenate([at, at]), np.concatenate([a, b]), len(x))
     at = at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))
     miss_at, apart_at, support = at[:, :3].T
-    sections = half_axes(at[:, 3:], radii)
+    sections = half_axes(at[:, 3:15], radii)
     apart_at = np.maximum(apart_at, 0)  # but for rounding, a difference of squares
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
     doubt = np.where(apart_at > 0, np.minimum(2 * miss_at, apart_at) / np.maximum(apart_at, TINY), 1)
-    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections)
+    # normals of a sheet as thin as its points are apart say nothing of its width, and there is nothing but doubt
+    spread = _spread_width(at[:, 15:] / np.maximum(support, TINY)[:, None])
+    width = sections.half_width + doubt * np.maximum(spread - sections.half_width, 0)
+    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width)
+
+
+def _spread_width(moments: np.ndarray) -> np.ndarray:
+    r"""Half width of sections by their points: from second moments around the axis, (m, 6) float array.
+
+    With the eigenvalues a >= b across the limb it is :math:`\sqrt{a (3 - b / a)}`: exact around a circle, where
+    a = b = r^2 / 2, also for half of one, and on a flat strip, where a = w^2 / 3.
+    """
+    _, less, most = np.linalg.eigvalsh(moments[:, ENTRIES].reshape(-1, 3, 3)).T
+    return np.sqrt(np.maximum(3 * most - np.clip(less, 0, most), 0))
 
 
 def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pull: np.ndarray, pattern: _Pattern) -> np.ndarray:
@@ -261,7 +233,7 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pull: np.ndarray, patte
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
     stencil = np.column_stack([np.ones(len(inner)), -chord])
     squared = np.maximum(reach.prod(axis=1), TINY)
-    width = np.minimum(near.sections.half_width[inner] ** 2, FIT_WIDEST**2 * squared) / squared
+    width = np.minimum(near.width[inner] ** 2, FIT_WIDEST**2 * squared) / squared
     bend = FIT_STIFFNESS**4 * width**2 * np.maximum(count[inner], 1)
     bend = bend[:, None, None] * stencil[:, :, None] * stencil[:, None]  # the same for all three coordinates
     blocks = np.concatenate(

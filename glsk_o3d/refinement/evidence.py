@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..numerics.morton import morton_order
+from ..numerics.nearest_edges import incident_edges, nearest_on_edges
 from ..numerics.neighbourhoods import uprightness
 from ..numerics.vectors import TINY, dot
 from ..numerics.winding import orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton
-from .axis_fit import incident_edges, nearest_on_edges
 from .surface_graph import SurfaceGraph
 
 # fitted: winding number below which an axis is in nothing; .5 on that of a tube seen from one side, .2 in sparse crowns

@@ -26,13 +26,9 @@ MEETING_STAY = 0.1  # weight of where the junction was, per meeting: lines that 
 class Meeting(NamedTuple):
     """Where limbs meet that go on straight on."""
 
-    place: np.ndarray
     anchor: np.ndarray  # (k, 3), the last undisturbed place of each limb
     foot: np.ndarray  # (k, 3), where each limb passes the meeting place, or its anchor if that is behind it
-    start: np.ndarray  # (k,), length along each limb from its junction to the anchor
-    say: np.ndarray  # (k,), whether the limb was asked
     fits: np.ndarray  # (k,), whether the limb passes within the radius of the thickest
-    ahead: np.ndarray  # (k,), whether it goes towards the place
 
 
 class Limbs:
@@ -112,7 +108,7 @@ class Limbs:
         near : (3,) float array
             Where lines meet that are nearly one.
         """
-        anchor, way, start = (np.array(values) for values in zip(*map(self.axis, limbs), strict=True))
+        anchor, way, _ = (np.array(values) for values in zip(*map(self.axis, limbs), strict=True))
         radius = self.radius[[self.branch[limb] for limb in limbs]]
         long = ~self.short[[self.branch[limb] for limb in limbs]]
         say = long if long.sum() > 1 else np.ones(len(long), bool)
@@ -121,7 +117,7 @@ class Limbs:
         place = near + np.linalg.solve(weight, np.einsum("kij,kj->i", across, anchor - near))
         along = dot(place - anchor, way)
         fits = norm(place - anchor - along[:, None] * way) <= radius.max()
-        return Meeting(place, anchor, anchor + np.maximum(along, 0)[:, None] * way, start, say, fits, along >= 0)
+        return Meeting(anchor, anchor + np.maximum(along, 0)[:, None] * way, fits)
 
 
 class _Place(NamedTuple):

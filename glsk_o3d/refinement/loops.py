@@ -16,8 +16,10 @@ from ..skeleton import Skeleton
 from .evidence import LEAST_INSIDE, Evidence
 from .merging import drop_edges, merge_vertices
 from .scores import HANDLE_WEIGHTS, probability
+from .surface_graph import SurfaceGraph
 from .triangles import collapse_triangles
 
+HOLE_WINDING = 0.25  # fitted: winding number in a hole, over that along the loop: near 0, and .5 or more inside a part
 WIDE_LOOP = 1.5  # fitted: opening of a loop that is more than two strands in one part
 WIDE_OPEN = 3.0  # fitted: opening beyond which it says no more: sparse crowns have wide false loops
 HOLE_SHARE = 0.6  # fitted: of the largest circle in a loop, the part of it that is asked
@@ -32,25 +34,33 @@ def surface_distance(skeleton: Skeleton) -> np.ndarray:
     return group_median(distance, vertex, len(skeleton.vertices))
 
 
-def zip_narrow_loops(skeleton: Skeleton) -> Skeleton:
+def zip_narrow_loops(skeleton: Skeleton, graph: SurfaceGraph) -> Skeleton:
     """Zip up the loops that open less than their tube is thick, before there is a fit: they lie inside one part.
 
     The opening of a loop is the radius of the largest circle inside it; the tube's is the median over the loop of the
     distance from its vertices to the surface. All such loops of a minimum cycle basis go at once, until there are none.
+    A loop around a hole stays, however narrow: the winding number in that circle is near 0.
 
     Parameters
     ----------
     skeleton : Skeleton
+    graph : SurfaceGraph
+        Of its points.
 
     Returns
     -------
     Skeleton
         Without triangles.
     """
+    evidence: Evidence | None = None
     while True:
         surface = surface_distance(skeleton)
         cycles = minimum_cycle_basis(len(surface), skeleton.edges, skeleton.edge_lengths)
         narrow = [cycle for cycle in cycles if not opens_wider(skeleton.vertices[cycle], np.median(surface[cycle]))]
+        if narrow:
+            evidence = evidence or Evidence.of(skeleton, graph)
+            holes = _holes(skeleton, narrow, evidence)
+            narrow = [cycle for cycle, hole in zip(narrow, holes, strict=True) if hole.share > HOLE_WINDING]
         if not narrow:
             return skeleton
         skeleton = _zipped(skeleton, narrow)
@@ -136,30 +146,48 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
         return []
     surface = surface_distance(skeleton)
     pairs, weight = evidence.bonds(skeleton)
-    circles, holes = [], []
+    found = []
+    for cycle, hole in zip(cycles, _holes(skeleton, cycles, evidence), strict=True):
+        tube = max(float(np.median(surface[cycle])), TINY)
+        crossing = crossings(cycle, len(surface), pairs, weight)
+        facts = dict(
+            opening=float(np.log(min(hole.radius, WIDE_OPEN * tube) / tube + 0.1)),
+            winding=float(np.clip(hole.share, 0, 1.5)),
+            bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.01)),
+            confidence=float(np.nan_to_num(skeleton.confidence[cycle]).mean()),
+        )
+        found.append(LoopEvidence(facts, hole.inside, hole.centre, int(np.argmin(crossing))))
+    return found
+
+
+class _Hole(NamedTuple):
+    """The largest circle in a loop."""
+
+    centre: np.ndarray
+    radius: float
+    winding: float  # the least winding number in it
+    inside: float  # the median one along the loop
+
+    @property
+    def share(self) -> float:
+        return self.winding / max(self.inside, LEAST_INSIDE)
+
+
+def _holes(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[_Hole]:
+    circles, places = [], []
     for cycle in cycles:
         points = skeleton.vertices[cycle]
         centre, radius = inscribed_circle(points)
         axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][:2]
         circles.append((centre, radius))
-        holes.append(centre + HOLE_SHARE * radius * np.vstack([np.zeros(3), DIRECTIONS @ axes]))
+        places.append(centre + HOLE_SHARE * radius * np.vstack([np.zeros(3), DIRECTIONS @ axes]))
     around = np.unique(np.concatenate(cycles))
-    answers = evidence.winding(np.concatenate([*holes, skeleton.vertices[around]]))
-    hole = answers[: -len(around)].reshape(len(cycles), -1).min(axis=1)
-    winding = np.zeros(len(surface))
+    answers = evidence.winding(np.concatenate([*places, skeleton.vertices[around]]))
+    least = answers[: -len(around)].reshape(len(cycles), -1).min(axis=1)
+    winding = np.zeros(len(skeleton.vertices))
     winding[around] = answers[-len(around) :]
-    found = []
-    for cycle, (centre, radius), least in zip(cycles, circles, hole, strict=True):
-        tube, inside = max(float(np.median(surface[cycle])), TINY), float(np.median(winding[cycle]))
-        crossing = crossings(cycle, len(surface), pairs, weight)
-        facts = dict(
-            opening=float(np.log(min(radius, WIDE_OPEN * tube) / tube + 0.1)),
-            winding=float(np.clip(least / max(inside, LEAST_INSIDE), 0, 1.5)),
-            bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.01)),
-            confidence=float(np.nan_to_num(skeleton.confidence[cycle]).mean()),
-        )
-        found.append(LoopEvidence(facts, inside, centre, int(np.argmin(crossing))))
-    return found
+    inside = [float(np.median(winding[cycle])) for cycle in cycles]
+    return [_Hole(*circle, float(hole), along) for circle, hole, along in zip(circles, least, inside, strict=True)]
 
 
 def crossings(cycle: np.ndarray, m: int, pairs: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -117,7 +117,7 @@ def meet(
         right[:3] = MEETING_HOLD * (near - place)
         right[3] = 1e-6 * touching
         for line in lines:
-            if line.spread <= 0:
+            if line.spread <= 0 or line.radius <= 0:
                 continue
             offset = line.middle - place
             aside = offset - (offset @ line.way) * line.way

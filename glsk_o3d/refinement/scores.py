@@ -6,20 +6,21 @@ from collections.abc import Mapping
 
 import numpy as np
 
-# All fitted, by benchmarks/calibrate.py on random shapes as scanners see them; docs/method.md says what the facts are.
+# All fitted, by benchmarks/calibrate.py on random shapes and things as scanners see them; docs/method.md says what the
+# facts are.
 AIR_WEIGHTS = {
-    "constant": -2.9,
-    "deficit": 2.6,
-    "surface": -1.1,
-    "straightness": -4.7,
-    "noise": 4.0,
+    "constant": -5.8,
+    "deficit": 1.7,
+    "surface": -0.5,
+    "straightness": -3.2,
+    "noise": 1.9,
     "bonds": -0.9,
-    "inner": 1.7,
-    "length": -1.3,
+    "inner": 3.4,
+    "length": -0.5,
 }
-HANDLE_WEIGHTS = {"constant": 1.9, "opening": 3.5, "winding": -4.0, "bonds": 0.8, "confidence": 2.8}
+HANDLE_WEIGHTS = {"constant": -0.9, "opening": 2.9, "winding": -3.3, "bonds": 0.5, "confidence": 3.0}
 BRIDGE_WEIGHTS = {"constant": -3.7, "winding": 5.8, "straightness": 2.5, "cap": -0.7}
-LIMB_WEIGHTS = {"constant": -0.8, "reach": 3.2, "web": -4.0}
+LIMB_WEIGHTS = {"constant": -3.0, "protrusion": 2.7, "web": -6.2, "confidence": 4.4}
 
 
 def probability(weights: Mapping[str, float], facts: Mapping[str, float]) -> float:

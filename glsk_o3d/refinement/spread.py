@@ -6,9 +6,9 @@ import numpy as np
 
 from ..numerics.groups import group_median
 from ..numerics.near_links import linked, steps
+from ..numerics.nearest_edges import incident_edges, nearest_on_edges
 from ..numerics.vectors import norm
 from ..skeleton import Skeleton
-from .axis_fit import incident_edges, nearest_on_edges
 
 
 def spread_around(skeleton: Skeleton) -> np.ndarray:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..numerics.nearest_edges import incident_edges
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
-from .axis_fit import incident_edges
 from .merging import support
 from .sections import measure_sections
 

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, samples, skeletonize
+from glsk_o3d.numerics.nearest_edges import incident_edges, nearest_on_edges
 from glsk_o3d.numerics.radii import plane_distance_radii
 from glsk_o3d.numerics.vectors import norm
 from glsk_o3d.refinement import axis_fit
-from glsk_o3d.refinement.axis_fit import FIT_BEYOND, FIT_STAY, HALF_SUPPORT, incident_edges, nearest_on_edges
+from glsk_o3d.refinement.axis_fit import FIT_BEYOND, FIT_STAY, HALF_SUPPORT
 from glsk_o3d.refinement.sections import measure_sections
 
 R = 0.15  # of the tubes
@@ -610,7 +611,7 @@ def test_tilted_normals_do_not_make_a_tube_thinner():
     radii, planes = radii_and_planes(replace(skeleton, normals=normals))
     np.testing.assert_allclose(np.median(planes), R / np.sqrt(2), rtol=0.05)
     assert np.median(radii) > 0.9 * R
-    assert radii.max() < 1.02 * R
+    assert radii[2:-2].max() < 1.02 * R  # at an open end there are points on one side alone
 
 
 def test_a_board_of_two_faces_has_a_radius():

@@ -6,9 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from glsk_o3d.numerics.cycles import minimum_cycle_basis
+from glsk_o3d.numerics.cycles import minimum_cycle_basis, opens_wider
 from glsk_o3d.refinement.evidence import Evidence
 from glsk_o3d.refinement.loops import close_loops, loop_facts, surface_distance, zip_narrow_loops, zip_pairs
+from glsk_o3d.refinement.surface_graph import SurfaceGraph
 
 X, Y, Z = np.eye(3)
 LADDER = [[(-0.8, y, 0), (0, y, 0), (0.8, y, 0)] for y in (0, 0.5)] + [[(x, 0, 0), (x, 0.5, 0)] for x in (-0.8, 0, 0.8)]
@@ -67,7 +68,20 @@ def test_raw_loops_are_zipped_that_open_less_than_their_tube_is_thick(piped, gap
     raw = strands(piped, gap=gap)
     reach = np.median(surface_distance(raw))
     assert (gap / 2 < reach) == zipped
-    assert zip_narrow_loops(raw).n_loops == (0 if zipped else 1)
+    assert zip_narrow_loops(raw, SurfaceGraph.of(raw)).n_loops == (0 if zipped else 1)
+
+
+def test_a_raw_loop_around_a_hole_stays_however_narrow(piped):
+    """A ring of which the hole is half as wide as its tube, and the contraction has gone too far."""
+    angle = np.linspace(0, 2 * np.pi, 25)
+    circle = 0.15 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    ring = piped([tuple(map(tuple, pair)) for pair in pairwise(circle)])
+    raw = replace(ring, vertices=0.62 * ring.vertices)
+    assert raw.n_loops == 1
+    assert not opens_wider(
+        raw.vertices[np.argsort(np.arctan2(*raw.vertices[:, 1::-1].T))], np.median(surface_distance(raw))
+    )
+    assert zip_narrow_loops(raw, SurfaceGraph.of(raw)).n_loops == 1
 
 
 def test_a_wide_loop_is_cut_where_fewest_bonds_cross(piped):

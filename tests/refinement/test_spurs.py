@@ -1,4 +1,4 @@
-"""Spurs are cut by how far their points leave the other branches, over the distance from these to the surface."""
+"""Spurs are cut by how far their points stand out of the surface around the other branches."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -9,20 +9,31 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
-from glsk_o3d.numerics.polylines import relative_distance
+from glsk_o3d.numerics.polylines import beyond_surface, relative_distance
+from glsk_o3d.refinement import spurs
 from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from glsk_o3d.refinement.spurs import SPUR_QUANTILE, limb_facts, prune_spurs
 
 N = 21  # vertices of the trunk
 PER = 60  # points of each: many, so that a cut spur does not change the thickness of its junction
 
-# a surface that says nothing of what hangs together: the reach alone decides
+# a surface that says nothing of what hangs together, and no confidence: how far points stand out decides
 UNBONDED = SimpleNamespace(bonds=lambda skeleton: (np.empty((0, 2), int), np.empty(0)))
+WIDE = 0.1  # half width of every section
 
 
-def pruned(skeleton, reach):
-    """Without the branches that reach less far."""
-    return prune_spurs(skeleton, UNBONDED, probability(LIMB_WEIGHTS, {"reach": np.log(reach + 0.1), "web": 0}))[0]
+@pytest.fixture(autouse=True)
+def _one_width(monkeypatch):
+    monkeypatch.setattr(
+        spurs, "measure_sections", lambda skeleton: SimpleNamespace(half_width=np.full(len(skeleton.vertices), WIDE))
+    )
+
+
+def pruned(skeleton, reach, thick=0.1):
+    """Without the branches that reach less far from a part so thick, over its thickness; at least 1."""
+    out = (reach - 1) * thick / WIDE
+    facts = {"protrusion": np.log(out + 0.3), "web": 0, "confidence": 0}
+    return prune_spurs(skeleton, UNBONDED, probability(LIMB_WEIGHTS, facts))[0]
 
 
 def directions(n, seed=0):
@@ -56,7 +67,7 @@ def tree(*spurs, radius=0.1, length=None, share=1.0, per=10, along=0.0):
 
 def test_short_is_cut_long_stays():
     raw = tree((5, 0.07), (12, 0.5))
-    skeleton = pruned(raw, 0.8)
+    skeleton = pruned(raw, 1.1)
     assert len(skeleton.vertices) == N + 2
     np.testing.assert_array_equal(skeleton.junctions, [12])
     np.testing.assert_allclose(skeleton.vertices[:N], raw.vertices[:N], atol=1e-15)
@@ -68,7 +79,7 @@ def test_short_is_cut_long_stays():
     assert (skeleton.vertex_of_point[(owner == N) | (owner == N + 1)] == 5).all()
 
 
-@pytest.mark.parametrize("reach", [0.4, 1.3, 2.0])
+@pytest.mark.parametrize("reach", [1.1, 1.3, 2.0])
 @pytest.mark.parametrize(("share", "cut"), [(1 - 1e-6, True), (1 + 1e-6, False)])
 def test_threshold_is_exact(reach, share, cut):
     radius = np.full(N, 0.03)
@@ -83,7 +94,7 @@ def test_what_counts_is_how_far_points_are_from_the_part_and_how_thick_it_is_the
     """Between two vertices of the trunk, and far from the junction where it is thin."""
     radius = np.where(np.linspace(-1, 1, N) < 0.4, 0.3, 0.1)
     there = 0.1 if along > 0.4 else 0.3
-    skeleton = pruned(tree((10, 1.3 * there * share), radius=radius, along=along), 1.3)
+    skeleton = pruned(tree((10, 1.3 * there * share), radius=radius, along=along), 1.3, there)
     assert (len(skeleton.vertices) == N) == cut
 
 
@@ -101,23 +112,25 @@ def test_distance_from_paths_over_their_thickness(far):
             expected = np.minimum(expected, distance / thick[nearest, 0])
     found = relative_distance(points + far, vertices + far, thickness, paths)
     np.testing.assert_allclose(found, expected, rtol=1e-3)
+    out = beyond_surface(points + far, vertices + far, np.full(12, 0.5), paths)
+    np.testing.assert_allclose(out, 0.5 * (relative_distance(points, vertices, np.full(12, 0.5), paths) - 1), atol=1e-8)
 
 
 @pytest.mark.parametrize(("reach", "length", "cut"), [(0.07, 0.9, True), (0.3, 0.02, False)])
 def test_points_count_and_not_the_curve(reach, length, cut):
-    skeleton = pruned(tree((10, reach), length=length), 1.0)
+    skeleton = pruned(tree((10, reach), length=length), 1.1)
     assert (len(skeleton.vertices) == N) == cut
 
 
 @pytest.mark.parametrize(("share", "cut"), [(1.0, True), (SPUR_QUANTILE + 0.02, True), (SPUR_QUANTILE - 0.02, False)])
 def test_a_few_far_points_do_not_save_a_spur(share, cut):
-    skeleton = pruned(tree((10, 0.05), share=share, per=100), 1.0)
+    skeleton = pruned(tree((10, 0.05), share=share, per=100), 1.1)
     assert (len(skeleton.vertices) == N) == cut
 
 
 def test_a_spur_without_points_reaches_nowhere():
     raw = tree((10, 0.5), per=0)
-    skeleton = pruned(raw, 1e-6)
+    skeleton = pruned(raw, 1 + 1e-6)
     assert len(skeleton.vertices) == N
     np.testing.assert_allclose(skeleton.vertices, raw.vertices[:N], atol=1e-15)
 
@@ -127,14 +140,14 @@ def test_points_without_a_say_do_not_count():
     raw = tree((10, 0.05), share=0.5)
     distance = np.linalg.norm(raw.points - raw.vertices[10], axis=1)
     raw.normals[(raw.vertex_of_point >= N) & (distance > 0.1)] = np.nan
-    assert len(pruned(raw, 1.0).vertices) == N
+    assert len(pruned(raw, 1.1).vertices) == N
 
 
 def test_a_junction_stays_what_it_was():
     raw = tree((10, 0.05))
     m = len(raw.vertices)
-    raw = replace(raw, radii=np.arange(m) + 1.0, confidence=np.linspace(0.5, 1, m))
-    skeleton = pruned(raw, 0.8)
+    raw = replace(raw, radii=np.arange(m) + 1.0, confidence=np.linspace(1, 0, m))
+    skeleton = pruned(raw, 1.1)
     assert len(skeleton.vertices) == N < m
     np.testing.assert_array_equal(skeleton.vertices, raw.vertices[:N])
     np.testing.assert_array_equal(skeleton.radii, raw.radii[:N])
@@ -144,7 +157,7 @@ def test_a_junction_stays_what_it_was():
 def test_ends_of_the_trunk_stay():
     """Only what leaves a junction is a spur: a path shorter than it is thick is all there is."""
     raw = tree(radius=50.0)
-    assert pruned(raw, 0.8) is raw
+    assert len(pruned(raw, 1.1).vertices) == len(raw.vertices)
 
 
 def test_a_vertex_without_points_is_as_thick_as_its_radius_says():
@@ -152,7 +165,7 @@ def test_a_vertex_without_points_is_as_thick_as_its_radius_says():
     raw = tree((10, 0.05))
     raw.vertex_of_point[raw.vertex_of_point == 10] = 9
     assert not (raw.vertex_of_point == 10).any()
-    assert len(pruned(raw, 0.8).vertices) == N
+    assert len(pruned(raw, 1.1).vertices) == N
 
 
 def test_far_points_in_chunks(monkeypatch):
@@ -166,19 +179,19 @@ def test_far_points_in_chunks(monkeypatch):
 def test_lines_have_no_thickness():
     """Whatever is off a line leaves it."""
     raw = tree((10, 0.5), radius=0.0)
-    assert pruned(raw, 1.3) is raw
+    assert len(pruned(raw, 1.3).vertices) == len(raw.vertices)
 
 
 def test_zero_keeps_all():
     raw = tree((5, 0.07))
-    assert pruned(raw, 0) is raw
+    assert len(prune_spurs(raw, UNBONDED, 0)[0].vertices) == len(raw.vertices)
 
 
 def test_least_first_until_it_is_no_junction(ringed):
     """Of three short branches the farthest two remain as a path."""
     tips = np.array([[0.06, 0, 0], [-0.02, 0.05, 0], [-0.02, -0.07, 0]])
-    raw = ringed(np.concatenate([[[0, 0, 0]], tips]), [(0, 1), (0, 2), (0, 3)], radius=[0.1, 1e-6, 1e-6, 1e-6])
-    skeleton = pruned(raw, 0.8)
+    raw = ringed(np.concatenate([[[0, 0, 0]], tips]), [(0, 1), (0, 2), (0, 3)], radius=[0.04, 1e-6, 1e-6, 1e-6])
+    skeleton = pruned(raw, 3, 0.04)
     assert skeleton.edges.tolist() == [[0, 1], [0, 2]]
     np.testing.assert_allclose(skeleton.vertices, [[0, 0, 0], tips[0], tips[2]], atol=1e-15)
 
@@ -190,7 +203,7 @@ def test_several_at_one_junction_and_in_any_numbering():
     edges = sorted(map(tuple, np.sort(back[raw.edges], axis=1).tolist()))
     renamed = Skeleton(raw.vertices[turn], edges, raw.radii, back[raw.vertex_of_point], raw.points, raw.normals)
     for case in (raw, renamed):
-        skeleton = pruned(case, 0.8)
+        skeleton = pruned(case, 1.1)
         assert len(skeleton.vertices) == N + 2
         assert len(skeleton.junctions) == 1
         expected = raw.vertices[[*range(N), N + 6, N + 7]]
@@ -199,27 +212,41 @@ def test_several_at_one_junction_and_in_any_numbering():
 
 
 def test_loops_at_a_junction_are_no_spurs(ringed):
-    """A tiny ring on a stem stays; the stem, a short link between two junctions whose limbs all meet, does not."""
+    """A tiny ring on a stem has no end: both stay."""
     tiny = [[0, 0, 0.02], [0.01, 0, 0.03], [0, 0, 0.04], [-0.01, 0, 0.03]]
     line = [[x, 0, 0] for x in (-1, 0, 1)]
-    edges = [(0, 1), (1, 2), (1, 3), (3, 4), (4, 5), (5, 6), (3, 6)]
-    skeleton = pruned(ringed(line + tiny, edges), 0.8)
-    assert (skeleton.n_loops, skeleton.n_components) == (1, 1)
-    assert skeleton.edges.tolist() == [[0, 1], [1, 2], [1, 3], [1, 5], [3, 4], [4, 5]]
+    raw = ringed(line + tiny, [(0, 1), (1, 2), (1, 3), (3, 4), (4, 5), (5, 6), (3, 6)])
+    assert len(pruned(raw, 1.1).edges) == len(raw.edges)
 
 
 def test_two_ways_between_two_junctions_stay(ringed):
     """They are a loop: neither may go, however short."""
     places = [[-1, 0, 0], [-0.02, 0, 0], [0, 0.01, 0], [0, -0.01, 0], [0.02, 0, 0], [1, 0, 0]]
     raw = ringed(places, [(0, 1), (1, 2), (1, 3), (2, 4), (3, 4), (4, 5)])
-    assert pruned(raw, 0.8) is raw
+    assert len(pruned(raw, 1.1).vertices) == len(raw.vertices)
 
 
-def test_reach_is_that_of_the_points_over_the_surface():
-    found = {leaf: np.exp(facts["reach"]) - 0.1 for leaf, facts in limb_facts(tree((5, 0.3), (12, 0.5)), UNBONDED)}
+def test_facts_of_a_limb():
+    """Its points stand out of the trunk, in its own half widths; nothing is said to hang together."""
+    raw = tree((5, 0.3), (12, 0.5))
+    raw = replace(raw, confidence=np.where(np.arange(len(raw.vertices)) < N, 0.2, 0.7))
+    found = dict(limb_facts(raw, UNBONDED))
     assert set(found) >= {N + 1, N + 3}
     for tip, reach in ((N + 1, 0.3), (N + 3, 0.5)):
-        assert found[tip] == pytest.approx(reach / 0.1, rel=0.15)
+        assert np.exp(found[tip]["protrusion"]) - 0.3 == pytest.approx((reach - 0.1) / WIDE, rel=0.15)
+        assert found[tip]["confidence"] == pytest.approx(0.7)
+        assert found[tip]["web"] == 0
+
+
+def test_a_cut_spur_does_not_make_its_junction_thicker():
+    """Its points are farther from the junction than the surface there is: the limb beside it stands out as before."""
+    far, near = ((10, 0.105), 400), ((10, 0.2), 10)
+    alone = dict(limb_facts(tree(near[0]), UNBONDED))[N + 1]["protrusion"]
+    raw = tree(far[0], near[0], per=400)
+    _, limbs = prune_spurs(raw, UNBONDED, 0.02)
+    assert [it.changed for it in limbs if it.place == tuple(raw.vertices[N + 1].tolist())] == [True]
+    kept = [it.probability for it in limbs if it.place == tuple(raw.vertices[N + 3].tolist())]
+    assert kept == [pytest.approx(probability(LIMB_WEIGHTS, {"protrusion": alone, "web": 0, "confidence": 0}), rel=0.3)]
 
 
 def test_what_is_pruned_was_judged():
@@ -233,7 +260,7 @@ def test_what_is_pruned_was_judged():
 
 
 def test_the_farther_a_limb_reaches_the_more_probable_it_is():
-    skeleton, limbs = prune_spurs(tree((5, 0.17), (12, 0.5)), UNBONDED, 0)
+    skeleton, limbs = prune_spurs(tree((5, 0.3), (12, 0.7)), UNBONDED, 0)
     found = {it.place: it for it in limbs}
     assert {(it.about, it.changed) for it in limbs} == {("limb", False)}
     short, far = (found[tuple(skeleton.vertices[tip])].probability for tip in (N + 1, N + 3))
