@@ -78,8 +78,9 @@ def _limbs(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tup
     leaves = np.flatnonzero(skeleton.degree == 1)
     tips = np.flatnonzero(np.bincount(truth.edges.ravel(), minlength=len(truth.nodes)) == 1)
     near = cdist(skeleton.vertices[leaves], truth.nodes[tips]) <= TIP_REACH * truth.radii[tips]
+    served = _served(near)
     for leaf, facts in limb_facts(skeleton, evidence):
-        yield "limb", facts, _served(near[leaves != leaf]) < _served(near)
+        yield "limb", facts, _served(near[leaves != leaf]) < served
 
 
 def _served(near: np.ndarray) -> int:

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .vectors import TINY, unit
+from .vectors import FULL, TINY, unit
 
 # measured: distance of two eigenvalues over their spread, below which the closed form is not exact enough
 EIGENVALUES_APART = 1e-3
-_SQUARE = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
 
 
 def principal_parts(entries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,10 +77,10 @@ def _direction(shape: np.ndarray, value: np.ndarray, which: int) -> np.ndarray:
     diagonal = adjugate[[0, 3, 5]]
     longest = np.argmax(diagonal, axis=0)
     line = np.arange(len(longest))
-    vectors = adjugate.T[line[:, None], np.array(_SQUARE)[longest]]
+    vectors = adjugate.T[line[:, None], FULL[longest]]
     vectors = unit(vectors)
     # its trace is the product of the distances to the two other eigenvalues
     dim = np.flatnonzero(diagonal.sum(axis=0) < 3 * EIGENVALUES_APART)
     if len(dim):
-        vectors[dim] = np.linalg.eigh(shape.T[dim][:, _SQUARE])[1][:, :, which]
+        vectors[dim] = np.linalg.eigh(shape.T[dim][:, FULL])[1][:, :, which]
     return vectors

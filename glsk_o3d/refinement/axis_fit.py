@@ -14,7 +14,7 @@ from ..numerics.nearest_edges import incident_edges, nearest_on_edges
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
-from ..numerics.vectors import COLUMNS, ROWS, TINY, dot, norm, unit
+from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, dot, norm, unit
 from ..skeleton import Skeleton
 from .sections import HalfAxes, half_axes, normal_moments
 from .surface_graph import SurfaceGraph
@@ -28,7 +28,6 @@ FIT_WALK = 3  # measured: vertices by which a point may move along the curve in 
 # derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
 FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
 HALF_SUPPORT = 8  # fitted: points that support a vertex half
-ENTRIES = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # derived: the upper triangle of a symmetric matrix, spread out
 
 
 def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = None) -> Skeleton:
@@ -202,7 +201,7 @@ def _spread_width(moments: np.ndarray) -> np.ndarray:
     With the eigenvalues a >= b across the limb it is :math:`\sqrt{a (3 - b / a)}`: exact around a circle, where
     a = b = r^2 / 2, also for half of one, and on a flat strip, where a = w^2 / 3.
     """
-    _, less, most = np.linalg.eigvalsh(moments[:, ENTRIES].reshape(-1, 3, 3)).T
+    _, less, most = np.linalg.eigvalsh(moments[:, FULL]).T
     return np.sqrt(np.maximum(3 * most - np.clip(less, 0, most), 0))
 
 
@@ -220,7 +219,7 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pull: np.ndarray, patte
     share, pairs = near.share, near.share[:, [0, 0, 1]] * near.share[:, [0, 1, 1]]
     at_pairs = group_sum(matrix, near.edge[:, None] + e * np.arange(3), 3 * e, pairs)
     at_ends = group_sum(target, near.edge[:, None] + e * np.arange(2), 2 * e, share)
-    at_edges = at_pairs[:, ENTRIES].reshape(3, e, 3, 3) + at_pairs[:, 6].reshape(3, e, 1, 1) * upright
+    at_edges = at_pairs[:, FULL].reshape(3, e, 3, 3) + at_pairs[:, 6].reshape(3, e, 1, 1) * upright
     wanted = at_ends[:, :3] + np.einsum("eij,ej->ei", np.tile(upright, (2, 1, 1)), at_ends[:, 3:6])
     facts = np.column_stack([wanted, at_ends[:, 6], np.tile(along.reshape(e, 9), (2, 1))])
     facts = group_sum(facts, ends.T.ravel(), m)

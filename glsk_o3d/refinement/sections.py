@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..numerics.groups import group_sum
-from ..numerics.vectors import COLUMNS, ROWS, TINY, dot, norm, unit
+from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, dot, norm, unit
 from ..skeleton import Skeleton
 
 LEAST_SHARE = 1e-5  # fitted: of the squared normals, above which they say something of a direction: 1/300 of a radian
-_FULL = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]  # derived: the entries of a symmetric 3 x 3 matrix, by row and column
 
 
 class Sections(NamedTuple):
@@ -119,11 +118,11 @@ def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> HalfAxes:
     otherwise : (m,) float array
         The half axis in a direction that nobody saw.
     """
-    share, axes = np.linalg.eigh(moments[:, :6][:, _FULL])
+    share, axes = np.linalg.eigh(moments[:, :6][:, FULL])
     known = share[:, 1:] > LEAST_SHARE * share.sum(axis=1, keepdims=True)
     # in units in which N is 1 the extremes of h are eigenvalues
     plane = axes[:, :, 1:] / np.sqrt(np.where(known, share[:, 1:], 1))[:, None]
-    reach = known[:, :, None] * known[:, None] * np.einsum("mik,mij,mjl->mkl", plane, moments[:, 6:][:, _FULL], plane)
+    reach = known[:, :, None] * known[:, None] * np.einsum("mik,mij,mjl->mkl", plane, moments[:, 6:][:, FULL], plane)
     unseen = np.where(known, 0, np.nan_to_num(otherwise)[:, None])
     half, turn = np.linalg.eigh(reach + unseen[:, None] * np.eye(2))
     half = np.maximum(half, 0)  # rounding may leave less than nothing
