@@ -22,10 +22,9 @@ from glsk_o3d.analysis import compare
 from glsk_o3d.numerics.neighbourhoods import local_outlier_ratio, nearest_neighbours, principal
 from glsk_o3d.pipelines import default
 from glsk_o3d.preparation import surface
-from glsk_o3d.preparation.denoising import DENOISED_NOISE, DENOISED_RATIO, subspace_mean_shift
+from glsk_o3d.preparation.denoising import DENOISED_NOISE, DENOISED_RATIO, MOST_IN_ONE, subspace_mean_shift
 from glsk_o3d.preparation.frame import MIN_POINTS
 from glsk_o3d.preparation.surface import noise_share
-from glsk_o3d.preparation.thinning import MOST_IN_ONE
 from glsk_o3d.ring_builder import default_k, default_size, published_k
 
 TORUS = samples.torus(n=600).points
@@ -65,7 +64,7 @@ def test_usual_number_of_neighbours(n, k):
 @pytest.mark.parametrize("n", [20, 900, 2000])
 def test_words_for_numbers_of_neighbours(word, number, n):
     points = samples.torus(n=n).points
-    assert named_rings(RingBuilder(k=word)(points)) == named_rings(RingBuilder(k=number(n))(points))
+    assert named_rings(RingBuilder(k=word, around=0)(points)) == named_rings(RingBuilder(k=number(n), around=0)(points))
 
 
 @pytest.mark.parametrize("k", ["published", "auto", 5, 20])
@@ -564,8 +563,9 @@ def test_a_tube_is_contracted_with_as_many_points_around_it_as_are_enough(n):
     assert 18 < around < 45
     assert len(state) < 0.9 * n
     assert state.mass.mean() == pytest.approx(1, rel=1e-12)
-    finer = replace(builder, around=35)(sample.points)
-    assert len(finer) > len(state)
+    if n > 4000:  # of fewer all of the surface has no more than its share
+        finer = replace(builder, around=45)(sample.points)
+        assert len(finer) > len(state)
 
 
 def test_thin_parts_and_edges_keep_their_points():
@@ -574,7 +574,10 @@ def test_thin_parts_and_edges_keep_their_points():
     state = RingBuilder()(np.concatenate([thick, thin + [0, 1, 0]]))
     kept = state.point_of_survivor
     assert (kept < 9000).sum() < 0.5 * 9000
-    assert (kept >= 9000).sum() > 0.9 * 600
+    assert (kept >= 9000).sum() > 0.7 * 600  # not those that are nearer than a twentieth of the way around
+    gone = np.setdiff1d(np.arange(9000, 9600), kept) - 9000
+    nearest = np.linalg.norm(thin[gone, None] - thin[kept[kept >= 9000] - 9000], axis=2).min(axis=1)
+    assert np.quantile(nearest, 0.9) < np.sqrt(2 * np.pi * 0.02 * 1.5 / 600)  # their spacing
 
 
 @pytest.mark.parametrize("around", [0, 20])

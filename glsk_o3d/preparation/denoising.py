@@ -15,10 +15,11 @@ from ..numerics.pairing import merge_nearest
 from ..numerics.vectors import PAIRS
 from .frame import MIN_POINTS
 from .surface import Surface
-from .thinning import MOST_IN_ONE, STEADY_SHARE
+from .thinning import STEADY_SHARE
 
 RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
 RIDGE_CHUNK = 1024  # measured: points at a time: the (3, points, 32) work arrays then stay in the cache
+MOST_IN_ONE = 4  # fitted: noisy points that are averaged in a pass
 ENOUGH_NOISY = 4096  # fitted: noisy points that are enough; down to about so many they are averaged
 DENOISED_RATIO, DENOISED_NOISE = 1.8, 0.2  # fitted: local outlier ratio of a denoised outlier, and its least noise
 

@@ -1,4 +1,4 @@
-"""Thin a surface: where there are more points than it takes, and where there are too many."""
+"""Thin a surface: to even spacing where there are more points than it takes, and where there are too many."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from scipy.sparse import csr_array
 
 from ..numerics.eigen import principal_parts
 from ..numerics.neighbourhoods import nearest_left, principal
-from ..numerics.pairing import final_representatives, merge_nearest, mutual_pairs
+from ..numerics.pairing import final_representatives, mutual_pairs
 from ..numerics.vectors import PAIRS, TINY
 from .surface import Surface
 
-MOST_IN_ONE = 4  # fitted: points that one may stand for after a pass, where there are more than enough
 ASK_AGAIN = 0.25  # measured: share of the points left, below which the neighbours are looked up anew
-DENSE_FROM, DENSE_TO = 2000, 8192  # fitted: points from which on, and down to which, more than enough are merged
+DENSE_FROM = 2000  # fitted: points from which on more than enough are merged
+ENOUGH = 2400  # fitted: points on a body without thin parts
+PACKED = 0.42  # measured: points left on an area of 1 if none are to be nearer than 1
+SMOOTHING = 8  # fitted: steps over which the thickness of parts is averaged
+LEAST_AROUND = 3  # derived: points around the thinnest part
 WIDER_STEPS = 3  # measured: steps from neighbour to neighbour: fewer see no more than noise, more see other parts
 SHEET_FROM = 0.4  # measured: second over third variance of these, from which on they are a sheet; tubes of 10 have it
 WIDER_BIAS = 1.25  # measured: on tubes with 18 to 80 points around them, noise of up to a fifth of their spacing
@@ -38,21 +41,18 @@ def thin_surface(surface: Surface, around: float, most: int, k: Callable[[int], 
     ----------
     surface : Surface
     around : float
-        Points around a part that are enough, see `thin_dense`; 0 merges none for this.
+        Points around a part that are enough, see `spacing_enough`; 0 merges none for this.
     most : int
     k : callable
         Neighbours to have among so many points.
     """
-    points, spread = surface.points, surface.spread
+    points = surface.points
     thinned = Thinned(np.arange(len(points)), np.arange(len(points)), surface.neighbours)
-    while around and len(thinned.survivors) >= DENSE_FROM:
-        representative = thin_dense(points[thinned.survivors], thinned.neighbours, spread, around)
-        if np.count_nonzero(representative == np.arange(len(representative))) > STEADY_SHARE * len(representative):
-            break
-        thinned = _merged(points, thinned, representative, k)
-        if len(thinned.survivors) < DENSE_TO:
-            break
-        spread = principal(points[thinned.survivors], thinned.neighbours)[0]
+    before = np.inf
+    while around and DENSE_FROM <= len(thinned.survivors) <= STEADY_SHARE * before:
+        before, here = len(thinned.survivors), points[thinned.survivors]
+        apart = spacing_enough(here, thinned.neighbours, around)
+        thinned = _merged(points, thinned, thin_nearer(here, thinned.neighbours, apart), k)
     if most < len(thinned.survivors):
         thinned = _merged(points, thinned, thin(points[thinned.survivors], thinned.neighbours, most), k)
     return thinned
@@ -109,11 +109,8 @@ def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:
     return representative
 
 
-def thin_dense(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray, around: float) -> np.ndarray:
-    r"""Merge mutual nearest neighbours, at most four into one, where the surface has more points than it takes.
-
-    Merged m into one, a tube with N points around it has :math:`N / \sqrt m`, see `points_around`. Points are merged
-    as long as `around` are left; edges and thin parts stay as they are.
+def thin_nearer(points: np.ndarray, neighbours: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Merge mutual nearest neighbours, round by round, until none are nearer than they are to be.
 
     Parameters
     ----------
@@ -121,18 +118,54 @@ def thin_dense(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray, a
         All different.
     neighbours : (n, k) int array
         Their nearest neighbours, the point itself first.
-    spread : (n, 3) float array
-        As from `principal`.
-    around : float
-        Positive.
+    apart : (n,) float array
+        How far apart they are to be; of two points the lesser counts.
 
     Returns
     -------
     (n,) int array
         The point that each was merged into; itself for those that are left.
     """
-    most = np.minimum((points_around(points, neighbours, spread) / max(around, 1)) ** 2, MOST_IN_ONE)
-    return merge_nearest(points, neighbours, most)
+    left, representative = np.ones(len(points), bool), np.arange(len(points))
+    while True:
+        kept, swallowed = mutual_pairs(points, neighbours, left)
+        nearer = ((points[kept] - points[swallowed]) ** 2).sum(axis=1) < np.minimum(apart[kept], apart[swallowed]) ** 2
+        if not nearer.any():
+            return final_representatives(representative)
+        representative[swallowed[nearer]] = kept[nearer]
+        left[swallowed[nearer]] = False
+
+
+def spacing_enough(points: np.ndarray, neighbours: np.ndarray, around: float) -> np.ndarray:
+    r"""How far apart points may be, so that `around` of them are around every part, and enough on the body.
+
+    The circumference of the part that a point is on is its points around times their spacing, see `points_around`;
+    measured point by point it is rough, and what is left would be as uneven. So its inverse is averaged over the
+    surface. Flat and thick parts have no more than their share of 2400 points, spread evenly over all of the surface.
+    Nowhere more than twice the spacing that there is: fewer points are measured again, with less noise.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    neighbours : (n, k) int array
+        Their nearest neighbours, the point itself first.
+    around : float
+        Positive.
+
+    Returns
+    -------
+    (n,) float array
+    """
+    k = neighbours.shape[1]
+    spread = principal(points, neighbours)[0]
+    area = 4 * np.pi * np.sqrt(spread[:, 1] * spread[:, 2]) / k**2  # a disc's variance is a quarter of R^2
+    spacing = np.sqrt(area)
+    bent = 1 / (np.maximum(points_around(points, neighbours, spread), LEAST_AROUND) * np.maximum(spacing, TINY))
+    mean_over = _mean_over(neighbours)
+    for _ in range(SMOOTHING):
+        bent = mean_over @ bent
+    among = np.minimum(1 / (around * np.maximum(bent, TINY)), np.sqrt(area.sum() / ENOUGH))
+    return np.minimum(np.sqrt(PACKED) * among, 2 * spacing)
 
 
 def points_around(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray) -> np.ndarray:
@@ -158,8 +191,7 @@ def points_around(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray
     (n,) float array
         Infinite where nothing but noise is seen.
     """
-    n, k = neighbours.shape
-    mean_over = csr_array((np.full(neighbours.size, 1 / k), neighbours.ravel(), k * np.arange(n + 1)), shape=(n, n))
+    k, mean_over = neighbours.shape[1], _mean_over(neighbours)
     moments = np.column_stack([points, *(points[:, i] * points[:, j] for i, j in PAIRS)])
     for _ in range(WIDER_STEPS):
         moments = mean_over @ moments
@@ -171,3 +203,9 @@ def points_around(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray
     bent = sheet * bent + (1 - sheet) * np.maximum(wider[0], 0)
     with np.errstate(divide="ignore"):
         return WIDER_BIAS * np.sqrt(np.pi * k / 4 * near[2] / bent)
+
+
+def _mean_over(neighbours: np.ndarray) -> csr_array:
+    """The matrix that takes values to their means over the neighbours."""
+    n, k = neighbours.shape
+    return csr_array((np.full(neighbours.size, 1 / k), neighbours.ravel(), k * np.arange(n + 1)), shape=(n, n))

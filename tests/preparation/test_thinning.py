@@ -6,9 +6,9 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import samples
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
-from glsk_o3d.preparation.denoising import average_noisy
+from glsk_o3d.preparation.denoising import MOST_IN_ONE, average_noisy
 from glsk_o3d.preparation.sampling import sample_grid
-from glsk_o3d.preparation.thinning import MOST_IN_ONE, points_around, thin, thin_dense
+from glsk_o3d.preparation.thinning import ENOUGH, points_around, spacing_enough, thin, thin_nearer
 
 
 def thinned(points, n, k=16):
@@ -79,9 +79,10 @@ def test_grids_end_somewhere():
 # ---- where there are more than enough
 
 
-def smoothed(points, around, k=16):
+def evened(points, around, k=16):
     neighbours = nearest_neighbours(points, k)[1]
-    return thin_dense(points, neighbours, principal(points, neighbours)[0], around)
+    apart = spacing_enough(points, neighbours, around)
+    return thin_nearer(points, neighbours, apart), apart
 
 
 def tube(many, noise, seed=0):
@@ -96,17 +97,31 @@ def tube(many, noise, seed=0):
 @pytest.mark.parametrize("noise", [0, 0.1, 0.2])
 @pytest.mark.parametrize("around", [20, 40])
 def test_dense_tubes_are_merged_as_far_as_allowed_and_sparse_ones_stay(around, noise):
-    """A cylinder with 100 points around it, and one with half as many as are enough."""
+    """A cylinder with 100 points around it, and one with half as many as are enough; twice the spacing at a time."""
     for many in (100, around / 2):
         points = tube(many, noise)
-        into = smoothed(points, around)
+        into, apart = evened(points, around)
         np.testing.assert_array_equal(into[into], into)
-        mass = np.bincount(into)[left(into)]
-        assert mass.max() <= MOST_IN_ONE
+        spacing, kept = 2 * np.pi / many, left(into)
+        assert np.median(apart) <= 2.1 * spacing
+        distance, other = (nearest[:, 1] for nearest in nearest_neighbours(points[kept], 2))
+        asked, mutual = np.minimum(apart[kept], apart[kept[other]]), other[other] == np.arange(len(other))
+        assert (distance >= asked)[mutual].mean() > 0.99  # but for those that have lost all of their neighbours
         if many == 100:
-            assert len(left(into)) < 0.6 * len(points)
+            assert len(left(into)) < 0.3 * len(points)
         else:
-            assert len(left(into)) > 0.95 * len(points)
+            assert len(left(into)) > 0.7 * len(points)
+            gone = np.flatnonzero(into != np.arange(len(points)))
+            assert (np.linalg.norm(points[gone] - points[into[gone]], axis=1) < spacing).all()
+
+
+def test_a_plane_has_its_share_of_the_points_that_are_enough():
+    """No part of it is thin, so that only their number says how far apart they may be."""
+    points = np.column_stack([np.random.default_rng(0).uniform(0, 1, (9000, 2)), np.zeros(9000)])
+    apart = spacing_enough(points, nearest_neighbours(points, 16)[1], 20)
+    inner = (np.abs(points[:, :2] - 0.5) < 0.3).all(axis=1)
+    assert np.median(apart[inner]) == pytest.approx(np.sqrt(0.42 / ENOUGH), rel=0.1)
+    assert len(left(evened(points, 20)[0])) == pytest.approx(ENOUGH, rel=0.1)
 
 
 @pytest.mark.parametrize("noise", [0, 0.1, 0.2])
@@ -142,10 +157,11 @@ def test_thin_parts_of_a_dense_cloud_stay(many, noise):
     turn = rng.uniform(0, 2 * np.pi, n)
     thin = np.column_stack([20 + radius * np.cos(turn), radius * np.sin(turn), rng.uniform(0, 20, n)])
     thin += rng.normal(0, noise * spacing, thin.shape)
-    into = smoothed(np.concatenate([thick, thin]), 20)
+    into, apart = evened(np.concatenate([thick, thin]), 20)
     share = np.bincount(into, minlength=len(into)) > 0
-    assert share[: len(thick)].mean() < 0.5
-    assert share[len(thick) :].mean() > 0.95
+    assert share[: len(thick)].mean() < 0.4
+    assert apart[len(thick) :].mean() < 0.5 * spacing  # a random sample has a few pairs so near
+    assert share[len(thick) :].mean() > 0.75
 
 
 # ---- on a grid

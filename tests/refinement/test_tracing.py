@@ -15,15 +15,17 @@ TWIGS = [(ROOT, FORK), *((FORK, FORK + [np.cos(t), np.sin(t), 1]) for t in (0, 2
 
 
 def scattered(lines, n, thick=0.005):
-    """Points around lines, evenly along them."""
+    """Points around lines, evenly along them; the same whatever was drawn before."""
+    rng = np.random.default_rng(n)
     length = np.array([np.linalg.norm(b - a) for a, b in lines])
-    line = RNG.choice(len(lines), n, p=length / length.sum())
+    line = rng.choice(len(lines), n, p=length / length.sum())
     start, stop = (np.array([each[i] for each in lines])[line] for i in (0, 1))
-    return start + RNG.random((n, 1)) * (stop - start) + thick * RNG.normal(size=(n, 3))
+    return start + rng.random((n, 1)) * (stop - start) + thick * rng.normal(size=(n, 3))
 
 
 def tube(n, radius=0.15, height=1.0):
-    t, z = RNG.random((2, n))
+    rng = np.random.default_rng(n)
+    t, z = rng.random((2, n))
     return np.column_stack([radius * np.cos(2 * np.pi * t), radius * np.sin(2 * np.pi * t), height * (z - 1)])
 
 
