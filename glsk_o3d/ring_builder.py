@@ -9,7 +9,7 @@ import numpy as np
 
 from .errors import InvalidParameterError
 from .interop.clouds import SearchParam, cloud_counts, cloud_points, search_parameters
-from .numerics.neighbourhoods import plane_axes
+from .numerics.neighbourhoods import plane_axes, principal
 from .numerics.rings import Rings, star_rings
 from .parameters import documented, parameter, resolve_length
 from .pipeline import Filter, Watch
@@ -101,8 +101,8 @@ class RingBuilder(Filter[Contraction]):
     around: float = parameter(
         20.0,
         "Points around a part that are enough: where the surface has more, near ones are merged until they are evenly "
-        "apart, but about 2400 are left if no part is thin; the one that stays takes over the mass. Fewer are faster; "
-        "clouds of less than 2000 points stay as they are. 0 merges none for this, and so does a `radius`.",
+        "apart, but about 2400 are left if no part is thin; the one that stays takes over the mass. Where parts are thin, "
+        "fewer are faster and more keep near ones apart; clouds of less than 2000 points stay as they are. 0 merges none for this, and so does a `radius`.",
         type="float",
         unit="points",
         low=0,
@@ -181,13 +181,15 @@ class RingBuilder(Filter[Contraction]):
 
     def _rings(self, surface: Surface, thinned: Thinned) -> Rings:
         """Delaunay stars among the neighbours within the radius, in the planes of the neighbourhoods."""
-        positions, axes = surface.points[thinned.survivors], plane_axes(surface.ring_normals[thinned.survivors])
+        positions, normals = surface.points[thinned.survivors], surface.ring_normals
+        if len(positions) < len(surface):  # among points of one scan line a plane is any that has the line in it
+            normals = principal(positions, thinned.neighbours)[1]
         neighbours = thinned.neighbours[:, 1:]
         if self.radius is not None:
             frame = surface.frame
             radius = resolve_length(self.radius, frame.diagonal * frame.scale) / frame.scale
             neighbours = self._within(radius, positions, neighbours)
-        return star_rings(positions, np.arange(len(positions)), neighbours, axes)
+        return star_rings(positions, np.arange(len(positions)), neighbours, plane_axes(normals))
 
     def _within(self, radius: float, positions: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
         """The neighbours without those beyond the radius, which become -1; but the nearest three stay."""

@@ -568,7 +568,42 @@ def test_a_tube_is_contracted_with_as_many_points_around_it_as_are_enough(n):
         assert len(finer) > len(state)
 
 
-def test_thin_parts_and_edges_keep_their_points():
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # normals are those of the lines
+@pytest.mark.parametrize("rings", [40, 44, 60])
+def test_scan_lines_much_denser_than_they_are_apart_are_a_surface(rings):
+    """The nearest points of each are of its own line, and show no plane; among those that are left they do."""
+    height, turn = np.meshgrid(np.linspace(0, 3, rings), np.linspace(0, 2 * np.pi, 20000 // rings, endpoint=False))
+    turn = turn + 6 * np.random.default_rng(0).random(rings)
+    cylinder = np.column_stack([0.3 * np.cos(turn).ravel(), 0.3 * np.sin(turn).ravel(), height.ravel()])
+    found = default()(cylinder)
+    assert found.report.n_contracted < 3000
+    assert (found.n_components, found.n_loops, len(found.leaves)) == (1, 0, 2)
+
+
+@pytest.mark.parametrize("power", [1, 3])
+def test_merged_points_stay_near_whatever_way_the_density_grows(power):
+    """Kept are those that others went into already: else one would sweep up a whole row of ever denser points."""
+    turn, along = np.meshgrid(np.linspace(0, 2 * np.pi, 80, endpoint=False), np.linspace(-2, 0, 200))
+    radius = np.exp(power * along)
+    cone = np.column_stack([(radius * np.cos(turn)).ravel(), (radius * np.sin(turn)).ravel(), radius.ravel()])
+    state = RingBuilder()(cone)
+    cloud = state.cloud
+    away = np.linalg.norm(cloud - cloud[state.survivors[state.representative]], axis=1)
+    spacing = np.sqrt(2) * np.linalg.norm(cloud[:, :2] - cloud[:, :2].mean(axis=0), axis=1) * 2 * np.pi / 80
+    assert len(state) < 0.8 * len(cone)
+    assert state.mass.max() < 20 * state.mass.mean()
+    assert np.quantile(away / spacing, 0.99) < 6
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("around", [1e-310, 1, 1000])
+def test_any_number_around_is_taken_on_curves_and_surfaces(around):
+    t = np.linspace(0, 6, 3000)
+    for points in (np.column_stack([np.cos(t), np.sin(t), 0.3 * t]), samples.torus(3000).points):
+        assert 100 < len(RingBuilder(around=around)(points)) <= 3000
+
+
+def test_thin_parts_keep_their_points():
     """A thick and a thin tube, equally dense: the thick one is merged, the thin one stays."""
     thick, thin = samples.tube(9000, radius=0.3, length=1.5).points, samples.tube(600, radius=0.02, length=1.5).points
     state = RingBuilder()(np.concatenate([thick, thin + [0, 1, 0]]))
@@ -577,7 +612,7 @@ def test_thin_parts_and_edges_keep_their_points():
     assert (kept >= 9000).sum() > 0.7 * 600  # not those that are nearer than a twentieth of the way around
     gone = np.setdiff1d(np.arange(9000, 9600), kept) - 9000
     nearest = np.linalg.norm(thin[gone, None] - thin[kept[kept >= 9000] - 9000], axis=2).min(axis=1)
-    assert np.quantile(nearest, 0.9) < np.sqrt(2 * np.pi * 0.02 * 1.5 / 600)  # their spacing
+    assert np.quantile(nearest, 0.8) < np.sqrt(2 * np.pi * 0.02 * 1.5 / 600)  # their spacing
 
 
 @pytest.mark.parametrize("around", [0, 20])

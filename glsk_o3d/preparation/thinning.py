@@ -19,6 +19,7 @@ DENSE_FROM = 2000  # fitted: points from which on more than enough are merged
 ENOUGH = 2400  # fitted: points on a body without thin parts
 PACKED = 0.42  # measured: points left on an area of 1 if none are to be nearer than 1
 SMOOTHING = 8  # fitted: steps over which the thickness of parts is averaged
+LEAST_MERGED = 0.001  # measured: share of the points that a round must merge: along a spiral it is one each
 LEAST_AROUND = 3  # derived: points around the thinnest part
 WIDER_STEPS = 3  # measured: steps from neighbour to neighbour: fewer see no more than noise, more see other parts
 SHEET_FROM = 0.4  # measured: second over third variance of these, from which on they are a sheet; tubes of 10 have it
@@ -46,13 +47,14 @@ def thin_surface(surface: Surface, around: float, most: int, k: Callable[[int], 
     k : callable
         Neighbours to have among so many points.
     """
-    points = surface.points
+    points, spread = surface.points, surface.spread
     thinned = Thinned(np.arange(len(points)), np.arange(len(points)), surface.neighbours)
     before = np.inf
     while around and DENSE_FROM <= len(thinned.survivors) <= STEADY_SHARE * before:
         before, here = len(thinned.survivors), points[thinned.survivors]
-        apart = spacing_enough(here, thinned.neighbours, around)
+        apart = spacing_enough(here, thinned.neighbours, spread, around)
         thinned = _merged(points, thinned, thin_nearer(here, thinned.neighbours, apart), k)
+        spread = principal(points[thinned.survivors], thinned.neighbours)[0]
     if most < len(thinned.survivors):
         thinned = _merged(points, thinned, thin(points[thinned.survivors], thinned.neighbours, most), k)
     return thinned
@@ -110,7 +112,9 @@ def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:
 
 
 def thin_nearer(points: np.ndarray, neighbours: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Merge mutual nearest neighbours, round by round, until none are nearer than they are to be.
+    """Merge mutual nearest neighbours that are nearer than they are to be, round by round, as long as it is worth it.
+
+    Of two the one stays that more were merged into, so that none wanders along rows of points that get ever denser.
 
     Parameters
     ----------
@@ -126,17 +130,19 @@ def thin_nearer(points: np.ndarray, neighbours: np.ndarray, apart: np.ndarray) -
     (n,) int array
         The point that each was merged into; itself for those that are left.
     """
-    left, representative = np.ones(len(points), bool), np.arange(len(points))
+    left, representative, mass = np.ones(len(points), bool), np.arange(len(points)), np.ones(len(points), int)
     while True:
-        kept, swallowed = mutual_pairs(points, neighbours, left)
-        nearer = ((points[kept] - points[swallowed]) ** 2).sum(axis=1) < np.minimum(apart[kept], apart[swallowed]) ** 2
-        if not nearer.any():
+        pairs = np.stack(mutual_pairs(points, neighbours, left))
+        nearer = ((points[pairs[0]] - points[pairs[1]]) ** 2).sum(axis=1) < apart[pairs].min(axis=0) ** 2
+        if np.count_nonzero(nearer) <= LEAST_MERGED * len(points):
             return final_representatives(representative)
-        representative[swallowed[nearer]] = kept[nearer]
-        left[swallowed[nearer]] = False
+        pairs = pairs[:, nearer]
+        kept, swallowed = np.where(mass[pairs[0]] < mass[pairs[1]], pairs[::-1], pairs)
+        mass[kept] += mass[swallowed]
+        representative[swallowed], left[swallowed] = kept, False
 
 
-def spacing_enough(points: np.ndarray, neighbours: np.ndarray, around: float) -> np.ndarray:
+def spacing_enough(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray, around: float) -> np.ndarray:
     r"""How far apart points may be, so that `around` of them are around every part, and enough on the body.
 
     The circumference of the part that a point is on is its points around times their spacing, see `points_around`;
@@ -149,22 +155,24 @@ def spacing_enough(points: np.ndarray, neighbours: np.ndarray, around: float) ->
     points : (n, 3) float array
     neighbours : (n, k) int array
         Their nearest neighbours, the point itself first.
+    spread : (n, 3) float array
+        As from `principal`.
     around : float
-        Positive.
+        Less than 1 is 1.
 
     Returns
     -------
     (n,) float array
     """
     k = neighbours.shape[1]
-    spread = principal(points, neighbours)[0]
-    area = 4 * np.pi * np.sqrt(spread[:, 1] * spread[:, 2]) / k**2  # a disc's variance is a quarter of R^2
-    spacing = np.sqrt(area)
+    # the variance of a disc is a quarter of R^2, that of a row of points a twelfth of its length squared
+    disc = np.sqrt(4 * np.pi * np.sqrt(spread[:, 1] * spread[:, 2])) / k
+    spacing = np.maximum(disc, np.sqrt(12 * spread[:, 2] / k) / k)
     bent = 1 / (np.maximum(points_around(points, neighbours, spread), LEAST_AROUND) * np.maximum(spacing, TINY))
     mean_over = _mean_over(neighbours)
     for _ in range(SMOOTHING):
         bent = mean_over @ bent
-    among = np.minimum(1 / (around * np.maximum(bent, TINY)), np.sqrt(area.sum() / ENOUGH))
+    among = np.minimum(1 / (max(around, 1) * np.maximum(bent, TINY)), np.sqrt(spacing @ spacing / ENOUGH))
     return np.minimum(np.sqrt(PACKED) * among, 2 * spacing)
 
 
