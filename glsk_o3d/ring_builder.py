@@ -101,8 +101,9 @@ class RingBuilder(Filter[Contraction]):
     around: float = parameter(
         20.0,
         "Points around a part that are enough: where the surface has more, near ones are merged until they are evenly "
-        "apart, but about 2400 are left if no part is thin; the one that stays takes over the mass. Where parts are thin, "
-        "fewer are faster and more keep near ones apart; clouds of less than 2000 points stay as they are. 0 merges none for this, and so does a `radius`.",
+        "apart, but about 2400 are left if no part is thin; the one that stays takes over the mass. Where parts are "
+        "thin, fewer are faster and more keep near ones apart; clouds of less than 2000 points stay as they are. 0 "
+        "merges none for this, and so does a `radius`.",
         type="float",
         unit="points",
         low=0,
