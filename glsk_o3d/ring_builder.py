@@ -9,7 +9,7 @@ import numpy as np
 
 from .errors import InvalidParameterError
 from .interop.clouds import SearchParam, cloud_counts, cloud_points, search_parameters
-from .numerics.neighbourhoods import plane_axes, principal
+from .numerics.neighbourhoods import plane_axes
 from .numerics.rings import Rings, star_rings
 from .parameters import documented, parameter, resolve_length
 from .pipeline import Filter, Watch
@@ -182,15 +182,13 @@ class RingBuilder(Filter[Contraction]):
 
     def _rings(self, surface: Surface, thinned: Thinned) -> Rings:
         """Delaunay stars among the neighbours within the radius, in the planes of the neighbourhoods."""
-        positions, normals = surface.points[thinned.survivors], surface.ring_normals
-        if len(positions) < len(surface):  # among points of one scan line a plane is any that has the line in it
-            normals = principal(positions, thinned.neighbours)[1]
+        positions, axes = surface.points[thinned.survivors], plane_axes(thinned.ring_normals)
         neighbours = thinned.neighbours[:, 1:]
         if self.radius is not None:
             frame = surface.frame
             radius = resolve_length(self.radius, frame.diagonal * frame.scale) / frame.scale
             neighbours = self._within(radius, positions, neighbours)
-        return star_rings(positions, np.arange(len(positions)), neighbours, plane_axes(normals))
+        return star_rings(positions, np.arange(len(positions)), neighbours, axes)
 
     def _within(self, radius: float, positions: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
         """The neighbours without those beyond the radius, which become -1; but the nearest three stay."""

@@ -33,6 +33,8 @@ class Thinned(NamedTuple):
     survivors: np.ndarray  # (n,) rows of the surface
     representative: np.ndarray  # (m,) for every point of the surface the position in `survivors` of what it went into
     neighbours: np.ndarray  # (n, k) among the survivors
+    spread: np.ndarray  # (n, 3) of these, as from `principal`
+    ring_normals: np.ndarray  # (n, 3) of their planes: among points of one scan line any that has the line in it is one
 
 
 def thin_surface(surface: Surface, around: float, most: int, k: Callable[[int], int]) -> Thinned:
@@ -47,14 +49,13 @@ def thin_surface(surface: Surface, around: float, most: int, k: Callable[[int], 
     k : callable
         Neighbours to have among so many points.
     """
-    points, spread = surface.points, surface.spread
-    thinned = Thinned(np.arange(len(points)), np.arange(len(points)), surface.neighbours)
+    points, all_of_them = surface.points, np.arange(len(surface))
+    thinned = Thinned(all_of_them, all_of_them, surface.neighbours, surface.spread, surface.ring_normals)
     before = np.inf
     while around and DENSE_FROM <= len(thinned.survivors) <= STEADY_SHARE * before:
         before, here = len(thinned.survivors), points[thinned.survivors]
-        apart = spacing_enough(here, thinned.neighbours, spread, around)
+        apart = spacing_enough(here, thinned.neighbours, thinned.spread, around)
         thinned = _merged(points, thinned, thin_nearer(here, thinned.neighbours, apart), k)
-        spread = principal(points[thinned.survivors], thinned.neighbours)[0]
     if most < len(thinned.survivors):
         thinned = _merged(points, thinned, thin(points[thinned.survivors], thinned.neighbours, most), k)
     return thinned
@@ -66,7 +67,8 @@ def _merged(points: np.ndarray, thinned: Thinned, representative: np.ndarray, k:
     rank = np.cumsum(kept) - 1
     survivors = thinned.survivors[kept]
     neighbours = nearest_left(points[thinned.survivors], thinned.neighbours, kept, k(len(survivors)))
-    return Thinned(survivors, rank[representative][thinned.representative], neighbours)
+    measured = principal(points[survivors], neighbours)
+    return Thinned(survivors, rank[representative][thinned.representative], neighbours, *measured)
 
 
 def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:
