@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidParameterError
+from ..numerics.groups import Members
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import TINY
 from .branches import branch_table
@@ -165,13 +166,12 @@ def _root(skeleton: Any, root: Any) -> Any:
 
 def _beyond_tips(skeleton: Any) -> dict[int, float]:
     """How far the part goes on beyond every tip of the curve, by its points."""
-    owner, ends = skeleton.vertex_of_point, np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
+    ends = np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
     ends = ends[skeleton.degree[ends[:, 0]] == 1]
-    order = np.argsort(owner, kind="stable")
-    first, stop = (np.searchsorted(owner[order], np.arange(len(skeleton.vertices)), side) for side in ("left", "right"))
+    members = Members(skeleton.vertex_of_point, len(skeleton.vertices))
     beyond = {}
     for tip, beside in ends.tolist():
-        points = skeleton.points[np.concatenate([order[first[v] : stop[v]] for v in (tip, beside)])]
+        points = skeleton.points[members.of(np.array([tip, beside]))]
         way = skeleton.vertices[tip] - skeleton.vertices[beside]
         if len(points) and way.any():
             offset, ahead = points - skeleton.vertices[tip], way / np.linalg.norm(way)

@@ -35,6 +35,26 @@ def group_median(values: np.ndarray, group: np.ndarray, n: int) -> np.ndarray:
     return median
 
 
+class Members:
+    """The members of every group.
+
+    Parameters
+    ----------
+    group : (m,) int array
+        Group 0 .. n-1 of each member; below 0 of those that have none.
+    n : int
+    """
+
+    def __init__(self, group: np.ndarray, n: int) -> None:
+        self._order = np.argsort(group, kind="stable")
+        self._first = np.searchsorted(group[self._order], np.arange(n + 1))
+
+    def of(self, groups: np.ndarray) -> np.ndarray:
+        """Those of some groups, in the order of these, (k,) int array."""
+        parts = [self._order[self._first[g] : self._first[g + 1]] for g in groups.tolist()]
+        return np.concatenate(parts) if parts else self._order[:0]
+
+
 def group_sum(values: np.ndarray, group: np.ndarray, n: int, weight: np.ndarray | None = None) -> np.ndarray:
     """Sum of the rows of each group.
 

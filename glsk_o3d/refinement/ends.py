@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..numerics.groups import Members
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
@@ -20,11 +21,12 @@ END_RUN = 2.0  # fitted: radii behind the cut over which the direction of a limb
 END_SIZE = 4.0  # fitted: radii behind the cut over which it is seen how wide a limb is, and how fast it gets thinner
 END_REACH = 0.98  # fitted: share of an end's points within its reach: normals and noise throw the others farther
 END_WINDOW = 1.25  # fitted: radii before the reach from which on points say where the limb stops
-END_BENDING = 0.1  # fitted: weight of going straight on, per point
-END_BENT = 1 / 3  # fitted: curvature at most, over the inverse radius: a tube cannot bend as sharply as its wall
+END_BENDING = 0.2  # fitted: weight of going straight on, per point
+END_BENT = 1.0  # derived: curvature at most, over the inverse radius: a tube that bends more sharply runs into itself
 END_TIP = 1.0  # fitted: last radii of a curve that go wherever it stops: a hook is as long
 END_LEFT = 0.25  # fitted: share of a branch from a junction that is left, at least, to say where it leads
 END_POINTS = 4  # derived: fewer say nothing about a curvature and a length
+CURVE_SAMPLES = 64  # derived: places along a parabola that say its length to 1e-3
 WAY_SAMPLES = 16  # derived: places along a run that say its direction, several on each of its few edges
 # For points weighted by the cube of c, the cosine of their normals with the axis: on a round cap of radius 1, where c
 # is the height over its centre and every height has the same area,
@@ -40,11 +42,13 @@ def regrow_ends(skeleton: Skeleton) -> Skeleton:
     Contraction draws the end of a limb into an edge or a corner of the face that closes it, and the fit follows: the
     normals of a cap lead along the axis and do not say where it is. So vertices within 1.75 half widths of where the
     points of the limb stop, and the last radius of the curve wherever it stops, are cut. The limb goes on in the
-    direction of the two radii behind, with the curvature k that the normals n of its sides ask for:
+    direction t of the two radii behind, with the turn d and the curvature k that the normals n of its sides ask for:
 
-    .. math:: \sum_p w (b \cdot (s t + s^2 k / 2 - p))^2 + \lambda s^4 |k|^2 / 4, \quad b = n \times t
+    .. math:: \sum_p w (b \cdot (s (t + d) + s^2 k / 2 - p))^2 + \lambda (s^2 |d|^2 + s^4 |k|^2 / 4),
+        \quad b = n \times t
 
-    with p and its length s along t seen from the last vertex left; caps, with b = 0, have no say.
+    with p and its length s along t seen from the last vertex left; caps, with b = 0, have no say. It is asked
+    twice, the second time along the first answer.
 
     It stops half a radius inside a flat cap and at the centre of a round one. Let c be the cosine of an outward normal
     with the axis. The mean of s with the weights c^3 is on a flat cap, and .8 radii beyond the centre of a round one;
@@ -99,31 +103,18 @@ def _ends(skeleton: Skeleton) -> Iterator[tuple[np.ndarray, int, bool]]:
 
 
 class _Cloud:
-    """The points of every vertex, and how wide they say the section is.
-
-    Attributes
-    ----------
-    radius : (M,) float array
-        Of a circle of the section's area.
-    wide : (M,) float array
-        The larger half width of the section.
-    """
+    """The points of every vertex, and how wide they say the section is."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton = skeleton
         sections = measure_sections(skeleton)
-        self.radius, self.wide = sections.radius, sections.half_width
-        vertex = skeleton.vertex_of_point
-        self._order = np.argsort(vertex, kind="stable")
-        self._first = np.searchsorted(vertex[self._order], np.arange(len(skeleton.vertices) + 1))
-
-    def of(self, vertices: np.ndarray) -> np.ndarray:
-        """Points that belong to some vertices, at least one, int array."""
-        return np.concatenate([self._order[self._first[v] : self._first[v + 1]] for v in vertices.tolist()])
+        self.radius = sections.radius  # (M,) float array, of a circle of the section's area
+        self.wide = sections.half_width  # (M,) float array, the larger one
+        self.points = Members(skeleton.vertex_of_point, len(skeleton.vertices))
 
     def surface(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Those of them that have normals, (n, 3) float array, and these."""
-        points = self.of(vertices)
+        """Points of some vertices that have normals, (n, 3) float array, and these."""
+        points = self.points.of(vertices)
         points = points[np.isfinite(self.skeleton.normals[points]).all(axis=1)]
         return self.skeleton.points[points], self.skeleton.normals[points]
 
@@ -134,9 +125,9 @@ def _grow(cloud: _Cloud, path: np.ndarray, first: int, other: bool) -> _Grown | 
     along = arc_lengths(places)
     length = along[-1]
     run, cut, way = _within(along, length, END_SIZE * np.median(cloud.radius[path])), len(path), np.zeros(3)
+    stop = max(length - END_TIP * np.median(cloud.radius[path[run]]), length / 2)
     for _ in range(2):  # how far the points reach is seen along a run that is no part of the cap itself
         radius, wide = np.median(cloud.radius[path[run]]), np.median(cloud.wide[path[run]])
-        stop = max(length - END_CUT * wide, length / 2)
         start = max(stop - END_RUN * radius, 0)
         way, anchor = _way(places, along, start, stop), place_at(places, along, stop)
         # the points of a junction are other limbs', too
@@ -206,32 +197,31 @@ class _End(NamedTuple):
 
     points: np.ndarray  # (n, 3)
     normals: np.ndarray  # (n, 3), of either sign
-    way: np.ndarray  # (3,)
-    bend: np.ndarray  # (3,), curvature
+    way: np.ndarray  # (3,), slope of the parabola at the origin
+    bend: np.ndarray  # (3,), and how fast it changes
     length: np.ndarray  # (n,), along the curve to the place nearest to each point
+    steps: np.ndarray  # (s,), of the parabola,
+    along: np.ndarray  # (s,), and its length up to them
 
     @classmethod
     def of(cls, points: np.ndarray, normals: np.ndarray, way: np.ndarray, radius: float) -> _End:
         """The curve through the origin in a direction that suits the points best."""
-        length = points @ way
-        across, off = np.cross(normals, way), points - length[:, None] * way
-        miss = dot(across, points)
-        weight = (length < np.quantile(length, END_REACH)) / (1 + (2 * miss / max(radius, TINY)) ** 2)
-        # as in the fit of all axes: normals that miss the axis by as much as anything does are noise
-        doubt = min(2 * (weight * miss**2) @ np.ones(len(miss)) / max(weight @ dot(off, off), TINY), 1)
-        frame = np.linalg.svd(way[None])[2][1:]
-        ask = across @ frame.T * (length**2 / 2)[:, None]
-        stiff = END_BENDING * weight.sum() / 2 * np.mean(length**4 / 4)
-        bend = np.linalg.solve((weight[:, None] * ask).T @ ask + (stiff + TINY) * np.eye(2), (weight * miss) @ ask)
-        bend = (1 - doubt) * bend @ frame
-        bend *= min(1, END_BENT / max(radius * np.linalg.norm(bend), TINY))
-        # inside of a bend the way is shorter than along the curve
-        aside = (off - (length**2 / 2)[:, None] * bend) @ bend
-        return cls(points, normals, way, bend, length * (1 + np.clip(aside, -0.5, 0.5)))
+        turn, bend = _bent(points, normals, way, radius)
+        way = (way + turn) / np.linalg.norm(way + turn)  # a parabola along the limb behind would open beside this one
+        turn, bend = _bent(points, normals, way, radius)
+        step, way = points @ way, way + turn
+        # the nearest place of the curve: one step of Newton from the one abreast
+        slope = way + step[:, None] * bend
+        off = points - step[:, None] * way - (step**2 / 2)[:, None] * bend
+        step = step + np.clip(dot(off, slope) / np.maximum(dot(slope, slope) - off @ bend, 0.5), -radius, radius)
+        steps = np.linspace(0, max(2 * step.max(), TINY), CURVE_SAMPLES)
+        along = arc_lengths(np.stack([steps, steps**2 / 2], axis=1) @ np.stack([way, bend]))
+        return cls(points, normals, way, bend, np.interp(step, steps, along), steps, along)
 
     def curve(self, length: np.ndarray) -> np.ndarray:
         """Places so far ahead, (k, 3) float array."""
-        return length[:, None] * self.way + (length**2 / 2)[:, None] * self.bend
+        step = np.interp(length, self.along, self.steps)
+        return step[:, None] * self.way + (step**2 / 2)[:, None] * self.bend
 
     def tip(self, taper: _Taper) -> float:
         """How far the limb goes on."""
@@ -241,7 +231,7 @@ class _End(NamedTuple):
         if late.sum() < END_POINTS:
             return max(reach - taper.at(reach) / 2, 0.0)
         length = self.length[late] - start
-        tangent = self.way + self.length[late, None] * self.bend
+        tangent = self.way + np.interp(self.length[late], self.along, self.steps)[:, None] * self.bend
         normals, points = self.normals[late], self.points[late] - self.curve(np.array([start]))
         outward = np.where(dot(normals, points) < 0, -1, 1) * dot(normals, tangent) / norm(tangent)
         # those of a cone lean outwards, too
@@ -259,6 +249,23 @@ class _End(NamedTuple):
         return min(max(tip, 0.0), reach)
 
 
+def _bent(points: np.ndarray, normals: np.ndarray, way: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """How a limb from the origin in a direction turns aside there, and its curvature, (3,) float arrays across it."""
+    length = points @ way
+    across, off = np.cross(normals, way), points - length[:, None] * way
+    miss = dot(across, points)
+    weight = (length < np.quantile(length, END_REACH)) / (1 + (2 * miss / max(radius, TINY)) ** 2)
+    frame = np.linalg.svd(way[None])[2][1:]
+    powers = np.stack([length, length**2 / 2], axis=1)
+    ask = (powers[:, :, None] * (across @ frame.T)[:, None]).reshape(-1, 4)
+    stiff = END_BENDING * weight.sum() / 2 * np.mean(powers**2, axis=0).repeat(2)
+    found = np.linalg.solve((weight[:, None] * ask).T @ ask + np.diag(stiff + TINY), (weight * miss) @ ask)
+    # as in the fit of all axes: normals that miss the axis by as much as anything does are noise
+    doubt = min(2 * weight @ (miss - ask @ found) ** 2 / max(weight @ dot(off, off), TINY), 1)
+    turn, bend = (1 - doubt) * found.reshape(2, 2) @ frame
+    return turn, bend * min(1, END_BENT / max(radius * np.linalg.norm(bend), TINY))
+
+
 def _replanted(skeleton: Skeleton, cloud: _Cloud, grown: list[tuple[np.ndarray, _Grown]]) -> Skeleton:
     """With new ends instead of those that were cut."""
     m = len(skeleton.vertices)
@@ -274,7 +281,7 @@ def _replanted(skeleton: Skeleton, cloud: _Cloud, grown: list[tuple[np.ndarray, 
         edges.append(np.column_stack([chain[:-1], chain[1:]]))
         radii.append(np.full(len(places), np.median(skeleton.radii[run])))
         confidence.append(np.full(len(places), np.median(skeleton.confidence[run])))
-        lost = cloud.of(gone) if len(gone) else np.empty(0, int)
+        lost = cloud.points.of(gone)
         near = cKDTree(np.concatenate([skeleton.vertices[chain[:1]], places])).query(skeleton.points[lost])[1]
         owner[lost] = chain[near]
     keep = np.concatenate([keep, np.ones(m - len(keep), bool)])

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..numerics.components import component_labels
+from ..numerics.groups import Members
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
@@ -156,8 +157,7 @@ def _places(skeleton: Skeleton, limbs: Limbs) -> dict[int, _Place]:
     """Where every junction belongs."""
     supporting = skeleton.supporting_points
     points, normals = skeleton.points[supporting], skeleton.normals.take(supporting, axis=0)
-    order = np.argsort(skeleton.vertex_of_point[supporting], kind="stable")
-    stop = np.cumsum(np.bincount(skeleton.vertex_of_point[supporting], minlength=len(skeleton.vertices)))
+    members = Members(skeleton.vertex_of_point[supporting], len(skeleton.vertices))
     low, high = axis_box(points if len(points) else skeleton.vertices)
     found = {}
     for junction in skeleton.junctions.tolist():
@@ -169,8 +169,7 @@ def _places(skeleton: Skeleton, limbs: Limbs) -> dict[int, _Place]:
             lines.append(line)
             radius = max(radius, float(np.interp(line.start, along, limbs.surface[path])))
             around.append(path[along <= along[-1] / 2])
-        owned = [order[stop[v - 1] if v else 0 : stop[v]] for v in np.unique(np.concatenate(around)).tolist()]
-        own = np.concatenate(owned)
+        own = members.of(np.unique(np.concatenate(around)))
         place, touching = meet(lines, skeleton.vertices[junction], radius, points[own], normals[own])
         # normals that mean nothing may meet anywhere
         found[junction] = _Place(np.clip(place, low, high), touching, lines)

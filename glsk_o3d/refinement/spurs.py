@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..numerics.groups import Members
 from ..numerics.polylines import arc_lengths, beyond_surface
 from ..numerics.vectors import TINY
 from ..report import Judgement
@@ -99,7 +100,9 @@ class _Twig(NamedTuple):
 
 
 def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
-    limbs, owned, web = Limbs(skeleton, joined=True), _Owned(skeleton), _Web(skeleton, evidence)
+    limbs, web = Limbs(skeleton, joined=True), _Web(skeleton, evidence)
+    supporting = skeleton.supporting_points
+    members = Members(skeleton.vertex_of_point[supporting], len(skeleton.vertices))
     wide, count = measure_sections(skeleton).half_width, support(skeleton)
     confidence, degree = np.nan_to_num(skeleton.confidence), skeleton.degree
     ending = np.zeros(len(degree), bool)
@@ -113,7 +116,9 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
         body = branch[branch != junction]
         share = count[body] / count[body].sum()
         half = float(share @ wide[body])
-        out = np.clip(_standing_out(limbs, k, junction, owned.points(body), ending), 0, FAR_OUT * half)
+        own = supporting[members.of(body)]
+        points = skeleton.points[own[:: len(own) // SPUR_POINTS + 1]]
+        out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * half)
         facts = dict(
             protrusion=float(np.log(out / max(half, TINY) + 0.3)),
             web=web.of(branch),
@@ -144,22 +149,6 @@ class _Web:
         out = (np.isfinite(shares).sum(axis=1) == 1) & (self._pairs != branch[0]).all(axis=1)
         weight = self._weight[out]
         return float(weight @ np.nansum(shares[out], axis=1) / max(weight.sum(), TINY))
-
-
-class _Owned:
-    """The points that each vertex owns."""
-
-    def __init__(self, skeleton: Skeleton) -> None:
-        supporting = skeleton.supporting_points
-        vertex = skeleton.vertex_of_point[supporting]
-        self._points = skeleton.points[supporting[np.argsort(vertex, kind="stable")]]
-        self._stop = np.cumsum(np.bincount(vertex, minlength=len(skeleton.vertices)))
-
-    def points(self, vertices: np.ndarray) -> np.ndarray:
-        """Those of some vertices; of many every so-manieth."""
-        parts = [self._points[self._stop[v - 1] if v else 0 : self._stop[v]] for v in vertices.tolist()]
-        found = np.concatenate(parts) if parts else np.empty((0, 3))
-        return found[:: len(found) // SPUR_POINTS + 1]
 
 
 def _standing_out(limbs: Limbs, k: int, junction: int, points: np.ndarray, ending: np.ndarray) -> float:

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import Skeleton
+from glsk_o3d import Skeleton, skeletonize
+from glsk_o3d.numerics.vectors import norm
 from glsk_o3d.refinement.ends import regrow_ends
+from glsk_o3d.samples import sauropod
 
 R = 0.1
 LENGTH = 1.2
@@ -97,10 +99,11 @@ def test_noise_moves_an_end_little(cap):
     np.testing.assert_allclose(found, [LENGTH - (cap == "flat") * R / 2, 0, 0], atol=0.35 * R)
 
 
-def test_a_bent_limb_stays_bent():
-    """Around a circle of six radii, two short: straight on it would be .9 radii off, a radius beyond its run."""
+@pytest.mark.parametrize(("radii", "off"), [(6, 0.35), (3, 0.75)])
+def test_a_bent_limb_stays_bent(radii, off):
+    """Around a circle of some radii, two short: straight on it would be 1 and 1.8 off."""
     points, normals = limb("flat", per=6000)
-    big = 6 * R
+    big = radii * R
 
     def bent(p):
         angle, radius = p[:, 0] / big, big + p[:, 1]
@@ -112,7 +115,20 @@ def test_a_bent_limb_stays_bent():
     normals = np.column_stack([x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle), z])
     curved = replace(flat, vertices=bent(flat.vertices), points=bent(points), normals=normals)
     grown = regrow_ends(curved)
-    np.testing.assert_allclose(tip(grown), bent(np.array([[LENGTH - R / 2, 0, 0]]))[0], atol=0.45 * R)
+    end = grown.vertices[grown.leaves]
+    stop = bent(np.array([[LENGTH - R / 2, 0, 0]]))
+    assert np.linalg.norm(end - stop, axis=1).min() < off * R
+
+
+@pytest.mark.parametrize(("n", "seed"), [(4096, 1), (8192, 0), (16384, 2)])
+def test_a_head_that_hangs_from_its_neck_has_an_axis(n, seed):
+    """Two radii long, turned by 70 degrees: an end that goes on along the neck leaves through its skin."""
+    body = sauropod(n, seed=seed)
+    skeleton = skeletonize(body.points)
+    nose = body.nodes[np.argmax(body.nodes[:, 0])]
+    end = skeleton.vertices[np.argmin(norm(skeleton.vertices - nose))]
+    assert norm(end - nose) < 0.045  # a radius there
+    assert end[0] > nose[0] - 0.02
 
 
 def test_new_vertices_are_like_those_behind():
