@@ -208,11 +208,16 @@ def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -
         for limb, line in zip(limbs.at[junction], lines, strict=True):
             path = limbs.paths[limb]
             along = arc_lengths(skeleton.vertices[path])
-            moved = np.flatnonzero((along > 0) & (along < line.start))
-            share = (along[moved] / max(line.start, TINY))[:, None]
-            vertices[path[moved]] = (1 - share) * place + share * line.anchor
+            start, anchor = line.start, line.anchor
+            if (anchor - place) @ line.way > 0:  # the place lies ahead of where the limb is joined: it would turn back
+                ahead = np.flatnonzero((along > start) & ((skeleton.vertices[path] - place) @ line.way < 0))
+                if len(ahead):
+                    start, anchor = along[ahead[0]], skeleton.vertices[path[ahead[0]]]
+            moved = np.flatnonzero((along > 0) & (along < start))
+            share = (along[moved] / max(start, TINY))[:, None]
+            vertices[path[moved]] = (1 - share) * place + share * anchor
             # a junction owns points of everything around: what it measured itself does not count
-            radius = np.interp(line.start, along, skeleton.radii[path])
+            radius = np.interp(start, along, skeleton.radii[path])
             radii[path[moved]] = radius
             radii[junction] = max(radii[junction], radius)
     return replace(skeleton, vertices=vertices, radii=radii)

@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 from glsk_o3d import Refiner, Skeleton
 from glsk_o3d.numerics.polylines import arc_lengths
 from glsk_o3d.refinement.evidence import Evidence
-from glsk_o3d.refinement.junctions import Limbs, move_junctions
-from glsk_o3d.refinement.meeting import limb_line, meet
+from glsk_o3d.refinement.junctions import Limbs, _Place, _straightened, move_junctions
+from glsk_o3d.refinement.meeting import Line, limb_line, meet
 from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from glsk_o3d.refinement.spurs import prune_spurs
 
@@ -296,3 +296,21 @@ def test_a_limbs_line_is_taken_where_it_has_left_the_others():
     assert line.middle[0] == pytest.approx(R)
     assert line.bend == pytest.approx(0, abs=1e-9)
     assert 2 * R < line.start < 2.5 * R
+
+
+def test_a_limb_does_not_turn_back_where_its_junction_moved_along_it():
+    """Three radii up a trunk, and its undisturbed part begins after one."""
+    paths = [[(0, 0, 0), (0, 0, 1)], [(0, 0, 0), (0.4, 0, -0.3)], [(0, 0, 0), (-0.4, 0, -0.3)]]
+    skeleton = drawn(paths, paths)
+    limbs = Limbs(skeleton, joined=False)
+    (junction,) = skeleton.junctions.tolist()
+    lines = []
+    for limb in limbs.at[junction]:
+        path = limbs.vertices[limbs.paths[limb]]
+        way = (path[0] - path[-1]) / np.linalg.norm(path[0] - path[-1])
+        lines.append(Line(path.mean(axis=0), way, 0.1, 0.0, R, path[0] - R * way, R))
+    moved = _straightened(skeleton, limbs, {junction: _Place(np.array([0, 0, 3 * R]), R, lines)})
+    trunk = next(branch for branch in moved.branches if moved.vertices[branch, 2].max() == 1)
+    height = moved.vertices[trunk, 2]
+    assert np.all(np.diff(height if height[0] < height[-1] else height[::-1]) > 0)
+    np.testing.assert_allclose(moved.vertices[junction], [0, 0, 3 * R])
