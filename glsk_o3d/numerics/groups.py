@@ -1,4 +1,4 @@
-"""Statistics of groups of values."""
+"""Groups of values: their members, sums and medians."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Members:
         self._first = np.searchsorted(group[self._order], np.arange(n + 1))
 
     def of(self, groups: np.ndarray) -> np.ndarray:
-        """Those of some groups, in the order of these, (k,) int array."""
+        """Members of some groups, in the order of these, (k,) int array."""
         parts = [self._order[self._first[g] : self._first[g + 1]] for g in groups.tolist()]
         return np.concatenate(parts) if parts else self._order[:0]
 

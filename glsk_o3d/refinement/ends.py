@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..numerics.groups import Members
 from ..numerics.polylines import arc_lengths, place_at
-from ..numerics.vectors import TINY, dot, norm
+from ..numerics.vectors import TINY, dot, norm, unit
 from ..skeleton import Skeleton
 from .axis_fit import axis_box
 from .sections import measure_sections
@@ -21,12 +21,12 @@ END_RUN = 2.0  # fitted: radii behind the cut over which the direction of a limb
 END_SIZE = 4.0  # fitted: radii behind the cut over which it is seen how wide a limb is, and how fast it gets thinner
 END_REACH = 0.98  # fitted: share of an end's points within its reach: normals and noise throw the others farther
 END_WINDOW = 1.25  # fitted: radii before the reach from which on points say where the limb stops
-END_BENDING = 0.2  # fitted: weight of going straight on, per point
-END_BENT = 1.0  # derived: curvature at most, over the inverse radius: a tube that bends more sharply runs into itself
+END_BENDING = 0.5  # fitted: weight of going straight on, twice lambda
+END_ROUNDS = 3  # measured: from then on hardly anything moves
 END_TIP = 1.0  # fitted: last radii of a curve that go wherever it stops: a hook is as long
 END_LEFT = 0.25  # fitted: share of a branch from a junction that is left, at least, to say where it leads
-END_POINTS = 4  # derived: fewer say nothing about a curvature and a length
-CURVE_SAMPLES = 64  # derived: places along a parabola that say its length to 1e-3
+END_POINTS = 4  # derived: fewer cannot say where a limb turns
+CURVE_SAMPLES = 64  # derived: places along a parabola that say its length to 1e-3 of the whole
 WAY_SAMPLES = 16  # derived: places along a run that say its direction, several on each of its few edges
 # For points weighted by the cube of c, the cosine of their normals with the axis: on a round cap of radius 1, where c
 # is the height over its centre and every height has the same area,
@@ -42,13 +42,15 @@ def regrow_ends(skeleton: Skeleton) -> Skeleton:
     Contraction draws the end of a limb into an edge or a corner of the face that closes it, and the fit follows: the
     normals of a cap lead along the axis and do not say where it is. So vertices within 1.75 half widths of where the
     points of the limb stop, and the last radius of the curve wherever it stops, are cut. The limb goes on in the
-    direction t of the two radii behind, with the turn d and the curvature k that the normals n of its sides ask for:
+    direction t of the two radii behind, with the turn d and the bend k, across t, that the normals n of its sides ask
+    for:
 
-    .. math:: \sum_p w (b \cdot (s (t + d) + s^2 k / 2 - p))^2 + \lambda (s^2 |d|^2 + s^4 |k|^2 / 4),
+    .. math:: \sum_p w \left((b \cdot (s (t + d) + s^2 k / 2 - p))^2 + \lambda (s^2 |d|^2 + s^4 |k|^2 / 4)\right),
         \quad b = n \times t
 
-    with p and its length s along t seen from the last vertex left; caps, with b = 0, have no say. It is asked
-    twice, the second time along the first answer.
+    with p and its length s along t seen from the last vertex left; caps, with b = 0, have no say. A point whose plane
+    passes the curve by half a radius counts half, and those beyond the reach do not count. The fit is made three times,
+    each along t + d of the one before.
 
     It stops half a radius inside a flat cap and at the centre of a round one. Let c be the cosine of an outward normal
     with the axis. The mean of s with the weights c^3 is on a flat cap, and .8 radii beyond the centre of a round one;
@@ -109,12 +111,12 @@ class _Cloud:
         self.skeleton = skeleton
         sections = measure_sections(skeleton)
         self.radius = sections.radius  # (M,) float array, of a circle of the section's area
-        self.wide = sections.half_width  # (M,) float array, the larger one
-        self.points = Members(skeleton.vertex_of_point, len(skeleton.vertices))
+        self.wide = sections.half_width  # (M,) float array, the larger half width
+        self.members = Members(skeleton.vertex_of_point, len(skeleton.vertices))
 
     def surface(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points of some vertices that have normals, (n, 3) float array, and these."""
-        points = self.points.of(vertices)
+        """Points, of some vertices, that have normals, and these; (n, 3) float arrays."""
+        points = self.members.of(vertices)
         points = points[np.isfinite(self.skeleton.normals[points]).all(axis=1)]
         return self.skeleton.points[points], self.skeleton.normals[points]
 
@@ -198,7 +200,7 @@ class _End(NamedTuple):
     points: np.ndarray  # (n, 3)
     normals: np.ndarray  # (n, 3), of either sign
     way: np.ndarray  # (3,), slope of the parabola at the origin
-    bend: np.ndarray  # (3,), and how fast it changes
+    bend: np.ndarray  # (3,), and how fast it changes along it
     length: np.ndarray  # (n,), along the curve to the place nearest to each point
     steps: np.ndarray  # (s,), of the parabola,
     along: np.ndarray  # (s,), and its length up to them
@@ -206,11 +208,12 @@ class _End(NamedTuple):
     @classmethod
     def of(cls, points: np.ndarray, normals: np.ndarray, way: np.ndarray, radius: float) -> _End:
         """The curve through the origin in a direction that suits the points best."""
-        turn, bend = _bent(points, normals, way, radius)
-        way = (way + turn) / np.linalg.norm(way + turn)  # a parabola along the limb behind would open beside this one
-        turn, bend = _bent(points, normals, way, radius)
+        turn = bend = np.zeros(3)
+        for _ in range(END_ROUNDS):  # the axis of the parabola is the limb behind: where this turns, so must the axis
+            way = unit((way + turn)[None])[0]
+            turn, bend = _turn_and_bend(points, normals, way, bend, radius)
         step, way = points @ way, way + turn
-        # the nearest place of the curve: one step of Newton from the one abreast
+        # the nearest place of the curve: one step of Newton from the one abreast, by a radius at most
         slope = way + step[:, None] * bend
         off = points - step[:, None] * way - (step**2 / 2)[:, None] * bend
         step = step + np.clip(dot(off, slope) / np.maximum(dot(slope, slope) - off @ bend, 0.5), -radius, radius)
@@ -220,7 +223,7 @@ class _End(NamedTuple):
 
     def curve(self, length: np.ndarray) -> np.ndarray:
         """Places so far ahead, (k, 3) float array."""
-        step = np.interp(length, self.along, self.steps)
+        step = np.interp(length, self.along, self.steps) + np.maximum(length - self.along[-1], 0)
         return step[:, None] * self.way + (step**2 / 2)[:, None] * self.bend
 
     def tip(self, taper: _Taper) -> float:
@@ -243,27 +246,26 @@ class _End(NamedTuple):
         variance = max(cap @ length**2 / max(weight, TINY) - mean**2, 0)
         # the cap of a tube has half a radius times the area of a unit of its length
         owed = ROUND_AREA * side.sum() * taper.radius / (2 * max(stop, TINY))
-        seen = min(weight / max(owed, TINY), 1)
+        seen = weight / max(owed, weight, TINY)
         inside = (ROUND_MEAN - 1 / 2) * min(variance / max(ROUND_VARIANCE * radius**2, TINY), 1)
         tip = start + seen * mean + (1 - seen) * stop - (1 / 2 + seen * inside) * radius
         return min(max(tip, 0.0), reach)
 
 
-def _bent(points: np.ndarray, normals: np.ndarray, way: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """How a limb from the origin in a direction turns aside there, and its curvature, (3,) float arrays across it."""
-    length = points @ way
-    across, off = np.cross(normals, way), points - length[:, None] * way
-    miss = dot(across, points)
-    weight = (length < np.quantile(length, END_REACH)) / (1 + (2 * miss / max(radius, TINY)) ** 2)
-    frame = np.linalg.svd(way[None])[2][1:]
+def _turn_and_bend(
+    points: np.ndarray, normals: np.ndarray, way: np.ndarray, bend: np.ndarray, radius: float
+) -> np.ndarray:
+    """How a limb from the origin in a direction turns aside there, and how it bends, (2, 3) float array."""
+    length, across = points @ way, np.cross(normals, way)
     powers = np.stack([length, length**2 / 2], axis=1)
+    miss = dot(across, points)
+    left = miss - powers[:, 1] * (across @ bend)
+    weight = (length <= np.quantile(length, END_REACH)) * radius**2 / (radius**2 + 4 * left**2 + TINY)
+    frame = np.linalg.svd(way[None])[2][1:]
     ask = (powers[:, :, None] * (across @ frame.T)[:, None]).reshape(-1, 4)
-    stiff = END_BENDING * weight.sum() / 2 * np.mean(powers**2, axis=0).repeat(2)
+    stiff = END_BENDING / 2 * (weight @ powers**2).repeat(2)
     found = np.linalg.solve((weight[:, None] * ask).T @ ask + np.diag(stiff + TINY), (weight * miss) @ ask)
-    # as in the fit of all axes: normals that miss the axis by as much as anything does are noise
-    doubt = min(2 * weight @ (miss - ask @ found) ** 2 / max(weight @ dot(off, off), TINY), 1)
-    turn, bend = (1 - doubt) * found.reshape(2, 2) @ frame
-    return turn, bend * min(1, END_BENT / max(radius * np.linalg.norm(bend), TINY))
+    return found.reshape(2, 2) @ frame
 
 
 def _replanted(skeleton: Skeleton, cloud: _Cloud, grown: list[tuple[np.ndarray, _Grown]]) -> Skeleton:
@@ -281,7 +283,7 @@ def _replanted(skeleton: Skeleton, cloud: _Cloud, grown: list[tuple[np.ndarray, 
         edges.append(np.column_stack([chain[:-1], chain[1:]]))
         radii.append(np.full(len(places), np.median(skeleton.radii[run])))
         confidence.append(np.full(len(places), np.median(skeleton.confidence[run])))
-        lost = cloud.points.of(gone)
+        lost = cloud.members.of(gone)
         near = cKDTree(np.concatenate([skeleton.vertices[chain[:1]], places])).query(skeleton.points[lost])[1]
         owner[lost] = chain[near]
     keep = np.concatenate([keep, np.ones(m - len(keep), bool)])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glsk_o3d.numerics.groups import group_median, group_sum
+from glsk_o3d.numerics.groups import Members, group_median, group_sum
 
 
 @settings(max_examples=200)
@@ -32,3 +32,10 @@ def test_sum_of_nothing():
 
 def test_median_of_nothing():
     assert group_median(np.empty(0), np.empty(0, int), 2).tolist() == [0, 0]
+
+
+def test_members_of_groups_in_the_order_asked_for():
+    members = Members(np.array([2, 0, -1, 2, 0, 2]), 4)
+    np.testing.assert_array_equal(members.of(np.array([2, 1, 0])), [0, 3, 5, 1, 4])
+    np.testing.assert_array_equal(members.of(np.array([0, 0])), [1, 4, 1, 4])
+    assert members.of(np.array([3])).shape == members.of(np.array([], int)).shape == (0,)
