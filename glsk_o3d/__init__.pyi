@@ -33,12 +33,14 @@ from .io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
 from .io.skeletons import read_skeleton, save_skeleton
 from .io.streamed_labels import annotate_file
 from .io.streaming import read_sample
+from .judgements import Judgement, Supported
 from .lpr_reducer import LPRReducer
 from .meshlab.meshset import MeshSet
 from .pipeline import Filter, Pipeline
 from .recipes import from_recipe, load_recipe, rerun, save_recipe, to_recipe
 from .refiner import Refiner
-from .report import IterationRecord, Judgement, Report
+from .report import IterationRecord, Report
+from .resampling import support
 from .ring_builder import RingBuilder
 from .skeleton import Skeleton
 from .state import Contraction
@@ -81,6 +83,7 @@ __all__ = [
     "Skeleton",
     "SkeletonWarning",
     "StageError",
+    "Supported",
     "analysis",
     "annotate_contraction",
     "annotate_file",
@@ -108,5 +111,6 @@ __all__ = [
     "save_skeleton",
     "save_tensor_cloud",
     "skeletonize",
+    "support",
     "to_recipe",
 ]

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from .judgements import Judgement
 from .numerics.vectors import AXES
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
@@ -27,7 +28,6 @@ from .refinement.subdivision import subdivide_edges
 from .refinement.surface_graph import SurfaceGraph
 from .refinement.tracing import trace
 from .refinement.triangles import collapse_triangles
-from .report import Judgement
 from .skeleton import Skeleton
 
 

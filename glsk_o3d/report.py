@@ -5,18 +5,18 @@ from __future__ import annotations
 import dataclasses
 import sys
 import warnings as _warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from types import UnionType
-from typing import Any, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from .errors import SkeletonWarning
 from .interop.verbosity import QUIET, open3d_is
+from .judgements import OUTCOMES, Judgement, Place, Supported
 
-Place: TypeAlias = tuple[float, float, float]
-_Record = TypeVar("_Record", bound="Report | IterationRecord | Judgement")
+_Record = TypeVar("_Record", bound="Report | IterationRecord | Judgement | Supported")
 
 NOT_CONTRACTED = "not contracted"
 STOPPED_BY_CALLER = "stopped by the caller"
@@ -69,81 +69,6 @@ class IterationRecord:
     contraction_weight: float
     solve_error: float
     seconds: float
-
-
-_OUTCOMES = {  # where the graph stayed as it was, and where it was changed
-    "air": ("branch kept", "branch cut"),
-    "loop": ("loop kept", "loop closed"),
-    "gap": ("gap left", "gap bridged"),
-    "limb": ("limb kept", "spur pruned"),
-}
-_QUESTIONS = {
-    "air": "the branch at ({}) crosses air",
-    "loop": "the loop at ({}) is a handle",
-    "gap": "the object goes on across the gap at ({})",
-    "limb": "the branch at ({}) is a limb",
-}
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """A question about the topology, and how it was answered.
-
-    Attributes
-    ----------
-    about : {"air", "loop", "gap", "limb"}
-        Whether a branch crosses air, a loop is a handle, a gap is bridged by the object, or a branch is a
-        limb and no spur.
-    place : (x, y, z)
-        In the cloud's units.
-    probability : float
-        That it is so.
-    changed : bool
-        Whether the graph was changed: the branch cut there, the loop closed, the gap bridged, the branch pruned.
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> [(it.about, it.changed) for it in skeletonize(torus(1000).points).report.judgements if it.about == "loop"]
-    [('loop', False)]
-    >>> str(Judgement("loop", (0.0, 0.5, 2.0), 0.55, changed=False))
-    'the loop at (0, 0.5, 2) is a handle: 0.55, loop kept'
-    """
-
-    about: str
-    place: Place
-    probability: float
-    changed: bool
-
-    @property
-    def is_uncertain(self) -> bool:
-        """Whether the probability lies between a quarter and three quarters."""
-        return 0.25 <= self.probability <= 0.75
-
-    @property
-    def outcome(self) -> str:
-        """What was done, in two words, such as ``"loop closed"`` or ``"gap left"``."""
-        return _OUTCOMES[self.about][self.changed]
-
-    @property
-    def question(self) -> str:
-        """What the probability is of, such as ``"the loop at (0, 0, 1) is a handle"``."""
-        return _QUESTIONS[self.about].format(coordinates(self.place))
-
-    def __str__(self) -> str:
-        return f"{self.question}: {self.probability:.2f}, {self.outcome}"
-
-
-def coordinates(place: Iterable[float]) -> str:
-    """A place as people read it: four digits, and of coordinates as on a map all ahead of the point and two more.
-
-    Examples
-    --------
-    >>> coordinates((0.123456, -12.3456, 5600321.98765))
-    '0.1235, -12.35, 5600321.99'
-    """
-    return ", ".join(f"{c:.4g}" if abs(c) < 1000 or not abs(c) < 1e8 else f"{c:.2f}" for c in place)
 
 
 def _made(cls: type[_Record], data: Mapping[str, Any]) -> _Record:
@@ -212,6 +137,12 @@ class Report:
         Where a tree grows from; empty if none was asked for.
     judgements : tuple of Judgement
         What was asked about the topology, with probabilities, and what was done.
+    n_draws : int
+        Samples of the cloud whose skeletons were compared with this one, see `glsk_o3d.support`; 0 if none were.
+    n_agreeing : int
+        Those of them with as many components, loops and ends.
+    support : tuple of Supported
+        Share of them that show each branch, loop and end of this skeleton; and loops and ends that it lacks.
     stages : tuple of str
         The filters that ran, as the expressions that rebuild them.
     recipe : dict
@@ -251,6 +182,9 @@ class Report:
     joined: tuple[tuple[Place, Place], ...] = ()
     root: Place | tuple[()] = ()
     judgements: tuple[Judgement, ...] = ()
+    n_draws: int = 0
+    n_agreeing: int = 0
+    support: tuple[Supported, ...] = ()
     stages: tuple[str, ...] = ()
     recipe: dict[str, Any] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -277,6 +211,12 @@ class Report:
         found = (it for it in self.judgements if it.is_uncertain)
         return tuple(sorted(found, key=lambda it: abs(it.probability - 0.5)))
 
+    @property
+    def unsupported(self) -> tuple[Supported, ...]:
+        """What more than a fifth of the samples disagree with, the most doubtful first."""
+        found = (it for it in self.support if not it.is_well_supported)
+        return tuple(sorted(found, key=lambda it: -it.doubt))
+
     def to_dict(self) -> dict[str, Any]:
         """Plain dict of numbers, strings, lists and dicts, as saved in JSON."""
         return dataclasses.asdict(self)
@@ -289,7 +229,10 @@ class Report:
         values["judgements"] = tuple(
             _made(Judgement, found | {"place": tuple(found["place"])}) for found in values.get("judgements", ())
         )
-        if not all(found.about in _OUTCOMES for found in values["judgements"]):
+        values["support"] = tuple(
+            _made(Supported, found | {"place": tuple(found["place"])}) for found in values.get("support", ())
+        )
+        if not all(found.about in OUTCOMES for found in values["judgements"]):
             raise ValueError("a judgement in its report is about nothing that is known")
         values["joined"] = tuple((tuple(start), tuple(stop)) for start, stop in values.get("joined", ()))
         lists = ("stages", "warnings", "root")

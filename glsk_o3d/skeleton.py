@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Root = int | str | Sequence[float] | np.ndarray | None
 
-OF_VERTICES = ("radii", "confidence", "half_width", "half_thickness")
+OF_VERTICES = ("radii", "confidence", "half_width", "half_thickness", "support")
 """What is known of every vertex but its place."""
 
 
@@ -60,6 +60,9 @@ class Skeleton:
     half_width, half_thickness : (M,) float64 array
         Half axes of the part's section at every vertex, the longer and the shorter one: of a bar half its width and
         half its thickness. The radius where nobody has measured them.
+    support : (M,) float64 array
+        Share of samples of the cloud whose skeletons show the curve there, see `glsk_o3d.support`; NaN where nobody has
+        measured it.
 
     Examples
     --------
@@ -84,11 +87,12 @@ class Skeleton:
     confidence: np.ndarray = None  # type: ignore[assignment]
     half_width: np.ndarray = None  # type: ignore[assignment]
     half_thickness: np.ndarray = None  # type: ignore[assignment]
+    support: np.ndarray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         # steps that merge or add vertices pass on what was measured before them: it means nothing any more
         unknown = np.full(len(self.vertices), np.nan)
-        for name, otherwise in zip(OF_VERTICES[1:], (unknown, self.radii, self.radii), strict=True):
+        for name, otherwise in zip(OF_VERTICES[1:], (unknown, self.radii, self.radii, unknown), strict=True):
             if np.shape(getattr(self, name))[:1] != unknown.shape:
                 object.__setattr__(self, name, otherwise)
         for name, dtype, columns in (
@@ -232,8 +236,8 @@ class Skeleton:
         -------
         networkx.Graph
             Nodes have ``position`` (3-tuple), ``radius``, ``confidence``, ``half_width``, ``half_thickness``,
-            ``curvature`` and ``torsion``; edges ``length`` and ``branch``. ``graph.graph["branches"]`` is the branch
-            table, a list of dicts, with a row for every value of ``branch``.
+            ``support``, ``curvature`` and ``torsion``; edges ``length`` and ``branch``. ``graph.graph["branches"]`` is
+            the branch table, a list of dicts, with a row for every value of ``branch``.
         """
         import networkx
 
@@ -256,7 +260,7 @@ class Skeleton:
 
         Parameters
         ----------
-        color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1]
+        color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
             What the colours of the edges show, or the one colour of all.
         """
         from .io.line_sets import to_line_set
@@ -287,12 +291,7 @@ class Skeleton:
         return to_pymeshlab(self)
 
     def save(
-        self,
-        path: str | PathLike[str],
-        *,
-        cut_loops: bool = False,
-        root: str | Root = None,
-        format: str | None = None,
+        self, path: str | PathLike[str], *, cut_loops: bool = False, root: Root = None, format: str | None = None
     ) -> None:
         """Write the skeleton to a file; the ending chooses the format. See `glsk_o3d.save_skeleton`."""
         from .io.skeletons import save_skeleton

@@ -107,6 +107,7 @@ def test_random_graphs_against_networkx(m, edges):
         facts = dict(back.nodes[i])
         known = np.isfinite([facts.pop("curvature"), facts.pop("torsion")])
         assert not known.any() or degree[i] in (1, 2)
+        assert np.isnan(facts.pop("support"))
         assert facts == {
             "position": tuple(skeleton.vertices[i]),
             "radius": skeleton.radii[i],

@@ -27,6 +27,7 @@ TASKS = {
 NAMES = {
     "skeletons": {
         "One call": ("skeletonize", "Skeleton"),
+        "How far it hangs on chance": ("support", "Supported"),
         "What it says about itself": ("Report", "IterationRecord", "Judgement"),
         "Fewer points, without a skeleton": ("remove_redundant_points",),
     },

@@ -26,6 +26,7 @@ PRINTED_COLUMNS = {  # format, of the columns that are read by people
     "angle": ".1f",
     "points": "d",
     "confidence": ".2f",
+    "support": ".2f",
 }
 
 
@@ -64,6 +65,8 @@ class BranchTable(Rows, row="branch"):
         Points of the skeleton's cloud that belong to the branch; see `segment`.
     confidence : (B,) float array
         Mean confidence.
+    support : (B,) float array
+        Share of samples of the cloud that show its least shown place, or end; see `glsk_o3d.support`.
     axis : (B,) int array
         The first row of the axis that a branch is part of. Where branches part, the one with the largest mean radius
         times cos(`angle`) continues the axis of its parent, unless it turns back, or ends within its own radius; each
@@ -99,21 +102,29 @@ class BranchTable(Rows, row="branch"):
     mean_torsion: np.ndarray
     points: np.ndarray
     confidence: np.ndarray
+    support: np.ndarray
     axis: np.ndarray
     order: np.ndarray
 
     def __repr__(self):
         return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
 
+    @property
+    def printed_columns(self) -> dict[str, str]:
+        """The columns that are read by people, each with its format; the support only if it is known."""
+        known = np.isfinite(self.support).any()
+        return {name: form for name, form in PRINTED_COLUMNS.items() if known or name != "support"}
+
     def __str__(self):
-        rows = [[*PRINTED_COLUMNS], *([cell(row, name) for name in PRINTED_COLUMNS] for row in self)]
+        columns = self.printed_columns
+        rows = [[*columns], *([cell(row, name) for name in columns] for row in self)]
         if len(rows) > PRINTED_ROWS + 1:
-            rows[PRINTED_ROWS - 4 : -4] = [["..."] + [""] * (len(PRINTED_COLUMNS) - 1)]
+            rows[PRINTED_ROWS - 4 : -4] = [["..."] + [""] * (len(columns) - 1)]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = (
             "  ".join(
                 word.ljust(width) if form == "s" else word.rjust(width)
-                for word, width, form in zip(row, widths, PRINTED_COLUMNS.values(), strict=True)
+                for word, width, form in zip(row, widths, columns.values(), strict=True)
             )
             for row in rows
         )

@@ -96,6 +96,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         mean_torsion=mean(torsion),
         points=np.bincount(label[label >= 0], minlength=len(paths)),
         confidence=mean(skeleton.confidence),
+        support=np.array([skeleton.support[path].min() for path in paths]),
         axis=axis,
         order=order,
     )

@@ -31,6 +31,7 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
         "traced": report.n_traced,
         "joined": len(report.joined),
         "uncertain": len(report.uncertain),
+        **({"samples": report.n_draws, "agreeing": report.n_agreeing} if report.n_draws else {}),
         "iterations": len(report.iterations),
         "converged": report.converged,
         "stop_reason": report.stop_reason,

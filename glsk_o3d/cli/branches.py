@@ -67,11 +67,11 @@ def _print(table: BranchTable) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    from ..analysis.branch_rows import PRINTED_COLUMNS, cell
+    from ..analysis.branch_rows import cell
 
     shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="")
-    for name, form in PRINTED_COLUMNS.items():
+    for name, form in table.printed_columns.items():
         shown.add_column(name.replace("_", " "), justify="left" if form == "s" else "right")
     for row in table:
-        shown.add_row(*(cell(row, name) for name in PRINTED_COLUMNS))
+        shown.add_row(*(cell(row, name) for name in table.printed_columns))
     print_table(shown, whole=True)

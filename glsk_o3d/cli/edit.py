@@ -103,7 +103,7 @@ def convert(
 
 def _graph(skeleton: Skeleton, largest: bool, cut: bool, root: int | str | None) -> tuple[Skeleton, list[str]]:
     from .. import editing
-    from ..report import coordinates
+    from ..judgements import coordinates
 
     told = []
     if largest:

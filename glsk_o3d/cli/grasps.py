@@ -153,7 +153,7 @@ def _print(best: GraspCandidates, found: int) -> None:
 
 def _cells(values: np.ndarray, form: str) -> list[str]:
     """A column of the table; numbers of one direction stand below each other."""
-    from ..report import coordinates
+    from ..judgements import coordinates
 
     rows = [
         [f"{value:{form}}" for value in row] if form else coordinates(row).split(", ")

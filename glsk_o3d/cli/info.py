@@ -202,6 +202,7 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
         "stop_reason": report.stop_reason,
         "repeatable": _repeatable(report.recipe),
         "uncertain": list(map(str, report.uncertain)),
+        "unsupported": list(map(str, report.unsupported)),
         "warnings": list(report.warnings),
         "versions": report.versions,
     }

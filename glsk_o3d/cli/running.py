@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from ..analysis.summary import ENDING_FACTS, ending, summary
-from ..report import Judgement
+from ..judgements import Judgement
+from ..report import Report
 from ..skeleton import Skeleton
 from .console import echo, print_iterations, print_json, print_rows
 
@@ -62,7 +64,9 @@ def print_results(
     facts = {**summary(skeleton, seconds), **more}
     if as_json:
         warnings = list(skeleton.report.warnings)
-        print_json({**facts, "warnings": warnings, "files": [str(path) for path in written]})
+        unsupported = list(map(asdict, skeleton.report.unsupported))
+        supported = {"unsupported": unsupported} if skeleton.report.n_draws else {}
+        print_json({**facts, **supported, "warnings": warnings, "files": [str(path) for path in written]})
     elif not quiet:
         told = {name: value for name, value in facts.items() if name not in (*ENDING_FACTS, "seconds")}
         hidden = {"dropped": facts["dropped"] or None}
@@ -71,11 +75,18 @@ def print_results(
         hidden["loops_closed"] = None  # most clouds have some, true ones are hardly ever among them
         hidden |= {name: None for name in ("outliers", "cuts", "bridges", "traced", "joined") if not facts[name]}
         hidden["uncertain"] = "\n".join(map(_close_call, skeleton.report.uncertain)) or None
+        if skeleton.report.n_draws:
+            hidden["samples"], hidden["agreeing"] = _supported(skeleton.report), None
         if facts["contracted"] == facts["distinct"]:
             hidden["contracted"] = None
         words = {name: "yes" if value else "no" for name, value in told.items() if isinstance(value, bool)}
         print_rows({**told, **words, **hidden, "contraction": ending(facts), "seconds": f"{seconds:.2f}"})
     tell_files(written, problems, quiet=quiet or as_json)
+
+
+def _supported(report: Report) -> str:
+    """How many samples agree with a skeleton, and what most of them do not show."""
+    return "\n".join([f"{report.n_agreeing} of {report.n_draws} have the same graph", *map(str, report.unsupported)])
 
 
 def _close_call(call: Judgement) -> str:

@@ -85,6 +85,16 @@ def skeletonize(
             show_default=False,
         ),
     ] = None,
+    support: Annotated[
+        int | None,
+        typer.Option(
+            "--support",
+            metavar="SAMPLES",
+            min=2,
+            help="Also skeletonise so many samples of the points, and say how many of them show each branch, loop and "
+            "end; 8 are enough. A sample takes about as long as the skeleton.",
+        ),
+    ] = None,
     drop_invalid: DropInvalid = False,
     cut_loops: CutLoops = False,
     as_json: Json = False,
@@ -100,6 +110,7 @@ def skeletonize(
         from ..recipes import save_recipe as write_recipe
         from ..recipes import to_recipe
         from ..recipes.writing import recipe_ending
+        from ..resampling import with_support
         from ..viewing.recorder import ContractionRecorder
         from .outputs import check_outputs, write
         from .overrides import choose
@@ -119,6 +130,9 @@ def skeletonize(
             update(f"reading {scan.name}")
             cloud, write_labelled = _read(scan, where, chosen, stream, labelled, quiet)
             skeleton, seconds = run(chosen, cloud, update, recorder)
+            if support is not None:
+                told = "comparing with the skeleton of sample {} of {}"
+                skeleton = with_support(skeleton, chosen, support, on_draw=lambda *n: update(told.format(*n), *n))
             if tubes is not None:
                 others[tubes] = lambda path: save_mesh(skeleton.to_tubes(), path)
             if labelled is not None:

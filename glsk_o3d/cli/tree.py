@@ -88,7 +88,7 @@ def tree(
 def _why_not(name: str, measures: TreeMeasures) -> str:
     """Why a measure is not known."""
     from ..analysis.forestry import BREAST_HEIGHT
-    from ..report import coordinates
+    from ..judgements import coordinates
 
     if name == "crown_base":
         return "no branch leaves the stem"

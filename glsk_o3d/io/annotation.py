@@ -39,7 +39,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     cloud : cloud, optional
         By default the one the skeleton was made from. Points of another one go with the nearest point of that, or with
         the nearest place on the curve if the skeleton's file held no cloud.
-    color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1], optional
+    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1], optional
         What the colours of the points are to show, or the one colour of all; see `glsk_o3d.io.colors.shades`.
 
     Returns

@@ -16,11 +16,11 @@ from ..numerics.groups import group_median
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-ColorChoice: TypeAlias = Literal["branch", "order", "radius", "confidence", "thickness"] | Sequence[float]
+ColorChoice: TypeAlias = Literal["branch", "order", "radius", "confidence", "support", "thickness"] | Sequence[float]
 """What colours show, or one colour for all: red, green and blue from 0 to 1."""
 
 UNKNOWN_GREY = (0.6, 0.6, 0.6)
-COLOR_NAMES = ("branch", "order", "radius", "confidence", "thickness")
+COLOR_NAMES = ("branch", "order", "radius", "confidence", "support", "thickness")
 THICKNESS_SPAN = 4.0  # fitted: that of the last colour; of the first it is one over that
 
 
@@ -30,9 +30,10 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
     Parameters
     ----------
     skeleton : Skeleton
-    color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1]
+    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
         Branches have 18 colours in turn. Orders of the branches, as in the table of them, go from dark blue, 0, to
-        yellow, the highest of the skeleton; radii from the least to the largest likewise, confidences from 0 to 1, and
+        yellow, the highest of the skeleton; radii from the least to the largest likewise, confidences and
+        support from 0 to 1, and
         the median thickness of the points of a vertex from a quarter to four, 1 in the middle. Or one colour for all:
         red, green, blue.
     branch : (n,) int array
@@ -119,5 +120,6 @@ def _median_thickness(skeleton: Skeleton) -> np.ndarray:
 _OF_VERTICES: dict[str, Callable[[Skeleton], np.ndarray]] = {
     "radius": _radius_share,
     "confidence": lambda skeleton: skeleton.confidence,
+    "support": lambda skeleton: skeleton.support,
     "thickness": lambda skeleton: _thickness_share(_median_thickness(skeleton)),
 }

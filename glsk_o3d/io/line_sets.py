@@ -21,7 +21,7 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = (0.85, 0.1, 0.1)) -> An
     Parameters
     ----------
     skeleton : Skeleton
-    color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1]
+    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
         What the colours of the edges show, or the one colour of all; see `glsk_o3d.io.colors.shades`.
 
     Returns
@@ -49,7 +49,7 @@ def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> 
     Parameters
     ----------
     skeleton : Skeleton
-    color : {"branch", "order", "radius", "confidence", "thickness"} or three floats in [0, 1], optional
+    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1], optional
         As for `to_line_set`; by default there are no colours.
 
     Returns

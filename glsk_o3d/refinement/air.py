@@ -7,9 +7,9 @@ from heapq import heappop, heappush
 
 import numpy as np
 
+from ..judgements import Judgement
 from ..numerics.polylines import place_at
 from ..numerics.vectors import TINY
-from ..report import Judgement
 from ..skeleton import Skeleton
 from .evidence import Evidence
 from .loops import crossings

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from ..judgements import Judgement
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, dot, norm
-from ..report import Judgement
 from ..skeleton import Skeleton
 from .evidence import LEAST_INSIDE, Evidence
 from .scores import BRIDGE_WEIGHTS, probability

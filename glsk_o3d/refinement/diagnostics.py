@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from ..judgements import Judgement, coordinates
 from ..numerics.components import component_labels
 from ..numerics.groups import group_median, group_sum
 from ..numerics.vectors import dot, norm
-from ..report import Judgement, coordinates
 from ..skeleton import Skeleton
 
 # All fitted; what tubes and balls have is derived.

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..judgements import Judgement
 from ..numerics.components import component_labels
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, opens_wider
 from ..numerics.groups import group_median
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, norm
-from ..report import Judgement
 from ..skeleton import Skeleton
 from .evidence import LEAST_INSIDE, Evidence
 from .merging import drop_edges, merge_vertices

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..judgements import Judgement
 from ..numerics.groups import Members
 from ..numerics.polylines import arc_lengths, beyond_surface
 from ..numerics.vectors import TINY
-from ..report import Judgement
 from ..skeleton import Skeleton
 from .evidence import Evidence
 from .junctions import Limbs

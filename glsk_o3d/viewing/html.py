@@ -13,9 +13,11 @@ import numpy as np
 
 from ..analysis.summary import point_count
 from ..io.colors import shades
+from ..judgements import coordinates
 
 if TYPE_CHECKING:
-    from ..report import IterationRecord, Judgement, Report
+    from ..judgements import Judgement
+    from ..report import IterationRecord, Report
     from ..skeleton import Skeleton
 
 MOST_LISTED_ROWS = 12  # of a table
@@ -109,6 +111,24 @@ def topology(report: Report) -> str:
     rest = len(listed) - MOST_LISTED_ROWS
     more = f'<p class="muted small">and {rest:,} clearer ones</p>' if rest > 0 else ""
     return f"{told}{_table(heads, rows, 'topology')}{more}"
+
+
+def support(report: Report) -> str:
+    """How many samples have the same graph, and what many of them do not show: the most doubtful first."""
+    if not report.n_draws:
+        return ""
+    told = (
+        f"<h2>Support</h2><p>{report.n_agreeing:,} of {report.n_draws:,} samples of the cloud have the same graph.</p>"
+    )
+    listed = report.unsupported[:MOST_LISTED_ROWS]
+    if not listed:
+        return told
+    heads = "<th>part</th><th>here</th><th>samples</th>"
+    rows = ""
+    for it in listed:
+        here = "yes" if it.present else "no"
+        rows += f"<tr><td>{it.about} at ({coordinates(it.place)})</td><td>{here}</td><td>{it.share:.0%}</td></tr>"
+    return told + _table(heads, rows, "support")
 
 
 def _margin(judgement: Judgement) -> float:

@@ -102,6 +102,7 @@ def _page(skeleton, recorder, title) -> str:
         else "",
         "sections": sections.contraction(skeleton.report)
         + sections.topology(skeleton.report)
+        + sections.support(skeleton.report)
         + sections.branches(skeleton)
         + sections.origin(skeleton.report),
         # no "<" in it, so that nothing in it can end the script element

@@ -32,6 +32,7 @@ ROOT_MARK = {"marker": "D", "s": 22, "facecolors": "#1f5fbf", "edgecolors": "whi
 _DOTS_SHARE, _DOT_AREA = 0.1, (0.5, 3)
 _LINE_SHARE, _LINE_WIDTH = 0.065, (0.6, 1.5)
 _DOT_SHARE, _WIDEST_DOT, _LONE_DOT = 0.12, 3.0, 3.7
+_MOST_MARKS = 12  # of what samples disagree with
 
 
 def save_preview(
@@ -42,8 +43,9 @@ def save_preview(
     The three views look along the coordinate axes, all at one scale: x across and y up, x across and z up, y across and
     z up. They are arranged so that they are large. The cloud is grey, lighter where it is farther; edges are red,
     junctions dark dots and leaves open ones, unless branches are too short for dots; a blue diamond is where a tree
-    grows from, ``Report.root``. Below are the counts and what the run warned of: the first two warnings, long ones
-    shortened, fewer and shorter in a low picture, and how many more there are.
+    grows from, ``Report.root``. Where `support` was asked for, amber rings mark what few samples show, and crosses what
+    some show and the skeleton lacks, with how many. Below are the counts and what the run warned of: the first two
+    warnings, long ones shortened, fewer and shorter in a low picture, and how many more there are.
 
     Parameters
     ----------
@@ -97,6 +99,7 @@ def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] 
         scale = 72 * axes.get_position().width * width / extent[a]  # points per unit
         _draw_cloud(axes, cloud - centre, a, b, scale**2 * np.prod(np.sort(extent)[1:]))
         _draw_curve(axes, skeleton, skeleton.vertices - centre, [a, b], scale)
+        _mark_doubts(axes, skeleton.report, centre, [a, b])
         if skeleton.report.root:
             place = np.subtract(skeleton.report.root, centre)[[a, b]]
             mark = axes.scatter(*place, **ROOT_MARK, zorder=4, clip_on=False)
@@ -139,6 +142,19 @@ def _draw_curve(axes, skeleton, vertices, across_up, scale):
     for chosen, face, wide in spots:
         style = {"s": wide**2, "facecolors": face, "edgecolors": _RED if face == _PAPER else face}
         axes.scatter(*vertices[chosen][:, across_up].T, zorder=3, clip_on=False, linewidths=0.3 * wide, **style)
+
+
+def _mark_doubts(axes, report, centre, across_up):
+    """Amber rings around what few samples show, crosses where many show what is not there, and how many of them."""
+    for it in report.unsupported[:_MOST_MARKS]:
+        x, y = np.subtract(it.place, centre)[across_up]
+        style: dict[str, Any] = {"s": 70, "linewidths": 1, "zorder": 5, "clip_on": False}
+        if it.present:
+            axes.scatter(x, y, marker="o", facecolors="none", edgecolors=_AMBER, **style)
+        else:
+            axes.scatter(x, y, marker="x", c=_AMBER, **style)
+        note = f"{round(it.share * report.n_draws)}/{report.n_draws}"
+        axes.annotate(note, (x, y), (6, 4), textcoords="offset points", color=_AMBER, fontsize=6, annotation_clip=False)
 
 
 def new_figure(size: tuple[float, float]) -> Any:

@@ -2,7 +2,7 @@
 
 import csv
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import open3d as o3d
@@ -245,7 +245,10 @@ def test_a_torso_goes_on_at_both_ends():
 def test_print():
     lines = str(TREE.branch_table()).splitlines()
     assert lines[0].startswith("BranchTable(15 branches, 4 levels): lengths in")
-    assert lines[1].split() == list(PRINTED_COLUMNS)
+    assert lines[1].split() == [name for name in PRINTED_COLUMNS if name != "support"]
+    supported = replace(TREE, support=np.full(len(TREE.vertices), 0.5)).branch_table()
+    assert str(supported).splitlines()[1].split() == list(PRINTED_COLUMNS)
+    assert str(supported).splitlines()[2].split()[-1] == "0.50"
     assert len(lines) == 17
     words = lines[2].split()
     table = TREE.branch_table()

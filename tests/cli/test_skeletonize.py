@@ -324,3 +324,17 @@ def test_a_close_call_comes_with_the_option_that_answers_otherwise():
     call = Judgement("gap", (1.0, 2.0, 3.0), 0.42, changed=False)
     told = "the object goes on across the gap at (1, 2, 3): 0.42, gap left; if that is wrong: --set Refiner.bridge=0.41"
     assert running._close_call(call) == told
+
+
+def test_support_is_told_and_shown(invoke, scans, tmp_path):
+    result = invoke("skeletonize", scans / "ring.ply", "-o", "r.json", "--report", "r.html", "--support", "2")
+    assert result.exit_code == 0
+    assert re.search(r"^samples +2 of 2 have the same graph$", result.stdout, re.M)
+    skeleton = read_skeleton(tmp_path / "r.json")
+    assert (skeleton.support.min(), skeleton.report.n_agreeing) == (1, 2)
+    assert "2 of 2 samples of the cloud have the same graph" in (tmp_path / "r.html").read_text()
+    told = json.loads(invoke("skeletonize", scans / "ring.ply", "-o", "s.json", "--support", "2", "--json").stdout)
+    assert (told["samples"], told["agreeing"], told["unsupported"]) == (2, 2, [])
+    told = json.loads(invoke("skeletonize", scans / "ring.ply", "-o", "t.json", "--json").stdout)
+    assert not {"samples", "agreeing", "unsupported"} & told.keys()
+    assert invoke("skeletonize", scans / "ring.ply", "-o", "u.json", "--support", "1").exit_code == 2

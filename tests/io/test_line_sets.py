@@ -32,7 +32,7 @@ def test_tensor_line_set(skeleton):
     assert lines.point.positions.dtype == o3d.core.float64
     np.testing.assert_array_equal(lines.point.positions.numpy(), skeleton.vertices)
     np.testing.assert_array_equal(lines.point.radius.numpy(), skeleton.radii[:, None])
-    assert set(lines.point) == {"positions", "radius", "confidence", "half_width", "half_thickness"}
+    assert set(lines.point) == {"positions", "radius", "confidence", "half_width", "half_thickness", "support"}
     np.testing.assert_array_equal(lines.point.half_width.numpy(), skeleton.half_width[:, None])
     np.testing.assert_array_equal(lines.point.half_thickness.numpy(), skeleton.half_thickness[:, None])
     assert lines.point.confidence.dtype == o3d.core.float64

@@ -11,7 +11,8 @@ import pytest
 
 import glsk_o3d as glsk
 from glsk_o3d import ContractionRecorder, Contractor, FileFormatError, InvalidParameterError, RingBuilder, save_report
-from glsk_o3d.report import IterationRecord, Judgement, Report
+from glsk_o3d.judgements import Judgement
+from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.samples import torus
 from glsk_o3d.viewing import html as sections
 from glsk_o3d.viewing.recorder import thinned

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.errors import FileFormatError, MissingPackageError
+from glsk_o3d.judgements import Supported
 from glsk_o3d.report import Report
 from glsk_o3d.viewing import preview
 from glsk_o3d.viewing.preview import save_preview
@@ -230,3 +231,18 @@ def test_a_line_for_the_count_comes_first():
     assert preview._warned([LONG, "two"], 6, 1) == ["2 warnings"]
     assert preview._warned(["one"], 6, 1) == ["warning: one"]
     assert preview._warned(["one"], 6, 0) == []
+
+
+def test_what_samples_disagree_with_is_marked(skeleton, tmp_path):
+    """Three marks in three views, and none where they agree."""
+    place = tuple(skeleton.vertices[0].tolist())
+    parts = Supported("end", place, 0.5), Supported("end", place, 0.5, present=False), Supported("loop", place, 1.0)
+    amber = []
+    for support in ((), parts[2:], parts[:1], parts):
+        report = Report(n_draws=8, n_agreeing=4, support=support)
+        save_preview(dataclasses.replace(skeleton, report=report), tmp_path / "p.png", size=(900, 400))
+        image = imread(tmp_path / "p.png")
+        near = np.abs(image[..., :3] - np.array([0xA0, 0x50, 0]) / 255).max(axis=-1) < 0.1
+        amber.append(int(near.sum()))
+    assert amber[0] == amber[1] == 0
+    assert 50 < amber[2] < amber[3]

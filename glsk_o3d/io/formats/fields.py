@@ -23,10 +23,11 @@ ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {
     "normals": ((3,), float),
     "half_width": ((), float),
     "half_thickness": ((), float),
+    "support": ((), float),
 }
 """The arrays of a skeleton: the shape of a row and the type of each. The one field more is ``report``."""
-LATER = ("half_width", "half_thickness")
-"""Those that older files lack: there they are the radii."""
+LATER = ("half_width", "half_thickness", "support")
+"""Those that older files lack: there they are the radii, and the support is not known."""
 
 
 def decode(values: Any) -> Skeleton:
@@ -47,7 +48,8 @@ def decode(values: Any) -> Skeleton:
     if values.get("format_version") != FORMAT_VERSION:
         found = values.get("format_version")
         raise ValueError(f"it has format_version {found!r} and this release reads {FORMAT_VERSION}: update glsk-o3d")
-    values = {name: values.get("radii") for name in LATER} | values
+    unknown = np.full(len(values.get("radii", ())), np.nan)
+    values = dict(zip(LATER, (values.get("radii"), values.get("radii"), unknown), strict=True)) | values
     missing = [name for name in (*ARRAYS, "report") if name not in values]
     if missing:
         raise ValueError(f"it lacks {', '.join(missing)}")

@@ -60,6 +60,7 @@ def checked(skeleton: Skeleton) -> Skeleton:
         ("confidence", skeleton.confidence, 1.0),
         ("half_width", skeleton.half_width, np.inf),
         ("half_thickness", skeleton.half_thickness, skeleton.half_width),
+        ("support", skeleton.support, 1.0),
     ):
         wrong = values[(values < 0) | (values > high)]
         if len(wrong):

@@ -11,7 +11,7 @@ import re
 
 import numpy as np
 
-from ...report import coordinates
+from ...judgements import coordinates
 from ...skeleton import Skeleton
 from .forests import global_shift, parents
 from .graphs import graph_skeleton
