@@ -63,8 +63,8 @@ def support(
     Returns
     -------
     Skeleton
-        That of all points, with `Skeleton.support`, the share of samples that show the curve within a local radius of
-        each vertex, at an end an end within two; and with `Report.support`, the share for every branch, loop and end,
+        That of all points, with ``Skeleton.support``, the share of samples that show the curve within a local radius of
+        each vertex, at an end an end within two; and with ``Report.support``, the share for every branch, loop and end,
         and for those ends and loops of other samples that this skeleton lacks.
 
     Raises

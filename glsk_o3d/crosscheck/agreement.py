@@ -19,6 +19,7 @@ from .reconstruction import INVENTED_DISTANCE, spacing
 # All fitted.
 FLAT_LAPLACIAN = 1e-3  # of the ring's size: smaller Laplacian coordinates have no direction
 TEAR_EDGES = 12  # edges of a border: ball pivoting leaves shorter ones everywhere
+MOST_BORDER = 0.05  # share of vertices on borders: half a ring is a strip with one border or two, closed it has no hole
 COMPARISON_STEP = 0.002  # of the diagonal: spacing of the places where skeletons are compared
 
 
@@ -78,6 +79,9 @@ class MeshFit:
     torn : float
         Share of the mesh's vertices that are not in the largest piece of the mesh on their part of the cloud: crumbs
         count for little, and parts of the cloud that are apart for nothing.
+    genus : int or None
+        Holes that pass through the mesh, its borders closed; None where a twentieth of its vertices lie on borders of
+        more than 12 edges, or three faces share an edge.
     """
 
     far: float
@@ -85,6 +89,7 @@ class MeshFit:
     pieces: int
     parts: int
     torn: float
+    genus: int | None
 
 
 @dataclass(frozen=True)
@@ -195,7 +200,34 @@ def mesh_fit(state, vertices, faces):
         pieces=len(np.unique(piece)),
         parts=int(part.max()) + 1,
         torn=float(1 - shared.max(axis=1).sum() / len(used)),
+        genus=_genus(faces) if border.mean() <= MOST_BORDER else None,
     )
+
+
+def _genus(faces):
+    """Holes that pass through a mesh, by its Euler characteristic with a disc in each border; None if it has none."""
+    n = len(faces)
+    corner = np.arange(3 * n).reshape(n, 3)
+    ends = np.stack([corner, np.roll(corner, -1, axis=1)], axis=2).reshape(-1, 2)  # of every side
+    vertices = faces.ravel()[ends]
+    turned = vertices[:, 0] > vertices[:, 1]
+    ends[turned], vertices[turned] = ends[turned, ::-1], vertices[turned, ::-1]
+    order = np.lexsort(vertices.T)
+    edge = np.unique(vertices[order], axis=0, return_inverse=True)[1].ravel()[np.argsort(order)]
+    sides = np.bincount(edge)
+    if sides.max(initial=0) > 2:
+        return None
+    by_edge = np.argsort(edge, kind="stable")
+    pairs = by_edge[sides[edge[by_edge]] == 2].reshape(-1, 2)
+    # corners in one fan around a vertex are one: where fans touch in a vertex alone, the surface does not hang together
+    fan = component_labels(3 * n, ends[pairs].transpose(0, 2, 1).reshape(-1, 2))
+    borders, border = 0, fan[ends[sides[edge] == 1]]
+    if len(border):
+        at, border = np.unique(border, return_inverse=True)
+        borders = int(component_labels(len(at), border.reshape(-1, 2)).max()) + 1
+    pieces = int(component_labels(fan.max(initial=-1) + 1, fan[ends]).max(initial=-1)) + 1
+    euler = int(fan.max(initial=-1)) + 1 - len(sides) + n
+    return (2 * pieces - borders - euler) // 2
 
 
 def _on_mesh(points, vertices, faces, values):

@@ -12,8 +12,8 @@ AGREES, IN_PART, DISTRUST, UNTOLD = VERDICTS = "agrees", "agrees in part", "do n
 
 MEANINGS = {
     AGREES: "as of clean, dense clouds; gaps that cloud and mesh share, as of scans from one or two sides, do not show",
-    IN_PART: "usual with noise, even little: of 48 test clouds 43 had a good skeleton all the same; look at --picture",
-    DISTRUST: "rare, and a call to look at --picture: of 8 test clouds 4 had a good skeleton all the same",
+    IN_PART: "usual with noise, even little: of 48 test clouds 44 had a good skeleton all the same; look at --picture",
+    DISTRUST: "rare, and a call to look at --picture: of 12 test clouds 8 had a good skeleton all the same",
     UNTOLD: "usual with much noise or few points: no word against the skeleton; look at --picture, or 'glsk evaluate'",
 }
 """What to expect of each verdict; the numbers are measured, see docs/crosscheck.md."""
@@ -53,9 +53,9 @@ def judge(
         twentieth of the mesh has borders that the cloud has not, a twentieth is torn off, smaller pieces of it are all
         that differs, or it closes around less than 70 % of the points whose rings close), where its contraction failed,
         and where no Laplacian coordinates could be compared. "agrees" where they lie within a fifth of a radius on
-        average and a radius in 95 % of their length, the mesh closes around 70 % of the points whose rings close, three
-        quarters of the Laplacian coordinates lie within 30 degrees, neither run warned of anything, and the contraction
-        of the mesh did not fail.
+        average and a radius in 95 % of their length, the mesh closes around 70 % of the points whose rings close and
+        has as many holes as the skeleton has loops, three quarters of the Laplacian coordinates lie within 30 degrees,
+        neither run warned of anything, and the contraction of the mesh did not fail.
     reasons : tuple of str
     """
     failed, grave, slight = [], [], []
@@ -71,6 +71,10 @@ def judge(
     if skeletons.hausdorff95_in_radii > HAUSDORFF_RADII:
         slight.append(
             f"5 % of a skeleton are more than {skeletons.hausdorff95_in_radii:.1f} local radii from the other"
+        )
+    if fit is not None and fit.genus is not None and fit.genus != skeletons.loops[0]:
+        slight.append(
+            f"holes: {fit.genus} pass through the mesh, and the skeleton of the cloud has {skeletons.loops[0]} loops"
         )
     turned = rows.angle and rows.angle["p75"] > TURNED_ANGLE
     if slight or apart > FAR_RADII:

@@ -12,6 +12,7 @@ from glsk_o3d.crosscheck.agreement import (
     MeshFit,
     RowAgreement,
     SkeletonAgreement,
+    _genus,
     mesh_fit,
 )
 from glsk_o3d.crosscheck.reconstruction import spacing
@@ -78,7 +79,7 @@ def test_a_mesh_that_fails_is_named():
     assert judge(rows(), apart(), (), Report(stop_reason="settled")) == ("agrees", ())
 
 
-FIT = MeshFit(far=0.0, open=0.0, pieces=1, parts=1, torn=0.0)
+FIT = MeshFit(far=0.0, open=0.0, pieces=1, parts=1, torn=0.0, genus=None)
 
 
 @pytest.mark.parametrize(
@@ -97,6 +98,36 @@ def test_a_mesh_that_does_not_describe_the_cloud_says_nothing_against_it(changed
     assert second.startswith("loops: 2")
     assert judge(rows(), apart(), fit=fit) == ("agrees", ())
     assert judge(rows(covered=0.6), differ)[0] == "cannot tell"
+
+
+def grid(n, m, close_n, close_m, shift=0):
+    """Faces of a grid of n by m vertices, closed or not."""
+    i, j = (a.ravel() for a in np.mgrid[: n - 1 + close_n, : m - 1 + close_m])
+    at = lambda a, b: shift + (a % n) * m + b % m  # noqa: E731
+    corners = at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)
+    return np.concatenate([np.column_stack([corners[k] for k in which]) for which in ((0, 1, 2), (0, 2, 3))])
+
+
+def test_genus_of_meshes():
+    ring, tube, sheet = grid(8, 9, 1, 1), grid(8, 9, 1, 0), grid(8, 9, 0, 0)
+    assert [_genus(faces) for faces in (ring, tube, sheet)] == [1, 0, 0]
+    turned = ring.copy()
+    turned[::3] = turned[::3, ::-1]
+    assert _genus(turned) == 1  # ball pivoting turns faces as it likes
+    assert _genus(np.concatenate([ring, ring + 72])) == 2
+    assert _genus(ring[np.arange(len(ring)) != 40]) == 1  # a border of three edges
+    pinched = np.concatenate([ring, grid(8, 9, 1, 1, shift=72)])
+    pinched[pinched == 72] = 0  # two rings touch in a vertex
+    assert _genus(pinched) == 2
+    assert _genus(np.concatenate([ring, [[0, 9, 999]]])) is None  # three faces share an edge
+
+
+def test_holes_of_the_mesh_are_loops_of_the_skeleton():
+    one = apart(loops=(1, 1))
+    assert judge(rows(), one, fit=replace(FIT, genus=1)) == ("agrees", ())
+    verdict, reasons = judge(rows(), one, fit=replace(FIT, genus=2))
+    assert verdict == "agrees in part"
+    assert reasons == ("holes: 2 pass through the mesh, and the skeleton of the cloud has 1 loops",)
 
 
 def test_a_crumb_is_no_excuse(ring, check):
