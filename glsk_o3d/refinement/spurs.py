@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
@@ -33,6 +34,9 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     draws them together in a sharp corner, and a spur into its tip is left. Another branch with an end may be a spur,
     too, far from its points: it counts as no thicker than the junction. A branch whose points have no say goes.
 
+    A flat end draws two prongs of the curve into its corners, and each stands out of the other. So where three branches
+    meet, the less probable one of two with ends is a limb only if the other is one, too: without it there is no fork.
+
     Parameters
     ----------
     skeleton : Skeleton
@@ -51,7 +55,7 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     judgements: list[Judgement] = []
     given = skeleton
     while True:
-        found = list(_twigs(skeleton, evidence))
+        found = _with_forks(skeleton, list(_twigs(skeleton, evidence)))
         worst: dict[int, _Twig] = {}
         for twig in found:
             before = worst.get(twig.junction)
@@ -93,10 +97,11 @@ class _Twig(NamedTuple):
     body: np.ndarray  # its other vertices
     tip: int
     facts: dict[str, float]
+    other: float = 1.0  # probability that the other prong is a limb
 
     @property
     def probability(self) -> float:
-        return probability(LIMB_WEIGHTS, self.facts)
+        return self.other * probability(LIMB_WEIGHTS, self.facts)
 
 
 def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
@@ -125,6 +130,20 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
             confidence=float(share @ confidence[body]),
         )
         yield _Twig(junction, body, tip, facts)
+
+
+def _with_forks(skeleton: Skeleton, twigs: list[_Twig]) -> list[_Twig]:
+    """Twigs, the less probable prong of every fork with the probability that both are limbs."""
+    at: defaultdict[int, list[int]] = defaultdict(list)
+    for number, twig in enumerate(twigs):
+        if skeleton.degree[twig.junction] == 3:
+            at[twig.junction].append(number)
+    found = list(twigs)
+    for numbers in at.values():
+        less, *others = sorted(numbers, key=lambda number: twigs[number].probability)
+        if others:
+            found[less] = twigs[less]._replace(other=twigs[others[0]].probability)
+    return found
 
 
 class _Web:

@@ -29,6 +29,12 @@ def _one_width(monkeypatch):
     )
 
 
+@pytest.fixture
+def _alone(monkeypatch):
+    """Every branch has its own probability, whatever the one beside it."""
+    monkeypatch.setattr(spurs, "_with_forks", lambda skeleton, twigs: twigs)
+
+
 def pruned(skeleton, reach, thick=0.1):
     """Without the branches that reach less far from a part so thick, over its thickness; at least 1."""
     out = (reach - 1) * thick / WIDE
@@ -79,6 +85,7 @@ def test_short_is_cut_long_stays():
     assert (skeleton.vertex_of_point[(owner == N) | (owner == N + 1)] == 5).all()
 
 
+@pytest.mark.usefixtures("_alone")
 @pytest.mark.parametrize("reach", [1.1, 1.3, 2.0])
 @pytest.mark.parametrize(("share", "cut"), [(1 - 1e-6, True), (1 + 1e-6, False)])
 def test_threshold_is_exact(reach, share, cut):
@@ -88,6 +95,7 @@ def test_threshold_is_exact(reach, share, cut):
     assert (len(skeleton.vertices) == N) == cut
 
 
+@pytest.mark.usefixtures("_alone")
 @pytest.mark.parametrize("along", [0.025, 0.05, 0.9])
 @pytest.mark.parametrize(("share", "cut"), [(1 - 1e-6, True), (1 + 1e-6, False)])
 def test_what_counts_is_how_far_points_are_from_the_part_and_how_thick_it_is_there(along, share, cut):
@@ -259,6 +267,21 @@ def test_what_is_pruned_was_judged():
     assert all(it.probability >= 0.5 for it in limbs if not it.changed)
 
 
+def test_a_fork_is_one_only_if_both_prongs_are_limbs():
+    """Alike prongs count together, whichever is the less probable; beside a long limb a prong counts for itself."""
+    raw = tree((10, 0.2))
+    alone = [probability(LIMB_WEIGHTS, facts) for _, facts in limb_facts(raw, UNBONDED)]
+    _, limbs = prune_spurs(raw, UNBONDED, 0)
+    less, more, most = sorted(alone)
+    assert sorted(it.probability for it in limbs) == pytest.approx(sorted([less * more, more, most]))
+    for least, left in ((less * more - 1e-9, 3), (less * more + 1e-9, 2)):
+        assert len(prune_spurs(raw, UNBONDED, least)[0].leaves) == left
+    crossed = tree((10, 0.2), (10, 0.3))  # four branches meet: each may go alone
+    alone = [probability(LIMB_WEIGHTS, facts) for _, facts in limb_facts(crossed, UNBONDED)]
+    assert sorted(it.probability for it in prune_spurs(crossed, UNBONDED, 0)[1]) == pytest.approx(sorted(alone))
+
+
+@pytest.mark.usefixtures("_alone")
 def test_the_farther_a_limb_reaches_the_more_probable_it_is():
     skeleton, limbs = prune_spurs(tree((5, 0.3), (12, 0.7)), UNBONDED, 0)
     found = {it.place: it for it in limbs}
