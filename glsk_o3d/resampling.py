@@ -87,7 +87,7 @@ def support(
     --------
     >>> from glsk_o3d.samples import torus
     >>> ring = support(torus(1000).points, draws=2)
-    >>> [(it.about, it.share) for it in ring.report.support], ring.support.min()
+    >>> [(it.about, it.share) for it in ring.report.support], float(ring.support.min())
     ([('branch', 1.0), ('loop', 1.0)], 1.0)
     """
     given = (pipeline, options) if isinstance(pipeline, Mapping) else (options,)
