@@ -66,11 +66,16 @@ def skeletonize(
     >>> skeletonize(torus(1000).points, k=12, drop_invalid=True).n_loops
     1
     """
+    return chosen_pipeline(pipeline, options)(cloud, on_iteration=on_iteration, on_state=on_state)
+
+
+def chosen_pipeline(
+    pipeline: Pipeline[Skeleton] | str | os.PathLike[str] | Mapping[str, Any], options: Mapping[str, Any]
+) -> Pipeline[Skeleton]:
+    """The pipeline that is meant, with options: what `skeletonize` takes."""
     if isinstance(pipeline, Mapping):
-        chosen = as_pipeline("default").with_options(pipeline, **options)
-    else:
-        chosen = as_pipeline(pipeline).with_options(options)
-    return chosen(cloud, on_iteration=on_iteration, on_state=on_state)
+        return as_pipeline("default").with_options(pipeline, **options)
+    return as_pipeline(pipeline).with_options(options)
 
 
 def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathLike[str]) -> Pipeline[Skeleton]:

@@ -226,12 +226,10 @@ class Report:
         """Inverse of `to_dict`; entries of a later version that this one does not know are passed over."""
         values = dict(data)
         values["iterations"] = tuple(_made(IterationRecord, record) for record in values.get("iterations", ()))
-        values["judgements"] = tuple(
-            _made(Judgement, found | {"place": tuple(found["place"])}) for found in values.get("judgements", ())
-        )
-        values["support"] = tuple(
-            _made(Supported, found | {"place": tuple(found["place"])}) for found in values.get("support", ())
-        )
+        for name, record in (("judgements", Judgement), ("support", Supported)):
+            values[name] = tuple(
+                _made(record, found | {"place": tuple(found["place"])}) for found in values.get(name, ())
+            )
         if not all(found.about in OUTCOMES for found in values["judgements"]):
             raise ValueError("a judgement in its report is about nothing that is known")
         values["joined"] = tuple((tuple(start), tuple(stop)) for start, stop in values.get("joined", ()))

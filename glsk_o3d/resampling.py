@@ -12,8 +12,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from .analysis.curves import along, pieces
 from .analysis.matching import matched
-from .driver import as_pipeline
+from .driver import chosen_pipeline
 from .errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
 from .judgements import Place, Supported
 from .numerics.components import component_labels
@@ -90,10 +91,7 @@ def support(
     >>> [(it.about, it.share) for it in ring.report.support], float(ring.support.min())
     ([('branch', 1.0), ('loop', 1.0)], 1.0)
     """
-    given = (pipeline, options) if isinstance(pipeline, Mapping) else (options,)
-    chosen = as_pipeline("default" if isinstance(pipeline, Mapping) else pipeline)
-    for each in given:
-        chosen = chosen.with_options(each)
+    chosen = chosen_pipeline(pipeline, options)
     return with_support(chosen(cloud), chosen, draws, seed=seed, on_draw=on_draw)
 
 
@@ -188,16 +186,9 @@ class _Curve:
         self.counts = skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)
         self.loops = minimum_cycle_basis(len(self.vertices), self.edges, skeleton.edge_lengths)
         self._lengths = skeleton.edge_lengths
-        self._places = cKDTree(self._along(self.edges))
-
-    def _along(self, edges: np.ndarray) -> np.ndarray:
-        """Places on some edges, a quarter of a radius apart at most, and all vertices, (k, 3) float array."""
-        start, stop = self.vertices[edges].transpose(1, 0, 2)
-        pieces = np.ceil(norm(stop - start) / (STEP * self.reach[edges].min(axis=1, initial=np.inf))).astype(int)
-        pieces = np.clip(pieces, 1, MOST_PIECES)
-        edge = np.repeat(np.arange(len(edges)), pieces)
-        share = (np.arange(len(edge)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[edge]
-        return np.concatenate([self.vertices, start[edge] + share[:, None] * (stop - start)[edge]])
+        step = np.maximum(STEP * self.reach[self.edges].min(axis=1, initial=np.inf), self._lengths / MOST_PIECES)
+        edge, share = pieces(self.vertices, self.edges, step)
+        self._places = cKDTree(np.concatenate([self.vertices, along(self.edges, edge, share, self.vertices)]))
 
     def shows(self, places: np.ndarray, reach: np.ndarray) -> np.ndarray:
         """Whether the curve comes within reach of places, (k,) bool array."""
@@ -207,7 +198,7 @@ class _Curve:
         """Whether what lies along a loop of another curve closes a loop, too, that comes along most of it."""
         around = cKDTree(other.vertices[loop])
         distance, nearest = around.query(self.vertices)
-        near = distance <= NEAR_LOOP * other.reach[loop][nearest % len(loop)]
+        near = distance <= NEAR_LOOP * other.reach[loop][nearest]
         edges = near[self.edges].all(axis=1)
         cycles = minimum_cycle_basis(len(self.vertices), self.edges[edges], self._lengths[edges])
         if not cycles:
@@ -239,8 +230,8 @@ class _Missing:
 
 
 def _middle(path: np.ndarray) -> np.ndarray:
-    along = arc_lengths(path)
-    return place_at(path, along, along[-1] / 2)
+    lengths = arc_lengths(path)
+    return place_at(path, lengths, lengths[-1] / 2)
 
 
 def _place(place: np.ndarray) -> Place:

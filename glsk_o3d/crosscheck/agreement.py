@@ -212,8 +212,7 @@ def _genus(faces):
     vertices = faces.ravel()[ends]
     turned = vertices[:, 0] > vertices[:, 1]
     ends[turned], vertices[turned] = ends[turned, ::-1], vertices[turned, ::-1]
-    order = np.lexsort(vertices.T)
-    edge = np.unique(vertices[order], axis=0, return_inverse=True)[1].ravel()[np.argsort(order)]
+    edge = np.unique(vertices, axis=0, return_inverse=True)[1].ravel()
     sides = np.bincount(edge)
     if sides.max(initial=0) > 2:
         return None
@@ -221,12 +220,11 @@ def _genus(faces):
     pairs = by_edge[sides[edge[by_edge]] == 2].reshape(-1, 2)
     # corners in one fan around a vertex are one: where fans touch in a vertex alone, the surface does not hang together
     fan = component_labels(3 * n, ends[pairs].transpose(0, 2, 1).reshape(-1, 2))
-    borders, border = 0, fan[ends[sides[edge] == 1]]
-    if len(border):
-        at, border = np.unique(border, return_inverse=True)
-        borders = int(component_labels(len(at), border.reshape(-1, 2)).max()) + 1
-    pieces = int(component_labels(fan.max(initial=-1) + 1, fan[ends]).max(initial=-1)) + 1
-    euler = int(fan.max(initial=-1)) + 1 - len(sides) + n
+    at, border = np.unique(fan[ends[sides[edge] == 1]], return_inverse=True)
+    borders = int(component_labels(len(at), border.reshape(-1, 2)).max(initial=-1)) + 1
+    points = int(fan.max(initial=-1)) + 1
+    pieces = int(component_labels(points, fan[ends]).max(initial=-1)) + 1
+    euler = points - len(sides) + n
     return (2 * pieces - borders - euler) // 2
 
 
