@@ -20,7 +20,7 @@ AIR_WEIGHTS = {
 }
 HANDLE_WEIGHTS = {"constant": -0.9, "opening": 2.9, "winding": -3.3, "bonds": 0.5, "confidence": 3.0}
 BRIDGE_WEIGHTS = {"constant": -3.7, "winding": 5.8, "straightness": 2.5, "cap": -0.7}
-LIMB_WEIGHTS = {"constant": -3.0, "protrusion": 2.7, "web": -6.2, "confidence": 4.4}
+LIMB_WEIGHTS = {"constant": -5.3, "protrusion": 3.0, "web": -4.7, "confidence": 4.0, "roundness": 2.5}
 
 
 def probability(weights: Mapping[str, float], facts: Mapping[str, float]) -> float:

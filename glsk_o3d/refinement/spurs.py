@@ -108,7 +108,9 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
     limbs, web = Limbs(skeleton, joined=True), _Web(skeleton, evidence)
     supporting = skeleton.supporting_points
     members = Members(skeleton.vertex_of_point[supporting], len(skeleton.vertices))
-    wide, count = measure_sections(skeleton).half_width, support(skeleton)
+    sections, count = measure_sections(skeleton), support(skeleton)
+    wide = sections.half_width
+    roundness = np.nan_to_num(sections.half_thickness / np.maximum(wide, TINY))
     confidence, degree = np.nan_to_num(skeleton.confidence), skeleton.degree
     ending = np.zeros(len(degree), bool)
     for branch in limbs.branches:
@@ -128,6 +130,7 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
             protrusion=float(np.log(out / max(half, TINY) + 0.3)),
             web=web.of(branch),
             confidence=float(share @ confidence[body]),
+            roundness=float(roundness[junction]),
         )
         yield _Twig(junction, body, tip, facts)
 

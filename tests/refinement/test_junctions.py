@@ -20,7 +20,9 @@ R = 0.1
 
 def pruned(skeleton, reach):
     """Without the branches that reach less far in tubes, even of those that hang together with no others."""
-    least = probability(LIMB_WEIGHTS, {"protrusion": np.log(reach - 1 + 0.3), "web": 0.0, "confidence": 0.0})
+    least = probability(
+        LIMB_WEIGHTS, {"protrusion": np.log(reach - 1 + 0.3), "web": 0.0, "confidence": 0.0, "roundness": 1.0}
+    )
     return prune_spurs(skeleton, Evidence.of(skeleton), least)[0]
 
 

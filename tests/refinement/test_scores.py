@@ -34,7 +34,7 @@ def test_extreme_facts_overflow_nothing(a, limit):
         ("AIR_WEIGHTS", {"deficit", "noise", "inner"}, {"surface", "straightness", "bonds", "length"}),
         ("HANDLE_WEIGHTS", {"opening", "bonds", "confidence"}, {"winding"}),
         ("BRIDGE_WEIGHTS", {"winding", "straightness"}, {"cap"}),
-        ("LIMB_WEIGHTS", {"protrusion", "confidence"}, {"web"}),
+        ("LIMB_WEIGHTS", {"protrusion", "confidence", "roundness"}, {"web"}),
     ],
 )
 def test_every_fact_speaks_the_way_it_should(name, more, less):

@@ -1,6 +1,7 @@
 """Spurs are cut by how far their points stand out of the surface around the other branches."""
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -20,13 +21,17 @@ PER = 60  # points of each: many, so that a cut spur does not change the thickne
 # a surface that says nothing of what hangs together, and no confidence: how far points stand out decides
 UNBONDED = SimpleNamespace(bonds=lambda skeleton: (np.empty((0, 2), int), np.empty(0)))
 WIDE = 0.1  # half width of every section
+ROUND = 0.8  # half thickness over half width of every section
 
 
 @pytest.fixture(autouse=True)
 def _one_width(monkeypatch):
-    monkeypatch.setattr(
-        spurs, "measure_sections", lambda skeleton: SimpleNamespace(half_width=np.full(len(skeleton.vertices), WIDE))
-    )
+    monkeypatch.setattr(spurs, "measure_sections", sections)
+
+
+def sections(skeleton, roundness=ROUND):
+    wide = np.full(len(skeleton.vertices), WIDE)
+    return SimpleNamespace(half_width=wide, half_thickness=roundness * wide)
 
 
 @pytest.fixture
@@ -38,7 +43,7 @@ def _alone(monkeypatch):
 def pruned(skeleton, reach, thick=0.1):
     """Without the branches that reach less far from a part so thick, over its thickness; at least 1."""
     out = (reach - 1) * thick / WIDE
-    facts = {"protrusion": np.log(out + 0.3), "web": 0, "confidence": 0}
+    facts = {"protrusion": np.log(out + 0.3), "web": 0, "confidence": 0, "roundness": ROUND}
     return prune_spurs(skeleton, UNBONDED, probability(LIMB_WEIGHTS, facts))[0]
 
 
@@ -244,6 +249,17 @@ def test_facts_of_a_limb():
         assert np.exp(found[tip]["protrusion"]) - 0.3 == pytest.approx((reach - 0.1) / WIDE, rel=0.15)
         assert found[tip]["confidence"] == pytest.approx(0.7)
         assert found[tip]["web"] == 0
+        assert found[tip]["roundness"] == pytest.approx(ROUND)
+
+
+def test_branches_of_flat_parts_are_less_probable_limbs(monkeypatch):
+    """A flat part draws strands into its corners."""
+    raw = tree((5, 0.3), (12, 0.5))
+    _, limbs = prune_spurs(raw, UNBONDED, 0)
+    monkeypatch.setattr(spurs, "measure_sections", partial(sections, roundness=0.2))
+    _, flat = prune_spurs(raw, UNBONDED, 0)
+    assert len(limbs) == len(flat) == 4
+    assert all(after.probability < before.probability for before, after in zip(limbs, flat, strict=True))
 
 
 def test_a_cut_spur_does_not_make_its_junction_thicker():
@@ -254,7 +270,11 @@ def test_a_cut_spur_does_not_make_its_junction_thicker():
     _, limbs = prune_spurs(raw, UNBONDED, 0.02)
     assert [it.changed for it in limbs if it.place == tuple(raw.vertices[N + 1].tolist())] == [True]
     kept = [it.probability for it in limbs if it.place == tuple(raw.vertices[N + 3].tolist())]
-    assert kept == [pytest.approx(probability(LIMB_WEIGHTS, {"protrusion": alone, "web": 0, "confidence": 0}), rel=0.3)]
+    assert kept == [
+        pytest.approx(
+            probability(LIMB_WEIGHTS, {"protrusion": alone, "web": 0, "confidence": 0, "roundness": ROUND}), rel=0.3
+        )
+    ]
 
 
 def test_what_is_pruned_was_judged():
