@@ -75,26 +75,26 @@ browser: | system-deps
 $(BIN)/python: | system-deps
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/.installed-demo: pyproject.toml | $(BIN)/python
+$(VENV)/.installed-demo: pyproject.toml benchmarks/pyproject.toml | $(BIN)/python
 	@echo "Installing glsk-o3d and the packages it needs into $(VENV); the first time this takes a minute or more"
-	@$(PIP) install --editable '.[pictures]'
+	@$(PIP) install --editable '.[pictures]' --editable benchmarks
 	@touch $@
 
-$(VENV)/.installed-test: pyproject.toml tests/readers.txt | $(BIN)/python
+$(VENV)/.installed-test: pyproject.toml benchmarks/pyproject.toml tests/readers.txt | $(BIN)/python
 	@echo "Installing glsk-o3d and what its tests need into $(VENV); the first time this takes a minute or more"
-	@$(PIP) install --editable '.[test,lint]'
+	@$(PIP) install --editable '.[test,lint]' --editable benchmarks
 	@$(PIP) install --no-deps -r tests/readers.txt
 	@touch $@ $(VENV)/.installed-demo
 
-$(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
+$(VENV)/.installed-docs: pyproject.toml benchmarks/pyproject.toml | $(BIN)/python
 	@echo "Installing glsk-o3d and what its site needs into $(VENV); the first time this takes a minute or more"
-	@$(PIP) install --editable '.[docs]'
+	@$(PIP) install --editable '.[docs]' --editable benchmarks
 	@touch $@ $(VENV)/.installed-demo
 
 # pc-skeletor alone: it asks for a mistree that needs a Fortran compiler, and for torch and dgl, which it never imports.
-$(PEERS)/.installed: pyproject.toml benchmarks/peers.txt | system-deps
+$(PEERS)/.installed: pyproject.toml benchmarks/pyproject.toml benchmarks/peers.txt | system-deps
 	@echo "Installing glsk-o3d and other tools into $(PEERS); the first time this takes some minutes"
 	@test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
-	@$(PEERS)/bin/python -m pip --disable-pip-version-check -qq install --editable ".[pictures]" -r benchmarks/peers.txt
+	@$(PEERS)/bin/python -m pip --disable-pip-version-check -qq install --editable ".[pictures]" --editable benchmarks -r benchmarks/peers.txt
 	@$(PEERS)/bin/python -m pip --disable-pip-version-check -qq install --no-deps pc-skeletor==1.0.0
 	@touch $@

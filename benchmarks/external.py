@@ -14,11 +14,11 @@ import typer
 from _common.command_line import application
 from _external import aneurisk, plants, trees, vessels
 from _external.entries import Source, check_sizes
+from glsk_bench import add_shape
+from glsk_bench.clouds import VARIANTS
+from glsk_bench.folders import begun
+from glsk_bench.versions import OWN
 
-from glsk_o3d.benchmark import add_shape
-from glsk_o3d.benchmark.clouds import VARIANTS
-from glsk_o3d.benchmark.folders import begun
-from glsk_o3d.benchmark.versions import OWN
 from glsk_o3d.errors import GlskError
 
 app = application(__doc__)

@@ -21,12 +21,12 @@ from _leaderboard import recorded, tables
 from _leaderboard.kept import SECONDS, Entry, keep, kept, seconds
 from _leaderboard.pictures import board, draw
 from _peers import PEERS, Peer, installed, one_thread, silence, skeleton_of
+from glsk_bench import leaderboard, make, read_folder, score_answers
+from glsk_bench.answers import TIMES_NAME, read_times
+from glsk_bench.clouds import cloud
+from glsk_bench.shapes import FAMILIES, shape
 
 from glsk_o3d import read_cloud, save_skeleton
-from glsk_o3d.benchmark import leaderboard, make, read_folder, score_answers
-from glsk_o3d.benchmark.answers import TIMES_NAME, read_times
-from glsk_o3d.benchmark.clouds import cloud
-from glsk_o3d.benchmark.shapes import FAMILIES, shape
 from glsk_o3d.interop.atomic import write_json
 from glsk_o3d.interop.clouds import cloud_points
 
@@ -34,7 +34,7 @@ BENCH = "bench"  # the clouds, in the folder that a run is given; beside it a fo
 TIMED = [(family, variant) for family in FAMILIES for variant in ("clean", "depth2")]  # with the seed 100
 KEPT_AFTER = 20  # skeletons, so that little is lost when a run is stopped
 PRELOADED = (  # by all processes at once, since imports take longer than some skeletons
-    *("glsk_o3d.pipelines", "glsk_o3d.benchmark.answers", "glsk_o3d.benchmark.making", "glsk_o3d.benchmark.table"),
+    *("glsk_o3d.pipelines", "glsk_bench.answers", "glsk_bench.making", "glsk_bench.table"),
     *("glsk_o3d.refiner", "glsk_o3d.io.scans", "glsk_o3d.viewing.preview", "open3d", "typer", "trimesh", "skeletor"),
     *("pc_skeletor", "pygel3d.graph", "compas_cgal.skeletonization", "compas_cgal.meshing", "skan"),
 )

@@ -1,7 +1,6 @@
 # The public names and where they live; the package imports each when it is first asked for.
 from . import analysis as analysis
 from . import batch as batch
-from . import benchmark as benchmark
 from . import crosscheck as crosscheck
 from . import editing as editing
 from . import pipelines as pipelines
@@ -88,7 +87,6 @@ __all__ = [
     "annotate_contraction",
     "annotate_file",
     "batch",
-    "benchmark",
     "crosscheck",
     "from_recipe",
     "load_recipe",

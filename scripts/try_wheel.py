@@ -1,4 +1,4 @@
-"""Installs the wheel alone, then with each extra, in folders of their own, and runs every command there.
+"""Installs the wheel alone, with each extra and with the benchmark, in folders of their own, and runs every command.
 
     python scripts/try_wheel.py [EXTRA ...]
 
@@ -6,6 +6,7 @@ Prints a table: what was installed, how many seconds and megabytes it took, and 
 command may succeed, or end with a message that names an extra; anything else is an error.
 """
 
+import re
 import subprocess
 import sys
 import tempfile
@@ -15,6 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 USERS = ("pictures", "crosscheck", "meshlab", "las", "e57", "cluster", "full")
+BENCH = "bench"  # the wheel beside it, with glsk-bench
 TABLE = "x,y,z,tree\n" + "".join(f"{x},{y},{z},{x % 2}\n" for x in range(40) for y in (0, 1, 2) for z in (0, 1, 2))
 COMMANDS = """\
 demo
@@ -52,12 +54,13 @@ def pip(python, *words):
     subprocess.run([python, "-m", "pip", "--disable-pip-version-check", "-qq", *words], check=True)
 
 
-def try_extra(wheel: Path, extra: str, folder: Path) -> tuple[float, float, list[str], list[str]]:
+def try_extra(wheel: Path, bench: Path, extra: str, folder: Path) -> tuple[float, float, list[str], list[str]]:
     """Seconds and megabytes of an installation, the extras that commands asked for, and what went wrong."""
     venv.create(folder / "venv", with_pip=True)
     binaries = folder / "venv" / ("Scripts" if sys.platform == "win32" else "bin")
     before, start = size(folder), time.perf_counter()
-    pip(binaries / "python", "install", f"{wheel}[{extra}]" if extra else wheel)
+    wheels = [wheel, bench] if extra == BENCH else [f"{wheel}[{extra}]" if extra else wheel]
+    pip(binaries / "python", "install", *wheels)
     seconds, here = time.perf_counter() - start, folder / "work"
     here.mkdir()
     megabytes = (size(folder) - before) / 1e6
@@ -68,8 +71,8 @@ def try_extra(wheel: Path, extra: str, folder: Path) -> tuple[float, float, list
     for line in COMMANDS.splitlines():
         done = subprocess.run([binaries / "glsk", *line.split()], cwd=here, capture_output=True, text=True)
         said = done.stderr.strip().splitlines()[-1:] or [""]
-        if "glsk-o3d[" in done.stderr:
-            asked.append(done.stderr.partition("glsk-o3d[")[2].partition("]")[0])
+        if wants := re.search(r'pip install "glsk-(?:o3d\[)?(\w+)', done.stderr):
+            asked.append(wants[1])
         elif done.returncode and not (line.startswith("info scan") and "not a valid" in said[0]):
             wrong.append(f"glsk {line}: {said[0]}")
     return seconds, megabytes, sorted(set(asked)), wrong
@@ -82,14 +85,14 @@ def size(folder: Path) -> int:
 
 def main() -> int:
     """Try the wheel alone and with the extras that are named, by default all for users."""
-    extras, failed = sys.argv[1:] or ["", *USERS], 0
+    extras, failed = sys.argv[1:] or ["", *USERS, BENCH], 0
     with tempfile.TemporaryDirectory() as place:
-        pip(sys.executable, "wheel", "--no-deps", "-w", place, ROOT)
-        (wheel,) = Path(place).glob("*.whl")
+        pip(sys.executable, "wheel", "--no-deps", "-w", place, ROOT, ROOT / "benchmarks")
+        (wheel,), (bench,) = Path(place).glob("glsk_o3d*.whl"), Path(place).glob("glsk_bench*.whl")
         print("| installed | s | MB | commands that ask for more |\n|---|--:|--:|---|", flush=True)
         for extra in extras:
             with tempfile.TemporaryDirectory() as folder:
-                seconds, megabytes, asked, wrong = try_extra(wheel, extra, Path(folder))
+                seconds, megabytes, asked, wrong = try_extra(wheel, bench, extra, Path(folder))
             print(
                 f"| {extra or 'alone'} | {seconds:.0f} | {megabytes:.0f} | {', '.join(asked) or 'none'} |", flush=True
             )

@@ -9,8 +9,8 @@ What has been written once is never changed: then this says so and fails, unless
 import sys
 from pathlib import Path
 
-from glsk_o3d.benchmark import read_folder
-from glsk_o3d.benchmark.versions import fingerprints, write_fingerprints
+from glsk_bench import read_folder
+from glsk_bench.versions import fingerprints, write_fingerprints
 
 
 def main(folder: Path) -> Path:

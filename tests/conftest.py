@@ -15,11 +15,11 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 import tomlkit
+from glsk_bench import make as make_benchmark
+from glsk_bench import versions
 from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
-from glsk_o3d.benchmark import make as make_benchmark
-from glsk_o3d.benchmark import versions
 from glsk_o3d.recipes.plugins import forget_plugins
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.ring_builder import RingBuilder
@@ -320,8 +320,8 @@ def rods(monkeypatch):
     shapes.shape = shape
     clouds.cloud = cloud
     clouds.coverage = lambda shape, points: 0.5 if shape.name == "trees_101" else 0.99
-    monkeypatch.setitem(sys.modules, "glsk_o3d.benchmark.shapes", shapes)
-    monkeypatch.setitem(sys.modules, "glsk_o3d.benchmark.clouds", clouds)
+    monkeypatch.setitem(sys.modules, "glsk_bench.shapes", shapes)
+    monkeypatch.setitem(sys.modules, "glsk_bench.clouds", clouds)
     monkeypatch.setattr(versions, "_file", lambda name: ROOT / "none")  # what the package knows is not of rods
     return names
 

@@ -7,15 +7,14 @@ from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).parents[1] / "glsk_o3d"
+ROOT = Path(__file__).parents[1]
+PACKAGE, BENCHMARK = ROOT / "glsk_o3d", ROOT / "benchmarks" / "src" / "glsk_bench"
 ROOMS = (
-    *("numerics", "preparation", "refinement", "analysis", "crosscheck"),
-    *("benchmark", "benchmark/shapes"),
+    *(PACKAGE / name for name in ("numerics", "preparation", "refinement", "analysis", "crosscheck")),
+    *(BENCHMARK, BENCHMARK / "shapes"),
 )
 FILTERS = ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "stopping")
-NUMERIC = sorted(
-    [*(PACKAGE / f"{name}.py" for name in FILTERS), *(p for room in ROOMS for p in (PACKAGE / room).glob("*.py"))]
-)
+NUMERIC = sorted([*(PACKAGE / f"{name}.py" for name in FILTERS), *(p for room in ROOMS for p in room.glob("*.py"))])
 ORIGIN = re.compile(r"\b(derived|published|measured|fitted)\b", re.IGNORECASE)
 
 
@@ -55,13 +54,13 @@ def said(lines, statement):
 def test_no_constant_is_assigned_in_two_modules():
     count = Counter(
         name
-        for path in PACKAGE.rglob("*.py")
+        for path in (*PACKAGE.rglob("*.py"), *BENCHMARK.rglob("*.py"))
         for name in {name for name, _ in constants(ast.parse(path.read_text(encoding="utf-8")))}
     )
     assert [name for name, times in count.items() if times > 1] == []
 
 
-@pytest.mark.parametrize("path", NUMERIC, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+@pytest.mark.parametrize("path", NUMERIC, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_every_number_says_where_it_comes_from(path):
     text = path.read_text(encoding="utf-8")
     silent = [

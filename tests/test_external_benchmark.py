@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import open3d as o3d
 import pytest
+from glsk_bench import read_folder, run, score_answers
+from glsk_bench.coverage import coverage
 
 from glsk_o3d import Skeleton, samples
-from glsk_o3d.benchmark import read_folder, run, score_answers
-from glsk_o3d.benchmark.coverage import coverage
 
 FORK = samples.y_junction(2000)
 

@@ -12,11 +12,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from glsk_bench import Results, leaderboard, read_folder, read_results
+from glsk_bench.scoring import Scores
 
 from glsk_o3d import read_skeleton
 from glsk_o3d.analysis import compare
-from glsk_o3d.benchmark import Results, leaderboard, read_folder, read_results
-from glsk_o3d.benchmark.scoring import Scores
 from glsk_o3d.samples import torus
 from glsk_o3d.skeleton import Skeleton
 

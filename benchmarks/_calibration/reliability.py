@@ -6,9 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 from _common.tables import Table, Tables, number
+from glsk_bench.intervals import mean_with_interval, told
 from scipy.stats import rankdata
-
-from glsk_o3d.benchmark.intervals import mean_with_interval, told
 
 from .fitting import Answered, fitted, said
 

@@ -17,12 +17,12 @@ from zipfile import BadZipFile
 import numpy as np
 import open3d as o3d
 import typer
+from glsk_bench import read_folder
+from glsk_bench.folders import INDEX_NAME
 from scipy.spatial import cKDTree
 
 from glsk_o3d import read_cloud, read_truth, samples
 from glsk_o3d.analysis import Truth
-from glsk_o3d.benchmark import read_folder
-from glsk_o3d.benchmark.folders import INDEX_NAME
 from glsk_o3d.interop.clouds import cloud_points
 
 from .results import ROOT

@@ -7,16 +7,16 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from glsk_bench import version
+from glsk_bench.clouds import cloud, coverage
+from glsk_bench.randomness import generator
+from glsk_bench.shapes import Shape
+from glsk_bench.shapes.axis import Axis as Cones
+from glsk_bench.shapes.drawing import SURFACE_POINTS
+from glsk_bench.shapes.paths import FINE_STEP
+from glsk_bench.shapes.surface import surface
 
 from glsk_o3d import read_skeleton
-from glsk_o3d.benchmark import version
-from glsk_o3d.benchmark.clouds import cloud, coverage
-from glsk_o3d.benchmark.randomness import generator
-from glsk_o3d.benchmark.shapes import Shape
-from glsk_o3d.benchmark.shapes.axis import Axis as Cones
-from glsk_o3d.benchmark.shapes.drawing import SURFACE_POINTS
-from glsk_o3d.benchmark.shapes.paths import FINE_STEP
-from glsk_o3d.benchmark.shapes.surface import surface
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.formats.graphs import graph_skeleton
 

@@ -9,8 +9,7 @@ from typing import Any
 
 from _common.results import read, read_packed, write_packed
 from _peers import PEERS
-
-from glsk_o3d.benchmark import Results, read_results
+from glsk_bench import Results, read_results
 
 KEPT = Path(__file__).resolve().parents[1] / "v1"
 SECONDS = KEPT / "seconds.json"

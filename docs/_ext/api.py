@@ -17,9 +17,9 @@ TASKS = {
     "batch": ("Many clouds", "glsk_o3d.batch"),
     "crosscheck": ("Cross-check with a mesh", "glsk_o3d.crosscheck"),
     "samples": ("Sample clouds", "glsk_o3d.samples"),
-    "benchmark": ("The benchmark", "glsk_o3d.benchmark"),
-    "benchmark_shapes": ("Shapes of the benchmark", "glsk_o3d.benchmark.shapes"),
-    "benchmark_clouds": ("Clouds of the benchmark", "glsk_o3d.benchmark.clouds"),
+    "benchmark": ("The benchmark", "glsk_bench"),
+    "benchmark_shapes": ("Shapes of the benchmark", "glsk_bench.shapes"),
+    "benchmark_clouds": ("Clouds of the benchmark", "glsk_bench.clouds"),
     "meshlab": ("In MeshLab's way", "glsk_o3d"),
     "errors": ("Errors and warnings", "glsk_o3d"),
 }

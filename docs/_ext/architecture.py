@@ -14,7 +14,6 @@ PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
 
 ROWS = (
     {"command line": ("cli", "__main__")},
-    {"benchmark": ("benchmark",)},
     {"cross-check": ("crosscheck",), "batches": ("batch",), "MeshLab": ("meshlab",)},
     {"pictures and windows": ("viewing",)},
     {"files": ("io",), "driver": ("driver", "resampling")},

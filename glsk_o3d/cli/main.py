@@ -11,7 +11,6 @@ from typing import Annotated
 import typer
 
 from .. import __version__
-from . import benchmark
 from .batch import batch
 from .branches import branches
 from .console import VisibleGroup, echo
@@ -22,6 +21,7 @@ from .evaluate import evaluate
 from .filters import filters
 from .grasps import grasps
 from .info import info
+from .plugged import add_plugged
 from .rerun import rerun
 from .rig import rig
 from .run import run
@@ -61,7 +61,7 @@ for command in (
     info,
 ):
     app.command(epilog=EPILOG if command is skeletonize else None)(command)
-app.add_typer(benchmark.app, name="benchmark")
+add_plugged(app)
 
 
 def _version(wanted: bool) -> None:

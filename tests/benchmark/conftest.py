@@ -5,8 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-
-from glsk_o3d.benchmark.shapes import shape
+from glsk_bench.shapes import shape
 
 
 @pytest.fixture(scope="session")

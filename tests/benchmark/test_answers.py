@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from glsk_bench import Results, answers, read_results, score, score_answers
 
 from glsk_o3d import Skeleton
-from glsk_o3d.benchmark import Results, answers, read_results, score, score_answers
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.skeletons import READABLE
 

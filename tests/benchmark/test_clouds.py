@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from glsk_bench.clouds import VARIANTS, cloud
+from glsk_bench.randomness import generator
+from glsk_bench.scanning import camera_places, cast, depth_image, seen_cosines
+from glsk_bench.shapes import FAMILIES, Shape
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d.benchmark.clouds import VARIANTS, cloud
-from glsk_o3d.benchmark.randomness import generator
-from glsk_o3d.benchmark.scanning import camera_places, cast, depth_image, seen_cosines
-from glsk_o3d.benchmark.shapes import FAMILIES, Shape
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.samples.capsules import signed_distance, visible
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from glsk_bench.clouds import cloud, coverage
+from glsk_bench.randomness import generator
+from glsk_bench.shapes import FAMILIES, Shape
+from glsk_bench.shapes.axis import Axis, joined
+from glsk_bench.shapes.surface import surface
 
-from glsk_o3d.benchmark.clouds import cloud, coverage
-from glsk_o3d.benchmark.randomness import generator
-from glsk_o3d.benchmark.shapes import FAMILIES, Shape
-from glsk_o3d.benchmark.shapes.axis import Axis, joined
-from glsk_o3d.benchmark.shapes.surface import surface
 from glsk_o3d.errors import InvalidParameterError
 
 

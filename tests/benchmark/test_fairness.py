@@ -3,12 +3,11 @@
 import networkx as nx
 import numpy as np
 import pytest
-
-from glsk_o3d.benchmark.shapes.axis import Axis, joined
-from glsk_o3d.benchmark.shapes.curves import polygon
-from glsk_o3d.benchmark.shapes.fairness import fault
-from glsk_o3d.benchmark.shapes.paths import chains, shortest_loop, subdivided
-from glsk_o3d.benchmark.shapes.solid import topology
+from glsk_bench.shapes.axis import Axis, joined
+from glsk_bench.shapes.curves import polygon
+from glsk_bench.shapes.fairness import fault
+from glsk_bench.shapes.paths import chains, shortest_loop, subdivided
+from glsk_bench.shapes.solid import topology
 
 
 def line(start, end, radius=0.1):

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
+from glsk_bench.intervals import mean_with_interval, told
 from scipy import stats
-
-from glsk_o3d.benchmark.intervals import mean_with_interval, told
 
 
 @pytest.mark.parametrize(("right", "of"), [(3, 20), (18, 20), (250, 300)])

@@ -7,10 +7,10 @@ from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
 import pytest
+from glsk_bench import make, read_folder, versions
+from glsk_bench.folders import INDEX_NAME
 
 from glsk_o3d import read_cloud
-from glsk_o3d.benchmark import make, read_folder, versions
-from glsk_o3d.benchmark.folders import INDEX_NAME
 from glsk_o3d.errors import BatchError, FileFormatError, InvalidParameterError
 
 CHOICE = dict(families=["tubes", "trees"], seeds=[100, 101], variants=["clean", "scan2"], jobs=1)
@@ -38,8 +38,8 @@ def test_what_is_in_the_folder(small):
 
 
 def test_clouds_and_axes_are_those_drawn(small, rods):
-    tube = sys.modules["glsk_o3d.benchmark.shapes"].shape("tubes", 101)
-    points = sys.modules["glsk_o3d.benchmark.clouds"].cloud(tube, "scan2", n=4096, seed=0).astype(np.float32)
+    tube = sys.modules["glsk_bench.shapes"].shape("tubes", 101)
+    points = sys.modules["glsk_bench.clouds"].cloud(tube, "scan2", n=4096, seed=0).astype(np.float32)
     path = small.path / "clouds" / "tubes_101_scan2.ply"
     np.testing.assert_array_equal(np.asarray(read_cloud(path).points, np.float32), points)
     header, _, rows = path.read_bytes().partition(b"end_header\n")
@@ -187,7 +187,7 @@ def test_no_benchmark(tmp_path):
 
 
 def test_in_two_processes_it_is_the_same(tmp_path):
-    pytest.importorskip("glsk_o3d.benchmark.shapes")  # what is drawn, not the rods of the other tests
+    pytest.importorskip("glsk_bench.shapes")  # what is drawn, not the rods of the other tests
     choice = dict(families=["tubes"], seeds=[100, 101], variants=["clean", "density"])
     alone, together = (make(tmp_path / str(jobs), **choice, jobs=jobs) for jobs in (1, 2))
     assert everything(alone.path) == everything(together.path)
@@ -195,7 +195,7 @@ def test_in_two_processes_it_is_the_same(tmp_path):
 
 
 def test_what_is_drawn_is_what_the_package_knows(tmp_path):
-    pytest.importorskip("glsk_o3d.benchmark.shapes")
+    pytest.importorskip("glsk_bench.shapes")
     made = make(tmp_path, seeds=[100], variants=["noise1", "depth2"], jobs=2)
     same = [cloud["sameness"] for told in made.shapes.values() for cloud in told["clouds"].values()]
     assert len(same) == 12
@@ -225,7 +225,7 @@ class Here:
 
 @pytest.mark.parametrize(("fault", "raised"), [(BrokenProcessPool(), BatchError), (OSError("full"), OSError)])
 def test_a_process_that_fails_is_told(rods, tmp_path, monkeypatch, fault, raised):
-    import glsk_o3d.benchmark.making as making
+    import glsk_bench.making as making
 
     def work(folder, version, family, seed, variants):
         if seed == 101:

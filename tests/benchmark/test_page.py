@@ -6,9 +6,9 @@ import sys
 
 import numpy as np
 import pytest
+from glsk_bench import run, score_answers
 
 from glsk_o3d import read_cloud, read_skeleton
-from glsk_o3d.benchmark import run, score_answers
 
 
 @pytest.fixture

@@ -5,10 +5,10 @@ import sys
 import time
 
 import pytest
+from glsk_bench import RunResult, run, score_answers
+from glsk_bench.commands import CAN_LIMIT_MEMORY
 
 from glsk_o3d import pipelines, read_skeleton
-from glsk_o3d.benchmark import RunResult, run, score_answers
-from glsk_o3d.benchmark.commands import CAN_LIMIT_MEMORY
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 
 ODD = """
@@ -185,8 +185,9 @@ def test_names_with_spaces_and_quotes(small, program, tmp_path):
 
 
 def test_our_pipelines_run_as_commands(rods, tmp_path):
+    from glsk_bench import make
+
     from glsk_o3d import read_cloud
-    from glsk_o3d.benchmark import make
 
     made = make(tmp_path / "bench", families=["tubes"], seeds=[100], variants=["clean"], jobs=1)
     assert run(made, tmp_path / "ours", pipeline="default") == RunResult(1, 0, 0, {})

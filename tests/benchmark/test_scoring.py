@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from glsk_bench.scoring import MOST_ANSWER_JUNCTIONS, MOST_ANSWER_PLACES, Scores, score
 
 from glsk_o3d.analysis import Truth
-from glsk_o3d.benchmark.scoring import MOST_ANSWER_JUNCTIONS, MOST_ANSWER_PLACES, Scores, score
 from glsk_o3d.errors import InvalidParameterError
 
 BEST = dict(

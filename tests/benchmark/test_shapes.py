@@ -5,17 +5,17 @@ from itertools import combinations
 import networkx as nx
 import numpy as np
 import pytest
+from glsk_bench.randomness import generator
+from glsk_bench.shapes import FAMILIES, Shape, shape
+from glsk_bench.shapes.axis import Axis, UnfitDraw
+from glsk_bench.shapes.curves import across, oval, swelling, wander
+from glsk_bench.shapes.drawing import DRAWN_BY, SURFACE_POINTS
+from glsk_bench.shapes.fairness import fault
+from glsk_bench.shapes.frame_graphs import GRAPHS
+from glsk_bench.shapes.paths import subdivided
+from glsk_bench.shapes.trees import Habit, _grow
 from scipy.spatial.distance import cdist
 
-from glsk_o3d.benchmark.randomness import generator
-from glsk_o3d.benchmark.shapes import FAMILIES, Shape, shape
-from glsk_o3d.benchmark.shapes.axis import Axis, UnfitDraw
-from glsk_o3d.benchmark.shapes.curves import across, oval, swelling, wander
-from glsk_o3d.benchmark.shapes.drawing import DRAWN_BY, SURFACE_POINTS
-from glsk_o3d.benchmark.shapes.fairness import fault
-from glsk_o3d.benchmark.shapes.frame_graphs import GRAPHS
-from glsk_o3d.benchmark.shapes.paths import subdivided
-from glsk_o3d.benchmark.shapes.trees import Habit, _grow
 from glsk_o3d.errors import InvalidParameterError
 
 ARRAYS = ("nodes", "edges", "radii", "points", "normals")
@@ -192,7 +192,7 @@ def test_refused_draws_are_counted(monkeypatch):
     monkeypatch.setitem(DRAWN_BY, "picky", picky)
     refused = [shape("picky", seed).facts["refused"] for seed in range(6)]
     assert {"dull", "thin"} == {word for each in refused for word in each}
-    monkeypatch.setattr("glsk_o3d.benchmark.shapes.drawing.MOST_DRAWS", 0)
+    monkeypatch.setattr("glsk_bench.shapes.drawing.MOST_DRAWS", 0)
     with pytest.raises(InvalidParameterError, match=r"no draw of picky 0 is fair \(\{\}\): take another seed"):
         shape("picky", 0)
 

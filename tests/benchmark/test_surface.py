@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from glsk_bench.randomness import generator
+from glsk_bench.shapes import FAMILIES
+from glsk_bench.shapes.surface import INSIDE, buried, surface
 
-from glsk_o3d.benchmark.randomness import generator
-from glsk_o3d.benchmark.shapes import FAMILIES
-from glsk_o3d.benchmark.shapes.surface import INSIDE, buried, surface
 from glsk_o3d.samples.capsules import capsule_distance, signed_distance
 
 

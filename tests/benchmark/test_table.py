@@ -3,9 +3,9 @@
 import json
 
 import pytest
+from glsk_bench import Results, Scores, leaderboard
+from glsk_bench.intervals import mean_with_interval
 
-from glsk_o3d.benchmark import Results, Scores, leaderboard
-from glsk_o3d.benchmark.intervals import mean_with_interval
 from glsk_o3d.errors import InvalidParameterError
 
 BEST = Scores(True, True, 1.0, 1.0, 0.1, 1.0, 1.0, 1.0, None, 0, 0, 0, 0)

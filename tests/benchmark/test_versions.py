@@ -5,10 +5,10 @@ import json
 
 import numpy as np
 import pytest
+from glsk_bench import make, version, versions
+from glsk_bench.versions import fingerprint, fingerprints, sameness
 
 from glsk_o3d import read_cloud
-from glsk_o3d.benchmark import make, version, versions
-from glsk_o3d.benchmark.versions import fingerprint, fingerprints, sameness
 from glsk_o3d.errors import InvalidParameterError
 
 

@@ -7,9 +7,8 @@ import importlib.util
 
 import numpy as np
 import pytest
-
-from glsk_o3d.benchmark.clouds import VARIANTS, cloud, coverage
-from glsk_o3d.benchmark.shapes import FAMILIES
+from glsk_bench.clouds import VARIANTS, cloud, coverage
+from glsk_bench.shapes import FAMILIES
 
 
 @pytest.fixture(scope="module")

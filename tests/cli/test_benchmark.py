@@ -75,7 +75,7 @@ def test_seeds_in_words(invoke, rods):
 
 
 def test_another_cloud_than_is_meant_is_told(invoke, rods, monkeypatch):
-    from glsk_o3d.benchmark import versions
+    from glsk_bench import versions
 
     monkeypatch.setattr(versions, "fingerprints", lambda name: {"tubes_100_clean": "00000000 1 2"})
     made = invoke("benchmark", "make", "a", "--families", "tubes", "--variants", "clean", "--seeds", "100", "--jobs", 1)
@@ -108,7 +108,7 @@ def test_making_scoring_and_tables_need_no_open3d(bench, perfect_answers, tmp_pa
     code = """
 import sys
 sys.path.insert(0, sys.argv[1])
-import glsk_o3d.benchmark.making
+import glsk_bench.making
 from glsk_o3d.cli.main import app
 app(["benchmark", "score", sys.argv[2], sys.argv[3], "-o", "s.json"], standalone_mode=False)
 app(["benchmark", "table", "s.json"], standalone_mode=False)

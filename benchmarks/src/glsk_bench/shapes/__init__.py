@@ -2,7 +2,7 @@
 
 Examples
 --------
->>> from glsk_o3d.benchmark.shapes import FAMILIES, shape
+>>> from glsk_bench.shapes import FAMILIES, shape
 >>> FAMILIES
 ('tubes', 'trees', 'frames', 'figures', 'handles', 'groups')
 >>> shape("groups", 0)

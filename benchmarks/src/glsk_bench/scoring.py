@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.comparison import PLACE_SPACING, compare
-from ..analysis.graph import check_graph, simple_edges
-from ..analysis.truth import Truth
-from ..errors import InvalidParameterError
-from ..skeleton import Skeleton
+from glsk_o3d.analysis.comparison import PLACE_SPACING, compare
+from glsk_o3d.analysis.graph import check_graph, simple_edges
+from glsk_o3d.analysis.truth import Truth
+from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.skeleton import Skeleton
 
 # Where an answer is refused, so that no program can fill the memory of who scores it.
 MOST_ANSWER_PLACES = 2_000_000  # fitted: along an answer; axes of the benchmark have a thousand to ten thousand

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InvalidParameterError
-from ..interop.atomic import write_atomically, write_json
+from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.interop.atomic import write_atomically, write_json
+
 from .answers import MEASURES, Results
 from .intervals import mean_with_interval, told
 from .versions import OWN
@@ -120,8 +121,8 @@ def leaderboard(results: Iterable[Results]) -> Leaderboard:
 
     Examples
     --------
-    >>> from glsk_o3d.benchmark import Results
-    >>> from glsk_o3d.benchmark.scoring import Scores
+    >>> from glsk_bench import Results
+    >>> from glsk_bench.scoring import Scores
     >>> rows = [dict(shape="tubes_100", variant="clean", seconds=None, **Scores.of_failure("no answer").as_dict())]
     >>> leaderboard([Results("v1", "mine", False, rows)]).entries[0]["all"]["failures"]
     1

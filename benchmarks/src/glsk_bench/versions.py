@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InvalidParameterError, did_you_mean
-from ..interop.atomic import write_atomically
+from glsk_o3d.errors import InvalidParameterError, did_you_mean
+from glsk_o3d.interop.atomic import write_atomically
 
 SUM_UNIT = 1e-8  # derived: a tenth of what all roundings together can make of a sum
 # derived: twice what they make, of 3 coordinates a point, below 1 and rounded to 2^-24, with weights of 1/2 in the mean

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InvalidParameterError, did_you_mean
-from ...numerics.components import component_labels
-from ...numerics.vectors import norm
+from glsk_o3d.errors import InvalidParameterError, did_you_mean
+from glsk_o3d.numerics.components import component_labels
+from glsk_o3d.numerics.vectors import norm
+
 from ..randomness import generator
 from .axis import UnfitDraw
 from .fairness import fault

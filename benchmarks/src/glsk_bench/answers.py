@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileFormatError, InvalidParameterError, MissingPackageError, brief
-from ..interop.atomic import write_json
-from ..io.skeletons import READABLE, read_skeleton
+from glsk_o3d.errors import FileFormatError, InvalidParameterError, MissingPackageError, brief
+from glsk_o3d.interop.atomic import write_json
+from glsk_o3d.io.skeletons import READABLE, read_skeleton
+
 from .folders import BenchmarkFolder, CloudFile, read_folder
 from .scoring import Scores, score
 
@@ -104,7 +105,7 @@ def score_answers(
     Examples
     --------
     >>> from glsk_o3d import Skeleton
-    >>> from glsk_o3d.benchmark import make
+    >>> from glsk_bench import make
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as place:
     ...     made = make(f"{place}/bench", families=["tubes"], seeds=[100], variants=["clean", "holes"], jobs=1)

@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileFormatError, InvalidParameterError, brief
-from ..interop.atomic import write_json
-from ..io.skeletons import READABLE, read_skeleton
-from ..recipes.catalogue import named_pipeline
+from glsk_o3d.errors import FileFormatError, InvalidParameterError, brief
+from glsk_o3d.interop.atomic import write_json
+from glsk_o3d.io.skeletons import READABLE, read_skeleton
+from glsk_o3d.recipes.catalogue import named_pipeline
+
 from .answers import TIMES_NAME, answer_files, read_times
 from .commands import CAN_LIMIT_MEMORY, Outcome, Runner, filled, words_of
 from .folders import BenchmarkFolder, CloudFile, read_folder
@@ -111,7 +112,7 @@ def run(
 
     Examples
     --------
-    >>> from glsk_o3d.benchmark import make
+    >>> from glsk_bench import make
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as place:
     ...     made = make(f"{place}/bench", families=["tubes"], seeds=[100], variants=["clean"], jobs=1)

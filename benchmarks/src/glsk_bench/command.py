@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import VisibleGroup, echo, print_json, print_rows, progress, say
-from .options import Json, Quiet, Verbose
-from .reporting import WrongUsage, reporting
+from glsk_o3d.cli.console import VisibleGroup, echo, print_json, print_rows, progress, say
+from glsk_o3d.cli.options import Json, Quiet, Verbose
+from glsk_o3d.cli.reporting import WrongUsage, reporting
 
 if TYPE_CHECKING:
-    from ..benchmark.commands import Outcome
+    from .commands import Outcome
 
 app = typer.Typer(
     cls=VisibleGroup,
@@ -52,7 +52,7 @@ def make(
 ) -> None:
     """Make the clouds and true axes. The same command again goes on where it was left."""
     with reporting(quiet=quiet, verbose=verbose):
-        from ..benchmark import make as make_folder
+        from . import make as make_folder
 
         with progress(not quiet, remaining=True) as update:
             update("drawing shapes")
@@ -111,7 +111,7 @@ def run(
     Failures are counted, and do not change the exit code: ANSWERS/times.json says why there is no answer.
     """
     with reporting(quiet=quiet, verbose=verbose):
-        from ..benchmark import run as run_program
+        from . import run as run_program
 
         with progress(not quiet, remaining=True) as update:
 
@@ -156,8 +156,9 @@ def score(
 ) -> None:
     """Score the answers of a program. What is missing or unreadable counts as a failure."""
     with reporting(quiet=quiet, verbose=verbose):
-        from ..benchmark import leaderboard, score_answers
-        from .outputs import REPORT_FILE, check_findings
+        from glsk_o3d.cli.outputs import REPORT_FILE, check_findings
+
+        from . import leaderboard, score_answers
 
         check_findings([(output, *REPORT_FILE)])
         with progress(not quiet, remaining=True) as update:
@@ -188,9 +189,10 @@ def table(
 ) -> None:
     """Compare programs: means with intervals, for all clouds and by kind."""
     with reporting(quiet=quiet, verbose=verbose):
-        from ..benchmark import leaderboard, read_results
-        from ..benchmark.table import save_leaderboard
-        from .outputs import check_findings
+        from glsk_o3d.cli.outputs import check_findings
+
+        from . import leaderboard, read_results
+        from .table import save_leaderboard
 
         files = output or []
         check_findings([(path, (".md", ".json"), "table is Markdown or JSON") for path in files], *scores)

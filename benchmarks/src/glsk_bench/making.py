@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ..batch.workers import LocalWorkers, died
-from ..errors import BatchError, InvalidParameterError, did_you_mean
-from ..numerics.cores import cores
+from glsk_o3d.batch.workers import LocalWorkers, died
+from glsk_o3d.errors import BatchError, InvalidParameterError, did_you_mean
+from glsk_o3d.numerics.cores import cores
+
 from . import versions
 from .folders import BenchmarkFolder, begun, write_axis, write_points
 

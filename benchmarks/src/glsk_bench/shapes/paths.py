@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ...numerics.vectors import norm
+from glsk_o3d.numerics.vectors import norm
 
 FINE_STEP = 0.5  # fitted: pieces of an axis, in the radius: their balls differ from the cone by a few percent of it
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..errors import InvalidParameterError
-from ..numerics.components import component_labels
-from ..numerics.vectors import norm
+from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.numerics.components import component_labels
+from glsk_o3d.numerics.vectors import norm
+
 from .shapes import Shape
 from .shapes.paths import FINE_STEP, subdivided
 
@@ -44,7 +45,7 @@ def coverage(shape: Shape, points: np.ndarray) -> float:
 
     Examples
     --------
-    >>> from glsk_o3d.benchmark.shapes import shape
+    >>> from glsk_bench.shapes import shape
     >>> tube = shape("tubes", 0)
     >>> coverage(tube, tube.points)
     1.0

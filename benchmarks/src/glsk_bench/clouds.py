@@ -8,9 +8,10 @@ from functools import partial
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..errors import InvalidParameterError, did_you_mean
-from ..numerics.vectors import norm
-from ..samples.sample import check
+from glsk_o3d.errors import InvalidParameterError, did_you_mean
+from glsk_o3d.numerics.vectors import norm
+from glsk_o3d.samples.sample import check
+
 from .coverage import coverage
 from .randomness import generator
 from .scanning import camera_places, depth_image, lidar_scan, seen_cosines
@@ -56,7 +57,7 @@ def cloud(shape: Shape, variant: str, n: int = 4096, seed: int = 0) -> np.ndarra
 
     Examples
     --------
-    >>> from glsk_o3d.benchmark.shapes import shape
+    >>> from glsk_bench.shapes import shape
     >>> tube = shape("tubes", 0)
     >>> scan = cloud(tube, "scan2", n=1024)
     >>> scan.shape, coverage(tube, scan) > 0.97

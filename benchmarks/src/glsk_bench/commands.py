@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..errors import LONGEST_QUOTED, InvalidParameterError
+from glsk_o3d.errors import LONGEST_QUOTED, InvalidParameterError
 
 try:
     import resource

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.curves import radii_from_points
-from ..analysis.graph import check_graph, simple_edges
-from ..analysis.truth import Truth
-from ..errors import InvalidParameterError
-from ..interop.clouds import cloud_points
+from glsk_o3d.analysis.curves import radii_from_points
+from glsk_o3d.analysis.graph import check_graph, simple_edges
+from glsk_o3d.analysis.truth import Truth
+from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.interop.clouds import cloud_points
+
 from .folders import BenchmarkFolder, begun, write_axis, write_points
 from .versions import OWN, fingerprint
 

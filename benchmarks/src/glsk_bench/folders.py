@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.truth import Truth
-from ..errors import FileFormatError, InvalidParameterError
-from ..interop.atomic import write_atomically, write_json
-from ..io.axes import read_truth
-from ..io.formats.ply_rows import header, table
+from glsk_o3d.analysis.truth import Truth
+from glsk_o3d.errors import FileFormatError, InvalidParameterError
+from glsk_o3d.interop.atomic import write_atomically, write_json
+from glsk_o3d.io.axes import read_truth
+from glsk_o3d.io.formats.ply_rows import header, table
+
 from .versions import OWN, VERSIONS
 
 INDEX_NAME = "benchmark.json"

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...numerics.vectors import dot, norm, unit
-from ...samples.capsules import capsule_distance
+from glsk_o3d.numerics.vectors import dot, norm, unit
+from glsk_o3d.samples.capsules import capsule_distance
 
 INSIDE = 2e-5  # fitted: how deep a point is that does not show: where cones hardly bend, none of their balls is drawn
 STRAIGHT = np.radians(1.5)  # fitted: what turns by less does not show a ball between its cones

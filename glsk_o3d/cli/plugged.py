@@ -1,0 +1,36 @@
+"""Commands of other distributions, which the entry-point group ``glsk_o3d.commands`` names."""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+
+import typer
+
+from ..errors import MissingPackageError
+from .console import say
+from .reporting import reporting
+
+COMMAND_GROUP = "glsk_o3d.commands"
+ELSEWHERE = {"benchmark": ("glsk-bench", "Score any program on shapes with known axes (in a distribution of its own).")}
+"""Commands that are not in this distribution: which has them, and what they do."""
+
+
+def add_plugged(app: typer.Typer) -> None:
+    """Add what is installed, and for each command of `ELSEWHERE` that is not, one that says how to get it."""
+    found = {entry.name: entry for entry in entry_points(group=COMMAND_GROUP)}
+    for name, entry in sorted(found.items()):
+        try:
+            app.add_typer(entry.load(), name=name)
+        except Exception as error:  # the code of others: the other commands work without it
+            say("warning", f"the command {name!r} ({entry.value}) is left out: {error}")
+    for name in ELSEWHERE.keys() - found.keys():
+        _add_absent(app, name, *ELSEWHERE[name])
+
+
+def _add_absent(app: typer.Typer, name: str, distribution: str, text: str) -> None:
+    def absent(context: typer.Context) -> None:
+        with reporting():
+            raise MissingPackageError(f'glsk {name} needs another distribution: pip install "{distribution}"')
+
+    settings = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
+    app.command(name, help=text, context_settings=settings)(absent)

@@ -1,0 +1,47 @@
+"""Commands of other distributions."""
+
+from importlib.metadata import EntryPoint
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from glsk_o3d.cli import plugged
+
+
+@pytest.fixture
+def glsk(monkeypatch):
+    """Runs a command line of an application with one command of its own and those of some entry points."""
+
+    def run(words, **values):
+        group = plugged.COMMAND_GROUP
+        found = [EntryPoint(name, value, group) for name, value in values.items()]
+        monkeypatch.setattr(plugged, "entry_points", lambda group: found)
+        app = typer.Typer()
+        app.command("own")(lambda: None)
+        plugged.add_plugged(app)
+        return CliRunner().invoke(app, words)
+
+    return run
+
+
+def test_what_is_installed_is_a_command(glsk):
+    shown = glsk(["benchmark", "--help"], benchmark="glsk_bench.command:app")
+    assert shown.exit_code == 0
+    assert {"make", "run", "score", "table"} <= set(shown.stdout.split())
+
+
+@pytest.mark.parametrize("more", [[], ["make", "bench", "--jobs", "2"], ["--help"]])
+def test_what_is_not_says_how_to_get_it(glsk, more):
+    absent = glsk(["benchmark", *more])
+    assert absent.exit_code == 1
+    assert absent.stdout == ""
+    assert absent.stderr == 'glsk: error: glsk benchmark needs another distribution: pip install "glsk-bench"\n'
+
+
+def test_what_is_broken_is_left_out(glsk, capsys):
+    result = glsk(["own"], broken="no_such_module:app")
+    assert result.exit_code == 0
+    warning = capsys.readouterr().err
+    assert warning.count("\n") == 1
+    assert warning.startswith("glsk: warning: the command 'broken' (no_such_module:app) is left out: ")
