@@ -6,17 +6,16 @@ import dataclasses
 import sys
 import warnings as _warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from types import UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from .errors import SkeletonWarning
 from .interop.verbosity import QUIET, open3d_is
-from .judgements import OUTCOMES, Judgement, Place, Supported
-
-_Record = TypeVar("_Record", bound="Report | IterationRecord | Judgement | Supported")
+from .judgements import QUESTIONS, Judgement, Place, Supported
 
 NOT_CONTRACTED = "not contracted"
 STOPPED_BY_CALLER = "stopped by the caller"
@@ -71,29 +70,29 @@ class IterationRecord:
     seconds: float
 
 
-def _made(cls: type[_Record], data: Mapping[str, Any]) -> _Record:
-    """A record from its entries, but for unknown ones; ValueError where one is not of its type."""
-    hints = get_type_hints(cls)
-    values = {name: value for name, value in data.items() if name in hints}
-    for name, value in values.items():
-        if not _fits(value, hints[name]):
-            raise ValueError(f"{name} in its report is {repr(value)[:80]}")
-    return cls(**values)
-
-
-def _fits(value: Any, hint: Any) -> bool:
-    """Whether a value is of a type; whole numbers that are not too large are floats, too."""
+def _read(value: Any, hint: Any, name: str = "it") -> Any:
+    """A value of a file as its type has it: records of dicts, tuples of lists; ValueError where it is something else."""
     kind, inner = get_origin(hint) or hint, get_args(hint)
     if kind in (Union, UnionType):
-        return any(_fits(value, each) for each in inner)
-    if kind in (int, float):
-        return (type(value) is int and abs(value) <= sys.maxsize) or (kind is float and isinstance(value, float))
-    if kind is tuple and isinstance(value, tuple):
-        hints = inner[:1] * len(value) if Ellipsis in inner else [each for each in inner if each != ()]
-        return len(value) == len(hints) and all(map(_fits, value, hints))
-    if kind is dict and isinstance(value, dict):
-        return all(_fits(each, inner[1]) for each in value.values())
-    return kind is Any or isinstance(value, kind)
+        for each in inner:
+            with suppress(ValueError):
+                return _read(value, each, name)
+    elif dataclasses.is_dataclass(kind) and isinstance(value, Mapping):
+        hints = get_type_hints(kind)
+        known: Any = {key: _read(each, hints[key], key) for key, each in value.items() if key in hints}
+        return kind(**known)  # type: ignore[operator]
+    elif kind is tuple and isinstance(value, list | tuple):
+        items = inner[:1] * len(value) if Ellipsis in inner else [each for each in inner if each != ()]
+        if len(value) == len(items):
+            return tuple(_read(each, item, name) for each, item in zip(value, items, strict=True))
+    elif kind is dict and isinstance(value, dict):
+        return {key: _read(each, inner[1], name) for key, each in value.items()}
+    elif kind in (int, float):  # whole numbers that are not too large are floats, too
+        if (type(value) is int and abs(value) <= sys.maxsize) or (kind is float and isinstance(value, float)):
+            return value
+    elif kind is Any or isinstance(value, kind):
+        return value
+    raise ValueError(f"{name} in its report is {repr(value)[:80]}")
 
 
 def outside() -> int:
@@ -106,12 +105,10 @@ def outside() -> int:
 
 @cache
 def _versions() -> dict[str, str]:
-    found = {}
-    for name in ("glsk-o3d", "numpy", "scipy", "open3d"):
-        try:
+    found = dict.fromkeys(("glsk-o3d", "numpy", "scipy", "open3d"), "not installed")
+    for name in found:
+        with suppress(PackageNotFoundError):
             found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
     return found
 
 
@@ -224,18 +221,9 @@ class Report:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Report:
         """Inverse of `to_dict`; entries of a later version that this one does not know are passed over."""
-        values = dict(data)
-        values["iterations"] = tuple(_made(IterationRecord, record) for record in values.get("iterations", ()))
-        for name, record in (("judgements", Judgement), ("support", Supported)):
-            values[name] = tuple(
-                _made(record, found | {"place": tuple(found["place"])}) for found in values.get(name, ())
-            )
-        if not all(found.about in OUTCOMES for found in values["judgements"]):
+        report = _read(data, cls)
+        if not all(found.about in QUESTIONS for found in report.judgements):
             raise ValueError("a judgement in its report is about nothing that is known")
-        values["joined"] = tuple((tuple(start), tuple(stop)) for start, stop in values.get("joined", ()))
-        lists = ("stages", "warnings", "root")
-        values |= {name: tuple(values[name]) for name in lists if isinstance(values.get(name), list)}
-        report = _made(cls, values)
         if not isinstance(report.recipe.get("pipeline", []), list):
             raise ValueError("its recipe is none")
         return report
