@@ -71,7 +71,7 @@ class IterationRecord:
 
 
 def _read(value: Any, hint: Any, name: str = "it") -> Any:
-    """A value of a file as its type has it: records of dicts, tuples of lists; ValueError where it is something else."""
+    """A value of a file as its type has it, records from dicts and tuples from lists; ValueError for others."""
     kind, inner = get_origin(hint) or hint, get_args(hint)
     if kind in (Union, UnionType):
         for each in inner:

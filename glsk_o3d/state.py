@@ -13,17 +13,7 @@ from .report import Report
 
 
 def at_rest(positions: np.ndarray, rings: Rings) -> dict[str, Any]:
-    """What a Contraction says of points that have not moved yet, as keywords.
-
-    Parameters
-    ----------
-    positions : (n, 3) float array
-    rings : Rings
-
-    Returns
-    -------
-    dict
-    """
+    """What a Contraction says of (n, 3) points that have not moved yet, as keywords."""
     _, ring_size = rings.nearest(positions)
     return dict(
         positions=positions,
@@ -135,9 +125,9 @@ class Contraction:
     @property
     def point_of_survivor(self) -> np.ndarray:
         """For every survivor the first input point that it is, (n,) int array."""
-        valid = np.flatnonzero(self.sampled)
+        points = np.flatnonzero(self.sampled)[::-1]  # of several writes the last one stays
         first = np.empty(len(self.cloud), int)
-        first[self.representative_of_point[valid[::-1]]] = valid[::-1]
+        first[self.representative_of_point[points]] = points
         return first[self.survivors]
 
     @property
