@@ -40,9 +40,9 @@ def parameter(
     doc : str
         One sentence; it appears in the class's docstring and in ``glsk filters``.
     type : {"int", "float", "bool", "length", "point", "choice", "reducer", "stop"}, optional
-        Of `default`, unless given. A length is a float in the cloud's units or a string such as ``"2%"`` of the
-        diagonal of the box that `RingBuilder.frame` names, a point a string such as ``"0.5,0,2"``. A trailing ``?``
-        allows None.
+        By default that of `default`, of a string "choice". A length is a float in the cloud's units or a string such
+        as ``"2%"`` of the diagonal of the box that `RingBuilder.frame` names, a point a string such as ``"0.5,0,2"``.
+        A trailing ``?`` allows None.
     unit : str
     low, high : float, optional
         Inclusive limits (`low` is exclusive with `open_low`); for a length in percent they limit nothing.
@@ -50,7 +50,7 @@ def parameter(
     choices : tuple of str
         What the type ``"choice"`` may be; any other type may also be one of these words.
     """
-    kind = type or default.__class__.__name__
+    kind = type or ("choice" if isinstance(default, str) else default.__class__.__name__)
     facts = dict(doc=doc, type=kind, unit=unit, low=low, high=high, open_low=open_low, choices=choices)
     return dataclasses.field(default=default, metadata=facts)
 
@@ -130,7 +130,8 @@ def _plain(value: Any) -> Any:
         return NONE
     if isinstance(value, Parameters):
         return value.table()
-    for kind, plain in ((str, str.__str__), (bool, bool), (Integral, int), (Real, float)):
+    plain_types: tuple[tuple[type, Any], ...] = ((str, str.__str__), (bool, bool), (Integral, int), (Real, float))
+    for kind, plain in plain_types:
         if isinstance(value, kind):
             return plain(value)
     named, article = (value, "") if hasattr(value, "__qualname__") else (type(value), "a ")

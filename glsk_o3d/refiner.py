@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
@@ -86,54 +87,30 @@ class Refiner(Filter[Skeleton]):
 
     collapse: Literal["length", "degree"] = parameter(
         "length",
-        "Which edge of a triangle collapses first: the shortest, or, as published, that with the least mean degree of "
-        "its ends, which changes with every sample of the points.",
-        type="choice",
+        "Which edge of a triangle collapses first: the shortest, or that with the least mean degree of its ends, which "
+        "changes with every sample of the points.",
         choices=("length", "degree"),
     )
     handle: float = parameter(
-        0.5,
-        "Least probability that a loop is a handle of the object; others are closed. 0 keeps all.",
-        type="float",
-        low=0,
-        high=1,
+        0.5, "Least probability that a loop is a handle of the object; others are closed. 0 keeps all.", low=0, high=1
     )
     air: float = parameter(
-        0.5,
-        "Probability that a branch crosses air from which on it is cut there. 0 cuts none.",
-        type="float",
-        low=0,
-        high=1,
+        0.5, "Probability that a branch crosses air from which on it is cut there. 0 cuts none.", low=0, high=1
     )
     bridge: float = parameter(
-        0.5,
-        "Probability that the object goes on across a gap from which on it is bridged. 0 bridges none.",
-        type="float",
-        low=0,
-        high=1,
+        0.5, "Probability that the object crosses a gap from which on it is bridged. 0 bridges none.", low=0, high=1
     )
     limb: float = parameter(
-        0.25,
-        "Least probability that a branch is a limb of the object; others, spurs, are pruned. 0 keeps all.",
-        type="float",
-        low=0,
-        high=1,
+        0.25, "Least probability that a branch is a limb; others, spurs, are pruned. 0 keeps all.", low=0, high=1
     )
-    spacing: float = parameter(
-        0.5,
-        "Longest edge over the local radius, by subdivision; 0 leaves the edges. Long ones cut corners.",
-        type="float",
-        low=0,
-    )
+    spacing: float = parameter(0.5, "Longest edge over the local radius, by subdivision; 0 leaves the edges.", low=0)
     recentre: int = parameter(
-        3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", type="int", unit="passes", low=0
+        3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", unit="passes", low=0
     )
-
     surface: float = parameter(
         0.65,
         "Least share of the points of a region that must show a surface; where fewer do, parts are traced along "
         "shortest paths through the points. 0 traces none.",
-        type="float",
         low=0,
         high=1,
     )
@@ -189,44 +166,37 @@ class Refiner(Filter[Skeleton]):
     def _judge(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
         """Close false loops, prune spurs, cut what crosses air, bridge gaps; then ask for loops and limbs anew."""
         evidence = Evidence.of(skeleton, surface)
-        skeleton, loops = self._close(skeleton, evidence)
-        skeleton, limbs = self._prune(skeleton, evidence)
-        skeleton, cuts = self._cut(skeleton, evidence)
+        skeleton, loops = self._asked(close_loops, skeleton, evidence, self.handle)
+        skeleton, limbs = self._asked(prune_spurs, skeleton, evidence, self.limb)
+        cuts, gaps = [], []
+        if self.air:
+            skeleton, cuts = cut_air(skeleton, evidence, skeleton.report.noise, self.air)
         if _changed(cuts):
-            limbs, (skeleton, more) = _of_changes(limbs), self._prune(skeleton, evidence)
-            limbs += more
-        skeleton, gaps = self._bridge(skeleton, evidence)
+            skeleton, more = self._asked(prune_spurs, skeleton, evidence, self.limb)
+            limbs = _changed(limbs) + more
+        if self.bridge:
+            skeleton, gaps = bridge_gaps(skeleton, evidence, self.bridge)
         if _changed([*cuts, *gaps]):
-            loops, (skeleton, again) = _of_changes(loops), self._close(self._refit(skeleton, evidence), evidence)
-            limbs, (skeleton, more) = _of_changes(limbs), self._prune(skeleton, evidence)
-            loops, limbs = loops + again, limbs + more
-        closed, cut, bridged = (len(_of_changes(found)) for found in (loops, cuts, gaps))
+            skeleton, again = self._asked(close_loops, self._refit(skeleton, evidence), evidence, self.handle)
+            skeleton, more = self._asked(prune_spurs, skeleton, evidence, self.limb)
+            loops, limbs = _changed(loops) + again, _changed(limbs) + more
         report = replace(
             skeleton.report,
             judgements=(*loops, *cuts, *gaps, *limbs),
-            n_loops_closed=closed,
-            n_cuts=cut,
-            n_bridges=bridged,
+            n_loops_closed=len(_changed(loops)),
+            n_cuts=len(_changed(cuts)),
+            n_bridges=len(_changed(gaps)),
         )
         return replace(skeleton, report=report)
 
-    def _close(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
-        if not self.handle:
+    def _asked(
+        self, answer: Callable[..., Any], skeleton: Skeleton, evidence: Evidence, limit: float
+    ) -> tuple[Skeleton, list[Judgement]]:
+        """A skeleton after a question was answered for its parts, with curves fitted anew where it was changed."""
+        if not limit:
             return skeleton, []
-        skeleton, loops = close_loops(skeleton, evidence, self.handle)
-        return (self._refit(skeleton, evidence) if _changed(loops) else skeleton), loops
-
-    def _prune(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
-        if not self.limb:
-            return skeleton, []
-        skeleton, limbs = prune_spurs(skeleton, evidence, self.limb)
-        return (self._refit(skeleton, evidence) if _changed(limbs) else skeleton), limbs
-
-    def _cut(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
-        return cut_air(skeleton, evidence, skeleton.report.noise, self.air) if self.air else (skeleton, [])
-
-    def _bridge(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
-        return bridge_gaps(skeleton, evidence, self.bridge) if self.bridge else (skeleton, [])
+        skeleton, judgements = answer(skeleton, evidence, limit)
+        return (self._refit(skeleton, evidence) if _changed(judgements) else skeleton), judgements
 
     def _refit(self, skeleton: Skeleton, evidence: Evidence) -> Skeleton:
         if self.spacing:
@@ -234,9 +204,5 @@ class Refiner(Filter[Skeleton]):
         return fit_axis(skeleton, self.recentre, evidence)
 
 
-def _of_changes(judgements: list[Judgement]) -> list[Judgement]:
+def _changed(judgements: list[Judgement]) -> list[Judgement]:
     return [it for it in judgements if it.changed]
-
-
-def _changed(judgements: list[Judgement]) -> bool:
-    return bool(_of_changes(judgements))

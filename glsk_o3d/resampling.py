@@ -163,7 +163,7 @@ def _supported(skeleton: Skeleton, others: list[Skeleton]) -> Skeleton:
     return replace(skeleton, support=support, report=report)
 
 
-def _told(about: str, place: np.ndarray, share: float, present: bool = True) -> Supported:
+def _told(about: str, place: np.ndarray, share: float | np.floating, present: bool = True) -> Supported:
     x, y, z = place.tolist()
     return Supported(about, (x, y, z), float(share), present)
 

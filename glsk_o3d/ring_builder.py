@@ -101,10 +101,8 @@ class RingBuilder(Filter[Contraction]):
     around: float = parameter(
         20.0,
         "Points around a part that are enough: where the surface has more, near ones are merged until they are evenly "
-        "apart, but about 2400 are left if no part is thin; the one that stays takes over the mass. Where parts are "
-        "thin, fewer are faster and more keep near ones apart; clouds of less than 2000 points stay as they are. 0 "
-        "merges none for this, and so does a `radius`.",
-        type="float",
+        "apart, but about 2400 are left if no part is thin; the one that stays takes over the mass. Clouds of less "
+        "than 2000 points stay as they are. 0 merges none for this, and so does a `radius`.",
         unit="points",
         low=0,
         high=1000,
@@ -113,8 +111,7 @@ class RingBuilder(Filter[Contraction]):
         "auto",
         "Most points to contract; the others are merged into a near one, which takes over their mass. Of more than "
         "four times as many, a sample from a grid says where the surface is, and the others only belong to a vertex. "
-        "'auto' is 25000, but 64 times the square root of their number from 152588 on; 'all' merges none, whatever "
-        "`around` says, as published.",
+        "'auto' is 25000, but 64 times the square root of their number from 152588 on; 'all' merges none at all.",
         type="int",
         unit="points",
         low=8,
@@ -123,30 +120,23 @@ class RingBuilder(Filter[Contraction]):
     outlier_factor: float = parameter(
         2.5,
         "A point this many times farther from its neighbours than these are from theirs is set aside: it goes to the "
-        "nearest vertex but has no say; so do many that float in space together, and one that denoising leaves alone. "
-        "0 keeps all.",
-        type="float",
+        "nearest vertex but has no say; so do many that float in space together. 0 keeps all.",
         low=0,
     )
     denoise: int = parameter(
         4,
         "Passes that draw the points of noisy neighbourhoods to the ridge of their density before the rings are made. "
-        "Where there are 8192 or more, these are averaged first, unless there is a `radius` or `thin_to` is 'all'. "
-        "Clean points stay. 0 for none.",
-        type="int",
+        "8192 or more are averaged first, unless there is a `radius` or `thin_to` is 'all'. 0 for none.",
         unit="passes",
         low=0,
     )
     frame: Literal["spread", "box"] = parameter(
         "spread",
         "What lengths in percent refer to, and the frame in which the weights are stated: the box with the spread of "
-        "the points, which turns with them, or the axis-aligned bounding box, as published.",
-        type="choice",
+        "the points, which turns with them, or the axis-aligned bounding box.",
         choices=("spread", "box"),
     )
-    drop_invalid: bool = parameter(
-        False, "Drop points with NaN or infinite coordinates instead of refusing.", type="bool"
-    )
+    drop_invalid: bool = parameter(False, "Drop points with NaN or infinite coordinates instead of refusing.")
 
     def __post_init__(self) -> None:
         # as plain numbers they can be compared, printed and written to files
