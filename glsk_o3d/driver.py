@@ -90,8 +90,7 @@ def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathL
     elif isinstance(pipeline, Filter):
         pipeline = Pipeline(pipeline)
     elif not isinstance(pipeline, Pipeline):
-        words = "must be a Pipeline, the name of one, or the path of a recipe"
-        raise InvalidParameterError(f"pipeline = {pipeline!r}: {words}")
+        raise InvalidParameterError(f"pipeline = {pipeline!r}: must be a Pipeline, its name, or the path of a recipe")
     pipeline.check_complete()
     return pipeline
 

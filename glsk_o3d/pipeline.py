@@ -28,6 +28,10 @@ FLOWS = (Cloud, Contraction, Skeleton)
 """What runs between filters."""
 ORDER = "the order is RingBuilder | Contractor | Connector | Refiner"
 RECIPE_VERSION = 1
+SOLVED = (
+    "solve %(iteration)d: %(n_points)d points, %(n_merged)d merged, e %(explained).4f, De %(explained_change).4f, "
+    "ring ratio %(ring_ratio).4f, %(seconds).3f s"
+)
 
 _log = logging.getLogger(__name__)
 
@@ -338,11 +342,7 @@ def _watch(on_iteration: OnIteration | None, on_state: OnState | None) -> Watch 
 
     def watch(state: Contraction) -> bool | None:
         record = state.report.iterations[-1]
-        _log.debug(
-            "solve %d: %d points, %d merged, e %.4f, De %.4f, ring ratio %.4f, %.3f s",
-            *(record.iteration, record.n_points, record.n_merged, record.explained, record.explained_change),
-            *(record.ring_ratio, record.seconds),
-        )
+        _log.debug(SOLVED, vars(record))
         if on_state is not None:
             on_state(state)
         return None if on_iteration is None else on_iteration(record)

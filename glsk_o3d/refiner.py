@@ -159,9 +159,7 @@ class Refiner(Filter[Skeleton]):
             skeleton = zip_narrow_loops(skeleton, surface)
         if self.recentre:
             skeleton = recall_runaways(skeleton)
-        if self.spacing:
-            skeleton = subdivide_edges(skeleton, self.spacing)
-        return fit_axis(skeleton, self.recentre, surface), surface
+        return self._centred(skeleton, surface), surface
 
     def _judge(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
         """Close false loops, prune spurs, cut what crosses air, bridge gaps; then ask for loops and limbs anew."""
@@ -177,7 +175,7 @@ class Refiner(Filter[Skeleton]):
         if self.bridge:
             skeleton, gaps = bridge_gaps(skeleton, evidence, self.bridge)
         if _changed([*cuts, *gaps]):
-            skeleton, again = self._asked(close_loops, self._refit(skeleton, evidence), evidence, self.handle)
+            skeleton, again = self._asked(close_loops, self._centred(skeleton, evidence), evidence, self.handle)
             skeleton, more = self._asked(prune_spurs, skeleton, evidence, self.limb)
             loops, limbs = _changed(loops) + again, _changed(limbs) + more
         report = replace(
@@ -196,12 +194,12 @@ class Refiner(Filter[Skeleton]):
         if not limit:
             return skeleton, []
         skeleton, judgements = answer(skeleton, evidence, limit)
-        return (self._refit(skeleton, evidence) if _changed(judgements) else skeleton), judgements
+        return (self._centred(skeleton, evidence) if _changed(judgements) else skeleton), judgements
 
-    def _refit(self, skeleton: Skeleton, evidence: Evidence) -> Skeleton:
+    def _centred(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
-        return fit_axis(skeleton, self.recentre, evidence)
+        return fit_axis(skeleton, self.recentre, surface)
 
 
 def _changed(judgements: list[Judgement]) -> list[Judgement]:

@@ -162,8 +162,8 @@ class RingBuilder(Filter[Contraction]):
             surface = average_noise(surface, self._k)
         surface = denoise(surface, self.denoise, self.outlier_factor > 0)
         thinned = thin_surface(surface, self.around if self._may_merge else 0, most, self._k)
-        told = Report(n_input=n + dropped, n_dropped=dropped)
-        return _contraction(points, finite, sample, surface, thinned, self._rings(surface, thinned), told)
+        report = Report(n_input=n + dropped, n_dropped=dropped)
+        return _contraction(points, finite, sample, surface, thinned, self._rings(surface, thinned), report)
 
     def sample_size(self, n: int) -> int:
         """About how many of n points say where the surface is, if these are more than twice as many."""
@@ -206,7 +206,13 @@ class RingBuilder(Filter[Contraction]):
 
 
 def _contraction(
-    points: np.ndarray, finite: np.ndarray, sample: Sample, surface: Surface, thinned: Thinned, rings: Rings, so: Report
+    points: np.ndarray,
+    finite: np.ndarray,
+    sample: Sample,
+    surface: Surface,
+    thinned: Thinned,
+    rings: Rings,
+    report: Report,
 ) -> Contraction:
     """What flows on: nothing has moved yet."""
     representative, outlier, sampled = np.full(len(points), -1), *np.zeros((2, len(points)), bool)
@@ -228,7 +234,7 @@ def _contraction(
         mass=np.bincount(thinned.representative, surface.merged) * (n / surface.merged.sum()),
         **at_rest(surface.points[thinned.survivors], rings),
         report=replace(
-            so,
+            report,
             n_outliers=int(outlier.sum()),
             n_sampled=len(sample.kept),
             n_distinct=int(surface.merged.sum()),
