@@ -37,9 +37,7 @@ class Connector(Filter[Skeleton]):
     Notes
     -----
     The published codes use one radius of 2 % of the bounding box's diagonal, and join a point's vertex to that of its
-    first foreign neighbour in the ring, so that their loops depend on where a ring happens to start.
-    ``links="nearest"`` takes the nearest foreign neighbour instead, which depends on nothing but the points;
-    ``links="all"`` takes all of them, so that what is connected by rings stays connected.
+    first foreign neighbour in the ring, wherever that happens to start; ``links="nearest"`` takes the nearest instead.
 
     References
     ----------
@@ -70,16 +68,11 @@ class Connector(Filter[Skeleton]):
     )
     links: Literal["all", "nearest"] = parameter(
         "all",
-        "Join a point's vertex with those of all its foreign ring neighbours (but where two surfaces face each other), "
-        "or of the nearest one only.",
+        "Join a point's vertex with those of all its foreign ring neighbours, but across gaps, or of the nearest one.",
         choices=("all", "nearest"),
     )
     min_support: float = parameter(
-        0.1,
-        "Where the cloud is noisy, vertices with less than this share of the points of another at most two edges away "
-        "are dropped, unless they hold parts together. 0 keeps all.",
-        low=0,
-        high=1,
+        0.1, "In noise, vertices with less than this share of a near one's points go. 0 keeps all.", low=0, high=1
     )
 
     def _run(self, state: Contraction, watch: Watch | None) -> Skeleton:

@@ -60,11 +60,7 @@ class Contractor(Filter[Contraction]):
         None, "Merges redundant points after each solve; None keeps them all.", type="reducer?"
     )
     reduce_above: int = parameter(
-        500,
-        "The reducer works only while more points are left: below, a pass costs more than it saves, and thin parts "
-        "lose the points that say where they are.",
-        unit="points",
-        low=0,
+        500, "The reducer works only while more points are left: thin parts need the others.", unit="points", low=0
     )
     stop: StopRule = parameter(ExplainedScore(), "Decides after each solve whether to stop.", type="stop")
     max_iterations: int = parameter(10, "Most solves.", unit="solves", low=1)
@@ -77,10 +73,7 @@ class Contractor(Filter[Contraction]):
         1.0, "Floor of W_H: a point whose ring grows would be held ever less, and run away.", low=0
     )
     line_hold: float = parameter(
-        30.0,
-        "Factor on W_H where the contracted cloud is a line already: more contraction would only shorten it and round "
-        "its bends, while thicker parts still need some.",
-        low=1,
+        30.0, "Factor on W_H where the cloud is a line already: more contraction would only shorten it.", low=1
     )
     keep_last: bool = parameter(True, "Keep the solve after which the rule says stop.")
     retries: int = parameter(

@@ -63,11 +63,6 @@ class Refiner(Filter[Skeleton]):
         the axis is; it names the region. Where questions about loops, air or gaps were close calls; it names the
         closest.
 
-    Notes
-    -----
-    The published code also merges nearly straight runs; an indexing slip makes that step idle in most clouds. It is
-    left out here.
-
     References
     ----------
     Cao et al. 2010, section 5; Wen et al. 2024, section II-D.
@@ -87,8 +82,7 @@ class Refiner(Filter[Skeleton]):
 
     collapse: Literal["length", "degree"] = parameter(
         "length",
-        "Which edge of a triangle collapses first: the shortest, or that with the least mean degree of its ends, which "
-        "changes with every sample of the points.",
+        "Which edge of a triangle collapses first: the shortest, or that with the least mean degree of its ends.",
         choices=("length", "degree"),
     )
     handle: float = parameter(
@@ -108,16 +102,12 @@ class Refiner(Filter[Skeleton]):
         3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", unit="passes", low=0
     )
     surface: float = parameter(
-        0.65,
-        "Least share of the points of a region that must show a surface; where fewer do, parts are traced along "
-        "shortest paths through the points. 0 traces none.",
-        low=0,
-        high=1,
+        0.65, "Share of points with a surface below which a region is traced as paths. 0 traces none.", low=0, high=1
     )
     root: str | Any = parameter(
         None,
-        "Where a tree grows from: the lowest place along an axis, the end that is thickest, or the place nearest to a "
-        "point; the skeleton is then one tree, whatever the gaps. None keeps parts and loops.",
+        "Where one tree grows from: the lowest place along an axis, the thickest end, or the place nearest to a point. "
+        "None keeps parts and loops.",
         type="point?",
         choices=(*AXES, "thickest"),
     )

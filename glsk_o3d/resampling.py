@@ -49,9 +49,8 @@ def support(
 ) -> Skeleton:
     """Curve skeleton of a cloud, and which part of it the skeletons of other samples of the object show.
 
-    Every sample leaves out a fifth of the points, at random. What only some of their skeletons show hangs on chance.
-    Trees of species get their support in this way (Felsenstein 1985). The samples are those of the delete-d jackknife
-    (Shao and Wu 1989): a bootstrap draws points twice, which add nothing here.
+    Every sample leaves out a fifth of the points, at random, as in the delete-d jackknife. What only some of their
+    skeletons show hangs on chance. Trees of species get their support in this way, by bootstraps.
 
     Parameters
     ----------

@@ -56,9 +56,9 @@ class RingBuilder(Filter[Contraction]):
     cloud is taken in its own working frame (centred, longest side 1.6), in Morton order and without duplicates (points
     that differ by rounding are one); what comes out is mapped back to the user's order and units.
 
-    For `k` Open3D's own search parameters may be given: ``KDTreeSearchParamKNN(knn)`` is ``k=knn``,
-    ``KDTreeSearchParamHybrid(radius, max_nn)`` is ``k=max_nn, radius=radius``, and ``KDTreeSearchParamRadius(radius)``,
-    which has no limit of its own, is ``k=30, radius=radius``.
+    For `k` Open3D's search parameters may be given: ``KDTreeSearchParamKNN(knn)`` is ``k=knn``,
+    ``KDTreeSearchParamHybrid(radius, max_nn)`` is ``k=max_nn, radius=radius``, and ``KDTreeSearchParamRadius(radius)``
+    is ``k=30, radius=radius``.
 
     Raises
     ------
@@ -81,9 +81,8 @@ class RingBuilder(Filter[Contraction]):
 
     k: int | Literal["auto", "published"] | SearchParam = parameter(
         "auto",
-        "Neighbours per point, itself included; at most all points. More bridge noise and gaps, fewer keep thin parts "
-        "apart. 'auto' is 16 from 4096 points on and fewer below, by the cube root, at least 8; 'published' is 1.2 % "
-        "of the points, at least 8 and at most 30.",
+        "Neighbours per point, itself included; at most all. More bridge noise and gaps, fewer keep thin parts apart. "
+        "'auto' is 8 to 16 and 'published' 8 to 30, by the number of points.",
         type="int",
         unit="points",
         low=4,
@@ -100,18 +99,15 @@ class RingBuilder(Filter[Contraction]):
     )
     around: float = parameter(
         20.0,
-        "Points around a part that are enough: where the surface has more, near ones are merged until they are evenly "
-        "apart, but about 2400 are left if no part is thin; the one that stays takes over the mass. Clouds of less "
-        "than 2000 points stay as they are. 0 merges none for this, and so does a `radius`.",
+        "Points around a part that are enough: where there are more, near ones are merged. 0 or a `radius`: none.",
         unit="points",
         low=0,
         high=1000,
     )
     thin_to: int | Literal["auto", "all"] = parameter(
         "auto",
-        "Most points to contract; the others are merged into a near one, which takes over their mass. Of more than "
-        "four times as many, a sample from a grid says where the surface is, and the others only belong to a vertex. "
-        "'auto' is 25000, but 64 times the square root of their number from 152588 on; 'all' merges none at all.",
+        "Most points to contract; others are merged into near ones, which take over their mass. 'auto' is 25000, or 64 "
+        "times the square root of their number if that is more; 'all' merges none, whatever `around` says.",
         type="int",
         unit="points",
         low=8,
@@ -120,20 +116,18 @@ class RingBuilder(Filter[Contraction]):
     outlier_factor: float = parameter(
         2.5,
         "A point this many times farther from its neighbours than these are from theirs is set aside: it goes to the "
-        "nearest vertex but has no say; so do many that float in space together. 0 keeps all.",
+        "nearest vertex but has no say. 0 keeps all.",
         low=0,
     )
     denoise: int = parameter(
         4,
-        "Passes that draw the points of noisy neighbourhoods to the ridge of their density before the rings are made. "
-        "8192 or more are averaged first, unless there is a `radius` or `thin_to` is 'all'. 0 for none.",
+        "Passes that draw the points of noisy neighbourhoods to the ridge of their density. 0 for none.",
         unit="passes",
         low=0,
     )
     frame: Literal["spread", "box"] = parameter(
         "spread",
-        "What lengths in percent refer to, and the frame in which the weights are stated: the box with the spread of "
-        "the points, which turns with them, or the axis-aligned bounding box.",
+        "What percentages and weights refer to: the box with the spread of the points, or the axis-aligned bounding box.",
         choices=("spread", "box"),
     )
     drop_invalid: bool = parameter(False, "Drop points with NaN or infinite coordinates instead of refusing.")
@@ -197,8 +191,7 @@ class RingBuilder(Filter[Contraction]):
         return self.radius is None and self.thin_to != "all"
 
     def _k(self, n: int) -> int:
-        rules: dict[Any, Any] = {"auto": default_k, "published": published_k}
-        chosen: Any = rules[self.k](n) if self.k in rules else self.k
+        chosen: Any = {"auto": default_k(n), "published": published_k(n)}.get(self.k, self.k)  # type: ignore[arg-type]
         return min(chosen, n)
 
     def _most(self, n: int) -> int:
