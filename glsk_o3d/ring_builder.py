@@ -127,7 +127,7 @@ class RingBuilder(Filter[Contraction]):
     )
     frame: Literal["spread", "box"] = parameter(
         "spread",
-        "What percentages and weights refer to: the box with the spread of the points, or the axis-aligned bounding box.",
+        "What percentages and weights refer to: the box with the spread of the points, or the axis-aligned one.",
         choices=("spread", "box"),
     )
     drop_invalid: bool = parameter(False, "Drop points with NaN or infinite coordinates instead of refusing.")
