@@ -227,14 +227,14 @@ class Pipeline(Generic[Produced]):
         (12, None, '2%')
         """
         pipeline: Any = self
-        told: dict[tuple[type[Parameters], str], str] = {}
+        names: dict[tuple[type[Parameters], str], str] = {}
         given = [*(options or {}).items(), *named.items()]
         # reducers and rules first: what is put in has parameters that others may change
         for name, value in sorted(given, key=lambda option: not (option[1] is None or callable(option[1]))):
             cls, field = pipeline.class_of_option(name)
-            if (cls, field.name) in told:
-                raise InvalidParameterError(f"{told[cls, field.name]} and {name} are one option: give it once")
-            told[cls, field.name] = name
+            if (cls, field.name) in names:
+                raise InvalidParameterError(f"{names[cls, field.name]} and {name} are one option: give it once")
+            names[cls, field.name] = name
             pipeline = _changed(pipeline, cls, field.name, value)
         pipeline.check()
         return pipeline

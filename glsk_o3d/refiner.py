@@ -193,4 +193,4 @@ class Refiner(Filter[Skeleton]):
 
 
 def _changed(judgements: list[Judgement]) -> list[Judgement]:
-    return [it for it in judgements if it.changed]
+    return [each for each in judgements if each.changed]

@@ -30,16 +30,12 @@ class IterationRecord:
     ----------
     iteration : int
         Counted from 1.
-    n_points : int
-        Points that were solved for.
-    n_merged : int
-        Points that the reduction after the solve merged away.
-    n_held : int
-        Points held in place because the solve would have thrown them out of the bounding box.
-    explained : float
-        PCA score e of the contracted points, 1 for a straight line (Wen et al. 2024, equation 14).
-    explained_change : float
-        De, the change of e per share of points kept (equation 16).
+    n_points, n_merged, n_held : int
+        Points that were solved for, those that the reduction after the solve merged away, and those held in place
+        because the solve would have thrown them out of the bounding box.
+    explained, explained_change : float
+        PCA score e of the contracted points, 1 for a straight line (Wen et al. 2024, equation 14), and De, its change
+        per share of points kept (equation 16).
     ring_ratio : float
         a(t), the sum of the ring sizes over that of the uncontracted cloud.
     contraction_weight : float
@@ -105,11 +101,11 @@ def outside() -> int:
 
 @cache
 def _versions() -> dict[str, str]:
-    found = dict.fromkeys(("glsk-o3d", "numpy", "scipy", "open3d"), "not installed")
-    for name in found:
+    versions = dict.fromkeys(("glsk-o3d", "numpy", "scipy", "open3d"), "not installed")
+    for name in versions:
         with suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
+            versions[name] = version(name)
+    return versions
 
 
 @dataclass(frozen=True)
@@ -134,17 +130,16 @@ class Report:
         Where a tree grows from; empty if none was asked for.
     judgements : tuple of Judgement
         What was asked about the topology, with probabilities, and what was done.
-    n_draws : int
-        Samples of the cloud whose skeletons were compared with this one, see `glsk_o3d.support`; 0 if none were.
-    n_agreeing : int
-        Those of them with as many components, loops and ends.
+    n_draws, n_agreeing : int
+        Samples of the cloud whose skeletons were compared with this one, see `glsk_o3d.support`, and those of them with
+        as many components, loops and ends.
     support : tuple of Supported
         Share of them that show each branch, loop and end of this skeleton; and loops and ends that it lacks.
     stages : tuple of str
         The filters that ran, as the expressions that rebuild them.
     recipe : dict
-        The same as a recipe, from which `glsk_o3d.from_recipe` makes the pipeline that repeats the run. Empty if it is
-        not known. What a recipe cannot hold is an entry ``"unwritten"`` that says what was there.
+        The same as `glsk_o3d.from_recipe` reads it; empty if it is not known. In the place of what a recipe cannot hold
+        is an entry ``"unwritten"`` that says what was there.
     seconds : dict of str to float
         Wall time per filter.
     iterations : tuple of IterationRecord
@@ -205,14 +200,14 @@ class Report:
     @property
     def uncertain(self) -> tuple[Judgement, ...]:
         """What was judged with a probability between a quarter and three quarters, the least certain first."""
-        found = (it for it in self.judgements if it.is_uncertain)
-        return tuple(sorted(found, key=lambda it: abs(it.probability - 0.5)))
+        uncertain = (each for each in self.judgements if each.is_uncertain)
+        return tuple(sorted(uncertain, key=lambda each: abs(each.probability - 0.5)))
 
     @property
     def unsupported(self) -> tuple[Supported, ...]:
         """What more than a fifth of the samples disagree with, the most doubtful first."""
-        found = (it for it in self.support if not it.is_well_supported)
-        return tuple(sorted(found, key=lambda it: -it.doubt))
+        unsupported = (each for each in self.support if not each.is_well_supported)
+        return tuple(sorted(unsupported, key=lambda each: -each.doubt))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dict of numbers, strings, lists and dicts, as saved in JSON."""
@@ -222,7 +217,7 @@ class Report:
     def from_dict(cls, data: Mapping[str, Any]) -> Report:
         """Inverse of `to_dict`; entries of a later version that this one does not know are passed over."""
         report = _read(data, cls)
-        if not all(found.about in QUESTIONS for found in report.judgements):
+        if not all(judgement.about in QUESTIONS for judgement in report.judgements):
             raise ValueError("a judgement in its report is about nothing that is known")
         if not isinstance(report.recipe.get("pipeline", []), list):
             raise ValueError("its recipe is none")

@@ -130,39 +130,39 @@ def _supported(skeleton: Skeleton, others: list[Skeleton]) -> Skeleton:
     """A skeleton with the share of others that show each part of it."""
     whole, curves = _Curve(skeleton), [_Curve(other) for other in others]
     near = np.array([curve.shows(whole.vertices, NEAR * whole.reach) for curve in curves])
-    found = []
+    supported = []
     for branch in skeleton.branches:
         path = skeleton.vertices[branch]
         lengths = arc_lengths(path)
         shares = near[:, branch].mean(axis=1)
-        found.append(_told("branch", place_at(path, lengths, lengths[-1] / 2), np.mean(shares >= MOST_OF_IT)))
+        supported.append(_part("branch", place_at(path, lengths, lengths[-1] / 2), np.mean(shares >= MOST_OF_IT)))
     for loop in whole.loops:
         shares = [curve.shows_loop(whole, loop) for curve in curves]
-        found.append(_told("loop", whole.vertices[loop].mean(axis=0), np.mean(shares)))
+        supported.append(_part("loop", whole.vertices[loop].mean(axis=0), np.mean(shares)))
     ends = np.zeros((len(curves), len(whole.ends)), bool)
     missing: list[_Missing] = []
     for draw, curve in enumerate(curves):
         pairs = matched(curve.vertices[curve.ends], whole.vertices[whole.ends], NEAR_END * whole.reach[whole.ends])
-        ends[draw, [there for _, there in pairs]] = True
-        for end in np.delete(curve.ends, [here for here, _ in pairs]).tolist():
+        ends[draw, [row for _, row in pairs]] = True
+        for end in np.delete(curve.ends, [row for row, _ in pairs]).tolist():
             missing.append(("end", draw, curve.vertices[end], NEAR_END * curve.reach[end]))
         for loop in curve.loops:
             if not whole.shows_loop(curve, loop):
                 middle = curve.vertices[loop].mean(axis=0)
                 missing.append(("loop", draw, middle, norm(curve.vertices[loop] - middle).mean()))
     shares = ends.mean(axis=0)
-    found += [_told("end", whole.vertices[end], share) for end, share in zip(whole.ends, shares, strict=True)]
+    supported += [_part("end", whole.vertices[end], share) for end, share in zip(whole.ends, shares, strict=True)]
     support = near.mean(axis=0)
     support[whole.ends] = np.minimum(support[whole.ends], shares)
     same = sum(curve.counts == whole.counts for curve in curves)
-    found += _lacking(missing, len(curves))
-    report = replace(skeleton.report, n_draws=len(curves), n_agreeing=same, support=tuple(found))
+    supported += _lacking(missing, len(curves))
+    report = replace(skeleton.report, n_draws=len(curves), n_agreeing=same, support=tuple(supported))
     if same <= WORTH_A_WARNING * len(curves):
         report = report.with_warning(_doubt(report))
     return replace(skeleton, support=support, report=report)
 
 
-def _told(about: str, place: np.ndarray, share: float | np.floating, present: bool = True) -> Supported:
+def _part(about: str, place: np.ndarray, share: float | np.floating, present: bool = True) -> Supported:
     x, y, z = place.tolist()
     return Supported(about, (x, y, z), float(share), present)
 
@@ -177,15 +177,15 @@ def _lacking(missing: list[_Missing], draws: int) -> Iterator[Supported]:
         for number in range(group.max() + 1):
             these = group == number
             share = len(np.unique(draw[these])) / draws
-            yield _told(about, place[these].mean(axis=0), share, present=False)
+            yield _part(about, place[these].mean(axis=0), share, present=False)
 
 
 def _doubt(report: Report) -> str:
     """What to say of a skeleton that another sample would not give."""
     other = report.n_draws - report.n_agreeing
-    told = f"uncertain: {other} of {report.n_draws} samples of the cloud have a skeleton with another graph"
+    message = f"uncertain: {other} of {report.n_draws} samples of the cloud have a skeleton with another graph"
     weak = report.unsupported
-    return f"{told}, above all {weak[0]}: look there" if weak else told
+    return f"{message}, above all {weak[0]}: look there" if weak else message
 
 
 class _Curve:
@@ -215,5 +215,5 @@ class _Curve:
         if not cycles:
             return False
         closed = cKDTree(self.vertices[np.unique(np.concatenate(cycles))])
-        there = closed.query(other.vertices[loop])[0] <= NEAR_LOOP * other.reach[loop]
-        return bool(there.mean() >= MOST_OF_IT)
+        along_it = closed.query(other.vertices[loop])[0] <= NEAR_LOOP * other.reach[loop]
+        return bool(along_it.mean() >= MOST_OF_IT)
