@@ -432,12 +432,6 @@ def test_attraction_has_a_floor_and_a_cap(built, monkeypatch, floor):
     np.testing.assert_allclose(weight[:5], np.maximum([0.25, 4, 500, 500, 1], floor))
 
 
-def test_presets_hold_nothing_and_have_no_floor():
-    for filter in (CAO, WEN):
-        assert (filter.min_attraction, filter.retries, filter.line_hold) == (0, 0, 1)
-    assert WEN.reduce_above == 0
-
-
 @pytest.mark.parametrize("above", [0, 150, 250, 400, 1000])
 def test_reducer_rests_when_few_are_left(built, above):
     filter = Contractor(reducer=LPRReducer(), reduce_above=above, stop=never, max_iterations=5)
