@@ -32,7 +32,7 @@ class Connector(Filter[Skeleton]):
 
     Farthest-point sampling leaves a ball around every vertex, as wide as `radius` or a share of the local thickness.
     Each contracted point belongs to its nearest vertex, in units of the vertex's ball, and the vertex moves to the mean
-    of its points. Vertices are joined where ring neighbours belong to different ones.
+    of its points.
 
     Notes
     -----

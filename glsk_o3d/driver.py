@@ -100,9 +100,8 @@ def remove_redundant_points(
 ) -> tuple[Any, Any]:
     """Remove points that say little more about the skeleton than their neighbours, by local point reduction.
 
-    The points are contracted, those that have become redundant are merged into their neighbours, and so on; what is
-    left of them is returned where it was. One pass takes about two fifths of the points, near and alike ones first, so
-    that the gaps are smaller than in a random sample. Used like ``remove_statistical_outlier``.
+    One pass contracts the points, merges those that have become redundant into their neighbours, and leaves about three
+    fifths, with smaller gaps than in a random sample, where they were. Used like ``remove_statistical_outlier``.
 
     Parameters
     ----------

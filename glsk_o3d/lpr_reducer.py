@@ -30,12 +30,10 @@ class LPRReducer(Filter[Contraction]):
 
     A point i may swallow its nearest ring neighbour m where :math:`F = V_1 - V_2 + 3 U < \varphi s_i^2`. Its new ring
     is the Delaunay star of i among both rings, on the uncontracted points, projected along the Laplacian coordinate of
-    i; m's entry in every other ring becomes i. A point takes part in at most one merge a pass, so all ring combinations
-    of a pass are independent and made in one batch.
+    i; m's entry in every other ring becomes i. A point takes part in at most one merge a pass.
 
     With `conserve_mass` a survivor takes over the mass of the point it swallows, and the ring sizes s(0) and s(t) are
-    measured anew on the combined rings; without it, a survivor that speaks for eight points pulls with the weight of
-    one on a ring twice as wide, which drags bent parts off their axis.
+    measured anew on the combined rings; without it, bent parts are drawn off their axis.
 
     Raises
     ------

@@ -37,24 +37,16 @@ from .skeleton import Skeleton
 class Refiner(Filter[Skeleton]):
     """Make the graph one-dimensional, close false loops, prune spurs, and centre it in the surface around it.
 
-    1. Edges that lie on a triangle are collapsed, the shortest first, until there is no triangle.
-    2. Loops that open less than their tube is thick, two strands in one part, are zipped up.
-    3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
-       corners.
-    4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
-       side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
-    5. The topology is judged by what the surface around the curve says: loops that are probably no handles are closed;
-       branches that are probably no limbs are pruned; branches that probably cross air are cut, and gaps across which
-       the object probably goes on are bridged.
-    6. Junctions move to where limbs meet, and those within one radius become one. Ends, which flat faces have pulled
-       into their edges, grow anew along their limbs to where these stop: half a radius inside a flat face, or the
-       centre of a round cap.
-    7. Where the cloud shows no surface, parts thinner than its points are far apart, what the steps before made of them
-       is replaced by shortest paths through the points.
-    8. With a `root`, all is made one tree that grows from there: gaps are joined where they are narrowest, and loops
-       are cut. Vertex 0 is the root, and every edge leads from parent to child.
-
-    The first step is published; with all options 0 it is the only one.
+    1. Edges that lie on a triangle are collapsed, the shortest first, until there is none. This step is published, and with
+       all options 0 the only one.
+    2. Loops narrower than their tube are zipped up, detached vertices brought back, and edges subdivided.
+    3. The curve and its radii are fitted to the axis of the surface: to the normals of the points around, even if only
+       one side was scanned, and to the points themselves where noise has spoilt the normals.
+    4. The topology is judged by the surface around the curve: false loops are closed, spurs pruned, branches that cross
+       air cut, and gaps bridged across which the object goes on.
+    5. Junctions move to where limbs meet, and ends grow along their limbs to where these stop.
+    6. Where the cloud shows no surface, the curve is replaced by shortest paths through the points. With a `root` all
+       is made one tree: vertex 0 is the root, and every edge leads from parent to child.
 
     Warns
     -----
