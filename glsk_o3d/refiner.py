@@ -37,8 +37,8 @@ from .skeleton import Skeleton
 class Refiner(Filter[Skeleton]):
     """Make the graph one-dimensional, close false loops, prune spurs, and centre it in the surface around it.
 
-    1. Edges that lie on a triangle are collapsed, the shortest first, until there is none. This step is published, and with
-       all options 0 the only one.
+    1. Edges that lie on a triangle are collapsed, the shortest first, until there is none. This step is published, and
+       with all options 0 the only one.
     2. Loops narrower than their tube are zipped up, detached vertices brought back, and edges subdivided.
     3. The curve and its radii are fitted to the axis of the surface: to the normals of the points around, even if only
        one side was scanned, and to the points themselves where noise has spoilt the normals.
