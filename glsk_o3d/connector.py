@@ -32,14 +32,12 @@ class Connector(Filter[Skeleton]):
 
     Farthest-point sampling leaves a ball around every vertex, as wide as `radius` or a share of the local thickness.
     Each contracted point belongs to its nearest vertex, in units of the vertex's ball, and the vertex moves to the mean
-    of its points. Vertices are joined where ring neighbours belong to different ones.
+    of its points.
 
     Notes
     -----
     The published codes use one radius of 2 % of the bounding box's diagonal, and join a point's vertex to that of its
-    first foreign neighbour in the ring, so that their loops depend on where a ring happens to start.
-    ``links="nearest"`` takes the nearest foreign neighbour instead, which depends on nothing but the points;
-    ``links="all"`` takes all of them, so that what is connected by rings stays connected.
+    first foreign neighbour in the ring, wherever that happens to start; ``links="nearest"`` takes the nearest instead.
 
     References
     ----------
@@ -66,26 +64,15 @@ class Connector(Filter[Skeleton]):
         open_low=True,
     )
     thickness: float = parameter(
-        0.6,
-        "Distance between vertices over the local thickness, where that is more; 0 for `radius` alone.",
-        type="float",
-        low=0,
+        0.6, "Distance between vertices over the local thickness, where that is more; 0 for `radius` alone.", low=0
     )
     links: Literal["all", "nearest"] = parameter(
         "all",
-        "Join a point's vertex with those of all its foreign ring neighbours (but where two surfaces face each other), "
-        "or of the nearest one only.",
-        type="choice",
+        "Join a point's vertex with those of all its foreign ring neighbours, but across gaps, or of the nearest one.",
         choices=("all", "nearest"),
     )
-
     min_support: float = parameter(
-        0.1,
-        "Where the cloud is noisy, vertices with less than this share of the points of another at most two edges away "
-        "are dropped, unless they hold parts together. 0 keeps all.",
-        type="float",
-        low=0,
-        high=1,
+        0.1, "In noise, vertices with less than this share of a near one's points go. 0 keeps all.", low=0, high=1
     )
 
     def _run(self, state: Contraction, watch: Watch | None) -> Skeleton:
@@ -128,16 +115,9 @@ class Connector(Filter[Skeleton]):
 
 
 def across_gaps(state: Contraction) -> np.ndarray:
-    """Ring links between surfaces that face each other: between them is air, or the inside of a part.
+    """Whether each ring link runs between surfaces that face each other: there is air, or the inside of a part.
 
-    Parameters
-    ----------
-    state : Contraction
-
-    Returns
-    -------
-    (r,) bool array
-        For every entry of the rings; only where there is no noise, since it spoils the normals.
+    Only where there is no noise, since it spoils the normals.
     """
     p, q = state.survivors[state.rings.centres], state.survivors[state.rings.indices]
     facing = uprightness(state.cloud, state.normals, p, q) < FACING_UPRIGHTNESS
@@ -145,23 +125,11 @@ def across_gaps(state: Contraction) -> np.ndarray:
 
 
 def drop_unsupported(skeleton: Skeleton, count: np.ndarray, noisy: np.ndarray, share: float) -> Skeleton:
-    """Drop the vertices that few points support: what noise leaves between parts, and contraction leaves there.
+    """Drop the noisy vertices that few points support: what noise leaves between parts, and contraction leaves there.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    count : (M,) int array
-        Points of every vertex.
-    noisy : (M,) bool array
-        Vertices that may be dropped.
-    share : float
-        Points of such a vertex over those of another at most two edges away, at most. Adjoining ones that
-        hold other parts together stay.
-
-    Returns
-    -------
-    Skeleton
-        The points of dropped vertices are those of the nearest one left, without normals: they have no say.
+    They have less than a share of the points, `count`, of another vertex at most two edges away. Adjoining ones that
+    hold other parts together stay. The points of dropped vertices go to the nearest one left, without normals: they
+    have no say.
     """
     m, edges = len(skeleton.vertices), skeleton.edges
     ends, others = np.concatenate([edges, edges[:, ::-1]]).T
@@ -191,17 +159,7 @@ def drop_unsupported(skeleton: Skeleton, count: np.ndarray, noisy: np.ndarray, s
 
 
 def contraction_distance(state: Contraction) -> np.ndarray:
-    """Median distance of the input points that each survivor speaks for to where it was contracted, smoothed over 16.
-
-    Parameters
-    ----------
-    state : Contraction
-
-    Returns
-    -------
-    (n,) float array
-        In the working frame.
-    """
+    """Median distance in the frame, smoothed over 16, of each survivor's points to where they were contracted."""
     distance = group_median(norm(state.cloud - state.positions[state.representative]), state.representative, len(state))
     _, neighbours = nearest_neighbours(state.positions, min(16, len(state)))
     return row_medians(distance.take(neighbours))

@@ -35,10 +35,10 @@ class Contractor(Filter[Contraction]):
     diagonal of the survivors' masses; it is the identity unless points were merged before, or by a reducer that
     conserves mass.
 
-    A late, ill-conditioned solve can throw points out of the cloud. It is detected (a point beyond 1.2 times the
-    bounding box or, in a frame that turns with the cloud, the ball around it; or a solve without a trustworthy
-    solution). Such a solve is repeated with the runaway points held;
-    where that does not help it is dropped, the last sound state is kept, and the report says so.
+    A late, ill-conditioned solve can throw points out of the cloud: beyond 1.2 times the bounding box or, in a frame
+    that turns with the cloud, the ball around it. Such a solve is repeated with the runaway points held; where that
+    does not help, or there is no trustworthy solution, it is dropped, the last sound state is kept, and the report
+    says so.
 
     References
     ----------
@@ -60,43 +60,26 @@ class Contractor(Filter[Contraction]):
         None, "Merges redundant points after each solve; None keeps them all.", type="reducer?"
     )
     reduce_above: int = parameter(
-        500,
-        "The reducer works only while more points are left: below, a pass costs more than it saves, and thin parts "
-        "lose the points that say where they are. 0 as published.",
-        type="int",
-        unit="points",
-        low=0,
+        500, "The reducer works only while more points are left: thin parts need the others.", unit="points", low=0
     )
     stop: StopRule = parameter(ExplainedScore(), "Decides after each solve whether to stop.", type="stop")
-    max_iterations: int = parameter(10, "Most solves.", type="int", unit="solves", low=1)
+    max_iterations: int = parameter(10, "Most solves.", unit="solves", low=1)
     initial_contraction: float = parameter(
-        0.2, "w_L of the first solve times the mean ring edge in the working frame.", type="float", low=0, open_low=True
+        0.2, "w_L of the first solve times the mean ring edge in the working frame.", low=0, open_low=True
     )
-    amplification: float = parameter(3.0, "Factor on w_L after each solve.", type="float", low=1)
-    max_contraction: float = parameter(2048.0, "Cap of w_L.", type="float", low=0, open_low=True)
+    amplification: float = parameter(3.0, "Factor on w_L after each solve.", low=1)
+    max_contraction: float = parameter(2048.0, "Cap of w_L.", low=0, open_low=True)
     min_attraction: float = parameter(
-        1.0,
-        "Floor of W_H: a point whose ring grows would be held ever less, and run away. 0 as published.",
-        type="float",
-        low=0,
+        1.0, "Floor of W_H: a point whose ring grows would be held ever less, and run away.", low=0
     )
     line_hold: float = parameter(
-        30.0,
-        "Factor on W_H where the contracted cloud is a line already: more contraction would only shorten it and round "
-        "its bends, while thicker parts still need some. 1 as published.",
-        type="float",
-        low=1,
+        30.0, "Factor on W_H where the cloud is a line already: more contraction would only shorten it.", low=1
     )
-    keep_last: bool = parameter(
-        True, "Keep the solve after which the rule says stop; the published codes throw it away.", type="bool"
-    )
+    keep_last: bool = parameter(True, "Keep the solve after which the rule says stop.")
     retries: int = parameter(
-        3,
-        "Times a solve that throws points out of the box is repeated with these points held. 0 as published.",
-        type="int",
-        low=0,
+        3, "Times a solve that throws points out of the box is repeated with these points held.", low=0
     )
-    max_attraction: float = parameter(1e4, "Cap of W_H.", type="float", low=0, open_low=True)
+    max_attraction: float = parameter(1e4, "Cap of W_H.", low=0, open_low=True)
 
     def _run(self, state: Contraction, watch: Watch | None) -> Contraction:
         reducer = self.reducer
@@ -178,20 +161,10 @@ class Contractor(Filter[Contraction]):
 
 
 def explained_variance(points: np.ndarray, rings: Rings) -> np.ndarray:
-    """Share of the largest principal component in the spread around every point, over two rings.
+    """Share, from 0 to 1, of the largest principal component in the spread around every point, over two rings.
 
     The moments of a point are averaged with those of its ring, twice, and count as much as four neighbours. Rings cost
     a third of what asking for the nearest points costs, and are as good.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-    rings : Rings
-
-    Returns
-    -------
-    (n,) float array
-        1 on a line, 0 where everything is in one place.
     """
     moments = np.stack([*points.T, *(points[:, i] * points[:, j] for i, j in PAIRS)], axis=1)
     own = (OWN_WEIGHT / (OWN_WEIGHT + rings.sizes))[:, None]
@@ -205,17 +178,7 @@ def explained_variance(points: np.ndarray, rings: Rings) -> np.ndarray:
 
 
 def explained_score(points: np.ndarray) -> float:
-    """PCA score e = (2 l1 + l2 + l3) / (2 (l1 + l2 + l3)): 1 for a line, 2/3 for a ball (Wen et al. 2024, equation 14).
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-        Not all the same.
-
-    Returns
-    -------
-    float
-    """
+    """PCA score e = (2 l1 + l2 + l3) / (2 (l1 + l2 + l3)) of points: 1 for a line, 2/3 for a ball."""
     offset = points - points.mean(axis=0)
     spread = np.linalg.eigvalsh(offset.T @ offset)  # Wen (13)
     return float((spread.sum() + spread[-1]) / (2 * spread.sum()))  # Wen (14)

@@ -79,20 +79,9 @@ def chosen_pipeline(
 
 
 def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathLike[str]) -> Pipeline[Skeleton]:
-    """The pipeline that is meant, from a cloud to a skeleton.
+    """The pipeline from a cloud to a skeleton that is meant by a pipeline, a filter, a name, or the path of a recipe.
 
-    Parameters
-    ----------
-    pipeline : Pipeline, Filter, name, or path of a recipe
-
-    Returns
-    -------
-    Pipeline
-
-    Raises
-    ------
-    InvalidParameterError, RecipeError
-        As in `skeletonize`.
+    InvalidParameterError and RecipeError as of `skeletonize`.
     """
     if isinstance(pipeline, os.PathLike) or (isinstance(pipeline, str) and pipeline.lower().endswith(RECIPE_ENDINGS)):
         pipeline = load_recipe(pipeline)
@@ -101,9 +90,7 @@ def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathL
     elif isinstance(pipeline, Filter):
         pipeline = Pipeline(pipeline)
     elif not isinstance(pipeline, Pipeline):
-        raise InvalidParameterError(
-            f"pipeline = {pipeline!r}: must be a Pipeline, the name of one, or the path of a recipe"
-        )
+        raise InvalidParameterError(f"pipeline = {pipeline!r}: must be a Pipeline, its name, or the path of a recipe")
     pipeline.check_complete()
     return pipeline
 
@@ -113,9 +100,8 @@ def remove_redundant_points(
 ) -> tuple[Any, Any]:
     """Remove points that say little more about the skeleton than their neighbours, by local point reduction.
 
-    The points are contracted, those that have become redundant are merged into their neighbours, and so on; what is
-    left of them is returned where it was. One pass takes about two fifths of the points, near and alike ones first, so
-    that the gaps are smaller than in a random sample. Used like ``remove_statistical_outlier``.
+    One pass contracts the points, merges those that have become redundant into their neighbours, and leaves about three
+    fifths, with smaller gaps than in a random sample, where they were. Used like ``remove_statistical_outlier``.
 
     Parameters
     ----------
@@ -155,15 +141,10 @@ def remove_redundant_points(
     name, tensor = open3d_class(cloud)
     if name == "TriangleMesh":
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
-    rings = RingBuilder(thin_to="all", outlier_factor=0, denoise=0) if rings is None else rings
-    contractor = Contractor(
-        reducer=LPRReducer() if reducer is None else reducer,
-        reduce_above=0,
-        max_iterations=int(passes),
-        stop=lambda iterations: None,
-    )
-    state = (rings | contractor)(cloud)
-    kept = np.sort(state.point_of_survivor)
+    rings = rings or RingBuilder(thin_to="all", outlier_factor=0, denoise=0)
+    reducer = reducer or LPRReducer()
+    contraction = Contractor(reducer=reducer, reduce_above=0, max_iterations=int(passes), stop=lambda iterations: None)
+    kept = np.sort((rings | contraction)(cloud).point_of_survivor)
     if name == "PointCloud" and not tensor:
         return cloud.select_by_index(kept), kept.tolist()
     if tensor:

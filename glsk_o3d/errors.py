@@ -1,4 +1,4 @@
-"""What can go wrong, by name. Every message says what was wrong, where, and what to do."""
+"""What can go wrong, by name: every message says what was wrong, where, and what to do."""
 
 import difflib
 from collections.abc import Iterable
@@ -55,31 +55,14 @@ class PluginWarning(UserWarning):
 
 
 def brief(error: object) -> str:
-    """What an error of another library says, or a name in a file, but no more than the beginning.
-
-    Some repeat the whole file, and so does a name where its end is damaged.
-
-    Examples
-    --------
-    >>> brief(ValueError("no number: " + 500 * "9"))[-8:]
-    '99999...'
-    """
+    """The beginning of what another library's error says, or of a name in a file: some repeat the whole file."""
     words = str(error)
     return words if len(words) <= LONGEST_QUOTED else f"{words[:LONGEST_QUOTED]}..."
 
 
 def did_you_mean(word: str, known: Iterable[str], what: str) -> str:
-    """The message for an unknown word: what was meant, or what there is.
+    """The message for an unknown word: the known one that was meant, or all that there are.
 
-    Parameters
-    ----------
-    word : str
-    known : iterable of str
-    what : str
-        What `word` should have been, such as ``"filter"``.
-
-    Examples
-    --------
     >>> did_you_mean("radios", ["radius", "links"], "parameter of Connector")
     "no parameter of Connector is called 'radios': did you mean 'radius'?"
     """

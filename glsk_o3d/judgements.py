@@ -8,17 +8,11 @@ from typing import TypeAlias
 
 Place: TypeAlias = tuple[float, float, float]
 
-OUTCOMES = {  # where the graph stayed as it was, and where it was changed
-    "air": ("branch kept", "branch cut"),
-    "loop": ("loop kept", "loop closed"),
-    "gap": ("gap left", "gap bridged"),
-    "limb": ("limb kept", "spur pruned"),
-}
-_QUESTIONS = {
-    "air": "the branch at ({}) crosses air",
-    "loop": "the loop at ({}) is a handle",
-    "gap": "the object goes on across the gap at ({})",
-    "limb": "the branch at ({}) is a limb",
+QUESTIONS = {  # what is asked, and what was done where the graph stayed as it was and where it was changed
+    "air": ("the branch at ({}) crosses air", "branch kept", "branch cut"),
+    "loop": ("the loop at ({}) is a handle", "loop kept", "loop closed"),
+    "gap": ("the object goes on across the gap at ({})", "gap left", "gap bridged"),
+    "limb": ("the branch at ({}) is a limb", "limb kept", "spur pruned"),
 }
 
 
@@ -61,12 +55,12 @@ class Judgement:
     @property
     def outcome(self) -> str:
         """What was done, in two words, such as ``"loop closed"`` or ``"gap left"``."""
-        return OUTCOMES[self.about][self.changed]
+        return QUESTIONS[self.about][1 + self.changed]
 
     @property
     def question(self) -> str:
         """What the probability is of, such as ``"the loop at (0, 0, 1) is a handle"``."""
-        return _QUESTIONS[self.about].format(coordinates(self.place))
+        return QUESTIONS[self.about][0].format(coordinates(self.place))
 
     def __str__(self) -> str:
         return f"{self.question}: {self.probability:.2f}, {self.outcome}"
@@ -117,11 +111,5 @@ class Supported:
 
 
 def coordinates(place: Iterable[float]) -> str:
-    """A place as people read it: four digits, and of coordinates as on a map all ahead of the point and two more.
-
-    Examples
-    --------
-    >>> coordinates((0.123456, -12.3456, 5600321.98765))
-    '0.1235, -12.35, 5600321.99'
-    """
+    """A place as people read it: four digits, and of coordinates as on a map all ahead of the point and two more."""
     return ", ".join(f"{c:.4g}" if abs(c) < 1000 or not abs(c) < 1e8 else f"{c:.2f}" for c in place)

@@ -19,6 +19,7 @@ PSI_FACTOR = 1.2  # published: psi' over psi
 AMPLIFICATION_SQUARED = 9  # published: s_L squared, in the code and not in the paper
 CURVATURE_WEIGHT = 3  # published: of U in F
 IN_PLANE_SINE = 1e-3  # fitted: sine of the angle below which a direction counts as lying in the tangent plane
+OF_SURVIVORS = ("survivors", "positions", "previous", "laplacian_coordinates", "mass", "ring_size0", "ring_size")
 MIN_SHRINKAGE = 1e-4  # published: floor of s - psi' s(0) in the working frame, as in the published code
 
 
@@ -29,12 +30,10 @@ class LPRReducer(Filter[Contraction]):
 
     A point i may swallow its nearest ring neighbour m where :math:`F = V_1 - V_2 + 3 U < \varphi s_i^2`. Its new ring
     is the Delaunay star of i among both rings, on the uncontracted points, projected along the Laplacian coordinate of
-    i; m's entry in every other ring becomes i. A point takes part in at most one merge a pass, so all ring combinations
-    of a pass are independent and made in one batch.
+    i; m's entry in every other ring becomes i. A point takes part in at most one merge a pass.
 
     With `conserve_mass` a survivor takes over the mass of the point it swallows, and the ring sizes s(0) and s(t) are
-    measured anew on the combined rings; without it, a survivor that speaks for eight points pulls with the weight of
-    one on a ring twice as wide, which drags bent parts off their axis.
+    measured anew on the combined rings; without it, bent parts are drawn off their axis.
 
     Raises
     ------
@@ -62,21 +61,14 @@ class LPRReducer(Filter[Contraction]):
 
     consumes: ClassVar[type] = Contraction
 
-    phi: float = parameter(
-        1e5, "Merge where F is below phi times the squared ring size.", type="float", low=0, open_low=True
-    )
-    conserve_mass: bool = parameter(True, "Survivors take over the mass of the points they swallow.", type="bool")
+    phi: float = parameter(1e5, "Merge where F is below phi times the squared ring size.", low=0, open_low=True)
+    conserve_mass: bool = parameter(True, "Survivors take over the mass of the points they swallow.")
     mend_rings: bool = parameter(
-        True,
-        "Rebuild rings that lost so many neighbours that they no longer surround their point; the published code keeps "
-        "them, and such points later run away.",
-        type="bool",
+        True, "Rebuild rings that no longer surround their point; without, such points later run away."
     )
     order: Literal["cheapest", "index"] = parameter(
         "cheapest",
-        "Which pairs are merged first: those with the least F / s^2, whatever the order of the input, or those of the "
-        "lowest point index, as in the published code.",
-        type="choice",
+        "Which pairs are merged first: those with the least F / s^2, or those of the lowest point index.",
         choices=("cheapest", "index"),
     )
 
@@ -108,42 +100,21 @@ class LPRReducer(Filter[Contraction]):
         rings = state.rings.replace(representatives, combined).take(np.flatnonzero(keep)).rename(index[representative])
         if self.mend_rings:
             rings = mend_rings(rings, state.cloud[state.survivors[keep]], state.normals[state.survivors[keep]])
-        mass, ring_size0, ring_size = state.mass, state.ring_size0, state.ring_size
+        left = {name: getattr(state, name)[keep] for name in OF_SURVIVORS}
         if self.conserve_mass:
-            mass = np.bincount(representative, mass, n)[keep]
-            _, ring_size0 = rings.nearest(state.cloud[state.survivors[keep]])
-            _, ring_size = rings.nearest(state.positions[keep])
-        else:
-            mass, ring_size0, ring_size = mass[keep], ring_size0[keep], ring_size[keep]
-        return replace(
-            state,
-            survivors=state.survivors[keep],
-            representative=index[representative][state.representative],
-            positions=state.positions[keep],
-            previous=state.previous[keep],
-            laplacian_coordinates=state.laplacian_coordinates[keep],
-            rings=rings,
-            mass=mass,
-            ring_size0=ring_size0,
-            ring_size=ring_size,
-        )
+            left["mass"] = np.bincount(representative, state.mass, n)[keep]
+            _, left["ring_size0"] = rings.nearest(state.cloud[left["survivors"]])
+            _, left["ring_size"] = rings.nearest(left["positions"])
+        return replace(state, **left, representative=index[representative][state.representative], rings=rings)
 
 
 def merge_energy(state: Contraction) -> np.ndarray:
-    r"""F of every point: what merging it with its nearest ring neighbour would cost (equations 6 to 11).
+    r"""F of every point after a solve: what merging it with its nearest ring neighbour would cost (equations 6 to 11).
 
-    Parameters
-    ----------
-    state : Contraction
-        After a solve.
-
-    Returns
-    -------
-    (n,) float array
-        :math:`V_1 - V_2 + 3 U`, with :math:`\psi' = 1.2 \psi`, :math:`\eta = (s - \psi' s(0)) / s(0)`,
-        :math:`V_1 = (9 w_L |\eta \delta|)^2` with the :math:`w_L` of the solve (9 is the published :math:`s_L^2`),
-        :math:`V_2 = (\psi' s(0) |P' - P| / (\eta (s(0) - s)))^2` and
-        :math:`U = |\delta_i - \bar\delta_j|^2` over the ring. Minus infinity where a ring did not change.
+    :math:`F = V_1 - V_2 + 3 U`, with :math:`\psi' = 1.2 \psi`, :math:`\eta = (s - \psi' s(0)) / s(0)`,
+    :math:`V_1 = (9 w_L |\eta \delta|)^2` with the :math:`w_L` of the solve (9 is the published :math:`s_L^2`),
+    :math:`V_2 = (\psi' s(0) |P' - P| / (\eta (s(0) - s)))^2` and :math:`U = |\delta_i - \bar\delta_j|^2` over the ring.
+    Minus infinity where a ring did not change.
     """
     s0, s, delta = state.ring_size0, state.ring_size, state.laplacian_coordinates
     drop = PSI_FACTOR * state.ring_ratio_drop  # psi'
@@ -158,19 +129,7 @@ def merge_energy(state: Contraction) -> np.ndarray:
 
 
 def combine_rings(state: Contraction, representatives: np.ndarray, swallowed: np.ndarray) -> Rings:
-    """Rings of the representatives after a merge: the Delaunay star among both rings, on the uncontracted points.
-
-    Parameters
-    ----------
-    state : Contraction
-    representatives, swallowed : (c,) int array
-        Pairs of survivors.
-
-    Returns
-    -------
-    Rings
-        Of length c.
-    """
+    """Rings of representatives that swallow others: Delaunay stars among both rings, on the uncontracted points."""
     union = np.concatenate([state.rings.padded(representatives), state.rings.padded(swallowed)], axis=1)
     union[(union == representatives[:, None]) | (union == swallowed[:, None])] = -1
     union.sort(axis=1)
@@ -189,19 +148,7 @@ def match_feasible(state: Contraction, representatives: np.ndarray, swallowed: n
 
     An umbrella of three or a fan of four is the least that still surrounds a point. The rings cost most, so they are
     made only for pairs that the matching takes; it is repeated without those found wanting until there are none, which
-    gives the same pairs as if these had never been there.
-
-    Parameters
-    ----------
-    state : Contraction
-    representatives, swallowed : (c,) int array
-        Pairs of survivors, every representative at most once.
-
-    Returns
-    -------
-    representatives : (p,) int array
-    combined : Rings
-        Their rings after the merge.
+    gives the same pairs as if these had never been there. Returns the representatives and their rings after the merge.
     """
     rings = Rings.concatenate([])
     ring_of = np.full(len(state), -1)
@@ -219,18 +166,7 @@ def match_feasible(state: Contraction, representatives: np.ndarray, swallowed: n
 
 
 def mend_rings(rings: Rings, points: np.ndarray, normals: np.ndarray) -> Rings:
-    """Rings with those of fewer than three neighbours rebuilt, as Delaunay stars among the rings of these neighbours.
-
-    Parameters
-    ----------
-    rings : Rings
-        Of length n.
-    points, normals : (n, 3) float array
-
-    Returns
-    -------
-    Rings
-    """
+    """Rings with those of fewer than three neighbours rebuilt: Delaunay stars among the rings of these neighbours."""
     broken = np.flatnonzero(rings.sizes < 3)
     if len(broken) == 0:
         return rings
@@ -242,18 +178,7 @@ def mend_rings(rings: Rings, points: np.ndarray, normals: np.ndarray) -> Rings:
 
 
 def match(n: int, representatives: np.ndarray, swallowed: np.ndarray) -> np.ndarray:
-    """Greedy matching in the given order: positions of the pairs whose two points are both still free.
-
-    Parameters
-    ----------
-    n : int
-        Number of points.
-    representatives, swallowed : (c,) int array
-
-    Returns
-    -------
-    (m,) int array
-    """
+    """Greedy matching of pairs of n points in the given order: positions of those whose points are both still free."""
     # Rounds of the pairs that come before all others at both their points. Of nearest neighbours two or three do; only
     # a chain of pairs in its own order takes a round for every second one.
     pairs = np.stack([representatives, swallowed], axis=1)

@@ -25,7 +25,7 @@ def parameter(
     default: Any,
     doc: str,
     *,
-    type: str,
+    type: str | None = None,
     unit: str = "-",
     low: float | None = None,
     high: float | None = None,
@@ -39,9 +39,10 @@ def parameter(
     default : object
     doc : str
         One sentence; it appears in the class's docstring and in ``glsk filters``.
-    type : {"int", "float", "bool", "length", "point", "choice", "reducer", "stop"}
-        A length is a float in the cloud's units or a string such as ``"2%"`` of the diagonal of the box that
-        `RingBuilder.frame` names, a point a string such as ``"0.5,0,2"``. A trailing ``?`` allows None.
+    type : {"int", "float", "bool", "length", "point", "choice", "reducer", "stop"}, optional
+        By default that of `default`, of a string "choice". A length is a float in the cloud's units or a string such
+        as ``"2%"`` of the diagonal of the box that `RingBuilder.frame` names, a point a string such as ``"0.5,0,2"``.
+        A trailing ``?`` allows None.
     unit : str
     low, high : float, optional
         Inclusive limits (`low` is exclusive with `open_low`); for a length in percent they limit nothing.
@@ -49,7 +50,8 @@ def parameter(
     choices : tuple of str
         What the type ``"choice"`` may be; any other type may also be one of these words.
     """
-    facts = dict(doc=doc, type=type, unit=unit, low=low, high=high, open_low=open_low, choices=choices)
+    kind = type or ("choice" if isinstance(default, str) else default.__class__.__name__)
+    facts = dict(doc=doc, type=kind, unit=unit, low=low, high=high, open_low=open_low, choices=choices)
     return dataclasses.field(default=default, metadata=facts)
 
 
@@ -118,33 +120,22 @@ class Parameters:
         """
         cls = type(self)
         origin = {} if cls.__module__.startswith(f"{__package__}.") else {FROM: cls.__module__}
-        fields = dataclasses.fields(self)  # type: ignore[arg-type]
-        return {
-            self.kind: cls.__name__,
-            **origin,
-            **{field.name: _plain(getattr(self, field.name)) for field in fields},
-        }
+        names = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]
+        return {self.kind: cls.__name__, **origin, **{name: _plain(getattr(self, name)) for name in names}}
 
 
 def _plain(value: Any) -> Any:
+    """A value as files hold it."""
     if value is None:
         return NONE
     if isinstance(value, Parameters):
         return value.table()
-    if isinstance(value, str):
-        return str.__str__(value)
-    if isinstance(value, bool):
-        return value
-    if isinstance(value, Integral):
-        return int(value)
-    if isinstance(value, Real):
-        return float(value)
-    return {UNWRITTEN: f"{_name(value)} is no number, word, filter or rule"}
-
-
-def _name(value: Any) -> str:
-    named = value if hasattr(value, "__qualname__") else type(value)
-    return f"{'' if named is value else 'a '}{named.__module__}.{named.__qualname__}"
+    plain_types: tuple[tuple[type, Any], ...] = ((str, str.__str__), (bool, bool), (Integral, int), (Real, float))
+    for kind, plain in plain_types:
+        if isinstance(value, kind):
+            return plain(value)
+    named, article = (value, "") if hasattr(value, "__qualname__") else (type(value), "a ")
+    return {UNWRITTEN: f"{article}{named.__module__}.{named.__qualname__} is no number, word, filter or rule"}
 
 
 def shown(value: Any) -> str:
@@ -159,15 +150,10 @@ def shown(value: Any) -> str:
     str
     """
     if isinstance(value, Integral) and abs(int(value)) > LARGEST_WHOLE:
-        return f"a number of {_digits(abs(int(value)))} digits"
+        digits = round(math.log10(abs(int(value))))  # rounded; Python itself writes no number of more than 4300
+        return f"a number of {digits + (abs(int(value)) >= 10**digits)} digits"
     text = repr(value)
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
-
-
-def _digits(whole: int) -> int:
-    """Of a positive number; the logarithm is rounded, and Python writes no number of more than 4300."""
-    about = round(math.log10(whole))
-    return about + (whole >= 10**about)
 
 
 def problem_with(value: Any, facts: Any) -> str | None:
@@ -184,20 +170,17 @@ def problem_with(value: Any, facts: Any) -> str | None:
     str or None
         None where nothing is.
     """
-    kind, low, high = facts["type"], facts["low"], facts["high"]
-    if isinstance(value, str) and value in facts["choices"]:
+    kind, choices = facts["type"].removesuffix("?"), facts["choices"]
+    if (isinstance(value, str) and value in choices) or (value is None and facts["type"].endswith("?")):
         return None
-    if kind.endswith("?"):
-        if value is None:
-            return None
-        kind = kind[:-1]
+    listed = ", ".join(map(repr, choices))
     if kind == "bool":
         return None if isinstance(value, bool) else "must be True or False"
     if kind == "choice":
-        return f"must be one of {', '.join(map(repr, facts['choices']))}"
+        return f"must be one of {listed}"
     if kind == "point":
-        words = f"{', '.join(map(repr, facts['choices']))} or " if facts["choices"] else ""
-        return None if isinstance(value, str) and _numbers(value) else f"must be {words}a point such as '0.5,0,2'"
+        words = f"{listed} or " if choices else ""
+        return None if isinstance(value, str) and _point(value) else f"must be {words}a point such as '0.5,0,2'"
     if kind in ("reducer", "stop"):
         usable = callable(value) and not isinstance(value, type)
         return None if usable else f"must be a {kind}: an instance, not a class or a name"
@@ -206,24 +189,27 @@ def problem_with(value: Any, facts: Any) -> str | None:
         if percent is None:
             return "must be a number in the cloud's units or a percentage of its diagonal such as '2%'"
         return None if 0 < percent <= 100 else "a percentage of the diagonal lies above 0% and up to 100%"
-    if isinstance(value, bool) or not isinstance(value, Integral if kind == "int" else Real):
+    return _problem_with_number(value, kind == "int", facts)
+
+
+def _problem_with_number(value: Any, whole: bool, facts: Any) -> str | None:
+    low, high, above = facts["low"], facts["high"], facts["open_low"]
+    if isinstance(value, bool) or not isinstance(value, Integral if whole else Real):
         words = "".join(f", or {choice!r}" for choice in facts["choices"])
-        return f"must be {'an int' if kind == 'int' else 'a number'}{words}"
-    most = LARGEST_WHOLE if kind == "int" else sys.float_info.max
+        return f"must be {'an int' if whole else 'a number'}{words}"
+    most = LARGEST_WHOLE if whole else sys.float_info.max
     if isinstance(value, Integral) and abs(int(value)) > most:  # Python has larger ones, arrays and files do not
         return f"must be at most {most:g}"
     if not isinstance(value, Integral) and not math.isfinite(value):
         return "must be finite"
-    if low is not None and (value < low or (facts["open_low"] and value == low)):
-        return f"must be {'above' if facts['open_low'] else 'at least'} {low}"
-    if high is not None and value > high:
-        return f"must be at most {high}"
-    return None
+    if low is not None and (value < low or (above and value == low)):
+        return f"must be {'above' if above else 'at least'} {low}"
+    return f"must be at most {high}" if high is not None and value > high else None
 
 
-def _numbers(text: str) -> tuple[float, ...] | None:
+def _point(text: str) -> tuple[float, ...] | None:
     try:
-        numbers = tuple(float(word) for word in text.split(","))
+        numbers = tuple(map(float, text.split(",")))
     except ValueError:
         return None
     return numbers if len(numbers) == 3 and all(map(math.isfinite, numbers)) else None
@@ -245,7 +231,7 @@ def resolve_point(text: str) -> tuple[float, ...]:
     >>> resolve_point("0.5,0,2")
     (0.5, 0.0, 2.0)
     """
-    numbers = _numbers(text)
+    numbers = _point(text)
     if numbers is None:
         raise InvalidParameterError(f"point {text!r}: must be three numbers such as '0.5,0,2'")
     return numbers

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import logging
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import pairwise
 from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
@@ -27,6 +28,10 @@ FLOWS = (Cloud, Contraction, Skeleton)
 """What runs between filters."""
 ORDER = "the order is RingBuilder | Contractor | Connector | Refiner"
 RECIPE_VERSION = 1
+SOLVED = (
+    "solve %(iteration)d: %(n_points)d points, %(n_merged)d merged, e %(explained).4f, De %(explained_change).4f, "
+    "ring ratio %(ring_ratio).4f, %(seconds).3f s"
+)
 
 _log = logging.getLogger(__name__)
 
@@ -75,27 +80,24 @@ class Filter(Parameters, Generic[Produced]):
         StageError
             `data` is not what the filter takes, or what it gives is not what it promises.
         """
+        name = type(self).__name__
         self.check()
         if not _is_of(data, self.consumes):
-            raise StageError(
-                f"{type(self).__name__} takes a {_named(self.consumes)}, not a {type(data).__name__}: {ORDER}"
-            )
+            raise StageError(f"{name} takes a {_named(self.consumes)}, not a {type(data).__name__}: {ORDER}")
         start = time.perf_counter()
         with following_open3d():
             result = self._ran(data, _watch(on_iteration, on_state))
             seconds = time.perf_counter() - start
-            _log.debug("%s took %.3f s: %r", type(self).__name__, seconds, result)
+            _log.debug("%s took %.3f s: %r", name, seconds, result)
         if result is None or not _is_of(result, self.produces):
-            raise StageError(
-                f"{type(self).__name__} should give a {_named(self.produces)} and gave a {type(result).__name__}"
-            )
-        if self.produces is Cloud:
-            try:
-                cloud_points(result)
-            except InvalidCloudError as error:
-                raise InvalidCloudError(f"{type(self).__name__} gave no usable cloud: {error}") from error
-            return result
-        return dataclasses.replace(result, report=with_stage(result.report, self, seconds))
+            raise StageError(f"{name} should give a {_named(self.produces)} and gave a {type(result).__name__}")
+        if self.produces is not Cloud:
+            return dataclasses.replace(result, report=with_stage(result.report, self, seconds))
+        try:
+            cloud_points(result)
+        except InvalidCloudError as error:
+            raise InvalidCloudError(f"{name} gave no usable cloud: {error}") from error
+        return result
 
     def __or__(self, other: Filter[Next] | Pipeline[Next]) -> Pipeline[Next]:
         return Pipeline(self) | other
@@ -225,65 +227,37 @@ class Pipeline(Generic[Produced]):
         (12, None, '2%')
         """
         pipeline: Any = self
-        told: dict[tuple[type[Parameters], str], str] = {}
-        # reducers and rules first: what is put in has parameters that others may change
+        names: dict[tuple[type[Parameters], str], str] = {}
         given = [*(options or {}).items(), *named.items()]
-        for name, value in sorted(
-            given, key=lambda option: not (isinstance(option[1], Parameters) or self._puts_in(option[0]))
-        ):
+        # reducers and rules first: what is put in has parameters that others may change
+        for name, value in sorted(given, key=lambda option: not (option[1] is None or callable(option[1]))):
             cls, field = pipeline.class_of_option(name)
-            if (cls, field.name) in told:
-                raise InvalidParameterError(f"{told[cls, field.name]} and {name} are one option: give it once")
-            told[cls, field.name] = name
+            if (cls, field.name) in names:
+                raise InvalidParameterError(f"{names[cls, field.name]} and {name} are one option: give it once")
+            names[cls, field.name] = name
             pipeline = _changed(pipeline, cls, field.name, value)
         pipeline.check()
         return pipeline
 
-    def _puts_in(self, name: str) -> bool:
-        """Whether an option has a reducer or a stopping rule for its value."""
-        try:
-            _, field = self.class_of_option(name)
-        except InvalidParameterError:  # perhaps of a part that is put in
-            return False
-        return field.metadata["type"].rstrip("?") in ("reducer", "stop")
-
     def class_of_option(self, name: str) -> tuple[type[Parameters], dataclasses.Field[Any]]:
-        """The class and the field that the name of an option means.
+        """The class in the pipeline and the field of it that the name of an option, such as ``"k"``, means.
 
-        Parameters
-        ----------
-        name : str
-            ``"RingBuilder.k"``, or ``"k"``.
-
-        Returns
-        -------
-        class
-            Of a filter, reducer or stopping rule in the pipeline.
-        dataclasses.Field
-            Of that class, as `parameter` makes it.
-
-        Raises
-        ------
-        InvalidParameterError
-            There is none, or more than one.
+        InvalidParameterError if there is none, or more than one.
         """
         if not isinstance(name, str):
             raise InvalidParameterError(f"{name!r}: the name of an option is a str")
         present = {type(part).__name__: type(part) for part in parts(self)}
-        holder, dot, field = name.rpartition(".")
+        holder, dot, option = name.rpartition(".")
         if dot and holder not in present:
             raise InvalidParameterError(f"{name}: {holder} is not in the pipeline, which has {', '.join(present)}")
-        fields = [
-            (cls, known)
-            for cls in ([present[holder]] if dot else present.values())
-            for known in dataclasses.fields(cls)  # type: ignore[arg-type]
-        ]
-        meant = [(cls, known) for cls, known in fields if known.name == field]
+        classes: list[Any] = [present[holder]] if dot else [*present.values()]
+        known = [(cls, field) for cls in classes for field in dataclasses.fields(cls)]
+        meant = [(cls, field) for cls, field in known if field.name == option]
         if not meant:
-            names = dict.fromkeys(known.name for _, known in fields)
-            raise InvalidParameterError(did_you_mean(field, names, f"parameter of {holder or 'the pipeline'}"))
+            names = dict.fromkeys(field.name for _, field in known)
+            raise InvalidParameterError(did_you_mean(option, names, f"parameter of {holder or 'the pipeline'}"))
         if len(meant) > 1:
-            choice = " or ".join(f"'{cls.__name__}.{field}'" for cls, _ in meant)
+            choice = " or ".join(f"'{cls.__name__}.{option}'" for cls, _ in meant)
             raise InvalidParameterError(f"{name}: more than one part of the pipeline has it: write {choice}")
         return meant[0]
 
@@ -301,16 +275,7 @@ class Pipeline(Generic[Produced]):
 
 
 def parts(item: Pipeline | Parameters) -> Iterator[Parameters]:
-    """Everything with parameters in a pipeline: its filters, and after each the reducer and the rule inside.
-
-    Parameters
-    ----------
-    item : Pipeline or Parameters
-
-    Yields
-    ------
-    Parameters
-    """
+    """Everything with parameters in a pipeline: its filters, and after each the reducer and the rule inside."""
     if isinstance(item, Pipeline):
         inner: Iterable[Any] = item.stages
     else:
@@ -325,72 +290,39 @@ def _changed(item: Any, cls: type[Parameters], name: str, value: Any) -> Any:
     """A pipeline, or a part of one, with a parameter replaced wherever its filter occurs, also inside another."""
     if isinstance(item, Pipeline):
         return Pipeline(*(_changed(stage, cls, name, value) for stage in item.stages))
-    changes = {name: value} if type(item) is cls else {}
-    for field in dataclasses.fields(item):
-        inner = getattr(item, field.name)
-        if isinstance(inner, Parameters) and field.name not in changes:
-            changes[field.name] = _changed(inner, cls, name, value)
-    return dataclasses.replace(item, **changes)
+    inner = {field.name: getattr(item, field.name) for field in dataclasses.fields(item)}
+    changes = {key: _changed(part, cls, name, value) for key, part in inner.items() if isinstance(part, Parameters)}
+    return dataclasses.replace(item, **(changes | {name: value} if type(item) is cls else changes))
 
 
 def recipe_of(*tables: dict[str, Any]) -> dict[str, Any]:
-    """The recipe of stages, each as `Parameters.table` makes it.
-
-    Parameters
-    ----------
-    *tables : dict
-
-    Returns
-    -------
-    dict
-    """
+    """The recipe of stages, each as `Parameters.table` makes it."""
     return {"glsk_o3d": {"version": RECIPE_VERSION}, "pipeline": list(tables)}
 
 
 def with_stage(report: Report, stage: Filter, seconds: float) -> Report:
-    """A report with one more filter in it.
-
-    Parameters
-    ----------
-    report : Report
-    stage : Filter
-    seconds : float
-
-    Returns
-    -------
-    Report
-    """
+    """A report with one more filter in it."""
     table = stage.table()
     if report.stop_reason == STOPPED_BY_CALLER:
         table[UNWRITTEN] = f"the contraction was stopped by the caller after solve {len(report.iterations)}"
-    name = type(stage).__name__
-    return dataclasses.replace(
-        report,
-        stages=(*report.stages, repr(stage)),
-        recipe=recipe_of(*report.recipe.get("pipeline", ()), table),
-        seconds={**report.seconds, name: report.seconds.get(name, 0.0) + seconds},
-    )
+    ran = Report(stages=(repr(stage),), recipe=recipe_of(table), seconds={type(stage).__name__: seconds})
+    return dataclasses.replace(report, **_filters_of(report, ran))
 
 
 def after(report: Report, ahead: Report) -> Report:
-    """A report with the filters of another ahead of its own: clouds carry no report of what made them.
+    """A report with the filters of another ahead of its own: clouds carry no report of what made them."""
+    return dataclasses.replace(report, **_filters_of(ahead, report))
 
-    Parameters
-    ----------
-    report, ahead : Report
 
-    Returns
-    -------
-    Report
-    """
-    return dataclasses.replace(
-        report,
-        stages=(*ahead.stages, *report.stages),
-        recipe=recipe_of(*ahead.recipe["pipeline"], *report.recipe["pipeline"]),
-        seconds={
-            name: ahead.seconds.get(name, 0.0) + report.seconds.get(name, 0.0)
-            for name in (*ahead.seconds, *report.seconds)
-        },
+def _filters_of(*reports: Report) -> dict[str, Any]:
+    """What ran in several reports, as keywords of one."""
+    seconds = Counter[str]()
+    for report in reports:
+        seconds.update(report.seconds)
+    return dict(
+        stages=sum((report.stages for report in reports), ()),
+        recipe=recipe_of(*(table for report in reports for table in report.recipe.get("pipeline", ()))),
+        seconds=dict(seconds),
     )
 
 
@@ -400,7 +332,7 @@ def _is_of(data: Any, flow: type) -> bool:
 
 
 def _named(flow: type) -> str:
-    return "cloud" if flow is Cloud else getattr(flow, "__name__", repr(flow))
+    return "cloud" if flow is Cloud else flow.__name__
 
 
 def _watch(on_iteration: OnIteration | None, on_state: OnState | None) -> Watch | None:
@@ -410,11 +342,7 @@ def _watch(on_iteration: OnIteration | None, on_state: OnState | None) -> Watch 
 
     def watch(state: Contraction) -> bool | None:
         record = state.report.iterations[-1]
-        _log.debug(
-            "solve %d: %d points, %d merged, e %.4f, De %.4f, ring ratio %.4f, %.3f s",
-            *(record.iteration, record.n_points, record.n_merged, record.explained, record.explained_change),
-            *(record.ring_ratio, record.seconds),
-        )
+        _log.debug(SOLVED, vars(record))
         if on_state is not None:
             on_state(state)
         return None if on_iteration is None else on_iteration(record)

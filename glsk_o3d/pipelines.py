@@ -24,12 +24,7 @@ def cao2010() -> Pipeline[Skeleton]:
     >>> cao2010().stages[1].reducer is None
     True
     """
-    return (
-        RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
-        | Contractor(stop=RingSizeRatio(), max_iterations=20, min_attraction=0, line_hold=1, keep_last=False, retries=0)
-        | Connector(radius="2%", thickness=0, links="nearest", min_support=0)
-        | Refiner(collapse="degree", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0, surface=0)
-    )
+    return _published(stop=RingSizeRatio(), max_iterations=20)
 
 
 def wen2024() -> Pipeline[Skeleton]:
@@ -43,17 +38,15 @@ def wen2024() -> Pipeline[Skeleton]:
     >>> wen2024().stages[1].reducer.conserve_mass
     False
     """
+    reducer = LPRReducer(conserve_mass=False, order="index", mend_rings=False)
+    return _published(reducer=reducer, reduce_above=0, stop=ExplainedScore(threshold=0.02))
+
+
+def _published(**contraction: Any) -> Pipeline[Skeleton]:
+    """What both published pipelines have in common: none of what this package adds."""
     return (
         RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
-        | Contractor(
-            reducer=LPRReducer(conserve_mass=False, order="index", mend_rings=False),
-            reduce_above=0,
-            stop=ExplainedScore(threshold=0.02),
-            min_attraction=0,
-            line_hold=1,
-            keep_last=False,
-            retries=0,
-        )
+        | Contractor(min_attraction=0, line_hold=1, keep_last=False, retries=0, **contraction)
         | Connector(radius="2%", thickness=0, links="nearest", min_support=0)
         | Refiner(collapse="degree", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0, surface=0)
     )
@@ -68,7 +61,7 @@ def default() -> Pipeline[Skeleton]:
     >>> default()(torus(1000).points).n_loops
     1
     """
-    return RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore()) | Connector() | Refiner()
+    return RingBuilder() | Contractor(reducer=LPRReducer()) | Connector() | Refiner()
 
 
 def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
@@ -88,19 +81,11 @@ def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
     >>> grown.n_components, grown.n_loops, len(grown.leaves)
     (1, 0, 3)
     """
-    return (
-        RingBuilder()
-        | Contractor(reducer=LPRReducer(), stop=ExplainedScore())
-        | Connector()
-        | Refiner(handle=1, root=root)
-    )
+    return RingBuilder() | Contractor(reducer=LPRReducer()) | Connector() | Refiner(handle=1, root=root)
 
 
 PIPELINES: dict[str, Callable[[], Pipeline[Skeleton]]] = {
-    "default": default,
-    "tree": tree,
-    "wen2024": wen2024,
-    "cao2010": cao2010,
+    make.__name__: make for make in (default, tree, wen2024, cao2010)
 }
 
 BUILTIN: dict[str, type[Parameters]] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
@@ -36,24 +37,16 @@ from .skeleton import Skeleton
 class Refiner(Filter[Skeleton]):
     """Make the graph one-dimensional, close false loops, prune spurs, and centre it in the surface around it.
 
-    1. Edges that lie on a triangle are collapsed, the shortest first, until there is no triangle.
-    2. Loops that open less than their tube is thick, two strands in one part, are zipped up.
-    3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
-       corners.
-    4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
-       side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
-    5. The topology is judged by what the surface around the curve says: loops that are probably no handles are closed;
-       branches that are probably no limbs are pruned; branches that probably cross air are cut, and gaps across which
-       the object probably goes on are bridged.
-    6. Junctions move to where limbs meet, and those within one radius become one. Ends, which flat faces have pulled
-       into their edges, grow anew along their limbs to where these stop: half a radius inside a flat face, or the
-       centre of a round cap.
-    7. Where the cloud shows no surface, parts thinner than its points are far apart, what the steps before made of them
-       is replaced by shortest paths through the points.
-    8. With a `root`, all is made one tree that grows from there: gaps are joined where they are narrowest, and loops
-       are cut. Vertex 0 is the root, and every edge leads from parent to child.
-
-    The first step is published; with all options 0 it is the only one.
+    1. Edges that lie on a triangle are collapsed, the shortest first, until there is none. This step is published, and
+       with all options 0 the only one.
+    2. Loops narrower than their tube are zipped up, detached vertices brought back, and edges subdivided.
+    3. The curve and its radii are fitted to the axis of the surface: to the normals of the points around, even if only
+       one side was scanned, and to the points themselves where noise has spoilt the normals.
+    4. The topology is judged by the surface around the curve: false loops are closed, spurs pruned, branches that cross
+       air cut, and gaps bridged across which the object goes on.
+    5. Junctions move to where limbs meet, and ends grow along their limbs to where these stop.
+    6. Where the cloud shows no surface, the curve is replaced by shortest paths through the points. With a `root` all
+       is made one tree: vertex 0 is the root, and every edge leads from parent to child.
 
     Warns
     -----
@@ -61,11 +54,6 @@ class Refiner(Filter[Skeleton]):
         Where no curve skeleton is meaningful, sphere-like or sheet-like clouds, and where many points do not say where
         the axis is; it names the region. Where questions about loops, air or gaps were close calls; it names the
         closest.
-
-    Notes
-    -----
-    The published code also merges nearly straight runs; an indexing slip makes that step idle in most clouds. It is
-    left out here.
 
     References
     ----------
@@ -86,61 +74,32 @@ class Refiner(Filter[Skeleton]):
 
     collapse: Literal["length", "degree"] = parameter(
         "length",
-        "Which edge of a triangle collapses first: the shortest, or, as published, that with the least mean degree of "
-        "its ends, which changes with every sample of the points.",
-        type="choice",
+        "Which edge of a triangle collapses first: the shortest, or that with the least mean degree of its ends.",
         choices=("length", "degree"),
     )
     handle: float = parameter(
-        0.5,
-        "Least probability that a loop is a handle of the object; others are closed. 0 keeps all.",
-        type="float",
-        low=0,
-        high=1,
+        0.5, "Least probability that a loop is a handle of the object; others are closed. 0 keeps all.", low=0, high=1
     )
     air: float = parameter(
-        0.5,
-        "Probability that a branch crosses air from which on it is cut there. 0 cuts none.",
-        type="float",
-        low=0,
-        high=1,
+        0.5, "Probability that a branch crosses air from which on it is cut there. 0 cuts none.", low=0, high=1
     )
     bridge: float = parameter(
-        0.5,
-        "Probability that the object goes on across a gap from which on it is bridged. 0 bridges none.",
-        type="float",
-        low=0,
-        high=1,
+        0.5, "Probability that the object crosses a gap from which on it is bridged. 0 bridges none.", low=0, high=1
     )
     limb: float = parameter(
-        0.25,
-        "Least probability that a branch is a limb of the object; others, spurs, are pruned. 0 keeps all.",
-        type="float",
-        low=0,
-        high=1,
+        0.25, "Least probability that a branch is a limb; others, spurs, are pruned. 0 keeps all.", low=0, high=1
     )
-    spacing: float = parameter(
-        0.5,
-        "Longest edge over the local radius, by subdivision; 0 leaves the edges. Long ones cut corners.",
-        type="float",
-        low=0,
-    )
+    spacing: float = parameter(0.5, "Longest edge over the local radius, by subdivision; 0 leaves the edges.", low=0)
     recentre: int = parameter(
-        3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", type="int", unit="passes", low=0
+        3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", unit="passes", low=0
     )
-
     surface: float = parameter(
-        0.65,
-        "Least share of the points of a region that must show a surface; where fewer do, parts are traced along "
-        "shortest paths through the points. 0 traces none.",
-        type="float",
-        low=0,
-        high=1,
+        0.65, "Share of points with a surface below which a region is traced as paths. 0 traces none.", low=0, high=1
     )
     root: str | Any = parameter(
         None,
-        "Where a tree grows from: the lowest place along an axis, the end that is thickest, or the place nearest to a "
-        "point; the skeleton is then one tree, whatever the gaps. None keeps parts and loops.",
+        "Where one tree grows from: the lowest place along an axis, the thickest end, or the place nearest to a point. "
+        "None keeps parts and loops.",
         type="point?",
         choices=(*AXES, "thickest"),
     )
@@ -182,61 +141,48 @@ class Refiner(Filter[Skeleton]):
             skeleton = zip_narrow_loops(skeleton, surface)
         if self.recentre:
             skeleton = recall_runaways(skeleton)
-        if self.spacing:
-            skeleton = subdivide_edges(skeleton, self.spacing)
-        return fit_axis(skeleton, self.recentre, surface), surface
+        return self._centred(skeleton, surface), surface
 
     def _judge(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
         """Close false loops, prune spurs, cut what crosses air, bridge gaps; then ask for loops and limbs anew."""
         evidence = Evidence.of(skeleton, surface)
-        skeleton, loops = self._close(skeleton, evidence)
-        skeleton, limbs = self._prune(skeleton, evidence)
-        skeleton, cuts = self._cut(skeleton, evidence)
+        skeleton, loops = self._asked(close_loops, skeleton, evidence, self.handle)
+        skeleton, limbs = self._asked(prune_spurs, skeleton, evidence, self.limb)
+        cuts, gaps = [], []
+        if self.air:
+            skeleton, cuts = cut_air(skeleton, evidence, skeleton.report.noise, self.air)
         if _changed(cuts):
-            limbs, (skeleton, more) = _of_changes(limbs), self._prune(skeleton, evidence)
-            limbs += more
-        skeleton, gaps = self._bridge(skeleton, evidence)
+            skeleton, more = self._asked(prune_spurs, skeleton, evidence, self.limb)
+            limbs = _changed(limbs) + more
+        if self.bridge:
+            skeleton, gaps = bridge_gaps(skeleton, evidence, self.bridge)
         if _changed([*cuts, *gaps]):
-            loops, (skeleton, again) = _of_changes(loops), self._close(self._refit(skeleton, evidence), evidence)
-            limbs, (skeleton, more) = _of_changes(limbs), self._prune(skeleton, evidence)
-            loops, limbs = loops + again, limbs + more
-        closed, cut, bridged = (len(_of_changes(found)) for found in (loops, cuts, gaps))
+            skeleton, again = self._asked(close_loops, self._centred(skeleton, evidence), evidence, self.handle)
+            skeleton, more = self._asked(prune_spurs, skeleton, evidence, self.limb)
+            loops, limbs = _changed(loops) + again, _changed(limbs) + more
         report = replace(
             skeleton.report,
             judgements=(*loops, *cuts, *gaps, *limbs),
-            n_loops_closed=closed,
-            n_cuts=cut,
-            n_bridges=bridged,
+            n_loops_closed=len(_changed(loops)),
+            n_cuts=len(_changed(cuts)),
+            n_bridges=len(_changed(gaps)),
         )
         return replace(skeleton, report=report)
 
-    def _close(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
-        if not self.handle:
+    def _asked(
+        self, answer: Callable[..., Any], skeleton: Skeleton, evidence: Evidence, limit: float
+    ) -> tuple[Skeleton, list[Judgement]]:
+        """A skeleton after a question was answered for its parts, with curves fitted anew where it was changed."""
+        if not limit:
             return skeleton, []
-        skeleton, loops = close_loops(skeleton, evidence, self.handle)
-        return (self._refit(skeleton, evidence) if _changed(loops) else skeleton), loops
+        skeleton, judgements = answer(skeleton, evidence, limit)
+        return (self._centred(skeleton, evidence) if _changed(judgements) else skeleton), judgements
 
-    def _prune(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
-        if not self.limb:
-            return skeleton, []
-        skeleton, limbs = prune_spurs(skeleton, evidence, self.limb)
-        return (self._refit(skeleton, evidence) if _changed(limbs) else skeleton), limbs
-
-    def _cut(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
-        return cut_air(skeleton, evidence, skeleton.report.noise, self.air) if self.air else (skeleton, [])
-
-    def _bridge(self, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
-        return bridge_gaps(skeleton, evidence, self.bridge) if self.bridge else (skeleton, [])
-
-    def _refit(self, skeleton: Skeleton, evidence: Evidence) -> Skeleton:
+    def _centred(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
-        return fit_axis(skeleton, self.recentre, evidence)
+        return fit_axis(skeleton, self.recentre, surface)
 
 
-def _of_changes(judgements: list[Judgement]) -> list[Judgement]:
-    return [it for it in judgements if it.changed]
-
-
-def _changed(judgements: list[Judgement]) -> bool:
-    return bool(_of_changes(judgements))
+def _changed(judgements: list[Judgement]) -> list[Judgement]:
+    return [each for each in judgements if each.changed]

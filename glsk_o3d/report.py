@@ -6,17 +6,16 @@ import dataclasses
 import sys
 import warnings as _warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from types import UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from .errors import SkeletonWarning
 from .interop.verbosity import QUIET, open3d_is
-from .judgements import OUTCOMES, Judgement, Place, Supported
-
-_Record = TypeVar("_Record", bound="Report | IterationRecord | Judgement | Supported")
+from .judgements import QUESTIONS, Judgement, Place, Supported
 
 NOT_CONTRACTED = "not contracted"
 STOPPED_BY_CALLER = "stopped by the caller"
@@ -31,16 +30,12 @@ class IterationRecord:
     ----------
     iteration : int
         Counted from 1.
-    n_points : int
-        Points that were solved for.
-    n_merged : int
-        Points that the reduction after the solve merged away.
-    n_held : int
-        Points held in place because the solve would have thrown them out of the bounding box.
-    explained : float
-        PCA score e of the contracted points, 1 for a straight line (Wen et al. 2024, equation 14).
-    explained_change : float
-        De, the change of e per share of points kept (equation 16).
+    n_points, n_merged, n_held : int
+        Points that were solved for, those that the reduction after the solve merged away, and those held in place
+        because the solve would have thrown them out of the bounding box.
+    explained, explained_change : float
+        PCA score e of the contracted points, 1 for a straight line (Wen et al. 2024, equation 14), and De, its change
+        per share of points kept (equation 16).
     ring_ratio : float
         a(t), the sum of the ring sizes over that of the uncontracted cloud.
     contraction_weight : float
@@ -71,29 +66,29 @@ class IterationRecord:
     seconds: float
 
 
-def _made(cls: type[_Record], data: Mapping[str, Any]) -> _Record:
-    """A record from its entries, but for unknown ones; ValueError where one is not of its type."""
-    hints = get_type_hints(cls)
-    values = {name: value for name, value in data.items() if name in hints}
-    for name, value in values.items():
-        if not _fits(value, hints[name]):
-            raise ValueError(f"{name} in its report is {repr(value)[:80]}")
-    return cls(**values)
-
-
-def _fits(value: Any, hint: Any) -> bool:
-    """Whether a value is of a type; whole numbers that are not too large are floats, too."""
+def _read(value: Any, hint: Any, name: str = "it") -> Any:
+    """A value of a file as its type has it, records from dicts and tuples from lists; ValueError for others."""
     kind, inner = get_origin(hint) or hint, get_args(hint)
     if kind in (Union, UnionType):
-        return any(_fits(value, each) for each in inner)
-    if kind in (int, float):
-        return (type(value) is int and abs(value) <= sys.maxsize) or (kind is float and isinstance(value, float))
-    if kind is tuple and isinstance(value, tuple):
-        hints = inner[:1] * len(value) if Ellipsis in inner else [each for each in inner if each != ()]
-        return len(value) == len(hints) and all(map(_fits, value, hints))
-    if kind is dict and isinstance(value, dict):
-        return all(_fits(each, inner[1]) for each in value.values())
-    return kind is Any or isinstance(value, kind)
+        for each in inner:
+            with suppress(ValueError):
+                return _read(value, each, name)
+    elif dataclasses.is_dataclass(kind) and isinstance(value, Mapping):
+        hints = get_type_hints(kind)
+        known: Any = {key: _read(each, hints[key], key) for key, each in value.items() if key in hints}
+        return kind(**known)  # type: ignore[operator]
+    elif kind is tuple and isinstance(value, list | tuple):
+        items = inner[:1] * len(value) if Ellipsis in inner else [each for each in inner if each != ()]
+        if len(value) == len(items):
+            return tuple(_read(each, item, name) for each, item in zip(value, items, strict=True))
+    elif kind is dict and isinstance(value, dict):
+        return {key: _read(each, inner[1], name) for key, each in value.items()}
+    elif kind in (int, float):  # whole numbers that are not too large are floats, too
+        if (type(value) is int and abs(value) <= sys.maxsize) or (kind is float and isinstance(value, float)):
+            return value
+    elif kind is Any or isinstance(value, kind):
+        return value
+    raise ValueError(f"{name} in its report is {repr(value)[:80]}")
 
 
 def outside() -> int:
@@ -106,13 +101,11 @@ def outside() -> int:
 
 @cache
 def _versions() -> dict[str, str]:
-    found = {}
-    for name in ("glsk-o3d", "numpy", "scipy", "open3d"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+    versions = dict.fromkeys(("glsk-o3d", "numpy", "scipy", "open3d"), "not installed")
+    for name in versions:
+        with suppress(PackageNotFoundError):
+            versions[name] = version(name)
+    return versions
 
 
 @dataclass(frozen=True)
@@ -137,17 +130,16 @@ class Report:
         Where a tree grows from; empty if none was asked for.
     judgements : tuple of Judgement
         What was asked about the topology, with probabilities, and what was done.
-    n_draws : int
-        Samples of the cloud whose skeletons were compared with this one, see `glsk_o3d.support`; 0 if none were.
-    n_agreeing : int
-        Those of them with as many components, loops and ends.
+    n_draws, n_agreeing : int
+        Samples of the cloud whose skeletons were compared with this one, see `glsk_o3d.support`, and those of them with
+        as many components, loops and ends.
     support : tuple of Supported
         Share of them that show each branch, loop and end of this skeleton; and loops and ends that it lacks.
     stages : tuple of str
         The filters that ran, as the expressions that rebuild them.
     recipe : dict
-        The same as a recipe, from which `glsk_o3d.from_recipe` makes the pipeline that repeats the run. Empty if it is
-        not known. What a recipe cannot hold is an entry ``"unwritten"`` that says what was there.
+        The same as `glsk_o3d.from_recipe` reads it; empty if it is not known. In the place of what a recipe cannot hold
+        is an entry ``"unwritten"`` that says what was there.
     seconds : dict of str to float
         Wall time per filter.
     iterations : tuple of IterationRecord
@@ -208,14 +200,14 @@ class Report:
     @property
     def uncertain(self) -> tuple[Judgement, ...]:
         """What was judged with a probability between a quarter and three quarters, the least certain first."""
-        found = (it for it in self.judgements if it.is_uncertain)
-        return tuple(sorted(found, key=lambda it: abs(it.probability - 0.5)))
+        uncertain = (each for each in self.judgements if each.is_uncertain)
+        return tuple(sorted(uncertain, key=lambda each: abs(each.probability - 0.5)))
 
     @property
     def unsupported(self) -> tuple[Supported, ...]:
         """What more than a fifth of the samples disagree with, the most doubtful first."""
-        found = (it for it in self.support if not it.is_well_supported)
-        return tuple(sorted(found, key=lambda it: -it.doubt))
+        unsupported = (each for each in self.support if not each.is_well_supported)
+        return tuple(sorted(unsupported, key=lambda each: -each.doubt))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dict of numbers, strings, lists and dicts, as saved in JSON."""
@@ -224,18 +216,9 @@ class Report:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Report:
         """Inverse of `to_dict`; entries of a later version that this one does not know are passed over."""
-        values = dict(data)
-        values["iterations"] = tuple(_made(IterationRecord, record) for record in values.get("iterations", ()))
-        for name, record in (("judgements", Judgement), ("support", Supported)):
-            values[name] = tuple(
-                _made(record, found | {"place": tuple(found["place"])}) for found in values.get(name, ())
-            )
-        if not all(found.about in OUTCOMES for found in values["judgements"]):
+        report = _read(data, cls)
+        if not all(judgement.about in QUESTIONS for judgement in report.judgements):
             raise ValueError("a judgement in its report is about nothing that is known")
-        values["joined"] = tuple((tuple(start), tuple(stop)) for start, stop in values.get("joined", ()))
-        lists = ("stages", "warnings", "root")
-        values |= {name: tuple(values[name]) for name in lists if isinstance(values.get(name), list)}
-        report = _made(cls, values)
         if not isinstance(report.recipe.get("pipeline", []), list):
             raise ValueError("its recipe is none")
         return report

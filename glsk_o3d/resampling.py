@@ -6,7 +6,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,7 +16,7 @@ from .analysis.curves import along, pieces
 from .analysis.matching import matched
 from .driver import chosen_pipeline
 from .errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
-from .judgements import Place, Supported
+from .judgements import Supported
 from .numerics.components import component_labels
 from .numerics.cycles import minimum_cycle_basis
 from .numerics.polylines import arc_lengths, place_at
@@ -34,6 +34,9 @@ STEP = 0.25  # derived: radii between places of a curve: what is a radius away i
 MOST_PIECES = 1000  # derived: of an edge, where radii are near nothing
 WORTH_A_WARNING = 0.7  # fitted: share of samples with the same graph up to which a skeleton is uncertain
 
+_Missing: TypeAlias = tuple[str, int, np.ndarray, float]
+"""What a sample shows and the skeleton lacks: what it is, the sample's number, the place, and how near is the same."""
+
 
 def support(
     cloud: Any,
@@ -46,9 +49,8 @@ def support(
 ) -> Skeleton:
     """Curve skeleton of a cloud, and which part of it the skeletons of other samples of the object show.
 
-    Every sample leaves out a fifth of the points, at random. What only some of their skeletons show hangs on chance.
-    Trees of species get their support in this way (Felsenstein 1985). The samples are those of the delete-d jackknife
-    (Shao and Wu 1989): a bootstrap draws points twice, which add nothing here.
+    Every sample leaves out a fifth of the points, at random, as in the delete-d jackknife. What only some of their
+    skeletons show hangs on chance. Trees of species get their support in this way, by bootstraps.
 
     Parameters
     ----------
@@ -103,20 +105,9 @@ def with_support(
     seed: int = 0,
     on_draw: Callable[[int, int], object] | None = None,
 ) -> Skeleton:
-    """A skeleton and which part of it the skeletons of samples of its points show, see `support`.
+    """A skeleton that a pipeline made, and which part of it the skeletons of samples of its points show.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        As the pipeline made it.
-    pipeline : Pipeline
-        From a cloud to a skeleton.
-    draws, seed, on_draw
-        As of `support`.
-
-    Returns
-    -------
-    Skeleton
+    The other arguments are those of `support`.
     """
     if isinstance(draws, bool) or not isinstance(draws, (int, np.integer)) or draws < 2:
         raise InvalidParameterError(f"draws = {draws!r}: must be an int of at least 2")
@@ -137,44 +128,64 @@ def with_support(
 
 def _supported(skeleton: Skeleton, others: list[Skeleton]) -> Skeleton:
     """A skeleton with the share of others that show each part of it."""
-    whole, found = _Curve(skeleton), []
-    curves = [_Curve(other) for other in others]
+    whole, curves = _Curve(skeleton), [_Curve(other) for other in others]
     near = np.array([curve.shows(whole.vertices, NEAR * whole.reach) for curve in curves])
+    supported = []
     for branch in skeleton.branches:
-        share = float(np.mean(near[:, branch].mean(axis=1) >= MOST_OF_IT))
-        found.append(Supported("branch", _place(_middle(skeleton.vertices[branch])), share))
+        path = skeleton.vertices[branch]
+        lengths = arc_lengths(path)
+        shares = near[:, branch].mean(axis=1)
+        supported.append(_part("branch", place_at(path, lengths, lengths[-1] / 2), np.mean(shares >= MOST_OF_IT)))
     for loop in whole.loops:
-        share = float(np.mean([curve.shows_loop(whole, loop) for curve in curves]))
-        found.append(Supported("loop", _place(whole.vertices[loop].mean(axis=0)), share))
+        shares = [curve.shows_loop(whole, loop) for curve in curves]
+        supported.append(_part("loop", whole.vertices[loop].mean(axis=0), np.mean(shares)))
     ends = np.zeros((len(curves), len(whole.ends)), bool)
-    missing = _Missing(len(curves))
+    missing: list[_Missing] = []
     for draw, curve in enumerate(curves):
         pairs = matched(curve.vertices[curve.ends], whole.vertices[whole.ends], NEAR_END * whole.reach[whole.ends])
-        ends[draw, [there for _, there in pairs]] = True
-        for end in np.delete(curve.ends, [here for here, _ in pairs]).tolist():
-            missing.add("end", draw, curve.vertices[end], NEAR_END * curve.reach[end])
+        ends[draw, [row for _, row in pairs]] = True
+        for end in np.delete(curve.ends, [row for row, _ in pairs]).tolist():
+            missing.append(("end", draw, curve.vertices[end], NEAR_END * curve.reach[end]))
         for loop in curve.loops:
             if not whole.shows_loop(curve, loop):
-                radius = norm(curve.vertices[loop] - curve.vertices[loop].mean(axis=0)).mean()
-                missing.add("loop", draw, curve.vertices[loop].mean(axis=0), radius)
+                middle = curve.vertices[loop].mean(axis=0)
+                missing.append(("loop", draw, middle, norm(curve.vertices[loop] - middle).mean()))
     shares = ends.mean(axis=0)
-    for end, share in zip(whole.ends.tolist(), shares.tolist(), strict=True):
-        found.append(Supported("end", _place(whole.vertices[end]), share))
+    supported += [_part("end", whole.vertices[end], share) for end, share in zip(whole.ends, shares, strict=True)]
     support = near.mean(axis=0)
     support[whole.ends] = np.minimum(support[whole.ends], shares)
     same = sum(curve.counts == whole.counts for curve in curves)
-    report = replace(skeleton.report, n_draws=len(curves), n_agreeing=same, support=(*found, *missing.found()))
+    supported += _lacking(missing, len(curves))
+    report = replace(skeleton.report, n_draws=len(curves), n_agreeing=same, support=tuple(supported))
     if same <= WORTH_A_WARNING * len(curves):
         report = report.with_warning(_doubt(report))
     return replace(skeleton, support=support, report=report)
 
 
+def _part(about: str, place: np.ndarray, share: float | np.floating, present: bool = True) -> Supported:
+    x, y, z = place.tolist()
+    return Supported(about, (x, y, z), float(share), present)
+
+
+def _lacking(missing: list[_Missing], draws: int) -> Iterator[Supported]:
+    """Ends and loops of samples that the skeleton lacks, those of several samples in one place as one."""
+    for about in dict.fromkeys(row[0] for row in missing):
+        rows = [row[1:] for row in missing if row[0] == about]
+        draw, place, reach = (np.array(column) for column in zip(*rows, strict=True))
+        near = cdist(place, place) <= np.maximum(reach[:, None], reach)
+        group = component_labels(len(place), np.argwhere(near))
+        for number in range(group.max() + 1):
+            these = group == number
+            share = len(np.unique(draw[these])) / draws
+            yield _part(about, place[these].mean(axis=0), share, present=False)
+
+
 def _doubt(report: Report) -> str:
     """What to say of a skeleton that another sample would not give."""
     other = report.n_draws - report.n_agreeing
-    told = f"uncertain: {other} of {report.n_draws} samples of the cloud have a skeleton with another graph"
+    message = f"uncertain: {other} of {report.n_draws} samples of the cloud have a skeleton with another graph"
     weak = report.unsupported
-    return f"{told}, above all {weak[0]}: look there" if weak else told
+    return f"{message}, above all {weak[0]}: look there" if weak else message
 
 
 class _Curve:
@@ -204,36 +215,5 @@ class _Curve:
         if not cycles:
             return False
         closed = cKDTree(self.vertices[np.unique(np.concatenate(cycles))])
-        there = closed.query(other.vertices[loop])[0] <= NEAR_LOOP * other.reach[loop]
-        return bool(there.mean() >= MOST_OF_IT)
-
-
-class _Missing:
-    """Ends and loops of samples that the skeleton lacks, those of several samples in one place as one."""
-
-    def __init__(self, draws: int) -> None:
-        self._draws = draws
-        self._rows: dict[str, list[tuple[int, np.ndarray, float]]] = {}
-
-    def add(self, about: str, draw: int, place: np.ndarray, reach: float) -> None:
-        self._rows.setdefault(about, []).append((draw, place, reach))
-
-    def found(self) -> Iterator[Supported]:
-        for about, rows in self._rows.items():
-            draw, place, reach = (np.array(column) for column in zip(*rows, strict=True))
-            near = cdist(place, place) <= np.maximum(reach[:, None], reach)
-            group = component_labels(len(place), np.argwhere(near))
-            for number in range(group.max() + 1):
-                these = group == number
-                share = len(set(draw[these].tolist())) / self._draws
-                yield Supported(about, _place(place[these].mean(axis=0)), share, present=False)
-
-
-def _middle(path: np.ndarray) -> np.ndarray:
-    lengths = arc_lengths(path)
-    return place_at(path, lengths, lengths[-1] / 2)
-
-
-def _place(place: np.ndarray) -> Place:
-    x, y, z = place.tolist()
-    return x, y, z
+        along_it = closed.query(other.vertices[loop])[0] <= NEAR_LOOP * other.reach[loop]
+        return bool(along_it.mean() >= MOST_OF_IT)

@@ -56,9 +56,9 @@ class RingBuilder(Filter[Contraction]):
     cloud is taken in its own working frame (centred, longest side 1.6), in Morton order and without duplicates (points
     that differ by rounding are one); what comes out is mapped back to the user's order and units.
 
-    For `k` Open3D's own search parameters may be given: ``KDTreeSearchParamKNN(knn)`` is ``k=knn``,
-    ``KDTreeSearchParamHybrid(radius, max_nn)`` is ``k=max_nn, radius=radius``, and ``KDTreeSearchParamRadius(radius)``,
-    which has no limit of its own, is ``k=30, radius=radius``.
+    For `k` Open3D's search parameters may be given: ``KDTreeSearchParamKNN(knn)`` is ``k=knn``,
+    ``KDTreeSearchParamHybrid(radius, max_nn)`` is ``k=max_nn, radius=radius``, and ``KDTreeSearchParamRadius(radius)``
+    is ``k=30, radius=radius``.
 
     Raises
     ------
@@ -81,9 +81,8 @@ class RingBuilder(Filter[Contraction]):
 
     k: int | Literal["auto", "published"] | SearchParam = parameter(
         "auto",
-        "Neighbours per point, itself included; at most all points. More bridge noise and gaps, fewer keep thin parts "
-        "apart. 'auto' is 16 from 4096 points on and fewer below, by the cube root, at least 8; 'published' is 1.2 % "
-        "of the points, at least 8 and at most 30.",
+        "Neighbours per point, itself included; at most all. More bridge noise and gaps, fewer keep thin parts apart. "
+        "'auto' is 8 to 16 and 'published' 8 to 30, by the number of points.",
         type="int",
         unit="points",
         low=4,
@@ -100,21 +99,15 @@ class RingBuilder(Filter[Contraction]):
     )
     around: float = parameter(
         20.0,
-        "Points around a part that are enough: where the surface has more, near ones are merged until they are evenly "
-        "apart, but about 2400 are left if no part is thin; the one that stays takes over the mass. Where parts are "
-        "thin, fewer are faster and more keep near ones apart; clouds of less than 2000 points stay as they are. 0 "
-        "merges none for this, and so does a `radius`.",
-        type="float",
+        "Points around a part that are enough: where there are more, near ones are merged. 0 or a `radius`: none.",
         unit="points",
         low=0,
         high=1000,
     )
     thin_to: int | Literal["auto", "all"] = parameter(
         "auto",
-        "Most points to contract; the others are merged into a near one, which takes over their mass. Of more than "
-        "four times as many, a sample from a grid says where the surface is, and the others only belong to a vertex. "
-        "'auto' is 25000, but 64 times the square root of their number from 152588 on; 'all' merges none, whatever "
-        "`around` says, as published.",
+        "Most points to contract; others are merged into near ones, which take over their mass. 'auto' is 25000, or 64 "
+        "times the square root of their number if that is more; 'all' merges none, whatever `around` says.",
         type="int",
         unit="points",
         low=8,
@@ -123,30 +116,21 @@ class RingBuilder(Filter[Contraction]):
     outlier_factor: float = parameter(
         2.5,
         "A point this many times farther from its neighbours than these are from theirs is set aside: it goes to the "
-        "nearest vertex but has no say; so do many that float in space together, and one that denoising leaves alone. "
-        "0 keeps all.",
-        type="float",
+        "nearest vertex but has no say. 0 keeps all.",
         low=0,
     )
     denoise: int = parameter(
         4,
-        "Passes that draw the points of noisy neighbourhoods to the ridge of their density before the rings are made. "
-        "Where there are 8192 or more, these are averaged first, unless there is a `radius` or `thin_to` is 'all'. "
-        "Clean points stay. 0 for none.",
-        type="int",
+        "Passes that draw the points of noisy neighbourhoods to the ridge of their density. 0 for none.",
         unit="passes",
         low=0,
     )
     frame: Literal["spread", "box"] = parameter(
         "spread",
-        "What lengths in percent refer to, and the frame in which the weights are stated: the box with the spread of "
-        "the points, which turns with them, or the axis-aligned bounding box, as published.",
-        type="choice",
+        "What percentages and weights refer to: the box with the spread of the points, or the axis-aligned one.",
         choices=("spread", "box"),
     )
-    drop_invalid: bool = parameter(
-        False, "Drop points with NaN or infinite coordinates instead of refusing.", type="bool"
-    )
+    drop_invalid: bool = parameter(False, "Drop points with NaN or infinite coordinates instead of refusing.")
 
     def __post_init__(self) -> None:
         # as plain numbers they can be compared, printed and written to files
@@ -172,8 +156,8 @@ class RingBuilder(Filter[Contraction]):
             surface = average_noise(surface, self._k)
         surface = denoise(surface, self.denoise, self.outlier_factor > 0)
         thinned = thin_surface(surface, self.around if self._may_merge else 0, most, self._k)
-        told = Report(n_input=n + dropped, n_dropped=dropped)
-        return _contraction(points, finite, sample, surface, thinned, self._rings(surface, thinned), told)
+        report = Report(n_input=n + dropped, n_dropped=dropped)
+        return _contraction(points, finite, sample, surface, thinned, self._rings(surface, thinned), report)
 
     def sample_size(self, n: int) -> int:
         """About how many of n points say where the surface is, if these are more than twice as many."""
@@ -207,8 +191,7 @@ class RingBuilder(Filter[Contraction]):
         return self.radius is None and self.thin_to != "all"
 
     def _k(self, n: int) -> int:
-        rules: dict[Any, Any] = {"auto": default_k, "published": published_k}
-        chosen: Any = rules[self.k](n) if self.k in rules else self.k
+        chosen: Any = {"auto": default_k(n), "published": published_k(n)}.get(self.k, self.k)  # type: ignore[arg-type]
         return min(chosen, n)
 
     def _most(self, n: int) -> int:
@@ -216,7 +199,13 @@ class RingBuilder(Filter[Contraction]):
 
 
 def _contraction(
-    points: np.ndarray, finite: np.ndarray, sample: Sample, surface: Surface, thinned: Thinned, rings: Rings, so: Report
+    points: np.ndarray,
+    finite: np.ndarray,
+    sample: Sample,
+    surface: Surface,
+    thinned: Thinned,
+    rings: Rings,
+    report: Report,
 ) -> Contraction:
     """What flows on: nothing has moved yet."""
     representative, outlier, sampled = np.full(len(points), -1), *np.zeros((2, len(points)), bool)
@@ -238,7 +227,7 @@ def _contraction(
         mass=np.bincount(thinned.representative, surface.merged) * (n / surface.merged.sum()),
         **at_rest(surface.points[thinned.survivors], rings),
         report=replace(
-            so,
+            report,
             n_outliers=int(outlier.sum()),
             n_sampled=len(sample.kept),
             n_distinct=int(surface.merged.sum()),

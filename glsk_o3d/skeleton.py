@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -92,19 +93,14 @@ class Skeleton:
     def __post_init__(self) -> None:
         # steps that merge or add vertices pass on what was measured before them: it means nothing any more
         unknown = np.full(len(self.vertices), np.nan)
-        for name, otherwise in zip(OF_VERTICES[1:], (unknown, self.radii, self.radii, unknown), strict=True):
+        otherwise = dict(confidence=unknown, half_width=self.radii, half_thickness=self.radii, support=unknown)
+        for name, value in otherwise.items():
             if np.shape(getattr(self, name))[:1] != unknown.shape:
-                object.__setattr__(self, name, otherwise)
-        for name, dtype, columns in (
-            ("vertices", float, 3),
-            ("edges", np.int64, 2),
-            *((name, float, None) for name in OF_VERTICES),
-            ("vertex_of_point", np.int64, None),
-            ("points", float, 3),
-            ("normals", float, 3),
-        ):
-            array = np.asarray(getattr(self, name), dtype)
-            array = array.reshape(-1, columns) if columns else array.reshape(-1)
+                object.__setattr__(self, name, value)
+        shapes = dict(vertices=(-1, 3), edges=(-1, 2), points=(-1, 3), normals=(-1, 3))
+        for name in (*shapes, "vertex_of_point", *OF_VERTICES):
+            dtype = np.int64 if name in ("edges", "vertex_of_point") else float
+            array = np.asarray(getattr(self, name), dtype).reshape(shapes.get(name, -1))
             object.__setattr__(self, name, array)
 
     def __repr__(self) -> str:
@@ -175,30 +171,23 @@ class Skeleton:
         for a, b in self.edges.tolist():
             neighbours[a].append(b)
             neighbours[b].append(a)
-        left = {(a, b) for a, b in self.edges.tolist()}
-        paths = []
+        left, paths = set(map(tuple, self.edges.tolist())), []
         ends = np.flatnonzero((self.degree > 0) & (self.degree != 2)).tolist()
         for start in ends + np.flatnonzero(self.degree == 2).tolist():
             for step in neighbours[start]:
-                path, here = [start], step
-                if (min(start, here), max(start, here)) not in left:
+                if (min(start, step), max(start, step)) not in left:
                     continue
-                left.discard((min(start, here), max(start, here)))
-                path.append(here)
-                while here != start and len(neighbours[here]) == 2:
-                    onward = neighbours[here][0] if neighbours[here][1] == path[-2] else neighbours[here][1]
-                    left.discard((min(here, onward), max(here, onward)))
-                    path.append(onward)
-                    here = onward
+                path = [start, step]
+                while path[-1] != start and len(neighbours[path[-1]]) == 2:
+                    before, (one, other) = path[-2], neighbours[path[-1]]
+                    path.append(other if one == before else one)
+                left.difference_update((min(edge), max(edge)) for edge in pairwise(path))
                 paths.append(np.array(path))
         return tuple(paths)
 
     @cached_property
     def loops(self) -> tuple[Loop, ...]:
-        """Loops of a minimum cycle basis, each with its opening and the probability that it is a handle.
-
-        See `glsk_o3d.analysis.Loop`.
-        """
+        """Loops of a minimum cycle basis, with openings and probabilities. See `glsk_o3d.analysis.Loop`."""
         from .analysis.loops import loops
 
         return loops(self)
@@ -216,10 +205,7 @@ class Skeleton:
         return branch_table(self, root)
 
     def annotate(self, cloud: Any = None, *, color: ColorChoice | None = None) -> Any:
-        """A copy of a cloud that says of every point where it belongs, and how thick it is there.
-
-        See `glsk_o3d.io.annotation.annotate`.
-        """
+        """A copy of a cloud that says where each point belongs. See `glsk_o3d.io.annotation.annotate`."""
         from .io.annotation import annotate
 
         return annotate(self, cloud, color=color)
@@ -246,9 +232,9 @@ class Skeleton:
 
         names = ("position", "radius", *OF_VERTICES[1:], "curvature", "torsion")
         values = [*(getattr(self, name) for name in OF_VERTICES), *curvature_torsion(self)]
+        columns = [map(tuple, self.vertices.tolist()), *(each.tolist() for each in values)]
         graph = networkx.Graph(branches=list(self.branch_table(root)) if len(self.vertices) else [])
-        places = map(tuple, self.vertices.tolist())
-        for i, facts in enumerate(zip(places, *(each.tolist() for each in values), strict=True)):
+        for i, facts in enumerate(zip(*columns, strict=True)):
             graph.add_node(i, **dict(zip(names, facts, strict=True)))
         facts = zip(self.edges.tolist(), self.edge_lengths.tolist(), branch_of_edge(self).tolist(), strict=True)
         for (a, b), length, branch in facts:
@@ -276,10 +262,7 @@ class Skeleton:
     def to_tubes(
         self, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16
     ) -> open3d.geometry.TriangleMesh:
-        """The skeleton as tubes as thick as the object, an ``open3d.geometry.TriangleMesh``.
-
-        See `glsk_o3d.io.tubes.to_tubes`.
-        """
+        """The skeleton as tubes as thick as the object. See `glsk_o3d.io.tubes.to_tubes`."""
         from .io.tubes import to_tubes
 
         return to_tubes(self, color, radius=radius, sides=sides)

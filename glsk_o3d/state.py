@@ -13,17 +13,7 @@ from .report import Report
 
 
 def at_rest(positions: np.ndarray, rings: Rings) -> dict[str, Any]:
-    """What a Contraction says of points that have not moved yet, as keywords.
-
-    Parameters
-    ----------
-    positions : (n, 3) float array
-    rings : Rings
-
-    Returns
-    -------
-    dict
-    """
+    """What a Contraction says of (n, 3) points that have not moved yet, as keywords."""
     _, ring_size = rings.nearest(positions)
     return dict(
         positions=positions,
@@ -51,10 +41,9 @@ class Contraction:
         The input.
     representative_of_point : (N,) int array
         Row of `cloud` that each input point is; -1 if it was dropped as not finite.
-    outlier : (N,) bool array
-        Input points that were set aside; `representative_of_point` is the distinct point nearest to them.
-    sampled : (N,) bool array
-        Input points that say where the surface is: no outliers, and of a large cloud a sample; others are only mapped.
+    outlier, sampled : (N,) bool array
+        Input points that were set aside, whose distinct point is the nearest one, and those that say where the surface
+        is: no outliers, and of a large cloud a sample.
     frame : Frame
     cloud : (m, 3) float64 array
         Distinct input points; noisy ones denoised, and where there are many, means of several.
@@ -79,10 +68,8 @@ class Contraction:
         Distance to the nearest ring neighbour in the uncontracted and in the contracted cloud: s(0), s(t).
     ring_ratio_drop : float
         psi: a(t-1) - a(t), the drop of the ring ratio in the last solve; a(1) after the first, 0 before it.
-    mean_ring_edge : float
-        Mean over the points of the mean ring edge of the uncontracted cloud.
-    contraction_weight : float
-        w_L of the last solve; 0 before the first.
+    mean_ring_edge, contraction_weight : float
+        Mean over the points of the mean ring edge of the uncontracted cloud, and w_L of the last solve, 0 before it.
     report : Report
 
     Examples
@@ -135,9 +122,9 @@ class Contraction:
     @property
     def point_of_survivor(self) -> np.ndarray:
         """For every survivor the first input point that it is, (n,) int array."""
-        valid = np.flatnonzero(self.sampled)
+        points = np.flatnonzero(self.sampled)[::-1]  # of several writes the last one stays
         first = np.empty(len(self.cloud), int)
-        first[self.representative_of_point[valid[::-1]]] = valid[::-1]
+        first[self.representative_of_point[points]] = points
         return first[self.survivors]
 
     @property

@@ -33,10 +33,8 @@ class ExplainedScore(Parameters):
     2
     """
 
-    threshold: float = parameter(
-        0.03, "De below which the contraction is finished.", type="float", low=0, open_low=True
-    )
-    min_iterations: int = parameter(4, "Solves before the rule may stop.", type="int", unit="solves", low=1)
+    threshold: float = parameter(0.03, "De below which the contraction is finished.", low=0, open_low=True)
+    min_iterations: int = parameter(4, "Solves before the rule may stop.", unit="solves", low=1)
 
     def __call__(self, iterations: tuple[IterationRecord, ...]) -> str | None:
         change = iterations[-1].explained_change
@@ -59,7 +57,7 @@ class RingSizeRatio(Parameters):
     'rings stopped shrinking'
     """
 
-    threshold: float = parameter(0.01, "Drop of the ring ratio below which it is finished.", type="float", low=0)
+    threshold: float = parameter(0.01, "Drop of the ring ratio below which it is finished.", low=0)
 
     def __call__(self, iterations: tuple[IterationRecord, ...]) -> str | None:
         before = iterations[-2].ring_ratio if len(iterations) > 1 else 1.0

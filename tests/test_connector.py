@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
-from glsk_o3d import Connector, Contractor, InvalidParameterError, LPRReducer, RingBuilder, Skeleton, pipelines, samples
+from glsk_o3d import Connector, Contractor, LPRReducer, RingBuilder, Skeleton, pipelines, samples
 from glsk_o3d.connector import UNSUPPORTED_NOISE, contraction_distance, drop_unsupported
 
 VARIANTS = {name: make().stages[2] for name, make in pipelines.PIPELINES.items()}
@@ -36,32 +36,18 @@ def test_gives_a_sound_skeleton(name, shape, assert_sound):
     assert (np.bincount(skeleton.vertex_of_point, minlength=len(skeleton.vertices)) > 0).all()
 
 
-def test_points_belong_where_their_survivor_belongs(state):
+def test_vertices_are_the_weighted_means_of_their_points_and_rings_join_them(state):
     skeleton = Connector()(state)
     owner = np.full(len(state), -1)
     owner[state.survivor_of_point] = skeleton.vertex_of_point
-    np.testing.assert_array_equal(owner[state.survivor_of_point], skeleton.vertex_of_point)
-
-
-def test_vertices_are_the_weighted_means_of_their_points(state):
-    skeleton = Connector()(state)
-    owner = np.full(len(state), -1)
-    owner[state.survivor_of_point] = skeleton.vertex_of_point
+    np.testing.assert_array_equal(owner[state.survivor_of_point], skeleton.vertex_of_point)  # of a survivor one vertex
     total = np.zeros_like(skeleton.vertices)
     np.add.at(total, owner, state.mass[:, None] * state.contracted)
-    mass = np.bincount(owner, state.mass)
-    np.testing.assert_allclose(skeleton.vertices, total / mass[:, None], atol=1e-12)
-
-
-def test_edges_join_what_rings_join(state):
-    skeleton = Connector()(state)
-    owner = np.full(len(state), -1)
-    owner[state.survivor_of_point] = skeleton.vertex_of_point
+    np.testing.assert_allclose(skeleton.vertices, total / np.bincount(owner, state.mass)[:, None], atol=1e-12)
     a, b = np.sort([owner[state.rings.centres], owner[state.rings.indices]], axis=0)
     possible = {(i, j) for i, j in zip(a.tolist(), b.tolist(), strict=True) if i != j}
-    nearest = {tuple(edge) for edge in ONE_RADIUS(state).edges.tolist()}
     assert {tuple(edge) for edge in skeleton.edges.tolist()} <= possible
-    assert nearest
+    assert len(ONE_RADIUS(state).edges)
     # a vertex with a neighbour in another one is never left alone
     assert (skeleton.degree > 0).all()
 
@@ -124,12 +110,6 @@ def test_radii_are_those_of_the_tube():
     np.testing.assert_allclose(skeleton.radii[middle], 0.1, rtol=0.05)
 
 
-@pytest.mark.parametrize("radius", ["0%", 0, -1, "fat", np.nan, None])
-def test_bad_radius(state, radius):
-    with pytest.raises(InvalidParameterError, match=r"Connector\.radius"):
-        Connector(radius=radius)(state)
-
-
 # ---- local thickness
 
 
@@ -155,7 +135,7 @@ def test_contraction_distance_of_a_tube_is_its_radius():
     assert np.quantile(off, 0.98) < 0.1
 
 
-def test_contraction_distance_ignores_a_few_points_gone_aunsupported(state):
+def test_contraction_distance_ignores_a_few_points_gone_astray(state):
     cloud = state.cloud.copy()
     cloud[state.survivors[::40]] += 100
     astray = replace(state, cloud=cloud)

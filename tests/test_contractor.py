@@ -35,10 +35,7 @@ def never(_):
 def test_first_solve_is_the_least_squares_solution(built, share):
     state = Contractor(max_iterations=1, initial_contraction=share)(built)
     weight = share / built.mean_ring_edge
-    laplacian = cotangent_laplacian(built.positions, built.rings).toarray()
-    n = len(built)
-    stacked, right = np.vstack([weight * laplacian, np.eye(n)]), np.vstack([np.zeros((n, 3)), built.positions])
-    np.testing.assert_allclose(state.positions, np.linalg.lstsq(stacked, right, rcond=None)[0], atol=1e-10)
+    laplacian = check_solve(built, state, weight, np.ones(len(built)), atol=1e-10)
     np.testing.assert_array_equal(state.previous, built.positions)
     np.testing.assert_allclose(state.laplacian_coordinates, laplacian @ built.positions, atol=1e-10)
     np.testing.assert_array_equal(state.ring_size, built.rings.nearest(state.positions)[1])
@@ -51,13 +48,18 @@ def test_first_solve_is_the_least_squares_solution(built, share):
 def test_second_solve_weighs_by_the_rings_of_the_first(built):
     one = replace(CAO, max_iterations=1)(built)
     two = replace(CAO, max_iterations=1)(one)
-    weight, attraction = 3 * one.contraction_weight, np.minimum(one.ring_size0 / one.ring_size, 1e4)
-    laplacian = cotangent_laplacian(one.positions, one.rings).toarray()
-    n = len(built)
-    stacked = np.vstack([weight * laplacian, np.diag(attraction)])
-    right = np.vstack([np.zeros((n, 3)), attraction[:, None] * one.positions])
-    np.testing.assert_allclose(two.positions, np.linalg.lstsq(stacked, right, rcond=None)[0], atol=1e-8)
+    attraction = np.minimum(one.ring_size0 / one.ring_size, 1e4)
+    check_solve(one, two, 3 * one.contraction_weight, attraction, atol=1e-8)
     assert two.ring_ratio_drop == pytest.approx(one.ring_ratio - two.ring_ratio)
+
+
+def check_solve(before, after, weight, attraction, atol):
+    """The solution is that of least squares; gives the Laplacian."""
+    laplacian = cotangent_laplacian(before.positions, before.rings).toarray()
+    stacked = np.vstack([weight * laplacian, np.diag(attraction)])
+    right = np.vstack([0 * before.positions, attraction[:, None] * before.positions])
+    np.testing.assert_allclose(after.positions, np.linalg.lstsq(stacked, right, rcond=None)[0], atol=atol)
+    return laplacian
 
 
 def test_mass_means_so_many_points_in_one_place(built):
@@ -428,12 +430,6 @@ def test_attraction_has_a_floor_and_a_cap(built, monkeypatch, floor):
     Contractor(max_iterations=1, min_attraction=floor, max_attraction=500.0)(replace(built, ring_size=size))
     ((_, weight),) = capture.calls
     np.testing.assert_allclose(weight[:5], np.maximum([0.25, 4, 500, 500, 1], floor))
-
-
-def test_presets_hold_nothing_and_have_no_floor():
-    for filter in (CAO, WEN):
-        assert (filter.min_attraction, filter.retries, filter.line_hold) == (0, 0, 1)
-    assert WEN.reduce_above == 0
 
 
 @pytest.mark.parametrize("above", [0, 150, 250, 400, 1000])

@@ -142,12 +142,6 @@ def test_refused_clouds(case, name):
         run(cloud, name)
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_ring_builder_refuses_the_same(case):
-    with pytest.raises(InvalidCloudError):
-        glsk.RingBuilder()(REFUSED[case][0])
-
-
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("scale", [1e-300, 1e-130, 1e130, 1e306])
 def test_extreme_sizes_are_refused(name, scale):

@@ -46,18 +46,16 @@ def named_rings(state):
     return rings
 
 
-@pytest.mark.parametrize(
-    ("n", "k"), [(8, 8), (708, 8), (709, 9), (1024, 12), (1987, 24), (2458, 29), (2459, 30), (10**6, 30)]
-)
-def test_published_number_of_neighbours(n, k):
-    assert published_k(n) == k
+NUMBERS = {
+    published_k: [(8, 8), (708, 8), (709, 9), (1024, 12), (1987, 24), (2458, 29), (2459, 30), (10**6, 30)],
+    default_k: [(8, 8), (614, 8), (615, 9), (2048, 13), (3723, 15), (3724, 16), (4096, 16), (10**8, 16)],
+    default_size: [(8, 8), (25000, 25000), (25001, 25000), (152588, 25000), (160000, 25600), (10**6, 64000)],
+}
 
 
-@pytest.mark.parametrize(
-    ("n", "k"), [(8, 8), (614, 8), (615, 9), (2048, 13), (3723, 15), (3724, 16), (4096, 16), (10**8, 16)]
-)
-def test_usual_number_of_neighbours(n, k):
-    assert default_k(n) == k
+@pytest.mark.parametrize("rule", NUMBERS, ids=lambda rule: rule.__name__)
+def test_numbers_by_the_number_of_points(rule):
+    assert [(n, rule(n)) for n, _ in NUMBERS[rule]] == NUMBERS[rule]
 
 
 @pytest.mark.parametrize(("word", "number"), [("auto", default_k), ("published", published_k)])
@@ -525,13 +523,6 @@ def test_a_radius_in_the_wrong_units_is_refused():
 
 
 # ---- thinning
-
-
-@pytest.mark.parametrize(
-    ("n", "expected"), [(8, 8), (25000, 25000), (25001, 25000), (152588, 25000), (160000, 25600), (10**6, 64000)]
-)
-def test_usual_number(n, expected):
-    assert default_size(n) == expected
 
 
 @pytest.mark.parametrize("thin_to", [500, 1000, 2500])
