@@ -27,7 +27,7 @@ _EDITS = {
     "generate_smoothed_skeleton": editing.smooth,
     "generate_simplified_skeleton": editing.simplify,
 }
-_FACTS = {
+_EDIT_PARAMETERS = {
     "length": facts_of("Least length of a branch that ends, from junction to tip.", "length", low=0),
     "radius": facts_of("Least mean radius of a branch that ends.", "length", low=0),
     "order": facts_of("Highest order of branches that stays: 0 for the stem alone.", "int?", low=0),
@@ -115,4 +115,4 @@ def _slots(function: Callable[..., Any]) -> Iterator[Slot]:
             kind = "point?" if each.default is None else "point"
             yield RootSlot("root", facts_of(_ROOT, kind, (*AXES, "thickest")), default=each.default)
         else:
-            yield Slot(each.name, _FACTS[each.name], default=each.default)
+            yield Slot(each.name, _EDIT_PARAMETERS[each.name], default=each.default)

@@ -89,6 +89,20 @@ class Layer:
             label=path.name,
         )
 
+    @classmethod
+    def of_mesh(cls, mesh: Any) -> Layer:
+        """A ``pymeshlab.Mesh`` as its matrix shows it; what nobody has set, zeros or white, is left out."""
+        normals, scalars, colors = mesh.vertex_normal_matrix(), mesh.vertex_scalar_array(), mesh.vertex_color_matrix()
+        return cls(
+            mesh.transformed_vertex_matrix(),
+            faces=mesh.face_matrix() if mesh.face_number() else None,
+            edges=mesh.edge_matrix().reshape(-1, 2) if mesh.edge_number() else None,
+            normals=_turned(normals, mesh.transform_matrix()) if normals.any() else None,
+            scalars=scalars if scalars.any() else None,
+            colors=None if (colors == 1).all() else colors,
+            label=mesh.label(),
+        )
+
     def shows(self, other: Layer) -> bool:
         """Whether both have the same vertices and edges, so that the one's flow is still the other's."""
         none = np.empty((0, 2), int)
@@ -195,6 +209,13 @@ class Layer:
 
     def _write_xyz(self, path: Path) -> None:
         np.savetxt(path, self.vertices, fmt="%.17g")
+
+
+def _turned(normals: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Normals as a layer's matrix shows them: they keep their lengths and stay normal where it is no rotation."""
+    turned = normals @ np.linalg.pinv(matrix[:3, :3])
+    before, after = (np.linalg.norm(vectors, axis=1, keepdims=True) for vectors in (normals, turned))
+    return turned * np.divide(before, after, out=np.ones_like(after), where=after > 0)
 
 
 def _elements(path: Path) -> dict[str, list[str]]:

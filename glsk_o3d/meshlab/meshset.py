@@ -40,10 +40,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
     ``pymeshlab.PureValue``, in the units of the cloud; a float and a string such as ``"2%"`` are understood too. What
     is not given is as elsewhere in this package, of the box that ``RingBuilder.frame`` names: ``"1% of the frame"``.
 
-    Raises
-    ------
-    MissingPackageError
-        When the class is imported and pymeshlab is not installed.
+    Where pymeshlab is not installed, importing the class raises MissingPackageError.
 
     Examples
     --------
@@ -60,8 +57,6 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         super().__init__(*args, **kwargs)
         self._script: list[Step] = []
         self._flows: dict[int, Layer] = {}  # what our filters made, by the number of the layer
-
-    # ----------------------------------------------------------------------------------------------------- filters
 
     def apply_filter(self, filter_name: str, **params: Any) -> dict[str, Any]:
         """Apply a filter of MeshLab's or ours to the current layer.
@@ -166,20 +161,14 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
                 print(f"{verb.name} : {verb.doc}")
         pymeshlab.search(word)
 
-    # ---------------------------------------------------------------------------------------------------- scripts
-
     def load_filter_script(self, filter_script_name: str | os.PathLike, *, any_filter: bool = False) -> None:
-        """Make a script file the current script. Nothing is run; everything is checked.
+        """Make a script file the current script. Nothing is run; everything is checked, ScriptError says what is wrong.
 
         Parameters
         ----------
         filter_script_name : path-like
         any_filter : bool
             Take also filters of MeshLab's that write, read or send files, from a script that is trusted.
-
-        Raises
-        ------
-        FileNotFoundError, FileFormatError, ScriptError
         """
         self._script = read_steps(filter_script_name, any_filter)
 
@@ -208,17 +197,8 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
                 values = [param.attributes[key] for key in VECTORS.get(param.type, ("value",))]
                 print(f"\t{param.name} : {param.type} = {', '.join(values)}")
 
-    # ----------------------------------------------------------------------------------------------------- layers
-
     def add_points(self, points: Any, name: str = "cloud") -> None:
-        """Add a cloud as a new layer, which becomes the current one.
-
-        Parameters
-        ----------
-        points : cloud
-            Anything that `glsk_o3d.skeletonize` takes.
-        name : str
-        """
+        """Add a cloud, anything that `skeletonize` takes, as a new layer, which becomes the current one."""
         self.add_mesh(Layer.of(points).to_pymeshlab(), name)
 
     def layer(self, number: int = -1) -> Layer:
@@ -231,21 +211,10 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         number = self.current_mesh_id() if number == -1 else number
         if not self.mesh_id_exists(number):
             raise InvalidParameterError(f"layer = {number}: there is no such layer")
-        mesh = self.mesh(number)
-        normals, scalars, colors = mesh.vertex_normal_matrix(), mesh.vertex_scalar_array(), mesh.vertex_color_matrix()
-        layer = Layer(
-            mesh.transformed_vertex_matrix(),
-            faces=mesh.face_matrix() if mesh.face_number() else None,
-            edges=mesh.edge_matrix().reshape(-1, 2) if mesh.edge_number() else None,
-            normals=_turned(normals, mesh.transform_matrix()) if normals.any() else None,  # every mesh has zeros
-            scalars=scalars if scalars.any() else None,
-            colors=None if (colors == 1).all() else colors,
-            label=mesh.label(),
-        )
-        known = self._flows.get(number)
+        layer, known = Layer.of_mesh(self.mesh(number)), self._flows.get(number)
         if known is None or not known.shows(layer):
             return layer
-        flow = known.flow
+        flow, scalars = known.flow, self.mesh(number).vertex_scalar_array()
         if isinstance(flow, Skeleton) and not np.array_equal(scalars, flow.radii, equal_nan=True):
             flow = replace(flow, radii=scalars, half_width=scalars, half_thickness=scalars)
         return replace(layer, edges=known.edges, flow=flow, source=known.source)
@@ -269,8 +238,8 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         try:
             if path.suffix.lower() in SCAN_ENDINGS:
                 self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)
-                return
-            self.load_new_mesh(str(path))
+            else:
+                self.load_new_mesh(str(path))
         except pymeshlab.PyMeshLabException as error:
             raise FileFormatError(f"{path}: MeshLab cannot read it: {' '.join(str(error).split())}") from error
         if not self.current_mesh().vertex_number():
@@ -316,13 +285,6 @@ def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
         return float(str(np.float32(value.value()))) if isinstance(value, pymeshlab.PureValue) else value
 
     return {name: plain(value) for name, value in params.items()}
-
-
-def _turned(normals: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Normals as a layer's matrix shows them: they keep their lengths and stay normal where it is no rotation."""
-    turned = normals @ np.linalg.pinv(matrix[:3, :3])
-    before, after = (np.linalg.norm(vectors, axis=1, keepdims=True) for vectors in (normals, turned))
-    return turned * np.divide(before, after, out=np.ones_like(after), where=after > 0)
 
 
 def _method(name: str, doc: str) -> Callable[..., dict[str, Any]]:

@@ -17,7 +17,7 @@ from .script import BOOL, FLOAT, LENGTH, Param
 PARTS = ("reducer", "stop")
 OF_FRAME = " of the frame"
 """What follows a percentage that is as everywhere else in this package, of the box that RingBuilder's `frame` names."""
-_TYPES = {
+_SLOT_TYPES = {
     "bool": ("bool", BOOL),
     "int": ("int", ("RichInt",)),
     "float": ("float", FLOAT),
@@ -59,13 +59,13 @@ class Slot:
         """The types that it may have in a script; the first is written."""
         if self.name == "layer":
             return ("RichMesh", "RichInt")
-        _, types = _TYPES.get(self.kind, ("str", ("RichString",)))
+        _, types = _SLOT_TYPES.get(self.kind, ("str", ("RichString",)))
         worded = self.kind == "length" or self.words
         return (*types, "RichString") if worded and "RichString" not in types else types
 
     def python_type(self) -> str:
         """Its type as MeshLab's listings print it."""
-        name, _ = _TYPES.get(self.kind, ("str", ()))
+        name, _ = _SLOT_TYPES.get(self.kind, ("str", ()))
         return f"{name} or str" if self.words and name != "str" else name
 
     def checked(self, value: Any) -> Any:

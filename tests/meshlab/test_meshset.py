@@ -130,16 +130,6 @@ def test_a_script_of_ours_alone_gives_the_same_without_pymeshlab(points, meshes,
         np.testing.assert_array_equal(mesh.vertex_scalar_array(), layer.scalars)
 
 
-def test_our_lengths_fit_every_scale(meshes, points, tmp_path):
-    meshes.generate_curve_skeleton_glsk(connector_radius=pymeshlab.PercentageValue(2))
-    meshes.save_filter_script(tmp_path / "s.mlx")
-    large = glsk.MeshSet()
-    large.add_points(4096 * points)  # a power of 2: every step is the same but for the exponents
-    large.load_filter_script(tmp_path / "s.mlx")
-    large.apply_filter_script()
-    np.testing.assert_allclose(large.current_skeleton().vertices, 4096 * meshes.current_skeleton().vertices, rtol=1e-9)
-
-
 def test_lengths_in_all_words(meshes, points):
     lengths = {
         0.023 * meshes.current_mesh().bounding_box().diagonal(): ("2.3%", pymeshlab.PercentageValue(2.3)),
