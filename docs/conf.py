@@ -40,7 +40,6 @@ exclude_patterns = [".*", "build", "dist", "demo", "tests", "glsk_o3d", "example
 nitpicky = True
 nitpick_ignore = [
     ("py:class", "pymeshlab.pmeshlab.MeshSet"),
-    ("py:class", "glsk_o3d.meshlab.meshset_layers.LayeredMeshSet"),  # a base class of MeshSet that has no page
     ("py:class", "glsk_o3d.analysis.rows.Rows"),  # of the tables
     ("py:obj", "glsk_o3d.pipeline.Produced"),  # a type variable
 ]

@@ -12,6 +12,7 @@ from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, norm
 from ..refinement.merging import merge_into
 from ..skeleton import Skeleton
+from .graphs import check_number
 
 SHRINK, SWELL = 0.5, -0.53  # published: factors of a pass there and back, which leave long waves as they are
 
@@ -48,10 +49,8 @@ def simplify(skeleton: Skeleton, *, tolerance: float | None = None, n: int | Non
     """
     if (tolerance is None) == (n is None):
         raise InvalidParameterError("simplify needs either a tolerance or n")
-    if tolerance is not None and not (np.isfinite(tolerance) and tolerance >= 0):
-        raise InvalidParameterError(f"tolerance = {tolerance!r}: must be finite and not negative")
-    if n is not None and (isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1):
-        raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
+    check_number("tolerance", tolerance, "float?")
+    check_number("n", n, "int?", low=1)
     matters = np.full(len(skeleton.vertices), np.inf)
     twins = Counter(tuple(sorted((path[0], path[-1]))) for path in skeleton.branches)
     for path in skeleton.branches:
@@ -106,11 +105,6 @@ def smooth(skeleton: Skeleton, *, passes: int = 10) -> Skeleton:
     -------
     Skeleton
 
-    Raises
-    ------
-    InvalidParameterError
-        passes is negative.
-
     Examples
     --------
     >>> from glsk_o3d import skeletonize
@@ -119,8 +113,7 @@ def smooth(skeleton: Skeleton, *, passes: int = 10) -> Skeleton:
     >>> abs(smooth(ring).length / ring.length - 1) < 0.02
     True
     """
-    if isinstance(passes, bool) or not isinstance(passes, int | np.integer) or passes < 0:
-        raise InvalidParameterError(f"passes = {passes!r}: must be an int of at least 0")
+    check_number("passes", passes, "int")
     inner = np.flatnonzero(skeleton.degree == 2)
     ends = np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
     ends = ends[np.argsort(ends[:, 0], kind="stable")]

@@ -1,17 +1,21 @@
-"""One component, no loops, another root."""
+"""One component, no loops, another root, fewer branches."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
+from ..analysis.branches import branch_table
 from ..errors import InvalidParameterError
 from ..numerics.near_links import linked
-from ..refinement.merging import some_vertices
+from ..numerics.vectors import norm
+from ..parameters import problem_with
+from ..refinement.merging import merge_into, some_vertices
 from ..refinement.rooted import RootPlace, numbered_from, root_among
-from ..skeleton import Skeleton
+from ..skeleton import Root, Skeleton
 
 
 def largest_component(skeleton: Skeleton) -> Skeleton:
@@ -107,12 +111,100 @@ def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
     >>> bool(line.vertices[0, 0] == line.vertices[:, 0].min())
     True
     """
-    if skeleton.n_loops:
-        raise InvalidParameterError(
-            f"the skeleton has {skeleton.n_loops} loops: only trees have a root; see cut_loops()"
-        )
+    _refuse_loops(skeleton, "only trees have a root")
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: it has no vertex to be the root")
-    vertex = root_among(skeleton.vertices, skeleton, root)
-    rooted = numbered_from(skeleton, vertex)
+    rooted = numbered_from(skeleton, root_among(skeleton.vertices, skeleton, root))
     return replace(rooted, report=replace(rooted.report, root=tuple(rooted.vertices[0].tolist())))
+
+
+def prune(
+    skeleton: Skeleton, *, length: float = 0.0, radius: float = 0.0, order: int | None = None, root: Root = None
+) -> Skeleton:
+    """Drop branches that leave a junction and end, and are short, thin, or of a high order.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    length : float
+        Least length of a branch, from junction to tip, in the cloud's units. Of every junction the shortest goes first,
+        and what is left of the junction is measured anew, so that the longest way through it stays.
+    radius : float
+        Least mean radius of a branch, in the same way.
+    order : int, optional
+        Highest order that stays, as `branch_table` counts: 0 for the stem alone.
+    root : str, int or (x, y, z), optional
+        Where orders count from, see `branch_table`.
+
+    Returns
+    -------
+    Skeleton
+        Points of a branch belong to the vertex that it grew from.
+
+    Raises
+    ------
+    InvalidParameterError
+        A number is out of its range, radii are not known, or orders are asked for of a skeleton with loops.
+
+    Examples
+    --------
+    >>> from glsk_o3d import pipelines
+    >>> from glsk_o3d.samples import tree
+    >>> whole = pipelines.tree()(tree(8000, forks=3).points)
+    >>> len(whole.leaves), len(prune(whole, order=0).leaves)
+    (9, 2)
+    """
+    check_number("length", length, "float")
+    check_number("radius", radius, "float")
+    check_number("order", order, "int?")
+    if order is not None:
+        skeleton = _without_orders(skeleton, order, root)
+    if length:
+        skeleton = _without_ends(skeleton, length, lambda now, path: norm(np.diff(now.vertices[path], axis=0)).sum())
+    if radius:
+        if not np.isfinite(skeleton.radii).all():
+            raise InvalidParameterError("the skeleton has no radii: it cannot be pruned by them")
+        skeleton = _without_ends(skeleton, radius, lambda now, path: now.radii[path[1:]].mean())
+    return skeleton
+
+
+def _without_orders(skeleton: Skeleton, order: int, root: Root) -> Skeleton:
+    _refuse_loops(skeleton, "branches have an order in a tree")
+    table = branch_table(skeleton, root)
+    group = np.arange(len(skeleton.vertices))
+    for row in np.argsort(table.level, kind="stable").tolist():  # parents before their children
+        if table.order[row] > order:
+            path = skeleton.branches[row]
+            away = path[1:] if path[0] == table.start[row] else path[:-1]
+            group[away] = group[table.start[row]]
+    return merge_into(skeleton, group)
+
+
+def _without_ends(skeleton: Skeleton, least: float, measure: Callable[[Skeleton, np.ndarray], float]) -> Skeleton:
+    """Without branches that end and measure less, the least of each junction first."""
+    while True:
+        worst: dict[int, tuple[float, np.ndarray]] = {}
+        for path in skeleton.branches:
+            path = path[::-1] if skeleton.degree[path[0]] == 1 else path
+            if skeleton.degree[path[0]] > 2 and skeleton.degree[path[-1]] == 1:
+                size, fork = measure(skeleton, path), int(path[0])
+                if size < min(least, worst.get(fork, (np.inf,))[0]):
+                    worst[fork] = size, path
+        if not worst:
+            return skeleton
+        group = np.arange(len(skeleton.vertices))
+        for fork, (_, path) in worst.items():
+            group[path] = fork
+        skeleton = merge_into(skeleton, group)
+
+
+def _refuse_loops(skeleton: Skeleton, why: str) -> None:
+    if skeleton.n_loops:
+        raise InvalidParameterError(f"the skeleton has {skeleton.n_loops} loops: {why}; see cut_loops()")
+
+
+def check_number(name: str, value: object, type: str, low: int = 0) -> None:
+    """Raise InvalidParameterError unless a value is of a type of `parameters.TYPES` and at least `low`."""
+    wrong = problem_with(value, dict(type=type, low=low, high=None, open_low=False, choices=()))
+    if wrong:
+        raise InvalidParameterError(f"{name} = {value!r}: {wrong}")

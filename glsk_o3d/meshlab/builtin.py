@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -33,46 +33,25 @@ def names() -> dict[str, str]:
 def trial() -> Any:
     """A MeshSet to ask what filters take: they raise, or crash the process, where there is nothing to apply them to."""
     pymeshlab = require("pymeshlab")
-    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32)
     ones, white = np.ones(4), np.ones((4, 4))
-    meshes = pymeshlab.MeshSet()
-    meshes.add_mesh(
-        pymeshlab.Mesh(
-            **dict(vertex_matrix=corners, face_matrix=faces, v_scalar_array=ones, f_scalar_array=ones),
-            **dict(v_color_matrix=white, f_color_matrix=white),
-        )
+    mesh = pymeshlab.Mesh(
+        vertex_matrix=np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+        face_matrix=np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32),
+        v_scalar_array=ones,
+        f_scalar_array=ones,
+        v_color_matrix=white,
+        f_color_matrix=white,
     )
+    meshes = pymeshlab.MeshSet()
+    meshes.add_mesh(mesh)
     return meshes
 
 
-def defaults(name: str) -> dict[str, Any]:
-    """The parameters of a filter, by pymeshlab's name, with their defaults for a mesh of size 1."""
-    return dict(trial().filter_parameter_values(name))
+def arguments(name: str, params: Sequence[Param], any_filter: bool = False) -> dict[str, Any]:
+    """Parameters in a script as keyword arguments for a filter by pymeshlab's name, checked by pymeshlab itself.
 
-
-def arguments(name: str, params: tuple[Param, ...], any_filter: bool = False) -> dict[str, Any]:
-    """Parameters in a script as keyword arguments for pymeshlab, checked by pymeshlab itself.
-
-    Parameters
-    ----------
-    name : str
-        As pymeshlab calls the filter.
-    params : tuple of Param
-    any_filter : bool
-        Take also filters that do not work on layers, see `ON_LAYERS`.
-
-    Returns
-    -------
-    dict of str to object
-        MeshLab's lengths are in the units of the mesh (``PureValue``); in percent they are a share of whatever MeshLab
-        takes percentages of there (``PercentageValue``).
-
-    Raises
-    ------
-    ValueError
-        With the line of the parameter as its second argument, or None.
-    MissingPackageError
+    Filters that do not work on layers are refused without `any_filter`. ValueError has the line of the parameter as
+    its second argument, or None.
     """
     if not (any_filter or name.startswith(ON_LAYERS)):
         raise ValueError(
@@ -82,47 +61,49 @@ def arguments(name: str, params: tuple[Param, ...], any_filter: bool = False) ->
         )
     if name not in require("pymeshlab").filter_list():
         raise ValueError("the pymeshlab that is installed has no such filter", None)
-    known, found = defaults(name), {}
+    known = trial().filter_parameter_values(name)
+    by_name = {key.rstrip("_"): key for key in known}  # the keyword of `lambda` is `lambda_`
+    found: dict[str, Any] = {}
     for param in params:
-        key = keyword(param.name, known)
+        key = by_name.get(pythonic(param.name))
         if key is None:
             raise ValueError(did_you_mean(param.name, known, "parameter"), param.line)
         if key in found:
             raise ValueError(f"parameter {param.name!r} is given twice", param.line)
         try:
-            found[key] = _argument(name, key, param, known[key])
+            found[key] = _argument(param, key, known[key])
+            _try(name, key, found[key], param.type)
         except ValueError as error:
             raise ValueError(f"parameter {param.name!r}: {error}", param.line) from None
     return found
 
 
-def _argument(name, key, param, default):
-    param.check_type(_fitting(default))
-    pymeshlab = require("pymeshlab")
-    value = param.value()
+def _argument(param: Param, key: str, default: Any) -> Any:
+    """The value of a parameter as pymeshlab takes it."""
+    pymeshlab, value = require("pymeshlab"), param.value(_fitting(default))
     if param.type in LENGTH:
         try:
-            percent = isinstance(value, str)
-            value = pymeshlab.PercentageValue(float(value[:-1])) if percent else pymeshlab.PureValue(value)
-        except Exception as error:  # here and below: pymeshlab's exceptions have no base of their own
+            if isinstance(value, str):
+                return pymeshlab.PercentageValue(float(value[:-1]))
+            return pymeshlab.PureValue(value)
+        except Exception as error:  # pymeshlab's exceptions have no base of their own
             raise ValueError(str(error)) from None
-    elif param.type == "RichColor":
-        value = pymeshlab.Color(*value)
-    elif isinstance(value, list):
-        value = np.reshape(value, np.shape(default))
-    elif is_layer(key, default) and value < 0:
+    if param.type == "RichColor":
+        return pymeshlab.Color(*value)
+    if isinstance(value, list):
+        return np.reshape(value, np.shape(default))
+    if is_layer(key, default) and value < 0:
         raise ValueError(f"there is no layer {value}")
-    try:
-        trial().filter_parameter_values(name, **{key: value})
-    except Exception as error:
-        reason = str(error).partition("\n")[0]
-        raise ValueError(f"a {param.type} is not what it takes" if "Unable to cast" in reason else reason) from None
     return value
 
 
-def keyword(name: str, known: Iterable[str]) -> str | None:
-    """Which of pymeshlab's keywords a parameter in a script is, or None: its ``lambda_`` is ``lambda`` there."""
-    return next((key for key in known if key.rstrip("_") == pythonic(name)), None)
+def _try(name: str, key: str, value: Any, type: str) -> None:
+    """Raise ValueError where pymeshlab does not take a value."""
+    try:
+        trial().filter_parameter_values(name, **{key: value})
+    except Exception as error:  # as above
+        reason = str(error).partition("\n")[0]
+        raise ValueError(f"a {type} is not what it takes" if "Unable to cast" in reason else reason) from None
 
 
 def is_layer(key: str, value: Any) -> bool:
@@ -133,15 +114,13 @@ def is_layer(key: str, value: Any) -> bool:
 def pythonic(name: str) -> str:
     """What pymeshlab makes of the name of a parameter.
 
-    Examples
-    --------
     >>> pythonic("Target number (x/y)")
     'target_number_x_y'
     """
     return re.sub(r"[().,'\":+]+", "", re.sub(r"[ /-]", "_", name.lower()))
 
 
-def _fitting(default) -> tuple[str, ...]:
+def _fitting(default: Any) -> tuple[str, ...]:
     """The types that a parameter with such a default may have in a script."""
     for kind, types in ((bool, BOOL), (int, INT), (float, FLOAT + LENGTH), (str, TEXT)):
         if isinstance(default, kind):

@@ -1,10 +1,9 @@
-"""What `glsk_o3d.editing` does to skeletons, for MeshLab: a verb for each function, made from its signature."""
+"""What `glsk_o3d.editing` does to skeletons, for MeshLab: a verb for each function, with its parameters."""
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -18,10 +17,9 @@ from ..io.formats.graphs import graph_skeleton
 from ..numerics.vectors import AXES
 from ..parameters import resolve_length
 from ..skeleton import Skeleton
-from .slots import OF_FRAME, Slot, facts_of
-from .verb import WHOLE, Verb, called
+from .verb import Slot, Verb, called, facts_of
 
-_EDITS: dict[str, Callable[..., Any]] = {
+_EDITS = {
     "generate_largest_skeleton_component": editing.largest_component,
     "generate_skeleton_without_loops": editing.cut_loops,
     "generate_rerooted_skeleton": editing.reroot,
@@ -29,6 +27,15 @@ _EDITS: dict[str, Callable[..., Any]] = {
     "generate_smoothed_skeleton": editing.smooth,
     "generate_simplified_skeleton": editing.simplify,
 }
+_EDIT_PARAMETERS = {
+    "length": facts_of("Least length of a branch that ends, from junction to tip.", "length", low=0),
+    "radius": facts_of("Least mean radius of a branch that ends.", "length", low=0),
+    "order": facts_of("Highest order of branches that stays: 0 for the stem alone.", "int?", low=0),
+    "passes": facts_of("How often; more passes make longer waves disappear.", "int", low=0),
+    "tolerance": facts_of("How far a dropped vertex may be from the simpler curve.", "length?", low=0),
+    "n": facts_of("How many vertices to keep, in place of a tolerance.", "int?", low=1),
+}
+_ROOT = "Where the tree grows from: the lowest vertex along an axis, the thickest end, a vertex, or a point."
 
 
 @dataclass(frozen=True)
@@ -60,32 +67,22 @@ class EditVerb(Verb):
 
     function: Callable[..., Any]
 
-    def checked(self, values):
-        for name, value in values.items():
-            if isinstance(value, str) and value.endswith(OF_FRAME):
-                raise InvalidParameterError(
-                    f"{name} = {value!r}: frames are of scans; of a skeleton percentages are of the box of its layer: "
-                    f"{value.removesuffix(OF_FRAME)!r}"
-                )
-        return super().checked(values)
-
     def plan(self, values):
         made = self.values(values)
         del made["layer"]
-        # nobody knows yet which vertices there are, and the function knows best what goes together
+        # tried on a line, since the function knows best what goes together; which vertices there are nobody knows yet
         self._applied(_line(), {name: value for name, value in made.items() if name != "root"}, 1.0)
         return made
 
     def run(self, layer, given, on_iteration=None):
         made = self.plan(given)
         if not layer.is_skeleton:
-            raise InvalidCloudError(
-                f"the layer ({layer.label}) is no skeleton: make one with {called(WHOLE)[0]}, or name its layer"
-            )
+            cure = "make one with generate_curve_skeleton_glsk, or name its layer"
+            raise InvalidCloudError(f"the layer ({layer.label}) is no skeleton: {cure}")
         try:
             found = self._applied(layer.to_skeleton(), made, layer.diagonal)
         except InvalidParameterError as error:
-            cure = f"cut them with {called('generate_skeleton_without_loops')[0]}"
+            cure = "cut them with generate_skeleton_without_loops_glsk"
             raise InvalidParameterError(str(error).replace("see cut_loops()", cure)) from None
         skeleton, *cut = found if isinstance(found, tuple) else (found,)
         told = {"cut": cut[0].mean(axis=1).tolist()} if cut else {}
@@ -103,23 +100,19 @@ def _line() -> Skeleton:
 
 
 def edits() -> list[EditVerb]:
-    """A verb for each function, with the names, defaults and sentences of its parameters."""
+    """A verb for each function of `glsk_o3d.editing`, with the names and defaults of its parameters."""
     found = []
     for stem, function in _EDITS.items():
-        text = inspect.getdoc(function) or ""
-        doc = text.partition("\n\n")[0].replace("\n", " ").replace("`", "")
-        found.append(EditVerb(*called(stem), doc, {slot.name: slot for slot in _slots(function, text)}, function))
+        doc = (inspect.getdoc(function) or "").partition("\n\n")[0].replace("\n", " ").replace("`", "")
+        found.append(EditVerb(*called(stem), doc, {slot.name: slot for slot in _slots(function)}, function))
     return found
 
 
-def _slots(function: Callable[..., Any], text: str) -> Iterator[Slot]:
-    section = text.partition("Parameters\n----------\n")[2].partition("\n\n")[0]
-    told = {name: " ".join(said.split()) for name, said in re.findall(r"^(\w+) : .*\n((?: +.*\n?)*)", section, re.M)}
+def _slots(function: Callable[..., Any]) -> Iterator[Slot]:
     _, *parameters = inspect.signature(function).parameters.values()
     for each in parameters:
-        doc, may_be_none = told.get(each.name, "").replace("`", ""), "?" * (each.default is None)
         if each.name == "root":
-            yield RootSlot("root", facts_of(doc, f"point{may_be_none}", (*AXES, "thickest")), default=each.default)
-            continue
-        kind = "length" if each.annotation.startswith("float") else "int"  # every float of theirs is one
-        yield Slot(each.name, facts_of(doc, kind + may_be_none, low=int(each.name == "n")), default=each.default)
+            kind = "point?" if each.default is None else "point"
+            yield RootSlot("root", facts_of(_ROOT, kind, (*AXES, "thickest")), default=each.default)
+        else:
+            yield Slot(each.name, _EDIT_PARAMETERS[each.name], default=each.default)

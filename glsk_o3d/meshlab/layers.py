@@ -30,26 +30,11 @@ LAYER_ENDINGS = {"points": (".ply", ".pcd", ".xyz"), "mesh": (".ply", ".obj", ".
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """Vertices with what hangs on them.
+    """Vertices with what hangs on them, (N, ...) arrays: MeshLab calls the scalars quality.
 
-    Attributes
-    ----------
-    vertices : (N, 3) float64 array
-    faces : (F, 3) int array or None
-    edges : (E, 2) int array or None
-    normals : (N, 3) float array or None
-    scalars : (N,) float array or None
-        One number per vertex, which MeshLab calls quality: radii of a skeleton, multiplicities of a contracted cloud,
-        branches of a segmented one.
-    colors : (N, 4) float array or None
-        Red, green, blue and alpha from 0 to 1.
-    label : str
-    flow : Contraction or Skeleton or None
-        What our filters pass on, of which the vertices are the visible part.
-    source : Layer or None
-        The layer from which the flow was made.
-    told : mapping
-        What else there is to say of how it was made.
+    Scalars are the radii of a skeleton, the multiplicities of a contracted cloud, the branches of a segmented one.
+    Colours are red, green, blue and alpha from 0 to 1. `flow` is what our filters pass on, of which the vertices are
+    the visible part, and `source` the layer that it was made from; `told` is what else there is to say of how.
     """
 
     vertices: np.ndarray
@@ -75,51 +60,47 @@ class Layer:
 
     @classmethod
     def read(cls, path: str | os.PathLike) -> Layer:
-        """A scan from a file, with whatever hangs on its vertices.
+        """A scan from a file that `read_cloud` reads, with the faces of a mesh and the quality of a PLY file.
 
-        Parameters
-        ----------
-        path : path-like
-            As in `glsk_o3d.read_cloud`. Of a mesh the faces are kept, of a PLY or OBJ file of lines the edges, and of a
-            PLY file the property ``quality``. What STL repeats for every triangle around it becomes one vertex.
-
-        Returns
-        -------
-        Layer
-            Its label is the name of the file.
-
-        Raises
-        ------
-        FileNotFoundError, FileFormatError, MissingPackageError
+        Of a PLY or OBJ file of lines the edges are kept. What STL repeats for every triangle becomes one vertex.
         """
-        path, scalars = check_scan(path), None
-        ending, o3d = path.suffix.lower(), import_open3d()
-        held = _elements(path, ending)
+        path = check_scan(path)
+        held = _elements(path)
         if "edge" in held and "face" not in held:
             drawing = read_skeleton(path)
-            return cls(
-                drawing.vertices,
-                edges=drawing.edges if len(drawing.edges) else None,
-                scalars=None if np.isnan(drawing.radii).all() else drawing.radii,
-                label=path.name,
-            )
+            edges = drawing.edges if len(drawing.edges) else None
+            radii = None if np.isnan(drawing.radii).all() else drawing.radii
+            return cls(drawing.vertices, edges=edges, scalars=radii, label=path.name)
         scan = read_scan(path)  # knows best what may be wrong with the file
-        cloud, faces = scan.to_legacy(), scan.triangles
-        points, normals, colors = cloud.points, cloud.normals, cloud.colors
-        if ending == ".stl":
-            mesh = o3d.geometry.TriangleMesh(points, o3d.utility.Vector3iVector(faces))
-            mesh.vertex_normals = normals
+        points, normals, faces, colors = scan.positions, scan.normals, scan.triangles, scan.colors
+        if path.suffix.lower() == ".stl":
+            o3d = import_open3d()
+            mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(points), o3d.utility.Vector3iVector(faces))
+            if normals is not None:
+                mesh.vertex_normals = o3d.utility.Vector3dVector(normals)
             mesh.remove_duplicated_vertices()
-            points, normals, faces = mesh.vertices, mesh.vertex_normals, np.array(mesh.triangles)
-        if "quality" in held.get("vertex", ()):
-            scalars = scan.attributes["quality"].astype(float)
+            points, normals, faces = map(np.array, (mesh.vertices, mesh.vertex_normals, mesh.triangles))
         return cls(
-            cloud_points(points),
+            points,
             faces=faces if len(faces) else None,
-            normals=np.array(normals) if len(normals) else None,
-            scalars=scalars,
-            colors=np.column_stack([colors, np.ones(len(colors))]) if len(colors) else None,
+            normals=normals,
+            scalars=scan.attributes["quality"].astype(float) if "quality" in held.get("vertex", ()) else None,
+            colors=None if colors is None else np.column_stack([colors, np.ones(len(colors))]),
             label=path.name,
+        )
+
+    @classmethod
+    def of_mesh(cls, mesh: Any) -> Layer:
+        """A ``pymeshlab.Mesh`` as its matrix shows it; what nobody has set, zeros or white, is left out."""
+        normals, scalars, colors = mesh.vertex_normal_matrix(), mesh.vertex_scalar_array(), mesh.vertex_color_matrix()
+        return cls(
+            mesh.transformed_vertex_matrix(),
+            faces=mesh.face_matrix() if mesh.face_number() else None,
+            edges=mesh.edge_matrix().reshape(-1, 2) if mesh.edge_number() else None,
+            normals=_turned(normals, mesh.transform_matrix()) if normals.any() else None,
+            scalars=scalars if scalars.any() else None,
+            colors=None if (colors == 1).all() else colors,
+            label=mesh.label(),
         )
 
     def shows(self, other: Layer) -> bool:
@@ -176,23 +157,10 @@ class Layer:
         return graph_skeleton(self.vertices, np.empty((0, 2)) if self.edges is None else self.edges, self.scalars)
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write the layer: one with edges as `save_skeleton` does, others with their faces, scalars and colours.
+        """Write the layer, complete or not at all: a skeleton by `save_skeleton`, which has the options.
 
-        Parameters
-        ----------
-        path : path-like
-            The ending of a skeleton's format; for points ``.ply`` (with the scalars as the property ``quality``, as
-            MeshLab has it), ``.pcd`` (float32, with normals and colours) or ``.xyz``; for a mesh also ``.obj``,
-            ``.off`` or ``.stl``.
-        **options
-            As in `save_skeleton`.
-
-        Raises
-        ------
-        FileFormatError
-            The ending is that of no format, or of none for such a layer.
-        OSError
-            The file cannot be written.
+        Others by their endings: ``.ply`` with everything, the scalars as ``quality`` as MeshLab has it, ``.pcd`` in
+        float32 with normals and colours, or ``.xyz``; a mesh also as ``.obj``, ``.off`` or ``.stl``.
         """
         path = Path(path)
         if self.is_skeleton:
@@ -221,9 +189,8 @@ class Layer:
 
     def _write_open3d(self, path: Path) -> None:
         o3d = import_open3d()
-        vector = o3d.utility.Vector3dVector
         points, normals, colors = (
-            vector(np.empty((0, 3)) if array is None else np.ascontiguousarray(array[:, :3], float))
+            o3d.utility.Vector3dVector(np.empty((0, 3)) if array is None else np.ascontiguousarray(array[:, :3], float))
             for array in (self.vertices, self.normals, self.colors)
         )
         if path.suffix.lower() in LAYER_ENDINGS["points"]:
@@ -231,9 +198,8 @@ class Layer:
             cloud.normals, cloud.colors = normals, colors
             done = o3d.io.write_point_cloud(str(path), cloud)
         else:
-            mesh = o3d.geometry.TriangleMesh(
-                points, o3d.utility.Vector3iVector(np.ascontiguousarray(self.faces, np.int32))
-            )
+            faces = o3d.utility.Vector3iVector(np.ascontiguousarray(self.faces, np.int32))
+            mesh = o3d.geometry.TriangleMesh(points, faces)
             mesh.vertex_normals, mesh.vertex_colors = normals, colors
             if path.suffix.lower() == ".stl":
                 mesh.compute_triangle_normals()
@@ -245,11 +211,19 @@ class Layer:
         np.savetxt(path, self.vertices, fmt="%.17g")
 
 
-def _elements(path, ending) -> dict[str, list[str]]:
-    if ending == ".obj":  # without faces Open3D finds nothing in it
+def _turned(normals: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Normals as a layer's matrix shows them: they keep their lengths and stay normal where it is no rotation."""
+    turned = normals @ np.linalg.pinv(matrix[:3, :3])
+    before, after = (np.linalg.norm(vectors, axis=1, keepdims=True) for vectors in (normals, turned))
+    return turned * np.divide(before, after, out=np.ones_like(after), where=after > 0)
+
+
+def _elements(path: Path) -> dict[str, list[str]]:
+    """What a PLY or OBJ file holds, with the properties of PLY."""
+    if path.suffix.lower() == ".obj":  # without faces Open3D finds nothing in it
         with path.open("rb") as stream:
             return {"face" if any(line.split()[:1] == [b"f"] for line in stream) else "edge": []}
-    return ply_elements(path) if ending == ".ply" else {}
+    return ply_elements(path) if path.suffix.lower() == ".ply" else {}
 
 
 def check_ending(path: Path, what: str) -> None:

@@ -4,21 +4,30 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import GlskError, InvalidParameterError, did_you_mean
+from ..errors import FileFormatError, GlskError, InvalidCloudError, InvalidParameterError, did_you_mean
+from ..interop.atomic import write_atomically
+from ..interop.packages import require
+from ..io.paths import SCAN_ENDINGS
+from ..io.scans import check_scan
+from ..io.skeletons import FORMATS
+from ..skeleton import Skeleton
 from . import builtin
-from .meshset_layers import LayeredMeshSet, pymeshlab
-from .recording import Recording, exact_digits
-from .script import read_script
+from .layers import Layer
+from .script import VECTORS, Call, read_script, write_script
 from .steps import Step, read_steps, step
-from .verbs import Verb, verbs
+from .verbs import verbs
+
+pymeshlab = require("pymeshlab")
 
 
-class MeshSet(LayeredMeshSet):
+class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
     """``pymeshlab.MeshSet`` with the filters of this package among MeshLab's own.
 
     Ours are applied as MeshLab's are, by name or as methods, and can be mixed with them in filter scripts. Each makes a
@@ -31,10 +40,7 @@ class MeshSet(LayeredMeshSet):
     ``pymeshlab.PureValue``, in the units of the cloud; a float and a string such as ``"2%"`` are understood too. What
     is not given is as elsewhere in this package, of the box that ``RingBuilder.frame`` names: ``"1% of the frame"``.
 
-    Raises
-    ------
-    MissingPackageError
-        When the class is imported and pymeshlab is not installed.
+    Where pymeshlab is not installed, importing the class raises MissingPackageError.
 
     Examples
     --------
@@ -49,9 +55,8 @@ class MeshSet(LayeredMeshSet):
 
     def __init__(self, *args: Any, **kwargs: Any):
         super().__init__(*args, **kwargs)
-        self._script = Recording()
-
-    # ----------------------------------------------------------------------------------------------------- filters
+        self._script: list[Step] = []
+        self._flows: dict[int, Layer] = {}  # what our filters made, by the number of the layer
 
     def apply_filter(self, filter_name: str, **params: Any) -> dict[str, Any]:
         """Apply a filter of MeshLab's or ours to the current layer.
@@ -77,90 +82,52 @@ class MeshSet(LayeredMeshSet):
         pymeshlab.PyMeshLabException
             A filter of MeshLab's failed.
         """
-        with self._script.following(self._numbers) as moved_to:
-            if filter_name in verbs():
-                params = _plain_lengths(params)
-                if moved_to is not None and params.get("layer", -1) == -1:
-                    params["layer"] = moved_to
-                done = step(verbs()[filter_name], params)
-                result, moved_to = self._run_ours(done), None
-            elif filter_name in pymeshlab.filter_list():
-                done, result = self._run_theirs(filter_name, params)
-            else:
-                raise InvalidParameterError(did_you_mean(str(filter_name), self.filter_list(), "filter"))
-            self._script.add(done, moved_to)
+        if filter_name in verbs():
+            done = step(verbs()[filter_name], _plain_lengths(params))
+            result = self._run_ours(done)
+        elif filter_name in pymeshlab.filter_list():
+            result = self._run_theirs(filter_name, params)
+            done = Step(filter_name, params, self._last_call())
+        else:
+            raise InvalidParameterError(did_you_mean(str(filter_name), self.filter_list(), "filter"))
+        self._script.append(done)
         return result
 
-    def _numbers(self) -> tuple[list[int], int]:
-        """Those of all layers, and of the current one; -1 where there is none."""
-        return sorted(mesh.id() for mesh in self), self.current_mesh_id() if self.mesh_number() else -1
-
     def apply_step(self, step: Step, on_iteration: Callable[..., Any] | None = None) -> dict[str, Any]:
-        """Run a filter of a script without adding it to the current script.
-
-        Parameters
-        ----------
-        step : Step
-        on_iteration : callable, optional
-            As in `glsk_o3d.skeletonize`.
-
-        Returns
-        -------
-        dict of str to object
-
-        Raises
-        ------
-        ScriptError
-            The filter failed; the message names file and line.
-        """
+        """Run a filter of a script without adding it to the current script; ScriptError if it fails."""
         with step.named_in_errors():
             if step.verb is not None:
                 return self._run_ours(step, on_iteration)
-            if step.goes_to is not None:
-                if not self.mesh_id_exists(step.goes_to):
-                    raise InvalidParameterError(f"mesh = {step.goes_to}: there is no such layer")
-                self.set_current_mesh(step.goes_to)
-                return {"layer": step.goes_to}
             try:
-                return self._run_theirs(step.name, step.values)[1]
+                return self._run_theirs(step.name, step.values)
             except Exception as error:  # pymeshlab's have no base of their own
                 raise GlskError(" ".join(str(error).split())) from error
 
-    def _run_ours(self, step: Step, on_iteration=None) -> dict[str, Any]:
-        verb = step.verb
-        assert verb is not None
-        layer = verb.run(self.layer(step.values.get("layer", -1)), step.values, on_iteration)
+    def _run_ours(self, step: Step, on_iteration: Callable[..., Any] | None = None) -> dict[str, Any]:
+        assert step.verb is not None
+        layer = step.verb.run(self.layer(step.values.get("layer", -1)), step.values, on_iteration)
         self.add_mesh(layer.to_pymeshlab(), layer.label)
         self._flows = {number: known for number, known in self._flows.items() if self.mesh_id_exists(number)}
         self._flows[self.current_mesh_id()] = layer
         return {"layer": self.current_mesh_id(), **layer.summary()}
 
-    def _run_theirs(self, name: str, params: dict[str, Any]) -> tuple[Step, dict[str, Any]]:
-        asked: Any = super() if self.mesh_number() else builtin.trial()  # without a mesh it crashes
-        exact = asked.filter_parameter_values(name, **params)
-        for key, value in exact.items():
-            if self.mesh_number() and builtin.is_layer(key, value) and not self.mesh_id_exists(value):
-                raise InvalidParameterError(f"{key} = {value}: there is no such layer")
+    def _run_theirs(self, name: str, params: dict[str, Any]) -> dict[str, Any]:
+        if self.mesh_number():  # without a mesh it crashes
+            for key, value in super().filter_parameter_values(name, **params).items():
+                if builtin.is_layer(key, value) and not self.mesh_id_exists(value):
+                    raise InvalidParameterError(f"{key} = {value}: there is no such layer")
         super().clear_filter_script()
-        result = super().apply_filter(name, **params)
-        with tempfile.TemporaryDirectory() as folder:  # MeshLab alone knows how they are written
+        return super().apply_filter(name, **params)
+
+    def _last_call(self) -> Call:
+        """The filter of MeshLab's that ran last as MeshLab writes it, which alone knows how."""
+        with tempfile.TemporaryDirectory() as folder:
             file = os.path.join(folder, "last.mlx")
             super().save_filter_script(file)
-            (call,) = read_script(file)
-        return exact_digits(Step(name, dict(params), call), exact), result
+            return read_script(file)[0]
 
     def filter_parameter_values(self, filter_name: str, **params: Any) -> dict[str, Any]:
-        """The parameters that `apply_filter` would use: those given, and the defaults of the others.
-
-        Parameters
-        ----------
-        filter_name : str
-        **params
-
-        Returns
-        -------
-        dict of str to object
-        """
+        """The parameters that `apply_filter` would use: those given, and the defaults of the others."""
         if filter_name in verbs():
             return verbs()[filter_name].values(_plain_lengths(params))
         return super().filter_parameter_values(filter_name, **params)
@@ -177,87 +144,136 @@ class MeshSet(LayeredMeshSet):
 
     @staticmethod
     def print_filter_parameter_list(filter_name: str) -> None:
-        """Print the parameters of a filter: name, type and default; of ours also limits and meaning.
-
-        Parameters
-        ----------
-        filter_name : str
-        """
-        verb = verbs().get(filter_name)
-        if verb is None:
-            if filter_name not in pymeshlab.filter_list():
-                raise InvalidParameterError(did_you_mean(filter_name, MeshSet.filter_list(), "filter"))
+        """Print the parameters of a filter: name, type and default; of ours also limits and meaning."""
+        if filter_name in verbs():
+            print(f"{filter_name} filter - list of parameter names:")
+            print("\n".join(verbs()[filter_name].listing()))
+        elif filter_name in pymeshlab.filter_list():
             pymeshlab.print_filter_parameter_list(filter_name)
-            return
-        print(f"{filter_name} filter - list of parameter names:")
-        print("\n".join(_described(verb)) or "\tNone.")
+        else:
+            raise InvalidParameterError(did_you_mean(filter_name, MeshSet.filter_list(), "filter"))
 
     @staticmethod
     def search(word: str) -> None:
-        """Print the filters, MeshLab's and ours, whose names or descriptions have a word.
-
-        Parameters
-        ----------
-        word : str
-        """
+        """Print the filters, MeshLab's and ours, whose names or descriptions have a word."""
         for verb in verbs().values():
             if all(part in f"{verb.name} {verb.title} {verb.doc}".lower() for part in word.lower().split()):
                 print(f"{verb.name} : {verb.doc}")
         pymeshlab.search(word)
 
-    # ---------------------------------------------------------------------------------------------------- scripts
-
     def load_filter_script(self, filter_script_name: str | os.PathLike, *, any_filter: bool = False) -> None:
-        """Make a script file the current script. Nothing is run; everything is checked.
+        """Make a script file the current script. Nothing is run; everything is checked, ScriptError says what is wrong.
 
         Parameters
         ----------
         filter_script_name : path-like
         any_filter : bool
             Take also filters of MeshLab's that write, read or send files, from a script that is trusted.
-
-        Raises
-        ------
-        FileNotFoundError, FileFormatError, ScriptError
-            See `glsk_o3d.meshlab.steps.read_steps`.
         """
-        self._script.load(read_steps(filter_script_name, any_filter))
+        self._script = read_steps(filter_script_name, any_filter)
 
     def apply_filter_script(self) -> None:
         """Run the filters of the current script, in order, from the current layer on."""
-        self._script.rerun()
-        for each in self._script.steps:
-            with self._script.following(self._numbers):
-                self.apply_step(each)
+        for each in self._script:
+            self.apply_step(each)
 
     def save_filter_script(self, filter_script_name: str | os.PathLike) -> None:
-        """Write the current script: what was loaded, and what was applied since. Our lengths in percent stay so.
+        """Write the current script: what was loaded, and the filters applied since. Our lengths in percent stay so.
 
-        A filter that acted on another layer than the one that the filter before left does so again.
-
-        Parameters
-        ----------
-        filter_script_name : path-like
-
-        Raises
-        ------
-        ScriptError
-            A filter acted on a layer that was added after the first filter, which no script can do.
+        Which layer was the current one is not in it: a filter of ours that names its layer acts on it again.
         """
-        self._script.save(filter_script_name)
+        write_script(filter_script_name, [each.call for each in self._script])
 
     def clear_filter_script(self) -> None:
         """Make the current script empty."""
-        self._script.clear()
+        self._script = []
+
+    def print_filter_script(self) -> None:
+        """Print the filters of the current script with their parameters."""
+        print(f"Filter Script Size : {len(self._script)}\n")
+        for i, each in enumerate(self._script):
+            print(f"{i}: {each.name}")
+            for param in each.call.params:
+                values = [param.attributes[key] for key in VECTORS.get(param.type, ("value",))]
+                print(f"\t{param.name} : {param.type} = {', '.join(values)}")
+
+    def add_points(self, points: Any, name: str = "cloud") -> None:
+        """Add a cloud, anything that `skeletonize` takes, as a new layer, which becomes the current one."""
+        self.add_mesh(Layer.of(points).to_pymeshlab(), name)
+
+    def layer(self, number: int = -1) -> Layer:
+        """A layer as our filters see it, with what they passed on if its vertices and edges are unchanged since.
+
+        -1 is the current layer. InvalidCloudError without any, InvalidParameterError without one of that number.
+        """
+        if not self.mesh_number():
+            raise InvalidCloudError("there is no layer: load a scan first")
+        number = self.current_mesh_id() if number == -1 else number
+        if not self.mesh_id_exists(number):
+            raise InvalidParameterError(f"layer = {number}: there is no such layer")
+        layer, known = Layer.of_mesh(self.mesh(number)), self._flows.get(number)
+        if known is None or not known.shows(layer):
+            return layer
+        flow, scalars = known.flow, self.mesh(number).vertex_scalar_array()
+        if isinstance(flow, Skeleton) and not np.array_equal(scalars, flow.radii, equal_nan=True):
+            flow = replace(flow, radii=scalars, half_width=scalars, half_thickness=scalars)
+        return replace(layer, edges=known.edges, flow=flow, source=known.source)
+
+    def current_skeleton(self) -> Skeleton:
+        """The skeleton in the current layer; its radii are the layer's scalars. InvalidCloudError if it has no edges.
+
+        It has its report and its points if nothing changed its vertices and edges since they were made.
+        """
+        layer = self.layer()
+        if layer.edges is None:
+            raise InvalidCloudError(f"the current layer ({layer.label}) has no edges: it is no skeleton")
+        return layer.to_skeleton()
+
+    def load_scan(self, path: str | os.PathLike) -> None:
+        """Add a scan from a file as a new layer: what `read_cloud` reads as ``glsk run`` does, all else by MeshLab.
+
+        FileNotFoundError or FileFormatError without points. `load_new_mesh` also has colours of faces and textures.
+        """
+        path = check_scan(path)
+        try:
+            if path.suffix.lower() in SCAN_ENDINGS:
+                self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)
+            else:
+                self.load_new_mesh(str(path))
+        except pymeshlab.PyMeshLabException as error:
+            raise FileFormatError(f"{path}: MeshLab cannot read it: {' '.join(str(error).split())}") from error
+        if not self.current_mesh().vertex_number():
+            raise FileFormatError(f"{path}: no points could be read")
+
+    def save_current_mesh(self, file_name: str | os.PathLike, *args: Any, **kwargs: Any) -> None:
+        """Write the current layer: as pymeshlab, but without options a layer of vertices and edges as `save_skeleton`.
+
+        So edges and their radii survive in PLY, which MeshLab would drop, and there are all formats of skeletons.
+        """
+        lines = self.current_mesh().edge_number() and not self.current_mesh().face_number()
+        if lines and not args and not kwargs and os.fspath(file_name).lower().endswith(tuple(FORMATS)):
+            self.save(file_name)
+        else:
+            super().save_current_mesh(os.fspath(file_name), *args, **kwargs)
+
+    def save(self, path: str | os.PathLike, **options: Any) -> None:
+        """Write the current layer as ``glsk run`` does, complete or not at all: by MeshLab if it has faces.
+
+        Options are those of `save_skeleton`. FileFormatError for an unknown ending.
+        """
+        layer = self.layer()
+        if layer.faces is None or Path(path).suffix.lower() in (".pcd", ".xyz"):  # which hold no faces
+            layer.save(path, **options)
+            return
+        try:
+            write_atomically(path, lambda temporary: super(MeshSet, self).save_current_mesh(str(temporary)))
+        except pymeshlab.PyMeshLabException as error:
+            raise FileFormatError(f"{path}: MeshLab cannot write it: {' '.join(str(error).split())}") from error
 
     def clear(self) -> None:
         """Remove all layers. The current script stays."""
         super().clear()
-        self._script.forget_layers()
-
-    def print_filter_script(self) -> None:
-        """Print the filters of the current script with their parameters."""
-        print(self._script)
+        self._flows = {}
 
 
 def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
@@ -271,26 +287,14 @@ def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
     return {name: plain(value) for name, value in params.items()}
 
 
-def _described(verb: Verb) -> Iterator[str]:
-    values = verb.values({})
-    for slot in verb.slots.values():
-        limits = {"above" if slot.facts["open_low"] else "min": slot.facts["low"], "max": slot.facts["high"]}
-        limits = {key: limit for key, limit in limits.items() if limit is not None}
-        said = f" [{'; '.join(f'{key}: {limit:g}' for key, limit in limits.items())}]" if limits else ""
-        said += f" ({', '.join(slot.words)})" if slot.words else ""
-        default = values.get(slot.name, "as the pipeline has it")
-        yield f"\t{slot.name} : {slot.python_type()} = {default}{said}\n\t\t{slot.facts['doc']}"
-
-
-def _method(name: str, verb: Verb):
+def _method(name: str, doc: str) -> Callable[..., dict[str, Any]]:
     def apply(self, **params):
         return self.apply_filter(name, **params)
 
-    apply.__name__ = name
-    apply.__qualname__ = f"MeshSet.{name}"
-    apply.__doc__ = f"{verb.doc}\n\nParameters: see ``MeshSet.print_filter_parameter_list({name!r})``.\n"
+    apply.__name__, apply.__qualname__ = name, f"MeshSet.{name}"
+    apply.__doc__ = f"{doc}\n\nParameters: see ``MeshSet.print_filter_parameter_list({name!r})``.\n"
     return apply
 
 
-for _name, _verb in verbs().items():
-    setattr(MeshSet, _name, _method(_name, _verb))
+for _verb in verbs().values():
+    setattr(MeshSet, _verb.name, _method(_verb.name, _verb.doc))

@@ -1,20 +1,8 @@
-"""MeshLab's filter scripts (.mlx), read and written without MeshLab.
-
-A script is a list of filters, each with the parameters that differ from its defaults::
-
-    <!DOCTYPE FilterScript>
-    <FilterScript>
-     <filter name="Generate Curve Skeleton (GLSkeleton)">
-      <Param type="RichAbsPerc" name="connector_radius" value="2%"/>
-     </filter>
-    </FilterScript>
-
-Of XML nothing else is taken: no entities, no references to other files, no elements of another kind. The parser is that
-of the standard library, because it knows line numbers and says, before it reads one, that a DOCTYPE has declarations.
-"""
+"""MeshLab's filter scripts (.mlx), read and written without MeshLab."""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -41,51 +29,28 @@ VECTORS = {
     **dict.fromkeys(POINT, ("x", "y", "z")),
     **dict.fromkeys(MATRIX, tuple(f"val{i}" for i in range(16))),
 }
+"""The attributes of the types that have their value in several."""
 
 
 @dataclass(frozen=True)
 class Param:
-    """A parameter as it stands in a script.
-
-    Attributes
-    ----------
-    name : str
-    type : str
-        ``"RichInt"``, ``"RichAbsPerc"`` and so on.
-    attributes : dict of str to str
-        All attributes of the element; most types have their value in ``value``.
-    line : int
-    """
+    """A parameter as it stands in a script: its attributes are text, most types have their value in ``value``."""
 
     name: str
     type: str
     attributes: dict[str, str]
     line: int = 0
 
-    def check_type(self, types: Sequence[str]) -> None:
-        """Raise ValueError unless the parameter has one of the types."""
+    def value(self, types: Sequence[str]) -> Any:
+        """A bool, int, float, str, list of floats (of ints for a colour), or for a length a float or text as "2%".
+
+        ValueError if the type is none of those, or what stands there is not of that type.
+        """
         if self.type not in types:
             fitting = f"it may be a {' or '.join(types)}" if types else "scripts cannot give it"
             raise ValueError(f"a {self.type} is not what it takes: {fitting}")
-
-    def value(self) -> Any:
-        """What stands there: bool, int, float, str, a list of floats (of ints for a colour), or for a
-        length a float or text such as "2%".
-
-        Raises
-        ------
-        ValueError
-            It is not of the type that it claims to be; the message says so.
-        """
         if self.type in VECTORS:
-            names = VECTORS[self.type]
-            lost = [name for name in names if name not in self.attributes]
-            if lost:
-                raise ValueError(f"a {self.type} has the attributes {', '.join(names)}, and {lost[0]} is not there")
-            numbers = [self._number(self._kind, self.attributes[name]) for name in names]
-            if self._kind is int and not all(0 <= number <= 255 for number in numbers):
-                raise ValueError("a RichColor is of whole numbers from 0 to 255")
-            return numbers
+            return self._vector(VECTORS[self.type])
         if "value" not in self.attributes:
             raise ValueError("it has no value")
         text = self.attributes["value"].strip()
@@ -96,36 +61,33 @@ class Param:
                 raise ValueError(f"{text[:40]!r} is neither true nor false")
             return text.lower() == "true"
         if self.type in LENGTH and text.endswith("%"):
-            self._number(float, text[:-1])
+            _number(text[:-1], float)
             return text
-        return self._number(self._kind, text)
+        return _number(text, int if self.type in INT else float)
 
-    @property
-    def _kind(self):
-        return int if self.type in (*INT, "RichColor") else float
+    def _vector(self, names: Sequence[str]) -> list[float]:
+        lost = [name for name in names if name not in self.attributes]
+        if lost:
+            raise ValueError(f"a {self.type} has the attributes {', '.join(names)}, and {lost[0]} is not there")
+        numbers = [_number(self.attributes[name], int if self.type == "RichColor" else float) for name in names]
+        if self.type == "RichColor" and not all(0 <= number <= 255 for number in numbers):
+            raise ValueError("a RichColor is of whole numbers from 0 to 255")
+        return numbers
 
-    def _number(self, kind, text):
-        try:
-            number = kind(text.replace("_", "?"))  # Python alone reads 1_0 as 10
-        except ValueError:
-            raise ValueError(f"{text[:40]!r} is not {'an int' if kind is int else 'a number'}") from None
-        if number != number or number in (float("inf"), float("-inf")):
-            raise ValueError(f"{text!r} is not finite")
-        return number
+
+def _number(text: str, kind: type) -> Any:
+    try:
+        number = kind(text.replace("_", "?"))  # Python alone reads 1_0 as 10
+    except ValueError:
+        raise ValueError(f"{text[:40]!r} is not {'an int' if kind is int else 'a number'}") from None
+    if kind is float and not math.isfinite(number):
+        raise ValueError(f"{text!r} is not finite")
+    return number
 
 
 @dataclass(frozen=True)
 class Call:
-    """A filter as it stands in a script.
-
-    Attributes
-    ----------
-    name : str
-        What MeshLab calls the filter in its menus.
-    params : tuple of Param
-    line : int
-        0 where it is not from a file.
-    """
+    """A filter as it stands in a script, by the name that MeshLab's menus have; line 0 where it is not from a file."""
 
     name: str
     params: tuple[Param, ...] = ()
@@ -133,21 +95,11 @@ class Call:
 
 
 def read_script(path: str | os.PathLike) -> list[Call]:
-    """Read a filter script. Whether its filters exist is not asked here.
+    """The filters of a script, at least one. Whether they exist is not asked here.
 
-    Returns
-    -------
-    list of Call
-        At least one.
-
-    Raises
-    ------
-    FileNotFoundError
-    FileFormatError
-        A folder, a device, or an empty or huge file.
-    ScriptError
-        It is not XML, has elements other than those of a script, or what scripts never need and attacks do: entities,
-        and a DOCTYPE with declarations or a reference. The message names file and line.
+    FileFormatError for a folder, a device, or an empty or huge file. ScriptError, with the line, for what is not XML,
+    for elements other than those of a script, and for what scripts never need and attacks do: entities, and a DOCTYPE
+    with declarations or a reference.
     """
     path = Path(path)
     if not path.exists():
@@ -164,6 +116,8 @@ def read_script(path: str | os.PathLike) -> list[Call]:
 
 
 class _Reader:
+    """The parser of the standard library: it knows lines, and tells of a DOCTYPE's declarations before it reads one."""
+
     def __init__(self, path: Path):
         self.path, self.depth = path, 0
         self.calls: list[tuple[str, list[Param], int]] = []
@@ -177,23 +131,18 @@ class _Reader:
             self.parser.Parse(data, True)
         except expat.ExpatError as error:
             line = min(error.lineno, data.count(b"\n") + 1)
-            raise ScriptError(
-                f"{self.path}, line {line}: not well-formed XML: {expat.ErrorString(error.code)}"
-            ) from None
-        except (ValueError, LookupError) as error:
-            if isinstance(error, ScriptError):
-                raise
-            raise ScriptError(f"{self.path}, line 1: cannot be read: {error}") from None  # an encoding nobody knows
+            said = f"not well-formed XML: {expat.ErrorString(error.code)}"
+            raise ScriptError(f"{self.path}, line {line}: {said}") from None
+        except ScriptError:
+            raise
+        except (ValueError, LookupError) as error:  # an encoding nobody knows
+            raise ScriptError(f"{self.path}, line 1: cannot be read: {error}") from None
         if not self.calls:
             raise self.error("the script has no filters")
         return [Call(name, tuple(params), line) for name, params, line in self.calls]
 
-    @property
-    def line(self) -> int:
-        return self.parser.CurrentLineNumber
-
     def error(self, message: str) -> ScriptError:
-        return ScriptError(f"{self.path}, line {self.line}: {message}")
+        return ScriptError(f"{self.path}, line {self.parser.CurrentLineNumber}: {message}")
 
     def doctype(self, name, system, public, has_declarations):
         if has_declarations or system or public:
@@ -209,20 +158,20 @@ class _Reader:
             hint = f": only <{expected}> may" if expected else ": nothing may"
             raise self.error(f"<{element[:40]}> cannot stand {inside}{hint}")
         self.depth += 1
-        if any(len(attributes.get(key, "")) > LONGEST_NAME for key in ("name", "type")):
+        name, type, line = attributes.get("name", ""), attributes.get("type", ""), self.parser.CurrentLineNumber
+        if max(len(name), len(type)) > LONGEST_NAME:
             raise self.error(f"a name of more than {LONGEST_NAME} characters")
         if element == "filter":
-            if not attributes.get("name"):
+            if not name:
                 raise self.error("a <filter> without a name")
-            self.calls.append((attributes["name"], [], self.line))
+            self.calls.append((name, [], line))
         elif element == "Param":
             filter, params, _ = self.calls[-1]
-            name, type = attributes.get("name"), attributes.get("type")
             if not (name and type):
                 raise self.error(f"filter {filter!r}: a <Param> without a {'type' if name else 'name'}")
             if name in [param.name for param in params]:
                 raise self.error(f"filter {filter!r}: parameter {name!r} is given twice")
-            params.append(Param(name, type, attributes, self.line))
+            params.append(Param(name, type, attributes, line))
 
     def end(self, element):
         self.depth -= 1
@@ -236,19 +185,17 @@ def script_text(calls: Iterable[Call]) -> str:
     """Filters as the text of a script."""
     lines = ["<!DOCTYPE FilterScript>", "<FilterScript>"]
     for call in calls:
-        inner = [f"  <Param {_attributes(param)}/>" for param in call.params]
-        lines.append(f" <filter name={quoteattr(call.name)}{'' if inner else '/'}>")
-        lines += [*inner, " </filter>"] if inner else []
+        lines.append(f" <filter name={quoteattr(call.name)}{'' if call.params else '/'}>")
+        for param in call.params:
+            attributes = {"type": param.type, "name": param.name, **param.attributes}
+            lines.append(f"  <Param {' '.join(f'{key}={quoteattr(value)}' for key, value in attributes.items())}/>")
+        if call.params:
+            lines.append(" </filter>")
     return "\n".join([*lines, "</FilterScript>", ""])
 
 
-def _attributes(param: Param) -> str:
-    ordered = {"type": param.type, "name": param.name, **param.attributes}
-    return " ".join(f"{key}={quoteattr(value)}" for key, value in ordered.items())
-
-
-def write_script(path: str | os.PathLike, calls: Sequence[Call]) -> None:
-    """Write filters as a script, as `write_atomically` does."""
+def write_script(path: str | os.PathLike, calls: Iterable[Call]) -> None:
+    """Write filters as a script, complete or not at all."""
     write_atomically(path, lambda temporary: temporary.write_text(script_text(calls), encoding="utf-8"))
 
 

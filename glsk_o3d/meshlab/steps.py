@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,13 +14,9 @@ from ..errors import GlskError, InvalidParameterError, MissingPackageError, Scri
 from ..interop.packages import require
 from . import builtin
 from .layers import Layer
-from .script import Call, Param, read_script
-from .slots import Slot, facts_of
-from .verbs import Verb, verbs
-
-CHANGE_LAYER = "Change the current layer"
-"""A filter of MeshLab 2016, which had it for scripts; today's has none."""
-_CHANGED = {"mesh": Slot("mesh", facts_of("The layer to go on with.", "int", low=0))}
+from .script import Call, read_script
+from .verb import Verb
+from .verbs import verbs
 
 
 @dataclass(frozen=True)
@@ -46,26 +42,19 @@ class Step:
 
     @property
     def verb(self) -> Verb | None:
-        """None for MeshLab's own filters, and where the layer is changed."""
+        """None for MeshLab's own filters."""
         return verbs().get(self.name)
-
-    @property
-    def goes_to(self) -> int | None:
-        """The layer that becomes the current one, where that is all."""
-        return self.values["mesh"] if self.call.name == CHANGE_LAYER else None
 
     @property
     def needs_pymeshlab(self) -> bool:
         """Whether it is a filter of MeshLab's own."""
-        return self.verb is None and self.goes_to is None
+        return self.verb is None
 
     @contextmanager
     def named_in_errors(self) -> Iterator[None]:
         """Say in every error of ours where in the script it happened."""
         try:
             yield
-        except ScriptError:
-            raise
         except GlskError as error:
             place = f"{self.place}: " if self.place else ""
             slots = self.verb.slots if self.verb is not None else ()
@@ -93,22 +82,6 @@ def step(verb: Verb, values: Mapping[str, Any]) -> Step:
     """
     params = tuple(verb.slots[name].written(value) for name, value in verb.values(values).items())
     return Step(verb.name, dict(values), Call(verb.title, params))
-
-
-def change_of_layer(number: int) -> Step:
-    """What makes another layer the current one.
-
-    Parameters
-    ----------
-    number : int
-
-    Returns
-    -------
-    Step
-    """
-    return Step(
-        "set_current_mesh", {"mesh": number}, Call(CHANGE_LAYER, (Param("mesh", "RichMesh", {"value": str(number)}),))
-    )
 
 
 def read_steps(path: str | os.PathLike, any_filter: bool = False) -> list[Step]:
@@ -140,11 +113,14 @@ def read_steps(path: str | os.PathLike, any_filter: bool = False) -> list[Step]:
             require("pymeshlab")
         except MissingPackageError as error:
             raise MissingPackageError(f"{path}: {_listed(foreign)}: {error}", name=error.name) from error
-    return [_step(call, path, any_filter) for call in calls]
+    ours = {verb.title: verb for verb in verbs().values()}
+    return [
+        _ours(ours[call.name], call, path) if call.name in ours else _theirs(call, path, any_filter) for call in calls
+    ]
 
 
 def meshlabs_own(calls: Sequence[Call], path: str | os.PathLike) -> list[Call]:
-    """The filters of a script that need pymeshlab.
+    """The filters of a script that need pymeshlab; ScriptError if it has one that nobody knows.
 
     Parameters
     ----------
@@ -155,13 +131,8 @@ def meshlabs_own(calls: Sequence[Call], path: str | os.PathLike) -> list[Call]:
     Returns
     -------
     list of Call
-
-    Raises
-    ------
-    ScriptError
-        It has a filter that nobody knows.
     """
-    ours = {CHANGE_LAYER, *(verb.title for verb in verbs().values())}
+    ours = [verb.title for verb in verbs().values()]
     foreign = [call for call in calls if call.name not in ours]
     for call in foreign:
         if call.name not in builtin.names():
@@ -171,49 +142,41 @@ def meshlabs_own(calls: Sequence[Call], path: str | os.PathLike) -> list[Call]:
 
 
 def _listed(calls: Sequence[Call]) -> str:
-    """Such as "'Select None' (lines 3, 9) and 'Close Holes' (line 5) are filters of MeshLab's own"."""
+    """Such as "'Select None' (lines 3, 9), 'Close Holes' (line 5) are filters of MeshLab's own"."""
     lines: dict[str, list[str]] = {}
     for call in calls:
         lines.setdefault(call.name, []).append(str(call.line))
     told = [f"{name!r} (line{'s' * (len(at) > 1)} {', '.join(at)})" for name, at in lines.items()]
-    told = [", ".join(told[:-1]), told[-1]] if len(told) > 1 else told
-    return " and ".join(told) + (" are filters of MeshLab's own" if len(lines) > 1 else " is a filter of MeshLab's own")
+    return f"{', '.join(told)} {'are filters' if len(told) > 1 else 'is a filter'} of MeshLab's own"
 
 
-def _step(call: Call, path, any_filter: bool) -> Step:
-    place = f"{path}, line {call.line}"
-    verb = next((verb for verb in verbs().values() if verb.title == call.name), None)
-    if verb is not None:
-        values = _values(verb.slots, call, path)
-        try:
-            verb.plan(values)
-        except InvalidParameterError as error:
-            raise ScriptError(f"{place}: filter {call.name!r}: {error}") from None
-        return Step(verb.name, values, call, place)
-    if call.name == CHANGE_LAYER:
-        values = _values(_CHANGED, call, path)
-        if not values:
-            raise ScriptError(f"{place}: filter {call.name!r}: its parameter 'mesh' is not there: which layer?")
-        return replace(change_of_layer(values["mesh"]), place=place)
-    name = builtin.names()[call.name]
-    try:
-        return Step(name, builtin.arguments(name, call.params, any_filter), call, place)
-    except ValueError as error:
-        message, line = error.args
-        raise ScriptError(f"{path}, line {line or call.line}: filter {call.name!r}: {message}") from None
-
-
-def _values(slots: Mapping[str, Slot], call: Call, path) -> dict[str, Any]:
+def _ours(verb: Verb, call: Call, path: str | os.PathLike) -> Step:
     values = {}
     for param in call.params:
+        if param.name not in verb.slots:
+            raise _refused(path, call, did_you_mean(param.name, verb.slots, "parameter"), param.line)
         try:
-            if param.name not in slots:
-                raise ValueError(did_you_mean(param.name, slots, "parameter"))
-            values[param.name] = slots[param.name].read(param)
+            values[param.name] = verb.slots[param.name].read(param)
         except ValueError as error:
-            known = f"parameter {param.name!r}: " if param.name in slots else ""
-            raise ScriptError(f"{path}, line {param.line}: filter {call.name!r}: {known}{error}") from None
-    return values
+            raise _refused(path, call, f"parameter {param.name!r}: {error}", param.line) from None
+    try:
+        verb.plan(values)
+    except InvalidParameterError as error:
+        raise _refused(path, call, str(error)) from None
+    return Step(verb.name, values, call, f"{path}, line {call.line}")
+
+
+def _theirs(call: Call, path: str | os.PathLike, any_filter: bool) -> Step:
+    name = builtin.names()[call.name]
+    try:
+        values = builtin.arguments(name, call.params, any_filter)
+    except ValueError as error:
+        raise _refused(path, call, *error.args) from None
+    return Step(name, values, call, f"{path}, line {call.line}")
+
+
+def _refused(path: str | os.PathLike, call: Call, message: str, line: int | None = None) -> ScriptError:
+    return ScriptError(f"{path}, line {line or call.line}: filter {call.name!r}: {message}")
 
 
 def scripts() -> dict[str, Path]:
@@ -265,32 +228,21 @@ class PlainLayers:
     """
 
     def __init__(self, layer: Layer):
-        self.layers, self.current = [layer], 0
+        self.layers = [layer]
 
     def layer(self, number: int = -1) -> Layer:
-        """A layer, the current one by default."""
+        """A layer; -1 is the current one, which is the last."""
         if number >= len(self.layers):
             raise InvalidParameterError(f"layer = {number}: there are {len(self.layers)}, counted from 0")
-        return self.layers[self.current if number == -1 else number]
+        return self.layers[number]
 
     def apply_step(self, step: Step, on_iteration: Callable[..., Any] | None = None) -> dict[str, Any]:
-        """Run a filter of ours, whose result becomes the current layer, or make another layer the current one.
-
-        Returns
-        -------
-        dict
-            The result in a few numbers.
-        """
+        """Run a filter of ours, whose result becomes the current layer, and give the result in a few numbers."""
         with step.named_in_errors():
-            if step.goes_to is not None:
-                self.layer(step.goes_to)
-                self.current = step.goes_to
-                return {"layer": self.current}
             assert step.verb is not None
             layer = self.layer(step.values.get("layer", -1))
             self.layers.append(step.verb.run(layer, step.values, on_iteration))
-        self.current = len(self.layers) - 1
-        return {"layer": self.current, **self.layer().summary()}
+        return {"layer": len(self.layers) - 1, **self.layer().summary()}
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
         """Write the current layer. See ``Layer.save``."""

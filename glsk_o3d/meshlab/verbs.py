@@ -1,17 +1,12 @@
-"""Our filters as MeshLab's users meet them: verbs that make a new layer from the current one.
-
-Everything is generated: every filter of the catalogue has a verb, with its parameters as they describe themselves, and
-so has every function of `glsk_o3d.editing`.
-"""
+"""Our filters as MeshLab's users meet them: a verb for every filter of the catalogue, which makes a new layer."""
 
 from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from itertools import chain
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,7 +16,7 @@ from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import Cloud
 from ..io.colors import shades
 from ..lpr_reducer import LPRReducer
-from ..parameters import resolve_length
+from ..parameters import Parameters, resolve_length
 from ..pipeline import Filter, Pipeline, parts
 from ..recipes.catalogue import catalogue, known_pipelines, named_pipeline, serves
 from ..ring_builder import RingBuilder
@@ -29,8 +24,7 @@ from ..skeleton import Skeleton
 from ..state import Contraction
 from .edits import edits
 from .layers import Layer
-from .slots import OF_FRAME, PARTS, Slot, facts_of, slots_of
-from .verb import SEGMENTED, WHOLE, Verb, called
+from .verb import OF_FRAME, PARTS, Slot, Verb, called, facts_of
 
 _NAMES = {
     "RingBuilder": "generate_one_rings",
@@ -52,36 +46,28 @@ class PipelineVerb(Verb):
         return named_pipeline(values.get("pipeline", self.default))
 
     def plan(self, values: Mapping[str, Any]) -> Pipeline:
-        """The filters that the verb runs with such parameters.
-
-        InvalidParameterError also for a parameter of something that is not in the pipeline.
-        """
+        """The filters that the verb runs with such parameters; refuses those of a filter that is not among them."""
         made = self.checked(values)
-        options = {
-            f"{slot.owner.__name__}.{slot.field}": name for name in made if (slot := self.slots[name]).owner is not None
-        }
+        names = {self.slots[name].option: name for name in made if self.slots[name].option}
         try:
-            return self.start(made).with_options({option: made[name] for option, name in options.items()})
+            return self.start(made).with_options({option: made[name] for option, name in names.items()})
         except InvalidParameterError as error:  # say it with the name that the verb has for it
             option, colon, why = str(error).partition(": ")
-            raise InvalidParameterError(f"{options.get(option, option)}{colon}{why}") from None
+            raise InvalidParameterError(f"{names.get(option, option)}{colon}{why}") from None
 
     def values(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """All parameters that matter, the given ones and the defaults of the others.
-
-        A percentage that was not given is as the filter has it, and says so: ``"1% of the frame"``.
-        """
-        pipeline, own = self.plan(given), super().values(given)
-        found: dict[str, Any] = {}
+        """As of every verb. A percentage that was not given says that it is the filter's: ``"1% of the frame"``."""
+        own, found = super().values(given), {}
+        present = {type(part).__name__: part for part in parts(self.plan(given))}
         for slot in self.slots.values():
-            if slot.owner is None:
+            holder, _, field = slot.option.partition(".")
+            if not holder:
                 found[slot.name] = own[slot.name]
-            for part in parts(pipeline):
-                if type(part) is slot.owner:
-                    value = getattr(part, slot.field)
-                    if slot.is_of_box(value) and not slot.is_of_box(given.get(slot.name)):
-                        value += OF_FRAME
-                    found[slot.name] = slot.written(value).attributes["value"] if slot.kind in PARTS else value
+            elif holder in present:
+                value = getattr(present[holder], field)
+                if slot.is_of_box(value) and not slot.is_of_box(given.get(slot.name)):
+                    value += OF_FRAME
+                found[slot.name] = slot.written(value).attributes["value"] if slot.kind in PARTS else value
         return found
 
     def plan_for(self, layer: Layer, given: Mapping[str, Any]) -> Pipeline:
@@ -93,8 +79,7 @@ class PipelineVerb(Verb):
         return self.plan({**given, **{name: resolve_length(value, diagonal) for name, value in percent.items()}})
 
     def run(self, layer, given, on_iteration=None):
-        pipeline = self.plan_for(layer, given)
-        return self.shown(pipeline(_cloud(layer), on_iteration=on_iteration), layer)
+        return self.shown(self.plan_for(layer, given)(_cloud(layer), on_iteration=on_iteration), layer)
 
 
 @dataclass(frozen=True)
@@ -114,7 +99,7 @@ class FilterVerb(PipelineVerb):
     def run(self, layer, given, on_iteration=None):
         pipeline = self.plan_for(layer, given)
         if _goes_on(layer, self.filter.consumes):
-            return self.shown(pipeline(layer.flow, on_iteration=on_iteration), _plain(layer))
+            return self.shown(pipeline(layer.flow, on_iteration=on_iteration), layer.source or layer)
         pipeline = Pipeline(*self.before(), *pipeline.stages)
         return self.shown(pipeline(_cloud(layer), on_iteration=on_iteration), layer)
 
@@ -130,12 +115,11 @@ class FilterVerb(PipelineVerb):
 
     def shown(self, result, source):
         layer = super().shown(result, source)
-        if self.filter is LPRReducer:  # a reduction is seen best where the points were
-            kept = result.point_of_survivor
-            hung = {name: getattr(source, name) for name in ("normals", "colors")}
-            hung = {name: array[kept] for name, array in hung.items() if array is not None}
-            return dataclasses.replace(layer, vertices=result.points[kept], **hung)
-        return layer
+        if self.filter is not LPRReducer:
+            return layer
+        kept = result.point_of_survivor  # a reduction is seen best where the points were
+        normals, colors = (None if each is None else each[kept] for each in (source.normals, source.colors))
+        return dataclasses.replace(layer, vertices=result.points[kept], normals=normals, colors=colors)
 
 
 @dataclass(frozen=True)
@@ -149,7 +133,7 @@ class SegmentVerb(PipelineVerb):
     def run(self, layer, given, on_iteration=None):
         pipeline = self.plan_for(layer, given)
         if _goes_on(layer, Skeleton):
-            skeleton, layer = layer.flow, _plain(layer)
+            skeleton, layer = layer.flow, layer.source or layer
         else:
             skeleton = pipeline(_cloud(layer), on_iteration=on_iteration)
         labels = skeleton.segment()
@@ -169,47 +153,49 @@ def verbs() -> dict[str, Verb]:
 
     The whole pipeline first, then each filter of the catalogue, the segmentation, and what changes skeletons.
     """
-    known = catalogue()
-    whole = {type(part): None for make in known_pipelines().values() for part in parts(make())}
-    whole |= {cls: None for cls in known.values() if any(serves(cls, kind) for kind in PARTS)}
+    segmented = SegmentVerb(
+        *called("generate_segmented_cloud"),
+        "The points that a skeleton was made from, with the branch that each belongs to as scalar and as colour. "
+        "On a layer without skeleton the default pipeline makes one first. Faces are kept.",
+        {},
+    )
+    filters = [_filter_verb(cls) for cls in catalogue().values() if issubclass(cls, Filter)]
+    layer = Slot("layer", facts_of("The layer to act on; -1 is the current one.", "int", low=-1), default=-1)
+    return {
+        verb.name: dataclasses.replace(verb, slots={**verb.slots, layer.name: layer})
+        for verb in (_whole_verb(), *filters, segmented, *edits())
+    }
+
+
+def _whole_verb() -> PipelineVerb:
+    """The verb of a whole pipeline, which has the parameters of all its filters."""
     about = "The named pipeline; parameters that are not given are as it has them."
     choice = facts_of(about, "choice", tuple(known_pipelines()))
-    slots = [
-        Slot("pipeline", choice, default=PipelineVerb.default),
-        *chain.from_iterable(slots_of(cls) for cls in whole),
-    ]
-    found: list[Verb] = [
-        PipelineVerb(
-            *called(WHOLE),
-            "The curve skeleton of the current layer's vertices, with radii as scalars.",
-            {slot.name: slot for slot in slots},
-        )
-    ]
-    for name, cls in known.items():
-        if issubclass(cls, Filter):
-            own = {slot.field: dataclasses.replace(slot, name=slot.field) for slot in slots_of(cls)}
-            kinds = {slot.kind for slot in own.values()} & set(PARTS)
-            inside = [part for part in known.values() if part is not cls and any(serves(part, kind) for kind in kinds)]
-            own |= {slot.name: slot for part in inside for slot in slots_of(part)}
-            words = "_".join(re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z0-9]*", name)).lower()
-            doc = (cls.__doc__ or name).partition("\n\n")[0].replace("\n", " ")
-            found.append(FilterVerb(*called(_NAMES.get(name, f"generate_by_{words}")), doc, own, cls))
-    found.append(
-        SegmentVerb(
-            *called(SEGMENTED),
-            "The points that a skeleton was made from, with the branch that each belongs to as scalar and as colour. "
-            "On a layer without skeleton the default pipeline makes one first. Faces are kept.",
-            {},
-        )
-    )
-    found += edits()
-    layer = Slot("layer", facts_of("The layer to act on; -1 is the current one.", "int", low=-1), default=-1)
-    return {verb.name: dataclasses.replace(verb, slots={**verb.slots, layer.name: layer}) for verb in found}
+    inside = [type(part) for make in known_pipelines().values() for part in parts(make())]
+    inside += [cls for cls in catalogue().values() if any(serves(cls, kind) for kind in PARTS)]
+    slots = [Slot("pipeline", choice, default=PipelineVerb.default)]
+    slots += [slot for cls in dict.fromkeys(inside) for slot in _slots(cls, f"{cls.__name__.lower()}_")]
+    doc = "The curve skeleton of the current layer's vertices, with radii as scalars."
+    return PipelineVerb(*called("generate_curve_skeleton"), doc, {slot.name: slot for slot in slots})
 
 
-def _plain(layer: Layer) -> Layer:
-    """The cloud or mesh that a layer was made from."""
-    return layer.source or layer
+def _filter_verb(cls: type[Filter]) -> FilterVerb:
+    """The verb of a filter, which has its parameters and those of what may be inside it."""
+    slots = list(_slots(cls))
+    kinds = {slot.kind for slot in slots} & set(PARTS)
+    for part in catalogue().values():
+        if part is not cls and any(serves(part, kind) for kind in kinds):
+            slots += _slots(part, f"{part.__name__.lower()}_")
+    words = "_".join(re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z0-9]*", cls.__name__)).lower()
+    doc = (cls.__doc__ or cls.__name__).partition("\n\n")[0].replace("\n", " ")
+    stem = _NAMES.get(cls.__name__, f"generate_by_{words}")
+    return FilterVerb(*called(stem), doc, {slot.name: slot for slot in slots}, cls)
+
+
+def _slots(cls: type[Parameters], prefix: str = "") -> Iterator[Slot]:
+    """A slot for each parameter of a filter, reducer or rule."""
+    for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+        yield Slot(prefix + field.name, field.metadata, f"{cls.__name__}.{field.name}")
 
 
 def _goes_on(layer: Layer, kind: type) -> bool:
@@ -219,6 +205,7 @@ def _goes_on(layer: Layer, kind: type) -> bool:
 
 
 def _cloud(layer: Layer) -> np.ndarray:
+    """The vertices of a layer that is a scan; InvalidCloudError for a skeleton and a contracted cloud."""
     if layer.is_skeleton:
         raise InvalidCloudError(
             f"the current layer ({layer.label}) is a skeleton or another line drawing: make the scan the current layer"

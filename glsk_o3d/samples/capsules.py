@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InvalidParameterError
-from .sample import Sample, check, collect, directions, noisy, perpendicular
+from .sample import Sample, check, collect, directions, noisy
 
 
 def signed_distance(points: np.ndarray, nodes: np.ndarray, edges: np.ndarray, radii: np.ndarray) -> np.ndarray:
@@ -14,10 +14,9 @@ def signed_distance(points: np.ndarray, nodes: np.ndarray, edges: np.ndarray, ra
     Parameters
     ----------
     points : (n, 3) array
-    nodes : (M, 3) array
+    nodes, radii : (M, 3) and (M,) array
     edges : (E, 2) int array
         A node without an edge is a ball.
-    radii : (M,) array
 
     Returns
     -------
@@ -87,6 +86,13 @@ def union_sample(name, nodes, edges, radii, n, noise, seed, cameras=None) -> Sam
         return points
 
     return Sample(noisy(collect(draw, n), noise, rng), nodes, edges, radii, name)
+
+
+def perpendicular(axis: np.ndarray, rng) -> np.ndarray:
+    """A random unit vector perpendicular to each row."""
+    v = rng.normal(size=axis.shape)
+    v -= axis * (v * axis).sum(axis=1, keepdims=True)
+    return v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
 def visible(points, camera, nodes, edges, radii) -> np.ndarray:

@@ -43,6 +43,7 @@ class Sample:
 
 
 def check(n, noise, **positive) -> None:
+    """Raise InvalidParameterError for a wrong number of points, noise, or length or angle by its name."""
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
         raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
     if not (np.isfinite(noise) and noise >= 0):
@@ -63,6 +64,7 @@ def collect(draw, n: int) -> np.ndarray:
 
 
 def noisy(points, noise: float, rng) -> np.ndarray:
+    """The points with Gaussian noise, which is a share of the diagonal of their box."""
     if noise == 0:
         return points
     diagonal = np.linalg.norm(np.ptp(points, axis=0))
@@ -70,18 +72,13 @@ def noisy(points, noise: float, rng) -> np.ndarray:
 
 
 def directions(n: int, rng) -> np.ndarray:
+    """Random unit vectors, (n, 3)."""
     v = rng.normal(size=(n, 3))
     return v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
-def perpendicular(axis: np.ndarray, rng) -> np.ndarray:
-    """A random unit vector perpendicular to each row."""
-    v = rng.normal(size=axis.shape)
-    v -= axis * (v * axis).sum(axis=1, keepdims=True)
-    return v / np.linalg.norm(v, axis=1, keepdims=True)
-
-
-def chain(nodes, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def chain(nodes, radius: float, closed: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes, edges and radii of a tube through the nodes, and back to the first if it is closed."""
     nodes = np.asarray(nodes, float)
-    start = np.arange(len(nodes) - 1)
-    return nodes, np.stack([start, start + 1], axis=1), np.full(len(nodes), float(radius))
+    start = np.arange(len(nodes) - (not closed))
+    return nodes, np.stack([start, (start + 1) % len(nodes)], axis=1), np.full(len(nodes), float(radius))

@@ -22,11 +22,8 @@ def sauropod(
 
     Parameters
     ----------
-    n : int
-        Number of points.
-    noise : float
-        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
-    seed : int
+    n, noise, seed : int, float, int
+        As in `sample_object`.
     cameras : tuple of points, optional
         Only points that one of these sees are kept, as in a scan: the belly and parts of the legs and of the flanks
         behind them are missing. None keeps the whole surface.
@@ -45,51 +42,38 @@ def sauropod(
 
 
 def _sauropod_axis() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """x forward, y to its left, z up; the feet stand on z = 0."""
-    nodes: list[np.ndarray] = []
-    radii: list[float] = []
-    edges: list[tuple[int, int]] = []
+    """Nodes, edges and radii; x forward, y to its left, z up; the feet stand on z = 0."""
+    nodes, edges, radii = [], [], []
 
-    def grow(start: int | None, places, sizes, end: int | None = None) -> int:
+    def grow(places, sizes, start=None, end=None):
         """A chain of new nodes from `start`, closed onto `end`; returns its last node."""
-        last = start
         for place, size in zip(places, sizes, strict=True):
-            nodes.append(np.asarray(place, float))
-            radii.append(float(size))
-            if last is not None:
-                edges.append((last, len(nodes) - 1))
-            last = len(nodes) - 1
-        assert last is not None
+            if start is not None:
+                edges.append((start, len(nodes)))
+            start = len(nodes)
+            nodes.append(place)
+            radii.append(size)
         if end is not None:
-            edges.append((last, end))
-        return last
+            edges.append((start, end))
+        return start
 
-    hip = grow(None, [(-0.20, 0, 0.345)], [0.105])
-    rear = grow(hip, [(-0.11, 0, 0.362)], [0.122])
-    front = grow(rear, [(0, 0, 0.37), (0.11, 0, 0.368)], [0.128, 0.122])
-    chest = grow(front, [(0.20, 0, 0.36)], [0.1])
+    hip = grow([(-0.20, 0, 0.345)], [0.105])
+    rear = grow([(-0.11, 0, 0.362)], [0.122], hip)
+    front = grow([(0, 0, 0.37), (0.11, 0, 0.368)], [0.128, 0.122], rear)
+    chest = grow([(0.20, 0, 0.36)], [0.1], front)
     neck = _curve([(0.20, 0, 0.36), (0.33, 0, 0.43), (0.395, 0, 0.57), (0.42, 0, 0.72), (0.47, 0, 0.80)], 8)
-    head = grow(chest, neck, np.linspace(0.08, 0.042, len(neck)))
-    grow(head, [(0.525, 0, 0.803), (0.615, 0, 0.765)], [0.056, 0.04])
-    tail = _curve(
-        [
-            (-0.20, 0, 0.345),
-            (-0.36, 0, 0.29),
-            (-0.50, 0.04, 0.195),
-            (-0.64, 0.11, 0.17),
-            (-0.75, 0.10, 0.25),
-            (-0.80, 0, 0.35),
-        ],
-        14,
-    )
-    grow(hip, tail, np.linspace(0.084, 0.028, len(tail)))
+    head = grow(neck, np.linspace(0.08, 0.042, len(neck)), chest)
+    grow([(0.525, 0, 0.803), (0.615, 0, 0.765)], [0.056, 0.04], head)
+    near_hip = [(-0.20, 0, 0.345), (-0.36, 0, 0.29), (-0.50, 0.04, 0.195)]
+    tail = _curve([*near_hip, (-0.64, 0.11, 0.17), (-0.75, 0.10, 0.25), (-0.80, 0, 0.35)], 14)
+    grow(tail, np.linspace(0.084, 0.028, len(tail)), hip)
     for root, x, sway in ((chest, 0.20, 0.025), (hip, -0.21, -0.025)):
         for side in (1, -1):
             leg = [(x, 0.105 * side, 0.25), (x + sway, 0.125 * side, 0.14), (x + sway * 0.4, 0.13 * side, 0.046)]
-            grow(root, leg, [0.062, 0.05, 0.046])
+            grow(leg, [0.062, 0.05, 0.046], root)
     arch = np.linspace(np.pi, 0, 15)[1:-1]
     handle = np.stack([0.14 * np.cos(arch), 0 * arch, 0.46 + 0.27 * np.sin(arch) ** 0.8], axis=1)
-    grow(rear, handle, np.full(len(handle), 0.03), end=front)
+    grow(handle, np.full(len(handle), 0.03), rear, end=front)
     return np.array(nodes), np.array(edges, np.int64), np.array(radii)
 
 

@@ -1,4 +1,4 @@
-"""Samples of simple shapes: tubes with ends, and what has no axis worth the name."""
+"""Samples of simple shapes: tubes, with ends or closed, and what has no axis worth the name."""
 
 from __future__ import annotations
 
@@ -16,16 +16,12 @@ def tube(
 
     Parameters
     ----------
-    n : int
-        Number of points.
-    length : float
-        Length of the axis; half balls at the ends come on top.
-    radius : float
+    n, noise, seed : int, float, int
+        As in `sample_object`.
+    length, radius : float
+        Of the axis and around it; half balls at the ends come on top.
     capped : bool
         Whether the ends are closed by half balls.
-    noise : float
-        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
-    seed : int
 
     Returns
     -------
@@ -37,7 +33,7 @@ def tube(
     Sample('tube', 500 points, 2 nodes, 1 edges)
     """
     check(n, noise, length=length, radius=radius)
-    nodes, edges, radii = chain(np.array([[-length / 2, 0, 0], [length / 2, 0, 0]]), radius)
+    nodes, edges, radii = chain([[-length / 2, 0, 0], [length / 2, 0, 0]], radius)
     if capped:
         return union_sample("tube", nodes, edges, radii, n, noise, seed)
     rng = np.random.default_rng(seed)
@@ -60,18 +56,12 @@ def helix(
 
     Parameters
     ----------
-    n : int
-        Number of points.
-    coil_radius : float
-        Radius of the axis, a helix.
-    radius : float
-        Radius of the wire; the turns must not touch and the wire must not fold.
-    pitch : float
-        Rise per turn.
-    turns : float
-    noise : float
-        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
-    seed : int
+    n, noise, seed : int, float, int
+        As in `sample_object`.
+    coil_radius, radius : float
+        Of the axis, a helix, and of the wire; the turns must not touch and the wire must not fold.
+    pitch, turns : float
+        Rise per turn, and the number of turns.
 
     Returns
     -------
@@ -130,17 +120,14 @@ def y_junction(
 
     Parameters
     ----------
-    n : int
-        Number of points.
+    n, noise, seed : int, float, int
+        As in `sample_object`.
     length : float
         Length of each axis.
     radii : tuple of three floats
         At the ends of the stem and of the two arms; all have the stem's radius in the middle.
     angle : float
         Between the arms, in degrees.
-    noise : float
-        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
-    seed : int
 
     Returns
     -------
@@ -159,17 +146,94 @@ def y_junction(
     return union_sample("y_junction", nodes, edges, np.array([radii[0], *radii], float), n, noise, seed)
 
 
+def torus(n: int = 4096, *, ring_radius: float = 0.4, radius: float = 0.1, noise: float = 0.0, seed: int = 0) -> Sample:
+    """A torus around z.
+
+    Parameters
+    ----------
+    n, noise, seed : int, float, int
+        As in `sample_object`.
+    ring_radius, radius : float
+        Of the axis, a circle, and of the tube, which is smaller.
+
+    Returns
+    -------
+    Sample
+
+    Examples
+    --------
+    >>> torus(500)
+    Sample('torus', 500 points, 128 nodes, 128 edges)
+    """
+    check(n, noise, ring_radius=ring_radius, radius=radius)
+    if radius >= ring_radius:
+        raise InvalidParameterError(f"radius = {radius}: must be below ring_radius = {ring_radius}")
+    rng = np.random.default_rng(seed)
+    points, axis = _torus_points(n, ring_radius, radius, rng), _circle(ring_radius, radius)
+    return Sample(noisy(points, noise, rng), *axis, "torus")
+
+
+def two_rings(
+    n: int = 4096, *, ring_radius: float = 0.3, radius: float = 0.06, noise: float = 0.0, seed: int = 0
+) -> Sample:
+    """Two links of a chain, which do not touch: two components, two loops.
+
+    Parameters
+    ----------
+    n, noise, seed : int, float, int
+        As in `sample_object`.
+    ring_radius : float
+        Radius of each axis; the second circle goes through the middle of the first.
+    radius : float
+        Radius of the tubes, below half of `ring_radius`.
+
+    Returns
+    -------
+    Sample
+
+    Examples
+    --------
+    >>> two_rings(500)
+    Sample('two_rings', 500 points, 256 nodes, 256 edges)
+    """
+    check(n, noise, ring_radius=ring_radius, radius=radius)
+    if 2 * radius >= ring_radius:
+        raise InvalidParameterError(f"radius = {radius}: must be below half of ring_radius = {ring_radius}")
+    rng = np.random.default_rng(seed)
+    points, (nodes, edges, radii) = _torus_points(n, ring_radius, radius, rng), _circle(ring_radius, radius)
+
+    def second(x):  # turned about x, and moved by one ring radius
+        return np.stack([x[:, 0] + ring_radius, -x[:, 2], x[:, 1]], axis=1)
+
+    points = np.where(rng.random(n)[:, None] < 0.5, points, second(points))
+    nodes, edges = np.concatenate([nodes, second(nodes)]), np.concatenate([edges, edges + len(nodes)])
+    return Sample(noisy(points, noise, rng), nodes, edges, np.concatenate([radii, radii]), "two_rings")
+
+
+def _circle(ring_radius: float, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes, edges and radii of a ring around z, in 128 pieces."""
+    angle = np.arange(128) * 2 * np.pi / 128
+    return chain(ring_radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1), radius, closed=True)
+
+
+def _torus_points(n: int, ring_radius: float, radius: float, rng) -> np.ndarray:
+    def draw(m):
+        around, tube_angle = rng.uniform(0, 2 * np.pi, (2, m))
+        out = ring_radius + radius * np.cos(tube_angle)
+        points = np.stack([out * np.cos(around), out * np.sin(around), radius * np.sin(tube_angle)], axis=1)
+        return points[rng.uniform(0, ring_radius + radius, m) < out]
+
+    return collect(draw, n)
+
+
 def sphere(n: int = 4096, *, radius: float = 0.5, noise: float = 0.0, seed: int = 0) -> Sample:
     """A sphere about the origin. Its axis is one node; a curve skeleton of it means nothing.
 
     Parameters
     ----------
-    n : int
-        Number of points.
+    n, noise, seed : int, float, int
+        As in `sample_object`.
     radius : float
-    noise : float
-        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
-    seed : int
 
     Returns
     -------
@@ -183,8 +247,7 @@ def sphere(n: int = 4096, *, radius: float = 0.5, noise: float = 0.0, seed: int 
     check(n, noise, radius=radius)
     rng = np.random.default_rng(seed)
     points = radius * directions(n, rng)
-    nodes, edges, radii = np.zeros((1, 3)), np.zeros((0, 2), np.int64), np.array([float(radius)])
-    return Sample(noisy(points, noise, rng), nodes, edges, radii, "sphere")
+    return Sample(noisy(points, noise, rng), *chain(np.zeros((1, 3)), radius), "sphere")
 
 
 def sheet(
@@ -194,14 +257,11 @@ def sheet(
 
     Parameters
     ----------
-    n : int
-        Number of points.
+    n, noise, seed : int, float, int
+        As in `sample_object`.
     length, width : float
     bend : float
         Angle between the two ends in degrees, below 360; 0 leaves the sheet flat.
-    noise : float
-        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
-    seed : int
 
     Returns
     -------
@@ -217,9 +277,8 @@ def sheet(
         raise InvalidParameterError(f"bend = {bend}: must be at least 0 and below 360 degrees")
     rng = np.random.default_rng(seed)
     along, across = rng.uniform(-length / 2, length / 2, n), rng.uniform(-width / 2, width / 2, n)
-    if bend == 0:
-        points = np.stack([along, across, np.zeros(n)], axis=1)
-    else:
+    points = np.stack([along, across, np.zeros(n)], axis=1)
+    if bend:
         curvature = np.deg2rad(bend) / length
         turn = curvature * along
         points = np.stack([np.sin(turn) / curvature, across, (np.cos(turn) - 1) / curvature], axis=1)

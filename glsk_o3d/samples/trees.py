@@ -33,16 +33,12 @@ def tree(
 
     Parameters
     ----------
-    n : int
-        Number of points.
+    n, noise, seed : int, float, int
+        As in `sample_object`; the seed is of the shape, too.
     forks : int
         From the foot to a tip; the tree has ``2 ** forks`` tips.
     length, radius : float
         Of the trunk, which stands upright in the origin; in metres it is a small tree.
-    noise : float
-        Standard deviation of the Gaussian noise, as a share of the bounding-box diagonal.
-    seed : int
-        Of the shape and of the points.
     cameras : (k, 3) array, optional
         Where the tree was scanned from: points that none of them sees are missing.
 
@@ -50,11 +46,6 @@ def tree(
     -------
     Sample
         Its first node is the foot, and each edge leads away from it.
-
-    Raises
-    ------
-    InvalidParameterError
-        A number is out of its range, or a camera inside the tree.
 
     Examples
     --------

@@ -243,10 +243,10 @@ def test_what_meshlab_writes_is_read(tmp_path):
 
 def test_every_name_is_one_of_pymeshlab():
     pymeshlab = pytest.importorskip("pymeshlab")
-    from glsk_o3d.meshlab.builtin import defaults, names
+    from glsk_o3d.meshlab.builtin import names, trial
 
     assert set(names().values()) == set(pymeshlab.filter_list()) - {"save_snapshot"}  # needs a window
-    assert all(isinstance(defaults(name), dict) for name in names().values())
+    assert all(isinstance(trial().filter_parameter_values(name), dict) for name in names().values())
 
 
 words = st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"]), min_size=1, max_size=20)
