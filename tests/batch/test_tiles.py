@@ -174,7 +174,7 @@ def test_the_plan_reads_and_writes_nothing(scene, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (dict(tiles=-1), "tiles = -1: the size of a tile"),
+        (dict(tiles=-1), "tiles = -1: must be above 0"),
         (dict(tiles=1.0, overlap=0.5), "at most a quarter"),
         (dict(overlap=0.1), "is that of tiles: give their size, too"),
         (dict(tiles=1.0, by="tree"), "labels have no seams, tiles have: give one of them"),
