@@ -1,4 +1,4 @@
-"""What a batch has to do, as plain records."""
+"""What a batch has to do, and has done, as plain records."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .grid import Grid
-from .ledger import Ledger
+from .ledger import Ledger, Row
 
 UP_TO_DATE = "done"
 RECIPE_FILE = "recipe.json"
@@ -98,3 +98,30 @@ class Plan:
     def skipped(self) -> int:
         """How many are done."""
         return len(self.tasks) - len(self.todo)
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """What a batch did.
+
+    Attributes
+    ----------
+    rows : dict of str to dict
+        What the ledger says about the inputs, by name, those skipped included.
+    done, skipped, failed : int
+    seconds : float
+        Wall time, from the first cloud handed out.
+    ledger : Path
+    """
+
+    rows: dict[str, Row]
+    done: int
+    skipped: int
+    failed: int
+    seconds: float
+    ledger: Path
+
+    @property
+    def rate(self) -> float:
+        """Clouds done or failed per second."""
+        return (self.done + self.failed) / self.seconds if self.seconds > 0 else 0.0

@@ -93,22 +93,16 @@ def plan_batch(
 
     Examples
     --------
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     Path(folder, "scan.ply").touch()
-    ...     plan = plan_batch(folder, f"{folder}/skeletons")
-    >>> [task.why for task in plan.tasks], plan.skipped
-    (['new'], 0)
-
     Of tiles the skeletons come first, and then the whole:
 
+    >>> from tempfile import TemporaryDirectory
     >>> import numpy as np
     >>> from glsk_o3d.samples import tube
     >>> with TemporaryDirectory() as folder:
     ...     np.savetxt(f"{folder}/pipe.xyz", tube(1000, radius=0.04).points)
     ...     plan = plan_batch(f"{folder}/pipe.xyz", f"{folder}/skeletons", tiles=0.6)
-    >>> [output for task in plan.tasks for output in task.job.outputs]
-    ['pipe.tiles/0-0-0.npz', 'pipe.tiles/1-0-0.npz', 'pipe.ply']
+    >>> [(task.why, *task.job.outputs) for task in plan.tasks]
+    [('new', 'pipe.tiles/0-0-0.npz'), ('new', 'pipe.tiles/1-0-0.npz'), ('new', 'pipe.ply')]
     """
     wanted = Wanted(pipeline, formats, preview, cut_loops, recursive, where, by, tiles, overlap, force)
     return planned(inputs, out_dir, wanted, write=False)
@@ -172,9 +166,7 @@ class Wanted:
         return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 
-def planned(
-    inputs: str | os.PathLike | Iterable[str | os.PathLike], out_dir: str | os.PathLike, wanted: Wanted, *, write: bool
-) -> Plan:
+def planned(inputs: Any, out_dir: str | os.PathLike, wanted: Wanted, *, write: bool) -> Plan:
     """The plan of `plan_batch`; `write` takes scenes apart at once, so that they are read but once."""
     given = [inputs] if isinstance(inputs, str | os.PathLike) else list(inputs)
     out = Path(os.path.abspath(out_dir))

@@ -10,7 +10,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,7 @@ from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
 from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
-from .jobs import RECIPE_FILE, UP_TO_DATE, Job, Plan, Task
+from .jobs import RECIPE_FILE, UP_TO_DATE, BatchResult, Plan, Task
 from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STALE, Row, locked
 from .plan import Wanted, planned
 from .splitting import PARTS_FOLDER, TILES_FOLDER
@@ -33,33 +32,6 @@ _POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed
 CANCELLED = "the work was cancelled, or its scheduler has gone: run the same batch to go on"
 WORKER_DIED = "the worker died with it, twice: out of memory, or a crash in native code"
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class BatchResult:
-    """What a batch did.
-
-    Attributes
-    ----------
-    rows : dict of str to dict
-        What the ledger says about the inputs, by name, those skipped included.
-    done, skipped, failed : int
-    seconds : float
-        Wall time, from the first cloud handed out.
-    ledger : Path
-    """
-
-    rows: dict[str, Row]
-    done: int
-    skipped: int
-    failed: int
-    seconds: float
-    ledger: Path
-
-    @property
-    def rate(self) -> float:
-        """Clouds done or failed per second."""
-        return (self.done + self.failed) / self.seconds if self.seconds > 0 else 0.0
 
 
 def run_batch(
@@ -185,22 +157,22 @@ def _make_room(plan: Plan) -> None:
             rows[name] = rows.pop(name) | {"input": source}
         elif task.why != UP_TO_DATE and rows.get(name, {}).get("status") == DONE:
             rows[name]["status"] = STALE
-    for task in plan.todo:
-        if task.job.needs:
-            _forget_tiles(plan, task.job)
+    _forget_tiles(plan)
     plan.ledger.rewrite()
     write_json(plan.out_dir / RECIPE_FILE, plan.recipe)
     for folder in {(plan.out_dir / task.job.name).parent for task in plan.todo}:
         folder.mkdir(parents=True, exist_ok=True)
 
 
-def _forget_tiles(plan: Plan, job: Job) -> None:
+def _forget_tiles(plan: Plan) -> None:
     """Drop tiles of earlier batches that are none any more, since the size has changed, or the scene."""
-    rows, first = plan.ledger.rows, job.name + TILES_FOLDER
-    for name in [name for name in rows if name.startswith(first) and name not in job.needs]:
-        for output in rows.pop(name).get("outputs", ()):
-            if output.startswith(first):
-                Path(plan.out_dir, output).unlink(missing_ok=True)
+    rows = plan.ledger.rows
+    for job in (task.job for task in plan.todo if task.job.needs):
+        first = job.name + TILES_FOLDER
+        for name in [name for name in rows if name.startswith(first) and name not in job.needs]:
+            for output in rows.pop(name).get("outputs", ()):
+                if output.startswith(first):
+                    Path(plan.out_dir, output).unlink(missing_ok=True)
 
 
 def _sweep(plan: Plan) -> None:
@@ -246,12 +218,11 @@ class _Run:
                 raise KeyboardInterrupt
 
     def _hand_out(self) -> None:
+        if self._again and not self._ready and not self._running:
+            self._ready.append(self._again.popleft())
+            self._retried.add(self._ready[0].job.name)
         while self._ready and len(self._running) < self._workers.capacity():
             task = self._ready.popleft()
-            self._running[self._workers.submit(work, task.job)] = task
-        if self._again and not self._running:
-            task = self._again.popleft()
-            self._retried.add(task.job.name)
             self._running[self._workers.submit(work, task.job)] = task
 
     def _collect(self, ended: Iterable[Future]) -> None:

@@ -123,17 +123,13 @@ def test_what_breaks_off_is_not_believed(scene, monkeypatch, tmp_path):
     assert not (tmp_path / "out" / ".parts" / "scene.json").exists()
 
 
-def test_what_cannot_be_read_leaves_nothing(tmp_path):
+def test_what_cannot_be_read_leaves_nothing_but_the_parts_of_others(scene, tmp_path):
     (tmp_path / "bad.ply").write_text("no")
     (tmp_path / "out").mkdir()
     for name in ("bad", "in/bad"):
         with pytest.raises(FileFormatError):
             splitter(tmp_path, tiles=2.0, overlap=0.25).split(name, tmp_path / "bad.ply")
         assert not list((tmp_path / "out").iterdir())
-
-
-def test_what_cannot_be_read_leaves_the_parts_of_others(scene, tmp_path):
-    (tmp_path / "bad.ply").write_text("no")
     split = splitter(tmp_path, by="tree").split("in/scene", scene)
     with pytest.raises(FileFormatError):
         splitter(tmp_path, by="tree").split("in/bad", tmp_path / "bad.ply")
@@ -253,10 +249,3 @@ def test_a_full_disk_is_no_fault_of_the_scene(scene, tmp_path):
     (folder / "0.ply").symlink_to("/dev/full")
     with pytest.raises(BatchError, match="the parts of a scene cannot be written there: No space left"):
         files.add(Scan(np.zeros((9, 3))), {"0": np.arange(9)})
-
-
-def test_the_list_of_parts_is_json(scene, tmp_path):
-    splitter(tmp_path, tiles=2.0, overlap=0.25).split("scene", scene)
-    told = json.loads((tmp_path / "out" / ".parts" / "scene.json").read_text())
-    assert told["cut"]["tiles"] == 2.0
-    assert told["input"] == str(scene)
