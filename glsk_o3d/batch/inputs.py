@@ -30,14 +30,9 @@ def find_inputs(inputs: Iterable[str | os.PathLike], out_dir: str | os.PathLike,
     """The clouds that are meant by folders, glob patterns, lists and files: absolute paths in the order of their names.
 
     A name is the path from the folder that was given, from the part of a pattern without wildcards, or from the folder
-    of a list (the whole path, where a list names what is not below); of a file that was given, its own name. It has no
-    ending and ``/`` between folders; the ending stays where names would be equal without it. A file that is meant twice
-    has the first of its names. Nothing in the output folder counts, where that lies below a folder or pattern. Whether
-    single files of a list are there shows when they are read.
-
-    FileFormatError where a list is a pipe or a device, FileNotFoundError where a file is not there, a folder or pattern
-    has no cloud, or nothing that a list names is there; InvalidParameterError where there is no input, a folder of
-    clouds is the output folder, or two results would have one name.
+    of a list (the whole path for what is not below it); of a file that was given, its own name. It has no ending, but
+    where names would be equal without. A file that is meant twice has the first of its names. Nothing in the output
+    folder counts, where that lies below a folder or pattern. Single files of a list need not be there.
     """
     out = os.path.abspath(out_dir)
     roots: dict[str, str] = {}

@@ -1,13 +1,4 @@
-"""Skeletons of tiles joined into one: nothing lost at a seam, nothing twice.
-
-Every tile saw more than its box, so what crosses a face of it was seen whole by the tiles on both sides, and their
-skeletons nearly coincide there. The tiles are taken in the order of their numbers. Each brings the connected pieces of
-its skeleton that come into its box, up to a little beyond it, less what lies on what others brought; where that ends,
-their cut ends are at hand, and the two are made one.
-
-So a curve that crosses from tile to tile is cut once, at a plane, and one that runs along a face, even in it, comes
-from one tile whole. If tiles were cut at the faces themselves, such a curve would be cut to shreds, or lost by both.
-"""
+"""Skeletons of tiles joined into one: nothing lost at a seam, nothing twice."""
 
 from __future__ import annotations
 
@@ -67,11 +58,13 @@ class Samples(NamedTuple):
 
 
 def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton, Seams]:
-    """Join the skeletons of overlapping tiles, whatever their order; a tile without points may be left out.
+    """Join the skeletons of overlapping tiles, whatever their order; the result has no points.
 
-    The result has vertices, edges, and what is known of the vertices, but no points. The axes of two parts are farther
-    apart than either is thick. So what lies nearer to another tile's skeleton than the radius is the same part, and cut
-    ends are the same place if they are no farther apart than both radii.
+    What crosses a face was seen whole by the tiles on both sides, and their skeletons nearly coincide there. Tiles are
+    taken in the order of their numbers. Each brings the pieces of its skeleton that come into its box, or a little
+    beyond it, less what lies on what others brought; where that ends, their cut ends are at hand, and the two are made
+    one. So a curve is cut once where it crosses from tile to tile, and not at all where it runs along a face. Parts are
+    farther apart than either is thick: what lies nearer to another tile's skeleton than the radius is the same part.
 
     >>> from glsk_o3d import skeletonize
     >>> from glsk_o3d.samples import torus
