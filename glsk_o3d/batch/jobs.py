@@ -56,6 +56,16 @@ class Task:
         ``"done"`` if it is to be skipped, else why not: ``"new"``, ``"failed before"``, ``"interrupted before"``,
         ``"other parameters"``, ``"outputs are gone"``, ``"input changed"``, ``"asked for"`` or, of what is joined from
         tiles, ``"tiles to do"``.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d.batch import plan_batch
+    >>> with TemporaryDirectory() as folder:
+    ...     Path(folder, "scan.ply").touch()
+    ...     plan = plan_batch(folder, f"{folder}/skeletons")
+    >>> plan.tasks[0].why
+    'new'
     """
 
     job: Job
@@ -80,6 +90,16 @@ class Plan:
         As it is in the folder.
     left_out : dict of str to str
         Files in the folders and patterns that are not taken, with the reason.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d.batch import plan_batch
+    >>> with TemporaryDirectory() as folder:
+    ...     Path(folder, "scan.ply").touch()
+    ...     plan = plan_batch(folder, f"{folder}/skeletons")
+    >>> len(plan.todo), plan.skipped
+    (1, 0)
     """
 
     out_dir: Path
@@ -112,6 +132,17 @@ class BatchResult:
     seconds : float
         Wall time, from the first cloud handed out.
     ledger : Path
+
+    Examples
+    --------
+    >>> from concurrent.futures import ThreadPoolExecutor
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d.batch import run_batch
+    >>> with TemporaryDirectory() as folder, ThreadPoolExecutor() as executor:
+    ...     _ = Path(folder, "scan.xyz").write_text("not a point")
+    ...     result = run_batch(folder, f"{folder}/skeletons", executor=executor)
+    >>> result.done, result.failed
+    (0, 1)
     """
 
     rows: dict[str, Row]

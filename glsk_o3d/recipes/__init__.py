@@ -8,6 +8,6 @@ be ``"extends"``, the name of a pipeline, and ``"set"``, changes to it by filter
 
 from .reading import from_recipe, load_recipe
 from .rerun import identical, rerun
-from .writing import RECIPE_ENDINGS, save_recipe, to_recipe
+from .writing import RECIPE_ENDINGS, gaps, save_recipe, to_recipe
 
-__all__ = ["RECIPE_ENDINGS", "from_recipe", "identical", "load_recipe", "rerun", "save_recipe", "to_recipe"]
+__all__ = ["RECIPE_ENDINGS", "from_recipe", "gaps", "identical", "load_recipe", "rerun", "save_recipe", "to_recipe"]

@@ -24,12 +24,31 @@ def catalogue() -> dict[str, type[Parameters]]:
 
 
 def find(name: str) -> type[Parameters] | None:
-    """The filter or stopping rule of that name, if there is one; plugins are only loaded for names of their own."""
+    """The filter or stopping rule of that name, if there is one; plugins are only loaded for names of their own.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    class or None
+    """
     return BUILTIN.get(name) or catalogue().get(name)
 
 
 def serves(cls: type[Parameters], kind: str) -> bool:
-    """Whether an instance can be a parameter of the type ``"reducer"`` or ``"stop"``, or a stage: ``"filter"``."""
+    """Whether an instance can be a parameter of the type ``"reducer"`` or ``"stop"``, or a stage: ``"filter"``.
+
+    Parameters
+    ----------
+    cls : class
+    kind : {"filter", "reducer", "stop"}
+
+    Returns
+    -------
+    bool
+    """
     if kind == "stop" or not issubclass(cls, Filter):
         return kind == "stop" and not issubclass(cls, Filter)
     return kind == "filter" or cls.consumes is cls.produces is Contraction

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -54,16 +55,32 @@ def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
     return recipe
 
 
-def refuse_gaps(value: Any, path: str = "") -> None:
-    """Raise RecipeError if a recipe, or a part of one, says that there was something that it could not hold."""
+def gaps(value: Any, path: str = "") -> Iterator[str]:
+    """What a recipe says that it could not hold, each with its path.
+
+    Parameters
+    ----------
+    value : dict, or part of one
+    path : str
+
+    Yields
+    ------
+    str
+    """
     if isinstance(value, dict):
         if UNWRITTEN in value:
-            raise RecipeError(f"{path}: a recipe cannot hold it: {value[UNWRITTEN]}")
+            yield f"{path}: a recipe cannot hold it: {value[UNWRITTEN]}"
         for key, item in value.items():
-            refuse_gaps(item, f"{path}.{key}" if path else str(key))
+            yield from gaps(item, f"{path}.{key}" if path else str(key))
     elif isinstance(value, list):
         for i, item in enumerate(value):
-            refuse_gaps(item, f"{path}[{i}]")
+            yield from gaps(item, f"{path}[{i}]")
+
+
+def refuse_gaps(recipe: Any) -> None:
+    """Raise RecipeError if a recipe lacks what it could not hold; see `gaps`."""
+    for gap in gaps(recipe):
+        raise RecipeError(gap)
 
 
 def _refuse_unknown(part: Parameters, path: str) -> None:
