@@ -6,11 +6,12 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
-from numbers import Real
+from typing import Any
 
 import numpy as np
 
 from ..errors import InvalidParameterError
+from ..parameters import problem_with, shown
 
 Tile = tuple[int, int, int]
 
@@ -26,24 +27,12 @@ class TooManyParts(InvalidParameterError):
 
 @dataclass(frozen=True)
 class Grid:
-    """Boxes of equal size that partition space; those at the border reach to infinity.
+    """Boxes of equal size that partition space; those at the border reach to infinity."""
 
-    Attributes
-    ----------
-    low : (x, y, z)
-        Corner of the first one.
-    cell : (x, y, z)
-        Their sides.
-    counts : (x, y, z)
-        How many there are along each axis.
-    overlap : float
-        How far beyond its box a tile takes points, at most half a side.
-    """
-
-    low: tuple[float, float, float]
-    cell: tuple[float, float, float]
-    counts: Tile
-    overlap: float
+    low: tuple[float, float, float]  # corner of the first one
+    cell: tuple[float, float, float]  # their sides
+    counts: Tile  # how many there are along each axis
+    overlap: float  # how far beyond its box a tile takes points, at most half a side
 
     @classmethod
     def over(cls, low: np.ndarray, high: np.ndarray, size: float, overlap: float) -> Grid:
@@ -81,19 +70,7 @@ class Grid:
             yield from ((axis, float(value)) for value in bounds if math.isfinite(value))
 
     def parted(self, points: np.ndarray) -> Iterator[tuple[Tile, np.ndarray]]:
-        """Which points each tile takes, those in its overlap too.
-
-        Parameters
-        ----------
-        points : (n, 3) float array
-            Finite.
-
-        Yields
-        ------
-        (int, int, int)
-        (m,) int array
-            Rows, in order.
-        """
+        """Every tile with the rows, in order, of those of (n, 3) finite points that it takes, its overlap included."""
         last = np.array(self.counts) - 1
         first, second = (
             np.clip(np.floor((points + side - self.low) / self.cell), 0, last).astype(np.int64)
@@ -114,27 +91,20 @@ class Grid:
             yield (x, y, z), row[start:stop]
 
 
-def checked_sizes(tiles: float, overlap: float | None) -> tuple[float, float]:
+def checked_sizes(tiles: Any, overlap: Any) -> tuple[float, float]:
     """The size of tiles and their overlap, by default an eighth of it; InvalidParameterError where they are none."""
-    tiles = _number("tiles", tiles)
-    if not (math.isfinite(tiles) and tiles > 0):
-        raise InvalidParameterError(f"tiles = {tiles:g}: the size of a tile is finite and above 0")
-    overlap = OVERLAP_SHARE * tiles if overlap is None else _number("overlap", overlap)
-    if not 0 < overlap <= MOST_OVERLAP * tiles:
-        raise InvalidParameterError(
-            f"overlap = {overlap:g}: must be above 0 and at most a quarter of the size of a tile, "
-            f"{MOST_OVERLAP * tiles:g}"
-        )
-    return tiles, overlap
+    _check_length("tiles", tiles, None, "a length in the cloud's units")
+    size = float(tiles)
+    if overlap is None:
+        return size, OVERLAP_SHARE * size
+    _check_length("overlap", overlap, MOST_OVERLAP * size, "at most a quarter of the size of a tile")
+    return size, float(overlap)
 
 
-def _number(name: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise InvalidParameterError(f"{name} = {value!r}: must be a number, a length in the cloud's units")
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
+def _check_length(name: str, value: Any, most: float | None, meant: str) -> None:
+    problem = problem_with(value, {"type": "float", "low": 0, "open_low": True, "high": most, "choices": ()})
+    if problem:
+        raise InvalidParameterError(f"{name} = {shown(value)}: {problem} ({meant})")
 
 
 def tile_name(tile: Tile) -> str:

@@ -1,18 +1,8 @@
-"""Skeletons of tiles joined into one: nothing lost at a seam, nothing twice.
-
-Every tile saw more than its box, so what crosses a face of it was seen whole by the tiles on both sides, and their
-skeletons nearly coincide there. The tiles are taken in the order of their numbers. Each brings the connected pieces of
-its skeleton that come into its box, up to a little beyond it, less what lies on what others brought; where that ends,
-their cut ends are at hand, and the two are made one.
-
-So a curve that crosses from tile to tile is cut once, at a plane, and one that runs along a face, even in it, comes
-from one tile whole. If tiles were cut at the faces themselves, such a curve would be cut to shreds, or lost by both.
-"""
+"""Skeletons of tiles joined into one: nothing lost at a seam, nothing twice."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -20,15 +10,42 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from ..analysis.curves import along, pieces
+from ..analysis.graph import simple_edges
+from ..numerics.components import component_labels
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
 from .grid import CUT_REACH, Grid, Tile
-from .loose_ends import Seams, finished
-from .strands import BORDER, INNER, Strands, inside
+from .strands import BORDER, INNER, Strands, inside, neighbours
 
 SAMPLE_STEP = 0.25  # fitted: of the scale of a curve, between the places at which others are compared with it
 MOST_SAMPLES = 1000  # derived: places on an edge, where the part has no thickness: a thousandth of it is near enough
 CLAIM_SHARE = 0.5  # fitted: of how far beyond its box a tile counts, up to where a piece must come to be its own
+LONGEST_STUB = 2.0  # fitted: of its scale, up to which what ends at a seam is the foot of a limb that forks beyond it
+
+
+class Seams(NamedTuple):
+    """How cut ends met at the seams of tiles."""
+
+    joined: int  # pairs that were made one, and ends that were tied to a curve beside them
+    unmatched: int  # ends that nobody went on from, since one of two tiles lost what the other has; kept as ends
+    thick: int  # cut ends where the overlap is too small for the part, and ends so near to a cut that it may go on
+    thickest: float  # radius of the thickest part at a seam
+
+    def messages(self, grid: Grid) -> list[str]:
+        """What is to be beware of, in sentences."""
+        told = []
+        if self.unmatched:
+            told.append(
+                f"{self.unmatched} of {self.joined + self.unmatched} cuts at seams have nothing to meet on the other "
+                "side, and end there: give larger tiles, or more overlap"
+            )
+        if self.thick:
+            need = grid.overlap * self.thickest / grid.thickest
+            told.append(
+                f"{self.thick} ends at seams are of parts thicker than the overlap of {grid.overlap:g} allows, radius "
+                f"up to {self.thickest:.3g}: give {need:.3g} or more"
+            )
+        return told
 
 
 class Samples(NamedTuple):
@@ -40,98 +57,15 @@ class Samples(NamedTuple):
     outward: np.ndarray  # (m, 3) where the curve would go on, at cut ends; 0 elsewhere
 
 
-@dataclass
-class Joint:
-    """What has been brought so far. Vertices are numbered through.
-
-    Attributes
-    ----------
-    strands : list of Strands
-    first : list of int
-        The number of the first vertex of each, and then of the next.
-    merged : list of (int, int)
-        A cut end, and the earlier one that is the same place.
-    touching : list of (int, int)
-        A cut end that found none, and the earlier vertex that is nearest.
-    open : list of int
-        Cut ends that nobody has gone on from.
-    met : list of (k, 8) array
-        Ends of the object that lie on what others brought: there a cut end has nothing to meet.
-    short : list of (k,) array
-        Radii at ends that are so near to where the points of a tile were cut off that they may be no ends.
-    """
-
-    strands: list[Strands] = field(default_factory=list)
-    first: list[int] = field(default_factory=lambda: [0])
-    merged: list[tuple[int, int]] = field(default_factory=list)
-    touching: list[tuple[int, int]] = field(default_factory=list)
-    open: list[int] = field(default_factory=list)
-    met: list[np.ndarray] = field(default_factory=list)
-    short: list[np.ndarray] = field(default_factory=list)
-
-    def values(self, vertices: Sequence[int] | np.ndarray) -> np.ndarray:
-        """The values of numbered vertices, (k, 8) float array."""
-        parts = np.searchsorted(self.first, vertices, side="right") - 1
-        rows = [
-            self.strands[part].values[at - self.first[part]] for part, at in zip(parts.tolist(), vertices, strict=True)
-        ]
-        return np.array(rows).reshape(-1, 8)
-
-    def bring(self, strands: Strands) -> tuple[Samples, np.ndarray]:
-        """Add strands; gives them as samples, and the numbers of their inner cut ends."""
-        first = self.first[-1]
-        self.strands.append(strands)
-        self.first.append(first + len(strands.values))
-        border, inner = strands.marks[:, BORDER], strands.marks[:, INNER]
-        self.open += (first + np.flatnonzero(border & ~inner)).tolist()
-        return _sampled(strands, first), first + np.flatnonzero(inner)
-
-    def meet(self, ends: np.ndarray, theirs: Samples) -> None:
-        """Match cut ends with open ones, the nearest first, one to one; others touch what is nearest."""
-        known = set(theirs.vertex.tolist())
-        waiting = [at for at in self.open if at in known]
-        mine, others = self.values(ends), self.values(waiting)
-        distance = cdist(mine[:, :3], others[:, :3])
-        near = distance <= mine[:, None, 5] + others[:, 5]
-        rows, columns = np.nonzero(near)
-        left, free = set(ends.tolist()), set(waiting)
-        for pair in np.argsort(distance[near], kind="stable"):
-            one, other = int(ends[rows[pair]]), waiting[columns[pair]]
-            if one in left and other in free:
-                self.merged.append((one, other))
-                left.remove(one)
-                free.remove(other)
-        gone = set(waiting) - free
-        self.open = [at for at in self.open if at not in gone]
-        loose = sorted(left)
-        nearest = cKDTree(theirs.places).query(self.values(loose)[:, :3])[1] if loose else []
-        self.touching += zip(loose, theirs.vertex[nearest].tolist(), strict=True)
-
-
 def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton, Seams]:
-    """Join the skeletons of overlapping tiles.
+    """Join the skeletons of overlapping tiles, whatever their order; the result has no points.
 
-    Parameters
-    ----------
-    skeletons : mapping of (int, int, int) to Skeleton
-        Of the points in each tile and its overlap; a tile without points may be left out.
-    grid : Grid
+    What crosses a face was seen whole by the tiles on both sides, and their skeletons nearly coincide there. Tiles are
+    taken in the order of their numbers. Each brings the pieces of its skeleton that come into its box, or a little
+    beyond it, less what lies on what others brought; where that ends, their cut ends are at hand, and the two are made
+    one. So a curve is cut once where it crosses from tile to tile, and not at all where it runs along a face. Parts are
+    farther apart than either is thick: what lies nearer to another tile's skeleton than the radius is the same part.
 
-    Returns
-    -------
-    Skeleton
-        Vertices, edges, and what is known of the vertices; it has no points. It does not depend on the order of the
-        mapping.
-    Seams
-        How the cut ends met.
-
-    Notes
-    -----
-    The axes of two parts are farther apart than either is thick. So what lies nearer to another tile's skeleton than
-    the radius is the same part, and cut ends are the same place if they are no farther apart than both radii.
-
-    Examples
-    --------
     >>> from glsk_o3d import skeletonize
     >>> from glsk_o3d.samples import torus
     >>> points = torus(8000, radius=0.05).points
@@ -140,27 +74,33 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
     >>> ring.n_components, ring.n_loops, seams.joined, seams.unmatched
     (1, 1, 4, 0)
     """
-    joint = Joint()
+    joint = _Joint()
     brought: dict[Tile, Samples] = {}
     for tile in sorted(skeletons):
         near = [each for each in brought if max(abs(a - b) for a, b in zip(each, tile, strict=True)) <= 1]
         strands = Strands.of(skeletons[tile]).within(*grid.box(tile, grid.trust))
         joint.short.append(_fell_short(strands, grid, tile))
         strands = strands.with_pieces(strands.touching(*grid.box(tile, CLAIM_SHARE * grid.trust)))
-        theirs = _all([brought[each] for each in near])
-        if len(theirs.places):
+        theirs = None
+        if near:
+            theirs = Samples(*map(np.concatenate, zip(*(brought[each] for each in near), strict=True)))
+        if theirs is not None and len(theirs.places):
             strands, met = _not_there(strands, theirs, grid, tile, near)
             joint.met.append(met)
-        brought[tile], ends = joint.bring(strands)
-        if len(ends):
-            joint.meet(ends, theirs)
-    return finished(joint, grid)
+        brought[tile] = joint.bring(strands, theirs)
+    return joint.finished(grid)
+
+
+def _fell_short(strands: Strands, grid: Grid, tile: Tile) -> np.ndarray:
+    """Radii at ends within reach of a cut through the points: it is not known whether the part goes on."""
+    ends = strands.values[(strands.degree <= 1) & ~strands.marks[:, BORDER]]
+    return ends[~inside(ends, *grid.box(tile, grid.overlap), CUT_REACH * ends[:, 3]), 3]
 
 
 def _not_there(
     strands: Strands, theirs: Samples, grid: Grid, tile: Tile, near: Sequence[Tile]
 ) -> tuple[Strands, np.ndarray]:
-    """What others have not brought, and the ends of the object that they have."""
+    """What others have not brought, and the values of the ends of the object that they have."""
     for axis, value in grid.seams(tile):
         strands = strands.split(axis, value)
     there = _covered(strands.middles, theirs)
@@ -177,13 +117,15 @@ def _not_there(
     return left.with_pieces(leaves).mended(), strands.values[ends]
 
 
-def _fell_short(strands: Strands, grid: Grid, tile: Tile) -> np.ndarray:
-    """Radii at ends within reach of a cut through the points: it is not known whether the part goes on."""
-    ends = strands.values[(strands.degree <= 1) & ~strands.marks[:, BORDER]]
-    return ends[~inside(ends, *grid.box(tile, grid.overlap), CUT_REACH * ends[:, 3]), 3]
+def _covered(values: np.ndarray, theirs: Samples) -> np.ndarray:
+    """Which places are on curves that are there: no farther from them than either is thick, and not past a cut end."""
+    distance, nearest = cKDTree(theirs.places).query(values[:, :3])
+    past = dot(values[:, :3] - theirs.places[nearest], theirs.outward[nearest]) > 0
+    return (distance <= np.fmax(values[:, 5], theirs.scale[nearest])) & ~past
 
 
 def _sampled(strands: Strands, first: int) -> Samples:
+    """Places along strands whose vertices are numbered from `first`."""
     places, edges = strands.values[:, :3], strands.edges
     scale = np.fmax(np.fmin(*strands.values[edges, 5].T), np.finfo(float).tiny)
     step = np.fmax(SAMPLE_STEP * scale, norm(places[edges[:, 1]] - places[edges[:, 0]]) / MOST_SAMPLES)
@@ -195,14 +137,117 @@ def _sampled(strands: Strands, first: int) -> Samples:
     return Samples(values[:, :3], values[:, 5], first + vertex, outward)
 
 
-def _all(samples: Sequence[Samples]) -> Samples:
-    if not samples:
-        return Samples(np.empty((0, 3)), np.empty(0), np.empty(0, int), np.empty((0, 3)))
-    return Samples(*(np.concatenate(each) for each in zip(*samples, strict=True)))
+class _Joint:
+    """What has been brought so far. Vertices are numbered through."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._values = [np.empty((0, 8))]
+        self._edges = [np.empty((0, 2), np.int64)]
+        self._merged: list[tuple[int, int]] = []  # a cut end, and the earlier one that is the same place
+        self._touching: list[tuple[int, int]] = []  # a cut end that found none, and the earlier vertex nearest to it
+        self._open: dict[int, np.ndarray] = {}  # the values of cut ends that nobody has gone on from
+        self.met = [np.empty((0, 8))]  # ends of the object that others brought: there a cut end has nothing to meet
+        self.short: list[np.ndarray] = []  # radii at ends so near to where points were cut off that they may be none
+
+    def bring(self, strands: Strands, theirs: Samples | None) -> Samples:
+        """Add what a tile brings, and join its inner cut ends to what others did; gives it as samples."""
+        first = self._count
+        self._count += len(strands.values)
+        self._values.append(strands.values)
+        self._edges.append(strands.edges + first)
+        border, inner = strands.marks[:, BORDER], strands.marks[:, INNER]
+        self._open |= {first + at: strands.values[at] for at in np.flatnonzero(border & ~inner).tolist()}
+        if inner.any():
+            assert theirs is not None
+            self._meet({first + at: strands.values[at] for at in np.flatnonzero(inner).tolist()}, theirs)
+        return _sampled(strands, first)
+
+    def _meet(self, ends: dict[int, np.ndarray], theirs: Samples) -> None:
+        """Match cut ends with open ones, the nearest first, one to one; others touch what is nearest."""
+        known = set(theirs.vertex.tolist())
+        waiting = {at: values for at, values in self._open.items() if at in known}
+        mine, others = (np.array(list(each.values())).reshape(-1, 8) for each in (ends, waiting))
+        distance = cdist(mine[:, :3], others[:, :3])
+        near = distance <= mine[:, None, 5] + others[:, 5]
+        rows, columns = np.nonzero(near)
+        one_of, other_of = list(ends), list(waiting)
+        loose = dict(ends)
+        for pair in np.argsort(distance[near], kind="stable"):
+            one, other = one_of[rows[pair]], other_of[columns[pair]]
+            if one in loose and other in self._open:
+                self._merged.append((one, other))
+                del loose[one], self._open[other]
+        if loose:
+            nearest = cKDTree(theirs.places).query(np.array(list(loose.values()))[:, :3])[1]
+            self._touching += zip(loose, theirs.vertex[nearest].tolist(), strict=True)
+
+    def finished(self, grid: Grid) -> tuple[Skeleton, Seams]:
+        """The skeleton that was brought together: merged, tied up, without stubs; and how."""
+        values = np.concatenate(self._values)
+        same = np.arange(len(values))
+        one, other = np.array(self._merged, np.int64).reshape(-1, 2).T
+        same[one] = other
+        values[other] = (values[other] + values[one]) / 2
+        alive = same == np.arange(len(values))
+        touching = np.array(self._touching, np.int64).reshape(-1, 2)
+        edges, loose = _tied(simple_edges(same[np.concatenate(self._edges)]), same[touching], alive)
+        ends = np.concatenate([np.array(list(self._open), np.int64), loose])
+        ends = ends[np.bincount(edges.ravel(), minlength=len(values))[ends] < 2]  # where curves fork, some go on
+        gone, ends = _stubs(values, edges, ends)
+        alive[gone] = False
+        edges = edges[alive[edges].all(axis=1)]
+        ends = ends[_unmet(values[ends], np.concatenate(self.met))]
+        radii = np.concatenate([values[np.concatenate([other, touching[:, 0], ends]), 3], *self.short])
+        seams = Seams(
+            joined=len(other) + len(touching) - len(loose),
+            unmatched=len(ends),
+            thick=int((radii > grid.thickest).sum()),
+            thickest=float(np.nanmax(radii, initial=0)),
+        )
+        number, kept, none = np.cumsum(alive) - 1, values[alive], np.empty((0, 3))
+        edges = simple_edges(number[edges])
+        known = dict(zip(("radii", "confidence", "half_width", "half_thickness"), kept.T[[3, 4, 6, 7]], strict=True))
+        return Skeleton(kept[:, :3], edges, vertex_of_point=none, points=none, normals=none, **known), seams
 
 
-def _covered(values: np.ndarray, theirs: Samples) -> np.ndarray:
-    """Which places are on curves that are there: no farther from them than either is thick, and not past a cut end."""
-    distance, nearest = cKDTree(theirs.places).query(values[:, :3])
-    past = dot(values[:, :3] - theirs.places[nearest], theirs.outward[nearest]) > 0
-    return (distance <= np.fmax(values[:, 5], theirs.scale[nearest])) & ~past
+def _tied(edges: np.ndarray, touching: np.ndarray, alive: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Edges from cut ends to the curves beside them, where they close no loop; and the ends that got none."""
+    piece = component_labels(len(alive), edges)
+    new, loose = [], []
+    for one, other in touching.tolist():
+        if piece[one] == piece[other]:
+            loose.append(one)
+        else:
+            new.append((one, other))
+            piece[piece == piece[one]] = piece[other]
+    return simple_edges(np.concatenate([edges, np.array(new, np.int64).reshape(-1, 2)])), np.array(loose, np.int64)
+
+
+def _stubs(values: np.ndarray, edges: np.ndarray, ends: np.ndarray) -> tuple[list[int], np.ndarray]:
+    """Vertices of short limbs that end in a cut: on the other side they fork elsewhere; and the other cut ends."""
+    gone: list[int] = []
+    left: list[int] = []
+    around = neighbours(edges) if len(ends) else {}
+    for end in ends.tolist():
+        path, length, longest = [end], 0.0, LONGEST_STUB * values[end, 5]
+        onward = around.get(end, set())
+        while len(onward) == 1 and length <= longest:
+            (at,) = onward
+            length += float(norm(values[None, at, :3] - values[path[-1], :3])[0])
+            onward = around[at] - {path[-1]}
+            path.append(at)
+        if len(path) > 1 and len(onward) > 1 and length <= longest:
+            gone += path[:-1]
+            around[path[-1]] = onward
+        else:
+            left.append(end)
+    return gone, np.array(left, np.int64)
+
+
+def _unmet(ends: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Which cut ends have no end of the object beside them that another tile saw."""
+    if not len(ends) or not len(others):
+        return np.ones(len(ends), bool)
+    distance, nearest = cKDTree(others[:, :3]).query(ends[:, :3])
+    return distance > ends[:, 5] + others[nearest, 5]

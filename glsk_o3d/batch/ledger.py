@@ -10,7 +10,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from ..errors import BatchError
 from ..interop.atomic import write_atomically, write_csv
@@ -37,13 +37,6 @@ _log = logging.getLogger(__name__)
 class Ledger:
     """The rows of an output folder, by name; in the folder they are ``ledger.jsonl``, and a table in ``ledger.csv``.
 
-    Parameters
-    ----------
-    folder : Path
-        Need not be there for reading.
-
-    Notes
-    -----
     While a batch runs, every row is a line that is added to the end. A process that dies may leave half a line: it is
     passed over, and gone when the ledger is next written whole.
     """
@@ -51,16 +44,12 @@ class Ledger:
     def __init__(self, folder: Path):
         self.path, self.table = folder / "ledger.jsonl", folder / "ledger.csv"
         self.rows: dict[str, Row] = {}
-        self._stream: BinaryIO | None = None
         lines = self.path.read_bytes().splitlines() if self.path.exists() else []
-        broken = 0
-        for line in lines:
-            row = _checked(line)
-            if row is None:
-                broken += 1
-            else:
-                self._keep(row)
+        rows = [row for line in lines if (row := _checked(line)) is not None]
+        for row in rows:
+            self._keep(row)
         self._once()
+        broken = len(lines) - len(rows)
         if broken:
             _log.warning("%s: %d broken lines passed over; their inputs are done anew", self.path, broken)
 
@@ -69,6 +58,7 @@ class Ledger:
         self.rows[row["name"]] = row
 
     def _once(self) -> None:
+        """Keep one row per input, in the order of the names."""
         last = {row["input"]: name for name, row in self.rows.items()}
         self.rows = {name: self.rows[name] for name in sorted(last.values())}
 
@@ -81,22 +71,14 @@ class Ledger:
     def add(self, row: Row) -> None:
         """Add a row, to the file at once; it replaces the one of its name."""
         self._keep(row)
-        if self._stream is None:
-            self._stream = self.path.open("ab")
-        self._stream.write(_line(row))
-        self._stream.flush()
+        with self.path.open("ab") as stream:
+            stream.write(_line(row))
 
     def close(self) -> None:
         """Write one line per input, and the table."""
-        if self._stream is not None:
-            self._stream.close()
-            self._stream = None
         self.rewrite()
-        write_csv(
-            self.table,
-            LEDGER_COLUMNS,
-            ([_cell(row.get(name)) for name in LEDGER_COLUMNS] for row in self.rows.values()),
-        )
+        cells = ([_cell(row.get(name)) for name in LEDGER_COLUMNS] for row in self.rows.values())
+        write_csv(self.table, LEDGER_COLUMNS, cells)
 
 
 def _checked(line: bytes) -> Row | None:
@@ -107,15 +89,13 @@ def _checked(line: bytes) -> Row | None:
         return None
     if not isinstance(row, dict):
         return None
-    texts = [row.get(name) for name in ("name", "input", "status")]
     outputs, messages = row.get("outputs", []), row.get("messages", [])
-    if not (all(isinstance(text, str) for text in texts) and isinstance(outputs, list) and isinstance(messages, list)):
+    if not (isinstance(outputs, list) and isinstance(messages, list) and isinstance(row.get("input"), str)):
         return None
     others = [value for name, value in row.items() if name not in ("outputs", "messages")]
     plain = all(value is None or isinstance(value, str | int | float) for value in [*others, *messages])
-    return (
-        row if plain and row["status"] in (DONE, FAILED, STALE) and all(map(_is_inside, [texts[0], *outputs])) else None
-    )
+    known = row.get("status") in (DONE, FAILED, STALE)
+    return row if plain and known and all(map(_is_inside, [row.get("name"), *outputs])) else None
 
 
 def _refuse(constant: str) -> float:
@@ -148,7 +128,7 @@ def file_hash(path: str | os.PathLike) -> str:
     if os.path.exists(path) and not os.path.isfile(path):
         raise OSError(f"{os.fspath(path)}: is no file")
     digest = hashlib.sha256()
-    with open(path, "rb") as stream:
+    with open(path, "rb") as stream:  # hashlib.file_digest needs Python 3.11
         while chunk := stream.read(1 << 20):
             digest.update(chunk)
     return digest.hexdigest()

@@ -1,91 +1,295 @@
-"""What a batch has to do."""
+"""Finding out what a batch has to do, and what is done already."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
-from .ledger import Ledger
-from .work import Job
+from ..driver import as_pipeline
+from ..errors import FileFormatError, InvalidParameterError
+from ..interop.packages import require_for
+from ..io.clouds.selection import parsed
+from ..io.skeletons import skeleton_ending
+from ..pipeline import Filter, Pipeline, parts
+from ..recipes import to_recipe
+from .grid import TooManyParts, checked_sizes
+from .inputs import Inputs, find_inputs, one_name
+from .jobs import RECIPE_FILE, TILE_ENDING, UP_TO_DATE, Job, Plan, Task
+from .ledger import DONE, STALE, Ledger, file_hash
+from .splitting import Cut, Splitter
 
-UP_TO_DATE = "done"
-RECIPE_FILE = "recipe.json"
-NEW_INPUT, ASKED_FOR, FAILED_BEFORE, INTERRUPTED_BEFORE = "new", "asked for", "failed before", "interrupted before"
-OTHER_PARAMETERS, OUTPUTS_GONE, INPUT_CHANGED = "other parameters", "outputs are gone", "input changed"
-TILES_TO_DO = "tiles to do"
 
+def plan_batch(
+    inputs: str | os.PathLike | Iterable[str | os.PathLike],
+    out_dir: str | os.PathLike,
+    *,
+    pipeline: Pipeline | Filter | str | os.PathLike = "default",
+    formats: Sequence[str] = ("ply",),
+    preview: bool = False,
+    cut_loops: bool = False,
+    recursive: bool = False,
+    where: str | None = None,
+    by: str | None = None,
+    tiles: float | None = None,
+    overlap: float | None = None,
+    force: bool = False,
+) -> Plan:
+    """Find out what a batch would do. Nothing is written.
 
-@dataclass(frozen=True)
-class Task:
-    """An input of a batch.
-
-    Attributes
+    Parameters
     ----------
-    job : Job
-    why : str
-        ``"done"`` if it is to be skipped, else why not: ``"new"``, ``"failed before"``, ``"interrupted before"``,
-        ``"other parameters"``, ``"outputs are gone"``, ``"input changed"``, ``"asked for"`` or, of what is joined from
-        tiles, ``"tiles to do"``.
+    inputs : path-like, or several
+        Folders, glob patterns, lists of files (``.txt``, one path a line, from the working folder) and clouds.
+    out_dir : path-like
+        Where results and ledger go; sub-folders as there are below each folder, pattern or list that is given.
+    pipeline : Pipeline, name, or path of a recipe
+        See `glsk_o3d.skeletonize`.
+    formats : sequence of str
+        Endings that `glsk_o3d.save_skeleton` knows; one file of each per cloud.
+    preview : bool
+        Also a picture of each.
+    cut_loops : bool
+        Cut loops open for formats that hold only trees.
+    recursive : bool
+        Take also the clouds in sub-folders.
+    where : str, optional
+        Take only points for which this holds; see `glsk_o3d.read_cloud`.
+    by : str, optional
+        One skeleton for each value of this attribute of the points, such as ``"treeID"``.
+    tiles : float, optional
+        Take scenes apart into tiles of at most this size, in the cloud's units, along every axis along which they are
+        longer, and join the skeletons of these into one. For scenes that are too large to be taken at once.
+    overlap : float, optional
+        How far a tile looks beyond itself, in the cloud's units: at least 2.7 times the radius of the thickest part
+        that crosses its faces, and at most a quarter of `tiles`. By default an eighth of it.
+    force : bool
+        Do everything anew.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    FileNotFoundError
+        A file is not there, or a folder or pattern has no cloud.
+    InvalidParameterError
+        The pipeline or a format is wrong, there is nothing to write, or a result would replace an input, the result of
+        another input that is still there, or, in a folder without a ledger, a file that no batch has made; `by` and
+        `tiles` are given both, or tiles with a pipeline that makes one tree.
+    MissingPackageError
+        A format, or the picture, is written by a package that is not installed.
+    RecipeError
+        No recipe can hold the pipeline: then it cannot be told whether two runs are the same.
+    BatchError
+        Where the parts of a scene are to be, in the output folder, there is something else.
 
     Examples
     --------
+    Of tiles the skeletons come first, and then the whole:
+
     >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d.batch import plan_batch
+    >>> import numpy as np
+    >>> from glsk_o3d.samples import tube
     >>> with TemporaryDirectory() as folder:
-    ...     Path(folder, "scan.ply").touch()
-    ...     plan = plan_batch(folder, f"{folder}/skeletons")
-    >>> plan.tasks[0].why
-    'new'
+    ...     np.savetxt(f"{folder}/pipe.xyz", tube(1000, radius=0.04).points)
+    ...     plan = plan_batch(f"{folder}/pipe.xyz", f"{folder}/skeletons", tiles=0.6)
+    >>> [(task.why, *task.job.outputs) for task in plan.tasks]
+    [('new', 'pipe.tiles/0-0-0.npz'), ('new', 'pipe.tiles/1-0-0.npz'), ('new', 'pipe.ply')]
     """
+    wanted = Wanted(pipeline, formats, preview, cut_loops, recursive, where, by, tiles, overlap, force)
+    return planned(inputs, out_dir, wanted, write=False)
 
-    job: Job
-    why: str
+
+@dataclass
+class Wanted:
+    """The options of `plan_batch`, checked before a batch looks at any cloud, and what follows from them."""
+
+    pipeline: Pipeline | Filter | str | os.PathLike = "default"
+    formats: Sequence[str] = ("ply",)
+    preview: bool = False
+    cut_loops: bool = False
+    recursive: bool = False
+    where: str | None = None
+    by: str | None = None
+    tiles: float | None = None
+    overlap: float | None = None
+    force: bool = False
+
+    def __post_init__(self) -> None:
+        chosen = as_pipeline(self.pipeline)
+        self.recipe = to_recipe(chosen)
+        try:
+            endings = dict.fromkeys(skeleton_ending(Path(), ending) for ending in self.formats)
+        except FileFormatError as error:
+            raise InvalidParameterError(str(error)) from None
+        self.endings = [*endings, *[".png"] * self.preview]
+        if not self.endings:
+            raise InvalidParameterError("there is nothing to write: give a format")
+        for ending in self.endings:
+            require_for(ending)
+        if self.where is not None:
+            parsed(self.where)
+        self.cut = self._cut(chosen)
+
+    def _cut(self, pipeline: Pipeline) -> Cut | None:
+        """How scenes are to be taken apart, if they are."""
+        if self.tiles is None:
+            if self.overlap is not None:
+                raise InvalidParameterError(f"overlap = {self.overlap!r}: is that of tiles: give their size, too")
+            return None if self.by is None else Cut(by=self.by, where=self.where)
+        if self.by is not None:
+            raise InvalidParameterError("by and tiles: labels have no seams, tiles have: give one of them")
+        stages = list(parts(pipeline))
+        if any(getattr(stage, "root", None) is not None for stage in stages):
+            raise InvalidParameterError(
+                "tiles: the pipeline makes one tree of all that is in a tile: give one without root"
+            )
+        tiles, overlap = checked_sizes(self.tiles, self.overlap)
+        drop_invalid = any(getattr(stage, "drop_invalid", False) for stage in stages)
+        return Cut(tiles=tiles, overlap=overlap, where=self.where, drop_invalid=drop_invalid)
+
+    @cached_property
+    def parameters(self) -> str:
+        """The hash by which results made with the same options are known."""
+        more: dict[str, Any] = {"cut_loops": True} if self.cut_loops else {}
+        more |= {"where": self.where} if self.where else {}
+        more |= {"tiles": [self.cut.tiles, self.cut.overlap]} if self.cut and self.cut.tiles else {}
+        told = {"recipe": self.recipe, **more} if more else self.recipe
+        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What a batch has to do.
+def planned(inputs: Any, out_dir: str | os.PathLike, wanted: Wanted, *, write: bool) -> Plan:
+    """The plan of `plan_batch`; `write` takes scenes apart at once, so that they are read but once."""
+    given = [inputs] if isinstance(inputs, str | os.PathLike) else list(inputs)
+    out = Path(os.path.abspath(out_dir))
+    ledger, hashed = Ledger(out), lru_cache(maxsize=None)(file_hash)  # of many clouds in one file
+    splitter = None
+    if wanted.cut is not None:  # what can be refused is refused before scenes are read
+        splitter = Splitter(out, wanted.cut, hashed, write)
+        _refuse_strangers(out, ledger, ())
+        if wanted.tiles is not None:
+            planned(given, out, replace(wanted, tiles=None, overlap=None), write=False)
+    found = find_inputs(given, out, recursive=wanted.recursive)
+    jobs = _apart(found, splitter) if splitter else [Job(name, str(p), str(p)) for name, p in found.named.items()]
+    sources = {text for job in jobs for text in (job.source, job.origin or job.path)}
+    jobs = list(_filled(jobs, out, wanted, ledger, sources))
+    tasks = _tasks(jobs, ledger, wanted, hashed)
+    _refuse_strangers(out, ledger, jobs)
+    _refuse_to_replace(tasks, ledger, sources)
+    if splitter is not None and write:
+        splitter.supply(task.job for task in tasks if task.why != UP_TO_DATE)
+    return Plan(out, wanted.recipe, wanted.parameters, tasks, ledger, found.left_out)
 
-    Attributes
-    ----------
-    out_dir : Path
-        Absolute.
-    recipe : dict
-        The pipeline.
-    parameters : str
-        The hash by which it is known.
-    tasks : tuple of Task
-        One per input, in the order of their names; after those of its tiles that of what is joined from them.
-    ledger : Ledger
-        As it is in the folder.
-    left_out : dict of str to str
-        Files in the folders and patterns that are not taken, with the reason.
 
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d.batch import plan_batch
-    >>> with TemporaryDirectory() as folder:
-    ...     Path(folder, "scan.ply").touch()
-    ...     plan = plan_batch(folder, f"{folder}/skeletons")
-    >>> len(plan.todo)
-    1
-    """
+def _apart(found: Inputs, splitter: Splitter) -> list[Job]:
+    """The jobs of files that are taken apart; what cannot be is left out."""
+    jobs: dict[str, Job] = {}
+    for name, path in found.named.items():
+        try:
+            new = splitter.jobs(name, path)
+        except TooManyParts:
+            raise
+        except InvalidParameterError as error:
+            found.left_out[str(path)] = str(error)
+            continue
+        for job in new:
+            if job.name in jobs:
+                raise one_name(jobs[job.name].source, job.source, job.name)
+            jobs[job.name] = job
+    if not jobs:
+        path, reason = next(iter(found.left_out.items()))
+        raise InvalidParameterError(f"{splitter.cut}: no input can be taken apart; {path}: {reason}")
+    return list(jobs.values())
 
-    out_dir: Path
-    recipe: dict[str, Any]
-    parameters: str
-    tasks: tuple[Task, ...]
-    ledger: Ledger
-    left_out: dict[str, str] = field(default_factory=dict)
 
-    @property
-    def todo(self) -> list[Task]:
-        """Those that are not done."""
-        return [task for task in self.tasks if task.why != UP_TO_DATE]
+def _filled(jobs: list[Job], out: Path, wanted: Wanted, ledger: Ledger, sources: set[str]) -> Iterator[Job]:
+    """The jobs with what they are to write, and what is there of earlier batches."""
+    results = {job.name + each for job in jobs for each in wanted.endings}
+    names = {row["input"]: name for name, row in ledger.rows.items()}
+    listed = {output for row in ledger.rows.values() for output in row.get("outputs", ())}
+    for job in jobs:
+        is_tile = job.origin and job.split is not None and job.split.grid is not None
+        outputs = tuple(job.name + ending for ending in ([TILE_ENDING] if is_tile else wanted.endings))
+        for output in outputs:
+            if str(out / output) in sources:
+                raise InvalidParameterError(f"{out / output}: is an input: give the results another folder")
+        before = names.get(job.source, job.name)  # otherwise its old results would be nobody's
+        stale = _listed_results(ledger, job.name) | (_listed_results(ledger, before) - results)
+        yield replace(
+            job,
+            out_dir=str(out),
+            outputs=outputs,
+            recipe=wanted.recipe,
+            cut_loops=wanted.cut_loops,
+            where=(wanted.where or "") if job.split is None else "",
+            stale=tuple(sorted(stale)),
+            foreign=tuple(each for each in outputs if each not in listed and os.path.lexists(out / each)),
+        )
 
-    @property
-    def skipped(self) -> int:
-        """How many are done."""
-        return len(self.tasks) - len(self.todo)
+
+def _listed_results(ledger: Ledger, name: str) -> set[str]:
+    """What the ledger lists for a name, if it is called so: it will be removed, whatever has happened to the ledger."""
+    outputs = ledger.rows.get(name, {}).get("outputs", ())
+    return {each for each in outputs if each.startswith(f"{name}.") and not set(each[len(name) :]) & {"/", os.sep}}
+
+
+def _tasks(jobs: list[Job], ledger: Ledger, wanted: Wanted, hashed: Callable[[Path], str]) -> tuple[Task, ...]:
+    """The jobs, each with why it is to be done, if it is."""
+
+    def why(job: Job) -> str:
+        row = ledger.rows.get(job.name)
+        if wanted.force:
+            return "asked for"
+        if row is None:
+            return "new"
+        if row["status"] != DONE:
+            return "interrupted before" if row["status"] == STALE else "failed before"
+        if row.get("parameters") != wanted.parameters:
+            return "other parameters"
+        written = row.get("outputs", ())
+        if not all(each in written and Path(job.out_dir, each).is_file() for each in job.outputs):
+            return "outputs are gone"
+        try:
+            now = hashed(Path(job.path)) if job.split is None else job.split.input_hash
+        except OSError:  # gone, or not to be read: the worker will say so
+            return "input changed"
+        return UP_TO_DATE if now == row.get("input_hash") else "input changed"
+
+    with ThreadPoolExecutor() as pool:  # a hash takes as long as reading the file
+        reasons = dict(zip((job.name for job in jobs), pool.map(why, jobs), strict=True))
+    to_do = {name for name, reason in reasons.items() if reason != UP_TO_DATE}
+    reasons |= {job.name: "tiles to do" for job in jobs if job.name not in to_do and to_do.intersection(job.needs)}
+    return tuple(Task(job, reasons[job.name]) for job in jobs)
+
+
+def _refuse_strangers(out: Path, ledger: Ledger, jobs: Iterable[Job]) -> None:
+    """Raise InvalidParameterError where a batch would replace what no batch has made, since there is no ledger."""
+    if ledger.path.exists():
+        return
+    strange = [each for job in jobs for each in job.foreign]
+    strange += [each for each in (ledger.table.name, RECIPE_FILE) if os.path.lexists(out / each)]
+    if strange:
+        raise InvalidParameterError(
+            f"{out / strange[0]}: is not the result of a batch, since there is no ledger here: give the results "
+            "another folder, or remove it"
+        )
+
+
+def _refuse_to_replace(tasks: Iterable[Task], ledger: Ledger, sources: set[str]) -> None:
+    """Raise InvalidParameterError where a result would replace that of another input which is still there."""
+    for task in tasks:
+        row = ledger.rows.get(task.job.name, {})
+        theirs = row.get("input", task.job.source)
+        if task.why != UP_TO_DATE and row.get("outputs") and theirs not in sources and os.path.exists(theirs):
+            raise InvalidParameterError(
+                f"{task.job.source}: its results, {task.job.name}, would replace those of {theirs}: give another "
+                "folder for them"
+            )

@@ -7,25 +7,22 @@ import os
 import shutil
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import contextmanager, nullcontext, suppress
-from dataclasses import dataclass, replace
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import __version__
 from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
 from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
-from .inputs import TILES_FOLDER
-from .ledger import DONE, FAILED, LOCK_FILE, STALE, Row, locked
-from .plan import RECIPE_FILE, UP_TO_DATE, Plan, Task
-from .planning import planned
-from .queueing import Queue
-from .splitting import PARTS_FOLDER
-from .wanted import Wanted
-from .work import Job, work
+from .jobs import RECIPE_FILE, UP_TO_DATE, BatchResult, Plan, Task
+from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STALE, Row, locked
+from .plan import Wanted, planned
+from .splitting import PARTS_FOLDER, TILES_FOLDER
+from .work import clear, told, work
 from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, died
 
 if TYPE_CHECKING:
@@ -33,44 +30,8 @@ if TYPE_CHECKING:
 
 _POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed
 CANCELLED = "the work was cancelled, or its scheduler has gone: run the same batch to go on"
+WORKER_DIED = "the worker died with it, twice: out of memory, or a crash in native code"
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class BatchResult:
-    """What a batch did.
-
-    Attributes
-    ----------
-    rows : dict of str to dict
-        What the ledger says about the inputs, by name, those skipped included.
-    done, skipped, failed : int
-    seconds : float
-        Wall time, from the first cloud handed out.
-    ledger : Path
-
-    Examples
-    --------
-    >>> from concurrent.futures import ThreadPoolExecutor
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder, ThreadPoolExecutor() as executor:
-    ...     _ = Path(folder, "scan.xyz").write_text("not a point")
-    ...     result = run_batch(folder, f"{folder}/skeletons", executor=executor)
-    >>> result.done, result.failed
-    (0, 1)
-    """
-
-    rows: dict[str, Row]
-    done: int
-    skipped: int
-    failed: int
-    seconds: float
-    ledger: Path
-
-    @property
-    def rate(self) -> float:
-        """Clouds done or failed per second."""
-        return (self.done + self.failed) / self.seconds if self.seconds > 0 else 0.0
 
 
 def run_batch(
@@ -140,47 +101,43 @@ def run_batch(
         raise InvalidParameterError("scheduler: the cluster has its own workers: give neither workers nor an executor")
     if workers is not None and workers < 1:
         raise InvalidParameterError(f"workers = {workers}: must be at least 1")
-    wanted, folder = Wanted.of(**options), Path(os.path.abspath(out_dir))
-    new = not folder.is_dir()
-    if new:
-        planned(
-            inputs, folder, replace(wanted, cut=None), write=False
-        )  # what is wrong is said before there is a folder
-        folder.mkdir(parents=True)
+    wanted, folder = Wanted(**options), Path(os.path.abspath(out_dir))
+    new = [each for each in (folder, *folder.parents) if not each.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
     with locked(folder):
-        with _nothing_left_behind(folder) if new else nullcontext():
+        try:
             plan = planned(inputs, folder, wanted, write=True)
+        except BaseException:
+            _remove_new(new)
+            raise
         if on_plan is not None:
             on_plan(plan)
-        crew, left = _hired(plan, workers, scheduler, executor), True
+        crew, complete = _hired(plan, workers, scheduler, executor), False
         start = time.perf_counter()
         try:
             _make_room(plan)
             try:
-                _work_through(plan, crew, on_result)
+                _Run(plan, crew, on_result).work_through()
             finally:
                 plan.ledger.close()
             _sweep(plan)
-            left = False
+            complete = True
         finally:
-            crew.close(at_once=left)
+            crew.close(at_once=not complete)
     rows = {task.job.name: plan.ledger.rows[task.job.name] for task in plan.tasks}
     failed = sum(row["status"] == FAILED for row in rows.values())
     done = len(plan.todo) - failed
     return BatchResult(rows, done, plan.skipped, failed, time.perf_counter() - start, plan.ledger.path)
 
 
-@contextmanager
-def _nothing_left_behind(folder: Path) -> Iterator[None]:
-    """Remove a new folder where it turns out that the batch cannot be planned."""
-    try:
-        yield
-    except BaseException:
-        shutil.rmtree(folder / PARTS_FOLDER, ignore_errors=True)
+def _remove_new(folders: Sequence[Path]) -> None:
+    """Remove the output folder, and those above it that are new, where it turns out that nothing can be planned."""
+    if folders:
+        shutil.rmtree(folders[0] / PARTS_FOLDER, ignore_errors=True)
         with suppress(OSError):  # on Windows nobody removes what is open
-            (folder / LOCK_FILE).unlink()
-            folder.rmdir()
-        raise
+            (folders[0] / LOCK_FILE).unlink()
+            for folder in folders:
+                folder.rmdir()
 
 
 def _hired(plan: Plan, workers, scheduler, executor) -> Workers:
@@ -200,22 +157,22 @@ def _make_room(plan: Plan) -> None:
             rows[name] = rows.pop(name) | {"input": source}
         elif task.why != UP_TO_DATE and rows.get(name, {}).get("status") == DONE:
             rows[name]["status"] = STALE
-    for task in plan.todo:
-        if task.job.needs:
-            _forget_tiles(plan, task.job)
+    _forget_tiles(plan)
     plan.ledger.rewrite()
     write_json(plan.out_dir / RECIPE_FILE, plan.recipe)
     for folder in {(plan.out_dir / task.job.name).parent for task in plan.todo}:
         folder.mkdir(parents=True, exist_ok=True)
 
 
-def _forget_tiles(plan: Plan, job: Job) -> None:
+def _forget_tiles(plan: Plan) -> None:
     """Drop tiles of earlier batches that are none any more, since the size has changed, or the scene."""
-    rows, first = plan.ledger.rows, job.name + TILES_FOLDER
-    for name in [name for name in rows if name.startswith(first) and name not in job.needs]:
-        for output in rows.pop(name).get("outputs", ()):
-            if output.startswith(first):
-                Path(plan.out_dir, output).unlink(missing_ok=True)
+    rows = plan.ledger.rows
+    for job in (task.job for task in plan.todo if task.job.needs):
+        first = job.name + TILES_FOLDER
+        for name in [name for name in rows if name.startswith(first) and name not in job.needs]:
+            for output in rows.pop(name).get("outputs", ()):
+                if output.startswith(first):
+                    Path(plan.out_dir, output).unlink(missing_ok=True)
 
 
 def _sweep(plan: Plan) -> None:
@@ -227,40 +184,100 @@ def _sweep(plan: Plan) -> None:
                 Path(task.job.path).parent.rmdir()
 
 
-def _work_through(plan: Plan, workers: Workers, on_result: Callable[[Row], object] | None) -> None:
-    queue, again = Queue(plan, on_result), deque[Task]()
-    running: dict[Future, Task] = {}
-    alone = warned = False
+class _Run:
+    """A batch at work: tasks that can be handed out, that wait for their tiles, that are in work, or to be retried."""
 
-    def hand_out(task):
-        running[workers.submit(work, task.job)] = task
+    def __init__(self, plan: Plan, workers: Workers, on_result: Callable[[Row], object] | None):
+        self._plan, self._workers, self._on_result = plan, workers, on_result
+        self._ready: deque[Task] = deque()
+        self._waiting = plan.todo
+        self._open = {task.job.name for task in plan.todo}
+        self._running: dict[Future, Task] = {}
+        self._again: deque[Task] = deque()  # their workers died; done alone in the end
+        self._retried: set[str] = set()
+        self._release()
 
-    with counted_interrupts() as interrupts:  # no line of the ledger is torn
-        while running or ((queue.ready or again) and not interrupts):
-            while queue.ready and not interrupts and len(running) < workers.capacity():
-                hand_out(queue.ready.popleft())
-            if again and not running and not interrupts:
-                alone = True
-                hand_out(again.popleft())
-            ready, _ = wait(running, _POLL_SECONDS, FIRST_COMPLETED)
-            lost: BatchError | None = None
-            for future in ready:
-                task = running.pop(future)
-                error = BatchError(CANCELLED) if future.cancelled() else future.exception()
-                if isinstance(error, BatchError):
-                    lost = error
-                elif died(error) and not alone:
-                    again.append(task)
-                else:
-                    queue.enter(task, queue.row(task, future, error))
-            if lost is not None:
-                raise lost
-            if len(interrupts) > 1:
+    def work_through(self) -> None:
+        """Hand out all tasks. Ctrl-C hands out no more and waits for what is in work; the second one does not wait."""
+        warned = False
+        with counted_interrupts() as interrupts:  # no line of the ledger is torn
+            while self._running or ((self._ready or self._again) and not interrupts):
+                if not interrupts:
+                    self._hand_out()
+                ended, _ = wait(self._running, _POLL_SECONDS, FIRST_COMPLETED)
+                self._collect(ended)
+                if len(interrupts) > 1:
+                    break
+                if interrupts and not warned:
+                    warned = True
+                    in_work = len(self._running)
+                    _log.warning("finishing what is in work (%d), nothing else: Ctrl-C again stops at once", in_work)
+                if not ended:
+                    self._workers.capacity()  # notices that a scheduler has gone
+            if interrupts:
                 raise KeyboardInterrupt
-            if interrupts and not warned:
-                warned = True
-                _log.warning("finishing what is in work (%d), nothing else: Ctrl-C again stops at once", len(running))
-            if not ready:
-                workers.capacity()  # notices that a scheduler has gone
-        if interrupts:
-            raise KeyboardInterrupt
+
+    def _hand_out(self) -> None:
+        if self._again and not self._ready and not self._running:
+            self._ready.append(self._again.popleft())
+            self._retried.add(self._ready[0].job.name)
+        while self._ready and len(self._running) < self._workers.capacity():
+            task = self._ready.popleft()
+            self._running[self._workers.submit(work, task.job)] = task
+
+    def _collect(self, ended: Iterable[Future]) -> None:
+        """Put what came of tasks into the ledger; BatchError, in the end, where there is nobody to work any more."""
+        lost: BatchError | None = None
+        for future in ended:
+            task = self._running.pop(future)
+            error = BatchError(CANCELLED) if future.cancelled() else future.exception()
+            if isinstance(error, BatchError):
+                lost = error
+            elif error is None:
+                self._enter(task, self._completed(task, future.result()))
+            elif not died(error):
+                self._enter(task, _failed(task, told(error)))
+            elif task.job.name in self._retried:
+                self._enter(task, _failed(task, WORKER_DIED))
+            else:
+                self._again.append(task)
+        if lost is not None:
+            raise lost
+
+    def _completed(self, task: Task, row: Row) -> Row:
+        """A worker's row, with what only this process knows."""
+        missing = row["error"].startswith("no such file") or ": no such folder" in row["error"]
+        if missing and Path(task.job.path).exists():
+            row["error"] += f" (on {row['worker']}; there is one here: workers need the same files by the same paths)"
+        if row.get("kept") and row["outputs"]:  # what the line told of them stays, too
+            before = self._plan.ledger.rows.get(task.job.name) or row
+            return before | {name: row[name] for name in ("status", "error", "outputs")}
+        return row
+
+    def _enter(self, task: Task, row: Row) -> None:
+        """Put a row into the ledger, and let those go on that waited for it."""
+        row = {"parameters": self._plan.parameters} | row | {"name": task.job.name, "input": task.job.source}
+        row = {name: row[name] for name in LEDGER_COLUMNS if name in row}
+        self._plan.ledger.add(row)
+        self._open.discard(task.job.name)
+        if self._on_result is not None:
+            self._on_result(row)
+        self._release()
+
+    def _release(self) -> None:
+        """Let those go on that wait for nothing any more; a scene of which tiles failed has failed, too."""
+        free = [task for task in self._waiting if self._open.isdisjoint(task.job.needs)]
+        self._waiting = [task for task in self._waiting if not self._open.isdisjoint(task.job.needs)]
+        for task in free:
+            rows = [self._plan.ledger.rows[name] for name in task.job.needs]
+            failed = [row for row in rows if row["status"] != DONE]
+            if failed:
+                why = f"{len(failed)} of {len(rows)} tiles failed, {failed[0]['name']} since {failed[0]['error']}"
+                self._enter(task, _failed(task, f"{why}: the same batch tries them again"))
+            else:
+                self._ready.append(task)
+
+
+def _failed(task: Task, error: str) -> Row:
+    clear(task.job)
+    return {"status": FAILED, "error": error, "outputs": [], "version": __version__}

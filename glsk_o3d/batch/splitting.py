@@ -3,148 +3,117 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import shutil
-from collections.abc import Callable, Container, Iterator
-from contextlib import suppress
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import BatchError, InvalidCloudError, InvalidParameterError, did_you_mean
+from ..errors import BatchError, FileFormatError, InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.atomic import write_json
 from ..io.clouds.blocks import read_blocks
-from ..io.clouds.scanned import Scan
+from ..io.clouds.scanned import COLOR_CHANNELS, Scan
+from ..io.formats import ply_rows
 from ..preparation.frame import not_finite
 from .grid import Grid, TooManyParts, tile_name, tile_of
-from .part_files import PartFiles, writing
+from .jobs import Job, Split
 
 PARTS_FOLDER = ".parts"
+TILES_FOLDER = ".tiles/"
+"""What follows the name of a scene in those of its tiles."""
 MOST_PARTS = 10_000  # fitted: more things than anybody numbers in a file; fewer than a scanner's intensities
 LONGEST_LABEL = 24  # derived: characters of the longest number of 64 bits, -2.2250738585072014e-308
 SPLIT_VERSION = 1
+_COUNT_WIDTH = 20  # derived: digits of the largest 64-bit number: the header is written before the count is known
 
 
 @dataclass(frozen=True)
 class Cut:
-    """How scenes are taken apart.
-
-    Attributes
-    ----------
-    by : str or None
-        A part for each value of this attribute.
-    tiles, overlap : float or None
-        A part for each tile of this size.
-    where : str or None
-        Only points for which this holds.
-    drop_invalid : bool
-        Pass over points that are not finite, which belong to no tile, instead of refusing them.
-    """
+    """How scenes are taken apart: into a part for each value of an attribute, or for each tile of a size."""
 
     by: str | None = None
     tiles: float | None = None
     overlap: float | None = None
-    where: str | None = None
-    drop_invalid: bool = False
+    where: str | None = None  # only points for which this holds
+    drop_invalid: bool = False  # pass over points that are not finite, which belong to no tile, instead of refusing
 
     def __str__(self) -> str:
         return f"by = {self.by!r}" if self.tiles is None else f"tiles = {self.tiles:g}"
 
 
-@dataclass(frozen=True)
-class Split:
-    """A scene, taken apart.
-
-    Attributes
-    ----------
-    input_hash : str
-        Of the scene.
-    parts : dict of str to str
-        What to say of which points they are, by labels that can stand in names.
-    points, dropped : int
-        In all, and those that are in no part: without a label, or a place.
-    grid : Grid or None
-        Of the tiles.
-    """
-
-    input_hash: str
-    parts: dict[str, str]
-    points: int
-    dropped: int
-    grid: Grid | None = None
-
-    @classmethod
-    def from_json(cls, data: dict[str, Any]) -> Split:
-        """From what `asdict` makes and JSON keeps; ValueError where a label is none: files are named by them."""
-        found = data["grid"]
-        grid = found and Grid(tuple(found["low"]), tuple(found["cell"]), tuple(found["counts"]), found["overlap"])
-        for label, meant in data["parts"].items():
-            if not isinstance(meant, str) or label != (
-                label_text(float(label)) if grid is None else tile_name(tile_of(label))
-            ):
-                raise ValueError(f"{label!r} names no part")
-        return cls(**{**data, "grid": grid})
-
-
 class Splitter:
     """Takes scenes apart, each once: what it found is kept in the output folder.
 
-    Parameters
-    ----------
-    out : Path
-    cut : Cut
-    hashed : callable
-        The hash of a file.
-    write : bool
-        Also write the parts; else only find out what they would be.
+    `hashed` gives the hash of a file. Without `write` the parts are not written, only found out.
     """
 
     def __init__(self, out: Path, cut: Cut, hashed: Callable[[Path], str], write: bool):
         self.cut, self.folder, self._hash, self._write = cut, out / PARTS_FOLDER, hashed, write
 
-    def split(self, name: str, path: Path) -> Split:
-        """Take a scene apart, unless that has been done.
+    def jobs(self, name: str, path: Path) -> list[Job]:
+        """A job for each part of a file, and after tiles one for the whole; one for the file if it cannot be read.
 
-        Parameters
-        ----------
-        name : str
-            Of its results.
-        path : Path
-
-        Raises
-        ------
-        FileNotFoundError, FileFormatError, InvalidCloudError
-            It cannot be read, or has points that belong to no part.
-        InvalidParameterError
-            It lacks what is asked for.
-        BatchError
-            The parts cannot be written, or there is something in their place that is not from here.
+        InvalidParameterError where the file lacks what is asked for.
         """
+        try:
+            split = self.split(name, path)
+        except (FileFormatError, InvalidCloudError, OSError):
+            return [Job(name, str(path), str(path))]  # the worker will say what is wrong
+        between = "-" if split.grid is None else TILES_FOLDER
+        known = Split(split.input_hash, {}, split.points, split.dropped, split.grid)
+        jobs = [
+            Job(
+                name=f"{name}{between}{label}",
+                path=str(self.file(name, label)),
+                source=f"{path} {part}",
+                origin=str(path),
+                split=known,
+            )
+            for label, part in split.parts.items()
+        ]
+        if split.grid is not None:
+            jobs.append(Job(name, str(path), str(path), needs=tuple(job.name for job in jobs), split=known))
+        return jobs
+
+    def supply(self, jobs: Iterable[Job]) -> None:
+        """Write the parts of scenes anew of which some are to be done, and were removed when they had been done."""
+        missing = [job for job in jobs if job.origin and not os.path.exists(job.path)]
+        for folder, origin in {Path(job.path).parent: job.origin for job in missing}.items():
+            self._divide(folder.relative_to(self.folder).as_posix(), Path(origin))
+
+    def split(self, name: str, path: Path) -> Split:
+        """Take a scene apart, unless that has been done. BatchError where the parts cannot be written."""
         self._check_place(name)
         known = self._known(name, path)
         if known is not None:
             return known
-        return self._divide(name, path) if self._write else _divided(path, self.cut, self._hash(path), None)
+        return self._divide(name, path) if self._write else divided(path, self.cut, self._hash(path), None)
 
     def file(self, name: str, label: str) -> Path:
         """Where a part is, or will be."""
         return self.folder / name / f"{label}.ply"
 
-    def supply(self, name: str, path: Path, labels: Container[str]) -> None:
-        """Write some parts anew that were removed when they had been done."""
-        self._divide(name, path, labels)
-
     def _known(self, name: str, path: Path) -> Split | None:
+        """What is kept of a scene, None where it is damaged or of something else: files are named by its labels."""
         try:
             told = json.loads(self._told(name).read_text(encoding="utf-8"))
-            same = (SPLIT_VERSION, str(path), asdict(self.cut)) == (told["version"], told["input"], told["cut"])
-            split = Split.from_json(told["split"]) if same else None
+            if (SPLIT_VERSION, str(path), asdict(self.cut)) != (told["version"], told["input"], told["cut"]):
+                return None
+            found = told["split"]["grid"]
+            grid = found and Grid(tuple(found["low"]), tuple(found["cell"]), tuple(found["counts"]), found["overlap"])
+            split = Split(**{**told["split"], "grid": grid})
+            for label, part in split.parts.items():
+                same = label_text(float(label)) if grid is None else tile_name(tile_of(label))
+                if label != same or len(label) > LONGEST_LABEL or not isinstance(part, str):
+                    return None
         except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError):  # none, or not of ours
             return None
-        return split if split is not None and split.input_hash == self._hash(path) else None
+        return split if split.input_hash == self._hash(path) else None
 
     def _check_place(self, name: str) -> None:
         """Raise BatchError where parts would be somewhere else, through a link, or where others keep something."""
@@ -156,21 +125,21 @@ class Splitter:
                 "results another folder"
             )
 
-    def _divide(self, name: str, path: Path, labels: Container[str] | None = None) -> Split:
-        with writing(self.folder):
+    def _divide(self, name: str, path: Path) -> Split:
+        """Write the parts of a scene."""
+        with _writing(self.folder):
             self._told(name).parent.mkdir(parents=True, exist_ok=True)
             write_json(self._told(name), {})  # of a batch that is killed the next one knows whose the folder is
-            if labels is None:
-                shutil.rmtree(self.folder / name, ignore_errors=True)
+            shutil.rmtree(self.folder / name, ignore_errors=True)
             (self.folder / name).mkdir(exist_ok=True)
-        files = PartFiles(self.folder / name, labels)
+        files = PartFiles(self.folder / name)
         try:
-            split = _divided(path, self.cut, self._hash(path), files)
+            split = divided(path, self.cut, self._hash(path), files)
             files.close()
         except BaseException:
             self._forget(name)
             raise
-        with writing(self.folder):
+        with _writing(self.folder):
             told = {"version": SPLIT_VERSION, "input": str(path), "cut": asdict(self.cut), "split": asdict(split)}
             write_json(self._told(name), told)
         return split
@@ -186,21 +155,67 @@ class Splitter:
         return self.folder / f"{name}.json"
 
 
-def _divided(path: Path, cut: Cut, digest: str, files: PartFiles | None) -> Split:
+class PartFiles:
+    """Parts of a scene written side by side as PLY, with normals and colours; coordinates keep all digits."""
+
+    def __init__(self, folder: Path):
+        self._folder, self._row = folder, np.dtype([])
+        self._counts: Counter[Path] = Counter()
+
+    def add(self, scan: Scan, rows: Mapping[str, np.ndarray]) -> None:
+        """Append to each part, by its label, some of the points of a block."""
+        columns: dict[str, np.ndarray] = dict(zip("xyz", scan.positions.astype("<f8").T, strict=True))
+        for names, values in ((("nx", "ny", "nz"), scan.normals), (COLOR_CHANNELS, scan.colors)):
+            if values is not None:
+                columns |= dict(zip(names, values.astype("<f4").T, strict=True))
+        table = ply_rows.table(columns)
+        self._row = table.dtype
+        with _writing(self._folder):
+            for label, chosen in rows.items():
+                path = self._folder / f"{label}.ply"
+                with path.open("ab") as stream:
+                    if path not in self._counts:
+                        stream.write(self._header(0))
+                    stream.write(table[chosen].tobytes())
+                self._counts[path] += len(chosen)
+
+    def close(self) -> None:
+        """Put into every file how many points it has: before, it is an empty cloud with something behind it."""
+        with _writing(self._folder):
+            for path, count in self._counts.items():
+                with path.open("r+b") as stream:
+                    stream.write(self._header(count))
+
+    def _header(self, count: int) -> bytes:
+        return ply_rows.header(self._row, count, width=_COUNT_WIDTH)
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """Raise BatchError where parts of a scene cannot be written into a folder."""
+    try:
+        yield
+    except OSError as error:
+        raise BatchError(f"{folder}: the parts of a scene cannot be written there: {error.strerror}") from error
+
+
+def divided(path: Path, cut: Cut, digest: str, files: PartFiles | None) -> Split:
+    """The parts of a scene; their points go to the files, if there are any."""
     grid = None if cut.tiles is None else _grid(path, cut)
     parts: dict[str, str] = {}
     points = kept = 0
     for scan in read_blocks(path, where=cut.where):
-        found = list(_by_label(scan, cut.by) if grid is None else _by_tile(scan, grid))
-        parts |= {label: meant for label, meant, _ in found}
+        rows: dict[str, np.ndarray] = {}
+        valid = np.flatnonzero(_finite(scan) if grid is not None else np.isfinite(_labels(scan, cut.by)))
+        for label, meant, chosen in _parted(scan, valid, cut.by, grid):
+            parts[label], rows[label] = meant, valid[chosen]
         if len(parts) > MOST_PARTS:
             why = "it numbers no things" if grid is None else "give larger tiles"
             raise TooManyParts(f"{cut}: has {len(parts)} parts or more in {path}: {why}")
-        points += len(scan)
-        kept += sum(len(rows) for _, _, rows in found) if grid is None else int(_finite(scan).sum())
+        points, kept = points + len(scan), kept + len(valid)
         if files is not None:
-            files.add(scan, {label: rows for label, _, rows in found})
-    ordered = sorted(parts, key=lambda label: [float(each) for each in ([label] if grid is None else label.split("-"))])
+            files.add(scan, rows)
+    ordered = sorted(parts, key=float if grid is None else tile_of)
     return Split(digest, {label: parts[label] for label in ordered}, points, points - kept, grid)
 
 
@@ -228,40 +243,28 @@ def _finite(scan: Scan) -> np.ndarray:
     return np.isfinite(scan.positions).all(axis=1)
 
 
-def _by_tile(scan: Scan, grid: Grid) -> Iterator[tuple[str, str, np.ndarray]]:
-    finite = np.flatnonzero(_finite(scan))
-    for tile, rows in grid.parted(scan.positions[finite]):
-        yield tile_name(tile), f"tile {tile_name(tile)}", finite[rows]
-
-
-def _by_label(scan: Scan, by: str | None) -> Iterator[tuple[str, str, np.ndarray]]:
+def _labels(scan: Scan, by: Any) -> np.ndarray:
+    """The labels of points; without one it is NaN, say."""
     if by not in scan.attributes:
         raise InvalidParameterError(did_you_mean(str(by), scan.given, "attribute of its points"))
-    values, group = np.unique(scan.attributes[by], return_inverse=True)
-    order = np.argsort(group, kind="stable")
-    for value, rows in zip(values.tolist(), np.split(order, np.cumsum(np.bincount(group))[:-1]), strict=True):
-        if math.isfinite(value):  # points without a label are NaN, say
-            try:
-                label = label_text(value)
-            except InvalidParameterError as error:
-                raise InvalidParameterError(f"{by}: {error}") from None
-            yield label, f"where {by} == {value!r}", rows
+    return scan.attributes[by]
+
+
+def _parted(scan: Scan, valid: np.ndarray, by: Any, grid: Grid | None) -> Iterator[tuple[str, str, np.ndarray]]:
+    """The parts of the valid points: label, what it means, and which of them."""
+    if grid is not None:
+        for tile, rows in grid.parted(scan.positions[valid]):
+            yield tile_name(tile), f"tile {tile_name(tile)}", rows
+        return
+    values, group = np.unique(_labels(scan, by)[valid], return_inverse=True)
+    rows_of = np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1])
+    for value, rows in zip(values.tolist(), rows_of, strict=False):  # of no values, split makes one group
+        label = label_text(value)
+        if len(label) > LONGEST_LABEL:
+            raise InvalidParameterError(f"{by}: {value!r} is no label: no name has that many digits")
+        yield label, f"where {by} == {value!r}", rows
 
 
 def label_text(value: float) -> str:
-    """A label as part of a name: all digits, since others may differ in the last one.
-
-    Raises
-    ------
-    InvalidParameterError
-        It is too long for a name.
-
-    Examples
-    --------
-    >>> label_text(17.0), label_text(0.25)
-    ('17', '0.25')
-    """
-    text = str(int(value)) if value == int(value) else repr(value)
-    if len(text) > LONGEST_LABEL:
-        raise InvalidParameterError(f"{value!r} is no label: no name has that many digits")
-    return text
+    """A label as part of a name, such as 17 or 0.25: all digits, since others may differ in the last one."""
+    return str(int(value)) if value == int(value) else repr(value)

@@ -19,18 +19,13 @@ where the curve goes on in what is there already."""
 class Strands:
     """A graph of which parts are taken.
 
-    Attributes
-    ----------
-    values : (n, 8) float array
-        x, y, z, radius, confidence, scale, half width and half thickness of every vertex. The scale is how far another
-        skeleton of the same part may be away: the radius, or the longest edge there, whatever is more.
-    edges : (e, 2) int array
-    marks : (n, 3) bool array
+    The values of a vertex are x, y, z, radius, confidence, scale, half width and half thickness. The scale is how far
+    another skeleton of the same part may be away: the radius, or the longest edge there, whatever is more.
     """
 
-    values: np.ndarray
-    edges: np.ndarray
-    marks: np.ndarray
+    values: np.ndarray  # (n, 8) float
+    edges: np.ndarray  # (e, 2) int
+    marks: np.ndarray  # (n, 3) bool
 
     @classmethod
     def of(cls, skeleton: Skeleton) -> Strands:
@@ -73,15 +68,9 @@ class Strands:
         )
 
     def keep(self, edges: np.ndarray, alone: np.ndarray, mark: int) -> Strands:
-        """Some edges with their vertices, and some of the vertices that have none.
+        """Some edges with their vertices, and of the vertices that have none those that are chosen by `alone`.
 
-        Parameters
-        ----------
-        edges : (e,) bool array
-        alone : (n,) bool array
-            Of vertices with edges it says nothing.
-        mark : int
-            The column in which vertices are marked that lose some of their edges.
+        Vertices that lose some of their edges are marked in the column `mark`.
         """
         degree = np.bincount(self.edges[edges].ravel(), minlength=len(self.values))
         marks = self.marks.copy()
@@ -120,10 +109,7 @@ class Strands:
 
     def mended(self) -> Strands:
         """Without the vertices that were made in vain, in the middle of edges that went on."""
-        around: dict[int, set[int]] = {at: set() for at in np.unique(self.edges).tolist()}
-        for a, b in self.edges.tolist():
-            around[a].add(b)
-            around[b].add(a)
+        around = neighbours(self.edges)
         vain = self.marks[:, MADE] & ~self.marks[:, [BORDER, INNER]].any(axis=1)
         for at in np.flatnonzero(vain).tolist():
             if len(around[at]) == 2:
@@ -144,3 +130,12 @@ def inside(values: np.ndarray, low: np.ndarray, high: np.ndarray, by: np.ndarray
     """Which rows, whose first columns are x, y and z, lie in a box, so far from its faces at least, (n,) bool array."""
     places, by = values[:, :3], np.reshape(by, (-1, 1))
     return np.all((places >= low + by) & (places <= high - by), axis=1)
+
+
+def neighbours(edges: np.ndarray) -> dict[int, set[int]]:
+    """The vertices that edges join to each."""
+    around: dict[int, set[int]] = {}
+    for a, b in edges.tolist():
+        around.setdefault(a, set()).add(b)
+        around.setdefault(b, set()).add(a)
+    return around

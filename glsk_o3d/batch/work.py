@@ -9,13 +9,11 @@ import socket
 import threading
 import time
 import traceback
-from collections.abc import Iterable
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
 from datetime import datetime, timezone
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -30,64 +28,11 @@ from ..report import Report
 from ..skeleton import Skeleton
 from ..viewing.preview import save_preview
 from .grid import Grid, tile_of
+from .jobs import TILE_ENDING, Job
 from .joining import join_tiles
 from .ledger import DONE, FAILED, Row, file_hash
-from .loose_ends import Seams
 
-TILE_ENDING = ".npz"
-"""Of the skeletons of tiles: what they keep, they keep to the last bit."""
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Job:
-    """All that a worker needs to know, as plain data.
-
-    Attributes
-    ----------
-    name : str
-    path : str
-        The cloud.
-    out_dir : str
-        A folder; the sub-folders of the outputs are there.
-    outputs : tuple of str
-        From `out_dir`. The ending chooses what is written; ``.png`` is a preview.
-    recipe : dict
-    cut_loops : bool
-    stale : tuple of str
-        Outputs of an earlier batch, from `out_dir`, which are no longer true.
-    foreign : tuple of str
-        Outputs that were there before, and of which no ledger knows whose they are: replaced perhaps, never removed.
-    source : str
-        What the ledger calls the cloud: its path, and which of its points are meant if it is one of many in a file.
-    where : str
-        The points to take; empty for all.
-    origin, input_hash : str
-        The file of which `path` holds a part, and its hash; empty where it is that file.
-    needs : tuple of str
-        The jobs, by name, that come first: the tiles from whose skeletons, their only outputs, this one is joined.
-    grid : Grid or None
-        Of the tiles, for one of them and for what is joined.
-    points, dropped : int
-        Of what is joined from tiles: in all, and those that are in none.
-    """
-
-    name: str
-    path: str
-    out_dir: str
-    outputs: tuple[str, ...]
-    recipe: dict[str, Any]
-    cut_loops: bool = False
-    stale: tuple[str, ...] = ()
-    foreign: tuple[str, ...] = ()
-    source: str = ""
-    where: str = ""
-    origin: str = ""
-    input_hash: str = ""
-    needs: tuple[str, ...] = ()
-    grid: Grid | None = None
-    points: int = 0
-    dropped: int = 0
 
 
 def work(job: Job) -> Row:
@@ -99,21 +44,20 @@ def work(job: Job) -> Row:
     start = time.perf_counter()
     row: Row = {"error": "", "outputs": [], "version": __version__}
     row["worker"] = f"{socket.gethostname()}, process {os.getpid()}"
-    with _Heard() as heard:
+    with _heard() as heard:
         try:
             with suppress(OSError):  # what it is shows when it is read
-                row["input_hash"] = job.input_hash or file_hash(job.path)
-            _skeletonize(job, row, heard.messages)
+                row["input_hash"] = file_hash(job.path) if job.split is None else job.split.input_hash
+            _skeletonize(job, row, heard)
             row["status"] = DONE
         except Exception as error:  # whatever it is, the other clouds are to be done
             row |= {"status": FAILED, "error": told(error).removeprefix(f"{job.path}: ")}
             if "points" not in row and not os.path.exists(job.path):  # a disk that is not mounted, say
                 row |= {"kept": True, "outputs": [each for each in job.stale if Path(job.out_dir, each).is_file()]}
         clear(job, row["outputs"])
-    messages = list(dict.fromkeys(heard.messages))
+    messages = list(dict.fromkeys(heard))
     row |= {"seconds": round(time.perf_counter() - start, 4), "warnings": len(messages), "messages": messages}
-    finished = datetime.now(timezone.utc).isoformat(timespec="seconds")
-    return {**row, "finished": finished}
+    return {**row, "finished": datetime.now(timezone.utc).isoformat(timespec="seconds")}
 
 
 def clear(job: Job, written: Iterable[str] = ()) -> None:
@@ -130,10 +74,10 @@ def clear(job: Job, written: Iterable[str] = ()) -> None:
 
 def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
     row |= {"seams": None, "unmatched": None}
+    grid = job.split and job.split.grid
     if job.needs:
-        skeleton, seams = _joined(job)
-        row |= {"seams": seams.joined, "unmatched": seams.unmatched}
-    elif job.grid is not None:
+        skeleton = _joined(job, row)
+    elif grid:
         skeleton = _of_tile(job)
     else:
         pipeline, where = from_recipe(job.recipe), job.where or None
@@ -143,10 +87,11 @@ def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
     facts = summary(skeleton, 0.0).items()
     row |= {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in facts}
     for output in job.outputs:
-        save = partial(skeleton.save, cut_loops=job.cut_loops)
+        path = Path(job.out_dir, output)
         if output.endswith(".png"):
-            save = partial(save_preview, skeleton, title=os.path.basename(job.source or job.path))
-        save(Path(job.out_dir, output))
+            save_preview(skeleton, path, title=os.path.basename(job.source))
+        else:
+            skeleton.save(path, cut_loops=job.cut_loops)
         row["outputs"].append(output)
 
 
@@ -162,19 +107,22 @@ def _of_tile(job: Job) -> Skeleton:
     return replace(skeleton, points=none, normals=none, vertex_of_point=np.empty(0))
 
 
-def _joined(job: Job) -> tuple[Skeleton, Seams]:
-    """The skeleton of a scene, from those of its tiles."""
-    assert job.grid is not None
+def _joined(job: Job, row: Row) -> Skeleton:
+    """The skeleton of a scene, from those of its tiles; the row is told how they met."""
+    assert job.split is not None
+    assert job.split.grid is not None
+    grid: Grid = job.split.grid
     skeletons = {
         tile_of(name.rpartition("/")[2]): read_skeleton(Path(job.out_dir, f"{name}{TILE_ENDING}")) for name in job.needs
     }
-    skeleton, seams = join_tiles(skeletons, job.grid)
-    report = Report(n_input=job.points, n_dropped=job.dropped)
+    skeleton, seams = join_tiles(skeletons, grid)
+    row |= {"seams": seams.joined, "unmatched": seams.unmatched}
+    report = Report(n_input=job.split.points, n_dropped=job.split.dropped)
     none = [each.report.n_input for each in skeletons.values() if not len(each.vertices)]
     said = f"{len(none)} of {len(skeletons)} tiles have no skeleton, of {sum(none)} points: the ledger says why"
-    for message in [said] * bool(none) + seams.messages(job.grid):
+    for message in [said] * bool(none) + seams.messages(grid):
         report = report.with_warning(message)
-    return replace(skeleton, report=report), seams
+    return replace(skeleton, report=report)
 
 
 def told(error: BaseException) -> str:
@@ -190,21 +138,15 @@ def told(error: BaseException) -> str:
     return " ".join(f"{type(error).__name__}: {error}{where}".split())
 
 
-class _Heard(logging.Handler):
-    """Keeps the warnings that this thread logs; they would otherwise go to the stderr of the worker."""
-
-    def __init__(self):
-        super().__init__(logging.WARNING)
-        self.messages: list[str] = []
-        self._thread = threading.get_ident()
-
-    def emit(self, record):
-        if record.thread == self._thread:
-            self.messages.append(record.getMessage())
-
-    def __enter__(self):
-        logging.getLogger("glsk_o3d").addHandler(self)
-        return self
-
-    def __exit__(self, *_):
-        logging.getLogger("glsk_o3d").removeHandler(self)
+@contextmanager
+def _heard() -> Iterator[list[str]]:
+    """The warnings that this thread logs; they would otherwise go to the stderr of the worker."""
+    messages: list[str] = []
+    thread, logger, handler = threading.get_ident(), logging.getLogger("glsk_o3d"), logging.Handler(logging.WARNING)
+    handler.addFilter(lambda record: record.thread == thread)
+    handler.emit = lambda record: messages.append(record.getMessage())  # type: ignore[method-assign]
+    logger.addHandler(handler)
+    try:
+        yield messages
+    finally:
+        logger.removeHandler(handler)

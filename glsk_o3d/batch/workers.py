@@ -13,10 +13,8 @@ import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
-from functools import partial
-from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from ..errors import BatchError, PluginWarning, SkeletonWarning
 from ..interop.packages import import_open3d, require
@@ -28,19 +26,6 @@ _DASK_LOG = logging.getLogger("distributed.client")
 _log = logging.getLogger(__name__)
 
 
-class Workers(Protocol):
-    """Who does the work."""
-
-    def submit(self, function: Callable, *arguments: Any) -> Future:
-        """Hand out one piece of work."""
-
-    def capacity(self) -> int:
-        """How many pieces to hand out at a time."""
-
-    def close(self, *, at_once: bool) -> None:
-        """Let the workers go; at once: without waiting for what they do."""
-
-
 def died(error: BaseException | None) -> bool:
     """Whether an error says that the worker died with the work."""
     return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"  # the latter is Dask's
@@ -50,135 +35,85 @@ def died(error: BaseException | None) -> bool:
 
 
 class LocalWorkers:
-    """Processes of this machine with one BLAS thread each.
+    """Processes of this machine with one BLAS thread each; `load` has them load at once what every skeleton needs.
 
     Each is a pool by itself, so that one that dies takes no other work with it, and it is known what it was doing.
-
-    Parameters
-    ----------
-    count : int
-    load : bool
-        Load what every skeleton needs, and takes its time, when they start.
     """
 
     def __init__(self, count: int, load: bool = True):
         self._seats = [_Seat(load) for _ in range(count)]
-        self._free = list(self._seats)
-        self._stillborn = 0
 
     def capacity(self) -> int:
+        """How many pieces of work to hand out at a time."""
         return len(self._seats)
 
     def submit(self, function: Callable, *arguments: Any) -> Future:
-        seat, told = self._free.pop(), Future()
-        seat.submit(function, *arguments).add_done_callback(partial(self._settle, seat, told))
-        return told
-
-    def _settle(self, seat: _Seat, told: Future, done: Future) -> None:
-        """Free the seat, and only then pass on what came of the work."""
-        if done.cancelled():
-            told.cancel()
-            return
-        error = done.exception()
-        if died(error):
-            self._stillborn = 0 if seat.began() else self._stillborn + 1
-            seat.close(wait=False)
-            if self._stillborn > len(self._seats):
-                error = BatchError(
-                    "worker processes die before they begin; stderr may say why. In a script, call run_batch under "
-                    'if __name__ == "__main__": every worker runs the rest of it too'
-                )
-        self._free.append(seat)
-        if error is None:
-            told.set_result(done.result())
-        else:
-            told.set_exception(error)
+        """Hand out one piece of work."""
+        return next(seat for seat in self._seats if seat.work.done()).submit(function, *arguments)
 
     def close(self, *, at_once: bool) -> None:
+        """Let the workers go; at once: without waiting for what they do."""
         for seat in self._seats:
             if at_once:
                 seat.kill()
         for seat in self._seats:
-            seat.close(wait=True)
+            if seat.pool is not None:
+                seat.pool.shutdown(cancel_futures=True)
 
 
 class _Seat:
     """A pool of one process, started when there is work, and anew when it has died."""
 
-    pool: ProcessPoolExecutor | None = None
-    process: _Process | None = None
-
     def __init__(self, load: bool):
         self._load = load
+        self.pool: ProcessPoolExecutor | None = None
+        self.work: Future = Future()
+        self.work.set_result(None)
 
     def submit(self, function, *arguments) -> Future:
-        if self.pool is not None:
-            with suppress(BrokenExecutor):  # died while it was idle
-                return self.pool.submit(function, *arguments)
-            self.close(wait=False)
-        context = _Context()
-        self.pool = ProcessPoolExecutor(1, context, _begin, (self._load,))
-        self._first = self.pool.submit(os.getpid)
-        self.process = context.process
-        return self.pool.submit(function, *arguments)
+        if self.pool is None:
+            self.pool = self._begun()
+        try:
+            self.work = self.pool.submit(function, *arguments)
+        except BrokenExecutor as error:  # it died, perhaps while it was idle
+            self.pool.shutdown(wait=False)
+            if self._first.exception() is not None:
+                raise BatchError(
+                    "worker processes die before they begin; stderr may say why. In a script, call run_batch under "
+                    'if __name__ == "__main__": every worker runs the rest of it too'
+                ) from error
+            self.pool = self._begun()
+            self.work = self.pool.submit(function, *arguments)
+        return self.work
 
-    def began(self) -> bool:
-        """Whether the process ever got as far as work."""
-        return self._first.done() and self._first.exception() is None
+    def _begun(self) -> ProcessPoolExecutor:
+        pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin, (self._load,))
+        with _inherited():
+            self._first = pool.submit(os.getpid)
+        return pool
 
     def kill(self) -> None:
-        process = self.process
-        if process is not None:
+        processes = getattr(self.pool, "_processes", None) or {}  # before Python 3.14 they have no public name
+        for process in list(processes.values()):
             process.kill()
-
-    def close(self, *, wait: bool) -> None:
-        pool, self.pool, self.process = self.pool, None, None
-        if pool is not None:
-            pool.shutdown(wait=wait, cancel_futures=True)
-
-
-class _Process(SpawnProcess):
-    """A worker that computes in one thread, and that leaves Ctrl-C to the process that started it."""
-
-    def start(self):
-        with _one_blas_thread(), _without_interrupts():  # the new process inherits both, before it imports anything
-            super().start()
-
-
-class _Context(SpawnContext):
-    """Starts such workers, and remembers the last one."""
-
-    process: _Process | None = None
-
-    def Process(self, *args, **kwargs):  # type: ignore[override]
-        self.process = _Process(*args, **kwargs)
-        return self.process
 
 
 @contextmanager
-def _one_blas_thread() -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+def _inherited() -> Iterator[None]:
+    """What a new process is to have before it imports anything: one BLAS thread, and Ctrl-C left to its parent."""
+    environment = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    signals = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if os.name == "posix" else None
     try:
         yield
     finally:
-        for name, value in before.items():
+        if signals is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, signals)
+        for name, value in environment.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-
-
-@contextmanager
-def _without_interrupts() -> Iterator[None]:
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin(load: bool) -> None:
@@ -187,11 +122,10 @@ def _begin(load: bool) -> None:
     threading.Thread(target=_follow, daemon=True).start()
     for category in (SkeletonWarning, PluginWarning):  # the report has the one, the first process tells the other
         warnings.simplefilter("ignore", category)
-    if not load:
-        return
-    with suppress(Exception):  # every job will say what is wrong
-        import_open3d()
-        importlib.import_module("glsk_o3d.recipes")
+    if load:
+        with suppress(Exception):  # every job will say what is wrong
+            import_open3d()
+            importlib.import_module("glsk_o3d.recipes")
 
 
 def _follow() -> None:
@@ -202,28 +136,39 @@ def _follow() -> None:
         os._exit(1)
 
 
-# -------------------------------------------------------------------------------------------------------------- Dask
+# ------------------------------------------------------------------------------------------------------ other machines
 
 
-class DaskWorkers:
-    """A Dask cluster.
+class GivenWorkers:
+    """An executor that somebody else made and will shut down; by default it gets as much as it has workers."""
 
-    Parameters
-    ----------
-    scheduler : str, path-like or distributed.Client
-        The address of a scheduler such as ``tcp://host:8786``, or the file that it wrote.
+    def __init__(self, executor: Executor, count: int | None = None):
+        self._executor, self._gone = executor, "the executor takes no more work"
+        self._count = count or getattr(executor, "_max_workers", None) or cores()
 
-    Raises
-    ------
-    BatchError
-        No scheduler answers there.
-    MissingPackageError
+    def capacity(self) -> int:
+        return self._count
+
+    def submit(self, function: Callable, *arguments: Any) -> Future:
+        try:
+            return self._executor.submit(function, *arguments)
+        except Exception as error:  # shut down, broken, or whatever a lost connection raises
+            raise BatchError(f"{self._gone}: {error}") from error
+
+    def close(self, *, at_once: bool) -> None:
+        pass
+
+
+class DaskWorkers(GivenWorkers):
+    """A Dask cluster: the address of its scheduler, the file that this wrote, or a ``distributed.Client``.
+
+    BatchError where no scheduler answers.
     """
 
     def __init__(self, scheduler: Any):
         distributed = require("distributed")
         self._own = not isinstance(scheduler, distributed.Client)
-        self.name = str(getattr(getattr(scheduler, "scheduler", scheduler), "address", scheduler))
+        self._name = str(getattr(getattr(scheduler, "scheduler", scheduler), "address", scheduler))
         if self._own:
             text = os.fspath(scheduler)
             try:
@@ -236,7 +181,8 @@ class DaskWorkers:
                 raise BatchError(f"{text}: no Dask scheduler answers there: {error}") from error
         self._client, self._level = scheduler, _DASK_LOG.level
         _DASK_LOG.setLevel(logging.CRITICAL)  # we say ourselves, in one line, that a scheduler has gone
-        self._executor = scheduler.get_executor(pure=False)
+        super().__init__(scheduler.get_executor(pure=False), 1)
+        self._gone = f"{self._name}: the connection to the Dask scheduler is lost: run the same batch to go on"
         self._asked, self._threads = -1.0, 0
 
     def capacity(self) -> int:
@@ -245,20 +191,11 @@ class DaskWorkers:
             try:
                 threads = sum(self._client.nthreads().values())
             except Exception as error:  # whatever a lost connection raises
-                raise self._lost() from error
+                raise BatchError(self._gone) from error
             if not threads and (self._threads or self._asked < 0):
-                _log.warning("%s: this cluster has no workers: waiting for some", self.name)
+                _log.warning("%s: this cluster has no workers: waiting for some", self._name)
             self._asked, self._threads = time.monotonic(), threads
         return max(1, 2 * self._threads)
-
-    def submit(self, function: Callable, *arguments: Any) -> Future:
-        try:
-            return self._executor.submit(function, *arguments)
-        except Exception as error:
-            raise self._lost() from error
-
-    def _lost(self) -> BatchError:
-        return BatchError(f"{self.name}: the connection to the Dask scheduler is lost: run the same batch to go on")
 
     def close(self, *, at_once: bool) -> None:
         self._executor.shutdown(wait=not at_once)
@@ -267,31 +204,4 @@ class DaskWorkers:
         _DASK_LOG.setLevel(self._level)
 
 
-# ------------------------------------------------------------------------------------------------------ any executor
-
-
-class GivenWorkers:
-    """An executor that somebody else made and will shut down.
-
-    Parameters
-    ----------
-    executor : concurrent.futures.Executor
-    count : int, optional
-        By default as many as it has workers.
-    """
-
-    def __init__(self, executor: Executor, count: int | None = None):
-        self._executor = executor
-        self._count = count or getattr(executor, "_max_workers", None) or cores()
-
-    def capacity(self) -> int:
-        return self._count
-
-    def submit(self, function: Callable, *arguments: Any) -> Future:
-        try:
-            return self._executor.submit(function, *arguments)
-        except RuntimeError as error:  # shut down, or broken
-            raise BatchError(f"the executor takes no more work: {error}") from error
-
-    def close(self, *, at_once: bool) -> None:
-        pass
+Workers = LocalWorkers | GivenWorkers

@@ -91,13 +91,12 @@ def _load(group, builtin, check, found):
             with redirect_stdout(sys.stderr):  # where there are results of commands, nothing else may be
                 plugin = entry.load()
                 check(entry.name, plugin)
+            found[entry.name] = plugin
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # whatever code of others raises; some is no Exception
             cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
             problems.append(f"plugin {entry.name!r} ({entry.value}) of {distribution} left out: {cause}")
-        else:
-            found[entry.name] = plugin
     return problems
 
 
@@ -108,11 +107,8 @@ def _entries(group: str, problems: list[str]) -> Iterator[tuple[str, metadata.En
     """
     seen = set()
     for distribution in metadata.distributions():
-        text = distribution.read_text("entry_points.txt") or ""
-        if group not in text:
-            continue
-        name = str(distribution.metadata["Name"])
-        if name in seen:
+        text, name = distribution.read_text("entry_points.txt") or "", str(distribution.metadata["Name"])
+        if group not in text or name in seen:
             continue
         seen.add(name)
         heads = [line for line in map(str.strip, text.splitlines()) if line.strip("[] ") == group]
@@ -122,9 +118,8 @@ def _entries(group: str, problems: list[str]) -> Iterator[tuple[str, metadata.En
             entries = list(distribution.entry_points.select(group=group))
         except Exception as error:
             problems.append(f"the plugins of {name} left out: its entry_points.txt is malformed: {error}")
-            continue
-        for entry in entries:
-            yield f"{name} {distribution.version}", entry
+        else:
+            yield from ((f"{name} {distribution.version}", entry) for entry in entries)
 
 
 def _check_filter(name: str, cls: Any) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InvalidParameterError, RecipeError, brief, did_you_mean
-from ..parameters import FROM, NONE, Parameters, problem_with
+from ..parameters import FROM, NONE, Parameters, problem_with, shown
 from ..pipeline import RECIPE_VERSION, Pipeline
 from .catalogue import catalogue, find, named_pipeline, serves
 from .writing import recipe_ending, refuse_gaps
@@ -109,30 +109,31 @@ def from_recipe(recipe: dict[str, Any]) -> Pipeline:
         return _extended(recipe["extends"], recipe.get("set", {}))
     stages = recipe["pipeline"]
     if not isinstance(stages, list) or not stages:
-        raise RecipeError(f"pipeline: must be a list of at least one stage, not {_short(stages)}")
+        raise RecipeError(f"pipeline: must be a list of at least one stage, not {shown(stages)}")
     read: list[Any] = [_part(stage, f"pipeline[{i}]", "filter") for i, stage in enumerate(stages)]
     return _valid(lambda: Pipeline(*read), "pipeline")
 
 
 def _check_head(recipe: Any) -> None:
+    """Raise RecipeError unless a recipe is a table of the right version with the right keys."""
     example = f'{{"glsk_o3d": {{"version": {RECIPE_VERSION}}}, "pipeline": [...]}}'
     if not isinstance(recipe, dict):
-        raise RecipeError(f"a recipe is a table such as {example}, not {_short(recipe)}")
+        raise RecipeError(f"a recipe is a table such as {example}, not {shown(recipe)}")
     head = recipe.get("glsk_o3d")
     if not isinstance(head, dict) or "version" not in head:
         raise RecipeError(f"glsk_o3d.version: is missing; a recipe is a table such as {example}")
     version = head["version"]
     if isinstance(version, bool) or not isinstance(version, int) or version < 1:
-        raise RecipeError(f"glsk_o3d.version: must be {RECIPE_VERSION}, not {_short(version)}")
+        raise RecipeError(f"glsk_o3d.version: must be {RECIPE_VERSION}, not {shown(version)}")
     if version > RECIPE_VERSION:
         raise RecipeError(f"glsk_o3d.version: is {version} and this release reads {RECIPE_VERSION}: update glsk-o3d")
-    for key in head:
-        if key != "version":
-            raise RecipeError(f"glsk_o3d.{brief(key)}: there is only 'version' in this table")
-    for key in recipe:
-        if key not in ("glsk_o3d", "pipeline", "extends", "set"):
-            hint = did_you_mean(str(key), ("pipeline", "extends", "set"), "key of a recipe")
-            raise RecipeError(f"{brief(key)}: {hint}")
+    for path, table, known in (
+        ("glsk_o3d.", head, ("version",)),
+        ("", recipe, ("glsk_o3d", "pipeline", "extends", "set")),
+    ):
+        for key in table:
+            if key not in known:
+                raise RecipeError(f"{path}{brief(key)}: {did_you_mean(str(key), known, 'key of this table')}")
     if ("pipeline" in recipe) == ("extends" in recipe):
         both = "has both" if "pipeline" in recipe else "lacks both"
         raise RecipeError(f"a recipe has either 'pipeline' or 'extends', and this one {both}")
@@ -146,7 +147,7 @@ def _extended(name: Any, changes: Any) -> Pipeline:
     except InvalidParameterError as error:
         raise RecipeError(f"extends: {error}") from None
     if not isinstance(changes, dict):
-        raise RecipeError(f"set: must be a table of filters, not {_short(changes)}")
+        raise RecipeError(f"set: must be a table of filters, not {shown(changes)}")
     read: dict[str, Any] = {}
     for owner, values in changes.items():
         cls = find(owner)
@@ -160,7 +161,7 @@ def _part(table: Any, path: str, role: str) -> Parameters:
     """A filter, reducer or rule from its table."""
     kind = "rule" if role == "stop" else "filter"
     if not isinstance(table, dict) or kind not in table:
-        raise RecipeError(f'{path}: must be a table such as {{"{kind}": NAME, ...}}, not {_short(table)}')
+        raise RecipeError(f'{path}: must be a table such as {{"{kind}": NAME, ...}}, not {shown(table)}')
     name = table[kind]
     cls, origin = find(name) if isinstance(name, str) else None, table.get(FROM)
     if cls is None or not serves(cls, role):
@@ -177,7 +178,7 @@ def _part(table: Any, path: str, role: str) -> Parameters:
 def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
     """Parameters of a class, each checked."""
     if not isinstance(table, dict):
-        raise RecipeError(f"{path}: must be a table of parameters, not {_short(table)}")
+        raise RecipeError(f"{path}: must be a table of parameters, not {shown(table)}")
     fields = {field.name: field.metadata for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
     values = {}
     for name, value in table.items():
@@ -192,7 +193,7 @@ def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
             value = _part(value, f"{path}.{name}", kind.rstrip("?"))
         problem = problem_with(value, facts)
         if problem:
-            raise RecipeError(f"{path}.{name}: {problem}, not {_short(value)}")
+            raise RecipeError(f"{path}.{name}: {problem}, not {shown(value)}")
         values[name] = value
     return values
 
@@ -205,8 +206,3 @@ def _valid(make: Callable[[], Any], path: str) -> Any:
     except (ValueError, TypeError) as error:  # InvalidParameterError, or what a plugin raises
         raise RecipeError(f"{path}: {error}") from None
     return made
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."

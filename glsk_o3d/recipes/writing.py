@@ -50,7 +50,7 @@ def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
     pipeline.check()
     recipe = recipe_of(*(stage.table() for stage in pipeline.stages))
     for i, stage in enumerate(pipeline.stages):
-        refuse_unknown(stage, f"pipeline[{i}]")
+        _refuse_unknown(stage, f"pipeline[{i}]")
     refuse_gaps(recipe)
     return recipe
 
@@ -81,6 +81,20 @@ def refuse_gaps(recipe: Any) -> None:
     """Raise RecipeError if a recipe lacks what it could not hold; see `gaps`."""
     for gap in gaps(recipe):
         raise RecipeError(gap)
+
+
+def _refuse_unknown(part: Parameters, path: str) -> None:
+    """Raise RecipeError if a filter or rule, or one inside it, is none that a recipe could name."""
+    cls = type(part)
+    if find(cls.__name__) is not cls:
+        name = f"{cls.__module__}.{cls.__qualname__}"
+        raise RecipeError(
+            f"{path}: a recipe cannot hold it: {name} is not among the filters and rules of 'glsk filters'"
+        )
+    for field in dataclasses.fields(part):  # type: ignore[arg-type]
+        value = getattr(part, field.name)
+        if isinstance(value, Parameters):
+            _refuse_unknown(value, f"{path}.{field.name}")
 
 
 def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
@@ -117,28 +131,8 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
 
 
 def recipe_ending(path: str | os.PathLike) -> str:
-    """The ending of a recipe's file name.
-
-    Raises
-    ------
-    RecipeError
-        It is another one.
-    """
+    """The ending of a recipe's file name; RecipeError for another one."""
     ending = Path(path).suffix.lower()
     if ending not in RECIPE_ENDINGS:
         raise RecipeError(f"{os.fspath(path)}: unknown ending; recipes are {' or '.join(RECIPE_ENDINGS)} files")
     return ending
-
-
-def refuse_unknown(part: Parameters, path: str) -> None:
-    """Raise RecipeError if a filter or rule, or one inside it, is none that a recipe could name."""
-    cls = type(part)
-    if find(cls.__name__) is not cls:
-        name = f"{cls.__module__}.{cls.__qualname__}"
-        raise RecipeError(
-            f"{path}: a recipe cannot hold it: {name} is not among the filters and rules of 'glsk filters'"
-        )
-    for field in dataclasses.fields(part):  # type: ignore[arg-type]
-        value = getattr(part, field.name)
-        if isinstance(value, Parameters):
-            refuse_unknown(value, f"{path}.{field.name}")

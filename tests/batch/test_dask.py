@@ -10,7 +10,7 @@ import pytest
 
 from glsk_o3d import BatchError
 from glsk_o3d.batch import plan_batch, run_batch
-from glsk_o3d.batch.queueing import WORKER_DIED
+from glsk_o3d.batch.run import WORKER_DIED
 from glsk_o3d.samples import torus
 
 distributed = pytest.importorskip("distributed")

@@ -46,19 +46,19 @@ def test_names():
 @pytest.mark.parametrize(
     ("sizes", "message"),
     [
-        ((0, None), "tiles = 0: the size"),
-        ((float("nan"), None), "the size of a tile is finite"),
-        ((10**5000, None), "tiles = inf: the size"),
+        ((0, None), "tiles = 0: must be above 0 .a length in the cloud's units"),
+        ((float("nan"), None), "tiles = nan: must be finite"),
+        ((10**5000, None), "tiles = a number of 5001 digits: must be at most"),
         (("abc", None), "tiles = 'abc': must be a number"),
         (([1], None), r"tiles = \[1\]: must be a number"),
         ((True, None), "tiles = True: must be a number"),
         ((np.array([1.0]), None), "must be a number"),
         ((4, "1"), "overlap = '1': must be a number"),
         ((4, True), "overlap = True: must be a number"),
-        ((4, float("nan")), "overlap = nan: must be above 0"),
-        ((4, 10**5000), "overlap = inf: must be above 0"),
+        ((4, float("nan")), "overlap = nan: must be finite"),
+        ((4, 10**5000), "overlap = a number of 5001 digits: must be at most"),
         ((4, 0), "overlap = 0: must be above 0"),
-        ((4, 1.1), "at most a quarter of the size of a tile, 1"),
+        ((4, 1.1), r"overlap = 1\.1: must be at most 1\.0 .at most a quarter of the size of a tile"),
     ],
 )
 def test_sizes_that_are_none(sizes, message):

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from glsk_o3d import FileFormatError, InvalidParameterError
+from glsk_o3d.batch import plan_batch
 from glsk_o3d.batch.inputs import find_inputs
-from glsk_o3d.batch.ledger import file_hash
-from glsk_o3d.batch.splitting import Cut, Splitter
 from glsk_o3d.io.paths import SCAN_ENDINGS
 
 
@@ -29,14 +28,9 @@ def touch(here):
     return make
 
 
-def by(attribute, **more):
-    """What takes files apart by an attribute, and writes nothing."""
-    return Splitter(Path("out"), Cut(by=attribute, **more), file_hash, write=False)
-
-
 def names(*inputs, out="out", **options):
     found = find_inputs(inputs, out, **options).named
-    assert all(source.path.is_absolute() for source in found.values())
+    assert all(path.is_absolute() for path in found.values())
     return list(found)
 
 
@@ -124,22 +118,6 @@ def test_a_list_that_may_never_end(here):
     os.mkfifo(here / "list.txt")
     with pytest.raises(FileFormatError, match=r"list\.txt: is a pipe or a device"):
         names("list.txt")
-
-
-def test_the_points_of_a_file_taken_apart(here):
-    (here / "forest.csv").write_text("x,y,z,tree\n" + "".join(f"{i},0,0,{i % 3}\n" for i in range(9)))
-    (here / "bare.xyz").write_text("1 2 3\n")
-    (here / "broken.ply").write_text("ply\n")
-    found = find_inputs(["forest.csv", "bare.xyz", "broken.ply"], "out", splitter=by("tree"))
-    assert {name: source.part for name, source in found.named.items()} == {
-        **{f"forest-{i}": f"where tree == {i}" for i in range(3)},
-        "broken": "",  # what is wrong with it shows when it is read
-    }
-    assert found.left_out == {str(here / "bare.xyz"): "no attribute of its points is called 'tree': there are none"}
-    with pytest.raises(
-        InvalidParameterError, match=r"by = 'trees': no input can be taken .*forest\.csv: .* did you mean 'tree'"
-    ):
-        find_inputs(["forest.csv"], "out", splitter=by("trees"))
 
 
 @pytest.mark.parametrize("first", [b"0.25 1", b"x,y,z", b"\xff\xfe", b"gone.ply"])
@@ -231,37 +209,70 @@ def test_odd_names(touch, here):
     assert names("in/[a].ply") == ["[a]"]
 
 
-def test_labels_that_differ_in_their_last_digit_are_two(here):
-    rows = "".join(f"{i},0,0,{12345678901 + i % 2}\n" for i in range(6))
-    (here / "a.csv").write_text("x,y,z,tree\n" + rows)
-    assert list(find_inputs(["a.csv"], "out", splitter=by("tree")).named) == ["a-12345678901", "a-12345678902"]
+# ------------------------------------------------------------------------------------------------- files taken apart
 
 
-def test_a_label_never_takes_the_name_of_another_file(here):
-    (here / "in").mkdir()
-    (here / "in" / "a-1.ply").write_text("ply\n")  # its points cannot be read, and it keeps its name
-    (here / "in" / "a.csv").write_text("x,y,z,tree\n1,2,3,1\n")
+@pytest.fixture
+def table(here):
+    def make(name, header, *rows):
+        (here / name).parent.mkdir(exist_ok=True)
+        (here / name).write_text("\n".join([header, *rows]) + "\n")
+
+    return make
+
+
+def apart(*inputs, **options):
+    """The inputs that are made of files, by name, and what is left out, by the names of the files."""
+    plan = plan_batch(inputs, "out", **options)
+    assert not Path("out").exists()
+    left_out = {Path(path).name: reason for path, reason in plan.left_out.items()}
+    return {task.job.name: task.job.source for task in plan.tasks}, left_out
+
+
+def test_the_points_of_a_file_taken_apart(here, table):
+    table("forest.csv", "x,y,z,tree", *(f"{i},0,0,{i % 3}" for i in range(9)))
+    table("bare.xyz", "1 2 3")
+    table("broken.ply", "ply")
+    found, left_out = apart("forest.csv", "bare.xyz", "broken.ply", by="tree")
+    assert found == {
+        "broken": str(here / "broken.ply"),  # what is wrong with it shows when it is read
+        **{f"forest-{i}": f"{here / 'forest.csv'} where tree == {i}" for i in range(3)},
+    }
+    assert left_out == {"bare.xyz": "no attribute of its points is called 'tree': there are none"}
+    with pytest.raises(
+        InvalidParameterError, match=r"by = 'trees': no input can be taken .*forest\.csv: .* did you mean 'tree'"
+    ):
+        apart("forest.csv", by="trees")
+
+
+def test_labels_that_differ_in_their_last_digit_are_two(table):
+    table("a.csv", "x,y,z,tree", *(f"{i},0,0,{12345678901 + i % 2}" for i in range(6)))
+    assert list(apart("a.csv", by="tree")[0]) == ["a-12345678901", "a-12345678902"]
+
+
+def test_a_label_never_takes_the_name_of_another_file(table):
+    table("in/a-1.ply", "ply")  # its points cannot be read, and it keeps its name
+    table("in/a.csv", "x,y,z,tree", "1,2,3,1")
     with pytest.raises(InvalidParameterError, match="would both be called a-1"):
-        find_inputs(["in"], "out", splitter=by("tree"))
+        apart("in", by="tree")
 
 
-def test_a_file_without_what_the_condition_names_stops_no_other(here):
-    (here / "a.csv").write_text("x,y,z,tree,cl\n1,2,3,1,5\n1,2,3,2,4\n")
-    (here / "b.csv").write_text("x,y,z,tree\n1,2,3,1\n")
-    found = find_inputs(["a.csv", "b.csv"], "out", splitter=by("tree", where="cl == 5"))
-    assert list(found.named) == ["a-1"]
-    assert "no attribute of the points is called 'cl'" in found.left_out[str(here / "b.csv")]
+@pytest.mark.parametrize(
+    ("header", "row", "options", "reason"),
+    [
+        ("x,y,z,tree", "1,2,3,1", dict(where="cl == 5"), "no attribute of the points is called 'cl'"),
+        ("x,y,z,tree,cl", "1,2,3,1e300,5", {}, "tree: 1e+300 is no label: no name has that many digits"),
+    ],
+)
+def test_a_file_that_cannot_be_taken_apart_stops_no_other(table, header, row, options, reason):
+    table("a.csv", "x,y,z,tree,cl", "1,2,3,inf,5", "1,2,3,2,5")
+    table("b.csv", header, row)
+    found, left_out = apart("a.csv", "b.csv", by="tree", **options)
+    assert list(found) == ["a-2"]
+    assert reason in left_out["b.csv"]
 
 
-def test_a_file_whose_labels_are_too_large_stops_no_other(here):
-    (here / "a.csv").write_text("x,y,z,tree\n1,2,3,inf\n1,2,3,2\n")
-    (here / "b.csv").write_text("x,y,z,tree\n1,2,3,1e300\n")
-    found = find_inputs(["a.csv", "b.csv"], "out", splitter=by("tree"))
-    assert list(found.named) == ["a-2"]
-    assert found.left_out == {str(here / "b.csv"): "tree: 1e+300 is no label: no name has that many digits"}
-
-
-def test_what_numbers_no_things_is_refused(here):
-    (here / "a.csv").write_text("x,y,z,time\n" + "".join(f"1,2,3,{i}\n" for i in range(10_001)))
+def test_what_numbers_no_things_is_refused(table):
+    table("a.csv", "x,y,z,time", *(f"1,2,3,{i}" for i in range(10_001)))
     with pytest.raises(InvalidParameterError, match=r"has 10001 parts .* numbers no things"):
-        find_inputs(["a.csv"], "out", splitter=by("time"))
+        apart("a.csv", by="time")

@@ -160,22 +160,6 @@ def test_files_of_others_are_not_touched(batch, scans, write, tmp_path, name):
     assert {path.name for path in (tmp_path / "out").iterdir()} <= {name, ".ledger.lock"}
 
 
-def test_a_folder_of_scans_and_more(batch, rows, tmp_path):
-    """A bad scan, given by name, whose folder is that of the results, and files that bear the names of results."""
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "a.xyz").write_text("no")
-    for name in ("a.ply", "a.png"):
-        (out / name).write_text("mine")
-    with pytest.raises(InvalidParameterError, match=r"a\.ply: is not the result of a batch"):
-        batch([out / "a.xyz"], preview=True)
-    (out / "z.xyz").write_text("no")
-    batch([out / "z.xyz"])  # now there is a ledger
-    batch([out / "a.xyz"], preview=True)
-    assert {row["status"] for row in rows(out, strict=False).values()} == {"failed"}
-    assert [(out / name).read_text() for name in ("a.ply", "a.png")] == ["mine", "mine"]
-
-
 def test_a_scan_that_is_not_there_costs_no_results(batch, scans, rows, tmp_path):
     out = tmp_path / "out"
     batch(formats=["ply", "json"])
@@ -328,27 +312,12 @@ def test_warnings_are_counted_and_kept(batch, write, rows, tmp_path):
     assert any("1 of 257 lines hold no point" in message for message in found["messages"])
 
 
-def test_sub_folders_are_mirrored(batch, write, rows, tmp_path):
-    write(tmp_path / "in" / "x" / "a.ply")
-    write(tmp_path / "in" / "y" / "z" / "a.xyz")
-    batch(recursive=True)
-    assert {row["outputs"][0] for row in rows(tmp_path / "out").values()} == {"x/a.ply", "y/z/a.ply"}
-
-
 def test_rows_of_other_inputs_stay(batch, scans, rows, tmp_path):
     batch()
     batch([scans / "a.ply"], pipeline="wen2024")
     found = rows(tmp_path / "out")
     assert list(found) == ["a", "b", "c"]
     assert found["a"]["parameters"] != found["b"]["parameters"] == found["c"]["parameters"]
-
-
-def test_a_broken_line_costs_one_run(batch, scans, rows, tmp_path):
-    batch()
-    ledger = tmp_path / "out" / "ledger.jsonl"
-    ledger.write_bytes(ledger.read_bytes()[:-40])
-    assert batch() == {"c": "new"}
-    assert list(rows(tmp_path / "out")) == ["a", "b", "c"]
 
 
 def test_a_name_that_is_no_unicode(batch, scans, write, rows, tmp_path):
@@ -397,14 +366,3 @@ class TestRefusals:
         assert plan.tasks[0].job.outputs == ("a.ply", "a.json", "a.png")
         assert (plan.skipped, len(plan.parameters)) == (0, 64)
         assert not (tmp_path / "out").exists()
-
-
-def test_an_error_of_the_caller_leaves_all_in_order(batch, scans, rows, tmp_path):
-    def stop(row):
-        raise LookupError("mine")
-
-    with pytest.raises(LookupError, match="mine"):
-        batch(on_result=stop)
-    assert len(rows(tmp_path / "out")) >= 1
-    assert len(batch()) <= 2
-    assert len(rows(tmp_path / "out")) == 3

@@ -39,13 +39,14 @@ def batch(scene, tmp_path):
 
 
 def test_one_skeleton_of_a_scene(batch, scene, rows, tmp_path):
-    assert batch(formats=["ply", "json"]) == dict.fromkeys(NAMES, "new")
+    assert batch(formats=["ply", "json"], preview=True) == dict.fromkeys(NAMES, "new")
     found = rows(tmp_path / "out")
     assert sorted(found) == sorted(NAMES)
     whole = found["scene"]
     assert (whole["points"], whole["dropped"], whole["unmatched"]) == (4503, 0, 0)
     assert (whole["components"], whole["loops"], whole["leaves"]) == (2, 1, 2)
-    assert whole["outputs"] == ["scene.ply", "scene.json"]
+    assert whole["outputs"] == ["scene.ply", "scene.json", "scene.png"]
+    assert (tmp_path / "out" / "scene.png").stat().st_size > 5000
     assert whole["input"] == str(scene)
     assert {row["input"] for row in found.values()} == {str(scene)} | {
         f"{scene} tile {name[-5:]}" for name in NAMES[:-1]
@@ -106,25 +107,17 @@ def test_other_tiles_replace_what_is_there(batch, rows, tmp_path):
     assert sorted(rows(tmp_path / "out")) == ["scene", "scene.tiles/0-0-0", "scene.tiles/1-0-0"]
 
 
-def test_no_worker_reads_the_scene(scene, tmp_path):
-    aside = scene.with_name("aside")
-    with ThreadPoolExecutor(1) as pool:
-        result = run_batch(scene, tmp_path / "out", executor=pool, on_plan=lambda plan: scene.rename(aside), **TILES)
-    assert (result.done, result.failed) == (7, 0)
-
-
-def test_labels_are_read_by_no_worker_either(tmp_path):
+@pytest.mark.parametrize("cut", [TILES, dict(by="tree")])
+def test_no_worker_reads_the_scene(tmp_path, cut):
     rings = np.concatenate([samples.torus(300).points + [3 * i, 0, 0] for i in range(2)])
-    path = tmp_path / "plot.csv"
+    path, aside = tmp_path / "plot.csv", tmp_path / "aside"
     np.savetxt(path, np.column_stack([rings, np.repeat([4, 7], 300)]), delimiter=",", header="x,y,z,tree", comments="")
     with ThreadPoolExecutor(1) as pool:
-        result = run_batch(
-            path, tmp_path / "out", executor=pool, by="tree", on_plan=lambda plan: path.rename(tmp_path / "aside")
-        )
-    assert {name: (row["status"], row["loops"]) for name, row in result.rows.items()} == {
-        "plot-4": ("done", 1),
-        "plot-7": ("done", 1),
-    }
+        result = run_batch(path, tmp_path / "out", executor=pool, on_plan=lambda plan: path.rename(aside), **cut)
+    whole = {name: row for name, row in result.rows.items() if ".tiles/" not in name}
+    assert whole.keys() == ({"plot-4", "plot-7"} if "by" in cut else {"plot"})
+    assert {row["status"] for row in result.rows.values()} == {"done"}
+    assert sum(row["components"] for row in whole.values()) == 2
 
 
 def test_a_tile_that_fails_leaves_the_scene_undone_and_is_tried_again(batch, rows, tmp_path, monkeypatch):
@@ -174,7 +167,7 @@ def test_the_plan_reads_and_writes_nothing(scene, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (dict(tiles=-1), "tiles = -1: the size of a tile"),
+        (dict(tiles=-1), "tiles = -1: must be above 0"),
         (dict(tiles=1.0, overlap=0.5), "at most a quarter"),
         (dict(overlap=0.1), "is that of tiles: give their size, too"),
         (dict(tiles=1.0, by="tree"), "labels have no seams, tiles have: give one of them"),
@@ -187,11 +180,11 @@ def test_what_is_refused(scene, tmp_path, options, message):
         plan_batch(scene, tmp_path / "out", **options)
 
 
-def test_what_cannot_be_planned_leaves_no_folder_behind(scene, tmp_path):
-    for options in (dict(by="tree"), dict(tiles=1e-7, overlap=1e-8)):
-        with pytest.raises(InvalidParameterError):
-            run_batch(scene, tmp_path / "out", **options)
-        assert not (tmp_path / "out").exists()
+@pytest.mark.parametrize("options", [dict(by="tree"), dict(tiles=1e-7, overlap=1e-8)])
+def test_what_cannot_be_planned_leaves_no_folder_behind(scene, tmp_path, options):
+    with pytest.raises(InvalidParameterError):
+        run_batch(scene, tmp_path / "deep" / "out", **options)
+    assert not (tmp_path / "deep").exists()
 
 
 @pytest.mark.parametrize("there", ["scene.ply", "recipe.json"])
@@ -212,14 +205,3 @@ def test_a_scene_that_cannot_be_read_fails_with_its_reason(tmp_path):
         result = run_batch(tmp_path / "bad.ply", tmp_path / "out", executor=pool, tiles=1.0)
     assert result.rows["bad"]["error"].startswith("not a valid .ply file")
     assert not (tmp_path / "out" / ".parts").exists()
-
-
-def test_a_picture_of_what_is_joined(batch, tmp_path):
-    batch(preview=True)
-    assert (tmp_path / "out" / "scene.png").stat().st_size > 5000
-
-
-def test_the_command(start, scene, tmp_path):
-    run = start(scene, "-o", "out", "--tiles", "0.7", "--overlap", "0.17", "--dry-run", "--json")
-    told = json.loads(run.communicate()[0])
-    assert (told["todo"], told["tasks"][-1]["input"]) == (7, str(scene))

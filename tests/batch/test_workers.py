@@ -11,7 +11,7 @@ import pytest
 
 from glsk_o3d import BatchError
 from glsk_o3d.batch import run_batch
-from glsk_o3d.batch.queueing import WORKER_DIED
+from glsk_o3d.batch.run import WORKER_DIED
 from glsk_o3d.batch.workers import GivenWorkers, LocalWorkers
 
 

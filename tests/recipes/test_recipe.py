@@ -168,57 +168,26 @@ GOOD = {"filter": "RingBuilder"}
 # Where it is wrong, and the words that help.
 WRONG = {
     ("glsk_o3d.version", '{"glsk_o3d": {"version": 1}, "pipeline": [...]}'): {"pipeline": [GOOD]},
-    ("glsk_o3d.version", "update"): {
-        "glsk_o3d": {"version": 2},
-        "stages": "of whatever shape",
-    },
-    ("glsk_o3d.extra", "'version'"): {
-        "glsk_o3d": {"version": 1, "extra": 4},
-        "pipeline": [GOOD],
-    },
+    ("glsk_o3d.version", "update"): {"glsk_o3d": {"version": 2}, "stages": "of whatever shape"},
+    ("glsk_o3d.extra", "there are version"): {"glsk_o3d": {"version": 1, "extra": 4}, "pipeline": [GOOD]},
     ("glsk_o3d.version", "'1'"): {"glsk_o3d": {"version": "1"}, "pipeline": [GOOD]},
     ("", "not [{'filter': 'RingBuilder'}]"): [GOOD],
     ("piepline", "'pipeline'"): {**HEAD, "piepline": [GOOD]},
     ("", "lacks both"): HEAD,
-    ("", "has both"): {
-        **HEAD,
-        "pipeline": [GOOD],
-        "extends": "default",
-    },
+    ("", "has both"): {**HEAD, "pipeline": [GOOD], "extends": "default"},
     ("pipeline", "[]"): {**HEAD, "pipeline": []},
     ("pipeline", "list"): {**HEAD, "pipeline": GOOD},
-    ("pipeline[1]", '{"filter": NAME, ...}'): {
-        **HEAD,
-        "pipeline": [GOOD, "Contractor"],
-    },
-    ("pipeline[1].filter", "'Contractor'"): {
-        **HEAD,
-        "pipeline": [GOOD, {"filter": "Contracter"}],
-    },
+    ("pipeline[1]", '{"filter": NAME, ...}'): {**HEAD, "pipeline": [GOOD, "Contractor"]},
+    ("pipeline[1].filter", "'Contractor'"): {**HEAD, "pipeline": [GOOD, {"filter": "Contracter"}]},
     ("pipeline[0].filter", "there are RingBuilder, Contractor, LPRReducer, Connector, Refiner"): {
         **HEAD,
         "pipeline": [{"filter": "ExplainedScore"}],
     },
-    ("pipeline[0].kk", "'k'"): {
-        **HEAD,
-        "pipeline": [{"filter": "RingBuilder", "kk": 20}],
-    },
-    ("pipeline[0].k", "7.5"): {
-        **HEAD,
-        "pipeline": [{"filter": "RingBuilder", "k": 7.5}],
-    },
-    ("pipeline[0].drop_invalid", "'yes'"): {
-        **HEAD,
-        "pipeline": [{"filter": "RingBuilder", "drop_invalid": "yes"}],
-    },
-    ("pipeline[0].frame", "'spread', 'box'"): {
-        **HEAD,
-        "pipeline": [{"filter": "RingBuilder", "frame": ["box"]}],
-    },
-    ("pipeline[0].radius", "100%"): {
-        **HEAD,
-        "pipeline": [{"filter": "Connector", "radius": "200%"}],
-    },
+    ("pipeline[0].kk", "'k'"): {**HEAD, "pipeline": [{"filter": "RingBuilder", "kk": 20}]},
+    ("pipeline[0].k", "7.5"): {**HEAD, "pipeline": [{"filter": "RingBuilder", "k": 7.5}]},
+    ("pipeline[0].drop_invalid", "'yes'"): {**HEAD, "pipeline": [{"filter": "RingBuilder", "drop_invalid": "yes"}]},
+    ("pipeline[0].frame", "'spread', 'box'"): {**HEAD, "pipeline": [{"filter": "RingBuilder", "frame": ["box"]}]},
+    ("pipeline[0].radius", "100%"): {**HEAD, "pipeline": [{"filter": "Connector", "radius": "200%"}]},
     ("pipeline[0].outlier_factor", "nan"): {
         **HEAD,
         "pipeline": [{"filter": "RingBuilder", "outlier_factor": float("nan")}],
@@ -248,28 +217,12 @@ WRONG = {
         "pipeline": [{"filter": "Contractor", "reducer": {"unwritten": "a function"}}],
     },
     ("extends", "default, tree, wen2024, cao2010"): {**HEAD, "extends": "best"},
-    ("set", "'extends'"): {
-        **HEAD,
-        "pipeline": [GOOD],
-        "set": {},
-    },
-    ("set.Connecter", "'Connector'"): {
-        **HEAD,
-        "extends": "default",
-        "set": {"Connecter": {"radius": 1}},
-    },
-    ("set.Connector.radios", "'radius'"): {
-        **HEAD,
-        "extends": "default",
-        "set": {"Connector": {"radios": 1}},
-    },
+    ("set", "'extends'"): {**HEAD, "pipeline": [GOOD], "set": {}},
+    ("set.Connecter", "'Connector'"): {**HEAD, "extends": "default", "set": {"Connecter": {"radius": 1}}},
+    ("set.Connector.radios", "'radius'"): {**HEAD, "extends": "default", "set": {"Connector": {"radios": 1}}},
     ("set.Connector", "5"): {**HEAD, "extends": "default", "set": {"Connector": 5}},
     ("set", "5"): {**HEAD, "extends": "default", "set": 5},
-    ("set", "LPRReducer.phi: "): {
-        **HEAD,
-        "extends": "cao2010",
-        "set": {"LPRReducer": {"phi": 1}},
-    },
+    ("set", "LPRReducer.phi: "): {**HEAD, "extends": "cao2010", "set": {"LPRReducer": {"phi": 1}}},
 }
 
 
@@ -290,11 +243,7 @@ def test_wrong_recipes(tmp_path, message, recipe):
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        (
-            "r.json",
-            b'{"glsk_o3d": {"version": 1},\n "pipeline": [}',
-            "JSON.* line 2",
-        ),
+        ("r.json", b'{"glsk_o3d": {"version": 1},\n "pipeline": [}', "JSON.* line 2"),
         ("r.json", b"", "JSON.* line 1"),
         ("r.json", b'{"a": 1, "b": {"k": 1, "k": 2}}', "'k'"),
         ("r.json", b"\xff\xfe", "JSON"),
