@@ -9,7 +9,7 @@ import open3d as o3d
 import pytest
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, samples, skeletonize
-from glsk_o3d.analysis.branch_rows import PRINTED_COLUMNS, BranchTable
+from glsk_o3d.analysis.branches import PRINTED_COLUMNS, BranchTable
 from glsk_o3d.analysis.segmentation import branch_of_edge, vertex_of_cloud
 
 RNG = np.random.default_rng(0)
