@@ -87,10 +87,11 @@ def _met(ways, obstacle, middle, low, high, asked, what) -> dict[str, np.ndarray
     """Where a finger meets something, and where no finger does, but the palm: (P, A) bool arrays by reason."""
     if obstacle.ndim == 1:
         behind = hits_plane(ways, obstacle, middle, low, high)
-        finger, palm = behind[..., :2].any(axis=2), behind[..., 2]
+        fingers, palm = behind[..., :2], behind[..., 2]
     else:
-        finger = hits(ways, obstacle, low[:, :2], high[:, :2], asked).any(axis=2)
-        palm = hits(ways, obstacle, low[:, 2:], high[:, 2:], asked & ~finger)[..., 0]
+        fingers = hits(ways, obstacle, low[:, :2], high[:, :2], asked)
+        palm = hits(ways, obstacle, low[:, 2:], high[:, 2:], asked & ~fingers.any(axis=2))[..., 0]
+    finger = fingers[..., 0] | fingers[..., 1]
     return {f"ways in with a finger in {what}": finger, f"ways in with the palm in {what}": palm}
 
 

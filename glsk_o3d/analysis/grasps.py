@@ -53,8 +53,7 @@ def grasp_candidates(
     gripper : Gripper or float
         Or its widest opening [cloud's units]; then all else is in proportion.
     cloud : cloud, optional
-        All points of the object; by default those of the skeleton. An empty tuple leaves it out: nothing keeps a finger
-        from going through the object then.
+        All points of the object; by default the skeleton's. With an empty tuple a finger may go through the object.
     obstacles : cloud or (4,) array_like, or a sequence of these, optional
         Clouds of what else is there; of a mesh the vertices count, and points of the object do no harm. Four numbers
         are a plane, as Open3D's ``segment_plane`` gives it: what is behind it, as seen from the object, is solid.
@@ -73,8 +72,7 @@ def grasp_candidates(
     min_confidence : float
         Least confidence of the skeleton, from 0 to 1. 0 takes also what nobody has measured.
     up : (3,) float array_like, optional
-        The first approach comes from above, as nearly as can be at a right angle to the axis. By default against the
-        direction of the cone, or else z.
+        The first approach comes from there, as nearly as it can. By default against the cone's direction, or else z.
 
     Returns
     -------
@@ -84,8 +82,7 @@ def grasp_candidates(
     Raises
     ------
     InvalidParameterError
-        The skeleton is empty or has no radii; it has no confidence, but `min_confidence` is above 0, or no points, and
-        no `cloud` is given; or a parameter is out of range.
+        The skeleton is empty or lacks radii, confidence or points that are needed; or a parameter is out of range.
     InvalidCloudError
         An obstacle or the object is no cloud.
 
@@ -104,10 +101,9 @@ def grasp_candidates(
     References
     ----------
     After Vahrenkamp et al. 2018, "Planning high-quality grasps using mean curvature object skeletons", IEEE RA-L 3(2),
-    who place hands along the branches of a mesh's skeleton, at right angles to them. They align the hand with the
-    section of the surface and evaluate the contacts; this function spreads the approaches evenly and does not. Ten Pas
-    et al. 2017, "Grasp pose detection in point clouds", IJRR 36(13-14), check candidates as here: no point in the
-    boxes of the hand, some between its fingers.
+    who place hands along the branches of a mesh's skeleton, and evaluate their contacts. Ten Pas et al. 2017, "Grasp
+    pose detection in point clouds", IJRR 36(13-14), check candidates as here: no point in the hand, some between its
+    fingers.
 
     Examples
     --------
@@ -198,8 +194,7 @@ def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
     if short:
         left_out["branches without a place between their margins"] = short
     place, branch, confidence = place[some], branch[some], confidence[some]
-    fitting = _Places(place[:, :3], place[:, 3:6], width[some], quality[some], confidence, branch, len(width))
-    return fitting, left_out
+    return _Places(place[:, :3], place[:, 3:6], width[some], quality[some], confidence, branch, len(width)), left_out
 
 
 def _sorted_out(reasons, n):
@@ -218,7 +213,6 @@ def _places_on(skeleton, path, spacing, margin):
     closed = path[0] == path[-1] and skeleton.degree[path[0]] == 2
     usual = np.nanmedian(radii) if np.isfinite(radii).any() else 0.0
     step = spacing or usual or length / 10
-    low, high = 0.0, length
     if closed:
         count = max(round(length / step), 1)
         at = length / count * np.arange(count)
@@ -228,7 +222,6 @@ def _places_on(skeleton, path, spacing, margin):
             return np.empty((0, 9))
         count = int((high - low) / step * (1 + 1e-12)) + 1
         at = (low + high) / 2 + step * (np.arange(count) - (count - 1) / 2)
-
     values = np.column_stack([curve, radii, skeleton.confidence[path]])
 
     def sample(places):
@@ -245,8 +238,7 @@ def _places_on(skeleton, path, spacing, margin):
     size = np.linalg.norm(chord[:, :3], axis=1, keepdims=True)
     axis = np.divide(chord[:, :3], size, out=np.full((count, 3), np.nan), where=size > 0)
     slope = chord[:, 3] / (behind - before)
-    found = np.column_stack([here[:, :3], axis, here[:, 3], slope, here[:, 4]])
-    return found[size[:, 0] > 0]
+    return np.column_stack([here[:, :3], axis, here[:, 3], slope, here[:, 4]])[size[:, 0] > 0]
 
 
 def _directions_around(axis, up, n):

@@ -48,7 +48,8 @@ def loops(skeleton: Skeleton) -> tuple[Loop, ...]:
         known = [bool(np.isfinite(skeleton.confidence[cycle]).any()) for cycle, _ in cycles]
         found = loop_facts(skeleton, [cycle for cycle, _ in cycles], Evidence.of(skeleton))
         chances = np.where(known, [loop.probability for loop in found], np.nan)
-    return tuple(Loop(*cycle, chance) for cycle, chance in zip(cycles, chances.tolist(), strict=True))
+    rows = zip(cycles, chances.tolist(), strict=True)
+    return tuple(Loop(cycle, opening, chance) for (cycle, opening), chance in rows)
 
 
 def opening_cycles(skeleton: Skeleton) -> list[tuple[np.ndarray, float]]:

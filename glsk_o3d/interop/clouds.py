@@ -94,18 +94,14 @@ def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int
     name, tensor = open3d_class(cloud)
     if not (name == "PointCloud" and tensor and SAMPLE_COUNT in cloud.point):
         return None, int(finite.sum()), int((~finite).sum())
-    held, wanted = cloud.point[SAMPLE_COUNT].cpu().numpy(), (len(cloud.point.positions), 1)
-    if held.shape not in (wanted, wanted[:1]):
+    counts, n = cloud.point[SAMPLE_COUNT].cpu().numpy().astype(float), len(cloud.point.positions)
+    if not (counts.shape in ((n, 1), (n,)) and (counts >= 1).all() and counts.sum() <= MOST_COUNTED):
         raise InvalidCloudError(
-            f"the cloud's attribute {SAMPLE_COUNT} has the shape {held.shape} and must have {wanted}: it says how many "
-            "points each one stands for; rename what says something else"
+            f"the cloud's attribute {SAMPLE_COUNT} of shape {counts.shape} must have a number of at least 1 for each "
+            f"of the {n} points, and less than 2^63 together: it says how many points each one stands for; rename what "
+            "says something else"
         )
-    counts = held.astype(float).reshape(-1)
-    if not ((counts >= 1).all() and counts.sum() <= MOST_COUNTED):
-        raise InvalidCloudError(
-            f"the cloud's attribute {SAMPLE_COUNT} must be at least 1 everywhere, and less than 2^63 together: it says "
-            "how many points each one stands for; rename what says something else"
-        )
+    counts = counts.reshape(-1)
     return counts[finite], int(counts[finite].sum()), int(counts[~finite].sum())
 
 
