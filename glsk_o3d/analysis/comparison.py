@@ -112,10 +112,11 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     True
     """
     truth = truth if isinstance(truth, Truth) else Truth(truth.nodes, truth.edges, truth.radii)
-    axis = Skeleton(truth.nodes, truth.edges, truth.radii, (), (), ())
+    nothing = np.empty((0, 3))
+    axis = Skeleton(truth.nodes, truth.edges, truth.radii, nothing, nothing, nothing)
     edges = check_graph(skeleton.vertices, skeleton.edges, "skeleton")
     radii = skeleton.radii if len(skeleton.radii) == len(skeleton.vertices) else np.full(len(skeleton.vertices), np.nan)
-    curve = Skeleton(skeleton.vertices, edges, radii, (), (), ())
+    curve = replace(skeleton, edges=edges, radii=radii)
     step = PLACE_SPACING * np.median(truth.radii)
     _, axis_places, axis_radius = places_along(axis, step)
     edge, curve_places, curve_radius = places_along(curve, step)
