@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import open3d
     import pymeshlab
 
-    from .analysis.branch_rows import BranchTable
+    from .analysis.branches import BranchTable
     from .analysis.loops import Loop
     from .io.colors import ColorChoice
 

@@ -19,7 +19,7 @@ def plain(app, env, node, contnode):
 
 def link(app, what, name, thing, options, lines):
     """Pages that docstrings name by their path become links."""
-    lines[:] = [re.sub(r"docs/filters/(\w+)\.md", r":doc:`/docs/filters/\1`", line) for line in lines]
+    lines[:] = [re.sub(r"docs/((?:filters/)?\w+)\.md", r":doc:`/docs/\1`", line) for line in lines]
 
 
 def lead_to_pages(app, docname, source):

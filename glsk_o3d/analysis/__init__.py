@@ -1,8 +1,7 @@
 """What a skeleton says about its object, and how good it is: against a known axis, or its cloud alone."""
 
 from .assessment import Assessment, LoopWidth, assess
-from .branch_rows import BranchTable
-from .branches import branch_table
+from .branches import BranchTable, branch_table
 from .comparison import Comparison, compare
 from .curvature import curvature_torsion
 from .forestry import TreeMeasures, tree_measures

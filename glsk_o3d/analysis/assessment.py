@@ -11,12 +11,14 @@ from scipy.spatial.distance import cdist
 
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
-from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
+from ..numerics.components import component_labels
 from ..numerics.neighbourhoods import nearest_neighbours
+from ..numerics.vectors import dot, norm
 from ..preparation.frame import check_extent
 from ..skeleton import Skeleton
 from .cross_sections import cross_sections
-from .graph import check_graph, count_components, simple_edges
+from .graph import check_graph, simple_edges
+from .loops import opening_cycles
 
 CLUSTER_NEIGHBOURS = 16  # fitted: of each point, in the graph whose components are the clusters of a cloud
 MIN_SECTION_POINTS = 6  # fitted: below which a place counts as outside
@@ -58,30 +60,19 @@ class LoopWidth:
 class Assessment:
     """How a skeleton lies in its cloud: four measures from 0 to 1, of which 1 is best, all without a unit.
 
-    They need no truth, and so cannot see everything: parts of the cloud without a branch, and loops that are missing,
-    cost little or nothing. Noise, and a scan from one side, cost something even on the true axis: compare skeletons of
-    one cloud.
-
-    A cross-section is what `cross_sections` makes, of at least six points. Where branches meet, none is of one tube
-    only: places in the largest empty ball around a junction do not count (unless there are no others). Branches that
-    run side by side in one part share its outline, and count as off its middle.
+    They need no truth, and so cannot see everything: parts of the cloud without a branch, and missing loops, cost
+    little or nothing. Noise, and a scan from one side, cost something even on the true axis: compare skeletons of one
+    cloud. The formulas, and what they give on closed forms: docs/evaluation.md.
 
     Attributes
     ----------
     centredness : float
-        Mean over the length that has cross-sections of max(0, 1 - d / r): d is the distance from the curve to the
-        centre of its cross-section and r that section's radius. 1 on the axis of a round tube, 0 on its surface and
-        outside.
+        Mean over the length of max(0, 1 - d / r), with d from the curve to the centre of its cross-section and r that
+        section's radius.
     boundedness : float
-        Share of the length that is inside: where the cross-section is seen in more than a third of all directions in
-        its plane, gaps of more than a right angle between points left out. Inside a closed outline all is seen; at the
-        distance x > r from the axis of a round tube arcsin(r / x) / pi, which is a half on the surface and a third at
-        1.15 r. A third, because a scan from one side shows less than a half even to the axis. Where there is no
-        cross-section the curve counts as outside.
+        Share of the length that sees its cross-section in more than a third of all directions.
     smoothness : float
-        max(0, 1 - (sum of a r) / (pi L)), with L the length, a the angle by which the curve turns at a vertex and r the
-        radius of the nearest cross-section: 1 minus the turning per radius travelled, in half turns. Junctions and
-        leaves do not count. 1 on a straight line, 1 - r / (pi R) on a circle of radius R.
+        1 minus how much the curve turns per radius travelled, in half turns; 0 where it turns more.
     topology : float
         min(components, clusters) / max(components, clusters), times the share of the loops that open wider than their
         tube (1 without loops).
@@ -123,13 +114,7 @@ class Assessment:
         return sum(loop.wider for loop in self.loops)
 
     def as_dict(self) -> dict[str, Any]:
-        """The numbers, as JSON holds them.
-
-        Returns
-        -------
-        dict of str to float, int or list
-            `loops` is a list of dicts with `opening`, `tube_radius` and `wider`.
-        """
+        """The numbers, as JSON holds them; `loops` is a list of dicts with `opening`, `tube_radius` and `wider`."""
         shown = {name: value for name, value in vars(self).items() if name != "edge_centredness"}
         return {**shown, "loops": [{**asdict(loop), "wider": loop.wider} for loop in self.loops]}
 
@@ -188,8 +173,8 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     centred = 1 - np.divide(offsets, radii, out=np.sign(offsets), where=offsets < radii)
     bounded = found & (sections.open_angles < OPEN_ANGLE)
     nearest = cKDTree(sections.places[found])
-    radius = sections.radii[found][nearest.query(skeleton.vertices)[1]]
-    loops = _loops(skeleton, radius)
+    radius = radii[nearest.query(skeleton.vertices)[1]]
+    loops = tuple(LoopWidth(opening, float(np.median(radius[cycle]))) for cycle, opening in opening_cycles(skeleton))
     components = skeleton.n_components
     agreement = min(components, clusters) / max(components, clusters)
     wide = sum(loop.wider for loop in loops) / len(loops) if loops else 1.0
@@ -203,6 +188,16 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
         loops=loops,
         edge_centredness=np.where(_at_junctions(skeleton, middles, cloud), np.nan, centred[nearest.query(middles)[1]]),
     )
+
+
+def _neighbourhood(cloud):
+    """Median distance to the last of the neighbours, and the connected components of the neighbour graph."""
+    k = min(CLUSTER_NEIGHBOURS, len(cloud))
+    if k < 2:
+        return 0.0, len(cloud)
+    distance, neighbour = nearest_neighbours(cloud, k)
+    pairs = np.column_stack([np.repeat(np.arange(len(cloud)), k), neighbour.ravel()])
+    return float(np.median(distance[:, -1])), int(component_labels(len(cloud), pairs).max()) + 1
 
 
 def _at_junctions(skeleton, places, cloud):
@@ -220,23 +215,6 @@ def _turning(skeleton, radius):
     onward = ends[np.argsort(ends[:, 0], kind="stable"), 1].reshape(-1, 2)
     before, after = (skeleton.vertices[onward] - skeleton.vertices[inner, None]).swapaxes(0, 1)
     # between the one edge and the other turned back; the arctangent is exact also near 0, where the arccosine is not
-    angle = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), -(before * after).sum(axis=1))
+    angle = np.arctan2(norm(np.cross(before, after)), -dot(before, after))
     straight = (before == 0).all(axis=1) | (after == 0).all(axis=1)
     return float((np.where(straight, 0, angle) * radius[inner]).sum())
-
-
-def _loops(skeleton, radius):
-    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-    openings = (inscribed_circle(skeleton.vertices[cycle])[1] for cycle in cycles)
-    widths = zip(openings, (np.median(radius[cycle]) for cycle in cycles), strict=True)
-    return tuple(LoopWidth(float(opening), float(tube_radius)) for opening, tube_radius in widths)
-
-
-def _neighbourhood(cloud):
-    """Median distance to the last of the neighbours, and the connected components of the neighbour graph."""
-    k = min(CLUSTER_NEIGHBOURS, len(cloud))
-    if k < 2:
-        return 0.0, len(cloud)
-    distance, neighbour = nearest_neighbours(cloud, k)
-    pairs = np.column_stack([np.repeat(np.arange(len(cloud)), k), neighbour.ravel()])
-    return float(np.median(distance[:, -1])), count_components(len(cloud), pairs)

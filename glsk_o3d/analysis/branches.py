@@ -1,17 +1,20 @@
-"""The branches of a skeleton, measured one by one."""
+"""The branches of a skeleton, measured one by one: a row of measures for each."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InvalidParameterError
-from ..numerics.polylines import place_at
+from ..numerics.polylines import arc_lengths, place_at
+from ..numerics.vectors import norm
 from ..refinement.rooted import root_among
-from .branch_rows import BranchTable
 from .curvature import curvature_torsion
 from .growth import axes, grow
+from .rows import Rows
 from .segmentation import branch_of_point
 
 if TYPE_CHECKING:
@@ -19,6 +22,114 @@ if TYPE_CHECKING:
 
 # fitted: radii from a junction between which a branch has its direction; nearer, parts blend
 HEADING_SPAN = (1.0, 3.0)
+PRINTED_ROWS = 20  # at most; fitted to a screen
+PRINTED_COLUMNS = {
+    **dict(branch="d", kind="s", parent="d", level="d", axis="d", order="d", length=".4g", mean_radius=".3g"),
+    **dict(start_radius=".3g", end_radius=".3g", tortuosity=".2f", angle=".1f", points="d"),
+    **dict(confidence=".2f", support=".2f"),
+}
+"""Those that people read, each with its format."""
+
+
+@dataclass(frozen=True, eq=False)
+class BranchTable(Rows, row="branch"):
+    """One row per branch: those of `Skeleton.branches` in their order, then the vertices without edges.
+
+    Lengths are in the cloud's units, means are along the curve, NaN is unknown. Iteration gives a dict of plain numbers
+    and strings per row; the two points become ``start_point_x`` and so on. ``print`` shows the main columns. More on
+    every column: docs/branches.md.
+
+    Attributes
+    ----------
+    kind : (B,) str array
+        ``"loop"`` for branches that lie on a loop, ``"tip"`` for others with a free end, ``"inner"`` for others between
+        junctions, ``"isolated"`` for a vertex without edges.
+    component : (B,) int array
+    parent : (B,) int array
+        The row that a branch grows from, on the shortest way from the root; -1 for those at the root.
+    level : (B,) int array
+        Steps from the root: 0 for those at the root, 1 for their children.
+    start, end : (B,) int arrays
+        Vertices at the ends, `start` towards the root.
+    start_point, end_point : (B, 3) float arrays
+    length : (B,) float array
+    tortuosity : (B,) float array
+        Length over the distance of the ends: 1 for a straight branch, infinite for a closed one.
+    mean_radius, start_radius, end_radius : (B,) float arrays
+    angle : (B,) float array
+        Degrees between the direction in which the parent arrives and that in which the branch leaves: 0 goes straight
+        on. NaN without a parent, and where the branch or its parent is closed.
+    mean_curvature, mean_torsion : (B,) float arrays
+        See `curvature_torsion`.
+    points : (B,) int array
+        Points of the skeleton's cloud that belong to the branch; see `segment`.
+    confidence : (B,) float array
+        Mean confidence.
+    support : (B,) float array
+        Share of samples of the cloud that show its least shown place, or end; see `glsk_o3d.support`.
+    axis : (B,) int array
+        The first row of the axis that a branch is part of. At a junction the thickest and straightest branch goes on.
+    order : (B,) int array
+        Centrifugal (Gravelius) order: 0 for axes at the root, and one more for each axis that grows from another.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import y_junction
+    >>> table = skeletonize(y_junction(2000).points).branch_table()
+    >>> len(table), list(table)[0]["kind"], table.length.shape
+    (3, 'tip', (3,))
+    """
+
+    kind: np.ndarray
+    component: np.ndarray
+    parent: np.ndarray
+    level: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    start_point: np.ndarray
+    end_point: np.ndarray
+    length: np.ndarray
+    tortuosity: np.ndarray
+    mean_radius: np.ndarray
+    start_radius: np.ndarray
+    end_radius: np.ndarray
+    angle: np.ndarray
+    mean_curvature: np.ndarray
+    mean_torsion: np.ndarray
+    points: np.ndarray
+    confidence: np.ndarray
+    support: np.ndarray
+    axis: np.ndarray
+    order: np.ndarray
+
+    def __repr__(self):
+        return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
+
+    @property
+    def printed_columns(self) -> dict[str, str]:
+        """The columns that are read by people, each with its format; the support only if it is known."""
+        known = np.isfinite(self.support).any()
+        return {name: form for name, form in PRINTED_COLUMNS.items() if known or name != "support"}
+
+    def __str__(self):
+        columns = self.printed_columns
+        rows = [[*columns], *([cell(row, name) for name in columns] for row in self)]
+        if len(rows) > PRINTED_ROWS + 1:
+            rows[PRINTED_ROWS - 4 : -4] = [["..."] + [""] * (len(columns) - 1)]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        sides = ["<" if form == "s" else ">" for form in columns.values()]
+        places = [f"{side}{width}" for side, width in zip(sides, widths, strict=True)]
+        lines = ["  ".join(map(format, row, places)).rstrip() for row in rows]
+        return "\n".join([f"{self!r}: lengths in the cloud's units, angles in degrees", *lines])
+
+
+def cell(row: dict[str, Any], name: str) -> str:
+    """A number of a row of a `BranchTable` as people read it, a dash for what is unknown; `name` is printed."""
+    value = row[name]
+    if (name == "parent" and value < 0) or (isinstance(value, float) and math.isnan(value)):
+        return "-"
+    return format(value, PRINTED_COLUMNS[name])
 
 
 @np.errstate(all="ignore")  # a file may hold coordinates whose squares no float64 holds
@@ -30,10 +141,8 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     skeleton : Skeleton
     root : str, int or (x, y, z), optional
         As of `editing.reroot`: ``"x"`` to ``"-z"`` for the vertex that is lowest along this axis, ``"thickest"`` for
-        the thickest end, a vertex, or a point whose nearest vertex it is. Its branch, or all that meet there, are those
-        of level 0 in its component. By default that is where the tree was made to grow from, if it was. In other
-        components, and else, it is the branch with the most volume (the longest one, where radii are unknown), with its
-        free or thicker end for a start.
+        the thickest end, a vertex, or a point whose nearest vertex it is. By default that is where the tree was made to
+        grow from, if it was; else, and in other components, the branch with the most volume has level 0.
 
     Returns
     -------
@@ -58,7 +167,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     root = skeleton.report.root or None if root is None else root
     chosen = None if root is None else root_among(skeleton.vertices, skeleton, root)
     paths = [*skeleton.branches, *np.flatnonzero(skeleton.degree == 0)[:, None]]
-    steps = [np.linalg.norm(np.diff(skeleton.vertices[path], axis=0), axis=1) for path in paths]
+    steps = [norm(np.diff(skeleton.vertices[path], axis=0)) for path in paths]
     length = np.array([step.sum() for step in steps])
     weights = [np.r_[step, 0] + np.r_[0, step] if step.any() else np.ones(len(step) + 1) for step in steps]
 
@@ -70,8 +179,6 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     outward = [path[::-1] if turn else path for path, turn in zip(paths, backwards, strict=True)]
     start, end = (np.array([path[i] for path in outward]) for i in (0, -1))
     first, last = skeleton.vertices[start], skeleton.vertices[end]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        tortuosity = length / np.linalg.norm(last - first, axis=1)
     curvature, torsion = curvature_torsion(skeleton)
     label = branch_of_point(skeleton, skeleton.points, skeleton.vertex_of_point)
     angle = np.array([_angle(skeleton, outward, i, parent[i]) for i in range(len(paths))])
@@ -87,7 +194,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         start_point=first,
         end_point=last,
         length=length,
-        tortuosity=tortuosity,
+        tortuosity=length / norm(last - first),
         mean_radius=mean_radius,
         start_radius=skeleton.radii[start],
         end_radius=skeleton.radii[end],
@@ -103,11 +210,13 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
 
 
 def _mean(values, weights):
+    """Weighted mean of the values that are known, NaN without any."""
     known = np.isfinite(values) & (weights > 0)
     return np.average(values[known], weights=weights[known]) if known.any() else np.nan
 
 
 def _kinds(skeleton, paths):
+    """The kind of every path, see `BranchTable`."""
     import networkx
 
     graph = networkx.Graph(skeleton.edges.tolist())
@@ -124,6 +233,7 @@ def _kinds(skeleton, paths):
 
 
 def _angle(skeleton, paths, row, parent):
+    """Degrees by which a path turns away from its parent, NaN where there is none or one of them is closed."""
     path, before = paths[row], paths[parent]
     if parent < 0 or path[0] == path[-1] or before[0] == before[-1]:
         return np.nan
@@ -136,8 +246,8 @@ def _angle(skeleton, paths, row, parent):
 
 
 def _heading(curve, radius):
-    """RootPlace a curve goes from its first point: from one to three radii, or the first quarter."""
-    along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
+    """Where a curve goes from its first point: from one to three radii, or over the first quarter."""
+    along = arc_lengths(curve)
     reach = along[-1]
     near, far = np.minimum(np.multiply(HEADING_SPAN, radius), [reach / 2, reach]) if radius > 0 else (0, reach / 4)
     return place_at(curve, along, far) - place_at(curve, along, near)

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..numerics.groups import group_median, group_sum
 from ..numerics.neighbourhoods import plane_axes
-from ..numerics.polylines import place_at
+from ..numerics.polylines import arc_lengths, place_at
 
 # All fitted; what an arc has is derived.
 POINTS_PER_SECTION, MOST_SECTIONS = 24, 1000  # points on average, and sections of a skeleton at most
@@ -21,30 +21,14 @@ MIN_ARC_VARIANCE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Sections:
-    """What the cloud looks like around S places along a skeleton, all of about one length.
+    """What the cloud looks like around S pieces of a skeleton, all of about one length: arrays with a row for each."""
 
-    Attributes
-    ----------
-    places : (S, 3) float array
-        The middles of the pieces that the branches are cut into.
-    lengths : (S,) float array
-        Their lengths along the curve.
-    counts : (S,) int array
-        Points in each section; with few of them the other values mean little.
-    offsets : (S,) float array
-        Distance from the place to the centre of its section.
-    radii : (S,) float array
-        Root mean square distance from the points to the centre: of a round tube its radius.
-    open_angles : (S,) float array
-        Radians out of 2 pi in which the place sees no points: the sum of the gaps of more than a right angle.
-    """
-
-    places: np.ndarray
+    places: np.ndarray  # (S, 3): the middles of the pieces
     lengths: np.ndarray
-    counts: np.ndarray
-    offsets: np.ndarray
-    radii: np.ndarray
-    open_angles: np.ndarray
+    counts: np.ndarray  # of points; where there are few, the other values mean little
+    offsets: np.ndarray  # from the place to the centre of the section
+    radii: np.ndarray  # root mean square distance from the points to the centre: the radius of a round tube
+    open_angles: np.ndarray  # radians in which the place sees no points: the sum of the gaps of more than a right angle
 
 
 def cross_sections(vertices, branches, points, shortest=0.0) -> Sections:
@@ -58,19 +42,8 @@ def cross_sections(vertices, branches, points, shortest=0.0) -> Sections:
     a round tube however unevenly its outline is covered. In directions in which the outline is flat, or seen from
     below a third of its circumference, it is the mean of the points.
 
-    Parameters
-    ----------
-    vertices : (M, 3) float array
-    branches : sequence of int arrays
-        Vertices in order; at least one has a length.
-    points : (N, 3) float array
-    shortest : float
-        Least length of the pieces, as far as branches are not shorter.
-
-    Returns
-    -------
-    Sections
-        About one per 24 points or fewer, at most about 1000, at least one per branch that has a length.
+    There is about one section per 24 points or fewer, at most about 1000, at least one per branch that has a length;
+    one branch must have a length. Pieces are no shorter than `shortest`, unless the branch is.
     """
     places, tangents, lengths = _cut(vertices, branches, len(points), shortest)
     n = len(places)
@@ -92,7 +65,7 @@ def cross_sections(vertices, branches, points, shortest=0.0) -> Sections:
 
 def _cut(vertices, branches, n_points, shortest):
     """Places, unit tangents and lengths of the pieces that the branches are cut into."""
-    along = [np.r_[0, np.cumsum(np.linalg.norm(np.diff(vertices[path], axis=0), axis=1))] for path in branches]
+    along = [arc_lengths(vertices[path]) for path in branches]
     total = sum(travelled[-1] for travelled in along)
     step = max(total / np.clip(n_points // POINTS_PER_SECTION, 1, MOST_SECTIONS), shortest)
     cuts, middles, lengths = [], [], []

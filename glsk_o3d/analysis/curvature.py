@@ -8,6 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidParameterError
+from ..numerics.polylines import arc_lengths
+from ..numerics.vectors import norm
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -25,8 +27,8 @@ def curvature_torsion(skeleton: Skeleton, window: float | None = None) -> tuple[
     Around every vertex a polynomial of fourth degree is fitted to the branch by weighted least squares, in arc length
     over a window; the Frenet formulas give curvature ``|r' x r''| / |r'|^3`` and torsion
     ``(r' x r'') . r''' / |r' x r''|^2``.
-    Closed branches are taken as closed. Near an open end, within half of half a window, they are those half of half a
-    window away from it: one-sided fits mean little.
+    Closed branches are taken as closed. Nearer to an open end than a quarter of the window, the values are those a
+    quarter of the window away from it: one-sided fits mean little.
 
     Parameters
     ----------
@@ -40,9 +42,8 @@ def curvature_torsion(skeleton: Skeleton, window: float | None = None) -> tuple[
     -------
     curvature, torsion : (M,) float arrays
         Per vertex, in 1 / the cloud's unit. Curvature is not negative; torsion is positive on a right-handed screw.
-        Both are NaN at junctions, where curves meet, and at vertices without edges; torsion is NaN also where the curve
-        is straight, turning less than 0.1 radians over half a window. Curves with fewer than four vertices have no
-        torsion either.
+        Both are NaN at junctions and at vertices without edges; torsion also where the curve turns less than 0.1
+        radians over half a window, and on curves with fewer than four vertices.
 
     Raises
     ------
@@ -76,22 +77,12 @@ def curvature_torsion(skeleton: Skeleton, window: float | None = None) -> tuple[
 
 @np.errstate(all="ignore")
 def bend(curve, half=None, closed=False):
-    """Curvature and torsion of one curve at its vertices; see `curvature_torsion`.
+    """Curvature and torsion, (n,) float arrays, of one curve, (n, 3) float array of two points or more.
 
-    Parameters
-    ----------
-    curve : (n, 3) float array
-        At least two points; the last is the first again if it is closed.
-    half : float, optional
-        Half the window; by default a quarter of the length.
-    closed : bool
-
-    Returns
-    -------
-    curvature, torsion : (n,) float arrays
+    The last point of a closed curve is its first one again. `half` the window is by default a quarter of the length.
     """
     n = len(curve)
-    along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
+    along = arc_lengths(curve)
     unit = along[-1]
     if not (np.isfinite(unit) and unit > 0):
         return np.full((2, n), np.nan)
@@ -119,8 +110,7 @@ def bend(curve, half=None, closed=False):
     scale = reach[:, None]
     velocity, acceleration, jerk = fit[:, 1] / scale, 2 * fit[:, 2] / scale**2, 6 * fit[:, 3] / scale**3
     normal = np.cross(velocity, acceleration)
-    size = np.linalg.norm(normal, axis=1)
-    speed = np.linalg.norm(velocity, axis=1)
+    size, speed = norm(normal), norm(velocity)
     curvature = np.divide(size, speed**3, out=np.full(n, np.nan), where=speed > 0)
     planar = (curvature * reach > STRAIGHT_ANGLE) & (least > 3)
     torsion = np.divide((normal * jerk).sum(axis=1), size**2, out=np.full(n, np.nan), where=planar)

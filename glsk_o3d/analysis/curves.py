@@ -23,7 +23,7 @@ def pieces(nodes, edges, step):
     """
     if len(edges) == 0:
         return np.arange(len(nodes)), np.zeros(len(nodes))
-    length = np.linalg.norm(nodes[edges[:, 1]] - nodes[edges[:, 0]], axis=1)
+    length = norm(nodes[edges[:, 1]] - nodes[edges[:, 0]])
     count = np.maximum(np.ceil(length / step).astype(int), 1)
     row = np.repeat(np.arange(len(edges)), count)
     before = np.repeat(np.cumsum(count) - count, count)
@@ -43,38 +43,28 @@ def distances(curve, other, step):
 
     Two (n,) float arrays; the places are `step` apart, and the radius is at least that.
     """
-    (here, radius), (there, radius_there) = (_places(skeleton, step) for skeleton in (curve, other))
+    (_, here, radius), (_, there, radius_there) = (places_along(skeleton, step) for skeleton in (curve, other))
     distance, nearest = cKDTree(there).query(here)
     return distance, np.maximum((radius + radius_there[nearest]) / 2, step)
 
 
-def _places(skeleton, step):
+def places_along(skeleton, step):
+    """Places along a skeleton, at most `step` apart: the edge of each, (n,), where it is, (n, 3), and its radius, (n,).
+
+    Without edges these are the vertices.
+    """
     row, part = pieces(skeleton.vertices, skeleton.edges, step)
-    return tuple(along(skeleton.edges, row, part, values) for values in (skeleton.vertices, skeleton.radii))
+    place, radius = (along(skeleton.edges, row, part, values) for values in (skeleton.vertices, skeleton.radii))
+    return row, place, radius
 
 
 def radii_from_points(nodes, edges, points):
-    """Radii of an axis that has none, from a cloud around it.
+    """Radii of an axis that has none, (M,) float array of positive numbers, from a cloud around it.
 
-    At each node it is the median distance of the points whose nearest place on the axis is nearer to that node than to
-    the other end of its edge. Nodes with fewer than three such points have the radius of the nearest one with enough,
-    along the axis, or straight where nothing of their part has enough.
-
-    Parameters
-    ----------
-    nodes : (M, 3) float array
-    edges : (E, 2) int array
-    points : (n, 3) float array
-
-    Returns
-    -------
-    (M,) float64 array
-        Positive.
-
-    Raises
-    ------
-    InvalidParameterError
-        The points are not around the axis: they are too few for any node, far away, or on it.
+    The radius at a node is the median distance of the points whose nearest place on the axis is nearer to that node
+    than to the other end of its edge. Nodes with fewer than three such points have the radius of the nearest one with
+    enough, along the axis, or straight where nothing of their part has enough. An InvalidParameterError says that the
+    points are not around the axis: too few for any node, far away, or on it.
     """
     node, distance = _owner(nodes, edges, points)
     count = np.bincount(node, minlength=len(nodes))

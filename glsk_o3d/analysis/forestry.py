@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import pdist
 
 from ..errors import InvalidParameterError, SkeletonWarning
-from ..numerics.vectors import AXES, TINY, along_axis
+from ..numerics.vectors import AXES, TINY, along_axis, norm
 from .tree_cylinders import OUTSIDE, Cylinders, cylinders
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
@@ -117,37 +117,23 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     def height(places: np.ndarray) -> np.ndarray:
         return unit * along_axis(places - ground, up)
 
+    def by_order(values: np.ndarray, power: int) -> tuple[float, ...]:
+        return tuple((unit**power * np.bincount(pieces.order, values)).tolist())
+
     stem = pieces.order == 0
     bottom, top = height(pieces.start_point), height(pieces.end_point)
     low, high = min(bottom.min(), top.min()), max(bottom.max(), top.max())
-    ground_height = -low / max(high - low, TINY)
+    highest = float(max(high, height(_points_near(skeleton)).max(initial=high)))
+    for doubt in _doubts(-low / max(high - low, TINY), highest, up, unit):
+        warnings.warn(doubt, SkeletonWarning, stacklevel=2)
     breast = np.flatnonzero(stem & (bottom <= BREAST_HEIGHT) & (top >= BREAST_HEIGHT))
     leaving = bottom[(pieces.order == 1) & stem[pieces.parent]]
     crowning = ~stem | (bottom > leaving.min(initial=np.inf))
     crown = unit * np.concatenate([pieces.start_point[crowning], pieces.end_point[crowning]])
     width, area = _extent(np.delete(crown, "xyz".index(up[-1]), axis=1))
-
-    known, total = np.isfinite(pieces.confidence), pieces.volume.sum()
-    if ground_height > 0.5:
-        warnings.warn(
-            f"the tree grows from {100 * ground_height:.0f} % of its height along {up}: does {up} point up?",
-            SkeletonWarning,
-            stacklevel=2,
-        )
-    tallest = float(max(high, height(_beside(skeleton)).max(initial=high)))
-    if tallest > TALLEST_TREE:
-        warnings.warn(
-            f"the tree is {tallest:.4g} m high, and none is known above {TALLEST_TREE:.0f} m: is a unit of the cloud "
-            f"{unit:g} m? pass unit=, such as 'mm'",
-            SkeletonWarning,
-            stacklevel=2,
-        )
-
-    def by_order(values: np.ndarray, power: int) -> tuple[float, ...]:
-        return tuple((unit**power * np.bincount(pieces.order, values)).tolist())
-
+    traced = np.where(np.isfinite(pieces.confidence), pieces.volume * (pieces.confidence == 0), np.nan)
     return TreeMeasures(
-        height=tallest,
+        height=highest,
         stem_diameter=2 * unit * _radius_at(BREAST_HEIGHT, height, pieces, breast[0]) if len(breast) else np.nan,
         crown_base=float(leaving.min()) if len(leaving) else np.nan,
         crown_width=width,
@@ -155,11 +141,22 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
         length=by_order(pieces.length, 1),
         area=by_order(pieces.area, 2),
         volume=by_order(pieces.volume, 3),
-        traced=float(np.where(known, pieces.volume * (pieces.confidence == 0), np.nan).sum() / max(total, TINY)),
+        traced=float(traced.sum() / max(pieces.volume.sum(), TINY)),
         root=tuple(ground.tolist()),
         up=up,
         unit=unit,
     )
+
+
+def _doubts(ground: float, highest: float, up: str, unit: float) -> Iterator[str]:
+    """What makes directions and units doubtful: a root above half of the height, and a tree taller than any."""
+    if ground > 0.5:
+        yield f"the tree grows from {100 * ground:.0f} % of its height along {up}: does {up} point up?"
+    if highest > TALLEST_TREE:
+        yield (
+            f"the tree is {highest:.4g} m high, and none is known above {TALLEST_TREE:.0f} m: is a unit of the cloud "
+            f"{unit:g} m? pass unit=, such as 'mm'"
+        )
 
 
 def _radius_at(level: float, height: Callable[[np.ndarray], np.ndarray], pieces: Cylinders, at: int) -> float:
@@ -172,27 +169,7 @@ def _radius_at(level: float, height: Callable[[np.ndarray], np.ndarray], pieces:
 
 
 def metres(unit: float | str) -> float:
-    """A unit of length in metres.
-
-    Parameters
-    ----------
-    unit : float or {"m", "cm", "mm", "in", "ft"}
-        As it is, or by its name.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    InvalidParameterError
-        It is neither positive nor one of these.
-
-    Examples
-    --------
-    >>> metres("mm"), metres(0.5)
-    (0.001, 0.5)
-    """
+    """A unit of length in metres, given as that or by its name: ``"mm"`` is 0.001."""
     try:
         value = METRES[unit] if isinstance(unit, str) and unit in METRES else float(unit)
     except (TypeError, ValueError):
@@ -209,13 +186,13 @@ def _upward(skeleton: Any, root: Any) -> str:
     return next((axis for axis in asked if isinstance(axis, str) and axis in AXES), "z")
 
 
-def _beside(skeleton: Any) -> np.ndarray:
-    """Points that are no farther from their vertex than where others are."""
+def _points_near(skeleton: Any) -> np.ndarray:
+    """The points no farther from their vertex than three radii and the longest edge there."""
     owner, longest = skeleton.vertex_of_point, np.zeros(len(skeleton.vertices))
     for ends in skeleton.edges.T:
         np.maximum.at(longest, ends, skeleton.edge_lengths)
     some = np.flatnonzero(owner >= 0)
-    away = np.linalg.norm(skeleton.points[some] - skeleton.vertices[owner[some]], axis=1)
+    away = norm(skeleton.points[some] - skeleton.vertices[owner[some]])
     return skeleton.points[some[away <= (OUTSIDE * skeleton.radii + longest)[owner[some]]]]
 
 

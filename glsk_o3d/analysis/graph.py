@@ -5,27 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InvalidParameterError
-from ..numerics.components import component_labels
 
 
 def check_graph(vertices, edges, name):
-    """Edges as an (E, 2) int64 array, if they and the vertices make a graph embedded in space.
-
-    Parameters
-    ----------
-    vertices : (M, 3) float array
-    edges : array_like
-    name : str
-        What to call the graph in an error.
-
-    Returns
-    -------
-    (E, 2) int64 array
-
-    Raises
-    ------
-    InvalidParameterError
-    """
+    """Edges as an (E, 2) int64 array; an InvalidParameterError says why `name`, as it calls the graph, is none."""
     edges = np.asarray(edges)
     edges = edges if edges.size else np.empty((0, 2), np.int64)
     if len(vertices) == 0:
@@ -43,8 +26,3 @@ def simple_edges(edges):
     """Edges, (E, 2) int array, as pairs i < j, sorted, each once, and none from a node to itself."""
     edges = np.unique(np.sort(edges, axis=1), axis=0)
     return edges[edges[:, 0] != edges[:, 1]]
-
-
-def count_components(n, edges):
-    """Connected components of a graph with n nodes and `edges`, (E, 2) int array."""
-    return int(component_labels(n, edges).max(initial=-1)) + 1

@@ -1,15 +1,9 @@
-"""What a gripper would run into on its straight way in: points, and what lies behind a plane.
-
-Points are samples of a surface. Where they are close, a finger cannot come through between them. Where they are not,
-each stands for the piece of surface around it, which reaches halfway to its neighbours: the box around these places, in
-the frame of the gripper, lies within the extent of the points: it makes the part no thicker, and leaves no gaps.
-"""
+"""What a gripper would run into on its straight way in: points, and what lies behind a plane."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -28,78 +22,38 @@ OUTSIDE_CONE = "ways in outside the cone"
 NOTHING_BETWEEN = "ways in with nothing between the jaws"
 
 
-@dataclass(frozen=True, eq=False)
-class Ways:
-    """Straight ways in to P places, A to each of them.
+class Ways(NamedTuple):
+    """Straight ways in to P places, A to each of them."""
 
-    Attributes
-    ----------
-    position, axis : (P, 3) float array
-        The places, and the direction of the part there.
-    approach : (P, A, 3) float array
-        Directions that are perpendicular to `axis`.
-    """
-
-    position: np.ndarray
-    axis: np.ndarray
-    approach: np.ndarray
-
-    @property
-    def closing(self) -> np.ndarray:
-        """From jaw to jaw, (P, A, 3) float array."""
-        return np.cross(self.axis[:, None], self.approach)
+    position: np.ndarray  # (P, 3)
+    axis: np.ndarray  # (P, 3), of the part
+    approach: np.ndarray  # (P, A, 3), perpendicular to the axis
+    closing: np.ndarray  # (P, A, 3), from jaw to jaw
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What the gripper must not meet, and how it may come.
+class Scene(NamedTuple):
+    """What the gripper must not meet, and how it may come."""
 
-    Attributes
-    ----------
-    points : (n, 3) float array
-        Of the object; none if nobody is to look at them.
-    obstacles : list of array
-        As `obstacle_list` gives them.
-    middle : (m, 3) float array
-        Where the object is: on this side of planes. The diagonal of its box is how far the gripper comes.
-    cone : (direction, cosine) or None
-        Approaches differ from the unit direction by an angle whose cosine is no less.
-    """
-
-    points: np.ndarray
-    obstacles: list[np.ndarray]
-    middle: np.ndarray
-    cone: tuple[np.ndarray, float] | None
+    points: np.ndarray  # (n, 3), of the object; none if nobody is to look at them
+    obstacles: list[np.ndarray]  # as `obstacle_list` gives them
+    middle: np.ndarray  # (m, 3), where the object is: on this side of planes; the gripper comes from a diagonal away
+    cone: tuple[np.ndarray, float] | None  # a unit direction, and the least cosine of the angle of an approach to it
 
 
 def free_ways(
     ways: Ways, scene: Scene, gripper: Gripper, width: np.ndarray, clearance: float
 ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
-    """What keeps the gripper from coming in, open a little wider than the part, or wider than that.
+    """What keeps the gripper from coming in, open a little wider than the `width` of the part, (P,), or wider still.
 
-    Parameters
-    ----------
-    ways : Ways
-    scene : Scene
-    gripper : Gripper
-    width : (P,) float array
-        Of the part.
-    clearance : float
-
-    Returns
-    -------
-    reasons : dict of str to (P, A) bool array
-        At the first opening, for the ways that are not free at any.
-    opening, depth : (P, A) float array
-        The least opening at which the way is free; and of the fingertips past the axis.
-    seen : (P, A) int array
-        Sides of the part that have points, as `GraspCandidates` has them.
+    The reasons, (P, A) bool arrays, are those at the least opening, for ways that are free at none. Three (P, A) arrays
+    follow: the least opening at which the way is free, the depth of the fingertips past the axis, and the number of
+    sides of the part that have points, as in `GraspCandidates`.
     """
     shape = ways.approach.shape[:2]
     far = float(np.linalg.norm(np.ptp(scene.middle, axis=0)))
     close = CLOSE_POINTS * min(gripper.finger[:2])
     surface = cells(scene.points, close)
-    others = [each if each.ndim == 1 else cells(each, close) for each in scene.obstacles]
+    obstacles = [each if each.ndim == 1 else cells(each, close) for each in scene.obstacles]
     depth = np.minimum(gripper.reach, width / 2)
     reasons: dict[str, np.ndarray] = {}
     opening, seen, free = np.full(shape, np.nan), np.zeros(shape, int), np.zeros(shape, bool)
@@ -112,19 +66,14 @@ def free_ways(
             found[OUTSIDE_CONE] = ways.approach @ scene.cone[0] < scene.cone[1]
             asked &= ~found[OUTSIDE_CONE]
         if len(surface):
-            found |= _met(ways, surface, low, high, asked, "the object")
+            found |= _met(ways, surface, scene.middle, low, high, asked, "the object")
             asked &= ~np.any(list(found.values()), axis=0)
             beside = hits(ways, surface, *sides(gripper, wide, depth, width), asked)
             seen = np.where(asked, beside.sum(axis=2), seen)
             found[NOTHING_BETWEEN] = asked & ~beside[..., :2].any(axis=2)
             asked &= ~found[NOTHING_BETWEEN]
-        for obstacle in others:
-            if obstacle.ndim == 1:
-                behind = hits_plane(ways, obstacle, scene.middle, low, high)
-                met = _named("an obstacle", behind[..., :2], behind[..., 2])
-            else:
-                met = _met(ways, obstacle, low, high, asked, "an obstacle")
-            for name, part in met.items():
+        for obstacle in obstacles:
+            for name, part in _met(ways, obstacle, scene.middle, low, high, asked, "an obstacle").items():
                 found[name] = found.get(name, False) | part
                 asked &= ~part
         opening = np.where(asked, wide[:, None], opening)
@@ -134,37 +83,24 @@ def free_ways(
     return met, opening, np.broadcast_to(depth[:, None], shape), seen
 
 
-def _met(ways, surface, low, high, asked, what) -> dict[str, np.ndarray]:
-    """Where a finger meets something, and where no finger does, but the palm."""
-    fingers = hits(ways, surface, low[:, :2], high[:, :2], asked)
-    left = asked & ~fingers.any(axis=2)
-    return _named(what, fingers, hits(ways, surface, low[:, 2:], high[:, 2:], left)[..., 0])
-
-
-def _named(what: str, fingers: np.ndarray, palm: np.ndarray) -> dict[str, np.ndarray]:
-    return {
-        f"ways in with a finger in {what}": fingers[..., 0] | fingers[..., 1],
-        f"ways in with the palm in {what}": palm,
-    }
+def _met(ways, obstacle, middle, low, high, asked, what) -> dict[str, np.ndarray]:
+    """Where a finger meets something, and where no finger does, but the palm: (P, A) bool arrays by reason."""
+    if obstacle.ndim == 1:
+        behind = hits_plane(ways, obstacle, middle, low, high)
+        fingers, palm = behind[..., :2], behind[..., 2]
+    else:
+        fingers = hits(ways, obstacle, low[:, :2], high[:, :2], asked)
+        palm = hits(ways, obstacle, low[:, 2:], high[:, 2:], asked & ~fingers.any(axis=2))[..., 0]
+    finger = fingers[..., 0] | fingers[..., 1]
+    return {f"ways in with a finger in {what}": finger, f"ways in with the palm in {what}": palm}
 
 
 def swept(
     gripper: Gripper, opening: np.ndarray, depth: np.ndarray, clearance: float, way: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of what the gripper's boxes sweep on a straight way in, with half the clearance around them.
+    """Corners, (P, 3, 3), of what the gripper's boxes sweep on a straight way in, with half the clearance around them.
 
-    Parameters
-    ----------
-    gripper : Gripper
-    opening, depth : (P,) float array
-        Between the jaws, and of their tips past the axis.
-    clearance, way : float
-        Lengths.
-
-    Returns
-    -------
-    low, high : (P, 3, 3) float array
-        The inner faces of the fingers stay: between them and the part is half the clearance already.
+    The inner faces of the fingers stay: between them and the part is half the clearance already.
     """
     low, high = gripper.boxes(opening, depth)
     towards, away = np.full((2, 3, 3), clearance / 2)
@@ -187,14 +123,12 @@ def sides(gripper: Gripper, opening: np.ndarray, depth: np.ndarray, width: np.nd
 
 
 def cells(points: np.ndarray, close: float) -> np.ndarray:
-    """The piece of surface that each point stands for, (N, K, 3) float array of places in it.
+    """The piece of surface that each point stands for: (N, K, 3) float array of places in it.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-        Repeated ones and those that are not finite do not count.
-    close : float
-        If all neighbours of every point are no farther than this, points are all there is, and K is 1.
+    Where points are no farther than `close` from all neighbours, no finger comes through between them: K is 1. Where
+    they are, each stands for the surface halfway to its neighbours. The box around these places, in the frame of the
+    gripper, lies within the extent of the points: it makes the part no thicker, and leaves no gaps. Repeated points and
+    those that are not finite do not count.
     """
     points = np.unique(points[np.isfinite(points).all(axis=1)], axis=0)
     k = min(CELL_NEIGHBOURS, len(points) - 1)
@@ -207,34 +141,23 @@ def cells(points: np.ndarray, close: float) -> np.ndarray:
 
 
 def hits(ways: Ways, surface: np.ndarray, low: np.ndarray, high: np.ndarray, asked: np.ndarray) -> np.ndarray:
-    """Which boxes have pieces of surface in them.
+    """Which boxes have pieces of surface in them, (P, A, B) bool array, of the ways that are `asked`, (P, A).
 
-    Parameters
-    ----------
-    ways : Ways
-    surface : (N, K, 3) float array
-        As `cells` gives it.
-    low, high : (P, B, 3) float array
-        Corners, in the frame of the gripper: x closing, y axis of the part, z approach.
-    asked : (P, A) bool array
-        Ways that matter; all others are said to have none.
-
-    Returns
-    -------
-    (P, A, B) bool array
+    `surface` is what `cells` gives; `low` and `high`, (P, B, 3), are corners in the frame of the gripper: x closing, y
+    axis of the part, z approach.
     """
     found = np.zeros((*asked.shape, low.shape[1]), bool)
     if not (len(surface) and asked.any()):
         return found
     reach = norm(np.maximum(np.abs(low), np.abs(high))).max() + norm(surface - surface[:, :1]).max()
     within = cKDTree(ways.position).query(surface[:, 0], distance_upper_bound=reach)[0] <= reach
-    surface, closing = surface[within], ways.closing
+    surface = surface[within]
     for place in np.flatnonzero(asked.any(axis=1)):
         some = np.flatnonzero(asked[place])
         first, last = _ends(surface @ ways.axis[place] - ways.position[place] @ ways.axis[place])
         near = np.flatnonzero((last > low[place, :, 1].min()) & (first < high[place, :, 1].max()))
         offset = surface[near] - ways.position[place]
-        x, z = offset @ closing[place, some].T, offset @ ways.approach[place, some].T
+        x, z = offset @ ways.closing[place, some].T, offset @ ways.approach[place, some].T
         least, most = zip(_ends(x), (first[near, None], last[near, None]), _ends(z), strict=True)
         for box in range(low.shape[1]):
             inside = [(most[i] > low[place, box, i]) & (least[i] < high[place, box, i]) for i in range(3)]
@@ -248,18 +171,7 @@ def _ends(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def hits_plane(ways: Ways, plane: np.ndarray, middle: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Which boxes reach behind a plane, on whose other side the object lies: (P, A, B) bool array.
-
-    Parameters
-    ----------
-    ways : Ways
-    plane : (4,) float array
-        Where a x + b y + c z + d = 0.
-    middle : (n, 3) float array
-        Points of the object.
-    low, high : (P, B, 3) float array
-        As in `hits`.
-    """
+    """Which boxes, as in `hits`, reach behind the plane a x + b y + c z + d = 0, seen from the points of the object."""
     size = np.linalg.norm(plane[:3])
     normal, shift = plane[:3] / size, plane[3] / size
     if np.median(middle @ normal + shift) < 0:

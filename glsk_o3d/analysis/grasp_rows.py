@@ -81,7 +81,8 @@ class GraspCandidates(Rows, row="grasp"):
         return replace(self, **arrays)
 
     def __repr__(self):
-        return f"GraspCandidates({len(self)} at {self.places} places{told(self.left_out, '; not taken: ')})"
+        missed = f"; not taken: {listed(self.left_out)}" if self.left_out else ""
+        return f"GraspCandidates({len(self)} at {self.places} places{missed})"
 
     @property
     def axis(self) -> np.ndarray:
@@ -90,10 +91,7 @@ class GraspCandidates(Rows, row="grasp"):
 
     @property
     def poses(self) -> np.ndarray:
-        """Frames of the gripper, (G, 4, 4) float array.
-
-        The origin is the position, x the closing direction, y the axis of the part, z the approach; right-handed.
-        """
+        """Frames of the gripper, (G, 4, 4) float array: x closing, y along the part, z approach."""
         poses = np.tile(np.eye(4), (len(self), 1, 1))
         for column, vectors in enumerate((self.closing, self.axis, self.approach, self.position)):
             poses[:, :3, column] = vectors
@@ -104,10 +102,6 @@ class GraspCandidates(Rows, row="grasp"):
 
         Two are the fingers, from tip to palm, with the opening between them, one joins them, one is as long as the palm
         is deep. Colours go from dark blue, the least quality among them, to yellow, the best.
-
-        Raises
-        ------
-        MissingPackageError
         """
         o3d, viridis = import_open3d(), require("matplotlib").colormaps["viridis"]
         hand = self.gripper
@@ -125,18 +119,7 @@ class GraspCandidates(Rows, row="grasp"):
         return drawn
 
     def to_json(self, path: str | os.PathLike) -> None:
-        """Write candidates, poses, gripper, and the reasons for what was left out; an unknown confidence is null.
-
-        Parameters
-        ----------
-        path : path-like
-            Appears complete or not at all.
-
-        Raises
-        ------
-        OSError
-            The folder does not exist, or the file cannot be written.
-        """
+        """Write candidates, poses, gripper, and the reasons for what was left out; an unknown confidence is null."""
         write_json(path, self.as_dict())
 
     def as_dict(self) -> dict:
@@ -153,21 +136,7 @@ class GraspCandidates(Rows, row="grasp"):
         }
 
     def to_ply(self, path: str | os.PathLike) -> None:
-        """Write the forks of `to_line_set` as a PLY file with coloured edges.
-
-        Parameters
-        ----------
-        path : path-like
-            Appears complete or not at all.
-
-        Raises
-        ------
-        InvalidParameterError
-            There is no grasp.
-        MissingPackageError
-        OSError
-            The folder does not exist, or the file cannot be written.
-        """
+        """Write the forks of `to_line_set` as a PLY file with coloured edges."""
         o3d, drawn = import_open3d(), self.to_line_set()
         if len(self) == 0:
             raise InvalidParameterError("there is no grasp to draw: write .json or .csv, which may be empty")
@@ -179,6 +148,6 @@ class GraspCandidates(Rows, row="grasp"):
         write_atomically(path, write)
 
 
-def told(left_out: Mapping[str, int], before: str) -> str:
-    """How many places were left out and why, after some words; nothing where there are none."""
-    return before + ", ".join(f"{count} {reason}" for reason, count in left_out.items()) if left_out else ""
+def listed(left_out: Mapping[str, int]) -> str:
+    """How many places and ways in were left out, and why."""
+    return ", ".join(f"{count} {reason}" for reason, count in left_out.items())

@@ -12,10 +12,10 @@ import numpy as np
 
 from ..errors import InvalidParameterError, SkeletonWarning
 from ..interop.clouds import cloud_points
+from ..numerics.polylines import arc_lengths
 from ..report import outside
 from .grasp_checks import Scene, Ways, free_ways, obstacle_list
-from .grasp_places import directions_around, places_along
-from .grasp_rows import GraspCandidates, told
+from .grasp_rows import GraspCandidates, listed
 from .gripper import Gripper, checked
 
 if TYPE_CHECKING:
@@ -40,16 +40,11 @@ def grasp_candidates(
 ) -> GraspCandidates:
     r"""Candidates for grasps with parallel jaws, from the axis and the radii of a skeleton's branches.
 
-    The jaws close across a branch: at places along its curve, from directions around it. With the radius r of the ball
-    on the axis that touches the surface and its change :math:`r' = dr/ds` along the curve, a part of round section is
-    :math:`w = 2 r / \sqrt{1 - r'^2}` wide across its axis: :math:`2 r` on a tube, more on a cone, which the ball
-    touches ahead of its widest section. Direction and :math:`r'` are those of a chord of the curve, from one radius
-    before the place to one behind.
-
-    The gripper comes in straight, open, from as far away as the diagonal of the object, until its fingertips are past
-    the axis: by its reach, or as far as the part if that is less. Ways on which a finger or the palm would sweep over
-    points of the object, or over an obstacle, are left out, and so are those on which there is no point between the
-    jaws.
+    The jaws close across a branch: at places along its curve, from directions around it. The gripper comes in straight,
+    open, from as far away as the diagonal of the object, until its fingertips are past the axis: by its reach, or as
+    far as the part if that is less. Ways on which a finger or the palm would sweep over points of the object, or over
+    an obstacle, are left out, and so are those on which there is no point between the jaws. What no camera has seen is
+    taken for free.
 
     Parameters
     ----------
@@ -58,8 +53,7 @@ def grasp_candidates(
     gripper : Gripper or float
         Or its widest opening [cloud's units]; then all else is in proportion.
     cloud : cloud, optional
-        All points of the object; by default those of the skeleton. An empty tuple leaves it out: nothing keeps a finger
-        from going through the object then.
+        All points of the object; by default the skeleton's. With an empty tuple a finger may go through the object.
     obstacles : cloud or (4,) array_like, or a sequence of these, optional
         Clouds of what else is there; of a mesh the vertices count, and points of the object do no harm. Four numbers
         are a plane, as Open3D's ``segment_plane`` gives it: what is behind it, as seen from the object, is solid.
@@ -72,16 +66,13 @@ def grasp_candidates(
     around : int
         Approach directions at each place, evenly around the axis.
     spacing : float, optional
-        Distance of the places along the curve [cloud's units]; by default the median radius of the branch. Around a
-        closed branch it is changed so that it fits a whole number of times.
+        Distance of the places along the curve [cloud's units]; by default the median radius of the branch.
     margin : float
-        Least distance along the curve from the ends of the branch, over the radius at that end: there, jaws meet other
-        parts, or only half of them the part.
+        Least distance along the curve from the ends of the branch, over the radius at that end.
     min_confidence : float
         Least confidence of the skeleton, from 0 to 1. 0 takes also what nobody has measured.
     up : (3,) float array_like, optional
-        The first approach comes from above, as nearly as can be at a right angle to the axis; on axes parallel to `up`,
-        from a side that depends on nothing but `up`. By default against the direction of the cone, or else z.
+        The first approach comes from there, as nearly as it can. By default against the cone's direction, or else z.
 
     Returns
     -------
@@ -91,8 +82,7 @@ def grasp_candidates(
     Raises
     ------
     InvalidParameterError
-        The skeleton is empty or has no radii; it has no confidence, but `min_confidence` is above 0, or no points, and
-        no `cloud` is given; or a parameter is out of range.
+        The skeleton is empty or lacks radii, confidence or points that are needed; or a parameter is out of range.
     InvalidCloudError
         An obstacle or the object is no cloud.
 
@@ -103,19 +93,17 @@ def grasp_candidates(
 
     Notes
     -----
-    The quality is confidence x room x evenness x sight. *Room* is :math:`1 - w / w_{max}`, the share of the widest
-    opening that is left to miss the part by. *Evenness* is :math:`\sqrt{1 - r'^2}`, the cosine of the angle between the
-    closing direction and the surface where the jaws meet it: 1 on a tube. *Sight* is the share, of the three sides of
-    the part that the gripper is around, on which there are points. An unknown confidence counts as 1, and so does the
-    sight if nobody looks. It ranks; it is no measure of force closure. What no camera has seen is taken for free.
+    With the radius r of the ball on the axis that touches the surface and its change :math:`r' = dr/ds` along the
+    curve, a part of round section is :math:`w = 2 r / \sqrt{1 - r'^2}` wide. The quality, confidence x
+    :math:`(1 - w / w_{max}) \sqrt{1 - r'^2}` x seen / 3, ranks, with 1 for unknown factors; it is no measure of force
+    closure. More on each step: docs/grasping.md.
 
     References
     ----------
     After Vahrenkamp et al. 2018, "Planning high-quality grasps using mean curvature object skeletons", IEEE RA-L 3(2),
-    who place hands along the branches of a mesh's skeleton, at right angles to them. They align the hand with the
-    section of the surface and evaluate the contacts; this function spreads the approaches evenly and does not. Ten Pas
-    et al. 2017, "Grasp pose detection in point clouds", IJRR 36(13-14), check candidates as here: no point in the
-    boxes of the hand, some between its fingers.
+    who place hands along the branches of a mesh's skeleton, and evaluate their contacts. Ten Pas et al. 2017, "Grasp
+    pose detection in point clouds", IJRR 36(13-14), check candidates as here: no point in the hand, some between its
+    fingers.
 
     Examples
     --------
@@ -138,28 +126,29 @@ def grasp_candidates(
     cone = None if cone is None else _cone(cone)
     above = _direction("up", up) if up is not None else np.array([0.0, 0, 1]) if cone is None else -cone[0]
     points = _object(skeleton, cloud)
-    size = np.linalg.norm(np.ptp(points if len(points) else skeleton.vertices, axis=0))
+    middle = points if len(points) else skeleton.vertices
+    size = np.linalg.norm(np.ptp(middle, axis=0))
     if 0 < UNIT_FACTOR * size < gripper.max_opening:
         message = f"the gripper opens {gripper.max_opening:.3g} and the object is {size:.3g} long: is it the same unit?"
         warnings.warn(message, SkeletonWarning, stacklevel=outside())
     places, left_out = _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence)
-    approach = directions_around(places.axis, above, around).reshape(-1, around, 3)
-    ways = Ways(places.position, places.axis, approach)
-    scene = Scene(points, obstacle_list(obstacles), points if len(points) else skeleton.vertices, cone)
+    approach = _directions_around(places.axis, above, around)
+    ways = Ways(places.position, places.axis, approach, np.cross(places.axis[:, None], approach))
+    scene = Scene(points, obstacle_list(obstacles), middle, cone)
     blocked, opening, depth, seen = free_ways(ways, scene, gripper, places.width, clearance)
-    free, ways_left_out = _sorted_out(blocked, approach.shape[0] * around)
+    free, ways_left_out = _sorted_out(blocked, len(approach) * around)
     quality = places.quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
     order = np.argsort(-quality.round(9), kind="stable")  # equal ones differ in their last digits
     free, quality = free[order], quality[order]
-    again = free // around
+    place = free // around
     candidates = GraspCandidates(
-        position=places.position[again],
+        position=places.position[place],
         approach=approach.reshape(-1, 3)[free],
         closing=ways.closing.reshape(-1, 3)[free],
         opening=opening.ravel()[free],
         depth=depth.ravel()[free],
-        branch=places.branch[again],
-        confidence=places.confidence[again],
+        branch=places.branch[place],
+        confidence=places.confidence[place],
         quality=quality,
         seen=seen.ravel()[free],
         gripper=gripper,
@@ -167,13 +156,13 @@ def grasp_candidates(
         left_out=left_out | ways_left_out,
     )
     if len(candidates) == 0:
-        why = told(candidates.left_out, ": ") or ": the skeleton has no branch"
-        warnings.warn(f"no grasp at {places.looked_at} places{why}", SkeletonWarning, stacklevel=outside())
+        why = listed(candidates.left_out) or "the skeleton has no branch"
+        warnings.warn(f"no grasp at {places.looked_at} places: {why}", SkeletonWarning, stacklevel=outside())
     return candidates
 
 
 class _Places(NamedTuple):
-    """Where the part fits between the jaws."""
+    """Where the part fits between the jaws: arrays with a row for each place, and how many were looked at."""
 
     position: np.ndarray
     axis: np.ndarray
@@ -186,7 +175,7 @@ class _Places(NamedTuple):
 
 def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
     """Places that fit, and how many do not, by reason."""
-    found = [places_along(skeleton, path, spacing, margin) for path in skeleton.branches]
+    found = [_places_on(skeleton, path, spacing, margin) for path in skeleton.branches]
     place = np.concatenate([np.empty((0, 9)), *found])
     branch = np.repeat(np.arange(len(found)), list(map(len, found))) if found else np.empty(0, int)
     radius, slope, confidence = place[:, 6:].T
@@ -205,14 +194,63 @@ def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
     if short:
         left_out["branches without a place between their margins"] = short
     place, branch, confidence = place[some], branch[some], confidence[some]
-    fitting = _Places(place[:, :3], place[:, 3:6], width[some], quality[some], confidence, branch, len(width))
-    return fitting, left_out
+    return _Places(place[:, :3], place[:, 3:6], width[some], quality[some], confidence, branch, len(width)), left_out
 
 
 def _sorted_out(reasons, n):
     """The rows for which no reason holds, and how often each is the first that does."""
     first = np.select([reason.ravel() for reason in reasons.values()], list(reasons), "") if reasons else np.full(n, "")
     return np.flatnonzero(first == ""), dict(Counter(first[first != ""].tolist()))
+
+
+def _places_on(skeleton, path, spacing, margin):
+    """Places along a branch, (n, 9): position, axis, radius, its slope, confidence."""
+    curve, radii = skeleton.vertices[path], skeleton.radii[path]
+    along = arc_lengths(curve)
+    length = along[-1]
+    if not length > 0:
+        return np.empty((0, 9))
+    closed = path[0] == path[-1] and skeleton.degree[path[0]] == 2
+    usual = np.nanmedian(radii) if np.isfinite(radii).any() else 0.0
+    step = spacing or usual or length / 10
+    if closed:
+        count = max(round(length / step), 1)
+        at = length / count * np.arange(count)
+    else:
+        low, high = margin * np.nan_to_num(radii[0]), length - margin * np.nan_to_num(radii[-1])
+        if low > high:
+            return np.empty((0, 9))
+        count = int((high - low) / step * (1 + 1e-12)) + 1
+        at = (low + high) / 2 + step * (np.arange(count) - (count - 1) / 2)
+    values = np.column_stack([curve, radii, skeleton.confidence[path]])
+
+    def sample(places):
+        period = {"period": length} if closed else {}
+        return np.column_stack([np.interp(places, along, column, **period) for column in values.T])
+
+    here = sample(at)
+    reach = np.where(here[:, 3] > 0, here[:, 3], step)
+    if closed:
+        before, behind = at - np.minimum(reach, length / 4), at + np.minimum(reach, length / 4)
+    else:
+        before, behind = np.maximum(at - reach, 0), np.minimum(at + reach, length)
+    chord = sample(behind) - sample(before)
+    size = np.linalg.norm(chord[:, :3], axis=1, keepdims=True)
+    axis = np.divide(chord[:, :3], size, out=np.full((count, 3), np.nan), where=size > 0)
+    slope = chord[:, 3] / (behind - before)
+    return np.column_stack([here[:, :3], axis, here[:, 3], slope, here[:, 4]])[size[:, 0] > 0]
+
+
+def _directions_around(axis, up, n):
+    """Directions perpendicular to each axis, (P, n, 3), evenly around it; the first points down as far as it can."""
+    side = np.eye(3)[np.argmin(np.abs(up))]
+    down = -(up - axis * (axis @ up)[:, None])
+    other = side - axis * (axis @ side)[:, None]
+    size = np.linalg.norm(down, axis=1, keepdims=True)
+    first = np.where(size > 1e-6, down, other)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    turn = 2 * np.pi * np.arange(n)[:, None] / n
+    return np.cos(turn) * first[:, None] + np.sin(turn) * np.cross(axis, first)[:, None]
 
 
 def _object(skeleton, cloud):
@@ -236,11 +274,10 @@ def _check(skeleton, clearance, around, spacing, margin, min_confidence):
         raise InvalidParameterError("this skeleton has no confidence, perhaps due to its file: give min_confidence=0")
     checked("clearance", clearance, low=0)
     if spacing is not None:
-        checked("spacing", spacing, above=0)
+        checked("spacing", spacing, low=0, open_low=True)
     checked("margin", margin, low=0)
     checked("min_confidence", min_confidence, low=0, high=1)
-    if isinstance(around, bool) or not isinstance(around, int | np.integer) or around < 1:
-        raise InvalidParameterError(f"around = {around!r}: must be a whole number of at least 1")
+    checked("around", around, type="int", low=1)
 
 
 def _cone(cone):

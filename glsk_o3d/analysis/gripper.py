@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..errors import InvalidParameterError
+from ..parameters import parameter, problem_with
 
 # Published: shapes of the Franka Hand in its maker's description (franka_description, franka_hand.xacro), which opens
 # 80 mm, over that: the fingertip and how far it is from the finger's joint; the capsule around the hand as far as that
@@ -58,48 +59,34 @@ class Gripper:
     reach: Any = None
 
     def __post_init__(self) -> None:
-        opening = checked("max_opening", self.max_opening, above=0)
-        for name, ratios in (("finger", FINGER_PER_OPENING), ("palm", PALM_PER_OPENING)):
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, tuple(opening * ratio for ratio in ratios))
-        if self.reach is None:
-            object.__setattr__(self, "reach", opening * REACH_PER_OPENING)
-        for name in ("finger", "palm"):
-            try:
-                sides = tuple(getattr(self, name))
-            except TypeError:
-                sides = ()
-            if len(sides) != 3:
-                raise InvalidParameterError(f"{name} = {getattr(self, name)!r}: must be three lengths")
-            object.__setattr__(self, name, tuple(checked(f"a side of {name}", side, above=0) for side in sides))
-        object.__setattr__(self, "max_opening", opening)
-        object.__setattr__(self, "min_opening", checked("min_opening", self.min_opening, low=0, high=opening))
-        object.__setattr__(self, "reach", checked("reach", self.reach, low=0, high=self.finger[2]))
+        opening = checked("max_opening", self.max_opening, low=0, open_low=True)
+        finger = _sides("finger", self.finger, FINGER_PER_OPENING, opening)
+        given = dict(
+            max_opening=opening,
+            min_opening=checked("min_opening", self.min_opening, low=0, high=opening),
+            finger=finger,
+            palm=_sides("palm", self.palm, PALM_PER_OPENING, opening),
+            reach=checked(
+                "reach", opening * REACH_PER_OPENING if self.reach is None else self.reach, low=0, high=finger[2]
+            ),
+        )
+        for name, value in given.items():
+            object.__setattr__(self, name, value)
 
     def boxes(self, opening: Any, depth: Any) -> tuple[np.ndarray, np.ndarray]:
-        """The two fingers and the palm, in the frame of the gripper.
-
-        Its origin is on the axis of the part; x is the closing direction, y along the part, z the approach.
+        """The two fingers and the palm, in the frame of the gripper: x closing, y along the part, z approach.
 
         Parameters
         ----------
         opening : float or (n,) array_like
             Between the jaws.
         depth : float or (n,) array_like
-            How far the fingertips are past the axis.
+            How far the fingertips are past the axis of the part, where the origin is.
 
         Returns
         -------
         low, high : (3, 3) or (n, 3, 3) float array
             Opposite corners of the finger towards -x, of that towards +x, and of the palm.
-
-        Examples
-        --------
-        >>> low, high = Gripper(1.0, finger=(0.1, 0.2, 0.5), palm=(2, 1, 1)).boxes(0.6, 0.1)
-        >>> (high - low).round(9)
-        array([[0.1, 0.2, 0.5],
-               [0.1, 0.2, 0.5],
-               [2. , 1. , 1. ]])
         """
         inner, tip = np.asarray(opening, float)[..., None, None] / 2, np.asarray(depth, float)[..., None, None]
         thickness, width, length = self.finger
@@ -110,13 +97,19 @@ class Gripper:
         return low + moved, high + moved
 
 
-def checked(
-    name: str, value: Any, *, low: float = -math.inf, high: float = math.inf, above: float = -math.inf
-) -> float:
-    """A finite number within limits, or InvalidParameterError."""
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool) and math.isfinite(value)
-    if number and low <= value <= high and value > above:
-        return float(value)
-    limits = [f"above {above}"] if above > -math.inf else [f"at least {low}"]
-    limits += [f"at most {high}"] if high < math.inf else []
-    raise InvalidParameterError(f"{name} = {value!r}: must be a finite number, {' and '.join(limits)}")
+def _sides(name: str, given: Any, ratios: tuple[float, ...], opening: float) -> tuple[float, ...]:
+    """The sides of a box, by default in proportion to the opening."""
+    if given is None:
+        return tuple(opening * ratio for ratio in ratios)
+    sides = tuple(given) if isinstance(given, Iterable) else ()
+    if len(sides) != 3:
+        raise InvalidParameterError(f"{name} = {given!r}: must be three lengths")
+    return tuple(checked(f"a side of {name}", side, low=0, open_low=True) for side in sides)
+
+
+def checked(name: str, value: Any, *, type: str = "float", **limits: Any) -> float:
+    """A number within limits, as those of `parameters.parameter`; InvalidParameterError for anything else."""
+    problem = problem_with(value, parameter(None, "", type=type, **limits).metadata)
+    if problem:
+        raise InvalidParameterError(f"{name} = {value!r}: {problem}")
+    return float(value)

@@ -8,7 +8,11 @@ import numpy as np
 
 
 def grow(skeleton, paths, length, section, chosen):
-    """Parent and level of every path, and whether it runs towards the root: the nearest path first, from the roots."""
+    """Parent and level of every path, and whether it runs towards the root: three (B,) arrays.
+
+    Paths are reached from the roots, the nearest first. `chosen` is the root vertex of its component, or None; other
+    components grow from the path with the most volume, `length` times `section`.
+    """
     ends = [(int(path[0]), int(path[-1])) for path in paths]
     at: dict[int, list[int]] = {}
     for row, pair in enumerate(ends):

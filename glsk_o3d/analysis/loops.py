@@ -41,23 +41,18 @@ class Loop:
 
 
 def loops(skeleton: Skeleton) -> tuple[Loop, ...]:
-    """The loops of a minimum cycle basis (Horton 1987), the shortest first.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-
-    Returns
-    -------
-    tuple of Loop
-        As many as `Skeleton.n_loops`.
-    """
-    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-    openings = [inscribed_circle(skeleton.vertices[cycle])[1] for cycle in cycles]
+    """The loops of a minimum cycle basis (Horton 1987), the shortest first: as many as `Skeleton.n_loops`."""
+    cycles = opening_cycles(skeleton)
     chances = np.full(len(cycles), np.nan)
     if cycles and len(skeleton.supporting_points):
-        known = [bool(np.isfinite(skeleton.confidence[cycle]).any()) for cycle in cycles]
-        found = loop_facts(skeleton, cycles, Evidence.of(skeleton))
+        known = [bool(np.isfinite(skeleton.confidence[cycle]).any()) for cycle, _ in cycles]
+        found = loop_facts(skeleton, [cycle for cycle, _ in cycles], Evidence.of(skeleton))
         chances = np.where(known, [loop.probability for loop in found], np.nan)
-    rows = zip(cycles, openings, chances.tolist(), strict=True)
-    return tuple(Loop(vertices, float(opening), chance) for vertices, opening, chance in rows)
+    rows = zip(cycles, chances.tolist(), strict=True)
+    return tuple(Loop(cycle, opening, chance) for (cycle, opening), chance in rows)
+
+
+def opening_cycles(skeleton: Skeleton) -> list[tuple[np.ndarray, float]]:
+    """The vertices of each loop of a minimum cycle basis, the shortest first, and how wide it opens."""
+    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+    return [(cycle, float(inscribed_circle(skeleton.vertices[cycle])[1])) for cycle in cycles]

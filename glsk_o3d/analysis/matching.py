@@ -16,7 +16,7 @@ JUNCTION_REACH = 2.0
 def matching_f1(found, true, reach):
     """F1 of found points as a guess at the true ones, (n, 3) and (m, 3); 1 if there are neither.
 
-    Pairs are no further apart than the (m,) `reach` of their true point. They are taken nearest first, each point once.
+    A pair is no further apart than the `reach`, (m,), of its true point. The nearest pairs come first, each point once.
     """
     if len(found) == 0 or len(true) == 0:
         return float(len(found) == len(true))
@@ -24,7 +24,7 @@ def matching_f1(found, true, reach):
 
 
 def matched(found, true, reach):
-    """The pairs of `matching_f1`, a list of (position in `found`, position in `true`)."""
+    """The pairs of `matching_f1`: a list of (row of `found`, row of `true`)."""
     apart = cdist(found, true)
     apart[apart > reach] = np.inf
     pairs = []
@@ -36,11 +36,11 @@ def matched(found, true, reach):
 
 
 def merged_junctions(points, axis, axis_radius):
-    """Junctions, (n, 3), those within a local radius of each other, or of ones between, as one at their mean.
+    """Clusters of junctions, (n, 3), that are within a local radius of the next one: their means and local radii.
 
-    The local radius is that of the thickest part whose ball around a place of the axis holds the junction, else that of
-    the nearest place; `axis` (k, 3) and `axis_radius` (k,) are places along the true one. With each mean comes the
-    largest local radius of what it stands for.
+    The local radius of a junction is that of the thickest part whose ball around a place of the axis holds it, else
+    that of the nearest place; of a cluster it is the largest. `axis` (k, 3) and `axis_radius` (k,) are places along the
+    true axis.
     """
     away = cdist(points, axis)
     local = np.where(away < axis_radius, axis_radius, 0.0).max(axis=1)

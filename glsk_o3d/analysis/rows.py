@@ -48,19 +48,9 @@ class Rows:
             yield dict(zip(columns, row, strict=True))
 
     def to_csv(self, path: str | os.PathLike) -> None:
-        """Write the table as CSV: a line of names, then a line per row.
+        """Write the table as CSV: a line of names, then a line per row. NaN and infinity are left empty.
 
-        NaN and infinity are left empty, as JSON has null for both.
-
-        Parameters
-        ----------
-        path : path-like
-            Appears complete or not at all.
-
-        Raises
-        ------
-        OSError
-            The folder does not exist, or the file cannot be written.
+        The file appears complete or not at all; an OSError says why it does not.
         """
         rows = (("" if isinstance(v, float) and not math.isfinite(v) else v for v in row.values()) for row in self)
         write_csv(path, [*self._columns()], rows)

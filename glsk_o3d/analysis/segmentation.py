@@ -27,15 +27,13 @@ def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
     ----------
     skeleton : Skeleton
     cloud : cloud, optional
-        By default the cloud that the skeleton was made from. Points of another one, such as the full scan of which a
-        thinned one was skeletonised, go with the nearest point of that; if the skeleton came from a file that holds no
-        cloud, with the nearest place on the curve.
+        By default the cloud that the skeleton was made from. Points of another one go with the nearest point of that;
+        if the skeleton came from a file that holds no cloud, with the nearest place on the curve.
 
     Returns
     -------
     (N,) int64 array
-        Rows of `Skeleton.branch_table`: positions in `Skeleton.branches`, and after these the vertices without edges in
-        their order. -1 only for points with coordinates that are not finite.
+        Rows of `Skeleton.branch_table`. -1 only for points with coordinates that are not finite.
 
     Raises
     ------
@@ -57,10 +55,9 @@ def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
 
 
 def vertex_of_cloud(skeleton, cloud=None):
-    """The points of a cloud and the vertex of each, (N, 3) float64 and (N,) int64 array; -1 for those that are not
-    finite.
+    """The points of a cloud, by default that of the skeleton, and the vertex of each; -1 for those that are not finite.
 
-    Without a cloud it is that of the skeleton.
+    (N, 3) float64 and (N,) int64 array.
     """
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: there is nothing to label points with")
@@ -78,19 +75,9 @@ def vertex_of_cloud(skeleton, cloud=None):
 
 
 def label_of_nearest(points, label, others):
-    """Labels of the points of another cloud: that of the nearest point that has one.
+    """Labels of other points, (n,) int array: each has that of the nearest point that has one, not below 0.
 
-    Parameters
-    ----------
-    points : (N, 3) float array
-    label : (N,) int array
-        -1 for none; not for all.
-    others : (n, 3) float array
-
-    Returns
-    -------
-    (n,) int array
-        `label` itself if the points are the same; otherwise -1 only for points that are not finite.
+    They are `label` itself if the points are the same; otherwise -1 only for points that are not finite.
     """
     if np.array_equal(points, others, equal_nan=True):
         return label

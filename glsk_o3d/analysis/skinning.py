@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..numerics.nearest_edges import nearest_on_edges
+from ..numerics.nearest_edges import incident_edges, nearest_on_edges
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -33,21 +33,9 @@ def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tu
         Rows of `forest.edges`: the one before and its own; twice the same where nothing comes before.
     weights : (N, 2) float array
         Not negative, with the sum 1.
-
-    Examples
-    --------
-    >>> from glsk_o3d import Skeleton
-    >>> line = Skeleton([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1], [1, 2]], [1, 1, 1], (), (), ())
-    >>> bones, weights = skin_weights(line, np.array([[1.25, 0.5, 0]]), np.array([1]))
-    >>> bones.tolist(), weights.tolist()
-    ([[0, 1]], [[0.5, 0.5]])
     """
-    edges = forest.edges
-    order = np.argsort(edges.ravel(), kind="stable")
-    first = np.searchsorted(edges.ravel()[order], np.arange(len(forest.vertices)))
-    column = np.arange(forest.degree.max(initial=1))
-    around = np.where(column < forest.degree[:, None], order[(first[:, None] + column) % max(len(order), 1)] // 2, -1)
-    bone, along = nearest_on_edges(forest.vertices, edges, around[vertex], points)
+    around = incident_edges(forest.edges, len(forest.vertices))
+    bone, along = nearest_on_edges(forest.vertices, forest.edges, around[vertex], points)
     parent = bone_before(forest)[bone]
     own = np.where(parent >= 0, np.minimum(2 * along, 1), 1)
     return np.column_stack([np.where(parent >= 0, parent, bone), bone]), np.column_stack([1 - own, own])
@@ -65,13 +53,6 @@ def bone_before(forest: Skeleton) -> np.ndarray:
     -------
     (E,) int array
         Rows of `forest.edges`; -1 for bones at a root.
-
-    Examples
-    --------
-    >>> from glsk_o3d import Skeleton
-    >>> line = Skeleton([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1], [1, 2]], [1, 1, 1], (), (), ())
-    >>> bone_before(line)
-    array([-1,  0])
     """
     leading = np.full(len(forest.vertices), -1)
     leading[forest.edges[:, 1]] = np.arange(len(forest.edges))

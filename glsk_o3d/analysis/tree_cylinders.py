@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InvalidParameterError
 from ..numerics.groups import Members
 from ..numerics.polylines import arc_lengths, place_at
-from ..numerics.vectors import TINY
+from ..numerics.vectors import TINY, norm
 from .branches import branch_table
 from .rows import Rows
 
@@ -24,8 +24,7 @@ RADIUS_SAMPLES = 8  # derived: places along a cylinder at which its radius is ta
 class Cylinders(Rows, row="cylinder"):
     """One row per cylinder, from the root outwards along each branch.
 
-    Lengths are in the cloud's units. Rows and CSV also have ``diameter``, ``area`` and ``volume``: in the cloud's
-    units, their square and their cube.
+    Lengths are in the cloud's units. Rows and CSV also have ``diameter``, ``area`` and ``volume``.
 
     Attributes
     ----------
@@ -64,17 +63,17 @@ class Cylinders(Rows, row="cylinder"):
 
     @property
     def diameter(self) -> np.ndarray:
-        """Of each, in the cloud's units."""
+        """Twice the radius."""
         return 2 * self.radius
 
     @property
     def volume(self) -> np.ndarray:
-        """Of each, in the cube of the cloud's units."""
+        """Of each cylinder, in the cube of the cloud's units."""
         return np.pi * self.radius**2 * self.length
 
     @property
     def area(self) -> np.ndarray:
-        """Of the lateral surface of each, in the square of the cloud's units."""
+        """Lateral surface of each cylinder, in the square of the cloud's units."""
         return 2 * np.pi * self.radius * self.length
 
     def _columns(self) -> dict[str, list]:
@@ -126,13 +125,13 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     if not np.isfinite(skeleton.radii).all():
         raise InvalidParameterError("the skeleton has no radii: a file of a format without them was read")
     table, beyond = branch_table(skeleton, _root(skeleton, root)), _beyond_tips(skeleton)
-    paths = [*skeleton.branches, *np.flatnonzero(skeleton.degree == 0)[:, None]]
+    if not skeleton.branches:
+        raise InvalidParameterError("the skeleton has no branches: there is nothing to put cylinders on")
     last = np.full(len(table), -1)
     rows: list[tuple] = []
     for row in np.argsort(table.level, kind="stable").tolist():
-        if len(paths[row]) < 2:
-            continue
-        path = paths[row] if paths[row][0] == table.start[row] else paths[row][::-1]
+        path = skeleton.branches[row]
+        path = path if path[0] == table.start[row] else path[::-1]
         before = int(table.parent[row])
         last[row] = last[before] if before >= 0 else -1
         along = arc_lengths(skeleton.vertices[path])
@@ -148,12 +147,10 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
         inside = ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(RADIUS_SAMPLES) + 0.5) / RADIUS_SAMPLES
         radius = np.sqrt((np.interp(inside, along, skeleton.radii[path]) ** 2).mean(axis=1))
         confidence = np.interp(inside, along, skeleton.confidence[path]).mean(axis=1)
-        facts = zip(places, places[1:], radius, np.diff(ends), confidence, strict=False)
-        for first, end, thick, length, sure in facts:
-            rows.append((first, end, thick, length, last[row], row, table.order[row], sure))
+        for i in range(pieces):
+            size = (radius[i], ends[i + 1] - ends[i])
+            rows.append((places[i], places[i + 1], *size, last[row], row, table.order[row], confidence[i]))
             last[row] = len(rows) - 1
-    if not rows:
-        raise InvalidParameterError("the skeleton has no branches: there is nothing to put cylinders on")
     return Cylinders(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
@@ -165,7 +162,7 @@ def _root(skeleton: Any, root: Any) -> Any:
 
 
 def _beyond_tips(skeleton: Any) -> dict[int, float]:
-    """How far the part goes on beyond every tip of the curve, by its points."""
+    """How far the part goes on beyond every tip of the curve, by its points: by vertex."""
     ends = np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
     ends = ends[skeleton.degree[ends[:, 0]] == 1]
     members = Members(skeleton.vertex_of_point, len(skeleton.vertices))
@@ -176,7 +173,7 @@ def _beyond_tips(skeleton: Any) -> dict[int, float]:
         if len(points) and way.any():
             offset, ahead = points - skeleton.vertices[tip], way / np.linalg.norm(way)
             along = offset @ ahead
-            aside = np.linalg.norm(offset - along[:, None] * ahead, axis=1)
+            aside = norm(offset - along[:, None] * ahead)
             reach = np.quantile(along[aside <= max(OUTSIDE * skeleton.radii[beside], aside.min())], TIP_QUANTILE)
             beyond[tip] = max(float(reach), 0.0)
     return beyond

@@ -25,8 +25,8 @@ class Truth:
     Raises
     ------
     InvalidParameterError
-        There are no nodes, shapes do not fit, a number is not finite, a radius is not positive, or an edge names a node
-        that is not there.
+        There are no nodes, shapes do not fit, a number is not finite, a radius is not positive, or an edge names a
+        missing node.
 
     Examples
     --------

@@ -67,7 +67,7 @@ def _print(table: BranchTable) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    from ..analysis.branch_rows import cell
+    from ..analysis.branches import cell
 
     shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="")
     for name, form in table.printed_columns.items():

@@ -21,9 +21,7 @@ def write_json(path: str | os.PathLike, data: Any) -> None:
 
 
 def write_csv(path: str | os.PathLike, names: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
-    """Write a table, a line of names and a line per row, as `write_atomically` does; what is None or empty is left
-    empty.
-    """
+    """Write a table, a line of names and a line per row, as `write_atomically` does; None is left empty."""
 
     def write(temporary: Path) -> None:
         with temporary.open("w", newline="", encoding="utf-8", errors="replace") as stream:
@@ -35,20 +33,10 @@ def write_csv(path: str | os.PathLike, names: Sequence[str], rows: Iterable[Iter
 def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -> None:
     """Write a file so that it appears complete or not at all.
 
-    Parameters
-    ----------
-    path : path-like
-        The file to make or to replace. Of a symbolic link the target is replaced.
-    write : callable
-        Given the path of a temporary file in the same folder, with the same ending, that it is to make. If it raises,
-        the temporary file is removed and `path` stays as it was.
-
-    Raises
-    ------
-    FileNotFoundError
-        The folder does not exist.
-    OSError
-        `path` is a folder or a device, or cannot be written; the message names it, not the temporary file.
+    `write` makes a temporary file in the same folder, with the same ending, given its path. If it raises, that file is
+    removed and the old one stays. Of a symbolic link the target is replaced. A FileNotFoundError says that the folder
+    does not exist, an OSError that the path is a folder or a device, or cannot be written; it names the path, not the
+    temporary file.
     """
     given, path = path, Path(os.path.realpath(path))
     if not path.parent.is_dir():

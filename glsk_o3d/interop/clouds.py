@@ -10,6 +10,8 @@ import numpy as np
 from ..errors import InvalidCloudError
 from .packages import import_open3d
 
+__all__ = ["Cloud", "SearchParam", "cloud_points", "to_point_cloud"]
+
 ACCEPTED = "an Open3D point cloud or triangle mesh (legacy or tensor) or an (N, 3) array of real numbers"
 SAMPLE_COUNT = "sample_count"
 """The attribute of a tensor cloud that says how many points of a larger one each stands for."""
@@ -82,43 +84,24 @@ def cloud_points(cloud: Any) -> np.ndarray:
 
 
 def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int, int]:
-    """How many points of a larger cloud each point of a sample stands for.
+    """How many points of a larger cloud each of the `finite` points, (N,) bool array, of a sample stands for.
 
-    Parameters
-    ----------
-    cloud : cloud
-    finite : (N,) bool array
-        The points to tell it of.
-
-    Returns
-    -------
-    counts : (n,) float64 array or None
-        The attribute ``sample_count`` of a tensor cloud, as `glsk_o3d.read_sample` gives it; None if there is none.
-    n : int
-        For how many points these stand all together.
-    others : int
-        And all others.
-
-    Raises
-    ------
-    InvalidCloudError
-        They are no such numbers: one for each point, finite, at least 1, and less than 2^63 together.
+    The numbers are those of the attribute ``sample_count`` of a tensor cloud, as `glsk_o3d.read_sample` gives it: (n,)
+    float array, None if there is none. Two ints follow: for how many points the finite ones stand together, and all
+    others. An InvalidCloudError says what is wrong with the attribute: it must have a number of at least 1 for each
+    point, and less than 2^63 together.
     """
     name, tensor = open3d_class(cloud)
     if not (name == "PointCloud" and tensor and SAMPLE_COUNT in cloud.point):
         return None, int(finite.sum()), int((~finite).sum())
-    held, wanted = cloud.point[SAMPLE_COUNT].cpu().numpy(), (len(cloud.point.positions), 1)
-    if held.shape not in (wanted, wanted[:1]):
+    counts, n = cloud.point[SAMPLE_COUNT].cpu().numpy().astype(float), len(cloud.point.positions)
+    if not (counts.shape in ((n, 1), (n,)) and (counts >= 1).all() and counts.sum() <= MOST_COUNTED):
         raise InvalidCloudError(
-            f"the cloud's attribute {SAMPLE_COUNT} has the shape {held.shape} and must have {wanted}: it says how many "
-            "points each one stands for; rename what says something else"
+            f"the cloud's attribute {SAMPLE_COUNT} of shape {counts.shape} must have a number of at least 1 for each "
+            f"of the {n} points, and less than 2^63 together: it says how many points each one stands for; rename what "
+            "says something else"
         )
-    counts = held.astype(float).reshape(-1)
-    if not ((counts >= 1).all() and counts.sum() <= MOST_COUNTED):
-        raise InvalidCloudError(
-            f"the cloud's attribute {SAMPLE_COUNT} must be at least 1 everywhere, and less than 2^63 together: it says "
-            "how many points each one stands for; rename what says something else"
-        )
+    counts = counts.reshape(-1)
     return counts[finite], int(counts[finite].sum()), int(counts[~finite].sum())
 
 
@@ -139,18 +122,7 @@ def _held(cloud: Any) -> Any:
 
 
 def open3d_class(thing: Any) -> tuple[str, bool]:
-    """The name of the Open3D class that something is of, and whether it is one of the tensor API.
-
-    Parameters
-    ----------
-    thing : object
-
-    Returns
-    -------
-    name : str
-        Empty if it is not Open3D's.
-    tensor : bool
-    """
+    """The name of something's Open3D class, empty if it has none, and whether that is of the tensor API."""
     for cls in type(thing).__mro__:
         package, *_ = parts = cls.__module__.split(".")
         if package == "open3d":
@@ -159,17 +131,9 @@ def open3d_class(thing: Any) -> tuple[str, bool]:
 
 
 def search_parameters(given: Any) -> dict[str, Any]:
-    """The number of neighbours and the radius in Open3D's ``KDTreeSearchParam*``.
+    """The number of neighbours ``k``, and ``radius`` if there is one, in Open3D's ``KDTreeSearchParam*``.
 
-    Parameters
-    ----------
-    given : object
-
-    Returns
-    -------
-    dict
-        With ``k``, and with ``radius`` (float) if there is one; for a radius alone, `k` is `MOST_NEIGHBOURS`. Empty for
-        anything else.
+    For a radius alone, `k` is `MOST_NEIGHBOURS`. The dict is empty for anything else.
     """
     name, _ = open3d_class(given)
     if name == "KDTreeSearchParamKNN":
@@ -191,10 +155,6 @@ def to_point_cloud(points: np.ndarray) -> Any:
     Returns
     -------
     open3d.geometry.PointCloud
-
-    Raises
-    ------
-    MissingPackageError
     """
     o3d = import_open3d()
     return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.ascontiguousarray(points, float).reshape(-1, 3)))

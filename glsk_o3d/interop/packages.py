@@ -11,22 +11,8 @@ from typing import Any
 
 from ..errors import MissingPackageError
 
-_DEBIAN = {  # shared library -> Debian package, where the one does not follow from the other
-    "libGL": "libgl1",
-    "libEGL": "libegl1",
-    "libGLX": "libglx0",
-    "libOpenGL": "libopengl0",
-    "libgomp": "libgomp1",
-    "libusb-1.0": "libusb-1.0-0",
-    "libX11": "libx11-6",
-    "libXext": "libxext6",
-    "libXrender": "libxrender1",
-    "libSM": "libsm6",
-    "libICE": "libice6",
-    "libglib-2.0": "libglib2.0-0",
-    "libc++": "libc++1",
-    "libc++abi": "libc++abi1",
-}
+_OF_DEBIAN = "GL EGL GLX OpenGL gomp usb-1.0 X11 Xext Xrender SM ICE glib-2.0 c++ c++abi"
+"""Shared libraries that Debian has in packages of their names."""
 _NEEDED = {  # ending of a file -> modules that read or write it
     ".html": ("matplotlib",),
     ".png": ("matplotlib",),
@@ -39,36 +25,30 @@ _NEEDED = {  # ending of a file -> modules that read or write it
 def require(package: str, install: str | None = None) -> Any:
     """Import a package, or say what to install: the extra of this package that brings it, or it in the version we need.
 
-    Parameters
-    ----------
-    package : str
-        Name of the module.
-    install : str, optional
-        What pip calls it, if it is not the module's name.
-
-    Returns
-    -------
-    module
-
-    Raises
-    ------
-    MissingPackageError
-        The package is not there, or it needs a shared library which is not; the message names the Debian package.
+    `install` is what pip calls it, if it is not the module's name. A MissingPackageError says that the package is not
+    there, or that it needs a shared library which is not; then it names the Debian package.
     """
     asked = install or package
     try:
         return importlib.import_module(package)
     except (ImportError, OSError) as error:
-        library = re.search(r"(lib[\w.+-]+?)\.so[\w.]*: cannot open shared object file", str(error))
+        library = re.search(r"(lib[\w.+-]+?)\.so\.?(\d*)[\w.]*: cannot open shared object file", str(error))
         if library:
-            debian = _DEBIAN.get(library[1])
-            cure = f"apt-get install {debian}" if debian else f"install the system library {library[1]}"
+            cure = _library_from(library[1], library[2])
         elif isinstance(error, ModuleNotFoundError) and error.name == package.partition(".")[0]:
             cure = f'pip install "{_asked_for(asked)[1]}"'
         else:
             cure = f'its installation is damaged ({error}): pip install --force-reinstall "{_asked_for(asked)[0]}"'
         need = f"needs {library[0].partition(':')[0]}, which this machine lacks" if library else "cannot be imported"
         raise MissingPackageError(f"{package} {need}: {cure}", name=package) from error
+
+
+def _library_from(name: str, version: str) -> str:
+    """How to get a shared library; Debian's package has its name, in small letters, and its version."""
+    if name.removeprefix("lib") in _OF_DEBIAN.split():
+        package = name.lower().replace("glib-", "glib")
+        return f"apt-get install {package}{'-' * package[-1].isdigit()}{version}"
+    return f"install the system library {name}"
 
 
 def require_for(ending: str) -> None:

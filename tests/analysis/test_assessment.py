@@ -1,6 +1,5 @@
 """`assess` on closed forms, and what it and `compare` refuse."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -182,15 +181,6 @@ def test_skeletons_that_are_none(pipe, vertices, edges, message, curve):
     for measure in (lambda s: compare(s, pipe), lambda s: assess(s, pipe.points)):
         with pytest.raises(InvalidParameterError, match=message):
             measure(curve(vertices, edges))
-
-
-def test_the_example_in_the_documentation(root, capsys, tmp_path, monkeypatch):
-    (code,) = re.findall(r"```python\n(.*?)```", (root / "docs" / "evaluation.md").read_text(), re.DOTALL)
-    monkeypatch.chdir(tmp_path)
-    exec(compile(code, "docs/evaluation.md", "exec"), {})
-    promised = re.findall(r"# prints (.*)", code)
-    assert capsys.readouterr().out.splitlines() == promised
-    assert promised
 
 
 @pytest.mark.parametrize("scale", [1e200, 1e-200])

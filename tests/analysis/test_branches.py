@@ -2,14 +2,14 @@
 
 import csv
 import math
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import open3d as o3d
 import pytest
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, samples, skeletonize
-from glsk_o3d.analysis.branch_rows import PRINTED_COLUMNS, BranchTable
+from glsk_o3d.analysis.branches import PRINTED_COLUMNS
 from glsk_o3d.analysis.segmentation import branch_of_edge, vertex_of_cloud
 
 RNG = np.random.default_rng(0)
@@ -288,15 +288,6 @@ def test_csv_and_dicts(tmp_path, skeleton):
     with pytest.raises(FileNotFoundError, match="no such folder"):
         table.to_csv(tmp_path / "none" / "table.csv")
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_csv_of_no_branches_has_its_names(tmp_path):
-    table = TREE.branch_table()
-    none = BranchTable(*(getattr(table, field.name)[:0] for field in fields(table)))
-    for each, path in ((table, tmp_path / "some.csv"), (none, tmp_path / "none.csv")):
-        each.to_csv(path)
-    some, empty = ((tmp_path / name).read_text().splitlines() for name in ("some.csv", "none.csv"))
-    assert empty == some[:1]
 
 
 @pytest.mark.parametrize("root", [-1, 121, 1.5, True, "trunk", (0, 0), (0, 0, np.nan), [[0, 0, 0]]])

@@ -9,7 +9,7 @@ import pytest
 
 from glsk_o3d import Skeleton, read_skeleton, samples
 from glsk_o3d.analysis import BranchTable
-from glsk_o3d.analysis.branch_rows import PRINTED_COLUMNS
+from glsk_o3d.analysis.branches import PRINTED_COLUMNS
 
 
 def test_table_file_and_json_agree(invoke, tmp_path, y):

@@ -14,6 +14,7 @@ from glsk_o3d.interop import packages
         (ImportError("libusb-1.0.so.0: cannot open shared object file: No such file"), "apt-get install libusb-1.0-0"),
         (OSError("libGL.so.1: cannot open shared object file: No such file"), "libGL.so.1.*apt-get install libgl1"),
         (ImportError("libX11.so.6: cannot open shared object file"), "apt-get install libx11-6"),
+        (ImportError("libglib-2.0.so.0: cannot open shared object file"), "apt-get install libglib2.0-0"),
         (ImportError("libgomp.so.1: cannot open shared object file"), "apt-get install libgomp1"),
         (ImportError("libodd-2.so.7: cannot open shared object file"), "install the system library libodd-2"),
     ],
