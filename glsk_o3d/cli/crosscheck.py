@@ -62,7 +62,7 @@ def crosscheck(
         from ..interop.atomic import write_json
         from ..io.meshes import read_mesh
         from ..io.scans import read_cloud
-        from ..viewing.preview import printable
+        from ..viewing.figures import printable
         from .outputs import PICTURE_FILE, REPORT_FILE, check_findings
         from .overrides import choose
 

@@ -15,7 +15,7 @@ from glsk_o3d.judgements import Judgement
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.samples import torus
 from glsk_o3d.viewing import html as sections
-from glsk_o3d.viewing.recorder import thinned
+from glsk_o3d.viewing.figures import thinned
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 from glsk_o3d.errors import FileFormatError, MissingPackageError
 from glsk_o3d.judgements import Supported
 from glsk_o3d.report import Report
-from glsk_o3d.viewing import preview
+from glsk_o3d.viewing import figures, preview
 from glsk_o3d.viewing.preview import save_preview
 
 matplotlib = pytest.importorskip("matplotlib")
@@ -223,7 +223,7 @@ def test_warnings_are_told_below_and_nothing_overlaps(tree, tmp_path, size, warn
     assert re.fullmatch(told, " ".join(lines))
     assert len(lines) <= 5
     save_preview(warned, tmp_path / "p.png", size=size)
-    image = imread(tmp_path / "p.png")[-preview.DPI // 4 :]
+    image = imread(tmp_path / "p.png")[-figures.DPI // 4 :]
     assert (image[..., 0] - image[..., 2] > 0.4).any() == bool(warnings)
 
 
