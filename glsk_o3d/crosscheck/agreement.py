@@ -51,7 +51,7 @@ class RowAgreement:
     same_rings: float | None  # share of compared rings with the mesh's neighbours in its order; None unless one to one
     common_triangles: float | None  # mean of the triangles in ring and mesh over those in either; None alike
     flat: float  # share of the compared rows that are flat in both, and so have no direction
-    angle: dict[str, float]  # quantiles of the angle between the two, in degrees; 0 is best
+    angle: dict[str, float]  # quantiles of the angle between ours and the mesh's, in degrees; 0 is best
     length: dict[str, float]  # quantiles of our length over the mesh's; 1 is best
 
 

@@ -146,8 +146,11 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
     vertex = skeleton.vertex_of_point[shown] if len(skeleton.vertices) else np.full(len(shown), -1)
     label = branch_of_point(skeleton, skeleton.points[shown], vertex) if len(skeleton.vertices) else vertex
     dots = len(skeleton.branches) + np.arange(len(lone))
+    captions, n = [f"Input: {point_count(skeleton):,} points"], len(positions) - 1
+    for it in skeleton.report.iterations[:n]:
+        captions.append(f"After solve {it.iteration} of {n}: {it.n_points - it.n_merged:,} points left")
     return {
-        "captions": _captions(skeleton, len(positions) - 1),
+        "captions": captions,
         "view": ("yz", "xz", "xy")[across],  # what is flat from its broad side; else z is up, or y if that is longest
         "unit": unit,
         "palette": sections.branch_colors(skeleton, len(skeleton.branches) + len(lone)),
@@ -167,11 +170,3 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
 
 def _packed(array, dtype) -> str:
     return base64.b64encode(np.ascontiguousarray(array, dtype).tobytes()).decode()
-
-
-def _captions(skeleton, n_solves) -> list[str]:
-    told = [f"Input: {point_count(skeleton):,} points"]
-    for record in skeleton.report.iterations[:n_solves]:
-        left = record.n_points - record.n_merged
-        told.append(f"After solve {record.iteration} of {n_solves}: {left:,} points left")
-    return told

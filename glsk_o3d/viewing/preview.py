@@ -6,7 +6,7 @@ import os
 import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -216,11 +216,8 @@ def _mark_doubts(axes, report, centre, across_up):
     """Amber rings around what few samples show, crosses where many show what is not there, and how many of them."""
     for it in report.unsupported[:_MOST_MARKS]:
         x, y = np.subtract(it.place, centre)[across_up]
-        style: dict[str, Any] = {"s": 70, "linewidths": 1, "zorder": 5, "clip_on": False}
-        if it.present:
-            axes.scatter(x, y, marker="o", facecolors="none", edgecolors=_AMBER, **style)
-        else:
-            axes.scatter(x, y, marker="x", c=_AMBER, **style)
+        ring, cross = dict(marker="o", facecolors="none", edgecolors=_AMBER), dict(marker="x", c=_AMBER)
+        axes.scatter(x, y, s=70, linewidths=1, zorder=5, clip_on=False, **(ring if it.present else cross))
         note = f"{round(it.share * report.n_draws)}/{report.n_draws}"
         axes.annotate(note, (x, y), (6, 4), textcoords="offset points", color=_AMBER, fontsize=6, annotation_clip=False)
 

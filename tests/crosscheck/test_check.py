@@ -192,10 +192,7 @@ def test_units_place_turn_and_order_do_not_matter(ring, check):
 
 def test_json(check):
     told = json.loads(json.dumps(check.to_dict(), allow_nan=False))
-    assert told == check.to_dict() | {"skeletons": told["skeletons"], "stop_reasons": told["stop_reasons"]}
-    assert told["verdict"] == "agrees"
-    assert told["skeletons"]["loops"] == [1, 1]
-    assert told["rows"]["one_to_one"] is told["skeletons"]["topology"] is True
+    assert (told["verdict"], told["skeletons"]["loops"], told["rows"]["one_to_one"]) == ("agrees", [1, 1], True)
     assert "2 igl.cotmatrix" in told["convention"]
 
 
