@@ -84,7 +84,8 @@ def plot_skeleton(
 
     if axes is None:
         axes = plt.figure(figsize=(6, 4), layout="constrained").add_subplot(projection="3d")
-    skeleton = Skeleton(*[np.empty(0)] * 6) if skeleton is None else skeleton
+    none = np.empty(0)
+    skeleton = Skeleton(none, none, none, none, none, none) if skeleton is None else skeleton
     points, vertices = skeleton.points if cloud is None else cloud_points(cloud), skeleton.vertices
     if point_colors is not None and np.shape(point_colors) != points.shape:
         raise InvalidParameterError(f"{len(points)} points need as many colours, not {np.shape(point_colors)}")
