@@ -23,9 +23,8 @@ from _common.tables import number, show
 from glsk_o3d import RingBuilder, read_cloud, samples
 from glsk_o3d.analysis import compare
 from glsk_o3d.crosscheck import cross_check, save_crosscheck_picture
-from glsk_o3d.crosscheck.mesh_contraction import curvature_normals, mesh_areas, mesh_laplacian, ring_areas
-from glsk_o3d.crosscheck.reconstruction import ball_pivoting
-from glsk_o3d.crosscheck.verdict import VERDICTS
+from glsk_o3d.crosscheck.agreement import VERDICTS
+from glsk_o3d.crosscheck.mesh import ball_pivoting, curvature_normals, mesh_areas, mesh_laplacian, ring_areas
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
 from glsk_o3d.numerics.mesh_rings import umbrellas
 
@@ -92,7 +91,7 @@ def curved(shape: str, n: int) -> dict:
     points, radius = _curved_cloud(shape, n)
     state = RingBuilder(thin_to="all")(points)
     cloud = state.frame.out_of(state.cloud)
-    _, faces = ball_pivoting(state.cloud, state.normals, state.rings)
+    _, faces = ball_pivoting(state)
     exact = -cloud * [0, 1, 1] / radius**2 if shape == "cylinder" else -2 * cloud / radius**2
     told = {}
     for name, laplacian, areas, whole in (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -23,6 +23,13 @@ from .stopping import ExplainedScore, StopRule
 
 LINE_VARIANCE = 0.99  # fitted: explained variance that counts as a line
 OWN_WEIGHT = 4  # fitted: neighbours that a point counts as in its own surroundings
+
+Laplacian: TypeAlias = Callable[[Contraction], csr_matrix]
+
+
+def ring_laplacian(state: Contraction) -> csr_matrix:
+    """The cotangent Laplacian of the current points on their rings."""
+    return cotangent_laplacian(state.positions, state.rings)
 
 
 @documented
@@ -82,12 +89,32 @@ class Contractor(Filter[Contraction]):
     max_attraction: float = parameter(1e4, "Cap of W_H.", low=0, open_low=True)
 
     def _run(self, state: Contraction, watch: Watch | None) -> Contraction:
+        return self.contract(state, watch=watch)
+
+    def contract(
+        self, state: Contraction, laplacian: Laplacian = ring_laplacian, *, watch: Watch | None = None
+    ) -> Contraction:
+        """Contract by another Laplacian than that of the rings, such as that of a mesh.
+
+        Parameters
+        ----------
+        state : Contraction
+        laplacian : callable
+            Gives for a Contraction the (n, n) csr_matrix of its current positions: rows sum to zero, L P points inward.
+        watch : callable, optional
+            Called with the Contraction after each solve; returns False to stop there.
+
+        Returns
+        -------
+        Contraction
+            Its report has no stage of this filter.
+        """
         reducer = self.reducer
         for _ in range(self.max_iterations):
             start = time.perf_counter()
             before = state
             try:
-                state, facts = self._solve(state)
+                state, facts = self._solve(state, laplacian)
             except SolveError as problem:
                 return _finished(state, f"solve {len(state.report.iterations) + 1} {REFUSED}: {problem}")
             state = _record(state, **facts, seconds=time.perf_counter() - start)
@@ -106,7 +133,7 @@ class Contractor(Filter[Contraction]):
                 return _finished(kept, reason, converged=True)
         return _finished(state, f"reached max_iterations = {self.max_iterations}")
 
-    def _solve(self, state: Contraction) -> tuple[Contraction, dict[str, Any]]:
+    def _solve(self, state: Contraction, laplacian_of: Laplacian) -> tuple[Contraction, dict[str, Any]]:
         """One contraction step: equations 2, 4 and 5; 3 is `solve_contraction`."""
         # Wen (4)
         contraction = state.contraction_weight * self.amplification or self.initial_contraction / state.mean_ring_edge
@@ -119,7 +146,7 @@ class Contractor(Filter[Contraction]):
                 * attraction
             )
         attraction = np.clip(attraction, self.min_attraction, self.max_attraction)
-        laplacian = self._laplacian(state)
+        laplacian = laplacian_of(state)
         mass = np.sqrt(state.mass)
         positions, facts = self._solve_in_box(state, laplacian, contraction / mass, attraction, mass)
         _, ring_size = state.rings.nearest(positions)
@@ -135,10 +162,6 @@ class Contractor(Filter[Contraction]):
         done = state.report.iterations
         drop = done[-1].ring_ratio - contracted.ring_ratio if done else contracted.ring_ratio  # Wen (10)
         return replace(contracted, ring_ratio_drop=drop), facts
-
-    def _laplacian(self, state: Contraction) -> csr_matrix:
-        """That of the current points; what has a surface of its own puts another in its place."""
-        return cotangent_laplacian(state.positions, state.rings)
 
     def _solve_in_box(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from glsk_o3d.viewing.preview import INK, save_figure
+from glsk_o3d.viewing.figures import INK, save_figure
 
 GREY, ORANGE, BLUE = "#777777", "#d95f02", "#1f4e9c"  # told apart by who sees no red or no green, and in print
 LOOKS = {"default": dict(color=BLUE, marker="o"), "wen2024": dict(color=ORANGE, marker="^")}

@@ -56,13 +56,13 @@ def crosscheck(
     """
     with reporting(scan, quiet=quiet, verbose=verbose):
         from ..crosscheck import cross_check, save_crosscheck_picture
-        from ..crosscheck.surfaces import SURFACES
-        from ..crosscheck.verdict import UNTOLD
+        from ..crosscheck.agreement import UNTOLD
+        from ..crosscheck.mesh import SURFACES
         from ..errors import InvalidCloudError, did_you_mean
         from ..interop.atomic import write_json
         from ..io.meshes import read_mesh
         from ..io.scans import read_cloud
-        from ..viewing.preview import printable
+        from ..viewing.figures import printable
         from .outputs import PICTURE_FILE, REPORT_FILE, check_findings
         from .overrides import choose
 
@@ -102,7 +102,7 @@ def crosscheck(
 
 def _rows(told: dict[str, Any]) -> dict[str, Any]:
     """What the check found, in words."""
-    from ..crosscheck.verdict import MEANINGS
+    from ..crosscheck.agreement import MEANINGS
 
     rows, skeletons, mesh = told["rows"], told["skeletons"], told["mesh"]
     shown = {

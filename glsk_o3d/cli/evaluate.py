@@ -134,7 +134,7 @@ def _draw(
     title: str,
 ) -> None:
     """The skeleton in its cloud, its edges coloured by the error, or without a truth by the centredness."""
-    from ..viewing.assessment_picture import save_assessment
+    from ..viewing.preview import save_assessment
 
     if comparison is not None:
         values, label, best = comparison.edge_error, "error in true radii", 0

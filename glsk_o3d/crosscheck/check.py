@@ -16,10 +16,8 @@ from ..preparation.frame import MIN_POINTS
 from ..recipes.catalogue import named_pipeline
 from ..ring_builder import RingBuilder
 from ..skeleton import Skeleton
-from .agreement import MeshFit, RowAgreement, SkeletonAgreement, compare_rows, compare_skeletons, mesh_fit
-from .mesh_contraction import mesh_skeleton
-from .surfaces import COVERED_SHARE, SURFACES, surface_of
-from .verdict import FAR_RADII, FAULTY_SHARE, HAUSDORFF_RADII, NEAR_RADII, TURNED_ANGLE, judge
+from . import agreement
+from .mesh import COVERED_SHARE, SURFACES, mesh_skeleton, surface_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +63,9 @@ class CrossCheck:
     reasons: tuple[str, ...]
     surface: str
     n_input: int
-    fit: MeshFit
-    rows: RowAgreement
-    skeletons: SkeletonAgreement
+    fit: agreement.MeshFit
+    rows: agreement.RowAgreement
+    skeletons: agreement.SkeletonAgreement
     points: np.ndarray = field(repr=False)
     angle: np.ndarray = field(repr=False)
     length_ratio: np.ndarray = field(repr=False)
@@ -80,7 +78,7 @@ class CrossCheck:
     @property
     def doubtful(self) -> np.ndarray:
         """Points where the Laplacian coordinates differ by more than 30 degrees, or could not be compared."""
-        return ~(self.angle <= TURNED_ANGLE)
+        return ~(self.angle <= agreement.TURNED_ANGLE)
 
     def to_dict(self) -> dict[str, Any]:
         """The verdict and all numbers but those of single points, as JSON holds them."""
@@ -91,7 +89,7 @@ class CrossCheck:
             "points": {
                 "given": self.n_input,
                 "used": len(self.points),
-                "turned": int((self.angle > TURNED_ANGLE).sum()),
+                "turned": int((self.angle > agreement.TURNED_ANGLE).sum()),
                 "not_compared": int(np.isnan(self.angle).sum()),
             },
             "mesh": {"vertices": len(self.vertices), "faces": len(self.faces), **asdict(self.fit)},
@@ -100,12 +98,12 @@ class CrossCheck:
             "warnings": list(self.skeleton.report.warnings),
             "stop_reasons": [self.skeleton.report.stop_reason, self.mesh_skeleton.report.stop_reason],
             "thresholds": {
-                "angle": TURNED_ANGLE,
-                "distance_in_radii": [NEAR_RADII, FAR_RADII],
-                "hausdorff95_in_radii": HAUSDORFF_RADII,
+                "angle": agreement.TURNED_ANGLE,
+                "distance_in_radii": [agreement.NEAR_RADII, agreement.FAR_RADII],
+                "hausdorff95_in_radii": agreement.HAUSDORFF_RADII,
                 "covered": COVERED_SHARE,
-                "far_or_open": FAULTY_SHARE,
-                "torn": FAULTY_SHARE,
+                "far_or_open": agreement.FAULTY_SHARE,
+                "torn": agreement.FAULTY_SHARE,
             },
             "convention": "L = 2 igl.cotmatrix: rows sum to 0, off-diagonals are positive, L P points inward",
         }
@@ -169,35 +167,29 @@ def cross_check(
         raise InvalidParameterError(f"pipeline = {pipeline!r}: must be one that starts with a RingBuilder")
     if isinstance(mesh, str) and mesh not in ("auto", *SURFACES):
         raise InvalidParameterError(f"mesh = {mesh!r}: must be 'auto', {', '.join(map(repr, SURFACES))}, or a mesh")
-    pipeline.check()
     if max_points is not None and not (isinstance(max_points, int | np.integer) and max_points >= MIN_POINTS):
-        raise InvalidParameterError(
-            f"max_points = {max_points!r}: must be None or a whole number of at least {MIN_POINTS}"
-        )
-    points = cloud_points(cloud)
-    n_input = len(points)
-    points = _thinned(points, max_points)
+        words = f"must be None or a whole number of at least {MIN_POINTS}"
+        raise InvalidParameterError(f"max_points = {max_points!r}: {words}")
+    pipeline.check()
+    pipeline.check_complete()
+    given = cloud_points(cloud)
+    points = _thinned(given, max_points)
     state = replace(pipeline.stages[0], thin_to="all")(points)
     skeleton = Pipeline(*pipeline.stages[1:])(state)
-    if not isinstance(skeleton, Skeleton):
-        raise InvalidParameterError(f"{pipeline!r} does not lead to a skeleton")
-
     surface, vertices, faces = surface_of(state, mesh)
-    angle, length, share, rows = compare_rows(state, vertices, faces)
+    numbers, rows = agreement.compare_rows(state, vertices, faces)
     if rows.compared == 0 and surface == "given":
         raise InvalidCloudError("no point of the cloud lies on the mesh: both must be in the same units and place")
     other = mesh_skeleton(state, vertices, faces, pipeline)
-    diagonal = state.frame.diagonal * state.frame.scale
-    skeletons = compare_skeletons(skeleton, other, diagonal)
-    fit = mesh_fit(state, vertices, faces)
-    verdict, reasons = judge(rows, skeletons, skeleton.report.warnings, other.report, fit)
-    of_point = state.representative_of_point
-    angle, length, share = (np.where(state.sampled, values[of_point], np.nan) for values in (angle, length, share))
+    skeletons = agreement.compare_skeletons(skeleton, other, state.frame.diagonal * state.frame.scale)
+    fit = agreement.mesh_fit(state, vertices, faces)
+    verdict, reasons = agreement.judge(rows, skeletons, fit, skeleton.report.warnings, other.report)
+    angle, length, share = np.where(state.sampled, numbers[:, state.representative_of_point], np.nan)
     return CrossCheck(
         verdict=verdict,
         reasons=reasons,
         surface=surface,
-        n_input=n_input,
+        n_input=len(given),
         fit=fit,
         rows=rows,
         skeletons=skeletons,
@@ -218,12 +210,7 @@ def _thinned(points, most):
     good = np.flatnonzero(finite)
     if most is None or len(good) <= most:
         return points
-    warnings.warn(
-        f"{most} of {len(good)} points are checked: raise max_points to use more, and wait longer",
-        SkeletonWarning,
-        stacklevel=3,
-    )
+    told = f"{most} of {len(good)} points are checked: raise max_points to use more, and wait longer"
+    warnings.warn(told, SkeletonWarning, stacklevel=3)
     kept = np.linspace(0, len(good) - 1, most).round().astype(int)
-    finite[good] = False
-    finite[good[morton_order(points[good])[kept]]] = True
-    return points[finite | ~np.isfinite(points).all(axis=1)]
+    return points[np.sort(np.append(good[morton_order(points[good])[kept]], np.flatnonzero(~finite)))]

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..interop.atomic import check_ending
-from ..viewing.layout import room, three_views
-from ..viewing.preview import INK, MOST_DRAWN_POINTS, colour_bar, new_figure, printable, save_figure
+from ..viewing import figures
 
 if TYPE_CHECKING:
     from .check import CrossCheck
@@ -18,7 +17,7 @@ _OURS, _THEIRS, _UNKNOWN = "#111111", "#0a6fc2", "#c9c9c9"
 
 # All fitted to the eye.
 _MOST_REASONS = 3  # lines of text
-_MOST_DEGREES = 60.0  # degrees at which the colours end
+_MOST_DEGREES = 60.0  # at which the colours end
 _HEAD_ROOM, _FOOT_ROOM = 0.95, 0.57  # inches above and below the three views
 
 
@@ -62,26 +61,26 @@ def save_crosscheck_picture(
     True
     """
     check_ending(path, "picture is a PNG", ".png")
-    save_figure(_draw(check, size, title), path)
+    figures.save_figure(_draw(check, size, title), path)
 
 
 def _draw(check, size, title):
-    figure = new_figure(size)
+    figure = figures.new_figure(size)
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
     from matplotlib.colors import Normalize, to_rgba
 
-    height = figure.get_figheight()
+    shown = figures.thinned(check.points, figures.MOST_DRAWN_POINTS)
+    shown = shown[np.argsort(np.nan_to_num(check.angle[shown], nan=-1), kind="stable")]  # the worst lie on top
+    points, angle = check.points[shown], check.angle[shown]
+    both = [points, check.skeleton.vertices, check.mesh_skeleton.vertices]  # they may differ widely
+    centre, extent = figures.room(np.concatenate(both))
     scale = ScalarMappable(Normalize(0, _MOST_DEGREES, clip=True), colormaps["YlOrRd"])
-    points, angle = _shown(check)
-    shown = np.concatenate([points, check.skeleton.vertices, check.mesh_skeleton.vertices])  # they may differ widely
-    centre, extent = room(shown)
-    points = points - centre
     colours = np.where(np.isnan(angle)[:, None], to_rgba(_UNKNOWN), scale.to_rgba(np.nan_to_num(angle)))
-    for a, b, axes in three_views(figure, extent, head=_HEAD_ROOM, foot=_FOOT_ROOM):
-        dot = float(np.clip(16000 / max(len(points), 1), 2, 6))
-        axes.scatter(points[:, a], points[:, b], s=dot, c=colours, linewidths=0, clip_on=False)
+    dot = float(np.clip(16000 / max(len(points), 1), 2, 6))
+    for a, b, axes in figures.three_views(figure, extent, head=_HEAD_ROOM, foot=_FOOT_ROOM):
+        axes.scatter(*(points - centre)[:, [a, b]].T, s=dot, c=colours, linewidths=0, clip_on=False)
         for skeleton, colour, line in ((check.mesh_skeleton, _THEIRS, 2.6), (check.skeleton, _OURS, 1.2)):
             places = (skeleton.vertices - centre)[:, [a, b]]
             for paint, wider in (("white", 1.4), (colour, 0)):  # a white edge lifts it off the cloud
@@ -89,33 +88,26 @@ def _draw(check, size, title):
                 axes.add_collection(LineCollection(places[skeleton.edges], **style))
             alone = skeleton.degree == 0
             axes.scatter(*places[alone].T, s=16, c=colour, linewidths=0, zorder=3, clip_on=False)
+    height = figure.get_figheight()
     _write(figure, check, title, height)
     box = [0.42, 0.3 / height, 0.16, 0.09 / height]
-    colour_bar(figure, scale, box, [0, 30, 60], ["0", "30", "60\N{DEGREE SIGN} and more"])
+    figures.colour_bar(figure, scale, box, [0, 30, 60], ["0", "30", "60\N{DEGREE SIGN} and more"])
     return figure
 
 
-def _shown(check):
-    """Finite points and their angles, those that cannot be compared first and the worst last."""
-    finite = np.flatnonzero(np.isfinite(check.points).all(axis=1))
-    finite = finite[:: max(1, -(-len(finite) // MOST_DRAWN_POINTS))]
-    order = finite[np.argsort(np.nan_to_num(check.angle[finite], nan=-1), kind="stable")]
-    return check.points[order], check.angle[order]
-
-
 def _write(figure, check, title, height):
-    head = f"{printable(title)}: {check.verdict}" if title else check.verdict
-    style = dict(ha="center", color=INK, parse_math=False)
-    figure.text(0.5, 1 - 0.33 / height, head, fontsize=12, **style)
+    """The verdict and its reasons above the views, and below them what the colours are."""
     reasons = [*check.reasons[:_MOST_REASONS]]
     if len(check.reasons) > _MOST_REASONS:
         reasons[-1] += f"; and {len(check.reasons) - _MOST_REASONS} more"
+    style = dict(ha="center", color=figures.INK, parse_math=False)
+    head = f"{figures.printable(title)}: {check.verdict}" if title else check.verdict
+    figure.text(0.5, 1 - 0.33 / height, head, fontsize=12, **style)
     for row, reason in enumerate(reasons):
         figure.text(0.5, 1 - (0.55 + 0.16 * row) / height, reason, fontsize=7.5, **style)
-    beside = dict(va="center_baseline", fontsize=8)
-    level = 0.34 / height
-    figure.text(0.41, level, "angle between the Laplacian coordinates", ha="right", color=INK, **beside)
-    grey = "not compared" if np.isnan(check.angle).any() else ""
-    figure.text(0.625, level, grey, color="#999999", **beside)
-    figure.text(0.70, level, "skeleton of the cloud", color=_OURS, **beside)
-    figure.text(0.81, level, "of the mesh", color=_THEIRS, **beside)
+    style = dict(y=0.34 / height, va="center_baseline", fontsize=8)
+    figure.text(0.41, s="angle between the Laplacian coordinates", ha="right", color=figures.INK, **style)
+    if np.isnan(check.angle).any():
+        figure.text(0.625, s="not compared", color="#999999", **style)
+    figure.text(0.70, s="skeleton of the cloud", color=_OURS, **style)
+    figure.text(0.81, s="of the mesh", color=_THEIRS, **style)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -16,28 +16,24 @@ from ..io.colors import shades
 from ..judgements import coordinates
 
 if TYPE_CHECKING:
-    from ..judgements import Judgement
-    from ..report import IterationRecord, Report
+    from ..report import Report
     from ..skeleton import Skeleton
 
 MOST_LISTED_ROWS = 12  # of a table
-_SOLVE_COLUMNS = (  # heading, field of the record, format, whether there is no room for it on a narrow screen
-    ("solve", "iteration", "d", False),
-    ("points", "n_points", ",d", False),
-    ("merged", "n_merged", ",d", False),
-    ("held", "n_held", ",d", True),
-    ("e", "explained", ".4f", True),
-    ("De", "explained_change", ".4f", False),
-    ("ring ratio", "ring_ratio", ".4f", False),
-    ("w<sub>L</sub>", "contraction_weight", ".4g", True),
-    ("solver error", "solve_error", ".1e", True),
-    ("seconds", "seconds", ".3f", True),
-)
-_CHARTS = (
-    ("Points solved for, <i>n</i>", "n_points", ",.10g"),
-    ("Change of the explained score, <i>De</i>", "explained_change", ".3g"),
-    ("Ring ratio, <i>a</i>", "ring_ratio", ".3g"),
-)
+_SOLVE_COLUMNS = {  # by heading: the field of a record, and its format
+    "solve": ("iteration", "d"),
+    "points": ("n_points", ",d"),
+    "merged": ("n_merged", ",d"),
+    "held": ("n_held", ",d"),
+    "e": ("explained", ".4f"),
+    "De": ("explained_change", ".4f"),
+    "ring ratio": ("ring_ratio", ".4f"),
+    "w<sub>L</sub>": ("contraction_weight", ".4g"),
+    "solver error": ("solve_error", ".1e"),
+    "seconds": ("seconds", ".3f"),
+}
+_EXTRA = ("held", "e", "w<sub>L</sub>", "solver error", "seconds", "tortuosity", "confidence")
+"""Columns that a narrow screen has no room for."""
 _WIDTH, _HEIGHT, _LEFT, _TOP, _BOTTOM = 320, 150, 46, 12, 22  # of a chart and of what surrounds its curve
 
 
@@ -73,19 +69,20 @@ def contraction(report: Report) -> str:
     told = f"<h2>Contraction</h2><p>{end}</p>"
     if not records:
         return told
-    heads = "".join(f"<th{_extra(hidden)}>{head}</th>" for head, _, _, hidden in _SOLVE_COLUMNS)
-    rows = ""
-    for record in records:
-        cells = (f"<td{_extra(hidden)}>{getattr(record, name):{form}}</td>" for _, name, form, hidden in _SOLVE_COLUMNS)
-        rows += f'<tr data-solve="{record.iteration:d}">{"".join(cells)}</tr>'
-    marks = {"explained_change": _threshold(report.recipe)}
-    charts = "".join(_chart(caption, records, name, form, marks.get(name)) for caption, name, form in _CHARTS)
-    return f'{told}<div class="charts">{charts}</div><h2>Solve by solve</h2>{_table(heads, rows)}'
+    charts = [
+        _chart("Points solved for, <i>n</i>", records, "n_points", ",.10g"),
+        _chart("Change of the explained score, <i>De</i>", records, "explained_change", ".3g", _threshold(report)),
+        _chart("Ring ratio, <i>a</i>", records, "ring_ratio", ".3g"),
+    ]
+    rows = [[f"{getattr(record, name):{form}}" for name, form in _SOLVE_COLUMNS.values()] for record in records]
+    marks = [f' data-solve="{record.iteration:d}"' for record in records]
+    table = _table(_SOLVE_COLUMNS, rows, marks=marks)
+    return f'{told}<div class="charts">{"".join(charts)}</div><h2>Solve by solve</h2>{table}'
 
 
-def _threshold(recipe) -> float | None:
+def _threshold(report: Report) -> float | None:
     """The De below which the contraction stops, if that is its rule."""
-    for stage in recipe.get("pipeline", ()):
+    for stage in report.recipe.get("pipeline", ()):
         rule = stage.get("stop") if isinstance(stage, dict) else None
         if isinstance(rule, dict) and rule.get("rule") == "ExplainedScore":
             value = rule.get("threshold")
@@ -100,60 +97,41 @@ def topology(report: Report) -> str:
     counts = Counter(it.outcome for it in report.judgements)
     told = ", ".join(f"{outcome}: {n:,}" for outcome, n in sorted(counts.items()))
     told = f"<h2>Topology</h2><p>{told}; {len(report.uncertain):,} of {len(report.judgements):,} close calls.</p>"
-    listed = sorted((it for it in report.judgements if it.changed or it.is_uncertain), key=_margin)
-    if not listed:
-        return told
-    heads = "<th>done</th><th>question</th><th>probability</th>"
-    rows = ""
-    for it in listed[:MOST_LISTED_ROWS]:
-        kind = ' class="uncertain"' if it.is_uncertain else ""
-        rows += f"<tr{kind}><td>{it.outcome}</td><td>{it.question}</td><td>{it.probability:.2f}</td></tr>"
-    rest = len(listed) - MOST_LISTED_ROWS
-    more = f'<p class="muted small">and {rest:,} clearer ones</p>' if rest > 0 else ""
-    return f"{told}{_table(heads, rows, 'topology')}{more}"
+    listed = [it for it in report.judgements if it.changed or it.is_uncertain]
+    listed.sort(key=lambda it: abs(it.probability - 0.5))
+    rows = [(it.outcome, it.question, f"{it.probability:.2f}") for it in listed[:MOST_LISTED_ROWS]]
+    marks = [' class="uncertain"' if it.is_uncertain else "" for it in listed[:MOST_LISTED_ROWS]]
+    table = _table(("done", "question", "probability"), rows, "topology", marks)
+    return told + table + _rest(listed, "clearer")
 
 
 def support(report: Report) -> str:
     """How many samples have the same graph, and what many of them do not show: the most doubtful first."""
     if not report.n_draws:
         return ""
-    told = (
-        f"<h2>Support</h2><p>{report.n_agreeing:,} of {report.n_draws:,} samples of the cloud have the same graph.</p>"
-    )
-    listed = report.unsupported[:MOST_LISTED_ROWS]
-    if not listed:
-        return told
-    heads = "<th>part</th><th>here</th><th>samples</th>"
-    rows = ""
-    for it in listed:
-        here = "yes" if it.present else "no"
-        rows += f"<tr><td>{it.about} at ({coordinates(it.place)})</td><td>{here}</td><td>{it.share:.0%}</td></tr>"
-    return told + _table(heads, rows, "support")
-
-
-def _margin(judgement: Judgement) -> float:
-    return abs(judgement.probability - 0.5)
+    told = f"{report.n_agreeing:,} of {report.n_draws:,} samples of the cloud have the same graph."
+    rows = [
+        (f"{it.about} at ({coordinates(it.place)})", "yes" if it.present else "no", f"{it.share:.0%}")
+        for it in report.unsupported[:MOST_LISTED_ROWS]
+    ]
+    return f"<h2>Support</h2><p>{told}</p>" + _table(("part", "here", "samples"), rows, "support")
 
 
 def branches(skeleton: Skeleton) -> str:
     """The longest branches, in the colours that they have in the view; numbered as in `Skeleton.branch_table`."""
     if len(skeleton.edges) == 0:
         return ""
-    table = sorted(skeleton.branch_table(), key=lambda row: -row["length"])
-    table = [row for row in table if row["kind"] != "isolated"]
+    listed = [row for row in skeleton.branch_table() if row["kind"] != "isolated"]
+    listed.sort(key=lambda row: -row["length"])
     colors = branch_colors(skeleton, len(skeleton.branches))
-    columns = (("length", "#.4g", False), ("mean_radius", "#.4g", False))
-    columns = (*columns, ("tortuosity", ".2f", True), ("confidence", ".2f", True))
-    heads = "<th>branch</th><th>kind</th>"
-    heads += "".join(f"<th{_extra(hidden)}>{name.replace('_', ' ')}</th>" for name, _, hidden in columns)
-    rows = ""
-    for row in table[:MOST_LISTED_ROWS]:
+    heads = ("branch", "kind", "length", "mean radius", "tortuosity", "confidence", "points")
+    rows = []
+    for row in listed[:MOST_LISTED_ROWS]:
         swatch = f'<span class="swatch" style="background:{colors[row["branch"]]}"></span>'
-        cells = "".join(f"<td{_extra(hidden)}>{_number(row[name], form)}</td>" for name, form, hidden in columns)
-        rows += f"<tr><td>{swatch}{row['branch']}</td><td>{row['kind']}</td>{cells}<td>{row['points']:,}</td></tr>"
-    rest = len(table) - MOST_LISTED_ROWS
-    more = f'<p class="muted small">and {rest:,} shorter ones</p>' if rest > 0 else ""
-    return f"<h2>Longest branches</h2>{_table(heads + '<th>points</th>', rows, 'branches')}{more}"
+        sizes = _number(row["length"]), _number(row["mean_radius"])
+        ratios = _number(row["tortuosity"], ".2f"), _number(row["confidence"], ".2f")
+        rows.append((f"{swatch}{row['branch']}", row["kind"], *sizes, *ratios, f"{row['points']:,}"))
+    return f"<h2>Longest branches</h2>{_table(heads, rows, 'branches')}{_rest(listed, 'shorter')}"
 
 
 def branch_colors(skeleton: Skeleton, n: int) -> list[str]:
@@ -173,7 +151,7 @@ def origin(report: Report) -> str:
     counts = {
         "input points": report.n_input,
         "dropped, not finite": report.n_dropped,
-        "sampled from a large cloud": report.n_sampled,
+        **({"sampled from a large cloud": report.n_sampled} if report.is_sampled else {}),
         "set aside as outliers": report.n_outliers,
         "distinct points": report.n_distinct,
         "contracted points": report.n_contracted,
@@ -183,8 +161,6 @@ def origin(report: Report) -> str:
         "traced, no surface": report.n_traced,
         "gaps joined": len(report.joined),
     }
-    if not report.is_sampled:
-        del counts["sampled from a large cloud"]
     numbers = {name: f"{n:,}" for name, n in counts.items()} if report.n_input else {}
     numbers |= {f"{name}, seconds": f"{seconds:.3f}" for name, seconds in report.seconds.items()}
     return f'{told}<div class="pair">{_facts("The run", numbers, "number")}{_facts("Versions", report.versions)}</div>'
@@ -194,12 +170,25 @@ def _number(value: float, form: str = "#.4g") -> str:
     return f"{value:{form}}".rstrip(".") if math.isfinite(value) else "–"
 
 
-def _extra(hidden: bool) -> str:
-    return ' class="extra"' if hidden else ""
+def _table(heads, rows, kind: str = "", marks=None) -> str:
+    """A table of HTML texts, nothing without rows; `marks` are attributes of the rows."""
+    if not rows:
+        return ""
+    classes = [' class="extra"' if head in _EXTRA else "" for head in heads]
+
+    def cells(tag, texts):
+        return "".join(f"<{tag}{extra}>{text}</{tag}>" for extra, text in zip(classes, texts, strict=True))
+
+    marked = zip(marks or [""] * len(rows), rows, strict=True)
+    body = "".join(f"<tr{mark}>{cells('td', row)}</tr>" for mark, row in marked)
+    head = f"<thead><tr>{cells('th', heads)}</tr></thead>"
+    return f'<div class="wide {kind}"><table>{head}<tbody>{body}</tbody></table></div>'
 
 
-def _table(heads: str, rows: str, kind: str = "") -> str:
-    return f'<div class="wide {kind}"><table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>'
+def _rest(listed, which: str) -> str:
+    """How many more there are than the rows of a table."""
+    rest = len(listed) - MOST_LISTED_ROWS
+    return f'<p class="muted small">and {rest:,} {which} ones</p>' if rest > 0 else ""
 
 
 def _facts(heading: str, told: dict[str, str], kind: str = "") -> str:
@@ -207,15 +196,12 @@ def _facts(heading: str, told: dict[str, str], kind: str = "") -> str:
     return f'<div><h2>{heading}</h2><table class="facts"><tbody>{rows}</tbody></table></div>' if rows else ""
 
 
-def _chart(
-    caption: str, records: Sequence[IterationRecord], name: str, form: str, threshold: float | None = None
-) -> str:
+def _chart(caption: str, records, name: str, form: str, threshold: float | None = None) -> str:
     """A number per solve, from zero, as SVG; what is not finite is left out."""
     solves = [record.iteration for record in records]
-    values = [(record.iteration, float(getattr(record, name))) for record in records]
-    values = [(solve, value) for solve, value in values if math.isfinite(value)]
-    levels = [value for _, value in values] + ([] if threshold is None else [threshold])
-    highest = _round_up(max(levels, default=1.0))
+    values = {record.iteration: float(getattr(record, name)) for record in records}
+    values = {solve: value for solve, value in values.items() if math.isfinite(value)}
+    highest = _round_up(max([*values.values(), *([] if threshold is None else [threshold])], default=1.0))
 
     def x(solve):
         share = (solve - solves[0]) / max(solves[-1] - solves[0], 1)
@@ -239,11 +225,11 @@ def _chart(
         for solve in solves[:: -(-len(solves) // 10)]
     )
     cursor = f'<line class="cursor" x1="0" x2="0" y1="{_TOP}" y2="{_HEIGHT - _BOTTOM}"/>'
-    curve = " ".join(f"{x(solve)},{y(value)}" for solve, value in values)
+    curve = " ".join(f"{x(solve)},{y(value)}" for solve, value in values.items())
     dots = "".join(
         f'<circle data-at="{solve}" cx="{x(solve)}" cy="{y(value)}" r="4">'
         f"<title>solve {solve}: {value:{form}}</title></circle>"
-        for solve, value in values
+        for solve, value in values.items()
     )
     return (
         f'<figure><figcaption>{caption}</figcaption><svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img">'

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..analysis.summary import point_count
+from ..analysis.summary import point_count, structure
 from ..errors import MissingPackageError
 from ..interop.packages import require
-from .preview import DPI, draw
+from .figures import DPI
+from .preview import draw
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -33,9 +34,8 @@ def picture(skeleton: Skeleton) -> str:
     drawn = np.asarray(figure.canvas.buffer_rgba())[..., :3]
     rows = np.flatnonzero((drawn < 250).any(axis=(1, 2)))  # without the white bands above and below flat drawings
     drawn = drawn[max(rows[0] - NOTEBOOK_MARGIN, 0) : rows[-1] + NOTEBOOK_MARGIN]
-    Image.fromarray(drawn.copy()).quantize(NOTEBOOK_COLOURS, method=Image.Quantize.MEDIANCUT).save(
-        stream, format="png", optimize=True
-    )
+    image = Image.fromarray(drawn.copy()).quantize(NOTEBOOK_COLOURS, method=Image.Quantize.MEDIANCUT)
+    image.save(stream, format="png", optimize=True)
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
@@ -44,32 +44,20 @@ def to_html(skeleton: Skeleton) -> str:
 
     Without what draws pictures, the numbers and what to install.
     """
-    report = skeleton.report
-    told = {
-        "points": f"{point_count(skeleton):,}",
-        "vertices": f"{len(skeleton.vertices):,}",
-        "edges": f"{len(skeleton.edges):,}",
-        "components": f"{skeleton.n_components:,}",
-        "loops": f"{skeleton.n_loops:,}",
-        "leaves": f"{len(skeleton.leaves):,}",
-        "junctions": f"{len(skeleton.junctions):,}",
-        "length": f"{skeleton.length:.4g}",
-    }
+    counts = {"points": point_count(skeleton), **structure(skeleton)}
     style = 'style="text-align:right;padding:2px 10px"'  # all here, since not every notebook has Jupyter's sheet
-    heads = "".join(f"<th {style}>{name}</th>" for name in told)
-    cells = "".join(f"<td {style}>{value}</td>" for value in told.values())
+    heads = "".join(f"<th {style}>{name}</th>" for name in counts)
+    told = (f"{value:.4g}" if name == "length" else f"{value:,}" for name, value in counts.items())
+    cells = "".join(f"<td {style}>{text}</td>" for text in told)
     image, missing = "", []
     try:
-        image = (
-            f'<img alt="{escape(repr(skeleton))}" style="width:100%;background:#fff;border-radius:4px" '
-            f'src="{picture(skeleton)}">'
-        )
+        style = 'style="width:100%;background:#fff;border-radius:4px"'
+        image = f'<img alt="{escape(repr(skeleton))}" {style} src="{picture(skeleton)}">'
     except MissingPackageError as error:
         missing = [str(error)]
-    warnings = "".join(
-        f'<p style="margin:4px 0;border-left:3px solid #c77700;padding-left:8px">{escape(text)}</p>'
-        for text in dict.fromkeys([*missing, *report.warnings])
-    )
+    style = 'style="margin:4px 0;border-left:3px solid #c77700;padding-left:8px"'
+    messages = dict.fromkeys([*missing, *skeleton.report.warnings])
+    warnings = "".join(f"<p {style}>{escape(text)}</p>" for text in messages)
     return (
         '<div style="max-width:1100px;font:13px/1.5 system-ui,sans-serif">'
         f'{image}<table style="font:inherit;border-collapse:collapse;margin-top:4px"><thead>'

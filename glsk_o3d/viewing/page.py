@@ -20,8 +20,9 @@ from ..errors import InvalidParameterError
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
 from . import html as sections
+from .figures import MOST_DRAWN_POINTS, thinned
 from .notebook import picture
-from .recorder import MOST_RECORDED_POINTS, ContractionRecorder, thinned
+from .recorder import ContractionRecorder
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -85,44 +86,40 @@ def save_report(
 def _page(skeleton, recorder, title) -> str:
     shown, positions = _followed(skeleton, recorder)
     finite = np.isfinite(skeleton.points).all(axis=1).sum()
-    script = _asset("report.js")
+    assets = files(__package__) / "assets"
+    html, css, script = ((assets / f"report.{ending}").read_text("utf-8") for ending in ("html", "css", "js"))
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    kind = "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
+    report, kind = skeleton.report, "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
     now = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
+    thinning = f"The view shows {len(shown):,} of {finite:,} points, drawn at random."
+    below = (
+        sections.contraction(report),
+        sections.topology(report),
+        sections.support(report),
+        sections.branches(skeleton),
+        sections.origin(report),
+    )
     parts = {
         "title": escape(title),
-        "subtitle": escape(f"{kind} · glsk-o3d {skeleton.report.versions.get('glsk-o3d', '')} · {now}"),
+        "subtitle": escape(f"{kind} · glsk-o3d {report.versions.get('glsk-o3d', '')} · {now}"),
         "policy": f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'",
-        "style": _asset("report.css"),
+        "style": css,
         "figures": sections.figures(skeleton),
-        "warnings": sections.warnings(skeleton.report.warnings),
+        "warnings": sections.warnings(report.warnings),
         "still": picture(skeleton),
-        "thinning": f"The view shows {len(shown):,} of {finite:,} points, drawn at random."
-        if len(shown) < finite
-        else "",
-        "sections": sections.contraction(skeleton.report)
-        + sections.topology(skeleton.report)
-        + sections.support(skeleton.report)
-        + sections.branches(skeleton)
-        + sections.origin(skeleton.report),
+        "thinning": thinning if len(shown) < finite else "",
+        "sections": "".join(below),
         # no "<" in it, so that nothing in it can end the script element
         "data": json.dumps(_data(skeleton, shown, positions), allow_nan=False).replace("<", "\\u003c"),
         "script": script,
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], _asset("report.html"))
-
-
-def _asset(name: str) -> str:
-    return (files(__package__) / "assets" / name).read_text("utf-8")
-
-
-# --------------------------------------------------------------------------------------------------------- the view
+    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], html)
 
 
 def _followed(skeleton, recorder) -> tuple[np.ndarray, list[np.ndarray]]:
     """The points to show, and where they are: at first, and after each solve."""
     if recorder is None or not recorder.positions:
-        shown = thinned(skeleton.points, MOST_RECORDED_POINTS)
+        shown = thinned(skeleton.points, MOST_DRAWN_POINTS)
         return shown, [skeleton.points[shown]]
     shown, positions = recorder.shown, recorder.positions
     same = len(positions) == len(skeleton.report.iterations) + 1 and shown.max(initial=-1) < len(skeleton.points)
@@ -149,8 +146,11 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
     vertex = skeleton.vertex_of_point[shown] if len(skeleton.vertices) else np.full(len(shown), -1)
     label = branch_of_point(skeleton, skeleton.points[shown], vertex) if len(skeleton.vertices) else vertex
     dots = len(skeleton.branches) + np.arange(len(lone))
+    captions, n = [f"Input: {point_count(skeleton):,} points"], len(positions) - 1
+    for it in skeleton.report.iterations[:n]:
+        captions.append(f"After solve {it.iteration} of {n}: {it.n_points - it.n_merged:,} points left")
     return {
-        "captions": _captions(skeleton, len(positions) - 1),
+        "captions": captions,
         "view": ("yz", "xz", "xy")[across],  # what is flat from its broad side; else z is up, or y if that is longest
         "unit": unit,
         "palette": sections.branch_colors(skeleton, len(skeleton.branches) + len(lone)),
@@ -170,11 +170,3 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
 
 def _packed(array, dtype) -> str:
     return base64.b64encode(np.ascontiguousarray(array, dtype).tobytes()).decode()
-
-
-def _captions(skeleton, n_solves) -> list[str]:
-    told = [f"Input: {point_count(skeleton):,} points"]
-    for record in skeleton.report.iterations[:n_solves]:
-        left = record.n_points - record.n_merged
-        told.append(f"After solve {record.iteration} of {n_solves}: {left:,} points left")
-    return told

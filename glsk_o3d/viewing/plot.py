@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +11,8 @@ from ..errors import InvalidParameterError
 from ..interop.clouds import cloud_points
 from ..interop.packages import require
 from ..io.colors import shades
+from ..skeleton import Skeleton
 from .preview import ROOT_MARK
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
 
 _FAR_GREY, _NEAR_GREY = 0.93, 0.55  # of the farthest and of the nearest point
 _TITLE_ROOM = 0.3  # inches
@@ -86,12 +84,12 @@ def plot_skeleton(
 
     if axes is None:
         axes = plt.figure(figsize=(6, 4), layout="constrained").add_subplot(projection="3d")
-    points = np.empty((0, 3)) if skeleton is None else skeleton.points
-    points = points if cloud is None else cloud_points(cloud)
+    none = np.empty(0)
+    skeleton = Skeleton(none, none, none, none, none, none) if skeleton is None else skeleton
+    points, vertices = skeleton.points if cloud is None else cloud_points(cloud), skeleton.vertices
     if point_colors is not None and np.shape(point_colors) != points.shape:
         raise InvalidParameterError(f"{len(points)} points need as many colours, not {np.shape(point_colors)}")
     finite = np.flatnonzero(np.isfinite(points).all(axis=1))
-    vertices = np.empty((0, 3)) if skeleton is None else skeleton.vertices
     shown = np.concatenate([points[finite], vertices])
     low, high = (shown.min(axis=0), shown.max(axis=0)) if len(shown) else (np.zeros(3), np.ones(3))
     elevation, azimuth = np.deg2rad(view)
@@ -102,13 +100,11 @@ def plot_skeleton(
     paint = grey if point_colors is None else np.asarray(point_colors)[drawn]
     axes.computed_zorder = False
     axes.scatter(*points[drawn].T, s=point_size, c=paint, linewidths=0, depthshade=False, clip_on=False, zorder=1)
-    if skeleton is not None and len(skeleton.edges):
+    if len(skeleton.edges):
         colors = shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
-        lines = vertices[skeleton.edges]
-        axes.add_collection(
-            Line3DCollection(lines, colors=colors, linewidths=line_width, capstyle="round", clip_on=False, zorder=2)
-        )
-    if skeleton is not None and skeleton.report.root:
+        style = dict(colors=colors, linewidths=line_width, capstyle="round", clip_on=False, zorder=2)
+        axes.add_collection(Line3DCollection(vertices[skeleton.edges], **style))
+    if skeleton.report.root:
         axes.scatter(*skeleton.report.root, **ROOT_MARK, depthshade=False, clip_on=False, zorder=3)
     half = np.maximum(high - low, 0.05 * (high - low).max() or 1.0) / 2
     for name, middle, reach in zip("xyz", (low + high) / 2, half, strict=True):

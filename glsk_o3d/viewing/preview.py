@@ -1,27 +1,26 @@
-"""A picture of a skeleton in its cloud, without a window."""
+"""Pictures of a skeleton in its cloud, without a window: plain, and coloured by a measure."""
 
 from __future__ import annotations
 
 import os
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..analysis.summary import point_count
-from ..interop.atomic import check_ending, write_atomically
-from ..interop.packages import require
+from ..analysis.summary import point_count, structure
+from ..errors import InvalidParameterError
+from ..interop.atomic import check_ending
 from ..numerics.vectors import norm
-from .layout import VIEW_GAP, fitting_size, room, three_views
-from .recorder import thinned
+from . import figures
+from .figures import INK, PAPER
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-MOST_DRAWN_POINTS = 20_000
-DPI = 150
-INK, _RED, _AMBER, _PAPER = "#333333", "#d0121f", "#a05000", "white"
+_RED, _AMBER = "#d0121f", "#a05000"
 _LINE_HEIGHT, _LETTER_WIDTH, _MOST_LINES, _MOST_WARNINGS = 0.16, 0.066, 2, 2  # inches; lines of each warning, warnings
 _FAR_DOT, _NEAR_DOT = np.array([0.91] * 3), np.array([0.70] * 3)
 ROOT_MARK = {"marker": "D", "s": 22, "facecolors": "#1f5fbf", "edgecolors": "white", "linewidths": 0.6, "label": "root"}
@@ -33,6 +32,8 @@ _DOTS_SHARE, _DOT_AREA = 0.1, (0.5, 3)
 _LINE_SHARE, _LINE_WIDTH = 0.065, (0.6, 1.5)
 _DOT_SHARE, _WIDEST_DOT, _LONE_DOT = 0.12, 3.0, 3.7
 _MOST_MARKS = 12  # of what samples disagree with
+_BAR = (1.7, 0.09)  # width and height of the colour bar, in inches
+_BAR_CORNER = (0.3, 0.2)  # from the upper right corner of the picture to that of the bar, in inches
 
 
 def save_preview(
@@ -80,40 +81,107 @@ def save_preview(
     True
     """
     check_ending(path, "preview is a picture", ".png")
-    save_figure(draw(skeleton, size, title, warnings=skeleton.report.warnings), path)
+    figures.save_figure(draw(skeleton, size, title, warnings=skeleton.report.warnings), path)
+
+
+def save_assessment(
+    skeleton: Skeleton,
+    points: np.ndarray,
+    values: np.ndarray,
+    path: str | os.PathLike,
+    *,
+    label: str,
+    best: int = 0,
+    unknown: str = "not measured",
+    size: tuple[int, int] = (1800, 760),
+    title: str | None = None,
+) -> None:
+    """Draw a skeleton in its cloud from three sides, as `save_preview` does, its edges coloured by a measure.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    points : (N, 3) float array
+        The cloud, in grey.
+    values : (E,) float array
+        One per edge, shown from 0 to 1; those outside have the colour of the nearer end, and NaN is drawn in black.
+    path : path-like
+        PNG; it appears complete or not at all.
+    label : str
+        What the values are, on the colour bar.
+    best : {0, 1}
+        The good end of the scale, dark blue; the bad one is orange.
+    unknown : str
+        What NaN means, below the colour bar if there is any.
+    size : (width, height)
+        In pixels.
+    title : str, optional
+        Above the views.
+
+    Raises
+    ------
+    InvalidParameterError
+        There is not one value per edge.
+    FileFormatError
+        The ending is not ``.png``.
+    MissingPackageError
+        matplotlib is not installed.
+    OSError
+        The folder does not exist, or the file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.analysis import compare
+    >>> from glsk_o3d.samples import torus
+    >>> ring = torus(1000)
+    >>> skeleton = skeletonize(ring.points)
+    >>> error = compare(skeleton, ring).edge_error
+    >>> with TemporaryDirectory() as folder:
+    ...     save_assessment(skeleton, ring.points, error, f"{folder}/error.png", label="error")
+    """
+    check_ending(path, "picture is a PNG", ".png")
+    if np.shape(values) != (len(skeleton.edges),):
+        raise InvalidParameterError(f"{len(skeleton.edges)} edges need as many values, not {np.shape(values)}")
+    shown = replace(skeleton, points=points, vertex_of_point=np.empty(0), normals=np.empty(0))
+    figure = draw(shown, size, title)
+    _colour(figure, values, label, best, unknown)
+    figures.save_figure(figure, path)
 
 
 def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] = ()):
     """The figure, not yet in a file."""
-    cloud = skeleton.points[thinned(skeleton.points, MOST_DRAWN_POINTS)]
-    centre, extent = room(np.concatenate([cloud, skeleton.vertices]))
-    head, foot = 0.55 if title else 0.25, 0.34
+    cloud = skeleton.points[figures.thinned(skeleton.points, figures.MOST_DRAWN_POINTS)]
+    centre, extent = figures.room(np.concatenate([cloud, skeleton.vertices]))
+    head, foot, root = 0.55 if title else 0.25, 0.34, skeleton.report.root
     if size is None:
         told = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if warnings else 0
-        size = DPI * fitting_size(extent, head=head, foot=foot + told)
-    figure = new_figure((size[0], size[1]))
+        size = figures.DPI * figures.fitting_size(extent, head=head, foot=foot + told)
+    figure = figures.new_figure((size[0], size[1]))
     width, height = figure.get_size_inches()
     warned = _warned(warnings, width, int(height / 3 / _LINE_HEIGHT))
     below = _LINE_HEIGHT * len(warned)
-    for a, b, axes in three_views(figure, extent, head=head, foot=foot + below):
+    for a, b, axes in figures.three_views(figure, extent, head=head, foot=foot + below):
         scale = 72 * axes.get_position().width * width / extent[a]  # points per unit
         _draw_cloud(axes, cloud - centre, a, b, scale**2 * np.prod(np.sort(extent)[1:]))
         _draw_curve(axes, skeleton, skeleton.vertices - centre, [a, b], scale)
         _mark_doubts(axes, skeleton.report, centre, [a, b])
-        if skeleton.report.root:
-            place = np.subtract(skeleton.report.root, centre)[[a, b]]
-            mark = axes.scatter(*place, **ROOT_MARK, zorder=4, clip_on=False)
-    if skeleton.report.root:
-        figure.legend(handles=[mark], loc="upper left", frameon=False, fontsize=8, labelcolor=INK, borderaxespad=0.3)
+        if root:
+            mark = axes.scatter(*np.subtract(root, centre)[[a, b]], **ROOT_MARK, zorder=4, clip_on=False)
+    if root:
+        style = dict(loc="upper left", frameon=False, borderaxespad=0.3)
+        figure.legend(handles=[mark], fontsize=8, labelcolor=INK, **style)
     if caption:
         counts = _caption(skeleton)
-        points = 8 * min(1, (width - VIEW_GAP) / (_LETTER_WIDTH * len(counts)))
+        points = 8 * min(1, (width - figures.VIEW_GAP) / (_LETTER_WIDTH * len(counts)))
         figure.text(0.5, (0.12 + below) / height, counts, ha="center", color=INK, fontsize=points)
+    style = dict(x=0.5, ha="center", parse_math=False)
     for row, line in enumerate(reversed(warned)):
         place = (0.1 + row * _LINE_HEIGHT) / height
-        figure.text(0.5, place, printable(line), ha="center", color=_AMBER, fontsize=8, parse_math=False)
+        figure.text(y=place, s=figures.printable(line), color=_AMBER, fontsize=8, **style)
     if title:
-        figure.text(0.5, 1 - 0.33 / height, printable(title), ha="center", color=INK, fontsize=12, parse_math=False)
+        figure.text(y=1 - 0.33 / height, s=figures.printable(title), color=INK, fontsize=12, **style)
     return figure
 
 
@@ -138,9 +206,9 @@ def _draw_curve(axes, skeleton, vertices, across_up, scale):
     dot = min(_DOT_SHARE * branch, _WIDEST_DOT)
     spots = [(skeleton.degree == 0, _RED, _LONE_DOT)]
     if dot > line:
-        spots += [(skeleton.degree == 1, _PAPER, dot), (skeleton.degree > 2, INK, dot)]
+        spots += [(skeleton.degree == 1, PAPER, dot), (skeleton.degree > 2, INK, dot)]
     for chosen, face, wide in spots:
-        style = {"s": wide**2, "facecolors": face, "edgecolors": _RED if face == _PAPER else face}
+        style = {"s": wide**2, "facecolors": face, "edgecolors": _RED if face == PAPER else face}
         axes.scatter(*vertices[chosen][:, across_up].T, zorder=3, clip_on=False, linewidths=0.3 * wide, **style)
 
 
@@ -148,56 +216,23 @@ def _mark_doubts(axes, report, centre, across_up):
     """Amber rings around what few samples show, crosses where many show what is not there, and how many of them."""
     for it in report.unsupported[:_MOST_MARKS]:
         x, y = np.subtract(it.place, centre)[across_up]
-        style: dict[str, Any] = {"s": 70, "linewidths": 1, "zorder": 5, "clip_on": False}
-        if it.present:
-            axes.scatter(x, y, marker="o", facecolors="none", edgecolors=_AMBER, **style)
-        else:
-            axes.scatter(x, y, marker="x", c=_AMBER, **style)
+        ring, cross = dict(marker="o", facecolors="none", edgecolors=_AMBER), dict(marker="x", c=_AMBER)
+        axes.scatter(x, y, s=70, linewidths=1, zorder=5, clip_on=False, **(ring if it.present else cross))
         note = f"{round(it.share * report.n_draws)}/{report.n_draws}"
         axes.annotate(note, (x, y), (6, 4), textcoords="offset points", color=_AMBER, fontsize=6, annotation_clip=False)
 
 
-def new_figure(size: tuple[float, float]) -> Any:
-    """A white figure of so many pixels, on a canvas of its own: pyplot and its global state stay out of it."""
-    require("matplotlib")
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(np.asarray(size) / DPI, facecolor=_PAPER)
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def colour_bar(figure, scale, box, ticks: list[float], labels: list[str] | None = None) -> None:
-    """A small horizontal colour bar; the box is left, bottom, width and height, as shares of the figure."""
-    bar = figure.colorbar(scale, cax=figure.add_axes(box), orientation="horizontal")
-    bar.set_ticks(ticks, labels=labels)
-    bar.outline.set_visible(False)
-    bar.ax.tick_params(length=0, pad=2, labelsize=7, labelcolor=INK)
-
-
-def save_figure(figure, path: str | os.PathLike) -> None:
-    """Write a figure as PNG, without the version of matplotlib; it appears complete or not at all."""
-    options = {"format": "png", "dpi": DPI, "metadata": {"Software": None}}
-    write_atomically(path, lambda temporary: figure.savefig(temporary, **options))
-
-
-def printable(text: object) -> str:
-    """A text that may be a file name, which may be no Unicode, as one that can be drawn and encoded."""
-    return str(text).encode("utf-8", "replace").decode()
-
-
 def _warned(warnings: Sequence[str], width: float, room: int) -> list[str]:
     """At most so many lines that tell the warnings in a figure so many inches wide; the last counts what is left."""
-    letters = max(int((width - 2 * VIEW_GAP) / _LETTER_WIDTH), 20)
+    letters = max(int((width - 2 * figures.VIEW_GAP) / _LETTER_WIDTH), 20)
     lines: list[str] = []
     more = len(warnings)
     for warning in warnings[:_MOST_WARNINGS]:
         free = room - len(lines) - (more > 1)
         if free < 1:
             break
-        wrapper = textwrap.TextWrapper(letters, max_lines=min(_MOST_LINES, free), placeholder=" ...")
-        lines += wrapper.wrap(f"warning: {warning}")
+        most = min(_MOST_LINES, free)
+        lines += textwrap.wrap(f"warning: {warning}", letters, max_lines=most, placeholder=" ...")
         more -= 1
     if more and room > len(lines):
         told = f"and {more} more" if lines else f"{more}"
@@ -206,16 +241,34 @@ def _warned(warnings: Sequence[str], width: float, room: int) -> list[str]:
 
 
 def _caption(skeleton: Skeleton) -> str:
-    n_points = point_count(skeleton)
-    counts = (
-        *[(n_points, "point")] * (n_points > 0),
-        (len(skeleton.vertices), "vertex"),
-        (len(skeleton.edges), "edge"),
-        (skeleton.n_components, "component"),
-        (skeleton.n_loops, "loop"),
-        (len(skeleton.leaves), "leaf"),
-        (len(skeleton.junctions), "junction"),
-    )
-    plural = {"vertex": "vertices", "leaf": "leaves"}
-    words = [f"{n} {noun if n == 1 else plural.get(noun, noun + 's')}" for n, noun in counts]
+    counts = {"points": point_count(skeleton), **structure(skeleton)}
+    told = [name for name in counts if name != "length" and (name != "points" or counts[name])]
+    one = {"vertices": "vertex", "leaves": "leaf"}
+    words = [f"{counts[name]} {one.get(name, name[:-1]) if counts[name] == 1 else name}" for name in told]
     return "   \N{MIDDLE DOT}   ".join(words)
+
+
+def _colour(figure, values, label, best, unknown):
+    """Colour the edges in a figure of `draw` by values from 0 to 1, and say by a bar in its corner what they are."""
+    from matplotlib import colormaps  # it is there: the figure was drawn with it
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import ListedColormap, Normalize
+
+    shades = colormaps["plasma"](np.linspace(0, 0.8, 256))  # its last fifth is too light for thin lines on white
+    shades = ListedColormap(shades[::-1] if best else shades).with_extremes(bad=INK)
+    scale = ScalarMappable(Normalize(0, 1, clip=True), shades)
+    for axes in figure.axes:
+        for drawn in axes.collections[1:]:  # the first is the cloud
+            if isinstance(drawn, LineCollection):
+                drawn.set(color=scale.to_rgba(np.ma.masked_invalid(values)), linewidths=2)
+            else:
+                drawn.set_edgecolor(INK)
+    size = figure.get_size_inches()
+    low = size - _BAR_CORNER - _BAR  # the lower left corner of the bar
+    figures.colour_bar(figure, scale, [*(low / size), *(_BAR / size)], [0, 0.5, 1])
+    beside = (low + [-0.1, _BAR[1] / 2]) / size
+    figure.text(*beside, label, ha="right", va="center_baseline", color=INK, fontsize=8)
+    if np.isnan(values).any():
+        below = (low + [_BAR[0], -0.3]) / size
+        figure.text(*below, f"black: {unknown}", ha="right", va="top", color=INK, fontsize=7)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..state import Contraction
-
-MOST_RECORDED_POINTS = 20_000
+from .figures import MOST_DRAWN_POINTS, thinned
 
 
 class ContractionRecorder:
@@ -36,7 +35,7 @@ class ContractionRecorder:
     (3, (300, 3))
     """
 
-    def __init__(self, most_points: int = MOST_RECORDED_POINTS):
+    def __init__(self, most_points: int = MOST_DRAWN_POINTS):
         self.most_points = most_points
         self.shown = np.empty(0, int)
         self.positions: list[np.ndarray] = []
@@ -46,11 +45,3 @@ class ContractionRecorder:
             self.shown = thinned(state.points, self.most_points)
             self.positions = [state.points[self.shown]]
         self.positions.append(state.contracted[state.survivor_of_point[self.shown]])
-
-
-def thinned(points: np.ndarray, most: int) -> np.ndarray:
-    """At most so many of the finite points, drawn at random but always the same: their indices, ascending."""
-    finite = np.flatnonzero(np.isfinite(points).all(axis=1))
-    if len(finite) <= most:
-        return finite
-    return np.sort(np.random.default_rng(0).choice(finite, most, replace=False))

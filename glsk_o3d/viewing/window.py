@@ -24,24 +24,11 @@ LINE_RADIUS = 0.002  # of the skeleton's lines per diagonal
 
 
 def show(skeleton: Skeleton, cloud: Any = None, *, title: str = "Curve skeleton") -> None:
-    """Open a window with a skeleton and its cloud, and wait until it is closed.
+    """Open a window with a skeleton and its cloud, or with one of them, and wait until it is closed.
 
     The keys C, S and T show and hide the cloud, the skeleton, and its tubes of true radius, which are hidden at first;
-    H lists Open3D's own, Q closes the window. Branches have colours in turn.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Without vertices, the cloud alone is shown.
-    cloud : open3d.geometry.PointCloud, optional
-        Shown instead of `skeleton.points`, with its colours.
-    title : str
-
-    Raises
-    ------
-    DisplayError
-        There is no display, or no window can be opened on it. Open3D itself would render unseen, and wait for ever.
-    MissingPackageError
+    H lists Open3D's own, Q closes the window. Branches have colours in turn. A point cloud of Open3D takes the place of
+    the skeleton's points. Without a display Open3D itself would render unseen, and wait for ever: that is an error.
     """
     window = open_window(skeleton, cloud, title)
     window.run()
@@ -49,22 +36,14 @@ def show(skeleton: Skeleton, cloud: Any = None, *, title: str = "Curve skeleton"
 
 
 def open_window(skeleton: Skeleton, cloud: Any, title: str) -> Any:
-    """The window of `show`, before it waits.
-
-    Returns
-    -------
-    open3d.visualization.VisualizerWithKeyCallback
-    """
+    """The window of `show`, an Open3D VisualizerWithKeyCallback, before it waits."""
+    elsewhere = "save_report and save_preview make files to look at instead"
     if not has_display():
-        raise DisplayError(
-            "there is no display to open a window on: save_report and save_preview make files to look at instead"
-        )
+        raise DisplayError(f"there is no display to open a window on: {elsewhere}")
     o3d = import_open3d()
     window = o3d.visualization.VisualizerWithKeyCallback()
     if not window.create_window(title, 1280, 800):
-        raise DisplayError(
-            "Open3D cannot open a window here: save_report and save_preview make files to look at instead"
-        )
+        raise DisplayError(f"Open3D cannot open a window here: {elsewhere}")
     options = window.get_render_option()
     options.point_size, options.mesh_shade_option = 3.0, o3d.visualization.MeshShadeOption.Color
     shapes = layers(skeleton, cloud)

@@ -10,15 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Connector, Contractor, LPRReducer, Refiner, RingBuilder, read_cloud, samples, skeletonize
 from glsk_o3d.crosscheck import cross_check
-from glsk_o3d.crosscheck.agreement import (
-    compare_rows,
-    compare_skeletons,
-    mesh_fit,
-)
-from glsk_o3d.crosscheck.mesh_contraction import MeshContractor
-from glsk_o3d.crosscheck.reconstruction import spacing
+from glsk_o3d.crosscheck.agreement import compare_rows, compare_skeletons, mesh_fit
+from glsk_o3d.crosscheck.mesh import spacing
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
-from glsk_o3d.io.meshes import mesh_arrays, read_mesh
+from glsk_o3d.io.meshes import read_mesh
 from glsk_o3d.numerics.mesh_rings import border_lengths
 from glsk_o3d.numerics.solver import SolveError
 from glsk_o3d.report import REFUSED
@@ -119,14 +114,14 @@ def test_open_ends_that_the_cloud_has_too_are_not_held_against_a_mesh():
 @SPIKY
 def test_a_mesh_whose_contraction_fails(ring, monkeypatch):
     """Its skeleton, of the only solve that is left, differs: that says nothing of the cloud's."""
-    solve = MeshContractor._solve_in_box
+    solve = Contractor._solve_in_box
 
     def refuse(self, state, *system):
-        if state.report.iterations:
+        if self.reducer is None and state.report.iterations:
             raise SolveError("too spiky")
         return solve(self, state, *system)
 
-    monkeypatch.setattr(MeshContractor, "_solve_in_box", refuse)
+    monkeypatch.setattr(Contractor, "_solve_in_box", refuse)
     found = cross_check(ring.points)
     assert found.mesh_skeleton.report.stop_reason == f"solve 2 {REFUSED}: too spiky"
     # of this ring the fit mends what one solve leaves: it may agree in part, but not surely
@@ -146,7 +141,7 @@ def test_flat_rows_have_one_direction(tilt):
     order = np.lexsort(state.points[state.point_of_survivor].T[:2])  # rows of the grid
     corner = (np.arange(11)[:, None] * 12 + np.arange(11)).ravel()
     faces = order[np.concatenate([corner[:, None] + [0, 1, 13], corner[:, None] + [0, 13, 12]])]
-    angle, length, _, found = compare_rows(state, state.cloud, faces)
+    (angle, length, _), found = compare_rows(state, state.cloud, faces)
     compared = np.isfinite(angle)
     assert compared.sum() == found.compared > 50
     assert found.flat > 0.9
@@ -154,7 +149,7 @@ def test_flat_rows_have_one_direction(tilt):
     assert (length[compared] == 1).mean() >= found.flat
 
 
-def test_the_aunsupported_end_of_either_skeleton_counts(make):
+def test_the_unsupported_end_of_either_skeleton_counts(make):
     def path(end):
         line = make(np.column_stack([np.linspace(0, end, 50), np.zeros((50, 2))]), np.arange(49)[:, None] + [0, 1])
         return replace(line, radii=np.full(50, 0.5))
@@ -197,10 +192,7 @@ def test_units_place_turn_and_order_do_not_matter(ring, check):
 
 def test_json(check):
     told = json.loads(json.dumps(check.to_dict(), allow_nan=False))
-    assert told == check.to_dict() | {"skeletons": told["skeletons"], "stop_reasons": told["stop_reasons"]}
-    assert told["verdict"] == "agrees"
-    assert told["skeletons"]["loops"] == [1, 1]
-    assert told["rows"]["one_to_one"] is told["skeletons"]["topology"] is True
+    assert (told["verdict"], told["skeletons"]["loops"], told["rows"]["one_to_one"]) == ("agrees", [1, 1], True)
     assert "2 igl.cotmatrix" in told["convention"]
 
 
@@ -209,7 +201,7 @@ def test_every_pipeline_and_legacy_and_tensor_clouds(ring, check):
         found = cross_check(ring.points, pipeline=name)
         np.testing.assert_array_equal(found.skeleton.vertices, skeletonize(ring.points, name).vertices)
         mesh, cloud = found.mesh_skeleton.report.stages, found.skeleton.report.stages
-        assert mesh[0].startswith("MeshContractor(reducer=None, ")
+        assert mesh[0].startswith("Contractor(reducer=None, ")
         assert mesh[1:] == cloud[-2:]
     legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(ring.points))
     tensor = o3d.t.geometry.PointCloud(ring.points.astype(np.float32))
@@ -285,11 +277,7 @@ def test_poisson_and_a_single_method(ring):
     ("mesh", "message"),
     [
         ("alpha", "mesh = 'alpha': must be 'auto', 'ball_pivoting', 'poisson', or a mesh"),
-        (7, "int is no triangle mesh"),
-        ((np.eye(3), np.zeros((0, 3), int)), r"needs \(V, 3\) vertices and \(F, 3\) triangles"),
-        ((np.eye(3), [[0, 1, 3]]), "names a vertex that is not there"),
         ((np.eye(3), [[0.0, 1, 2]]), "names a vertex that is not there"),
-        ((np.eye(3) * np.nan, [[0, 1, 2]]), "not finite"),
         (o3d.geometry.TriangleMesh(), "needs"),
     ],
 )
@@ -312,12 +300,6 @@ def test_a_mesh_is_read_once(surface, tmp_path, monkeypatch):
         for name in ("read_triangle_mesh", "read_point_cloud"):
             monkeypatch.setattr(o3d.io, name, lambda *words, once=once, **_: next(once)(*words))
         assert len(read_mesh(tmp_path / f"m.{ending}").triangles) == len(surface[1])
-
-
-def test_arrays_of_a_mesh_are_copies():
-    vertices, faces = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)
-    found = mesh_arrays((vertices, faces))
-    assert [array.dtype for array in found] == [np.float64, np.int64]
 
 
 # ---------------------------------------------------------------------------------------------------------- the clouds

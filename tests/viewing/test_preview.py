@@ -8,7 +8,8 @@ import pytest
 from glsk_o3d.errors import FileFormatError, MissingPackageError
 from glsk_o3d.judgements import Supported
 from glsk_o3d.report import Report
-from glsk_o3d.viewing import preview
+from glsk_o3d.viewing import figures, preview
+from glsk_o3d.viewing.page import save_report
 from glsk_o3d.viewing.preview import save_preview
 
 matplotlib = pytest.importorskip("matplotlib")
@@ -165,19 +166,22 @@ def test_caption_counts_the_cloud_and_not_what_the_skeleton_holds_of_it(tree):
     assert preview._caption(dataclasses.replace(tree, report=Report(), **WITHOUT_POINTS)).startswith("6 vertices ")
 
 
-def test_failure_leaves_nothing(tree, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("save", "name"), [(save_preview, "p.png"), (save_report, "r.html")])
+def test_failure_leaves_what_was_there(tree, tmp_path, monkeypatch, save, name):
+    (tmp_path / name).write_text("before")
     with pytest.raises(FileNotFoundError, match="no such folder"):
-        save_preview(tree, tmp_path / "missing" / "p.png")
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, path, **_: path.write_bytes(b"half") / 0)
+        save(tree, tmp_path / "missing" / name)
+    monkeypatch.setattr("os.replace", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        save_preview(tree, tmp_path / "p.png")
-    assert not list(tmp_path.iterdir())
+        save(tree, tmp_path / name)
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "before")]
 
 
+@pytest.mark.parametrize(("save", "ending"), [(save_preview, "png"), (save_report, "html")])
 @pytest.mark.parametrize("name", ["p.jpg", "p", "p.png.bak"])
-def test_other_endings_are_refused(tree, tmp_path, name):
-    with pytest.raises(FileFormatError, match=rf"{name}: .*\.png"):
-        save_preview(tree, tmp_path / name)
+def test_other_endings_are_refused(tree, tmp_path, save, ending, name):
+    with pytest.raises(FileFormatError, match=rf"{name}: .*\.{ending}"):
+        save(tree, tmp_path / name)
     assert not list(tmp_path.iterdir())
 
 
@@ -223,7 +227,7 @@ def test_warnings_are_told_below_and_nothing_overlaps(tree, tmp_path, size, warn
     assert re.fullmatch(told, " ".join(lines))
     assert len(lines) <= 5
     save_preview(warned, tmp_path / "p.png", size=size)
-    image = imread(tmp_path / "p.png")[-preview.DPI // 4 :]
+    image = imread(tmp_path / "p.png")[-figures.DPI // 4 :]
     assert (image[..., 0] - image[..., 2] > 0.4).any() == bool(warnings)
 
 

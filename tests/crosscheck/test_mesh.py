@@ -1,28 +1,31 @@
-"""libigl's Laplacian in our convention, exact curvatures, and the contraction of meshes."""
+"""Meshes of clouds: their reconstruction, libigl's Laplacian in our convention, exact curvatures, contraction."""
 
 from dataclasses import replace
 
 import igl
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
 from glsk_o3d import Connector, Contractor, LPRReducer, Pipeline, Refiner, RingBuilder, pipelines
-from glsk_o3d.crosscheck.mesh_contraction import (
-    MeshContractor,
+from glsk_o3d.crosscheck.mesh import (
+    INVENTED_DISTANCE,
+    ball_pivoting,
     curvature_normals,
     mesh_areas,
     mesh_laplacian,
     mesh_skeleton,
     mesh_state,
+    poisson,
     ring_areas,
+    spacing,
+    without_bare,
 )
-from glsk_o3d.crosscheck.reconstruction import ball_pivoting
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.numerics.cotangent import WEIGHT_CAP, cotangent_laplacian
 from glsk_o3d.numerics.mesh_rings import common_share, umbrellas
 from glsk_o3d.numerics.rings import Rings
-from glsk_o3d.samples import sphere, torus, tube
+from glsk_o3d.samples import sheet, sphere, torus, tube
 
 
 def convex_rings(points, faces):
@@ -44,9 +47,65 @@ def convex_rings(points, faces):
 def cloud_and_mesh(points, **parameters):
     """The state, and a ball-pivoting mesh, both in the user's units; the exact copies of points that rows mean."""
     state = RingBuilder(thin_to="all", **parameters)(points)
-    vertices, faces = ball_pivoting(state.cloud, state.normals, state.rings)
-    assert vertices is state.cloud
+    _, faces = ball_pivoting(state)
     return state, state.frame.out_of(state.cloud), faces
+
+
+# -------------------------------------------------------------------------------------------------- reconstruction
+
+
+def reconstructed(by, points):
+    state = RingBuilder(thin_to="all")(points)
+    return state, *by(state)
+
+
+def euler_characteristic(n, faces):
+    edges = np.unique(np.sort(np.concatenate([faces[:, p] for p in ([0, 1], [1, 2], [2, 0])]), axis=1), axis=0)
+    return n - len(edges) + len(faces)
+
+
+def test_ball_pivoting_has_the_points_for_vertices(even_ball):
+    points, _ = even_ball(1000)
+    state, vertices, faces = reconstructed(ball_pivoting, points)
+    assert vertices is state.cloud
+    assert umbrellas(1000, faces).all()
+    assert euler_characteristic(1000, faces) == 2
+
+
+def test_ball_pivoting_leaves_the_ends_of_a_pipe_open():
+    state, vertices, faces = reconstructed(ball_pivoting, tube(3000, capped=False).points)
+    border = ~umbrellas(len(vertices), faces)
+    ends = np.abs(state.frame.out_of(state.cloud)[:, 0]) > 0.48
+    assert border[ends].mean() > 5 * border[~ends].mean()
+
+
+@pytest.mark.parametrize("shape", [torus, sheet])
+def test_poisson_lies_on_the_cloud_and_invents_nothing(shape):
+    sample = shape(4000)
+    state, vertices, faces = reconstructed(poisson, sample.points)
+    np.testing.assert_array_equal(np.unique(faces), np.arange(len(vertices)))
+    distance = cKDTree(state.cloud).query(vertices)[0]
+    step = spacing(state.cloud)
+    assert distance.max() < INVENTED_DISTANCE * step
+    assert np.median(distance) < step
+    whole = umbrellas(len(vertices), faces).mean()
+    assert whole == 1 if shape is torus else 0.8 < whole < 0.99  # the sheet stays open
+    if shape is torus:
+        assert euler_characteristic(len(vertices), faces) == 0
+
+
+def test_the_same_twice():
+    points = torus(1000, noise=0.01).points
+    for by in (ball_pivoting, poisson):
+        first, second = (reconstructed(by, points) for _ in range(2))
+        np.testing.assert_array_equal(first[1], second[1])
+        np.testing.assert_array_equal(first[2], second[2])
+
+
+def test_bare_vertices_go():
+    vertices, faces = without_bare(np.arange(15.0).reshape(5, 3), np.array([[4, 1, 2]]))
+    np.testing.assert_array_equal(vertices, [[3, 4, 5], [6, 7, 8], [12, 13, 14]])
+    assert faces.tolist() == [[2, 0, 1]]
 
 
 # ------------------------------------------------------------------------------------------------- sign and factor
@@ -189,13 +248,13 @@ def test_it_is_the_contractor_where_rings_and_one_rings_are_the_same():
     begun, faces = mesh_state(state, state.cloud, faces)
     centred = state.cloud - state.cloud.mean(axis=0)
     rings = convex_rings(centred, faces)
-    like = Contractor(max_iterations=3, stop=lambda iterations: None)
-    ours = like(replace(begun, rings=rings))
-    theirs = MeshContractor(faces, replace(like, reducer=LPRReducer()))(begun)
+    contractor = Contractor(max_iterations=3, stop=lambda iterations: None)
+    ours = contractor(replace(begun, rings=rings))
+    theirs = contractor.contract(begun, lambda state: mesh_laplacian(state.positions, faces))
     assert len(theirs.report.iterations) == len(ours.report.iterations) == 3
     assert len(theirs) == len(ours) == 400
     np.testing.assert_allclose(theirs.positions, ours.positions, atol=1e-5)
-    assert "reducer=None" in theirs.report.stages[-1]
+    assert theirs.report.stages == begun.report.stages == ()
 
 
 def test_points_without_a_triangle_go_to_the_nearest_with_one():
@@ -223,8 +282,9 @@ def test_the_skeleton_of_a_torus_is_its_axis():
 
 def test_a_reduction_of_its_own_is_left_out_and_a_contractor_is_needed():
     state, _, faces = cloud_and_mesh(torus(800).points)
-    stages = RingBuilder(), Contractor(), LPRReducer(), Connector(), Refiner()
+    stages = RingBuilder(), Contractor(reducer=LPRReducer()), LPRReducer(), Connector(), Refiner()
     skeleton = mesh_skeleton(state, state.cloud, faces, Pipeline(*stages))
-    assert [stage.partition("(")[0] for stage in skeleton.report.stages] == ["MeshContractor", "Connector", "Refiner"]
+    assert [stage.partition("(")[0] for stage in skeleton.report.stages] == ["Contractor", "Connector", "Refiner"]
+    assert skeleton.report.stages[0].startswith("Contractor(reducer=None, ")
     with pytest.raises(InvalidParameterError, match="no Contractor"):
         mesh_skeleton(state, state.cloud, faces, RingBuilder() | Connector())
