@@ -36,20 +36,15 @@ def batch(
     cut_loops: options.CutLoops = False,
     workers: Annotated[int | None, option("N", "Processes; by default one for each core at hand.", min=1)] = None,
     scheduler: Annotated[
-        str | None,
-        option(
-            "ADDRESS|FILE", "Work on a Dask cluster, tcp://host:port or its scheduler file, that sees the same files."
-        ),
+        str | None, option("ADDRESS|FILE", "Work on a Dask cluster: tcp://host:port, or the file of its scheduler.")
     ] = None,
     where: options.Where = None,
     by: Annotated[str | None, option("ATTRIBUTE", "One skeleton for each value of it, such as treeID.")] = None,
     tiles: Annotated[
-        float | None,
-        option("SIZE", "Skeletonise large scenes in tiles of at most this size, and join their skeletons."),
+        float | None, option("SIZE", "Skeletonise scenes in tiles of at most this size, and join them.")
     ] = None,
     overlap: Annotated[
-        float | None,
-        option("LENGTH", "Of tiles: at least 2.7 radii of what crosses their faces; by default an eighth of SIZE."),
+        float | None, option("LENGTH", "Of tiles, at least 2.7 radii of what is cut; by default an eighth of SIZE.")
     ] = None,
     force: Annotated[bool, Option("--force", help="Do also what is done already.")] = False,
     dry_run: Annotated[bool, Option("--dry-run", help="Only say what would be done, and why.")] = False,

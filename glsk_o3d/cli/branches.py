@@ -12,9 +12,7 @@ from .outputs import check_outputs
 
 def branches(
     skeleton: SkeletonFile,
-    output: Annotated[
-        list[Path] | None, output_option("CSV", "Write the table, with ends, curvature and torsion; may be repeated.")
-    ] = None,
+    output: Annotated[list[Path] | None, output_option("CSV", "Write the whole table; may be repeated.")] = None,
     root: Root = None,
     as_json: Json = False,
     quiet: Quiet = False,

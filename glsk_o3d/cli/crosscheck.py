@@ -21,9 +21,7 @@ def crosscheck(
         str, option("NAME", "How to make a mesh: ball_pivoting, poisson, or auto: the first where it closes.")
     ] = "auto",
     output: Numbers = None,
-    picture: Annotated[
-        Path | None, option("PNG", "Draw the cloud coloured by disagreement, and both skeletons.")
-    ] = None,
+    picture: Annotated[Path | None, option("PNG", "Draw the disagreement on the cloud, and both skeletons.")] = None,
     pipeline: PipelineName = "default",
     max_points: Annotated[int, option("N", "Thin larger clouds to so many points; 0 for no limit.")] = 16384,
     drop_invalid: DropInvalid = False,
@@ -48,7 +46,7 @@ def crosscheck(
     if mesh is not None and method != "auto":
         raise WrongUsage("--mesh gives a mesh: there is none to make with --method")
     check_outputs([(output, *REPORT_FILE), (picture, *PICTURE_FILE)], scan, mesh)
-    chosen = choose(pipeline, None, (), drop_invalid)
+    chosen = choose(pipeline, drop_invalid=drop_invalid)
     with progress(not quiet and not verbose) as update:
         update(f"reading {scan.name}")
         load_open3d()

@@ -28,7 +28,7 @@ def demo(
     from ..interop.packages import import_open3d, require_for
     from .overrides import choose
 
-    chosen = choose(pipeline, None, (), False)
+    chosen = choose(pipeline)
     if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(f"{folder}: is a file, not a folder")
     folder.mkdir(parents=True, exist_ok=True)

@@ -43,9 +43,7 @@ def evaluate(
         Path | None, option("FILE", "Also compare with a known axis: npz with nodes, edges and radii, or a skeleton.")
     ] = None,
     output: Numbers = None,
-    preview: Annotated[
-        Path | None, option("PNG", "Draw the skeleton coloured by its error, or by its centredness.")
-    ] = None,
+    preview: Annotated[Path | None, option("PNG", "Draw the skeleton coloured by error or centredness.")] = None,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,

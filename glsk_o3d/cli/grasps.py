@@ -32,26 +32,18 @@ def grasps(
     opening: Annotated[float, option("LENGTH", "Of the gripper, at its widest.")],
     cloud: Annotated[Path | None, option("FILE", "All points of the object, where the skeleton has none.")] = None,
     scene: Annotated[list[Path] | None, option("FILE", "Points of what else is there; may be repeated.")] = None,
-    plane: Annotated[
-        list[str] | None, option("A,B,C,D", "A table, where ax + by + cz + d = 0; may be repeated.")
-    ] = None,
-    cone: Annotated[
-        str | None, option("DIRECTION,DEGREES", "Come in no farther from this: -z,60, or 0,0.5,-1,60.")
-    ] = None,
-    up: Annotated[
-        str | None, option("DIRECTION", "Of what is above: z, or x,y,z. Else against the cone, or z.")
-    ] = None,
+    plane: Annotated[list[str] | None, option("A,B,C,D", "A table, ax + by + cz + d = 0; may be repeated.")] = None,
+    cone: Annotated[str | None, option("DIRECTION,DEGREES", "Come in no farther from this, such as -z,60.")] = None,
+    up: Annotated[str | None, option("DIRECTION", "What is up: z, or x,y,z. Else against the cone, or z.")] = None,
     clearance: Annotated[
-        float | None, option("LENGTH", "Half of it on each side of the part; a tenth of the opening.")
+        float | None, option("LENGTH", "Half on each side; by default a tenth of the opening.")
     ] = None,
-    finger: Annotated[
-        str | None, option("THICKNESS,WIDTH,LENGTH", "Of a finger; else as the Franka Hand has it.")
-    ] = None,
+    finger: Annotated[str | None, option("THICKNESS,WIDTH,LENGTH", "By default as the Franka Hand has it.")] = None,
     palm: Annotated[str | None, option("EXTENT,WIDTH,DEPTH", "Of the hand behind the fingers; else the same.")] = None,
     min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.5,
     count: Annotated[int, option("N", "So many of the best.", "-n", min=1)] = 20,
     output: Annotated[
-        list[Path] | None, output_option("FILE", "Write them: json, csv, ply to look at; may be repeated.")
+        list[Path] | None, output_option("FILE", "json, csv, or ply to look at; may be repeated.")
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,

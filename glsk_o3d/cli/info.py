@@ -24,9 +24,7 @@ EXTENT_DIGITS = 6  # fitted: of coordinates, counted from the size of the cloud 
 
 
 def info(
-    file: Annotated[
-        Path | None, argument("[FILE]", "A cloud, a mesh or a skeleton. Without one: the formats read and written.")
-    ] = None,
+    file: Annotated[Path | None, argument("[FILE]", "A cloud, mesh or skeleton; or none, for the formats.")] = None,
     where: Where = None,
     as_json: Json = False,
     quiet: Quiet = False,

@@ -17,7 +17,9 @@ from .reporting import WrongUsage
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 
 
-def choose(pipeline: str, recipe: Path | None, settings: Iterable[str], drop_invalid: bool) -> Pipeline:
+def choose(
+    pipeline: str, recipe: Path | None = None, settings: Iterable[str] = (), drop_invalid: bool = False
+) -> Pipeline:
     """The pipeline, from a cloud to a skeleton, that the options of a command ask for."""
     if recipe is not None and pipeline != "default":
         raise WrongUsage(f"--recipe {recipe} and --pipeline {pipeline}: give one of them")

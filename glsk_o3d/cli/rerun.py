@@ -15,9 +15,7 @@ from .running import print_results, run
 
 def rerun(
     result: Annotated[Path, argument("RESULT", "A skeleton that 'glsk skeletonize' wrote as json or npz.")],
-    scan: Annotated[
-        Path | None, argument("SCAN", "Another cloud to run it on; by default the points in the result.")
-    ] = None,
+    scan: Annotated[Path | None, argument("SCAN", "Another cloud to run it on, instead of its points.")] = None,
     output: Output = None,
     preview: Preview = None,
     report: ReportPage = None,

@@ -15,14 +15,10 @@ from .reporting import WrongUsage, load_open3d
 
 def rig(
     skeleton: SkeletonFile,
-    mesh: Annotated[
-        Path | None, argument("MESH", "What it moves: a mesh, or a cloud. By default the skeleton's tubes.")
-    ] = None,
+    mesh: Annotated[Path | None, argument("MESH", "A mesh or a cloud; by default the skeleton's tubes.")] = None,
     output: Annotated[list[Path] | None, output_option("GLB", "Where to write the rig: binary glTF.")] = None,
     root: Annotated[Any, root_option("Which joint moves all others")] = None,
-    cut_loops: Annotated[
-        bool, Option("--cut-loops", help="Cut loops of the skeleton open; the surface stays whole.")
-    ] = False,
+    cut_loops: Annotated[bool, Option("--cut-loops", help="Cut loops open; the surface stays whole.")] = False,
     up: Annotated[str, option("AXIS", "Which axis of the data points up: z or y.")] = "z",
     quiet: Quiet = False,
     verbose: Verbose = False,

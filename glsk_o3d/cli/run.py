@@ -20,18 +20,11 @@ def run(
     scan: Annotated[Path | None, argument("SCAN", "The cloud or mesh it starts from.")] = None,
     output: Annotated[
         list[Path] | None,
-        output_option(
-            "FILE",
-            "Where to write the last layer: a skeleton as in 'glsk skeletonize', points as ply, pcd or xyz, a mesh as "
-            "ply, obj, off or stl; may be repeated.",
-        ),
+        output_option("FILE", "The last layer: a skeleton, points (ply, pcd, xyz) or a mesh (ply, obj, off, stl)."),
     ] = None,
     listed: Annotated[bool, Option("--list", help="List the scripts that come with the package.")] = False,
     any_filter: Annotated[
-        bool,
-        Option(
-            "--any-meshlab-filter", help="Run also filters that write, read or send files, of scripts that you trust."
-        ),
+        bool, Option("--any-meshlab-filter", help="Trust the script: filters may write, read and send files.")
     ] = False,
     cut_loops: CutLoops = False,
     as_json: Json = False,

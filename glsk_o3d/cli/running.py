@@ -17,13 +17,6 @@ if TYPE_CHECKING:
     from ..report import IterationRecord, Report
     from ..skeleton import Skeleton
 
-_DOING = {
-    "RingBuilder": "building rings",
-    "Contractor": "contracting",
-    "LPRReducer": "merging points",
-    "Connector": "connecting",
-    "Refiner": "refining",
-}
 _ITERATIONS = {  # head of a column, field of IterationRecord, format
     "solve": ("iteration", "d"),
     "points": ("n_points", "d"),
@@ -44,7 +37,7 @@ def run(pipeline: Callable[..., Skeleton], cloud: Any, update, on_state=None) ->
 
     def on_stage(stage):
         nonlocal doing, most
-        doing, most = _DOING.get(type(stage).__name__, type(stage).__name__), getattr(stage, "max_iterations", None)
+        doing, most = type(stage).__name__, getattr(stage, "max_iterations", None)
         update(doing)
 
     def on_iteration(record):

@@ -39,16 +39,9 @@ def skeletonize(
     labelled: Annotated[
         Path | None, option("CLOUD", "Also write the scan with branch, radius, ... of every point: ply, pcd or npz.")
     ] = None,
-    save_recipe: Annotated[
-        Path | None, option("FILE", "Also write the pipeline as run to a json or toml file.")
-    ] = None,
+    save_recipe: Annotated[Path | None, option("FILE", "Also write the pipeline to a json or toml file.")] = None,
     stream: Annotated[
-        bool | None,
-        Option(
-            "--stream/--no-stream",
-            help="Read only a sample of the scan, in little memory; by default if it has over ten million points.",
-            show_default=False,
-        ),
+        bool | None, Option("--stream/--no-stream", help="Read only a sample; by default if over ten million points.")
     ] = None,
     support: Annotated[
         int | None, option("SAMPLES", "Also skeletonise so many samples, and say what they share; 8 are enough.", min=2)

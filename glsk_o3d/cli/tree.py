@@ -29,16 +29,10 @@ def tree(
     skeleton: Annotated[Path, argument("SKELETON", "Of a tree, with radii: 'glsk skeletonize --pipeline tree'.")],
     output: Annotated[
         list[Path] | None,
-        output_option(
-            "FILE",
-            "Write the cylinders: csv in the file's units; in metres qsm.csv for rTwig, mat for TreeQSM, txt for "
-            "treetools; may be repeated.",
-        ),
+        output_option("FILE", "Write cylinders: csv, or in metres qsm.csv (rTwig), mat (TreeQSM), txt (treetools)."),
     ] = None,
     root: Root = None,
-    up: Annotated[
-        str | None, option("AXIS", "What points up: x to -z. By default the axis that the tree was grown along, or z.")
-    ] = None,
+    up: Annotated[str | None, option("AXIS", "What points up, x to -z; else as it was grown, or z.")] = None,
     unit: Annotated[str, option("UNIT", "One unit of the file: m, cm, mm, in or ft, or its metres.")] = "m",
     as_json: Json = False,
     quiet: Quiet = False,
