@@ -4,112 +4,49 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
-import sys
-import textwrap
-from collections.abc import Callable, Iterator, Mapping
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cache
 from typing import Any
 
 import typer
-from typer.core import TyperGroup
 
-# A terminal obeys these wherever they come from, the name of a file or a label in one; or shows text in another order.
-_CONTROLS = [*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A)]
-_SHOWN = {code: repr(chr(code))[1:-1] for code in _CONTROLS if chr(code) not in "\n\t"}
-_IN_JSON = {code: f"\\u{code:04x}" for code in _SHOWN if code > 0x20}  # the others json writes so itself
+UNBROKEN = 10**5  # more characters than a line of a table has
 
 
 def visible(text: str) -> str:
-    """Text with its control characters, but line ends and tabs, written as Python writes them.
+    """Text with its control characters, but line ends and tabs, written as Python writes them: terminals obey them.
 
     Examples
     --------
     >>> print(visible("a\x1b[2Jb"))
     a\\x1b[2Jb
     """
-    return text.translate(_SHOWN)
+    return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", lambda found: repr(found[0])[1:-1], text)
 
 
 def echo(text: str = "", *, err: bool = False) -> None:
-    """Print lines on stdout, or stderr, with control characters visible: all text goes out here or by `console`."""
+    """Print lines on stdout, or stderr."""
     typer.echo(visible(text), err=err)
-
-
-def console(*, stderr: bool = False) -> Any:
-    """A rich console that prints text as it is, without markup or highlighting, and with control characters visible."""
-    return _console_class()(stderr=stderr, markup=False, highlight=False, emoji=False)
-
-
-@cache
-def _console_class() -> type:
-    from rich.console import Console
-    from rich.segment import Segment
-
-    class VisibleConsole(Console):
-        def render(self, renderable: Any, options: Any = None) -> Iterator[Any]:
-            for text, style, control in super().render(renderable, options):
-                yield Segment(text if control else visible(text), style, control)
-
-    return VisibleConsole
-
-
-class VisibleGroup(TyperGroup):
-    """Commands of which the mistakes that typer itself finds on the command line are told with `visible` words.
-
-    A file that may not be read is no mistake in the command line: it is said as other errors are, in one line.
-    """
-
-    def make_context(self, *args: Any, **options: Any) -> Any:
-        with _visible_mistakes():
-            return super().make_context(*args, **options)
-
-    def invoke(self, ctx: Any) -> Any:
-        with _visible_mistakes():
-            return super().invoke(ctx)
-
-
-@contextmanager
-def _visible_mistakes() -> Iterator[None]:
-    try:
-        yield
-    except Exception as error:  # typer's own have no public base
-        if isinstance(message := getattr(error, "message", None), str):
-            if message.endswith("is not readable."):
-                say("error", message.removesuffix("."))
-                raise typer.Exit(1) from None
-            told = visible(message)
-            if message.startswith("Got unexpected extra argument") and _takes_outputs(getattr(error, "ctx", None)):
-                told = f"{told.rstrip('.')}: a file to write comes after -o"
-            error.message = told  # type: ignore[attr-defined]
-        raise
-
-
-def _takes_outputs(context: Any) -> bool:
-    return context is not None and any("-o" in parameter.opts for parameter in context.command.params)
-
-
-def print_table(table: Any, *, stderr: bool = False, whole: bool = False) -> None:
-    """Print a rich table without the spaces that fill its lines; a `whole` one is as wide as it is, whatever the
-    terminal.
-    """
-    out = console(stderr=stderr)
-    if whole:
-        out.width = 10**4
-    with out.capture() as captured:
-        out.print(table)
-    # not by `echo`: where there are colours, the console has put control characters in, and no others are left
-    typer.echo("\n".join(line.rstrip() for line in captured.get().removesuffix("\n").split("\n")), err=stderr)
 
 
 def say(kind: str, message: str) -> None:
     """Print one line to stderr, yellow for a "warning" and red for an "error"; other kinds are "info" and "debug"."""
-    from rich.text import Text
-
     style = {"error": "red", "warning": "yellow"}.get(kind, "dim")
     prefix = f"glsk: {kind}: " if kind in ("error", "warning") else "glsk: "
-    console(stderr=True).print(Text(prefix + " ".join(message.split()), style=style), soft_wrap=True)
+    console(stderr=True).print(prefix + visible(" ".join(message.split())), style=style, soft_wrap=True)
+
+
+def heading(text: str) -> None:
+    """Print a bold line on stdout."""
+    console().print(visible(text), style="bold", soft_wrap=True)
+
+
+def console(*, stderr: bool = False) -> Any:
+    """A rich console that prints text as it is, without markup or highlighting."""
+    from rich.console import Console
+
+    return Console(stderr=stderr, markup=False, highlight=False, emoji=False)
 
 
 @contextmanager
@@ -119,29 +56,55 @@ def progress(shown: bool, *, remaining: bool = False) -> Iterator[Callable[..., 
     Gives ``update(text, done=None, total=None)``; without numbers the bar only moves. With `remaining` it also says how
     many are done of how many, and how long the others will take.
     """
-    if not (shown and sys.stderr is not None and sys.stderr.isatty()):
+    out = console(stderr=True)
+    if not (shown and out.file.isatty()):
         yield lambda text, done=None, total=None: None
         return
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        SpinnerColumn,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich import progress as bar
 
-    columns = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn()]
+    columns: list[Any] = ["{task.description}", bar.BarColumn(20), bar.TimeElapsedColumn()]
     if remaining:
-        columns += [MofNCompleteColumn(), TextColumn("left:"), TimeRemainingColumn()]
-    with Progress(*columns, console=console(stderr=True), transient=True) as bars:
+        columns += [bar.MofNCompleteColumn(), "left:", bar.TimeRemainingColumn()]
+    with bar.Progress(bar.SpinnerColumn(), *columns, console=out, transient=True) as bars:
         task = bars.add_task("starting", total=None)
 
         def update(text, done=None, total=None):
-            bars.update(task, description=text, completed=done or 0, total=total)
+            bars.update(task, description=visible(text), completed=done or 0, total=total)
 
         yield update
+
+
+def print_table(
+    rows: Iterable[Sequence[str]],
+    heads: Sequence[str] = (),
+    *,
+    left: Collection[int] = (),
+    wrap: bool = False,
+    err: bool = False,
+) -> None:
+    """Print rows of words below each other, those in the columns `left` to the left, all so where there are no `heads`.
+
+    The last column is broken to the width of the terminal, or of 80 where there is none, if `wrap` says so.
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    rows = list(rows)
+    table = Table.grid(padding=(0, 2, 0, 0))
+    if heads:
+        table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="")
+    width = len(heads or next(iter(rows), ()))
+    for i in range(width):
+        to_left = not heads or i in left
+        table.add_column(heads[i] if heads else "", justify="left" if to_left else "right", no_wrap=i < width - 1)
+    for row in rows:
+        table.add_row(*row)
+    out = console()
+    if not wrap:
+        out.width = UNBROKEN
+    with out.capture() as captured:
+        out.print(table)
+    echo("\n".join(line.rstrip() for line in captured.get().removesuffix("\n").split("\n")), err=err)
 
 
 def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
@@ -150,49 +113,15 @@ def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
     Those that are None are left out; floats are printed with six digits.
     """
     if title:
-        console().print(title, style="bold", soft_wrap=True)
+        heading(title)
     shown = {name.replace("_", " "): value for name, value in rows.items() if value is not None}
-    indent = max(map(len, shown)) + 2
-    room = (
-        max(shutil.get_terminal_size().columns - indent, 20)
-        if sys.stdout is not None and sys.stdout.isatty()
-        else 10**6
-    )
-    for name, value in shown.items():
-        text = f"{value:.6g}" if isinstance(value, float) else str(value)
-        lines = [part for line in text.splitlines() for part in textwrap.wrap(line, room, drop_whitespace=False)]
-        echo(f"{name:<{indent}}" + f"\n{'':<{indent}}".join(lines))
-
-
-def print_iterations(records, *, stderr: bool = False) -> None:
-    """Print a contraction's iterations as a table."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    if not records:
-        return
-    columns = {
-        "solve": ("iteration", "d"),
-        "points": ("n_points", "d"),
-        "merged": ("n_merged", "d"),
-        "e": ("explained", ".4f"),
-        "De": ("explained_change", ".4f"),
-        "rings": ("ring_ratio", ".4f"),
-        "w_L": ("contraction_weight", ".4g"),
-        "error": ("solve_error", ".1e"),
-        "seconds": ("seconds", ".3f"),
-    }
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, header_style="")
-    for head in columns:
-        table.add_column(head, justify="right")
-    for record in records:
-        table.add_row(*(format(getattr(record, name), form) for name, form in columns.values()))
-    print_table(table, stderr=stderr)
+    words = ((name, f"{value:.6g}" if isinstance(value, float) else str(value)) for name, value in shown.items())
+    print_table(words, wrap=console().file.isatty())
 
 
 def print_json(data: Any) -> None:
     """Print JSON on stdout; numbers that are not finite become null."""
-    typer.echo(json.dumps(_finite(data), indent=2, ensure_ascii=False, allow_nan=False).translate(_IN_JSON))
+    typer.echo(json.dumps(_finite(data), indent=2, allow_nan=False))
 
 
 def _finite(data):

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from .console import echo, print_json, print_table
-from .options import Json, Quiet, Verbose
-from .reporting import WrongUsage, reporting
+from .options import Json, Quiet, Verbose, argument, option, output_option
+from .outputs import check_outputs, tell_files
+from .reporting import WrongUsage
 
 if TYPE_CHECKING:
     import numpy as np
@@ -28,43 +28,22 @@ PRINTED_GRASP = {
 
 
 def grasps(
-    skeleton: Annotated[
-        Path, typer.Argument(metavar="SKELETON", help="Of the object; JSON and npz files know its points.")
-    ],
-    opening: Annotated[float, typer.Option(metavar="LENGTH", help="Of the gripper, at its widest.")],
-    cloud: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="All points of the object, where the skeleton has none.")
-    ] = None,
-    scene: Annotated[
-        list[Path] | None, typer.Option(metavar="FILE", help="Points of what else is there; may be repeated.")
-    ] = None,
-    plane: Annotated[
-        list[str] | None,
-        typer.Option(metavar="A,B,C,D", help="A table, where ax + by + cz + d = 0; may be repeated."),
-    ] = None,
-    cone: Annotated[
-        str | None,
-        typer.Option(metavar="DIRECTION,DEGREES", help="Come in no farther from this: -z,60, or 0,0.5,-1,60."),
-    ] = None,
-    up: Annotated[
-        str | None,
-        typer.Option(metavar="DIRECTION", help="Of what is above: z, or x,y,z. Else against the cone, or z."),
-    ] = None,
+    skeleton: Annotated[Path, argument("SKELETON", "Of the object; JSON and npz files know its points.")],
+    opening: Annotated[float, option("LENGTH", "Of the gripper, at its widest.")],
+    cloud: Annotated[Path | None, option("FILE", "All points of the object, where the skeleton has none.")] = None,
+    scene: Annotated[list[Path] | None, option("FILE", "Points of what else is there; may be repeated.")] = None,
+    plane: Annotated[list[str] | None, option("A,B,C,D", "A table, ax + by + cz + d = 0; may be repeated.")] = None,
+    cone: Annotated[str | None, option("DIRECTION,DEGREES", "Come in no farther from this, such as -z,60.")] = None,
+    up: Annotated[str | None, option("DIRECTION", "What is up: z, or x,y,z. Else against the cone, or z.")] = None,
     clearance: Annotated[
-        float | None,
-        typer.Option(metavar="LENGTH", help="Half of it on each side of the part; a tenth of the opening."),
+        float | None, option("LENGTH", "Half on each side; by default a tenth of the opening.")
     ] = None,
-    finger: Annotated[
-        str | None, typer.Option(metavar="THICKNESS,WIDTH,LENGTH", help="Of a finger; else as the Franka Hand has it.")
-    ] = None,
-    palm: Annotated[
-        str | None, typer.Option(metavar="EXTENT,WIDTH,DEPTH", help="Of the hand behind the fingers; else the same.")
-    ] = None,
-    min_confidence: Annotated[float, typer.Option(metavar="SHARE", help="Of the skeleton, from 0 to 1.")] = 0.5,
-    count: Annotated[int, typer.Option("-n", min=1, metavar="N", help="So many of the best.")] = 20,
+    finger: Annotated[str | None, option("THICKNESS,WIDTH,LENGTH", "By default as the Franka Hand has it.")] = None,
+    palm: Annotated[str | None, option("EXTENT,WIDTH,DEPTH", "Of the hand behind the fingers; else the same.")] = None,
+    min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.5,
+    count: Annotated[int, option("N", "So many of the best.", "-n", min=1)] = 20,
     output: Annotated[
-        list[Path] | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write them: json, csv, ply to look at; may be repeated."),
+        list[Path] | None, output_option("FILE", "json, csv, or ply to look at; may be repeated.")
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -76,36 +55,35 @@ def grasps(
     or the palm would meet points of the object or of the scene, or the far side of a plane, on a straight way in. What
     was not scanned is taken for free.
     """
-    with reporting(quiet=quiet, verbose=verbose):
-        from ..analysis import Gripper, grasp_candidates
-        from ..io.scans import read_cloud
-        from ..io.skeletons import read_skeleton
-        from .outputs import check_findings
+    from .. import read_cloud, read_skeleton
+    from ..analysis import Gripper, grasp_candidates
 
-        files = [(path, GRASP_ENDINGS, "grasps are JSON, CSV or PLY") for path in output or []]
-        check_findings(files, skeleton, cloud, *(scene or []))
-        planes = [_numbers("--plane", text, 4) for text in plane or []]
-        shape = {name: _numbers(f"--{name}", text, 3) for name, text in (("finger", finger), ("palm", palm)) if text}
-        gripper = Gripper(opening, finger=shape.get("finger"), palm=shape.get("palm"))
-        found = grasp_candidates(
-            read_skeleton(skeleton),
-            gripper,
-            cloud=None if cloud is None else read_cloud(cloud),
-            obstacles=[*planes, *map(read_cloud, scene or [])],
-            clearance=clearance,
-            min_confidence=min_confidence,
-            cone=_cone(cone),
-            up=None if up is None else _direction("--up", up),
-        )
-        best = found[:count]
-        for path in output or []:
-            {".json": best.to_json, ".csv": best.to_csv, ".ply": best.to_ply}[path.suffix.lower()](path)
-        if as_json:
-            print_json({"skeleton": str(skeleton), "found": len(found), **best.as_dict()})
-        elif not quiet:
-            _print(best, len(found))
-            for path in output or []:
-                echo(f"wrote {path}")
+    files = [(path, GRASP_ENDINGS, "grasps are JSON, CSV or PLY") for path in output or []]
+    check_outputs(files, skeleton, cloud, *(scene or []))
+    planes = [_numbers("--plane", text, 4) for text in plane or []]
+    gripper = Gripper(
+        opening,
+        finger=None if finger is None else _numbers("--finger", finger, 3),
+        palm=None if palm is None else _numbers("--palm", palm, 3),
+    )
+    found = grasp_candidates(
+        read_skeleton(skeleton),
+        gripper,
+        cloud=None if cloud is None else read_cloud(cloud),
+        obstacles=[*planes, *map(read_cloud, scene or [])],
+        clearance=clearance,
+        min_confidence=min_confidence,
+        cone=None if cone is None else _cone(cone),
+        up=None if up is None else _direction("--up", up),
+    )
+    best = found[:count]
+    for path in output or []:
+        {".json": best.to_json, ".csv": best.to_csv, ".ply": best.to_ply}[path.suffix.lower()](path)
+    if as_json:
+        print_json({"skeleton": str(skeleton), "found": len(found), **best.as_dict()})
+    elif not quiet:
+        _print(best, len(found))
+        tell_files(output, quiet=quiet)
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
@@ -126,32 +104,22 @@ def _direction(option: str, text: str) -> tuple[float, ...]:
     return _numbers(option, text, 3)
 
 
-def _cone(text: str | None) -> tuple[tuple[float, ...], float] | None:
-    if text is None:
-        return None
+def _cone(text: str) -> tuple[tuple[float, ...], float]:
     direction, _, degrees = text.rpartition(",")
     return _direction("--cone", direction), _numbers("--cone", degrees, 1)[0]
 
 
 def _print(best: GraspCandidates, found: int) -> None:
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
     echo(f"{found} grasps at {best.places} places")
     for reason, times in best.left_out.items():
         limit = " (confidence below --min-confidence)" if reason == "uncertain" else ""
         echo(f"left out: {times} {reason}{limit}")
-    if not len(best):
-        return
-    shown = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="")
-    for name in PRINTED_GRASP:
-        shown.add_column(name, justify="right")
-    for cells in zip(*(_cells(getattr(best, name), form) for name, form in PRINTED_GRASP.items()), strict=True):
-        shown.add_row(*cells)
-    print_table(shown, whole=True)
+    if len(best):
+        columns = [_cells(getattr(best, name), form) for name, form in PRINTED_GRASP.items()]
+        print_table(list(zip(*columns, strict=True)), list(PRINTED_GRASP))
 
 
-def _cells(values: np.ndarray, form: str) -> list[str]:
+def _cells(values: np.ndarray, form: str) -> Sequence[str]:
     """A column of the table; numbers of one direction stand below each other."""
     from ..judgements import coordinates
 

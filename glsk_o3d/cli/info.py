@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections import Counter
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from .console import print_iterations, print_json, print_rows
-from .options import Json, Quiet, Verbose, Where
-from .reporting import holding_interrupts, reporting
+from .console import print_json, print_rows
+from .options import Json, Quiet, Verbose, Where, argument
+from .reporting import load_open3d
+from .running import print_iterations
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ..io.clouds.scanned import Scan
     from ..skeleton import Skeleton
 
@@ -22,147 +24,100 @@ EXTENT_DIGITS = 6  # fitted: of coordinates, counted from the size of the cloud 
 
 
 def info(
-    file: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="[FILE]",
-            help="A cloud, a mesh or a skeleton. Without one: the formats that are read and written.",
-        ),
-    ] = None,
+    file: Annotated[Path | None, argument("[FILE]", "A cloud, mesh or skeleton; or none, for the formats.")] = None,
     where: Where = None,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Say what is in a cloud or skeleton file."""
-    with reporting(quiet=quiet, verbose=verbose):
-        from ..io.clouds.blocks import promised_points, read_blocks
-        from ..io.scans import read_scan
-        from ..io.skeletons import holds_skeleton, read_skeleton
-        from ..io.streaming import LARGE_CLOUD
+    from ..io.skeletons import holds_skeleton, read_skeleton
 
-        if file is None:
-            _formats(as_json)
-            return
-        if holds_skeleton(file):
-            skeleton = read_skeleton(file)
-            told = skeleton_facts(skeleton)
-            records = skeleton.report.iterations
-        else:
-            if (promised_points(file) or 0) > LARGE_CLOUD:
-                told = large_facts(read_blocks(file, where=where))
-            else:
-                with holding_interrupts():
-                    scan = read_scan(file, where)
-                told = cloud_facts(scan)
-            records = ()
-        if as_json:
-            iterations = {"iterations": skeleton.report.to_dict()["iterations"]} if records else {}
-            print_json({"file": str(file), **told, **iterations})
-            return
-        if quiet:
-            return
-        if told.get("repeatable"):
-            told["stages"] = _in_short(told["stages"], skeleton.report.recipe)
-        print_rows({name: _words(value, name) for name, value in _in_words(told).items()}, title=str(file))
-        if records:
-            print_iterations(records)
+    iterations: Any = ()
+    if file is None:
+        shown = facts = _formats()
+    elif holds_skeleton(file):
+        skeleton = read_skeleton(file)
+        facts, iterations = _skeleton_facts(skeleton), skeleton.report.iterations
+        shown = _skeleton_in_words(facts, skeleton)
+    else:
+        facts = _cloud_facts(file, where)
+        shown = _cloud_in_words(facts)
+    if as_json:
+        head = {"file": str(file)} if file else {}
+        tail = {"iterations": list(map(asdict, iterations))} if iterations else {}
+        print_json({**head, **facts, **tail})
+    elif not quiet or file is None:
+        print_rows({name: _words(value) for name, value in shown.items()}, title=str(file or ""))
+        print_iterations(iterations)
 
 
-def _formats(as_json: bool) -> None:
-    """Print the endings that are read and written, and what is missing for some."""
+def _formats() -> dict[str, Any]:
+    """The endings that are read and written, and what is missing for some."""
     from ..errors import MissingPackageError
     from ..interop.packages import require_for
     from ..io.paths import CLOUD_ENDINGS, MESH_ENDINGS
     from ..io.skeletons import FORMATS, READABLE
 
-    kinds = {"clouds": CLOUD_ENDINGS, "meshes": MESH_ENDINGS, "skeletons": READABLE}
     lacking = {}
-    for ending in (ending for endings in kinds.values() for ending in endings):
+    for ending in (*CLOUD_ENDINGS, *MESH_ENDINGS, *READABLE):
         try:
             require_for(ending)
         except MissingPackageError as error:
             lacking[ending] = str(error)
-    written = [ending for ending in FORMATS if ending not in READABLE]
-    if as_json:
-        print_json({**kinds, "only_written": written, "lacking": lacking})
-        return
-    rows: dict[str, Any] = {f"{kind} read": " ".join(endings) for kind, endings in kinds.items()}
-    rows |= {"only written": " ".join(written), "lacking": "\n".join(map(": ".join, lacking.items())) or None}
-    print_rows(rows)
+    written = tuple(ending for ending in FORMATS if ending not in READABLE)
+    kinds = {"clouds": CLOUD_ENDINGS, "meshes": MESH_ENDINGS, "skeletons": READABLE}
+    return {**kinds, "only_written": written, "lacking": lacking}
 
 
-def cloud_facts(scan: Scan) -> dict[str, Any]:
+def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
     """What there is to know about a cloud, or the vertices of a mesh, before skeletonising it.
 
-    Lengths are in the cloud's units; the spacing is the median distance of a point to the nearest other one.
+    Lengths are in the cloud's units. A large cloud is read in blocks, which say nothing of duplicates and the spacing.
     """
     import numpy as np
-    from scipy.spatial import KDTree
 
-    points = scan.positions
-    finite = points[np.isfinite(points).all(axis=1)]
-    distinct = np.unique(finite, axis=0)
-    low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (np.full(3, np.nan),) * 2
-    spacing = np.nan
-    if len(distinct) > 1:
-        spacing = np.median(KDTree(distinct).query(distinct, k=2)[0][:, 1])
-    return {
-        "kind": "cloud",
-        "points": len(points),
-        "triangles": len(scan.triangles) or None,
-        "not_finite": len(points) - len(finite),
-        "duplicates": len(finite) - len(distinct),
-        "lowest": low.tolist(),
-        "highest": high.tolist(),
-        "diagonal": float(np.linalg.norm(high - low)),
-        "median_spacing": float(spacing),
-        "colours": scan.colors is not None,
-        "normals": scan.normals is not None,
-        "attributes": {name: _attribute(values) for name, values in scan.given.items()} or None,
-    }
+    from ..io.clouds.blocks import promised_points, read_blocks
+    from ..io.scans import read_scan
+    from ..io.streaming import LARGE_CLOUD
 
-
-def large_facts(blocks: Iterable[Scan]) -> dict[str, Any]:
-    """The same for a cloud in blocks, but for what only all of its points together say: duplicates, and spacing."""
-    import numpy as np
-
-    n, lost, ends, known = 0, 0, [], dict[str, dict[str, Any]]()
-    unset: set[str] = set()
-    for i, block in enumerate(blocks):
+    load_open3d()
+    large = (promised_points(file) or 0) > LARGE_CLOUD
+    n, lost, ends, unset = 0, 0, [], []
+    known: dict[str, dict[str, Any]] = {}
+    for block in read_blocks(file, where=where) if large else [read_scan(file, where)]:
         finite = block.positions[np.isfinite(block.positions).all(axis=1)]
         n, lost = n + len(block), lost + len(block) - len(finite)
         ends += [finite.min(axis=0), finite.max(axis=0)] if len(finite) else []
-        unset = unset & block.unset if i else set(block.unset)
+        unset.append(block.unset)
         for name, values in block.attributes.items():
-            told = _attribute(values)
-            known[name] = _together(known[name], told) if name in known else told
+            facts = _attribute(values)
+            known[name] = _together(known[name], facts) if name in known else facts
     low, high = (np.min(ends, axis=0), np.max(ends, axis=0)) if ends else (np.full(3, np.nan),) * 2
+    never_set = frozenset.intersection(*unset)
     return {
         "kind": "cloud",
         "points": n,
         "not_finite": lost,
+        **({} if large else _facts_of_whole(block, finite)),
         "lowest": low.tolist(),
         "highest": high.tolist(),
         "diagonal": float(np.linalg.norm(high - low)),
         "colours": block.colors is not None,
         "normals": block.normals is not None,
-        "attributes": {name: facts for name, facts in known.items() if name not in unset} or None,
+        "attributes": {name: facts for name, facts in known.items() if name not in never_set} or None,
     }
 
 
-def _together(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
-    """What two blocks say of an attribute: how many points have each value only while these are few."""
-    some = [each for each in (one, other) if "lowest" in each]
-    told: dict[str, Any] = {}
-    if some:
-        told = {"lowest": min(each["lowest"] for each in some), "highest": max(each["highest"] for each in some)}
-    if "counts" in one and "counts" in other:
-        both = one["counts"] | other["counts"]
-        counts = {name: one["counts"].get(name, 0) + other["counts"].get(name, 0) for name in both}
-        if len(counts) <= FEW_VALUES:
-            told |= {"distinct": len(counts), "counts": {name: counts[name] for name in sorted(counts, key=float)}}
-    return told
+def _facts_of_whole(scan: Scan, finite: np.ndarray) -> dict[str, Any]:
+    """What only all points of a cloud together say; the spacing is the median distance to the nearest other point."""
+    import numpy as np
+    from scipy.spatial import KDTree
+
+    distinct = np.unique(finite, axis=0)
+    spacing = np.median(KDTree(distinct).query(distinct, k=2)[0][:, 1]) if len(distinct) > 1 else np.nan
+    duplicates = len(finite) - len(distinct)
+    return {"triangles": len(scan.triangles) or None, "duplicates": duplicates, "median_spacing": float(spacing)}
 
 
 def _attribute(values: Any) -> dict[str, Any]:
@@ -171,15 +126,45 @@ def _attribute(values: Any) -> dict[str, Any]:
 
     known = values[np.isfinite(values)] if values.dtype.kind == "f" else values
     distinct, counts = np.unique(known, return_counts=True)
-    told: dict[str, Any] = {"distinct": len(distinct)}
+    facts: dict[str, Any] = {"distinct": len(distinct)}
     if len(distinct):
-        told |= {"lowest": distinct[0].item(), "highest": distinct[-1].item()}
+        facts |= {"lowest": distinct[0].item(), "highest": distinct[-1].item()}
     if len(distinct) <= FEW_VALUES:
-        told["counts"] = {f"{value:.10g}": n for value, n in zip(distinct.tolist(), counts.tolist(), strict=True)}
-    return told
+        facts["counts"] = {f"{value:.10g}": n for value, n in zip(distinct.tolist(), counts.tolist(), strict=True)}
+    return facts
 
 
-def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
+def _together(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    """What two blocks say of an attribute: how many points have each value only while these are few."""
+    facts: dict[str, Any] = {}
+    known = [each for each in (one, other) if "lowest" in each]
+    if known:
+        facts = {"lowest": min(each["lowest"] for each in known), "highest": max(each["highest"] for each in known)}
+    if "counts" in one and "counts" in other:
+        counts = Counter(one["counts"]) + Counter(other["counts"])
+        if len(counts) <= FEW_VALUES:
+            facts |= {"distinct": len(counts), "counts": {name: counts[name] for name in sorted(counts, key=float)}}
+    return facts
+
+
+def _cloud_in_words(facts: dict[str, Any]) -> dict[str, Any]:
+    """The facts with coordinates of as many digits as the size of the cloud asks for, and attributes as ranges."""
+    diagonal, decimals = facts["diagonal"], EXTENT_DIGITS
+    if math.isfinite(diagonal) and diagonal > 0:
+        decimals = max(EXTENT_DIGITS - math.ceil(math.log10(diagonal)), 0)
+    corners = {name: "  ".join(f"{item:.{decimals}f}" for item in facts[name]) for name in ("lowest", "highest")}
+    ranges = [f"{name} {_range(attribute)}" for name, attribute in (facts["attributes"] or {}).items()]
+    return {**facts, **corners, "attributes": "\n".join(ranges) or None}
+
+
+def _range(attribute: dict[str, Any]) -> str:
+    if "counts" in attribute:
+        return ", ".join(f"{value} ({n} points)" for value, n in attribute["counts"].items()) or "unknown"
+    values = f", {attribute['distinct']} values" if "distinct" in attribute else ""
+    return f"{attribute['lowest']:.10g} to {attribute['highest']:.10g}{values}"
+
+
+def _skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
     """What there is to know about a skeleton and the run that made it; None for what its file lacks."""
     import numpy as np
 
@@ -187,17 +172,17 @@ def skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
 
     report = skeleton.report
     radii = skeleton.radii[np.isfinite(skeleton.radii)]
-    told = {
+    facts = {
         "kind": "skeleton",
         **structure(skeleton),
         "radii": [float(radii.min()), float(radii.max())] if len(radii) else None,
         "points": len(skeleton.points) or None,
     }
     if not report.stages:
-        return told
+        return facts
     return {
-        **told,
-        "stages": [stage for i, stage in enumerate(report.stages) if stage not in report.stages[:i]],
+        **facts,
+        "stages": list(dict.fromkeys(report.stages)),
         "converged": report.converged,
         "stop_reason": report.stop_reason,
         "repeatable": _repeatable(report.recipe),
@@ -219,12 +204,15 @@ def _repeatable(recipe) -> bool:
         return False
 
 
-def _in_short(stages: list[str], recipe: dict[str, Any]) -> list[str]:
-    """The filters of a run with those options alone that are not the default of the filter."""
+def _skeleton_in_words(facts: dict[str, Any], skeleton: Skeleton) -> dict[str, Any]:
+    """The facts with the filters of the run, as far as they can be repeated, with those options that are no default."""
     from ..recipes import from_recipe
 
-    short = {repr(stage): _call(stage) for stage in from_recipe(recipe).stages}
-    return [short.get(stage, stage) for stage in stages]
+    shown = {**facts, "radii": " to ".join(f"{radius:.6g}" for radius in facts["radii"] or []) or None}
+    if facts.get("repeatable"):
+        short = {repr(stage): _call(stage) for stage in from_recipe(skeleton.report.recipe).stages}
+        shown["stages"] = [short.get(stage, stage) for stage in facts["stages"]]
+    return shown
 
 
 def _call(made: Any) -> str:
@@ -233,45 +221,17 @@ def _call(made: Any) -> str:
 
     if not is_dataclass(made):
         return repr(made)
-    given = {field.name: getattr(made, field.name) for field in fields(made) if field.init}
-    chosen = [
-        f"{field.name}={_call(given[field.name])}"
-        for field in fields(made)
-        if given.get(field.name, field.default) != field.default
-    ]
+    options = {field: getattr(made, field.name) for field in fields(made) if field.init}
+    chosen = [f"{field.name}={_call(value)}" for field, value in options.items() if value != field.default]
     return type(made).__name__ + f"({', '.join(chosen)})" * bool(chosen)
 
 
-def _in_words(told: dict[str, Any]) -> dict[str, Any]:
-    """Facts as the table shows them: coordinates with as many digits as the size of the cloud asks for."""
-    told = dict(told)
-    if told.get("radii"):
-        told["radii"] = " to ".join(f"{radius:.6g}" for radius in told["radii"])
-    if told["kind"] == "cloud":
-        diagonal = told["diagonal"]
-        fine = math.isfinite(diagonal) and diagonal > 0
-        decimals = max(EXTENT_DIGITS - math.ceil(math.log10(diagonal)), 0) if fine else EXTENT_DIGITS
-        for name in ("lowest", "highest"):
-            told[name] = "  ".join(f"{item:.{decimals}f}" for item in told[name])
-        told["attributes"] = {name: _range(facts) for name, facts in (told["attributes"] or {}).items()} or None
-    return told
-
-
-def _range(facts: dict[str, Any]) -> str:
-    if "counts" in facts:
-        return ", ".join(f"{value} ({n} points)" for value, n in facts["counts"].items()) or "unknown"
-    values = f", {facts['distinct']} values" if "distinct" in facts else ""
-    return f"{facts['lowest']:.10g} to {facts['highest']:.10g}{values}"
-
-
-def _words(value: Any, name: str) -> Any:
+def _words(value: Any) -> Any:
     """A value as the table shows it."""
     if isinstance(value, dict):
-        apart = "\n" if name == "attributes" else ", "
-        return apart.join(f"{name} {text}" for name, text in value.items())
+        return ", ".join(f"{name} {text}" for name, text in value.items()) or None
+    if isinstance(value, tuple):
+        return " ".join(value)
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, list):
-        strings = all(isinstance(item, str) for item in value)
-        return "\n".join(value) or None if strings else "  ".join(f"{item:.6g}" for item in value)
-    return value
+    return "\n".join(value) or None if isinstance(value, list) else value

@@ -13,7 +13,7 @@ import typer
 from .. import __version__
 from .batch import batch
 from .branches import branches
-from .console import VisibleGroup, echo
+from .console import echo
 from .crosscheck import crosscheck
 from .demo import demo
 from .edit import convert, edit
@@ -22,6 +22,7 @@ from .filters import filters
 from .grasps import grasps
 from .info import info
 from .plugged import add_plugged
+from .reporting import reported
 from .rerun import rerun
 from .rig import rig
 from .run import run
@@ -35,32 +36,15 @@ EPILOG = (
 )
 
 app = typer.Typer(
-    cls=VisibleGroup,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["--help", "-h"]},
     epilog=EPILOG,
 )
-for command in (
-    skeletonize,
-    batch,
-    run,
-    rerun,
-    evaluate,
-    crosscheck,
-    branches,
-    tree,
-    grasps,
-    edit,
-    convert,
-    rig,
-    view,
-    demo,
-    filters,
-    info,
-):
-    app.command(epilog=EPILOG if command is skeletonize else None)(command)
+ANALYSES = (evaluate, crosscheck, branches, tree, grasps)
+for command in (skeletonize, batch, run, rerun, *ANALYSES, edit, convert, rig, view, demo, filters, info):
+    app.command(epilog=EPILOG if command is skeletonize else None)(reported(command))
 add_plugged(app)
 
 

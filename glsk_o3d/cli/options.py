@@ -1,87 +1,85 @@
-"""Options that several commands have."""
+"""Arguments and options that several commands have."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "graphml", "cgal", "polylines.txt"]
 SKELETON_ENDINGS += ["vtp", "dxf", "glb", "mtg", "plant.csv", "urdf"]
 """Endings of skeletons; written out, since the table of formats is slow to import."""
-
 TREE_ENDINGS = ["swc", "glb", "mtg", "plant.csv", "urdf"]
 """Endings of formats that hold only trees."""
-ROOT_WORDS = "x to -z for the lowest along an axis, thickest, the number of a vertex, or a point near one, x,y,z"
-"""What may follow ``--root``, in all commands."""
 
-SKELETON_FILE = "A skeleton in a file: json, npz, ply, obj, swc, graphml, cgal or polylines.txt."
 
+def argument(metavar: str, help: str) -> Any:
+    """An argument, as `Annotated` takes it; that a file cannot be read is no mistake in the command line."""
+    return Argument(metavar=metavar, help=help, readable=False)
+
+
+def option(metavar: str, help: str, *names: str, **more: Any) -> Any:
+    """An option with a value, as `Annotated` takes it; it is called as its parameter, unless it has names."""
+    return Option(*names, metavar=metavar, help=help, readable=False, **more)
+
+
+def output_option(metavar: str, help: str) -> Any:
+    """The option of a command for the files that it writes."""
+    return option(metavar, help, "--output", "-o")
+
+
+def root_option(help: str) -> Any:
+    """The option for where a skeleton grows from: the number of a vertex, or words for `editing.reroot`."""
+    words = "x to -z for the lowest along an axis, thickest, the number of a vertex, or a point near one, x,y,z"
+
+    def place(text: str) -> int | str:
+        return int(text) if text.isdecimal() and len(text) < 19 else text
+
+    return option("ROOT", f"{help}: {words}.", parser=place)
+
+
+SkeletonFile = Annotated[
+    Path, argument("SKELETON", "A skeleton in a file: json, npz, ply, obj, swc, graphml, cgal or polylines.txt.")
+]
+ScanFile = Annotated[
+    Path,
+    argument("SCAN", "A cloud: ply, pcd, csv, txt, asc, xyz, pts, las, laz, e57; or a mesh: off, obj, stl, gltf, glb."),
+]
 Where = Annotated[
-    str | None,
-    typer.Option(
-        "--where",
-        metavar="CONDITION",
-        help="Take only points for which this holds, such as 'classification == 5'; 'glsk info' lists what a file has.",
-    ),
+    str | None, option("CONDITION", "Take only points such as 'classification == 5'; 'glsk info' says what a file has.")
 ]
-Output = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE",
-        help=f"Where to write the skeleton: {', '.join(SKELETON_ENDINGS)}, by the ending; may be repeated.",
-    ),
-]
-Preview = Annotated[Path | None, typer.Option("--preview", metavar="PNG", help="Also draw cloud and skeleton.")]
-ReportPage = Annotated[
-    Path | None,
-    typer.Option(
-        "--report", metavar="HTML", help="Also write a page to look at: turn, zoom, watch the contraction, read."
-    ),
-]
-CutLoops = Annotated[
-    bool,
-    typer.Option("--cut-loops", help=f"Cut loops open for formats that hold only trees ({', '.join(TREE_ENDINGS)})."),
-]
+DropInvalid = Annotated[bool, Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")]
+
 PipelineName = Annotated[
-    str,
-    typer.Option(
-        "--pipeline",
-        metavar="NAME",
-        help="One of default, tree, wen2024 and cao2010, or a plugin's; 'glsk filters' says what they are.",
-    ),
+    str, option("NAME", "One of default, tree, wen2024 and cao2010, or a plugin's; see 'glsk filters'.")
 ]
-Recipe = Annotated[
-    Path | None,
-    typer.Option("--recipe", metavar="FILE", help="Run a pipeline from a json or toml file instead of a named one."),
-]
+Recipe = Annotated[Path | None, option("FILE", "Run a pipeline from a json or toml file instead of a named one.")]
 Settings = Annotated[
     list[str] | None,
-    typer.Option(
+    option(
+        "[FILTER.]PARAMETER=VALUE",
+        "Change a parameter, such as Connector.radius=2%, or k=24 where only one filter has a k; see 'glsk filters'; "
+        "may be repeated.",
         "--set",
-        metavar="[FILTER.]PARAMETER=VALUE",
-        help="Change a parameter, such as Connector.radius=2%, or k=24 where only one filter has a k; may be repeated. "
-        "See 'glsk filters'.",
     ),
 ]
-DropInvalid = Annotated[bool, typer.Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")]
-Root = Annotated[
-    str | None,
-    typer.Option(
-        "--root",
-        metavar="ROOT",
-        help=f"Where the skeleton grows from: {ROOT_WORDS}. By default, where it was made to grow from, or else its "
-        "part with the most volume.",
+Root = Annotated[Any, root_option("Where the skeleton grows from, by default from where its file says")]
+
+Output = Annotated[
+    list[Path] | None,
+    output_option(
+        "FILE", f"Where to write the skeleton: {', '.join(SKELETON_ENDINGS)}, by the ending; may be repeated."
     ),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout instead of tables.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors (and JSON, if asked for).")]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print each iteration, the log, and tracebacks.")]
-
-
-def root_place(text: str | None) -> int | str | None:
-    """What ``--root`` says, as `refinement.rooted.root_among` takes it: the number of a vertex, or words."""
-    return int(text) if text is not None and text.isdecimal() and len(text) < 19 else text
+Numbers = Annotated[Path | None, output_option("JSON", "Write all numbers to a file.")]
+Preview = Annotated[Path | None, option("PNG", "Also draw cloud and skeleton.")]
+ReportPage = Annotated[
+    Path | None, option("HTML", "Also write a page to look at: turn, zoom, watch the contraction, read.", "--report")
+]
+CutLoops = Annotated[
+    bool, Option("--cut-loops", help=f"Cut loops open for formats that hold only trees ({', '.join(TREE_ENDINGS)}).")
+]
+Json = Annotated[bool, Option("--json", help="Print JSON on stdout instead of tables.")]
+Quiet = Annotated[bool, Option("--quiet", "-q", help="Print nothing but errors (and JSON, if asked for).")]
+Verbose = Annotated[bool, Option("--verbose", "-v", help="Also print each iteration, the log, and tracebacks.")]

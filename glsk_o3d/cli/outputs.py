@@ -4,92 +4,52 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
+from typing import TYPE_CHECKING
 
-from ..errors import FileFormatError, GlskError
-from ..interop.packages import require, require_for
-from ..io.meshes import mesh_ending
-from ..io.scans import tensor_cloud_ending
-from ..io.skeletons import skeleton_ending
-from ..refinement.rooted import RootPlace
-from ..skeleton import Skeleton
-from ..viewing.page import save_report
-from ..viewing.preview import save_preview
-from ..viewing.recorder import ContractionRecorder
+from ..errors import GlskError
+from ..interop.packages import require_for
+from .console import echo
+from .options import SKELETON_ENDINGS
 from .reporting import WrongUsage
 
-_MADE_WITH = {".png": "; a picture is made with --preview", ".html": "; a page is made with --report"}
+if TYPE_CHECKING:
+    from ..refinement.rooted import RootPlace
+    from ..skeleton import Skeleton
+    from ..viewing.recorder import ContractionRecorder
 
 REPORT_FILE, PICTURE_FILE = (".json", "report is JSON"), (".png", "picture is a PNG")
+PAGE_FILE = ((".html", ".htm"), "report is a page")
+SKELETON_FILE = (tuple(f".{ending}" for ending in SKELETON_ENDINGS), "file is a skeleton")
+"""Endings of files, and what the files are, as `check_outputs` takes them."""
+
+Writers = dict[Path, Callable[[Path], object]]
 
 
 def check_outputs(
-    outputs: Sequence[Path],
-    preview: Path | None = None,
-    scan: Path | None = None,
-    page: Path | None = None,
-    others: Iterable[Path] = (),
-    check_ending: Callable[[Path], object] = skeleton_ending,
-    *,
-    tubes: Path | None = None,
-    labelled: Path | None = None,
-    **inputs: Path | None,
+    files: Iterable[tuple[Path | None, str | tuple[str, ...], str]], *inputs: Path | None, needed: str | None = None
 ) -> None:
-    """Find out before computing whether the files can be written.
+    """Find out before computing whether files can be written.
 
-    WrongUsage for an unknown ending (as `check_ending` has it, which raises FileFormatError), one file twice, the scan
-    or another input among them, or no file at all; OSError where a folder is missing, or a file cannot be written.
+    Each comes with its ending, or all that it may have, and what it is. WrongUsage for a wrong ending, one file twice,
+    an input, or no file where it is `needed`, which says how to give one; OSError where a folder is missing, or a file
+    cannot be written.
     """
-    for path in outputs:
-        _check(check_ending, path, _MADE_WITH.get(path.suffix.lower(), ""))
-    for check, coloured in ((mesh_ending, tubes), (tensor_cloud_ending, labelled)):
-        if coloured is not None:
-            _check(check, coloured)
-            require("matplotlib")
-    if preview is not None and preview.suffix.lower() != ".png":
-        raise WrongUsage(f"{preview}: the preview is a picture and its name ends in .png")
-    if page is not None and page.suffix.lower() not in (".html", ".htm"):
-        raise WrongUsage(f"{page}: the report is a page and its name ends in .html")
-    files = [*outputs, *(path for path in (preview, page, tubes, labelled) if path is not None)]
-    if not files:
-        raise WrongUsage("nothing to write: give an output with -o, --tubes or --labelled, a --preview or a --report")
-    files += others
-    sources = {"scan": scan, **inputs}
-    seen = {os.path.realpath(path): f"is the {what} itself" for what, path in sources.items() if path is not None}
-    for path in files:
-        real = os.path.realpath(path)
-        if real in seen:
-            raise WrongUsage(f"{path}: {seen[real]}: choose another name")
-        seen[real] = "is named twice"
-    for path in files:
-        check_writable(path)
-
-
-def _check(check_ending: Callable[[Path], object], path: Path, hint: str = "") -> None:
-    try:
-        check_ending(path)
-    except FileFormatError as error:
-        raise WrongUsage(f"{error}{hint}") from None
-
-
-def check_findings(files: Iterable[tuple[Path | None, str | tuple[str, ...], str]], *inputs: Path | None) -> None:
-    """Find out before computing whether what is found can be written; `files`, or None, come with their ending, or all
-    that they may have, and what they are.
-
-    WrongUsage for a wrong ending, or an input; OSError where a folder is missing, or a file cannot be written.
-    """
-    taken = [os.path.realpath(path) for path in inputs if path is not None]
-    for path, ending, what in files:
-        if path is None:
-            continue
+    given = [(path, ending, what) for path, ending, what in files if path is not None]
+    if needed and not given:
+        raise WrongUsage(f"nothing to write: give {needed}")
+    taken = {os.path.realpath(path): "is an input" for path in inputs if path is not None}
+    for path, ending, what in given:
         if not path.name.lower().endswith(ending):
             known = ending if isinstance(ending, str) else " or ".join(ending)
             raise WrongUsage(f"{path}: the {what} and its name ends in {known}")
-        if os.path.realpath(path) in taken:
-            raise WrongUsage(f"{path}: is an input: choose another name")
+        real = os.path.realpath(path)
+        if real in taken:
+            raise WrongUsage(f"{path}: {taken[real]}: choose another name")
+        taken[real] = "is named twice"
+    for path, _, _ in given:
         check_writable(path)
 
 
@@ -110,35 +70,37 @@ def check_writable(path: Path) -> None:
         raise OSError(f"{path}: no file can be made in this folder: {error.strerror}") from error
 
 
-def write(
-    skeleton: Skeleton,
-    outputs: Sequence[Path],
-    preview: Path | None,
-    page: Path | None = None,
-    others: Mapping[Path, Callable[[Path], object]] = MappingProxyType({}),
-    *,
-    title: str,
-    cut_loops: bool,
-    root: RootPlace | None = None,
-    update,
-    recorder: ContractionRecorder | None = None,
-) -> tuple[list[Path], list[str]]:
-    """Write all files of a run, and `others`, as `write_each` does.
+def skeleton_files(
+    outputs: Sequence[Path] | None, preview: Path | None = None, page: Path | None = None
+) -> list[tuple[Path | None, str | tuple[str, ...], str]]:
+    """What `check_outputs` takes, of a skeleton, its picture and its page."""
+    skeletons = [(path, *SKELETON_FILE) for path in outputs or []]
+    return [*skeletons, (preview, *PICTURE_FILE), (page, *PAGE_FILE)]
 
-    `cut_loops` and `root` are as for `save_skeleton`. The title is above the preview and the page; the recorder watched
-    the run, for the page.
-    """
-    writers: dict[Path, Callable[[Path], object]] = {
-        path: partial(skeleton.save, cut_loops=cut_loops, root=root) for path in outputs
-    }
+
+def skeleton_writers(
+    skeleton: Skeleton,
+    outputs: Sequence[Path] | None,
+    preview: Path | None = None,
+    page: Path | None = None,
+    *,
+    title: str = "",
+    cut_loops: bool = False,
+    root: RootPlace | None = None,
+    recorder: ContractionRecorder | None = None,
+) -> Writers:
+    """What writes a skeleton, its picture and its page; the recorder watched the run, for the page."""
+    from .. import save_preview, save_report
+
+    writers: Writers = {path: partial(skeleton.save, cut_loops=cut_loops, root=root) for path in outputs or []}
     if preview is not None:
         writers[preview] = partial(save_preview, skeleton, title=title)
     if page is not None:
         writers[page] = partial(save_report, skeleton, recorder=recorder, title=title)
-    return write_each({**writers, **others}, update)
+    return writers
 
 
-def write_each(writers: Mapping[Path, Callable[[Path], object]], update) -> tuple[list[Path], list[str]]:
+def write_each(writers: Writers, update: Callable[[str], object] = lambda text: None) -> tuple[list[Path], list[str]]:
     """Write all files that can be written, each with its function; one that cannot does not keep the others from it.
 
     Gives the files that were written, and what was wrong with the others. `update` is that of `console.progress`.
@@ -156,3 +118,11 @@ def write_each(writers: Mapping[Path, Callable[[Path], object]], update) -> tupl
         except Exception as error:  # a mistake in one writer: what was computed goes into the other files all the same
             problems.append(f"{path}: cannot be written: {type(error).__name__}: {error}")
     return written, problems
+
+
+def tell_files(written: Sequence[Path] | None, problems: Sequence[str] = (), *, quiet: bool) -> None:
+    """Print which files were written; then raise OSError if some were not."""
+    for path in [] if quiet else written or []:
+        echo(f"wrote {path}")
+    if problems:
+        raise OSError("; ".join(problems))

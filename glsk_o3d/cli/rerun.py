@@ -6,21 +6,16 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from .console import progress
-from .options import CutLoops, Json, Output, Preview, Quiet, ReportPage, Verbose
-from .reporting import holding_interrupts, reporting
+from .options import CutLoops, Json, Output, Preview, Quiet, ReportPage, Verbose, argument
+from .outputs import check_outputs, skeleton_files, skeleton_writers, write_each
+from .reporting import load_open3d
+from .running import print_results, run
 
 
 def rerun(
-    result: Annotated[
-        Path, typer.Argument(metavar="RESULT", help="A skeleton that 'glsk skeletonize' wrote as json or npz.")
-    ],
-    scan: Annotated[
-        Path | None,
-        typer.Argument(metavar="SCAN", help="Another cloud to run it on; by default the points in the result."),
-    ] = None,
+    result: Annotated[Path, argument("RESULT", "A skeleton that 'glsk skeletonize' wrote as json or npz.")],
+    scan: Annotated[Path | None, argument("SCAN", "Another cloud to run it on, instead of its points.")] = None,
     output: Output = None,
     preview: Preview = None,
     report: ReportPage = None,
@@ -35,51 +30,29 @@ def rerun(
     bit; where other releases make it differ, there is a warning. Without outputs it only says whether it is the same.
     'glsk skeletonize --recipe' runs recipes from files of their own.
     """
-    with reporting(scan or result, quiet=quiet, verbose=verbose):
-        from ..errors import RecipeError
-        from ..io.scans import read_cloud
-        from ..io.skeletons import read_skeleton
-        from ..io.streaming import sample_for
-        from ..recipes import from_recipe, identical
-        from ..recipes import rerun as run_again
-        from ..recipes.rerun import is_of_sample
-        from ..viewing.recorder import ContractionRecorder
-        from .outputs import check_outputs, write
-        from .running import print_results, run
+    from .. import ContractionRecorder, RecipeError, from_recipe, read_cloud, read_skeleton
+    from .. import rerun as run_again
+    from ..io.streaming import sample_for
+    from ..recipes.rerun import identical, is_of_sample
 
-        outputs = output or []
-        if outputs or preview is not None or report is not None:
-            check_outputs(outputs, preview, scan, report, result=result)
-        recorder = ContractionRecorder() if report is not None else None
-        with progress(not quiet and not verbose) as update:
-            update(f"reading {result.name}")
-            made = read_skeleton(result)
-            try:
-                if scan is None or not is_of_sample(made):
-                    with holding_interrupts():
-                        cloud = read_cloud(scan) if scan is not None else None
-                else:
-                    cloud = sample_for(from_recipe(made.report.recipe), scan, stream=True)
-                skeleton, seconds = run(partial(run_again, made), cloud, update, recorder)
-            except RecipeError as error:
-                raise RecipeError(f"{result}: cannot be repeated: {error}") from error
-            written, problems = write(
-                skeleton,
-                outputs,
-                preview,
-                report,
-                title=(scan or result).name,
-                cut_loops=cut_loops,
-                update=update,
-                recorder=recorder,
-            )
-        print_results(
-            skeleton,
-            seconds,
-            written,
-            problems,
-            {"identical": identical(skeleton, made)},
-            quiet=quiet,
-            verbose=verbose,
-            as_json=as_json,
+    check_outputs(skeleton_files(output, preview, report), scan, result)
+    recorder = ContractionRecorder() if report is not None else None
+    with progress(not quiet and not verbose) as update:
+        update(f"reading {result.name}")
+        load_open3d()
+        made, cloud = read_skeleton(result), None
+        try:
+            if scan is not None and is_of_sample(made):
+                cloud = sample_for(from_recipe(made.report.recipe), scan, stream=True)
+            elif scan is not None:
+                cloud = read_cloud(scan)
+            skeleton, seconds = run(partial(run_again, made), cloud, update, recorder)
+        except RecipeError as error:
+            raise RecipeError(f"{result}: cannot be repeated: {error}") from error
+        title = (scan or result).name
+        writers = skeleton_writers(
+            skeleton, output, preview, report, title=title, cut_loops=cut_loops, recorder=recorder
         )
+        written, problems = write_each(writers, update)
+    same = {"identical": identical(skeleton, made)}
+    print_results(skeleton, seconds, written, problems, same, quiet=quiet, verbose=verbose, as_json=as_json)

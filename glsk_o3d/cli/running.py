@@ -7,44 +7,52 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..analysis.summary import ENDING_FACTS, ending, summary
-from ..judgements import Judgement
-from ..report import Report
-from ..skeleton import Skeleton
-from .console import echo, print_iterations, print_json, print_rows
+from .console import print_json, print_rows, print_table
+from .outputs import tell_files
 
-_DOING = {
-    "RingBuilder": "building rings",
-    "Contractor": "contracting",
-    "LPRReducer": "merging points",
-    "Connector": "connecting",
-    "Refiner": "refining",
+if TYPE_CHECKING:
+    from ..judgements import Judgement
+    from ..report import IterationRecord, Report
+    from ..skeleton import Skeleton
+
+_ITERATIONS = {  # head of a column, field of IterationRecord, format
+    "solve": ("iteration", "d"),
+    "points": ("n_points", "d"),
+    "merged": ("n_merged", "d"),
+    "e": ("explained", ".4f"),
+    "De": ("explained_change", ".4f"),
+    "rings": ("ring_ratio", ".4f"),
+    "w_L": ("contraction_weight", ".4g"),
+    "error": ("solve_error", ".1e"),
+    "seconds": ("seconds", ".3f"),
 }
 
 
 def run(pipeline: Callable[..., Skeleton], cloud: Any, update, on_state=None) -> tuple[Skeleton, float]:
     """Run a pipeline and show how far it is; gives the skeleton, and the seconds it took."""
     start = time.perf_counter()
-    on_stage, on_iteration = _watch(update)
-    skeleton = pipeline(cloud, on_iteration=on_iteration, on_state=on_state, on_stage=on_stage)
-    return skeleton, time.perf_counter() - start
-
-
-def _watch(update):
     doing, most = "", None
 
     def on_stage(stage):
         nonlocal doing, most
-        doing, most = _DOING.get(type(stage).__name__, type(stage).__name__), getattr(stage, "max_iterations", None)
+        doing, most = type(stage).__name__, getattr(stage, "max_iterations", None)
         update(doing)
 
     def on_iteration(record):
         left = record.n_points - record.n_merged
         update(f"{doing}: solve {record.iteration} of at most {most}, {left} points", record.iteration, most)
 
-    return on_stage, on_iteration
+    skeleton = pipeline(cloud, on_iteration=on_iteration, on_state=on_state, on_stage=on_stage)
+    return skeleton, time.perf_counter() - start
+
+
+def print_iterations(records: Sequence[IterationRecord], *, err: bool = False) -> None:
+    """Print a contraction's iterations as a table."""
+    rows = [[format(getattr(record, name), form) for name, form in _ITERATIONS.values()] for record in records]
+    if rows:
+        print_table(rows, list(_ITERATIONS), err=err)
 
 
 def print_results(
@@ -54,39 +62,45 @@ def print_results(
     problems: Sequence[str],
     more: Mapping[str, Any] = MappingProxyType({}),
     *,
-    quiet,
-    verbose,
-    as_json=False,
+    quiet: bool,
+    verbose: bool,
+    as_json: bool = False,
 ) -> None:
     """Print the summary, with `more` facts, and the files written; then raise OSError if there were problems."""
+    from ..analysis.summary import summary
+
+    report = skeleton.report
     if verbose:
-        print_iterations(skeleton.report.iterations, stderr=True)
+        print_iterations(report.iterations, err=True)
     facts = {**summary(skeleton, seconds), **more}
     if as_json:
-        warnings = list(skeleton.report.warnings)
-        unsupported = list(map(asdict, skeleton.report.unsupported))
-        supported = {"unsupported": unsupported} if skeleton.report.n_draws else {}
-        print_json({**facts, **supported, "warnings": warnings, "files": [str(path) for path in written]})
+        supported = {"unsupported": list(map(asdict, report.unsupported))} if report.n_draws else {}
+        files = [str(path) for path in written]
+        print_json({**facts, **supported, "warnings": list(report.warnings), "files": files})
     elif not quiet:
-        told = {name: value for name, value in facts.items() if name not in (*ENDING_FACTS, "seconds")}
-        hidden = {"dropped": facts["dropped"] or None}
-        if not skeleton.report.is_sampled:
-            hidden["sampled"] = None
-        hidden["loops_closed"] = None  # most clouds have some, true ones are hardly ever among them
-        hidden |= {name: None for name in ("outliers", "cuts", "bridges", "traced", "joined") if not facts[name]}
-        hidden["uncertain"] = "\n".join(map(_close_call, skeleton.report.uncertain)) or None
-        if skeleton.report.n_draws:
-            hidden["samples"], hidden["agreeing"] = _supported(skeleton.report), None
-        if facts["contracted"] == facts["distinct"]:
-            hidden["contracted"] = None
-        words = {name: "yes" if value else "no" for name, value in told.items() if isinstance(value, bool)}
-        print_rows({**told, **words, **hidden, "contraction": ending(facts), "seconds": f"{seconds:.2f}"})
+        print_rows(_shown(facts, report))
     tell_files(written, problems, quiet=quiet or as_json)
 
 
-def _supported(report: Report) -> str:
-    """How many samples agree with a skeleton, and what most of them do not show."""
-    return "\n".join([f"{report.n_agreeing} of {report.n_draws} have the same graph", *map(str, report.unsupported)])
+def _shown(facts: Mapping[str, Any], report: Report) -> dict[str, Any]:
+    """The facts that say something of this run, in words."""
+    from ..analysis.summary import ENDING_FACTS, ending
+
+    hidden = {*ENDING_FACTS, "seconds", "agreeing"}
+    hidden.add("loops_closed")  # most clouds have some, true ones are hardly ever among them
+    noted = ("dropped", "outliers", "cuts", "bridges", "traced", "joined")
+    hidden.update(name for name in noted if not facts[name])
+    if not report.is_sampled:
+        hidden.add("sampled")
+    if facts["contracted"] == facts["distinct"]:
+        hidden.add("contracted")
+    shown = {name: value for name, value in facts.items() if name not in hidden}
+    shown |= {name: "yes" if value else "no" for name, value in shown.items() if isinstance(value, bool)}
+    shown["uncertain"] = "\n".join(map(_close_call, report.uncertain)) or None
+    if report.n_draws:
+        agreeing = f"{report.n_agreeing} of {report.n_draws} have the same graph"
+        shown["samples"] = "\n".join([agreeing, *map(str, report.unsupported)])
+    return {**shown, "contraction": ending(facts), "seconds": f"{facts['seconds']:.2f}"}
 
 
 def _close_call(call: Judgement) -> str:
@@ -94,12 +108,3 @@ def _close_call(call: Judgement) -> str:
     from ..refinement.diagnostics import otherwise
 
     return f"{call}; if that is wrong: --set {otherwise(call)}"
-
-
-def tell_files(written: Sequence[Path], problems: Sequence[str] = (), *, quiet: bool) -> None:
-    """Print which files were written; then raise OSError if some were not."""
-    if not quiet:
-        for path in written:
-            echo(f"wrote {path}")
-    if problems:
-        raise OSError("; ".join(problems))

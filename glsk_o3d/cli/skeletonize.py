@@ -7,24 +7,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Option
 
+from . import options
 from .console import echo, progress
-from .options import (
-    CutLoops,
-    DropInvalid,
-    Json,
-    Output,
-    PipelineName,
-    Preview,
-    Quiet,
-    Recipe,
-    ReportPage,
-    Settings,
-    Verbose,
-    Where,
-)
-from .reporting import WrongUsage, holding_interrupts, reporting
+from .options import option
+from .outputs import check_outputs, skeleton_files, skeleton_writers, write_each
+from .reporting import WrongUsage, load_open3d
+from .running import print_results, run
 
 if TYPE_CHECKING:
     from ..pipeline import Pipeline
@@ -32,123 +22,80 @@ if TYPE_CHECKING:
 
 
 def skeletonize(
-    scan: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SCAN",
-            help="The cloud: ply, pcd, csv, txt, asc, xyz, pts, las, laz, e57; or a mesh: off, obj, stl, gltf, glb.",
-        ),
-    ],
-    output: Output = None,
-    preview: Preview = None,
-    report: ReportPage = None,
-    pipeline: PipelineName = "default",
-    recipe: Recipe = None,
-    settings: Settings = None,
-    where: Where = None,
+    scan: options.ScanFile,
+    output: options.Output = None,
+    preview: options.Preview = None,
+    report: options.ReportPage = None,
+    pipeline: options.PipelineName = "default",
+    recipe: options.Recipe = None,
+    settings: options.Settings = None,
+    where: options.Where = None,
     root: Annotated[
-        str | None,
-        typer.Option(
-            "--root",
-            metavar="ROOT",
-            help="Make one tree that grows from there: x to -z for the lowest along an axis, thickest, or a point, "
-            "x,y,z. Short for --set Refiner.root=ROOT.",
-        ),
+        str | None, option("ROOT", "Grow one tree from there: x to -z, lowest along an axis, thickest, or x,y,z.")
     ] = None,
     tubes: Annotated[
-        Path | None,
-        typer.Option(
-            "--tubes",
-            metavar="MESH",
-            help="Also write the skeleton as tubes as thick as the object: ply, obj, off, stl, glb or gltf.",
-        ),
+        Path | None, option("MESH", "Also write tubes as thick as the object: ply, obj, off, stl, glb or gltf.")
     ] = None,
     labelled: Annotated[
-        Path | None,
-        typer.Option(
-            "--labelled",
-            metavar="CLOUD",
-            help="Also write the scan with all that it has, coloured by branch, and branch, vertex, order, radius, "
-            "confidence and thickness of every point: ply, pcd or npz.",
-        ),
+        Path | None, option("CLOUD", "Also write the scan with branch, radius, ... of every point: ply, pcd or npz.")
     ] = None,
-    save_recipe: Annotated[
-        Path | None,
-        typer.Option("--save-recipe", metavar="FILE", help="Also write the pipeline as run to a json or toml file."),
-    ] = None,
+    save_recipe: Annotated[Path | None, option("FILE", "Also write the pipeline to a json or toml file.")] = None,
     stream: Annotated[
-        bool | None,
-        typer.Option(
-            "--stream/--no-stream",
-            help="Read the scan in blocks, and of it the sample that its skeleton is made from: memory does not grow "
-            "with the file. By default where it has more than ten million points.",
-            show_default=False,
-        ),
+        bool | None, Option("--stream/--no-stream", help="Read only a sample; by default if over ten million points.")
     ] = None,
     support: Annotated[
-        int | None,
-        typer.Option(
-            "--support",
-            metavar="SAMPLES",
-            min=2,
-            help="Also skeletonise so many samples of the points, and say how many of them show each branch, loop and "
-            "end; 8 are enough. A sample takes about as long as the skeleton.",
-        ),
+        int | None, option("SAMPLES", "Also skeletonise so many samples, and say what they share; 8 are enough.", min=2)
     ] = None,
-    drop_invalid: DropInvalid = False,
-    cut_loops: CutLoops = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    drop_invalid: options.DropInvalid = False,
+    cut_loops: options.CutLoops = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
 ) -> None:
     """Compute the curve skeleton of a scan.
 
     Everything that can be checked is checked before the computation starts. Files appear complete or not at all.
     """
-    with reporting(scan, quiet=quiet, verbose=verbose):
-        from ..io.meshes import save_mesh
-        from ..recipes import save_recipe as write_recipe
-        from ..recipes import to_recipe
-        from ..recipes.writing import recipe_ending
-        from ..resampling import with_support
-        from ..viewing.recorder import ContractionRecorder
-        from .outputs import check_outputs, write
-        from .overrides import choose
-        from .running import print_results, run
+    from .. import ContractionRecorder, recipes, save_mesh
+    from ..interop.packages import require
+    from ..io.meshes import WRITTEN_MESH_ENDINGS
+    from ..io.scans import WRITTEN_CLOUD_ENDINGS
+    from ..resampling import with_support
+    from .overrides import choose
 
-        rooted = [f"Refiner.root={root}"] if root is not None else []
-        chosen = choose(pipeline, recipe, [*(settings or []), *rooted], drop_invalid)
-        outputs = output or []
-        others: dict[Path, Callable[[Path], object]] = {}
+    rooted = [f"Refiner.root={root}"] if root is not None else []
+    chosen = choose(pipeline, recipe, [*(settings or []), *rooted], drop_invalid)
+    results = [
+        *skeleton_files(output, preview, report),
+        (tubes, WRITTEN_MESH_ENDINGS, "tubes are a mesh"),
+        (labelled, WRITTEN_CLOUD_ENDINGS, "file is a cloud with labels"),
+    ]
+    if all(path is None for path, *_ in results):
+        raise WrongUsage("nothing to write: give -o, --tubes or --labelled, a --preview or a --report")
+    check_outputs([*results, (save_recipe, (".json", ".toml"), "file is a recipe")], scan, recipe)
+    if tubes is not None or labelled is not None:
+        require("matplotlib")  # for the colours of branches
+    if save_recipe is not None:
+        recipes.to_recipe(chosen)  # not all can be written
+    recorder = ContractionRecorder() if report is not None else None
+    with progress(not quiet and not verbose) as update:
+        update(f"reading {scan.name}")
+        cloud, write_labelled = _read(scan, where, chosen, stream, labelled, quiet)
+        skeleton, seconds = run(chosen, cloud, update, recorder)
+        if support is not None:
+            comparing = "comparing with the skeleton of sample {} of {}"
+            skeleton = with_support(skeleton, chosen, support, on_draw=lambda *n: update(comparing.format(*n), *n))
+        writers = skeleton_writers(
+            skeleton, output, preview, report, title=scan.name, cut_loops=cut_loops, recorder=recorder
+        )
         if save_recipe is not None:
-            recipe_ending(save_recipe)
-            to_recipe(chosen)
-            others[save_recipe] = partial(write_recipe, chosen)
-        check_outputs(outputs, preview, scan, report, others, tubes=tubes, labelled=labelled, recipe=recipe)
-        recorder = ContractionRecorder() if report is not None else None
-        with progress(not quiet and not verbose) as update:
-            update(f"reading {scan.name}")
-            cloud, write_labelled = _read(scan, where, chosen, stream, labelled, quiet)
-            skeleton, seconds = run(chosen, cloud, update, recorder)
-            if support is not None:
-                told = "comparing with the skeleton of sample {} of {}"
-                skeleton = with_support(skeleton, chosen, support, on_draw=lambda *n: update(told.format(*n), *n))
-            if tubes is not None:
-                others[tubes] = lambda path: save_mesh(skeleton.to_tubes(), path)
-            if labelled is not None:
-                others[labelled] = lambda path: write_labelled(skeleton, path)
-            written, problems = write(
-                skeleton,
-                outputs,
-                preview,
-                report,
-                others,
-                title=scan.name,
-                cut_loops=cut_loops,
-                update=update,
-                recorder=recorder,
-            )
-        print_results(skeleton, seconds, written, problems, quiet=quiet, verbose=verbose, as_json=as_json)
+            writers[save_recipe] = partial(recipes.save_recipe, chosen)
+        if tubes is not None:
+            writers[tubes] = lambda path: save_mesh(skeleton.to_tubes(), path)
+        if labelled is not None:
+            writers[labelled] = partial(write_labelled, skeleton)
+        written, problems = write_each(writers, update)
+    print_results(skeleton, seconds, written, problems, quiet=quiet, verbose=verbose, as_json=as_json)
 
 
 def _read(
@@ -157,13 +104,12 @@ def _read(
     """The cloud, or the sample of a large one; and what writes all of it with labels."""
     import numpy as np
 
-    from ..interop.packages import import_open3d
-    from ..io.scans import read_scan, save_tensor_cloud
-    from ..io.streamed_labels import STREAMED_ENDING, annotate_file
+    from .. import annotate_file, save_tensor_cloud
+    from ..io.scans import read_scan
+    from ..io.streamed_labels import STREAMED_ENDING
     from ..io.streaming import sample_for
 
-    with holding_interrupts():
-        import_open3d()
+    load_open3d()
     if labelled is None or labelled.suffix.lower() == STREAMED_ENDING:
         sample = sample_for(pipeline, scan, where, stream)
         if sample is not None:
@@ -175,8 +121,7 @@ def _read(
             return sample, lambda skeleton, path: annotate_file(skeleton, scan, path, where=where)
     elif stream:
         raise WrongUsage(f"{labelled}: --stream writes a cloud with labels as {STREAMED_ENDING} alone")
-    with holding_interrupts():
-        read = read_scan(scan, where)  # what it is skeletonised from is the same, whether it is labelled or not
+    read = read_scan(scan, where)  # what it is skeletonised from is the same, whether it is labelled or not
     cloud, whole = read.to_legacy(), None if labelled is None else read.to_tensor()
     return cloud, lambda skeleton, path: save_tensor_cloud(_labelled(skeleton, whole), path)
 

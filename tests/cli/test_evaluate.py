@@ -1,15 +1,11 @@
 """`glsk evaluate`: how good a skeleton is."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
-from glsk_o3d import save_assessment
 from glsk_o3d.analysis import assess, compare
-from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.io.skeletons import save_skeleton
 from glsk_o3d.samples import torus
 from glsk_o3d.skeleton import Skeleton
@@ -38,14 +34,6 @@ def folder(tmp_path_factory, ring, moved):
     np.savez(place / "truth.npz", nodes=ring.nodes, edges=ring.edges, radii=ring.radii)
     np.savez(place / "none.npz", nodes=np.empty((0, 3)), edges=np.empty((0, 2), int), radii=[])
     return place
-
-
-def colours(path):
-    """Whether a picture has dark blue and orange lines, left of the colour bar and below it."""
-    image = imread(path)[110:, :, :3]
-    blue = (image[..., 2] > 0.5) & (image[..., 0] < 0.2) & (image[..., 1] < 0.1)
-    orange = (image[..., 0] > 0.9) & (image[..., 1] > 0.5) & (image[..., 2] < 0.35)
-    return blue.sum(), orange.sum()
 
 
 def test_without_a_truth(glsk, scans, folder, tmp_path, ring, moved):
@@ -129,40 +117,3 @@ def test_a_cloud_elsewhere_or_in_other_units(invoke, folder, tmp_path, write_sca
         result = invoke("evaluate", folder / "s.json", write_scan(tmp_path / "c.ply", points))
         assert result.exit_code == 0
         assert "c.ply: the skeleton does not lie in it: is this the cloud it was made from" in result.stderr
-
-
-def test_help_loads_nothing_heavy():
-    code = "import sys\nfrom glsk_o3d.cli.main import app\ntry:\n    app(['evaluate', '--help'])\nexcept SystemExit:\n"
-    code += "    print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr)"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "--truth" in run.stdout
-    assert not set(run.stderr.split()) & {"open3d", "matplotlib", "numpy", "scipy", "networkx"}
-
-
-def test_the_picture_tells_good_from_bad(ring, moved, tmp_path):
-    flags = np.zeros(len(moved.edges))
-    counts = {}
-    for value, best in ((0, 0), (1, 0), (7, 0), (0, 1), (1, 1), (np.nan, 1)):
-        save_assessment(
-            moved, ring.points, flags + value, tmp_path / "p.png", label="measure", best=best, title="a title"
-        )
-        blue, orange = colours(tmp_path / "p.png")
-        counts[value, best] = (blue > 500, orange > 500)
-    good, bad = (True, False), (False, True)
-    assert list(counts.values()) == [good, bad, bad, bad, good, (False, False)]
-
-
-def test_the_legend_tells_what_black_is(ring, moved, tmp_path):
-    legends = []
-    for value in (0.5, np.nan):
-        save_assessment(moved, ring.points, np.full(len(moved.edges), value), tmp_path / "p.png", label="measure")
-        legends.append((imread(tmp_path / "p.png")[85:110, 1400:, :3] < 0.5).sum())
-    assert legends[0] == 0 < legends[1]
-
-
-def test_the_picture_needs_a_value_per_edge(ring, moved, tmp_path):
-    with pytest.raises(InvalidParameterError, match="128 edges"):
-        save_assessment(moved, ring.points, np.zeros(3), tmp_path / "p.png", label="measure")
-    with pytest.raises(FileFormatError, match=r"p\.jpg: .*PNG"):
-        save_assessment(moved, ring.points, np.zeros(128), tmp_path / "p.jpg", label="measure")
-    assert list(tmp_path.iterdir()) == []

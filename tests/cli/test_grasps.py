@@ -75,7 +75,7 @@ def test_no_grasp_is_a_warning(invoke, rod):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["rod.npz", "--opening", "-1"], "--opening -1.0: must be above 0"),
+        (["rod.npz", "--opening", "-1"], "max_opening = -1.0: must be above 0"),
         (["rod.npz", "--opening", "1", "--plane", "0,0,1"], "--plane 0,0,1: write 4 numbers with commas"),
         (["rod.npz", "--opening", "1", "--plane", "0,0,0,1"], "is no plane"),
         (["rod.npz", "--opening", "1", "--cone", "down,30"], "--cone down: write 3 numbers"),
@@ -84,11 +84,8 @@ def test_no_grasp_is_a_warning(invoke, rod):
         (["rod.npz", "--opening", "1", "--up", "w"], "--up w: write 3 numbers"),
         (["rod.npz", "--opening", "1", "--finger", "a,b,c"], "--finger a,b,c: write 3 numbers"),
         (["rod.npz", "--opening", "1", "-o", "g.txt"], "the grasps are JSON, CSV or PLY and its name ends in .json"),
-        (["y.ply", "--opening", "1"], "has no confidence, perhaps due to its file: add --min-confidence 0"),
-        (
-            ["y.ply", "--opening", "1", "--min-confidence", "0"],
-            "does not know the points of the object: give the scan with",
-        ),
+        (["y.ply", "--opening", "1"], "has no confidence, perhaps due to its file: give min_confidence=0"),
+        (["y.ply", "--opening", "1", "--min-confidence", "0"], "does not know the points of the object: give cloud="),
     ],
 )
 def test_refuses(refused, rod, y, words, message):

@@ -79,7 +79,7 @@ def test_settings_change_a_recipe(invoke, scans, tmp_path, made):
 @pytest.mark.parametrize(
     ("code", "words", "message"),
     [
-        (2, ["rerun", "s.json", "-o", "s.json"], "s.json: is the result itself: choose another name"),
+        (2, ["rerun", "s.json", "-o", "s.json"], "s.json: is an input: choose another name"),
         (1, ["rerun", "none.json", "-o", "a.ply"], "none.json: no such file"),
         (1, ["rerun", "s.json", "none.ply", "-o", "a.ply"], "none.ply: no such file"),
         (1, ["rerun", "s.ply", "-o", "a.ply"], "s.ply: cannot be repeated: it holds no recipe"),
@@ -87,15 +87,15 @@ def test_settings_change_a_recipe(invoke, scans, tmp_path, made):
         (1, ["rerun", "gone.json", "-o", "a.ply"], "gone.json: cannot be repeated: pipeline[0].filter: no filter is"),
         (1, ["rerun", "gone.json", "-o", "a.ply"], "(or install the plugin that it is from)"),
         (1, ["rerun", "s.json", "few.xyz", "-o", "a.ply"], "few.xyz: 3 finite points"),
-        (2, ["skeletonize", "SCAN", "--recipe", "r.toml", "-o", "r.toml"], "r.toml: unknown ending"),
         (
             2,
-            ["skeletonize", "SCAN", "--recipe", "r.toml", "--save-recipe", "./r.toml", "-o", "a.ply"],
-            "the recipe its",
+            ["skeletonize", "SCAN", "--recipe", "r.toml", "-o", "r.toml"],
+            "r.toml: the file is a skeleton and its name ends in .ply or",
         ),
+        (2, ["skeletonize", "SCAN", "--recipe", "r.toml", "--save-recipe", "./r.toml", "-o", "a.ply"], "is an input"),
         (2, ["skeletonize", "SCAN", "--save-recipe", "a.json", "-o", "a.json"], "a.json: is named twice"),
         (2, ["skeletonize", "SCAN", "--save-recipe", "a.json"], "nothing to write"),
-        (1, ["skeletonize", "SCAN", "--save-recipe", "a.yaml", "-o", "a.ply"], "a.yaml: unknown ending; recipes are"),
+        (2, ["skeletonize", "SCAN", "--save-recipe", "a.yaml", "-o", "a.ply"], "a.yaml: the file is a recipe and its"),
         (1, ["skeletonize", "SCAN", "--save-recipe", "no/a.json", "-o", "a.ply"], "no: no such folder"),
         (2, ["skeletonize", "SCAN", "--recipe", "r.toml", "--pipeline", "wen2024", "-o", "a.ply"], "give one of them"),
         (1, ["skeletonize", "SCAN", "--recipe", "none.toml", "-o", "a.ply"], "none.toml: No such file"),
@@ -104,11 +104,7 @@ def test_settings_change_a_recipe(invoke, scans, tmp_path, made):
             ["skeletonize", "SCAN", "--recipe", "bad.json", "-o", "a.ply"],
             "bad.json: pipeline[0].k: must be at least",
         ),
-        (
-            2,
-            ["skeletonize", "SCAN", "--recipe", "part.json", "-o", "a.ply"],
-            "does not lead from a cloud to a skeleton",
-        ),
+        (2, ["skeletonize", "SCAN", "--recipe", "part.json", "-o", "a.ply"], "not lead from a cloud to a skeleton"),
     ],
 )
 def test_refused_before_anything_runs(invoke, scans, tmp_path, made, code, words, message):

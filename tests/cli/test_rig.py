@@ -62,7 +62,7 @@ def test_alone_it_has_its_tubes(invoke, tmp_path, y):
 
 
 def test_loops_are_cut_if_one_says_so(invoke, refused, ring, tmp_path):
-    assert "1 loop(s): add --cut-loops to drop" in refused(1, "rig", ring, "-o", "r.glb")
+    assert "1 loop(s): pass cut_loops=True to drop" in refused(1, "rig", ring, "-o", "r.glb")
     result = invoke("rig", ring, "-o", "r.glb", "--cut-loops")
     assert result.stdout == "11 bones move the skeleton's own surface\nwrote r.glb\n"
     save_rig(read_skeleton(tmp_path / ring), tmp_path / "expected.glb", cut_loops=True)
@@ -74,16 +74,16 @@ def test_loops_are_cut_if_one_says_so(invoke, refused, ring, tmp_path):
     [
         (2, ["y.ply"], "nothing to write: give one output with -o"),
         (2, ["none.ply", "-o", "r.fbx"], "r.fbx: the rig is binary glTF and its name ends in .glb"),
-        (2, ["none.ply", "-o", "r.glb", "--up", "x"], "--up x: must be z or y"),
+        (2, ["y.ply", "-o", "r.glb", "--up", "x"], "up = 'x': must be one of z, y"),
         (2, ["y.ply", "r.glb", "-o", "r.glb"], "r.glb: is an input: choose another name"),
         (1, ["none.ply", "-o", "no/r.glb"], "no: no such folder: make it before writing r.glb"),
         (1, ["none.ply", "-o", "r.glb"], "none.ply: no such file"),
         (1, ["y.ply", "none.ply", "-o", "r.glb"], "none.ply: no such file"),
         (1, ["y.ply", "y.ply", "-o", "r.glb"], "y.ply: is a skeleton, not a scan"),
-        (1, ["cloud.ply", "-o", "r.glb"], "cloud.ply: is a cloud, not a skeleton: run 'glsk skeletonize' first"),
+        (1, ["cloud.ply", "-o", "r.glb"], "cloud.ply: is a cloud, not a skeleton: make one with glsk_o3d.skeletonize"),
         (1, ["y.ply", "junk.ply", "-o", "r.glb"], "junk.ply: not a valid .ply file: it does not start with 'ply'"),
         (1, ["y.ply", "nan.xyz", "-o", "r.glb"], "nan.xyz: the surface has points that are not finite: drop them"),
-        (1, ["bare.obj", "-o", "r.glb"], "bare.obj: holds neither radii nor points to make a surface of: give a MESH"),
+        (1, ["bare.obj", "-o", "r.glb"], "a rig needs radii or points: read the skeleton from"),
         (2, ["y.ply", "-o", "r.glb", "--root", "up"], "root = 'up': must be an axis, x to -z, 'thickest', a vertex"),
         (2, ["y.ply", "-o", "r.glb", "--root", "99"], "root = 99: there are vertices 0 to "),
     ],

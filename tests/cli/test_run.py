@@ -115,7 +115,7 @@ def test_points_are_written_with_labels_and_colours(invoke, scans, script, tmp_p
         (1, ["run", "bad.mlx", "SCAN", "-o", "s.ply"], "bad.mlx, line 2: no filter is called 'Generate Skeletn'"),
         (2, ["run", "glskeleton", "SCAN", "-o", "s.stl"], "s.stl: unknown ending; known are .ply"),
         (2, ["run", "points.mlx", "SCAN", "-o", "s.json"], "s.json: unknown ending for points; known are .ply, .pcd"),
-        (2, ["run", "glskeleton", "SCAN", "-o", "SCAN"], "is the scan itself"),
+        (2, ["run", "glskeleton", "SCAN", "-o", "SCAN"], "is an input"),
         (1, ["run", "glskeleton", "SCAN", "-o", "no/s.ply"], "no: no such folder"),
         (1, ["run", "glskeleton", "nowhere.ply", "-o", "s.ply"], "nowhere.ply: no such file"),
     ],

@@ -32,9 +32,7 @@ def test_without_a_display_it_names_what_else_there_is(glsk, monkeypatch, skelet
         monkeypatch.setenv("DISPLAY", display)
     run = glsk("view", skeleton_file)
     assert run.returncode == 1
-    assert run.stderr.startswith(
-        "glsk: error: there is no display to open a window on: --report PAGE.html and --preview"
-    )
+    assert run.stderr.startswith("glsk: error: there is no display to open a window on: save_report and save_preview")
     assert run.stderr.count("\n") == 1
 
 

@@ -341,7 +341,7 @@ def test_filters_that_write_files_run_where_somebody_says_that_the_script_is_tru
     words = ["run", str(script), str(tmp_path / "s.xyz"), "-o", str(tmp_path / "o.ply")]
     refused = CliRunner().invoke(app, words)
     assert refused.exit_code == 1
-    assert "unless --any-meshlab-filter says that this one is trusted" in refused.output
+    assert "unless any_filter=True says that this one is trusted" in refused.output
     ran = []
     monkeypatch.setattr(MeshSet, "apply_step", lambda self, step, watch: ran.append(step.name))
     CliRunner().invoke(app, [*words, "--any-meshlab-filter"])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from glsk_o3d.cli.console import VisibleGroup, echo, print_json, print_rows, progress, say
+from glsk_o3d.cli.console import echo, print_json, print_rows, progress, say
 from glsk_o3d.cli.options import Json, Quiet, Verbose
 from glsk_o3d.cli.reporting import WrongUsage, reporting
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from .commands import Outcome
 
 app = typer.Typer(
-    cls=VisibleGroup,
     no_args_is_help=True,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["--help", "-h"]},
@@ -156,11 +155,11 @@ def score(
 ) -> None:
     """Score the answers of a program. What is missing or unreadable counts as a failure."""
     with reporting(quiet=quiet, verbose=verbose):
-        from glsk_o3d.cli.outputs import REPORT_FILE, check_findings
+        from glsk_o3d.cli.outputs import REPORT_FILE, check_outputs
 
         from . import leaderboard, score_answers
 
-        check_findings([(output, *REPORT_FILE)])
+        check_outputs([(output, *REPORT_FILE)])
         with progress(not quiet, remaining=True) as update:
             update("reading")
             results = score_answers(folder, answers, name=name, on_cloud=update)
@@ -189,13 +188,13 @@ def table(
 ) -> None:
     """Compare programs: means with intervals, for all clouds and by kind."""
     with reporting(quiet=quiet, verbose=verbose):
-        from glsk_o3d.cli.outputs import check_findings
+        from glsk_o3d.cli.outputs import check_outputs
 
         from . import leaderboard, read_results
         from .table import save_leaderboard
 
         files = output or []
-        check_findings([(path, (".md", ".json"), "table is Markdown or JSON") for path in files], *scores)
+        check_outputs([(path, (".md", ".json"), "table is Markdown or JSON") for path in files], *scores)
         board = leaderboard(map(read_results, scores))
         for path in files:
             save_leaderboard(board, path)

@@ -60,7 +60,7 @@ class Skeletonizer:
         if not opening >= 0:
             raise InvalidParameterError(f"opening = {opening}: must be 0, for no grasps, or more")
         self.make, self.min_points, self.opening = make, min_points, opening
-        self.pipeline = override(as_pipeline(pipeline), filter(None, settings), name=pipeline)
+        self.pipeline = override(as_pipeline(pipeline), filter(None, settings))
 
     def __call__(self, cloud: Any) -> Results:
         """The messages about a ``sensor_msgs/msg/PointCloud2``, in its frame and with its stamp.
