@@ -16,8 +16,8 @@ import numpy as np
 from ..analysis.truth import Truth
 from ..errors import FileFormatError, InvalidParameterError
 from ..interop.atomic import write_atomically, write_json
-from ..io.axes import read_truth
 from ..io.formats.ply_rows import header, table
+from ..io.skeletons import read_truth
 from .versions import OWN, VERSIONS
 
 INDEX_NAME = "benchmark.json"

@@ -71,9 +71,8 @@ def evaluate(
     with reporting(cloud, quiet=quiet, verbose=verbose):
         from ..interop.atomic import write_json
         from ..interop.clouds import cloud_points
-        from ..io.axes import read_truth
         from ..io.scans import read_cloud
-        from ..io.skeletons import read_skeleton
+        from ..io.skeletons import read_skeleton, read_truth
         from .outputs import PICTURE_FILE, REPORT_FILE, check_findings
 
         files = [path for path in (output, preview) if path is not None]

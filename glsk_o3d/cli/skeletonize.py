@@ -159,8 +159,7 @@ def _read(
 
     from ..interop.packages import import_open3d
     from ..io.scans import read_scan, save_tensor_cloud
-    from ..io.streamed_labels import STREAMED_ENDING, annotate_file
-    from ..io.streaming import sample_for
+    from ..io.streaming import STREAMED_ENDING, annotate_file, sample_for
 
     with holding_interrupts():
         import_open3d()

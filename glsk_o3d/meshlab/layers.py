@@ -19,7 +19,8 @@ from ..io.clouds.scanned import COLOR_CHANNELS
 from ..io.formats import ply_rows
 from ..io.formats.graphs import graph_skeleton
 from ..io.formats.ply import ply_elements
-from ..io.scans import check_scan, read_scan
+from ..io.paths import existing_file
+from ..io.scans import read_scan
 from ..io.skeletons import read_skeleton, save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
 from ..state import Contraction
@@ -92,7 +93,7 @@ class Layer:
         ------
         FileNotFoundError, FileFormatError, MissingPackageError
         """
-        path, scalars = check_scan(path), None
+        path, scalars = existing_file(path), None
         ending, o3d = path.suffix.lower(), import_open3d()
         held = _elements(path, ending)
         if "edge" in held and "face" not in held:

@@ -12,8 +12,7 @@ import numpy as np
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import write_atomically
 from ..interop.packages import require
-from ..io.paths import CLOUD_ENDINGS, MESH_ENDINGS
-from ..io.scans import check_scan
+from ..io.paths import CLOUD_ENDINGS, MESH_ENDINGS, existing_file
 from ..io.skeletons import save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
 from .layers import Layer
@@ -151,7 +150,7 @@ class LayeredMeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         ------
         FileNotFoundError, FileFormatError
         """
-        path = check_scan(path)
+        path = existing_file(path)
         try:
             if path.suffix.lower() in CLOUD_ENDINGS + MESH_ENDINGS:
                 self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)

@@ -15,7 +15,7 @@ from glsk_o3d import (
     skeletonize,
 )
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
-from glsk_o3d.io import streamed_labels, streaming
+from glsk_o3d.io import streaming
 from glsk_o3d.io.clouds import blocks
 from glsk_o3d.io.formats import ply_tables
 from glsk_o3d.samples import torus, y_junction
@@ -248,7 +248,7 @@ def test_a_scan_that_breaks_off_leaves_nothing_behind(scans, tmp_path):
 @pytest.mark.parametrize("change", ["more points", "fewer points", "no classification"])
 def test_a_scan_that_changes_meanwhile_leaves_nothing_behind(scans, tmp_path, monkeypatch, change):
     cloud, skeleton = read_tensor_cloud(scans / "scan.ply"), skeletonize(torus(1000).points)
-    path, survey = tmp_path / "scan.ply", streamed_labels._survey
+    path, survey = tmp_path / "scan.ply", streaming._survey
     save_tensor_cloud(cloud, path)
 
     def changes_then(*given):
@@ -258,7 +258,7 @@ def test_a_scan_that_changes_meanwhile_leaves_nothing_behind(scans, tmp_path, mo
         save_tensor_cloud(cloud.append(cloud) if change == "more points" else cloud.select_by_index([*range(99)]), path)
         return told
 
-    monkeypatch.setattr(streamed_labels, "_survey", changes_then)
+    monkeypatch.setattr(streaming, "_survey", changes_then)
     with pytest.raises(FileFormatError, match=r"scan\.ply: has changed while it was read"):
         annotate_file(skeleton, path, tmp_path / "out.ply")
     assert [each.name for each in tmp_path.iterdir()] == ["scan.ply"]
@@ -274,8 +274,8 @@ def test_an_error_while_writing_keeps_the_old_file(scans, tmp_path, monkeypatch)
             raise OSError(28, "No space left on device")
         return real(*args)
 
-    real = streamed_labels.ply_rows.table
-    monkeypatch.setattr(streamed_labels.ply_rows, "table", fails)
+    real = streaming.ply_rows.table
+    monkeypatch.setattr(streaming.ply_rows, "table", fails)
     with pytest.raises(OSError, match="No space left"):
         annotate_file(skeleton, scans / "scan.ply", tmp_path / "out.ply")
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]

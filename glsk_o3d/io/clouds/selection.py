@@ -15,6 +15,8 @@ import numpy as np
 from ...errors import InvalidCloudError, InvalidParameterError, did_you_mean
 from .scanned import Scan
 
+__all__ = ["select"]
+
 _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
@@ -63,22 +65,7 @@ def select(scan: Scan, where: str) -> Scan:
 
 
 def chosen_points(scan: Scan, where: str) -> np.ndarray:
-    """For which points a condition holds.
-
-    Parameters
-    ----------
-    scan : Scan
-    where : str
-
-    Returns
-    -------
-    (N,) bool array
-
-    Raises
-    ------
-    InvalidParameterError
-        As from `select`.
-    """
+    """For which points a condition holds, (N,) bool array; InvalidParameterError as from `select`."""
     try:
         chosen = np.asarray(_value(parsed(where), scan.columns))
     except (TypeError, ValueError) as error:
@@ -91,40 +78,12 @@ def chosen_points(scan: Scan, where: str) -> np.ndarray:
 
 
 def none_chosen(where: str) -> InvalidCloudError:
-    """The error for a condition that holds for no point.
-
-    Parameters
-    ----------
-    where : str
-
-    Returns
-    -------
-    InvalidCloudError
-    """
+    """The error for a condition that holds for no point."""
     return InvalidCloudError(f"there is no point with {where}")
 
 
 def parsed(where: str) -> ast.expr:
-    """A condition as a tree of Python's grammar.
-
-    Parameters
-    ----------
-    where : str
-
-    Returns
-    -------
-    ast.expr
-
-    Raises
-    ------
-    InvalidParameterError
-        It is none, or an attribute is called as a word of Python is.
-
-    Examples
-    --------
-    >>> ast.dump(parsed("z"))
-    "Name(id='z', ctx=Load())"
-    """
+    """A condition as a tree of Python's grammar; InvalidParameterError if it is none."""
     try:
         return ast.parse(where.strip(), mode="eval").body
     except (SyntaxError, RecursionError, MemoryError) as error:
@@ -134,12 +93,6 @@ def parsed(where: str) -> ast.expr:
         word = next((word for word in re.findall(r"\w+", where) if iskeyword(word) and word not in _GRAMMAR), "")
         cure = f"write {word}_ for {word}" if word else cure
         raise InvalidParameterError(f"where = {where[:200]!r}: {why}: {cure}") from None
-
-
-def _column(name: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    if name not in columns:
-        raise InvalidParameterError(did_you_mean(name, columns, "attribute of the points"))
-    return columns[name]
 
 
 def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
@@ -160,5 +113,7 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
         case ast.Constant(value=int() | float() as number):
             return number
         case ast.Name(id=name):
-            return _column(name, columns)
+            if name not in columns:
+                raise InvalidParameterError(did_you_mean(name, columns, "attribute of the points"))
+            return columns[name]
     raise InvalidParameterError(f"{ast.unparse(node)!r} is not understood: compare attributes with numbers")

@@ -20,7 +20,7 @@ from ...interop.clouds import cloud_points, open3d_class
 from ...numerics.vectors import norm, unit
 from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
-from .forests import as_forest, global_shift
+from .graphs import as_forest, global_shift
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
 COMPONENT_TYPES = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2

@@ -13,8 +13,7 @@ import numpy as np
 from ...errors import FileFormatError
 from ...numerics.vectors import norm
 from ...skeleton import Skeleton
-from .forests import is_outward, parents
-from .text import line
+from .graphs import is_outward, line, parents
 
 URDF_DENSITY = 1000.0  # published: of water, in kg/m³; fresh wood and most plants are near it
 

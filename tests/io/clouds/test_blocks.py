@@ -95,6 +95,21 @@ WHOLE = {
 }
 
 
+def joined(blocks):
+    """The points of several blocks, one after the other; unset is what is so in all."""
+    parts = list(blocks)
+    if len(parts) == 1:
+        return parts[0]
+    colors, normals = ([getattr(part, name) for part in parts] for name in ("colors", "normals"))
+    return Scan(
+        np.concatenate([part.positions for part in parts]),
+        None if colors[0] is None else np.concatenate(colors),
+        None if normals[0] is None else np.concatenate(normals),
+        {name: np.concatenate([part.attributes[name] for part in parts]) for name in parts[0].attributes},
+        unset=frozenset.intersection(*(part.unset for part in parts)),
+    )
+
+
 def assert_same(found, scan):
     for name in ("positions", "colors", "normals", "triangles"):
         a, b = getattr(found, name), getattr(scan, name)
@@ -115,17 +130,17 @@ def test_blocks_joined_are_the_file(tmp_path, make, rows):
     path = make(tmp_path)
     blocks = list(read_blocks(path, rows=rows))
     assert [len(block) for block in blocks] == [min(rows, N - begin) for begin in range(0, N, rows)]
-    assert_same(Scan.joined(blocks), read_scan(path))
+    assert_same(joined(blocks), read_scan(path))
 
 
 @pytest.mark.parametrize("make", FILES.values(), ids=FILES)
 def test_bare_blocks_are_the_positions(tmp_path, make):
     path = make(tmp_path)
-    bare = Scan.joined(read_blocks(path, rows=10, bare=True))
+    bare = joined(read_blocks(path, rows=10, bare=True))
     assert bare.colors is None
     assert bare.attributes == {}
     np.testing.assert_array_equal(bare.positions, read_scan(path).positions)
-    chosen = Scan.joined(read_blocks(path, rows=10, bare=True, where="y > 0"))
+    chosen = joined(read_blocks(path, rows=10, bare=True, where="y > 0"))
     np.testing.assert_array_equal(chosen.positions, read_scan(path, "y > 0").positions)
 
 
@@ -152,7 +167,7 @@ def test_conditions_choose_in_blocks_as_in_the_whole(tmp_path, name):
     where = "x > 400000.2 and y > 0"
     blocks = list(read_blocks(path, rows=7, where=where))
     assert all(0 < len(block) <= 7 for block in blocks)
-    assert_same(Scan.joined(blocks), read_scan(path, where))
+    assert_same(joined(blocks), read_scan(path, where))
     with pytest.raises(InvalidCloudError, match="no point with x > 500000"):
         list(read_blocks(path, rows=7, where="x > 500000"))
     with pytest.raises(InvalidParameterError, match="colour"):

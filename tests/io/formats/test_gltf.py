@@ -8,8 +8,8 @@ import pytest
 from glsk_o3d import Skeleton
 from glsk_o3d.analysis.skinning import skin_weights
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
-from glsk_o3d.io.formats.forests import as_forest
 from glsk_o3d.io.formats.gltf import save_rig
+from glsk_o3d.io.formats.graphs import as_forest
 
 KINDS = {5121: "u1", 5123: "u2", 5125: "u4", 5126: "f4"}
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}

@@ -41,21 +41,6 @@ def test_swc_keeps_edges_of_no_length(make, tmp_path):
     assert len(read_skeleton(tmp_path / "s.swc").edges) == 2
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "1 0 0 0 0 1 2\n",
-        "1 0 0 0 0 1 -1\n1 0 0 0 0 1 -1\n",
-        "1 0 0 0 0 1\n",
-        "1 0 0 0 0 1 nan\n2 0 0 0 0\n",
-    ],
-)
-def test_damaged_files(tmp_path, text):
-    (tmp_path / "s.swc").write_text(text, encoding="latin-1")
-    with pytest.raises(FileFormatError, match=r"s\.swc"):
-        read_skeleton(tmp_path / "s.swc")
-
-
 def test_coordinates_of_a_map_are_shifted_along_the_axes_that_need_it(tmp_path, caplog):
     vertices = np.array([[5e5, 5.4e6, -0.05], [5e5 + 0.25, 5.4e6 + 0.125, 10.0]])
     far = Skeleton(vertices, [[0, 1]], [0.01, 0.01], (), (), ())
