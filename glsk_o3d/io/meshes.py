@@ -24,23 +24,8 @@ PLY_VERTEX_BYTES, PLY_COLOR_BYTES, PLY_TRIANGLE_BYTES, STL_TRIANGLE_BYTES = 48, 
 
 
 def read_mesh(path: str | os.PathLike) -> Any:
-    """Read a triangle mesh.
-
-    Parameters
-    ----------
-    path : path-like
-        PLY, OFF, OBJ, STL, glTF or GLB.
-
-    Returns
-    -------
-    open3d.geometry.TriangleMesh
-
-    Raises
-    ------
-    FileNotFoundError
-    FileFormatError
-        A folder, an unknown ending, a damaged file, or one without triangles.
-    MissingPackageError
+    """Read an Open3D triangle mesh from PLY, OFF, OBJ, STL, glTF or GLB; errors as from `read_cloud`, and
+    FileFormatError for a file without triangles.
     """
     endings = (".ply", *MESH_ENDINGS)
     if not str(path).lower().endswith(endings):

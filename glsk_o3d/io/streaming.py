@@ -219,7 +219,7 @@ def annotate_file(
     check_ending(output, "labelled cloud of a large file is PLY", STREAMED_ENDING)
     if Path(output).exists() and Path(path).exists() and os.path.samefile(path, output):
         raise FileFormatError(f"{os.fspath(output)}: is the scan itself: give another name")
-    owner = _Owner(skeleton)
+    label = _labeller(skeleton)
     source = scan_file(path)
     with refused_where_damaged(source):
         types = ply.types(source) if source.suffix.lower() == ".ply" else {}
@@ -232,7 +232,7 @@ def annotate_file(
             for block in read_blocks(path, where=where):
                 if not kinds.keys() <= block.attributes.keys():
                     raise _changed(path)
-                table = ply_rows.table(_columns(block, kinds, held, owner.labels(block.positions)))
+                table = ply_rows.table(_columns(block, kinds, held, label(block.positions)))
                 if row is None:
                     stream.write(ply_rows.header(table.dtype, n))
                 elif row != table.dtype:
@@ -246,32 +246,29 @@ def annotate_file(
     return n
 
 
-class _Owner:
-    """Whose each point is: the vertex, and how thick the part is there."""
+def _labeller(skeleton: Skeleton) -> Callable[[np.ndarray], dict[str, np.ndarray]]:
+    """What says of points, (m, 3) float array, where they belong, coloured by branch."""
+    if len(skeleton.vertices) == 0:
+        raise InvalidParameterError("the skeleton is empty: there is nothing to label points with")
+    known = np.flatnonzero(skeleton.vertex_of_point >= 0)
+    points_of, owner = skeleton.points[known], skeleton.vertex_of_point[known]
+    if len(known):
+        tree = cKDTree(points_of)
+        apart = nearest_neighbours(points_of, min(SCALE_NEIGHBOUR + 1, len(known)))[0][:, -1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            thickness_of = skeleton.radii[owner] / apart
 
-    def __init__(self, skeleton: Skeleton) -> None:
-        if len(skeleton.vertices) == 0:
-            raise InvalidParameterError("the skeleton is empty: there is nothing to label points with")
-        self._skeleton = skeleton
-        self._known = np.flatnonzero(skeleton.vertex_of_point >= 0)
-        if len(self._known):
-            points = skeleton.points[self._known]
-            self._tree = cKDTree(points)
-            apart = nearest_neighbours(points, min(SCALE_NEIGHBOUR + 1, len(points)))[0][:, -1]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                self._thickness = skeleton.radii[skeleton.vertex_of_point[self._known]] / apart
-
-    def labels(self, points: np.ndarray) -> dict[str, np.ndarray]:
-        """What is told of points, (m, 3) float array, coloured by branch."""
+    def label(points: np.ndarray) -> dict[str, np.ndarray]:
         vertex, thickness = np.full(len(points), -1), np.full(len(points), np.nan)
-        if not len(self._known):
-            vertex = vertex_of_cloud(self._skeleton, points)[1]
+        if not len(known):
+            vertex = vertex_of_cloud(skeleton, points)[1]
         elif len(rows := np.flatnonzero(np.isfinite(points).all(axis=1))):
             rows = rows[morton_order(points[rows])]  # what is near in memory is found faster
-            nearest = self._tree.query(points[rows])[1]
-            vertex[rows] = self._skeleton.vertex_of_point[self._known[nearest]]
-            thickness[rows] = self._thickness[nearest]
-        return labels(self._skeleton, points, vertex, thickness, "branch")
+            nearest = tree.query(points[rows])[1]
+            vertex[rows], thickness[rows] = owner[nearest], thickness_of[nearest]
+        return labels(skeleton, points, vertex, thickness, "branch")
+
+    return label
 
 
 def _survey(path: str | os.PathLike, where: str | None) -> tuple[int, dict[str, np.dtype]]:

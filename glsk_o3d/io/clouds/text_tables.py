@@ -23,7 +23,6 @@ from .scanned import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, named_attribu
 
 _log = logging.getLogger(__name__)
 
-ENCODED_BYTES = 1 << 16  # fitted: more than any header, by which the alphabet is told
 LOOK_AHEAD = 20  # fitted: lines in which a decimal comma shows
 HEADER_LINES = 100  # fitted to nothing: longer headers are those of other files
 UNIT_SLACK = 0.01  # measured: normals in text have two digits at the least
@@ -59,7 +58,7 @@ def holds_points(path: Path) -> bool:
     if not path.is_file():  # a pipe may never end
         return False
     try:
-        with _opened(path) as stream:
+        with path.open(encoding="utf-8-sig", errors="replace") as stream:
             _layout(stream)
     except (NoPoints, OSError):
         return False
@@ -69,7 +68,7 @@ def holds_points(path: Path) -> bool:
 def read(path: Path) -> Scan:
     """The points of a file of text; NoPoints if there is none. Lines that hold no point are skipped and logged."""
     ending = path.suffix.lower()
-    with _opened(path) as stream:
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:
         first = stream.readline(64).strip()
         if ending == ".pts" and not first.isdigit():
             raise ValueError("its first line is not the number of points")
@@ -92,18 +91,6 @@ def read(path: Path) -> Scan:
     called = names or [role or f"column_{column + 1}" for role, column in zip(roles, layout.columns, strict=True)]
     attributes = named_attributes((called[i], _whole(rows[:, i])) for i in others)
     return Scan(positions, None if colors is None else unit_colors(colors), normals, attributes)
-
-
-def _opened(path: Path) -> TextIO:
-    """A file of text, in UTF-8, or else in the eight bits of Western Europe."""
-    with path.open("rb") as stream:
-        head = stream.read(ENCODED_BYTES).rpartition(b"\n")[0]
-    try:
-        head.decode("utf-8")
-        encoding = "utf-8-sig"
-    except UnicodeDecodeError:
-        encoding = "cp1252"
-    return path.open(encoding=encoding, errors="replace")
 
 
 def _layout(stream: TextIO) -> Layout:

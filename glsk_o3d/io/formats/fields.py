@@ -60,7 +60,7 @@ def read_npz(data: bytes) -> Skeleton:
     words = ("format", "format_version", "report")
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
         if sum(info.file_size for info in packed.infolist()) > max(MOST_EXPANDED * len(data), SMALL_ARCHIVE):
-            raise ValueError(f"its {len(data)} bytes would become more than {MOST_EXPANDED} times as many: no skeleton packs so")
+            raise ValueError(f"it would become more than {MOST_EXPANDED} times as large: no skeleton packs so")
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         values = {name: archive[name] for name in (*words, *ARRAYS) if name in archive.files}
     for name in words:

@@ -19,7 +19,7 @@ URDF_DENSITY = 1000.0  # published: of water, in kg/m³; fresh wood and most pla
 
 
 def write(skeleton: Skeleton) -> bytes:
-    """The content of a URDF file.
+    """The content of a URDF file of a forest that is numbered outwards and has radii; FileFormatError if it is none.
 
     Vertex i has ``link_i``, on the fixed joint ``joint_i``; the links of roots stand on the link ``base``, at the
     origin of the cloud. A link's frame is where it can bend: at the vertex that it comes from, of a root at the vertex
@@ -27,28 +27,6 @@ def write(skeleton: Skeleton) -> bytes:
     cloud is in the joints of the roots alone. Both visual and collision are the ball of the vertex and the cylinder
     that leads to it, as thick as its ends on average; what has no size is left out. Masses are those of solid cylinders
     of `URDF_DENSITY`, of a root that of its ball.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        A forest whose edges lead away from its roots, from the smaller to the larger vertex, as of
-        `glsk_o3d.editing.reroot`; with radii.
-
-    Returns
-    -------
-    bytes
-
-    Raises
-    ------
-    FileFormatError
-        A vertex has two smaller neighbours, as in loops; or coordinates or radii are not known.
-
-    Examples
-    --------
-    >>> from glsk_o3d import Skeleton
-    >>> stick = Skeleton([[0, 0, 0], [0, 0, 1]], [[0, 1]], [0.1, 0.1], (), (), ())
-    >>> [row.strip() for row in write(stick).decode().splitlines() if "<link" in row]
-    ['<link name="base" />', '<link name="link_0">', '<link name="link_1">']
     """
     _check(skeleton)
     vertices, radii = skeleton.vertices, skeleton.radii

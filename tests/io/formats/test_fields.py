@@ -148,7 +148,7 @@ def test_an_archive_that_would_fill_the_memory_is_refused_unread(archived, tmp_p
     np.savez_compressed(tmp_path / "s.npz", **{**archived, "points": np.zeros((10**7, 3))})
     assert (tmp_path / "s.npz").stat().st_size < 10**6
     monkeypatch.setattr(np, "load", None)
-    with pytest.raises(FileFormatError, match=r"would become more than 200 times as many: no skeleton packs so"):
+    with pytest.raises(FileFormatError, match=r"would become more than 200 times as large: no skeleton packs so"):
         read_skeleton(tmp_path / "s.npz")
 
 
