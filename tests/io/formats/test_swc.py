@@ -13,15 +13,6 @@ def test_swc_as_others_write_it(tmp_path):
     np.testing.assert_array_equal(back.radii, [0.5, 2, 0.5])
 
 
-def test_swc_rows(forest, tmp_path):
-    forest.save(tmp_path / "s.swc")
-    rows = [line.split() for line in (tmp_path / "s.swc").read_text().splitlines() if line[0] != "#"]
-    numbers, parents = [int(row[0]) for row in rows], [int(row[6]) for row in rows]
-    assert numbers == [*range(1, 7)]
-    assert all(parent < number for parent, number in zip(parents, numbers, strict=True))
-    assert parents.count(-1) == forest.n_components == 3
-
-
 def test_swc_refuses_loops_or_cuts_the_longest_edges(loop, tmp_path):
     with pytest.raises(FileFormatError, match=r"2 loop.*cut_loops=True"):
         loop.save(tmp_path / "s.swc")
