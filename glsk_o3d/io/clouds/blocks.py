@@ -17,7 +17,7 @@ from ..formats import ply
 from ..paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, breaks_off, existing_file, unknown_ending
 from ..skeletons import holds_skeleton, read_skeleton
 from . import e57, las, pcd, text_tables
-from .scanned import NoPoints, Scan
+from .scanned import ALL_ROWS, NoPoints, Scan
 from .selection import chosen_points, none_chosen, parsed
 
 BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take more memory
@@ -26,9 +26,14 @@ BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take 
 def read_whole(path: str | os.PathLike) -> Scan:
     """Read all points of a cloud or mesh, and its triangles. Errors as from `glsk_o3d.read_cloud`."""
     path = scan_file(path)
+    reader = _READERS[path.suffix.lower()]
     with refused_where_damaged(path):
-        scan = _READERS[path.suffix.lower()].read(path)
-    if len(scan) == 0:
+        blocks = None if reader.blocks is None else reader.blocks(path, ALL_ROWS, False)
+        if blocks is not None:
+            scan = next(blocks, None)
+        else:
+            scan = reader.read(path) if reader.read else None
+    if not scan:
         raise _holds_no_points(path)
     return scan
 
@@ -54,8 +59,7 @@ def read_blocks(
     reader = _READERS[path.suffix.lower()]
     with refused_where_damaged(path):
         blocks = None if reader.blocks is None else reader.blocks(path, rows, bare and where is None)
-    found = iter([read_whole(path)]) if blocks is None else _watched(path, blocks)
-    return found if where is None else _selected(found, where)
+    return _chosen(path, iter([read_whole(path)]) if blocks is None else blocks, where)
 
 
 def promised_points(path: str | os.PathLike) -> int | None:
@@ -106,29 +110,24 @@ def _holds_no_points(path: Path) -> FileFormatError:
     return FileFormatError(f"{path}: no points could be read: it is damaged, empty, or not a {ending} file")
 
 
-def _watched(path: Path, blocks: Iterator[Scan]) -> Iterator[Scan]:
-    """The same blocks, and errors as those of files."""
-    with refused_where_damaged(path):
-        first = next(blocks, None)
-    if first is None:
-        raise _holds_no_points(path)
-    yield first
-    with refused_where_damaged(path):
-        yield from blocks
-
-
-def _selected(blocks: Iterator[Scan], where: str) -> Iterator[Scan]:
-    any_chosen = False
-    for block in blocks:
-        chosen = chosen_points(block, where)
-        if chosen.any():
+def _chosen(path: Path, blocks: Iterator[Scan], where: str | None) -> Iterator[Scan]:
+    """Of each block the points for which a condition holds, if there are any; errors as those of files."""
+    any_read = any_chosen = False
+    while True:
+        with refused_where_damaged(path):
+            block = next(blocks, None)
+        if block is None:
+            break
+        any_read = True
+        if where is not None:
+            block = block[chosen_points(block, where)]
+        if len(block):
             any_chosen = True
-            yield block[chosen]
+            yield block
+    if not any_read:
+        raise _holds_no_points(path)
     if not any_chosen:
-        raise none_chosen(where)
-
-
-# -------------------------------------------------------------------------------------------------------------- meshes
+        raise none_chosen(str(where))
 
 
 def _read_mesh(path: Path) -> Scan:
@@ -170,20 +169,17 @@ def _check_off(path: Path) -> None:
         raise breaks_off(n + m, found, "vertices and faces")
 
 
-# --------------------------------------------------------------------------------------------------------------- table
-
-
 class Reader(NamedTuple):
-    """How scans of a format are read: whole; a few points at a time, `blocks(path, rows, bare)`, which is None for a
-    file that cannot be read so; and how many points there are by the header.
+    """How scans of a format are read: whole; a few points at a time, `blocks(path, rows, bare)`; and how many there are
+    by the header. The latter two are None for formats that are always read whole, and give None for such files.
     """
 
-    read: Callable[[Path], Scan]
+    read: Callable[[Path], Scan] | None
     blocks: Callable[[Path, int, bool], Iterator[Scan] | None] | None = None
     promised: Callable[[Path], int | None] | None = None
 
 
-_LAS = Reader(las.read, las.blocks, las.promised)
+_LAS = Reader(None, las.blocks, las.promised)
 _READERS: dict[str, Reader] = {
     **dict.fromkeys(MESH_ENDINGS, Reader(_read_mesh)),
     **dict.fromkeys(TEXT_ENDINGS, Reader(text_tables.read)),

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...interop.packages import require, require_for
 from ..paths import breaks_off
-from .scanned import ALL_ROWS, COLOR_CHANNELS, Scan, brightest, named_attributes, only, unit_colors
+from .scanned import COLOR_CHANNELS, Scan, brightest, named_attributes, unit_colors
 
 VLR_BYTES, EVLR_BYTES = 54, 60  # published: LAS 1.4 R15, of the heads of records
 PACKED_RECORD, LAYERED = 22204, 3  # published: LASzip's own record, and its way to pack in which chunks have layers
@@ -19,13 +19,8 @@ LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}  # published: of the parts of a point, by 
 MOST_PACKED = 200  # fitted: points of a LAZ file per byte; of flat grids there are 93, of a million in one place 140
 
 
-def read(path: Path) -> Scan:
-    """The points of a LAS or LAZ file; dimensions that are 0 throughout are unset."""
-    return only(blocks(path, ALL_ROWS))
-
-
 def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan]:
-    """The same, so many points at a time, or positions alone if `bare`; unset is what is 0 in a block."""
+    """The points of a file, so many at a time, or positions alone if `bare`; unset is what is 0 in a block."""
     require_for(path.suffix)
     promised(path)
     return _blocks(path, rows, bare)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...interop.packages import import_open3d
 from ..paths import breaks_off
-from .scanned import ALL_ROWS, Scan, named_attributes, only
+from .scanned import Scan, named_attributes
 
 _PCD_NORMALS = ["normal_x", "normal_y", "normal_z"]
 _PCD_TYPES = {kind + size for kind, sizes in (("F", "48"), ("I", "1248"), ("U", "1248")) for size in sizes}
@@ -20,18 +20,35 @@ _PACKED_COLORS = ("rgb", "rgba")
 
 
 def read(path: Path) -> Scan:
-    """The points of a PCD file; ValueError where it is damaged or breaks off."""
+    """The points of a compressed PCD file, which `blocks` does not read; ValueError where it is damaged."""
     row, points, kept, start = _header(path)
-    if kept == "binary_compressed":
-        return _compressed(path, row, points, start)
-    if kept not in _ROW_READERS:
+    if kept != "binary_compressed":
         raise ValueError(f"its data are {kept!r}, which is not understood")
-    return only(blocks(path, ALL_ROWS))
+    with path.open("rb") as stream:
+        stream.seek(start)
+        packed, size = np.frombuffer(stream.read(8).ljust(8, b"\0"), "<u4").tolist()
+        if len(stream.read(packed)) < packed or size < points * row.itemsize:
+            raise ValueError("its compressed data break off")
+    o3d = import_open3d()
+    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+        point = o3d.t.io.read_point_cloud(str(path)).point
+    held = {name: point[name].numpy() for name in point}
+    if len(held.get("positions", ())) != points:
+        raise ValueError("its compressed data make no sense")
+    single = [name.partition(" ")[2] for name in row.names or () if row[name].shape == (1,)]
+    attributes = named_attributes((name, held[name][:, 0]) for name in single if name in held and name != "_")
+    colors, normals = held.get("colors"), held.get("normals")
+    return Scan(
+        held["positions"].astype(float),
+        None if colors is None else colors / 255,
+        None if normals is None else normals.astype(float),
+        attributes,
+    )
 
 
 def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan] | None:
-    """The same, so many points at a time, or positions alone if `bare`; None where it has to be read whole, since
-    columns follow each other.
+    """The points of a PCD file, so many at a time, or positions alone if `bare`; None for compressed data, whose
+    columns follow each other. ValueError where it is damaged or breaks off.
     """
     row, points, kept, start = _header(path)
     if kept not in _ROW_READERS:
@@ -128,27 +145,3 @@ def _binary(stream: BinaryIO, row: np.dtype, n: int) -> tuple[dict[str, np.ndarr
 
 _RowReader = Callable[[BinaryIO, np.dtype, int], tuple[dict[str, np.ndarray], int]]
 _ROW_READERS: dict[str, _RowReader] = {"ascii": _text, "binary": _binary}
-
-
-def _compressed(path: Path, row: np.dtype, points: int, start: int) -> Scan:
-    """Columns one after the other, packed with LZF, which Open3D unpacks; what it cannot unpack it leaves out."""
-    with path.open("rb") as stream:
-        stream.seek(start)
-        packed, size = np.frombuffer(stream.read(8).ljust(8, b"\0"), "<u4").tolist()
-        if len(stream.read(packed)) < packed or size < points * row.itemsize:
-            raise ValueError("its compressed data break off")
-    o3d = import_open3d()
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        point = o3d.t.io.read_point_cloud(str(path)).point
-    held = {name: point[name].numpy() for name in point}
-    if len(held.get("positions", ())) != points:
-        raise ValueError("its compressed data make no sense")
-    single = [name.partition(" ")[2] for name in row.names or () if row[name].shape == (1,)]
-    attributes = named_attributes((name, held[name][:, 0]) for name in single if name in held and name != "_")
-    colors, normals = held.get("colors"), held.get("normals")
-    return Scan(
-        held["positions"].astype(float),
-        None if colors is None else colors / 255,
-        None if normals is None else normals.astype(float),
-        attributes,
-    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from keyword import iskeyword
 from typing import Any
@@ -92,11 +92,6 @@ class Scan:
         for name, kind in self.kinds.items():
             cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(self.attributes[name][:, None], kind))
         return cloud
-
-
-def only(blocks: Iterator[Scan] | None) -> Scan:
-    """The one block of a file that was read whole, without points if there is none."""
-    return next(blocks or iter(()), Scan(np.empty((0, 3))))
 
 
 def attribute_name(text: str, taken: Iterable[str] = ()) -> str:

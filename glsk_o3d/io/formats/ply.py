@@ -20,14 +20,12 @@ import numpy as np
 from ...errors import FileFormatError
 from ...skeleton import Skeleton
 from ..clouds.scanned import (
-    ALL_ROWS,
     COLOR_CHANNELS,
     NO_TRIANGLES,
     NORMAL_NAMES,
     Scan,
     brightest,
     named_attributes,
-    only,
     unit_colors,
 )
 from .graphs import NoEdges, graph_skeleton
@@ -98,10 +96,7 @@ def read(data: bytes) -> Skeleton:
 
 
 def read_scan(path: Path) -> Scan:
-    """The vertices of a PLY file, and the triangles between them; ValueError where it is damaged or breaks off."""
-    found = blocks(path, ALL_ROWS)
-    if found is not None:
-        return only(found)
+    """The vertices of a PLY file that `blocks` does not read, and the triangles between them."""
     with path.open("rb") as stream:
         tables = read_tables(stream, ("vertex", "face"))
     if "vertex" not in tables:
@@ -111,8 +106,8 @@ def read_scan(path: Path) -> Scan:
 
 
 def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan] | None:
-    """The same, so many points at a time, or positions alone if `bare`; None where it has to be read whole: text, lists
-    and meshes. ValueError, before the first block, where it is damaged or breaks off.
+    """The vertices of a PLY file, so many at a time, or positions alone if `bare`; None where it has to be read whole:
+    text, lists and meshes. ValueError, before the first block, where it is damaged or breaks off.
     """
     found = _found(path)
     return None if found is None else _blocks(path, *found, rows, bare)
