@@ -211,9 +211,6 @@ def skeleton_ending(path: Path, format: str | None = None) -> str:
     return found[0]
 
 
-# --------------------------------------------------------------------------------------------------------- known axes
-
-
 def read_truth(path: str | os.PathLike) -> Truth:
     """Read a known axis.
 

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from ..pipeline import Pipeline
     from ..skeleton import Skeleton
 
-STREAMED_ENDING = ".ply"
-"""Of files that labels are streamed to."""
+STREAMED_ENDING = ".ply"  # of files that labels are streamed to
 LARGE_CLOUD = 10_000_000  # measured: points that in memory take 2 GB, and in blocks half the time
 
 
@@ -155,9 +154,6 @@ def sample_for(
     if dropped:
         points, counts = np.append(points, np.full((1, 3), np.nan), axis=0), np.append(counts, dropped)
     return _cloud(points, counts)
-
-
-# -------------------------------------------------------------------------------------------------------------- labels
 
 
 def annotate_file(

@@ -120,14 +120,6 @@ def test_formats_of_trees_cut_loops_only_when_told(loop, tmp_path, ending):
     loop.save(tmp_path / f"s{ending}", cut_loops=True)
 
 
-@pytest.mark.parametrize("text", ["", "\0\xff garbage\n" * 9], ids=["empty", "garbage"])
-@pytest.mark.parametrize("ending", READABLE)
-def test_hostile_files(tmp_path, ending, text):
-    (tmp_path / f"s{ending}").write_text(text, encoding="latin-1")
-    with pytest.raises(FileFormatError, match=rf"s\{ending}"):
-        read_skeleton(tmp_path / f"s{ending}")
-
-
 PLY = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
 DAMAGED = {
     ".cgal": ["2 0 0 0 1 1\n", "0\n", "1.5 0 0 0 1 1\n"],
@@ -154,7 +146,12 @@ DAMAGED = {
 }
 
 
-@pytest.mark.parametrize(("ending", "text"), [(ending, text) for ending, texts in DAMAGED.items() for text in texts])
+NOTHING = [(ending, text) for ending in READABLE for text in ("", "\0\xff garbage\n" * 9)]
+
+
+@pytest.mark.parametrize(
+    ("ending", "text"), [*NOTHING, *((ending, text) for ending, texts in DAMAGED.items() for text in texts)]
+)
 def test_damaged_files(tmp_path, ending, text):
     (tmp_path / f"s{ending}").write_text(text, encoding="latin-1")
     with pytest.raises(FileFormatError, match=rf"s\{ending}"):

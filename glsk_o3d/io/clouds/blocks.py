@@ -26,7 +26,7 @@ BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take 
 def read_whole(path: str | os.PathLike) -> Scan:
     """Read all points of a cloud or mesh, and its triangles. Errors as from `glsk_o3d.read_cloud`."""
     path = scan_file(path)
-    reader = _READERS[path.suffix.lower()]
+    reader = _SCAN_READERS[path.suffix.lower()]
     with refused_where_damaged(path):
         blocks = None if reader.blocks is None else reader.blocks(path, ALL_ROWS, False)
         if blocks is not None:
@@ -56,7 +56,7 @@ def read_blocks(
     path = scan_file(path)
     if where is not None:
         parsed(where)
-    reader = _READERS[path.suffix.lower()]
+    reader = _SCAN_READERS[path.suffix.lower()]
     with refused_where_damaged(path):
         blocks = None if reader.blocks is None else reader.blocks(path, rows, bare and where is None)
     return _chosen(path, iter([read_whole(path)]) if blocks is None else blocks, where)
@@ -65,7 +65,7 @@ def read_blocks(
 def promised_points(path: str | os.PathLike) -> int | None:
     """How many points a file holds by its header; None for one that is not read in blocks. Errors as `read_blocks`."""
     path = scan_file(path)
-    promised = _READERS[path.suffix.lower()].promised
+    promised = _SCAN_READERS[path.suffix.lower()].promised
     with refused_where_damaged(path):
         return None if promised is None else promised(path)
 
@@ -104,10 +104,9 @@ def refused_where_damaged(path: Path) -> Iterator[None]:
 
 
 def _holds_no_points(path: Path) -> FileFormatError:
-    ending = path.suffix.lower()
-    if _READERS[ending].blocks is not None:  # where these hold less than they promise, it is an error
-        return FileFormatError(f"{path}: it has no points: by its header there are 0: export it again")
-    return FileFormatError(f"{path}: no points could be read: it is damaged, empty, or not a {ending} file")
+    return FileFormatError(
+        f"{path}: no points could be read: it is empty, damaged, or not a {path.suffix.lower()} file"
+    )
 
 
 def _chosen(path: Path, blocks: Iterator[Scan], where: str | None) -> Iterator[Scan]:
@@ -180,7 +179,7 @@ class Reader(NamedTuple):
 
 
 _LAS = Reader(None, las.blocks, las.promised)
-_READERS: dict[str, Reader] = {
+_SCAN_READERS: dict[str, Reader] = {
     **dict.fromkeys(MESH_ENDINGS, Reader(_read_mesh)),
     **dict.fromkeys(TEXT_ENDINGS, Reader(text_tables.read)),
     ".ply": Reader(ply.read_scan, ply.blocks, ply.promised),

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import ast
 import operator
-import re
 from collections.abc import Callable, Mapping
 from functools import reduce
-from keyword import iskeyword
 from typing import Any
 
 import numpy as np
@@ -27,7 +25,6 @@ _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.In: np.isin,
     ast.NotIn: lambda values, among: ~np.isin(values, among),
 }
-_GRAMMAR = {"and", "or", "not", "in"}
 _JOINS = {ast.And: np.logical_and, ast.Or: np.logical_or}
 
 
@@ -88,10 +85,7 @@ def parsed(where: str) -> ast.expr:
         return ast.parse(where.strip(), mode="eval").body
     except (SyntaxError, RecursionError, MemoryError) as error:
         why = getattr(error, "msg", "it is nested too deeply")
-        cure = "write == for equal" if re.search(r"[^=!<>]=[^=]", where) else "write such as 'classification == 5'"
-        cure = "write 'and' and 'or'" if "&&" in where or "||" in where else cure
-        word = next((word for word in re.findall(r"\w+", where) if iskeyword(word) and word not in _GRAMMAR), "")
-        cure = f"write {word}_ for {word}" if word else cure
+        cure = "write such as 'classification == 5 and not z < 2', and class_ for class"
         raise InvalidParameterError(f"where = {where[:200]!r}: {why}: {cure}") from None
 
 

@@ -13,13 +13,13 @@ import numpy as np
 from ...errors import FileFormatError
 from ...numerics.vectors import norm
 from ...skeleton import Skeleton
-from .graphs import is_outward, line, parents
+from .graphs import line, parents
 
 URDF_DENSITY = 1000.0  # published: of water, in kg/m³; fresh wood and most plants are near it
 
 
 def write(skeleton: Skeleton) -> bytes:
-    """The content of a URDF file of a forest that is numbered outwards and has radii; FileFormatError if it is none.
+    """The content of a URDF file of a forest that is numbered outwards; FileFormatError where it has no radii.
 
     Vertex i has ``link_i``, on the fixed joint ``joint_i``; the links of roots stand on the link ``base``, at the
     origin of the cloud. A link's frame is where it can bend: at the vertex that it comes from, of a root at the vertex
@@ -67,11 +67,6 @@ def write(skeleton: Skeleton) -> bytes:
 
 
 def _check(skeleton: Skeleton) -> None:
-    if skeleton.n_loops or not is_outward(skeleton):
-        what = (
-            f"the skeleton has {skeleton.n_loops} loop(s)" if skeleton.n_loops else "the edges do not lead from a root"
-        )
-        raise FileFormatError(f"URDF holds trees only and {what}: see glsk_o3d.editing.cut_loops and reroot")
     if not np.isfinite(skeleton.vertices).all():
         raise FileFormatError("URDF needs finite coordinates, and some vertices have none")
     unknown = np.count_nonzero(~np.isfinite(skeleton.radii))

@@ -76,12 +76,12 @@ def test_damaged_files(las, e57, tmp_path, name):
 
 
 @pytest.mark.parametrize("name", ["c.las", "c.laz"])
-def test_a_file_without_points_is_not_called_damaged(tmp_path, name):
+def test_a_file_without_points(tmp_path, name):
     laspy = pytest.importorskip("laspy")
     laspy.LasData(laspy.LasHeader(point_format=3, version="1.2")).write(tmp_path / name)
-    with pytest.raises(FileFormatError, match=rf"{name}: it has no points: by its header there are 0"):
+    with pytest.raises(FileFormatError, match=rf"{name}: no points could be read"):
         read_cloud(tmp_path / name)
-    with pytest.raises(FileFormatError, match=rf"{name}: it has no points: by its header there are 0"):
+    with pytest.raises(FileFormatError, match=rf"{name}: no points could be read"):
         next(read_blocks(tmp_path / name))
 
 
