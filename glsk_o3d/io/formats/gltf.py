@@ -99,7 +99,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
         raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
     if len(forest.edges) > MOST_JOINTS:
         raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
-    points, (name, tensor) = cloud_points(mesh), open3d_class(mesh)
+    points, (kind, tensor) = cloud_points(mesh), open3d_class(mesh)
     if not np.isfinite(points).all():
         raise InvalidCloudError("the surface has points that are not finite: drop them first")
     (low, high), (least, most) = ((each.min(axis=0), each.max(axis=0)) for each in (forest.vertices, points))
@@ -120,7 +120,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
     for name, values in _looks(mesh, len(points)).items():
         attributes[name] = buffer.add(values, "f4", "VEC3")
     primitive: dict[str, Any] = {"attributes": attributes, "mode": POINTS_MODE}
-    if name == "TriangleMesh":
+    if kind == "TriangleMesh":
         triangles = mesh.triangle.indices.cpu().numpy() if tensor else np.asarray(mesh.triangles)
         if len(triangles):
             primitive |= {"indices": buffer.add(triangles.reshape(-1), "u4", "SCALAR"), "mode": TRIANGLES_MODE}

@@ -172,6 +172,7 @@ def test_normals_and_colours_go_along(tree, rig):
     for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
         file = rig(tree, given)
         part = file.meshes[0].primitives[0].attributes
+        assert file.meshes[0].primitives[0].mode == 4
         np.testing.assert_allclose(accessor(file, part.NORMAL), np.asarray(mesh.vertex_normals), atol=1e-6)
         # sRGB's half is 0.214 in linear light
         np.testing.assert_allclose(accessor(file, part.COLOR_0)[0], [1, 0.2140, 0], atol=1e-3)
