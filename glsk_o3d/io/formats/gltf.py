@@ -156,13 +156,19 @@ def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
     name, tensor = open3d_class(mesh)
     if name not in ("PointCloud", "TriangleMesh"):
         return {}
-    start, held = "vertex_" if name == "TriangleMesh" else "", mesh.to_legacy() if tensor else mesh
-    normals, colors = (np.asarray(getattr(held, f"{start}{key}")) for key in ("normals", "colors"))
+    if tensor:
+        held = mesh.vertex if name == "TriangleMesh" else mesh.point
+        parts = (held[key].cpu().numpy() if key in held else np.empty((0, 3)) for key in ("normals", "colors"))
+    else:
+        start = "vertex_" if name == "TriangleMesh" else ""
+        parts = (np.asarray(getattr(mesh, f"{start}{key}")) for key in ("normals", "colors"))
+    normals, colors = parts
     found = {}
     if len(normals) == n and (norm(normals) > 0).all():
         found["NORMAL"] = unit(normals)
     if len(colors) == n:
-        found["COLOR_0"] = np.where(colors <= SRGB_KNEE, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
+        shades = colors / 255 if colors.dtype == np.uint8 else colors
+        found["COLOR_0"] = np.where(shades <= SRGB_KNEE, shades / 12.92, ((shades + 0.055) / 1.055) ** 2.4)
     return found
 
 
