@@ -62,15 +62,6 @@ def test_a_mesh_with_few_vertices_is_told(tmp_path, caplog, ending, resolution, 
     assert ("sample_points_uniformly" in caplog.text) == coarse
 
 
-def test_a_mesh_whose_triangles_name_what_is_not_there(tmp_path, caplog):
-    (tmp_path / "m.ply").write_text(
-        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-        "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"
-    )
-    assert len(read_cloud(tmp_path / "m.ply").points) == 3
-    assert not caplog.text
-
-
 @pytest.mark.parametrize("ending", CLOUD_ENDINGS + MESH_ENDINGS)
 @pytest.mark.parametrize(
     "data",

@@ -53,20 +53,6 @@ def test_colours_of_sixteen_bits_and_of_eight(las, top, scale):
     np.testing.assert_allclose(np.asarray(cloud.colors), np.array([[0, 1, 0], [1, 1, 0], [0, 1, 0]]) * top / scale)
 
 
-def test_attributes_survive_a_skeleton_and_a_file(las, tmp_path):
-    import open3d as o3d
-
-    from glsk_o3d import Skeleton
-
-    cloud = read_tensor_cloud(las(classification=[2, 5, 5]))
-    line = Skeleton(PLACES[:2], [[0, 1]], [1, 1], [0, 1, 1], PLACES, np.ones((3, 3)))
-    o3d.t.io.write_point_cloud(str(tmp_path / "marked.ply"), line.annotate(cloud))
-    back = read_tensor_cloud(tmp_path / "marked.ply")
-    assert back.point.classification.flatten().numpy().tolist() == [2, 5, 5]
-    assert back.point.branch.flatten().numpy().tolist() == [0, 0, 0]
-    np.testing.assert_allclose(back.point.positions.numpy(), PLACES, rtol=0, atol=1e-9)
-
-
 @pytest.mark.parametrize("name", ["c.las", "c.laz", "c.e57"])
 def test_damaged_files(las, e57, tmp_path, name):
     path = e57(PLACES) if name == "c.e57" else las(name)
