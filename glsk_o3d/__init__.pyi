@@ -24,14 +24,12 @@ from .errors import (
 )
 from .interop.clouds import Cloud
 from .io.annotation import annotate_contraction
-from .io.axes import read_truth
 from .io.cylinders import save_cylinders
 from .io.formats.gltf import save_rig
 from .io.meshes import save_mesh
 from .io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
-from .io.skeletons import read_skeleton, save_skeleton
-from .io.streamed_labels import annotate_file
-from .io.streaming import read_sample
+from .io.skeletons import read_skeleton, read_truth, save_skeleton
+from .io.streaming import annotate_file, read_sample
 from .judgements import Judgement, Supported
 from .lpr_reducer import LPRReducer
 from .meshlab.meshset import MeshSet

@@ -106,8 +106,7 @@ def _read(
 
     from .. import annotate_file, save_tensor_cloud
     from ..io.scans import read_scan
-    from ..io.streamed_labels import STREAMED_ENDING
-    from ..io.streaming import sample_for
+    from ..io.streaming import STREAMED_ENDING, sample_for
 
     load_open3d()
     if labelled is None or labelled.suffix.lower() == STREAMED_ENDING:

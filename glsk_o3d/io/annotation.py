@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from ..skeleton import Skeleton
     from ..state import Contraction
 
+__all__ = ["annotate", "annotate_contraction"]
+
 
 def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None = None) -> Any:
     """A copy of a cloud that says of every point where it belongs.
@@ -72,22 +74,8 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
 def labels(
     skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray, thickness: np.ndarray, color: ColorChoice | None = None
 ) -> dict[str, np.ndarray]:
-    """What `annotate` says of points.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    points : (N, 3) float array
-    vertex : (N,) int array
-        What each belongs to, -1 for nothing.
-    thickness : (N,) float array
-    color : optional
-        As for `annotate`.
-
-    Returns
-    -------
-    dict of str to (N,) array
-        Integers are int32; ``colors`` are (N, 3) uint8, if asked for.
+    """What `annotate` says of points that belong to vertices, -1 for none, and have a thickness: (N,) arrays by name;
+    integers are int32, and ``colors`` (N, 3) uint8, if asked for.
     """
     branch = branch_of_point(skeleton, points, vertex)
     orders = np.where(branch >= 0, branch_table(skeleton).order[branch], -1)

@@ -1,26 +1,36 @@
-"""Tables of cylinders to files: the endings, and what they are read by."""
+"""Cylinders of trees to files: as tables of TreeQSM and as tree files of treetools.
+
+A branch of TreeQSM is an axis: from where it leaves its parent to its tip. Its cylinders follow each other, counted
+from 1, and the trunk is branch 1, of order 0 (Raumonen et al. 2013, https://github.com/InverseTampere/TreeQSM).
+
+A tree file of raycloudtools and treetools (CSIRO) has, after comments and a line of names, a line per tree. It has the
+root, whose parent is -1, and a segment per cylinder, its tip and radius; the cylinder reaches from the tip of the
+parent, counted from 0 in its line, to its own.
+"""
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+from scipy.io import savemat
+
 from ..analysis.forestry import metres
 from ..analysis.tree_cylinders import Cylinders
 from ..interop.atomic import write_atomically
-from .formats import treeqsm, treetools
+from ..numerics.vectors import unit as directions
+from .formats.graphs import text
 from .paths import unknown_ending
 
-IN_METRES: dict[str, Callable[[Cylinders], bytes]] = {
-    ".qsm.csv": treeqsm.write_csv,
-    ".mat": treeqsm.write_mat,
-    ".txt": treetools.write,
-}
-"""Formats of other programs, which take lengths for metres, by the ending of the file."""
-CYLINDER_ENDINGS = (*IN_METRES, ".csv")
-"""All endings, longer ones before those that they end in."""
+SEGMENT_NAMES = ("x", "y", "z", "radius", "parent_id", "curve_length", "order")
+"""Of the numbers of a segment. treetools itself adds ``length``, ``volume``, ``diameter``, ``branch`` and more, and
+refuses files that have them.
+"""
 
 
 def save_cylinders(tree: Cylinders, path: str | os.PathLike, unit: float | str = 1.0) -> None:
@@ -73,13 +83,7 @@ def save_cylinders(tree: Cylinders, path: str | os.PathLike, unit: float | str =
 
 
 def cylinders_ending(path: str | os.PathLike) -> str:
-    """The one of `CYLINDER_ENDINGS` that a file name has; FileFormatError if there is none.
-
-    Examples
-    --------
-    >>> cylinders_ending("oak.QSM.csv"), cylinders_ending("qsm.csv")
-    ('.qsm.csv', '.csv')
-    """
+    """The one of `CYLINDER_ENDINGS` that a file name has; FileFormatError if there is none."""
     name = Path(path).name.lower()
     found = [ending for ending in CYLINDER_ENDINGS if name.endswith(ending)]
     if not found:
@@ -88,15 +92,81 @@ def cylinders_ending(path: str | os.PathLike) -> str:
 
 
 def scaled(tree: Cylinders, factor: float) -> Cylinders:
-    """The same cylinders in another unit: all lengths times a factor.
-
-    Examples
-    --------
-    >>> from glsk_o3d import Skeleton
-    >>> from glsk_o3d.analysis import cylinders
-    >>> stem = Skeleton([[0, 0, 0], [0, 0, 500]], [[0, 1]], [125, 125], (), (), ())
-    >>> scaled(cylinders(stem), 0.001).length.tolist()
-    [0.5]
-    """
+    """The same cylinders in another unit: all lengths times a factor."""
     lengths = ("start_point", "end_point", "radius", "length")
     return replace(tree, **{name: factor * getattr(tree, name) for name in lengths})
+
+
+def treeqsm_table(tree: Cylinders) -> bytes:
+    """A CSV file that rTwig's ``run_rtwig`` and ``update_cylinders`` take for a table of TreeQSM; lengths in metres."""
+    columns = {
+        f"{name}{end}": column.tolist()
+        for name, array in treeqsm_fields(tree).items()
+        for end, column in zip((".x", ".y", ".z") if array.shape[1] == 3 else ("",), array.T, strict=True)
+    }
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows([columns, *zip(*columns.values(), strict=True)])
+    return stream.getvalue().encode()
+
+
+def treeqsm_matrix(tree: Cylinders) -> bytes:
+    """A MATLAB file with TreeQSM's struct ``cylinder``, as rTwig's ``export_mat`` writes it, too; lengths in metres."""
+    stream = io.BytesIO()
+    savemat(stream, {"cylinder": treeqsm_fields(tree)})
+    return stream.getvalue()
+
+
+def treeqsm_fields(tree: Cylinders) -> dict[str, np.ndarray]:
+    """The fields of TreeQSM's struct ``cylinder``, sorted by branch: (K, 1) or (K, 3) arrays by name.
+
+    Numbers of cylinders and branches count from 1, 0 stands for none. Where several cylinders grow from the root
+    the first is the parent of the others: TreeQSM knows one without.
+    """
+    k = len(tree)
+    begins = (tree.parent < 0) | (tree.order != tree.order[tree.parent])
+    axis = np.cumsum(begins)
+    for row in np.flatnonzero(~begins).tolist():  # parents come first
+        axis[row] = axis[tree.parent[row]]
+    sort = np.argsort(axis, kind="stable")
+    number = np.argsort(sort) + 1
+    axis, first = axis[sort], np.r_[True, np.diff(axis[sort]) > 0]
+    parent = np.where(tree.parent < 0, 1, number[tree.parent])[sort]
+    parent[0] = 0
+    position = np.arange(k) - np.flatnonzero(first)[axis - 1] + 1
+    last = np.r_[first[1:], True]
+    columns = {
+        "radius": tree.radius[sort],
+        "length": tree.length[sort],
+        "start": tree.start_point[sort],
+        "axis": directions(tree.end_point - tree.start_point)[sort],
+        "parent": parent,
+        "extension": np.where(last, 0, np.arange(k) + 2),
+        "added": np.zeros(k, int),
+        "UnmodRadius": tree.radius[sort],
+        "branch": axis,
+        "BranchOrder": tree.order[sort],
+        "PositionInBranch": position,
+    }
+    return {name: column.reshape(k, -1) for name, column in columns.items()}
+
+
+def tree_file(*trees: Cylinders) -> bytes:
+    """A tree file of raycloudtools and treetools, a line per tree; lengths in metres."""
+    return text(["# trees written by glsk-o3d, in metres", ",".join(SEGMENT_NAMES), *map(_tree_line, trees)])
+
+
+def _tree_line(tree: Cylinders) -> str:
+    root = (*tree.start_point[0].tolist(), float(tree.radius[0]), -1, 0.0, 0)
+    columns = (*tree.end_point.T, tree.radius, tree.parent + 1, tree.length, tree.order)
+    segments = zip(*(column.tolist() for column in columns), strict=True)
+    return ", ".join(",".join(map(str, segment)) for segment in (root, *segments))
+
+
+IN_METRES: dict[str, Callable[[Cylinders], bytes]] = {
+    ".qsm.csv": treeqsm_table,
+    ".mat": treeqsm_matrix,
+    ".txt": tree_file,
+}
+"""Formats of other programs, which take lengths for metres, by the ending of the file."""
+CYLINDER_ENDINGS = (*IN_METRES, ".csv")
+"""All endings, longer ones before those that they end in."""

@@ -16,25 +16,7 @@ if TYPE_CHECKING:
 
 
 def to_line_set(skeleton: Skeleton, color: ColorChoice = (0.85, 0.1, 0.1)) -> Any:
-    """A skeleton as a legacy line set, ready for ``draw_geometries``.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
-        What the colours of the edges show, or the one colour of all; see `glsk_o3d.io.colors.shades`.
-
-    Returns
-    -------
-    open3d.geometry.LineSet
-        Points and lines in the order of `skeleton.vertices` and `skeleton.edges`.
-
-    Raises
-    ------
-    InvalidParameterError
-        The colour is unknown.
-    MissingPackageError
-    """
+    """A skeleton as a legacy line set, points and lines in its order, with colours of the edges as from `shades`."""
     o3d = import_open3d()
     lines = o3d.geometry.LineSet()
     lines.points = o3d.utility.Vector3dVector(_rows(skeleton.vertices, float, 3))
@@ -44,26 +26,11 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = (0.85, 0.1, 0.1)) -> An
 
 
 def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> Any:
-    """A skeleton as a tensor line set.
+    """A skeleton as a tensor line set on the CPU.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1], optional
-        As for `to_line_set`; by default there are no colours.
-
-    Returns
-    -------
-    open3d.t.geometry.LineSet
-        On the CPU: ``point.positions`` (M, 3), ``point.radius``, ``point.confidence``, ``point.half_width`` and
-        ``point.half_thickness`` (M, 1) float64, and ``line.indices`` (E, 2) int64 and ``line.branch`` (E, 1) int32;
-        with a color, ``line.colors`` (E, 3) float64.
-
-    Raises
-    ------
-    InvalidParameterError
-        The colour is unknown.
-    MissingPackageError
+    It has ``point.positions`` (M, 3), ``point.radius``, ``point.confidence``, ``point.half_width``,
+    ``point.half_thickness`` and ``point.support`` (M, 1) float64, ``line.indices`` (E, 2) int64, ``line.branch`` (E, 1)
+    int32 and, with a color, ``line.colors`` (E, 3) float64.
     """
     o3d = import_open3d()
     lines = o3d.t.geometry.LineSet()

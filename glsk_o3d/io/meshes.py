@@ -12,9 +12,9 @@ import numpy as np
 from ..errors import FileFormatError, InvalidParameterError
 from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
-from .formats.text import line, text
+from .clouds.blocks import read_whole
+from .formats.graphs import line, text
 from .paths import MESH_ENDINGS, unknown_ending
-from .scans import read_whole
 
 WRITTEN_MESH_ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf")
 SINGLE_PRECISION = (".stl", ".glb", ".gltf")
@@ -24,23 +24,8 @@ PLY_VERTEX_BYTES, PLY_COLOR_BYTES, PLY_TRIANGLE_BYTES, STL_TRIANGLE_BYTES = 48, 
 
 
 def read_mesh(path: str | os.PathLike) -> Any:
-    """Read a triangle mesh.
-
-    Parameters
-    ----------
-    path : path-like
-        PLY, OFF, OBJ, STL, glTF or GLB.
-
-    Returns
-    -------
-    open3d.geometry.TriangleMesh
-
-    Raises
-    ------
-    FileNotFoundError
-    FileFormatError
-        A folder, an unknown ending, a damaged file, or one without triangles.
-    MissingPackageError
+    """Read an Open3D triangle mesh from PLY, OFF, OBJ, STL, glTF or GLB; errors as from `read_cloud`, and
+    FileFormatError for a file without triangles.
     """
     endings = (".ply", *MESH_ENDINGS)
     if not str(path).lower().endswith(endings):
@@ -106,9 +91,8 @@ def save_mesh(mesh: Any, path: str | os.PathLike) -> None:
                 f"{os.fspath(path)}: {ending} has too few digits for coordinates as large as {largest:.3g}, "
                 f"they would be up to {step:.2g} off: write ply, obj or off"
             )
-    text_writer = {".obj": _obj, ".off": _off}.get(ending)
-    if text_writer is not None:
-        data = text_writer(points, triangles, mesh)
+    if ending in (".obj", ".off"):
+        data = (_obj if ending == ".obj" else _off)(points, triangles, mesh)
         write_atomically(path, lambda temporary: temporary.write_bytes(data))
     else:
         write_atomically(path, lambda temporary: _write_open3d(mesh, temporary))
@@ -166,21 +150,9 @@ def _colors(mesh: Any) -> list[np.ndarray]:
 
 
 def mesh_arrays(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and triangles of a mesh.
+    """Vertices, (V, 3) float64, and triangles, (F, 3) int64, of a mesh of Open3D or a pair of arrays.
 
-    Parameters
-    ----------
-    mesh : open3d.geometry.TriangleMesh, open3d.t.geometry.TriangleMesh, or a pair of arrays (V, 3) and (F, 3)
-
-    Returns
-    -------
-    vertices : (V, 3) float64 array
-    faces : (F, 3) int64 array
-
-    Raises
-    ------
-    InvalidParameterError
-        It is none of these, has no triangles, or coordinates or indices are of no use.
+    InvalidParameterError if it is none, has no triangles, or coordinates or indices are of no use.
     """
     try:
         if hasattr(mesh, "triangles"):

@@ -1,4 +1,4 @@
-"""Names of files that are to be read: their endings, and whether they are there."""
+"""Files that are to be read: their endings, whether they are there, and the errors for those that are not whole."""
 
 from __future__ import annotations
 
@@ -18,10 +18,7 @@ SCAN_ENDINGS = CLOUD_ENDINGS + MESH_ENDINGS
 
 
 def existing_file(path: str | os.PathLike) -> Path:
-    """The path of a file that is there and not empty.
-
-    FileNotFoundError, or FileFormatError for a folder, a pipe or an empty file.
-    """
+    """The path of a file; FileNotFoundError, or FileFormatError for a folder, a pipe or an empty file."""
     path = Path(path)
     if path.is_dir():
         raise FileFormatError(f"{path}: is a folder, not a file")
@@ -42,3 +39,8 @@ def check_ends(path: str | os.PathLike) -> None:
 def unknown_ending(what: object, known: Iterable[str]) -> FileFormatError:
     """The error for a file, or what else, whose ending is that of no format; it lists those that are known."""
     return FileFormatError(f"{what}: unknown ending; known are {', '.join(known)}")
+
+
+def breaks_off(promised: int, found: int, what: str = "points") -> ValueError:
+    """The error for a file that holds less than its header promises."""
+    return ValueError(f"it promises {promised} {what} and holds {found}: it breaks off")

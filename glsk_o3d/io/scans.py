@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, MissingPackageError, brief
 from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
 from ..interop.verbosity import following_open3d
-from .clouds import e57, gltf_sizes, las, pcd, ply_points, text_tables
-from .clouds.completeness import check_complete
-from .clouds.scanned import NoPoints, Scan
+from .clouds import pcd
+from .clouds.blocks import read_whole
+from .clouds.scanned import Scan
 from .clouds.selection import select
-from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unknown_ending
-from .skeletons import holds_skeleton, read_skeleton
+from .formats import ply
+from .paths import unknown_ending
 
 WRITTEN_CLOUD_ENDINGS = (".ply", ".pcd", ".npz")
 """Files that hold all attributes of a tensor cloud."""
@@ -151,9 +148,9 @@ def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
             written.point.normals = cloud.point.normals.to(cloud.point.positions.dtype)
         with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
             done = o3d.t.io.write_point_cloud(str(temporary), written)
-        try:
-            check_complete(temporary)  # where it is, Open3D does not say so
-        except FileFormatError:
+        try:  # whether it is whole, which Open3D does not say
+            (ply if ending == ".ply" else pcd).promised(temporary)
+        except ValueError:
             done = False
         if not done:
             raise OSError("Open3D could not write all of it: is the disk full?")
@@ -180,91 +177,6 @@ def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
                 *(os.fspath(path), len(scan)),
             )
     return scan if where is None else select(scan, where)
-
-
-def read_whole(path: str | os.PathLike) -> Scan:
-    """Read all points of a cloud or mesh, and its triangles."""
-    path = scan_file(path)
-    with refused_where_damaged(path):
-        scan = _CLOUD_READERS[path.suffix.lower()](path)
-    if len(scan) == 0:
-        raise holds_no_points(path)
-    return scan
-
-
-def scan_file(path: str | os.PathLike) -> Path:
-    """The path of a file that can be a scan; errors as from `read_cloud`, but for those of reading it."""
-    path = existing_file(path) if Path(path).suffix.lower() in _LOOK_THEMSELVES else check_scan(path)
-    ending = path.suffix.lower()
-    if holds_skeleton(path) if ending in SCAN_ENDINGS else _is_skeleton(path):
-        raise FileFormatError(f"{path}: is a skeleton, not a scan")
-    if ending not in SCAN_ENDINGS:
-        raise unknown_ending(path, SCAN_ENDINGS)
-    return path
-
-
-def check_scan(path: str | os.PathLike) -> Path:
-    """Find out before reading a scan whether it is there and complete.
-
-    FileNotFoundError, or FileFormatError for a folder, or a file that is empty or breaks off.
-    """
-    path = existing_file(path)
-    check_complete(path)
-    return path
-
-
-def _is_skeleton(path: Path) -> bool:
-    """Whether a file with an ending that scans do not have can be read as a skeleton."""
-    try:
-        read_skeleton(path)
-    except FileFormatError:
-        return False
-    return True
-
-
-@contextmanager
-def refused_where_damaged(path: Path) -> Iterator[None]:
-    """FileFormatError for what goes wrong with the contents of a file."""
-    try:
-        yield
-    except (MissingPackageError, PermissionError):
-        raise
-    except NoPoints as error:
-        raise FileFormatError(f"{path}: no points could be read: {error}") from None
-    except Exception as error:  # whatever a parser raises on a hostile file, std::bad_alloc
-        raise FileFormatError(f"{path}: not a valid {path.suffix.lower()} file: {brief(error)}") from error
-
-
-def holds_no_points(path: Path) -> FileFormatError:
-    """The error for a file without points."""
-    ending = path.suffix.lower()
-    if ending in _SAY_HOW_MANY:
-        return FileFormatError(f"{path}: it has no points: by its header there are 0: export it again")
-    return FileFormatError(f"{path}: no points could be read: it is damaged, empty, or not a {ending} file")
-
-
-def _read_mesh(path: Path) -> Scan:
-    if path.suffix.lower() in (".gltf", ".glb"):
-        gltf_sizes.check_sizes(path)
-    o3d = import_open3d()
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        mesh = o3d.io.read_triangle_mesh(str(path))
-    colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
-    normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
-    return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))
-
-
-_LOOK_THEMSELVES = (".ply", ".pcd")  # whether files are complete: they would be read twice
-_SAY_HOW_MANY = (".ply", ".pcd", ".las", ".laz")  # read here: where they hold less than they promise, it is an error
-_CLOUD_READERS = {
-    **dict.fromkeys(MESH_ENDINGS, _read_mesh),
-    **dict.fromkeys(TEXT_ENDINGS, text_tables.read),
-    ".ply": ply_points.read,
-    ".pcd": pcd.read,
-    ".las": las.read,
-    ".laz": las.read,
-    ".e57": e57.read,
-}
 
 
 def _coarse(vertices: np.ndarray, triangles: np.ndarray) -> bool:

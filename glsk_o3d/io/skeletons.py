@@ -1,37 +1,28 @@
-"""Skeletons to files and back: the table of formats.
-
-A format is a module with ``write(skeleton) -> bytes``, perhaps ``read(data: bytes) -> Skeleton``, and a line in
-`FORMATS`.
-"""
+"""Skeletons to files and back: the table of formats."""
 
 from __future__ import annotations
 
 import os
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from ..errors import FileFormatError, MissingPackageError, brief
+import numpy as np
+
+from ..analysis.truth import Truth
+from ..errors import FileFormatError, InvalidParameterError, MissingPackageError, brief
 from ..interop.atomic import write_atomically
 from ..refinement.rooted import RootPlace
 from ..skeleton import Skeleton
-from .formats import dxf, gltf, graphml, json, mtg, npz, obj, plant_csv, ply, polylines, swc, urdf, vtp
-from .formats.forests import as_forest
-from .formats.graphs import NoEdges
+from .formats import fields, gltf, graphml, obj, plants, ply, polylines, swc, urdf
+from .formats.graphs import NoEdges, as_forest
 from .paths import SCAN_ENDINGS, existing_file, unknown_ending
 
 
 class Format(NamedTuple):
-    """How skeletons are written to a kind of file, and read from it.
-
-    Attributes
-    ----------
-    write : callable
-        The content of a file, as bytes.
-    read : callable, optional
-        The skeleton in the content of a file; any error means that it is damaged. None for what is only written.
-    trees : bool
-        It holds trees only: `write` gets what `glsk_o3d.io.formats.forests.as_forest` makes.
+    """How skeletons are written to a kind of file, and read from it: bytes from a skeleton and back. Any error of
+    `read` means that the file is damaged. Where a format holds trees only `write` gets what `as_forest` makes.
     """
 
     write: Callable[[Skeleton], bytes]
@@ -42,17 +33,17 @@ class Format(NamedTuple):
 FORMATS: dict[str, Format] = {
     ".ply": Format(ply.write, ply.read),
     ".obj": Format(obj.write, obj.read),
-    ".json": Format(json.write, json.read),
-    ".npz": Format(npz.write, npz.read),
+    ".json": Format(fields.write_json, fields.read_json),
+    ".npz": Format(fields.write_npz, fields.read_npz),
     ".swc": Format(swc.write, swc.read, trees=True),
     ".graphml": Format(graphml.write, graphml.read),
-    ".cgal": Format(polylines.write, polylines.read),
-    ".polylines.txt": Format(polylines.write, polylines.read),
-    ".vtp": Format(vtp.write),
-    ".dxf": Format(dxf.write),
+    ".cgal": Format(polylines.write_cgal, polylines.read_cgal),
+    ".polylines.txt": Format(polylines.write_cgal, polylines.read_cgal),
+    ".vtp": Format(polylines.write_vtp),
+    ".dxf": Format(polylines.write_dxf),
     ".glb": Format(gltf.write, trees=True),
-    ".mtg": Format(mtg.write, trees=True),
-    ".plant.csv": Format(plant_csv.write, trees=True),
+    ".mtg": Format(plants.write_mtg, trees=True),
+    ".plant.csv": Format(plants.write_csv, trees=True),
     ".urdf": Format(urdf.write, trees=True),
 }
 """The formats of skeletons by the ending of the file."""
@@ -218,3 +209,48 @@ def skeleton_ending(path: Path, format: str | None = None) -> str:
     if not found:
         raise unknown_ending(path if format is None else f"format {format!r}", FORMATS)
     return found[0]
+
+
+def read_truth(path: str | os.PathLike) -> Truth:
+    """Read a known axis.
+
+    Parameters
+    ----------
+    path : path-like
+        An npz archive with `nodes`, `edges` and `radii`, or any file with radii that `read_skeleton` reads.
+
+    Returns
+    -------
+    Truth
+
+    Raises
+    ------
+    FileNotFoundError
+    FileFormatError
+        It is neither, or what it holds is no axis.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d.samples import torus
+    >>> ring = torus(1000)
+    >>> with TemporaryDirectory() as folder:
+    ...     np.savez(f"{folder}/ring.npz", nodes=ring.nodes, edges=ring.edges, radii=ring.radii)
+    ...     truth = read_truth(f"{folder}/ring.npz")
+    >>> len(truth.edges) == len(ring.edges)
+    True
+    """
+    path, names = existing_file(path), ("nodes", "edges", "radii")
+    try:
+        if path.suffix.lower() == ".npz" and zipfile.is_zipfile(path):
+            with np.load(path, allow_pickle=False) as archive:
+                if set(names) <= set(archive.files):
+                    return Truth(*(archive[name] for name in names))
+        skeleton = read_skeleton(path)
+        return Truth(skeleton.vertices, skeleton.edges, skeleton.radii)
+    except FileFormatError:
+        raise
+    except InvalidParameterError as error:
+        raise FileFormatError(f"{path}: {error}") from None
+    except (ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise FileFormatError(f"{path}: not a valid .npz truth: {error}") from None

@@ -17,6 +17,8 @@ from .colors import ColorChoice, shades
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
+__all__ = ["to_tubes"]
+
 
 def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
     """A skeleton as a mesh of tubes, one for every branch, closed by half balls.
@@ -76,24 +78,10 @@ def sweep(
     sides: int,
     sections: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Closed surfaces around curves: circles or ellipses swept along them, and half balls at the ends.
+    """Closed surfaces around curves, each a path of vertices: circles swept along them, and half balls at the ends.
 
-    Parameters
-    ----------
-    vertices : (M, 3) float array
-    radii : (M,) float array
-    paths : sequence of int arrays
-        Vertices in order.
-    sides : int
-    sections : ((M,) float array, (M,) float array, (M, 3) float array), optional
-        Half axes of ellipses, and the unit direction of the first. By default there are circles of the radii.
-
-    Returns
-    -------
-    points : (P, 3) float array
-    triangles : (T, 3) int array
-    row : (P,) int array
-        The row, in the paths one after the other, that each point belongs to.
+    `sections` makes the circles ellipses: half axes, two (M,) arrays, and the unit direction of the first, (M, 3).
+    Gives points, (P, 3), triangles, (T, 3), and the row, in the paths one after the other, that each point belongs to.
     """
     if len(paths) == 0:
         return np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int)

@@ -19,7 +19,8 @@ from ..io.clouds.scanned import COLOR_CHANNELS
 from ..io.formats import ply_rows
 from ..io.formats.graphs import graph_skeleton
 from ..io.formats.ply import ply_elements
-from ..io.scans import check_scan, read_scan
+from ..io.paths import existing_file
+from ..io.scans import read_scan
 from ..io.skeletons import read_skeleton, save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
 from ..state import Contraction
@@ -64,7 +65,7 @@ class Layer:
 
         Of a PLY or OBJ file of lines the edges are kept. What STL repeats for every triangle becomes one vertex.
         """
-        path = check_scan(path)
+        path = existing_file(path)
         held = _elements(path)
         if "edge" in held and "face" not in held:
             drawing = read_skeleton(path)

@@ -14,8 +14,7 @@ import numpy as np
 from ..errors import FileFormatError, GlskError, InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.atomic import write_atomically
 from ..interop.packages import require
-from ..io.paths import SCAN_ENDINGS
-from ..io.scans import check_scan
+from ..io.paths import SCAN_ENDINGS, existing_file
 from ..io.skeletons import FORMATS
 from ..skeleton import Skeleton
 from . import builtin
@@ -234,7 +233,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
 
         FileNotFoundError or FileFormatError without points. `load_new_mesh` also has colours of faces and textures.
         """
-        path = check_scan(path)
+        path = existing_file(path)
         try:
             if path.suffix.lower() in SCAN_ENDINGS:
                 self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)

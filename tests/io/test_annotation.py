@@ -96,12 +96,9 @@ def test_through_files(cloud, skeleton, tmp_path, ending):
     assert_equal(held(o3d.t.io.read_point_cloud(path)), held(annotated))
 
 
-def test_contracted_positions_through_files(cloud, state, tmp_path):
+def test_contracted_positions_are_columns_of_a_ply_file(cloud, state, tmp_path):
     annotated = annotate_contraction(state, cloud)
-    for ending in ("npz", "ply"):
-        assert o3d.t.io.write_point_cloud(str(tmp_path / f"cloud.{ending}"), annotated)
-    back = o3d.t.io.read_point_cloud(str(tmp_path / "cloud.npz"))
-    np.testing.assert_array_equal(back.point.contracted.numpy(), annotated.point.contracted.numpy())
+    assert o3d.t.io.write_point_cloud(str(tmp_path / "cloud.ply"), annotated)
     back = o3d.t.io.read_point_cloud(str(tmp_path / "cloud.ply"))
     columns = np.hstack([back.point[f"contracted_{i}"].numpy() for i in range(3)])
     np.testing.assert_array_equal(columns, annotated.point.contracted.numpy())
@@ -168,6 +165,5 @@ def test_colours(cloud, skeleton):
         assert len(np.unique(by_order.point.colors.numpy()[by_order.point.order.numpy()[:, 0] == order], axis=0)) == 1
     legacy = skeleton.annotate(cloud, color="branch").to_legacy()
     np.testing.assert_allclose(np.asarray(legacy.colors), shown / 255, atol=1e-6)
-    for wrong in ("size", (1, 0), (0, 0, 2), ("a", 0, 0), np.nan):
-        with pytest.raises(InvalidParameterError, match="color"):
-            skeleton.annotate(cloud, color=wrong)
+    with pytest.raises(InvalidParameterError, match="color"):
+        skeleton.annotate(cloud, color="size")

@@ -11,8 +11,7 @@ from scipy.io import loadmat
 
 from glsk_o3d import FileFormatError, InvalidParameterError, pipelines, samples
 from glsk_o3d.analysis import Cylinders, cylinders
-from glsk_o3d.io.cylinders import save_cylinders, scaled
-from glsk_o3d.io.formats import treeqsm, treetools
+from glsk_o3d.io.cylinders import save_cylinders, scaled, tree_file, treeqsm_fields, treeqsm_table
 
 TREEINFO_ADDS = {"volume", "diameter", "length", "strength", "min_strength", "dominance", "angle", "children", "branch"}
 TREEINFO_ADDS |= {"branch_order", "extension", "pos_in_branch", "segment_length", "branch_angle"}
@@ -56,12 +55,12 @@ def read_trees(data):
 def test_tree_file_by_hand(two_branches):
     line = "0.0,0.0,0.0,0.5,-1,0.0,0, 0.0,0.0,1.0,0.5,0,1.0,0, 1.5,0.0,1.0,0.25,1,1.25,1, 0.0,0.0,2.0,0.5,1,1.0,0\n"
     head = "# trees written by glsk-o3d, in metres\nx,y,z,radius,parent_id,curve_length,order\n"
-    assert treetools.write(two_branches).decode() == head + line
-    assert treetools.write(two_branches, two_branches).decode() == head + line + line
+    assert tree_file(two_branches).decode() == head + line
+    assert tree_file(two_branches, two_branches).decode() == head + line + line
 
 
 def test_tree_file_keeps_volume_and_parents(tree):
-    names, (segments,) = read_trees(treetools.write(tree))
+    names, (segments,) = read_trees(tree_file(tree))
     assert not TREEINFO_ADDS & set(names)
     x, radius, parent, length = segments[:, :3], segments[1:, 3], segments[:, 4].astype(int), segments[1:, 5]
     np.testing.assert_array_equal(x, np.vstack([tree.start_point[:1], tree.end_point]))
@@ -80,7 +79,7 @@ def test_tree_file_keeps_volume_and_parents(tree):
 
 
 def test_table_of_treeqsm_by_hand(two_branches):
-    assert treeqsm.write_csv(two_branches).decode() == (
+    assert treeqsm_table(two_branches).decode() == (
         "radius,length,start.x,start.y,start.z,axis.x,axis.y,axis.z,"
         "parent,extension,added,UnmodRadius,branch,BranchOrder,PositionInBranch\n"
         "0.5,1.0,0.0,0.0,0.0,0.0,0.0,1.0,0,2,0,0.5,1,0,1\n"
@@ -90,7 +89,7 @@ def test_table_of_treeqsm_by_hand(two_branches):
 
 
 def test_branches_of_treeqsm_are_axes(tree):
-    table = {name: column.squeeze() for name, column in treeqsm.fields(tree).items()}
+    table = {name: column.squeeze() for name, column in treeqsm_fields(tree).items()}
     number, parent = np.arange(1, len(tree) + 1), table["parent"]
     assert (parent < number).all()
     assert (parent == 0).sum() == 1
@@ -111,8 +110,8 @@ def test_branches_of_treeqsm_are_axes(tree):
 
 def test_several_cylinders_at_the_root_have_one_parent(two_branches):
     star = Cylinders(**{**vars(two_branches), "parent": np.array([-1, -1, 0]), "order": np.zeros(3, int)})
-    assert treeqsm.fields(star)["parent"].ravel().tolist() == [0, 1, 1]
-    assert treeqsm.fields(star)["branch"].ravel().tolist() == [1, 1, 2]
+    assert treeqsm_fields(star)["parent"].ravel().tolist() == [0, 1, 1]
+    assert treeqsm_fields(star)["branch"].ravel().tolist() == [1, 1, 2]
 
 
 def test_matlab_file_in_the_functions_of_treeqsm(tree, tmp_path):
@@ -125,13 +124,13 @@ def test_matlab_file_in_the_functions_of_treeqsm(tree, tmp_path):
     for index in ("parent", "extension", "branch"):
         read[index] = read[index].astype(int) - 1  # it counts from 0, as Python does
     found = branches(read)
-    axes = treeqsm.fields(tree)["branch"].ravel()
-    litres = 1000 * np.bincount(axes - 1, treeqsm.fields(tree)["radius"].ravel() ** 2 * np.pi * read["length"])
+    axes = treeqsm_fields(tree)["branch"].ravel()
+    litres = 1000 * np.bincount(axes - 1, treeqsm_fields(tree)["radius"].ravel() ** 2 * np.pi * read["length"])
     np.testing.assert_allclose(found["volume"], litres, rtol=1e-6)  # in single precision
     assert found["volume"].sum() / 1000 == pytest.approx(tree.volume.sum(), rel=1e-6)
     assert found["length"].sum() == pytest.approx(tree.length.sum(), rel=1e-6)
     first = np.unique(axes, return_index=True)[1]
-    np.testing.assert_array_equal(found["order"], treeqsm.fields(tree)["BranchOrder"].ravel()[first])
+    np.testing.assert_array_equal(found["order"], treeqsm_fields(tree)["BranchOrder"].ravel()[first])
 
 
 @pytest.mark.skipif(shutil.which("Rscript") is None, reason="needs R")

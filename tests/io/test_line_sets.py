@@ -7,7 +7,7 @@ import pytest
 import glsk_o3d as glsk
 from glsk_o3d import samples
 from glsk_o3d.io.colors import COLOR_NAMES
-from glsk_o3d.io.line_sets import to_line_set
+from glsk_o3d.skeleton import OF_VERTICES
 
 
 @pytest.fixture(scope="module", params=[np.float32, np.float64])
@@ -15,39 +15,24 @@ def branched(request):
     return glsk.skeletonize(samples.y_junction(800).points.astype(request.param))
 
 
-def test_line_set(skeleton):
-    lines = skeleton.to_line_set()
-    assert isinstance(lines, o3d.geometry.LineSet)
-    np.testing.assert_array_equal(np.asarray(lines.points), skeleton.vertices)
-    np.testing.assert_array_equal(np.asarray(lines.lines).reshape(-1, 2), skeleton.edges)
-    np.testing.assert_array_equal(
-        np.asarray(to_line_set(skeleton, (0, 0.5, 1)).colors).reshape(-1, 3),
-        np.tile([0, 0.5, 1], (len(skeleton.edges), 1)),
-    )
-
-
-def test_tensor_line_set(skeleton):
-    lines = skeleton.to_tensor_line_set()
-    assert isinstance(lines, o3d.t.geometry.LineSet)
-    assert lines.point.positions.dtype == o3d.core.float64
-    np.testing.assert_array_equal(lines.point.positions.numpy(), skeleton.vertices)
-    np.testing.assert_array_equal(lines.point.radius.numpy(), skeleton.radii[:, None])
-    assert set(lines.point) == {"positions", "radius", "confidence", "half_width", "half_thickness", "support"}
-    np.testing.assert_array_equal(lines.point.half_width.numpy(), skeleton.half_width[:, None])
-    np.testing.assert_array_equal(lines.point.half_thickness.numpy(), skeleton.half_thickness[:, None])
-    assert lines.point.confidence.dtype == o3d.core.float64
-    np.testing.assert_array_equal(lines.point.confidence.numpy(), skeleton.confidence[:, None])
-    np.testing.assert_array_equal(lines.line.indices.numpy(), skeleton.edges)
-    legacy = lines.to_legacy()
+def test_line_sets_of_both_kinds_have_their_own_copy_of_the_graph(skeleton):
+    legacy, tensor = skeleton.to_line_set((0, 0.5, 1)), skeleton.to_tensor_line_set()
+    assert isinstance(legacy, o3d.geometry.LineSet)
+    np.testing.assert_array_equal(np.asarray(legacy.points), skeleton.vertices)
     np.testing.assert_array_equal(np.asarray(legacy.lines).reshape(-1, 2), skeleton.edges)
-
-
-def test_line_sets_do_not_alias_the_skeleton(tree):
-    before = tree.vertices.copy()
-    tensor, legacy = tree.to_tensor_line_set(), tree.to_line_set()
+    np.testing.assert_array_equal(np.asarray(legacy.colors), np.tile([0, 0.5, 1], (len(skeleton.edges), 1)))
+    assert isinstance(tensor, o3d.t.geometry.LineSet)
+    expected = {"positions": skeleton.vertices, "radius": skeleton.radii[:, None]}
+    expected |= {name: getattr(skeleton, name)[:, None] for name in OF_VERTICES[1:]}
+    assert set(tensor.point) == expected.keys()
+    for name, values in expected.items():
+        assert tensor.point[name].dtype == o3d.core.float64
+        np.testing.assert_array_equal(tensor.point[name].numpy(), values)
+    np.testing.assert_array_equal(tensor.line.indices.numpy(), skeleton.edges)
+    before = skeleton.vertices.copy()
     tensor.point.positions += 1
     legacy.translate((1, 1, 1))
-    np.testing.assert_array_equal(tree.vertices, before)
+    np.testing.assert_array_equal(skeleton.vertices, before)
 
 
 def test_colours_without_radii_or_confidence(branched):

@@ -11,14 +11,6 @@ from glsk_o3d.io.meshes import WRITTEN_MESH_ENDINGS, mesh_arrays, read_mesh, sav
 OCTAHEDRON = o3d.geometry.TriangleMesh.create_octahedron()
 
 
-@pytest.mark.parametrize("ending", ["ply", "off", "obj", "gltf"])
-def test_meshes_that_open3d_writes(tmp_path, ending):
-    o3d.io.write_triangle_mesh(str(tmp_path / f"m.{ending}"), OCTAHEDRON)
-    vertices, faces = mesh_arrays(read_mesh(tmp_path / f"m.{ending}"))
-    assert vertices.shape == (6, 3)
-    assert faces.shape == (8, 3)
-
-
 def test_what_is_no_mesh(cloud, tmp_path):
     o3d.io.write_point_cloud(str(tmp_path / "c.ply"), cloud)
     with pytest.raises(FileFormatError, match=r"c\.ply.* cloud"):
@@ -112,21 +104,9 @@ def test_a_mesh_that_breaks_off_is_no_file(tmp_path, monkeypatch, tubes, ending)
     assert not list(tmp_path.iterdir())
 
 
-def test_many_vertices(tmp_path):
-    ring = samples.torus(2000)
-    tubes = Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ()).to_tubes(sides=512)
-    assert len(tubes.vertices) > 2**16
-    save_mesh(tubes, tmp_path / "t.gltf")
-    back = read_mesh(tmp_path / "t.gltf")
-    assert len(back.triangles) == len(tubes.triangles)
-    assert back.get_surface_area() == pytest.approx(tubes.get_surface_area(), rel=1e-5)
-
-
 @pytest.mark.parametrize("ending", ["ply", "obj", "off", "stl", "glb", "gltf"])
 @pytest.mark.parametrize("coloured", [False, True])
 def test_any_mesh_of_open3d_is_written(tmp_path, ending, coloured):
-    import open3d as o3d
-
     mesh = o3d.geometry.TriangleMesh.create_sphere(1.0, 8)
     if coloured:
         mesh.paint_uniform_color([0.5, 0.25, 0])

@@ -3,10 +3,9 @@ import os
 import pytest
 
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io.axes import read_truth
 from glsk_o3d.io.clouds.text_tables import holds_points
 from glsk_o3d.io.scans import read_cloud
-from glsk_o3d.io.skeletons import read_skeleton
+from glsk_o3d.io.skeletons import read_skeleton, read_truth
 
 
 @pytest.mark.parametrize("read", [read_skeleton, read_cloud])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.formats import swc
-from glsk_o3d.io.formats.forests import as_forest
+from glsk_o3d.io.formats.graphs import as_forest
 from glsk_o3d.io.skeletons import FORMATS, READABLE, holds_skeleton, read_skeleton, save_skeleton
 from glsk_o3d.report import Report
 from glsk_o3d.skeleton import Skeleton
@@ -120,9 +120,39 @@ def test_formats_of_trees_cut_loops_only_when_told(loop, tmp_path, ending):
     loop.save(tmp_path / f"s{ending}", cut_loops=True)
 
 
-@pytest.mark.parametrize("text", ["", "\0\xff garbage\n" * 9], ids=["empty", "garbage"])
-@pytest.mark.parametrize("ending", READABLE)
-def test_hostile_files(tmp_path, ending, text):
+PLY = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
+DAMAGED = {
+    ".cgal": ["2 0 0 0 1 1\n", "0\n", "1.5 0 0 0 1 1\n"],
+    ".graphml": ["<graphml/>", "<html><p>"],
+    ".json": ["[]", "[" * 100_000, "{"],
+    ".npz": ["PK"],
+    ".obj": ["v 1 2\n", "v 1 2 three\n", *(f"v 1 2 3\nv 4 5 6\nl {line}\n" for line in ("0 1", "1 3", "1 -3"))],
+    ".swc": [
+        *("1 0 0 0 0 1 2\n", "1 0 0 0 0 1 -1\n1 0 0 0 0 1 -1\n"),
+        *("1 0 0 0 0 1\n", "1 0 0 0 0 1 nan\n2 0 0 0 0\n"),
+    ],
+    ".ply": [
+        PLY + "end_header\n1 2 3\n4 5\n",
+        PLY + "element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n1 2 3\n4 5 6\n0 2\n",
+        PLY.replace("ascii", "binary_little_endian") + "end_header\nabc",
+        PLY.replace("ascii", "klingon") + "end_header\n",
+        PLY.replace("float x", "quaternion x") + "end_header\n",
+        PLY.replace("vertex 2", "vertex -2") + "end_header\n",
+        PLY.replace("vertex 2", "vertex 999999999999") + "end_header\n1 2 3\n",
+        PLY.replace("vertex 2", "vertices 2") + "end_header\n1 2 3\n4 5 6\n",
+        PLY.replace("float x", "float u") + "end_header\n1 2 3\n4 5 6\n",
+        "ply\n",
+    ],
+}
+
+
+NOTHING = [(ending, text) for ending in READABLE for text in ("", "\0\xff garbage\n" * 9)]
+
+
+@pytest.mark.parametrize(
+    ("ending", "text"), [*NOTHING, *((ending, text) for ending, texts in DAMAGED.items() for text in texts)]
+)
+def test_damaged_files(tmp_path, ending, text):
     (tmp_path / f"s{ending}").write_text(text, encoding="latin-1")
     with pytest.raises(FileFormatError, match=rf"s\{ending}"):
         read_skeleton(tmp_path / f"s{ending}")

@@ -10,12 +10,13 @@ from glsk_o3d import (
     pipelines,
     read_cloud,
     read_sample,
+    read_skeleton,
     read_tensor_cloud,
     save_tensor_cloud,
     skeletonize,
 )
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
-from glsk_o3d.io import streamed_labels, streaming
+from glsk_o3d.io import streaming
 from glsk_o3d.io.clouds import blocks
 from glsk_o3d.io.formats import ply_tables
 from glsk_o3d.samples import torus, y_junction
@@ -80,22 +81,6 @@ def test_a_sample_of_another_size_and_of_some_points(scans, points):
     np.testing.assert_array_equal(few.point.positions.numpy(), np.asarray(read_cloud(scans / "scan.ply").points))
 
 
-def test_a_file_that_is_one_block_is_read_once(tmp_path, points, monkeypatch):
-    np.savetxt(tmp_path / "c.xyz", points[:3000], fmt="%.17g")
-    read, reads = streaming.read_blocks, []
-    monkeypatch.setattr(streaming, "read_blocks", lambda *given, **more: reads.append(1) or read(*given, **more))
-    sample = read_sample(tmp_path / "c.xyz", n=500)
-    assert len(reads) == 1
-    assert len(sample.point.positions) < 1000
-    assert int(sample.point.sample_count.numpy().sum()) == 3000
-
-
-@pytest.mark.parametrize(("n", "says"), [(0, "n = 0"), (2.5, "n = 2.5"), (True, "n = True")])
-def test_sizes_are_whole_numbers(scans, n, says):
-    with pytest.raises(InvalidParameterError, match=says):
-        read_sample(scans / "scan.ply", n=n)
-
-
 def test_points_that_are_not_finite(tmp_path, points):
     import open3d as o3d
 
@@ -154,26 +139,12 @@ def test_labels_are_those_of_annotate(scans, tmp_path, ending, where):
         np.testing.assert_array_equal(found.scan_green.numpy()[:, 0], cloud.point.colors.numpy()[:, 1])
 
 
-def test_labels_agree_with_those_of_the_whole(scans, whole, tmp_path):
-    annotate_file(skeletonize(read_sample(scans / "scan.ply")), scans / "scan.ply", tmp_path / "marked.ply")
-    branch = read_tensor_cloud(tmp_path / "marked.ply").point.branch.numpy()[:, 0]
-    assert (branch == whole.segment()).mean() > 0.99  # cells of the grid there, nearest points here, beside junctions
-
-
-def test_thickness_is_told_by_the_points_of_the_skeleton(tmp_path):
-    cloud = torus(4000).points
-    skeleton = skeletonize(cloud)
+def test_thickness_is_told_by_the_points_of_the_skeleton_and_not_at_all_without(tmp_path):
+    skeleton = skeletonize(torus(1000).points)
     save_tensor_cloud(skeleton.annotate(), tmp_path / "scan.ply")
     annotate_file(skeleton, tmp_path / "scan.ply", tmp_path / "marked.ply")
     found = read_tensor_cloud(tmp_path / "marked.ply").point.thickness.numpy()
     np.testing.assert_array_equal(found, skeleton.annotate().point.thickness.numpy())
-
-
-def test_a_skeleton_without_its_cloud_labels_too(tmp_path):
-    from glsk_o3d import read_skeleton
-
-    skeleton = skeletonize(torus(1000).points)
-    save_tensor_cloud(skeleton.annotate(), tmp_path / "scan.ply")
     skeleton.save(tmp_path / "ring.ply")
     bare = read_skeleton(tmp_path / "ring.ply")
     annotate_file(bare, tmp_path / "scan.ply", tmp_path / "marked.ply")
@@ -248,7 +219,7 @@ def test_a_scan_that_breaks_off_leaves_nothing_behind(scans, tmp_path):
 @pytest.mark.parametrize("change", ["more points", "fewer points", "no classification"])
 def test_a_scan_that_changes_meanwhile_leaves_nothing_behind(scans, tmp_path, monkeypatch, change):
     cloud, skeleton = read_tensor_cloud(scans / "scan.ply"), skeletonize(torus(1000).points)
-    path, survey = tmp_path / "scan.ply", streamed_labels._survey
+    path, survey = tmp_path / "scan.ply", streaming._survey
     save_tensor_cloud(cloud, path)
 
     def changes_then(*given):
@@ -258,7 +229,7 @@ def test_a_scan_that_changes_meanwhile_leaves_nothing_behind(scans, tmp_path, mo
         save_tensor_cloud(cloud.append(cloud) if change == "more points" else cloud.select_by_index([*range(99)]), path)
         return told
 
-    monkeypatch.setattr(streamed_labels, "_survey", changes_then)
+    monkeypatch.setattr(streaming, "_survey", changes_then)
     with pytest.raises(FileFormatError, match=r"scan\.ply: has changed while it was read"):
         annotate_file(skeleton, path, tmp_path / "out.ply")
     assert [each.name for each in tmp_path.iterdir()] == ["scan.ply"]
@@ -274,19 +245,22 @@ def test_an_error_while_writing_keeps_the_old_file(scans, tmp_path, monkeypatch)
             raise OSError(28, "No space left on device")
         return real(*args)
 
-    real = streamed_labels.ply_rows.table
-    monkeypatch.setattr(streamed_labels.ply_rows, "table", fails)
+    real = streaming.ply_rows.table
+    monkeypatch.setattr(streaming.ply_rows, "table", fails)
     with pytest.raises(OSError, match="No space left"):
         annotate_file(skeleton, scans / "scan.ply", tmp_path / "out.ply")
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]
 
 
-def test_outputs_that_are_refused(scans, tmp_path):
+def test_what_is_refused_before_a_file_is_read(scans, tmp_path):
     skeleton = skeletonize(torus(1000).points)
     with pytest.raises(FileFormatError, match=r"its name ends in \.ply"):
         annotate_file(skeleton, scans / "scan.las", tmp_path / "out.npz")
     with pytest.raises(FileFormatError, match="is the scan itself"):
         annotate_file(skeleton, scans / "scan.ply", scans / "scan.ply")
+    for n in (0, 2.5, True):
+        with pytest.raises(InvalidParameterError, match=f"n = {n}"):
+            read_sample(scans / "scan.ply", n=n)
 
 
 def test_memory_does_not_grow_with_the_file(tmp_path):

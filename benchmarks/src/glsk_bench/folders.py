@@ -16,8 +16,8 @@ import numpy as np
 from glsk_o3d.analysis.truth import Truth
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.interop.atomic import write_atomically, write_json
-from glsk_o3d.io.axes import read_truth
 from glsk_o3d.io.formats.ply_rows import header, table
+from glsk_o3d.io.skeletons import read_truth
 
 from .versions import OWN, VERSIONS
 

@@ -31,8 +31,8 @@ def read(path: Path) -> Scan:
     if all(name in scan for scan in scans for name in _E57_COLORS):
         colors = unit_colors(np.column_stack([column(name) for name in _E57_COLORS]))
     if any("intensity" in scan for scan in scans):
-        unknown = [np.full(len(scan[_E57_PLACE[0]]), np.nan) for scan in scans]
+        unknown = (np.full(len(scan[_E57_PLACE[0]]), np.nan) for scan in scans)
         attributes["intensity"] = np.concatenate(
-            [scan.get("intensity", none) for scan, none in zip(scans, unknown, strict=True)]
+            [scan.get("intensity", nan) for scan, nan in zip(scans, unknown, strict=True)]
         )
     return Scan(positions, colors, None, attributes)

@@ -1,6 +1,4 @@
-"""LAS and LAZ, the files of laser scanners: coordinates at full digits, and all that is known of each return (extra
-``las``: laspy, lazrs).
-"""
+"""LAS and LAZ, the files of laser scanners: full digits, and all that is known of each return (laspy, lazrs)."""
 
 from __future__ import annotations
 
@@ -12,7 +10,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ...interop.packages import require, require_for
-from .scanned import ALL_ROWS, COLOR_CHANNELS, Scan, brightest, named_attributes, only, unit_colors
+from ..paths import breaks_off
+from .scanned import COLOR_CHANNELS, Scan, brightest, named_attributes, unit_colors
 
 VLR_BYTES, EVLR_BYTES = 54, 60  # published: LAS 1.4 R15, of the heads of records
 PACKED_RECORD, LAYERED = 22204, 3  # published: LASzip's own record, and its way to pack in which chunks have layers
@@ -20,21 +19,28 @@ LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}  # published: of the parts of a point, by 
 MOST_PACKED = 200  # fitted: points of a LAZ file per byte; of flat grids there are 93, of a million in one place 140
 
 
-def read(path: Path) -> Scan:
-    """The points of a LAS or LAZ file; dimensions that are 0 throughout are unset."""
-    return only(blocks(path, ALL_ROWS))
-
-
 def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan]:
-    """The same, so many points at a time; unset is what is 0 in a block. `bare` ones are positions alone."""
+    """The points of a file, so many at a time, or positions alone if `bare`; unset is what is 0 in a block."""
     require_for(path.suffix)
-    _check_header(path)
+    promised(path)
     return _blocks(path, rows, bare)
 
 
 def promised(path: Path) -> int:
-    """The points that the header promises."""
-    return _check_header(path)
+    """The points of a file.
+
+    ValueError where it promises more than its bytes hold: laspy would look for each, lazrs take memory.
+    """
+    packed, size = path.suffix.lower() == ".laz", path.stat().st_size
+    with path.open("rb") as stream:
+        head = stream.read(375)
+        points, start, length = _header(head, size, packed)
+        if packed:
+            records = int.from_bytes(head[100:104], "little")
+            _check_packed(stream, size, int.from_bytes(head[94:96], "little"), records, start, points, length)
+    if not packed and size - start < points * length:
+        raise breaks_off(points, (size - start) // length)
+    return points
 
 
 def _blocks(path: Path, rows: int, bare: bool) -> Iterator[Scan]:
@@ -44,8 +50,8 @@ def _blocks(path: Path, rows: int, bare: bool) -> Iterator[Scan]:
         for begin in range(0, n, rows):
             points = file.read_points(rows)
             if len(points) < min(rows, n - begin):
-                raise _broken_off(n, begin + len(points))
-            yield Scan(_places(points)) if bare else _scan(points, top)
+                raise breaks_off(n, begin + len(points))
+            yield _scan(points, top, bare)
 
 
 @contextmanager
@@ -66,8 +72,11 @@ def _opened(path: Path, parts: str) -> Iterator[Any]:
         raise ValueError(f"lazrs cannot read it: {error}") from None
 
 
-def _scan(points: Any, top: float | None) -> Scan:
+def _scan(points: Any, top: float | None, bare: bool) -> Scan:
     """Some of the points; `top` is the largest number among the colours of all, None if these are all."""
+    positions = np.ascontiguousarray(np.column_stack([points.x, points.y, points.z]), float)
+    if bare:
+        return Scan(positions)
     names = [name for name in points.point_format.dimension_names if name not in ("X", "Y", "Z")]
     colors = np.column_stack([points[name] for name in COLOR_CHANNELS]) if set(COLOR_CHANNELS) <= set(names) else None
     held = ((name, np.asarray(points[name])) for name in names if name not in COLOR_CHANNELS)
@@ -76,11 +85,7 @@ def _scan(points: Any, top: float | None) -> Scan:
     if colors is not None:
         top = brightest(colors) if top is None else top
         colors = unit_colors(colors, top) if top else None
-    return Scan(_places(points), colors, None, attributes, unset=unset)
-
-
-def _places(points: Any) -> np.ndarray:
-    return np.ascontiguousarray(np.column_stack([points.x, points.y, points.z]), float)
+    return Scan(positions, colors, None, attributes, unset=unset)
 
 
 def _brightest(path: Path, rows: int) -> float:
@@ -95,24 +100,7 @@ def _brightest(path: Path, rows: int) -> float:
     return top
 
 
-def _check_header(path: Path) -> int:
-    """The points of a file.
-
-    ValueError where it promises more than its bytes hold: laspy would look for each, lazrs take memory.
-    """
-    packed, size = path.suffix.lower() == ".laz", path.stat().st_size
-    with path.open("rb") as stream:
-        head = stream.read(375)
-        points, start, length = _promised(head, size, packed)
-        if packed:
-            records = int.from_bytes(head[100:104], "little")
-            _check_packed(stream, size, int.from_bytes(head[94:96], "little"), records, start, points, length)
-    if not packed and size - start < points * length:
-        raise _broken_off(points, (size - start) // length)
-    return points
-
-
-def _promised(head: bytes, size: int, packed: bool) -> tuple[int, int, int]:
+def _header(head: bytes, size: int, packed: bool) -> tuple[int, int, int]:
     """The points of a header, where they begin, and the bytes of each."""
     if len(head) < 227 or head[:4] != b"LASF":
         raise ValueError("it does not start with the header of a LAS file")
@@ -127,10 +115,6 @@ def _promised(head: bytes, size: int, packed: bool) -> tuple[int, int, int]:
     if any(count * length > size for count, length in records) or number(96, 4) > size:
         raise ValueError(f"its header promises more than its {size} bytes can hold")
     return points, number(96, 4), point_bytes
-
-
-def _broken_off(points: int, found: int) -> ValueError:
-    return ValueError(f"it promises {points} points and holds {found}: it breaks off")
 
 
 def _check_packed(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
@@ -10,7 +9,9 @@ from typing import BinaryIO
 
 import numpy as np
 
-from .scanned import ALL_ROWS, Scan, named_attributes, only
+from ...interop.packages import import_open3d
+from ..paths import breaks_off
+from .scanned import Scan, named_attributes
 
 _PCD_NORMALS = ["normal_x", "normal_y", "normal_z"]
 _PCD_TYPES = {kind + size for kind, sizes in (("F", "48"), ("I", "1248"), ("U", "1248")) for size in sizes}
@@ -18,15 +19,64 @@ _PLACE = (" x", " y", " z")  # after the number of the field
 _PACKED_COLORS = ("rgb", "rgba")
 
 
-def read_header(stream: BinaryIO) -> tuple[np.dtype, int, str]:
-    """The type of a row, the number of points and how the data are kept; ValueError where it makes no sense."""
+def read(path: Path) -> Scan:
+    """The points of a compressed PCD file, which `blocks` does not read; ValueError where it is damaged."""
+    row, points, kept, start = _header(path)
+    if kept != "binary_compressed":
+        raise ValueError(f"its data are {kept!r}, which is not understood")
+    with path.open("rb") as stream:
+        stream.seek(start)
+        packed, size = np.frombuffer(stream.read(8).ljust(8, b"\0"), "<u4").tolist()
+        if len(stream.read(packed)) < packed or size < points * row.itemsize:
+            raise ValueError("its compressed data break off")
+    o3d = import_open3d()
+    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+        point = o3d.t.io.read_point_cloud(str(path)).point
+    held = {name: point[name].numpy() for name in point}
+    if len(held.get("positions", ())) != points:
+        raise ValueError("its compressed data make no sense")
+    single = [name.partition(" ")[2] for name in row.names or () if row[name].shape == (1,)]
+    attributes = named_attributes((name, held[name][:, 0]) for name in single if name in held and name != "_")
+    colors, normals = held.get("colors"), held.get("normals")
+    return Scan(
+        held["positions"].astype(float),
+        None if colors is None else colors / 255,
+        None if normals is None else normals.astype(float),
+        attributes,
+    )
+
+
+def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan] | None:
+    """The points of a PCD file, so many at a time, or positions alone if `bare`; None for compressed data, whose
+    columns follow each other. ValueError where it is damaged or breaks off.
+    """
+    row, points, kept, start = _header(path)
+    if kept not in _ROW_READERS:
+        return None
+    found = _blocks(path, start, row, points, _ROW_READERS[kept], rows)
+    return (_scan({name: columns[name] for name in columns if not bare or name[-2:] in _PLACE}) for columns in found)
+
+
+def promised(path: Path) -> int | None:
+    """The points that the header promises; None where they have to be read whole. ValueError where it breaks off."""
+    _, points, kept, _ = _header(path)
+    return points if kept in _ROW_READERS else None
+
+
+def _header(path: Path) -> tuple[np.dtype, int, str, int]:
+    """The type of a row, the number of points, how the data are kept and where they begin.
+
+    ValueError where it makes no sense, or where binary data break off.
+    """
     header: dict[str, list[str]] = {}
-    while "DATA" not in header:
-        line = stream.readline(1 << 16)
-        if not line:
-            raise ValueError("its header has no DATA")
-        key, *values = line.decode("ascii", "replace").split() or ["#"]
-        header[key] = values
+    with path.open("rb") as stream:
+        while "DATA" not in header:
+            line = stream.readline(1 << 16)
+            if not line:
+                raise ValueError("its header has no DATA")
+            key, *values = line.decode("ascii", "replace").split() or ["#"]
+            header[key] = values
+        start = stream.tell()
     names, sizes, kinds = header["FIELDS"], header["SIZE"], header["TYPE"]
     counts = [int(count) for count in header.get("COUNT", ["1"] * len(names))]
     points, (data,) = int(header["POINTS"][0]), header["DATA"]
@@ -34,44 +84,12 @@ def read_header(stream: BinaryIO) -> tuple[np.dtype, int, str]:
         raise ValueError("its header counts less than nothing")
     if not all(kind + size in _PCD_TYPES for kind, size in zip(kinds, sizes, strict=True)):
         raise ValueError("its header has types that are not understood")
-    rows = zip(names, sizes, kinds, counts, strict=True)
-    fields = [(f"{i} {name}", f"<{kind.lower()}{size}", (n,)) for i, (name, size, kind, n) in enumerate(rows)]
-    return np.dtype(fields), points, data
-
-
-def read(path: Path) -> Scan:
-    """The points of a PCD file; ValueError where it is damaged or breaks off."""
-    with path.open("rb") as stream:
-        row, points, kept = read_header(stream)
-        if kept == "binary_compressed":
-            return _scan(_compressed(stream, row, points))
-        if kept not in _ROW_READERS:
-            raise ValueError(f"its data are {kept!r}, which is not understood")
-    return only(blocks(path, ALL_ROWS))
-
-
-def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan] | None:
-    """The same, so many points at a time; None where it has to be read whole, since columns follow each other.
-
-    `bare` ones are positions alone.
-    """
-    with path.open("rb") as stream:
-        row, points, kept = read_header(stream)
-        start = stream.tell()
-    if kept not in _ROW_READERS:
-        return None
+    fields = zip(names, sizes, kinds, counts, strict=True)
+    row = np.dtype([(f"{i} {name}", f"<{kind.lower()}{size}", (n,)) for i, (name, size, kind, n) in enumerate(fields)])
     there = (path.stat().st_size - start) // row.itemsize
-    if kept == "binary" and there < points:
-        raise _broken_off(points, there)
-    found = _blocks(path, start, row, points, _ROW_READERS[kept], rows)
-    return (_scan({name: columns[name] for name in columns if not bare or name[-2:] in _PLACE}) for columns in found)
-
-
-def promised(path: Path) -> int | None:
-    """The points that the header promises; None where they have to be read whole."""
-    with path.open("rb") as stream:
-        _, points, kept = read_header(stream)
-    return points if kept in _ROW_READERS else None
+    if data == "binary" and there < points:
+        raise breaks_off(points, there)
+    return row, points, data, start
 
 
 def _blocks(
@@ -83,7 +101,7 @@ def _blocks(
             n = min(rows, points - begin)
             columns, found = read_rows(stream, row, n)
             if found < n:
-                raise _broken_off(points, begin + found)
+                raise breaks_off(points, begin + found)
             yield columns
 
 
@@ -107,66 +125,23 @@ def _colors(packed: np.ndarray) -> np.ndarray:
     return np.stack([bits >> 16 & 255, bits >> 8 & 255, bits & 255], axis=1) / 255
 
 
-def _broken_off(points: int, found: int) -> ValueError:
-    return ValueError(f"it promises {points} points and holds {found}: it breaks off")
-
-
 def _text(stream: BinaryIO, row: np.dtype, n: int) -> tuple[dict[str, np.ndarray], int]:
     """The next n rows, or those that are left, and how many they are."""
     lines = [line.decode("ascii", "replace") for line in islice((line for line in stream if line.strip()), n)]
     widths = [row[name].shape[0] for name in row.names or ()]
-    table = (
-        np.loadtxt(lines, ndmin=2, comments=None, usecols=range(sum(widths))) if lines else np.empty((0, sum(widths)))
-    )
+    shape = len(lines), sum(widths)
+    table = np.loadtxt(lines, ndmin=2, comments=None, usecols=range(shape[1])) if lines else np.empty(shape)
     parts = np.split(table, np.cumsum(widths)[:-1], axis=1)
     with np.errstate(invalid="ignore"):
         columns = {name: part.astype(row[name].base) for name, part in zip(row.names or (), parts, strict=True)}
     return columns, len(lines)
 
 
-def _rows(stream: BinaryIO, row: np.dtype, n: int) -> tuple[dict[str, np.ndarray], int]:
+def _binary(stream: BinaryIO, row: np.dtype, n: int) -> tuple[dict[str, np.ndarray], int]:
     data = stream.read(n * row.itemsize)
     table = np.frombuffer(data, row, len(data) // row.itemsize)
     return {name: table[name] for name in row.names or ()}, len(table)
 
 
 _RowReader = Callable[[BinaryIO, np.dtype, int], tuple[dict[str, np.ndarray], int]]
-_ROW_READERS: dict[str, _RowReader] = {"ascii": _text, "binary": _rows}
-
-
-def _compressed(stream: BinaryIO, row: np.dtype, points: int) -> dict[str, np.ndarray]:
-    """Columns one after the other, packed with LZF."""
-    packed, size = np.frombuffer(stream.read(8).ljust(8, b"\0"), "<u4").tolist()
-    data = stream.read(packed)
-    if len(data) < packed or size < points * row.itemsize:
-        raise ValueError("its compressed data break off")
-    columns, found = io.BytesIO(_unpacked(data, size)), {}
-    for name in row.names or ():
-        base, n = row[name].base, row[name].shape[0]
-        found[name] = np.frombuffer(columns.read(points * n * base.itemsize), base).reshape(points, n)
-    return found
-
-
-def _unpacked(data: bytes, size: int) -> bytes:
-    """What LZF has packed, of so many bytes: runs as they are, and copies of what came before (liblzf's format)."""
-    out, at = bytearray(), 0
-    while at < len(data) and len(out) < size:
-        control = data[at]
-        at += 1
-        if control < 32:
-            out += data[at : at + control + 1]
-            at += control + 1
-            continue
-        length = control >> 5
-        if length == 7:
-            length += data[at]
-            at += 1
-        start = len(out) - ((control & 31) << 8) - data[at] - 1
-        at, length = at + 1, length + 2
-        if start < 0:
-            raise ValueError("its compressed data make no sense")
-        piece = out[start : start + length]
-        out += (piece * (length // len(piece) + 1))[:length]  # it may overlap what it makes
-    if len(out) != size:
-        raise ValueError("its compressed data break off")
-    return bytes(out)
+_ROW_READERS: dict[str, _RowReader] = {"ascii": _text, "binary": _binary}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from keyword import iskeyword
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 from ...interop.packages import import_open3d
 
 COLOR_CHANNELS = ["red", "green", "blue"]
+NORMAL_NAMES = ["nx", "ny", "nz"]
 NO_TRIANGLES = np.empty((0, 3), np.int64)
 ALL_ROWS = sys.maxsize  # derived: more than any file has
 
@@ -24,28 +25,14 @@ class NoPoints(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """Points and what a file says of each.
-
-    Attributes
-    ----------
-    positions : (N, 3) float64 array
-    colors : (N, 3) float array or None
-        Red, green and blue from 0 to 1.
-    normals : (N, 3) float array or None
-    attributes : dict of str to (N,) array
-        All else, such as ``intensity`` or ``classification``; the names can stand in an expression.
-    triangles : (T, 3) int array
-        Between the points, if it is a mesh.
-    unset : frozenset of str
-        Attributes that the format has, and nobody gave: they can be asked for, but are not told.
-    """
+    """Points, (N, 3) arrays, and what a file says of each."""
 
     positions: np.ndarray
-    colors: np.ndarray | None = None
+    colors: np.ndarray | None = None  # red, green and blue from 0 to 1
     normals: np.ndarray | None = None
-    attributes: dict[str, np.ndarray] = field(default_factory=dict)
-    triangles: np.ndarray = field(default_factory=lambda: NO_TRIANGLES)
-    unset: frozenset[str] = frozenset()
+    attributes: dict[str, np.ndarray] = field(default_factory=dict)  # all else; the names can stand in an expression
+    triangles: np.ndarray = field(default_factory=lambda: NO_TRIANGLES)  # between the points, if it is a mesh
+    unset: frozenset[str] = frozenset()  # attributes that nobody gave: they can be asked for, but are not told
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -58,21 +45,6 @@ class Scan:
             None if self.normals is None else self.normals[rows],
             {name: values[rows] for name, values in self.attributes.items()},
             unset=self.unset,
-        )
-
-    @staticmethod
-    def joined(parts: Iterable[Scan]) -> Scan:
-        """The points of several scans with the same columns, one after the other; unset is what is so in all."""
-        parts = list(parts)
-        if len(parts) == 1:
-            return parts[0]
-        colors, normals = ([getattr(part, name) for part in parts] for name in ("colors", "normals"))
-        return Scan(
-            np.concatenate([part.positions for part in parts]),
-            None if colors[0] is None else np.concatenate(colors),
-            None if normals[0] is None else np.concatenate(normals),
-            {name: np.concatenate([part.attributes[name] for part in parts]) for name in parts[0].attributes},
-            unset=frozenset.intersection(*(part.unset for part in parts)),
         )
 
     @property
@@ -120,11 +92,6 @@ class Scan:
         for name, kind in self.kinds.items():
             cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(self.attributes[name][:, None], kind))
         return cloud
-
-
-def only(blocks: Iterator[Scan] | None) -> Scan:
-    """The one block of a file that was read whole, without points if there is none."""
-    return next(blocks or iter(()), Scan(np.empty((0, 3))))
 
 
 def attribute_name(text: str, taken: Iterable[str] = ()) -> str:

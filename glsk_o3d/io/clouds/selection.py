@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import ast
 import operator
-import re
 from collections.abc import Callable, Mapping
 from functools import reduce
-from keyword import iskeyword
 from typing import Any
 
 import numpy as np
 
 from ...errors import InvalidCloudError, InvalidParameterError, did_you_mean
 from .scanned import Scan
+
+__all__ = ["select"]
 
 _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
@@ -25,7 +25,6 @@ _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.In: np.isin,
     ast.NotIn: lambda values, among: ~np.isin(values, among),
 }
-_GRAMMAR = {"and", "or", "not", "in"}
 _JOINS = {ast.And: np.logical_and, ast.Or: np.logical_or}
 
 
@@ -63,22 +62,7 @@ def select(scan: Scan, where: str) -> Scan:
 
 
 def chosen_points(scan: Scan, where: str) -> np.ndarray:
-    """For which points a condition holds.
-
-    Parameters
-    ----------
-    scan : Scan
-    where : str
-
-    Returns
-    -------
-    (N,) bool array
-
-    Raises
-    ------
-    InvalidParameterError
-        As from `select`.
-    """
+    """For which points a condition holds, (N,) bool array; InvalidParameterError as from `select`."""
     try:
         chosen = np.asarray(_value(parsed(where), scan.columns))
     except (TypeError, ValueError) as error:
@@ -91,55 +75,18 @@ def chosen_points(scan: Scan, where: str) -> np.ndarray:
 
 
 def none_chosen(where: str) -> InvalidCloudError:
-    """The error for a condition that holds for no point.
-
-    Parameters
-    ----------
-    where : str
-
-    Returns
-    -------
-    InvalidCloudError
-    """
+    """The error for a condition that holds for no point."""
     return InvalidCloudError(f"there is no point with {where}")
 
 
 def parsed(where: str) -> ast.expr:
-    """A condition as a tree of Python's grammar.
-
-    Parameters
-    ----------
-    where : str
-
-    Returns
-    -------
-    ast.expr
-
-    Raises
-    ------
-    InvalidParameterError
-        It is none, or an attribute is called as a word of Python is.
-
-    Examples
-    --------
-    >>> ast.dump(parsed("z"))
-    "Name(id='z', ctx=Load())"
-    """
+    """A condition as a tree of Python's grammar; InvalidParameterError if it is none."""
     try:
         return ast.parse(where.strip(), mode="eval").body
     except (SyntaxError, RecursionError, MemoryError) as error:
         why = getattr(error, "msg", "it is nested too deeply")
-        cure = "write == for equal" if re.search(r"[^=!<>]=[^=]", where) else "write such as 'classification == 5'"
-        cure = "write 'and' and 'or'" if "&&" in where or "||" in where else cure
-        word = next((word for word in re.findall(r"\w+", where) if iskeyword(word) and word not in _GRAMMAR), "")
-        cure = f"write {word}_ for {word}" if word else cure
+        cure = "write such as 'classification == 5 and not z < 2', and class_ for class"
         raise InvalidParameterError(f"where = {where[:200]!r}: {why}: {cure}") from None
-
-
-def _column(name: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    if name not in columns:
-        raise InvalidParameterError(did_you_mean(name, columns, "attribute of the points"))
-    return columns[name]
 
 
 def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
@@ -160,5 +107,7 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
         case ast.Constant(value=int() | float() as number):
             return number
         case ast.Name(id=name):
-            return _column(name, columns)
+            if name not in columns:
+                raise InvalidParameterError(did_you_mean(name, columns, "attribute of the points"))
+            return columns[name]
     raise InvalidParameterError(f"{ast.unparse(node)!r} is not understood: compare attributes with numbers")

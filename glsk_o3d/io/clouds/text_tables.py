@@ -1,8 +1,8 @@
-"""Clouds as text: x, y and z in columns, with or without a line of names; colours, normals and all else are kept.
+"""Clouds as text: CSV, TXT, ASC, PTS and the XYZ family, with or without a line of names; all numbers are kept.
 
-CSV, TXT, ASC, PTS and the XYZ family: the columns are parted by spaces, tabs, commas or semicolons, numbers may have a
-decimal comma, and lines ahead of the first three numbers are a header. Without names the columns after z are colours if
-three are whole numbers up to 255, normals if they have the length 1.
+The columns are parted by spaces, tabs, commas or semicolons, numbers may have a decimal comma, and lines ahead of the
+first three numbers are a header. Without names the columns after z are colours if three are whole numbers up to 255,
+normals if they have the length 1.
 """
 
 from __future__ import annotations
@@ -18,53 +18,39 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from ...interop.verbosity import following_open3d
-from .scanned import COLOR_CHANNELS, NoPoints, Scan, named_attributes, unit_colors
+from ..paths import breaks_off
+from .scanned import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, named_attributes, unit_colors
 
 _log = logging.getLogger(__name__)
 
-ENCODED_BYTES = 1 << 16  # fitted: more than any header, by which the alphabet is told
 LOOK_AHEAD = 20  # fitted: lines in which a decimal comma shows
 HEADER_LINES = 100  # fitted to nothing: longer headers are those of other files
 UNIT_SLACK = 0.01  # measured: normals in text have two digits at the least
 _ROLES = {
-    **dict.fromkeys(("x", "easting", "rechtswert", "ostwert"), "x"),
-    **dict.fromkeys(("y", "northing", "hochwert", "nordwert"), "y"),
-    **dict.fromkeys(("z", "height", "elevation", "altitude", "höhe", "hoehe"), "z"),
+    **dict.fromkeys(("x", "easting"), "x"),
+    **dict.fromkeys(("y", "northing"), "y"),
+    **dict.fromkeys(("z", "height", "elevation", "altitude"), "z"),
     **dict.fromkeys(("r", "red", "rf"), "red"),
     **dict.fromkeys(("g", "green", "gf"), "green"),
     **dict.fromkeys(("b", "blue", "bf"), "blue"),
-    **{name: name for name in ("nx", "ny", "nz")},
+    **{name: name for name in NORMAL_NAMES},
     **{f"{word}{mark}{axis}": f"n{axis}" for word in ("normal", "n") for mark in ("_", "") for axis in "xyz"},
 }
-_NORMALS = ["nx", "ny", "nz"]
 _BY_ENDING = {
-    ".xyzn": [*"xyz", *_NORMALS],
+    ".xyzn": [*"xyz", *NORMAL_NAMES],
     ".xyzrgb": [*"xyz", *COLOR_CHANNELS],
     ".pts": [*"xyz", "intensity", *COLOR_CHANNELS],
 }
 
 
 class Layout(NamedTuple):
-    """How a file of text is laid out.
+    """How a file of text is laid out."""
 
-    Attributes
-    ----------
-    skip : int
-        Lines of the header.
-    delimiter : str or None
-        None for any white space.
-    decimal_comma : bool
-    names : list of str
-        Of the columns, empty where the file has none.
-    columns : list of int
-        Those with numbers, by the first line that has three.
-    """
-
-    skip: int
-    delimiter: str | None
+    skip: int  # lines of the header
+    delimiter: str | None  # None for any white space
     decimal_comma: bool
-    names: list[str]
-    columns: list[int]
+    names: list[str]  # of the columns, empty where the file has none
+    columns: list[int]  # those with numbers, by the first line that has three
 
 
 def holds_points(path: Path) -> bool:
@@ -72,7 +58,7 @@ def holds_points(path: Path) -> bool:
     if not path.is_file():  # a pipe may never end
         return False
     try:
-        with _opened(path) as stream:
+        with path.open(encoding="utf-8-sig", errors="replace") as stream:
             _layout(stream)
     except (NoPoints, OSError):
         return False
@@ -81,34 +67,30 @@ def holds_points(path: Path) -> bool:
 
 def read(path: Path) -> Scan:
     """The points of a file of text; NoPoints if there is none. Lines that hold no point are skipped and logged."""
-    with _opened(path) as stream:
+    ending = path.suffix.lower()
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:
+        first = stream.readline(64).strip()
+        if ending == ".pts" and not first.isdigit():
+            raise ValueError("its first line is not the number of points")
+        stream.seek(0)
         layout = _layout(stream)
         stream.seek(0)
         rows = _rows(stream, layout, path)
+    if ending == ".pts" and len(rows) < int(first):
+        raise breaks_off(int(first), len(rows))
     names = [layout.names[column] for column in layout.columns] if layout.names else []
-    roles = [_role(name) for name in names] or _guess(rows, path.suffix.lower())
+    roles = [_role(name) for name in names] or _guess(rows, ending)
 
     def together(wanted: Sequence[str]) -> np.ndarray | None:
         return rows[:, [roles.index(role) for role in wanted]] if set(wanted) <= set(roles) else None
 
-    positions, colors, normals = rows[:, list(map(roles.index, "xyz"))], together(COLOR_CHANNELS), together(_NORMALS)
-    used = {*"xyz", *(COLOR_CHANNELS if colors is not None else ()), *(_NORMALS if normals is not None else ())}
+    positions = rows[:, list(map(roles.index, "xyz"))]
+    colors, normals = together(COLOR_CHANNELS), together(NORMAL_NAMES)
+    used = {*"xyz", *(COLOR_CHANNELS if colors is not None else ()), *(NORMAL_NAMES if normals is not None else ())}
     others = [i for i, role in enumerate(roles) if role not in used or i != roles.index(role)]
     called = names or [role or f"column_{column + 1}" for role, column in zip(roles, layout.columns, strict=True)]
     attributes = named_attributes((called[i], _whole(rows[:, i])) for i in others)
     return Scan(positions, None if colors is None else unit_colors(colors), normals, attributes)
-
-
-def _opened(path: Path) -> TextIO:
-    """A file of text, in UTF-8, or else in the eight bits of Western Europe."""
-    with path.open("rb") as stream:
-        head = stream.read(ENCODED_BYTES).rpartition(b"\n")[0]
-    try:
-        head.decode("utf-8")
-        encoding = "utf-8-sig"
-    except UnicodeDecodeError:
-        encoding = "cp1252"
-    return path.open(encoding=encoding, errors="replace")
 
 
 def _layout(stream: TextIO) -> Layout:
@@ -165,7 +147,7 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
         if not text:
             continue
         words = (text.replace(",", ".") if layout.decimal_comma else text).split(layout.delimiter)
-        row = [_number(words[i]) if i < len(words) else np.nan for i in layout.columns]
+        row = [float(words[i]) if i < len(words) and _is_number(words[i]) else np.nan for i in layout.columns]
         broken_off = not line.endswith("\n") and len(words) <= layout.columns[-1]  # its last number may be cut
         if not broken_off and all(i < len(words) and _is_number(words[i]) for i in layout.columns[:3]):
             found.append(row)
@@ -178,7 +160,7 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
 
 
 def _guess(rows: np.ndarray, ending: str) -> list[str]:
-    """What the columns of a file without names are; empty for those of which nothing is known."""
+    """What the columns of a file without names are; empty where nothing is known."""
     n = rows.shape[1]
     known = _BY_ENDING.get(ending, [])
     if ending == ".pts" and n == 6:
@@ -191,7 +173,7 @@ def _guess(rows: np.ndarray, ending: str) -> list[str]:
             if (three == np.round(three)).all() and three.min() >= 0 and 1 < three.max() <= 255:
                 roles[start : start + 3] = COLOR_CHANNELS
             elif (np.abs(np.linalg.norm(three, axis=1) - 1) < UNIT_SLACK).all():
-                roles[start : start + 3] = _NORMALS
+                roles[start : start + 3] = NORMAL_NAMES
     return roles
 
 
@@ -206,10 +188,6 @@ def _whole(values: np.ndarray) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         whole = np.isfinite(values).all() and (np.abs(values) < 2**31).all() and (values == np.round(values)).all()
     return values.astype(np.int64) if whole else values
-
-
-def _number(word: str) -> float:
-    return float(word) if _is_number(word) else np.nan
 
 
 def _is_number(word: str) -> bool:

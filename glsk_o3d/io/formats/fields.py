@@ -1,9 +1,15 @@
-"""What the two formats that keep everything have in common: the fields of a skeleton, by name."""
+"""JSON and npz: keep everything, to the last bit; JSON as text that every language reads, npz small.
+
+In JSON NaN is null and the infinities are strings, since strict JSON has neither. An npz file is never unpickled; its
+report is a string of JSON.
+"""
 
 from __future__ import annotations
 
+import io
 import json
 import math
+import zipfile
 from typing import Any
 
 import numpy as np
@@ -28,21 +34,51 @@ ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {
 """The arrays of a skeleton: the shape of a row and the type of each. The one field more is ``report``."""
 LATER = ("half_width", "half_thickness", "support")
 """Those that older files lack: there they are the radii, and the support is not known."""
+MOST_EXPANDED = 200  # fitted: times the size of a file that its arrays may have; those of skeletons have 1 to 20
+SMALL_ARCHIVE = 1 << 26  # derived: bytes that may always be held
 
 
-def decode(values: Any) -> Skeleton:
-    """The skeleton whose fields stand in a dict.
+def write_json(skeleton: Skeleton) -> bytes:
+    """The content of a JSON file."""
+    return dumps({**_arrays(skeleton), "report": skeleton.report.to_dict()}).encode()
 
-    Parameters
-    ----------
-    values : dict
-        With ``format``, ``format_version``, the arrays or lists of numbers, and the report as a dict of `plain` values.
 
-    Raises
-    ------
-    ValueError
-        It is something else, is from a newer release, lacks a field, or the fields do not fit together.
-    """
+def read_json(data: bytes) -> Skeleton:
+    """The skeleton in the content of a JSON file."""
+    return _decode(json.loads(data))
+
+
+def write_npz(skeleton: Skeleton) -> bytes:
+    """The content of an npz file."""
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **_arrays(skeleton), report=dumps(skeleton.report.to_dict()))
+    return stream.getvalue()
+
+
+def read_npz(data: bytes) -> Skeleton:
+    """The skeleton in the content of an npz file."""
+    words = ("format", "format_version", "report")
+    with zipfile.ZipFile(io.BytesIO(data)) as packed:
+        if sum(info.file_size for info in packed.infolist()) > max(MOST_EXPANDED * len(data), SMALL_ARCHIVE):
+            raise ValueError(f"it would become more than {MOST_EXPANDED} times as large: no skeleton packs so")
+    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+        values = {name: archive[name] for name in (*words, *ARRAYS) if name in archive.files}
+    for name in words:
+        values[name] = values[name].item() if name in values and values[name].ndim == 0 else None
+    return _decode({**values, "report": json.loads(values["report"] or "null")})
+
+
+def dumps(value: Any) -> str:
+    """Strict JSON of numbers, arrays, dicts and lists."""
+    return json.dumps(_plain(value), allow_nan=False)
+
+
+def _arrays(skeleton: Skeleton) -> dict[str, Any]:
+    return {"format": FORMAT, "format_version": FORMAT_VERSION, **{name: getattr(skeleton, name) for name in ARRAYS}}
+
+
+def _decode(values: Any) -> Skeleton:
+    """The skeleton whose fields stand in a dict; ValueError where it is something else, or from a newer release."""
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise ValueError(f"it is not marked as a {FORMAT!r}")
     if values.get("format_version") != FORMAT_VERSION:
@@ -61,13 +97,13 @@ def decode(values: Any) -> Skeleton:
         if array.shape[1:] != columns or array.dtype.kind not in ("iu" if kind is int else "f"):
             raise ValueError(f"{name} has shape {array.shape} and dtype {array.dtype}")
         arrays[name] = array
-    for name, words in (("confidence", "confidences"), *((name, name) for name in LATER)):
+    for name in ("confidence", *LATER):  # those that a skeleton leaves out where they do not fit
         if len(arrays[name]) != len(arrays["vertices"]):
-            raise ValueError(f"{len(arrays[name])} {words} for {len(arrays['vertices'])} vertices")
+            raise ValueError(f"{name} has {len(arrays[name])} values for {len(arrays['vertices'])} vertices")
     return checked(Skeleton(**arrays, report=Report.from_dict(_with_nan(values["report"]))))
 
 
-def plain(value: Any) -> Any:
+def _plain(value: Any) -> Any:
     """What JSON can hold: NaN becomes null and the infinities strings, in arrays, dicts and lists alike."""
     if isinstance(value, np.ndarray):
         cells = value.astype(object)
@@ -76,9 +112,9 @@ def plain(value: Any) -> Any:
             cells[np.isposinf(value)], cells[np.isneginf(value)] = "Infinity", "-Infinity"
         return cells.tolist()
     if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
+        return [_plain(item) for item in value]
     value = value.item() if isinstance(value, np.generic) else value
     if isinstance(value, float) and not math.isfinite(value):
         return None if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
@@ -86,14 +122,9 @@ def plain(value: Any) -> Any:
 
 
 def _with_nan(value: Any) -> Any:
-    """Inverse of `plain` for the report; of arrays NumPy does it."""
+    """Inverse of `_plain` for the report; of arrays NumPy does it."""
     if isinstance(value, dict):
         return {key: _with_nan(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_with_nan(item) for item in value]
     return math.nan if value is None else float(value) if value in ("Infinity", "-Infinity") else value
-
-
-def dumps(value: Any) -> str:
-    """JSON of `plain` values."""
-    return json.dumps(plain(value), allow_nan=False)

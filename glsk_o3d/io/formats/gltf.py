@@ -20,7 +20,7 @@ from ...interop.clouds import cloud_points, open3d_class
 from ...numerics.vectors import norm, unit
 from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
-from .forests import as_forest, global_shift
+from .graphs import as_forest, global_shift
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
 COMPONENT_TYPES = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
@@ -99,7 +99,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
         raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
     if len(forest.edges) > MOST_JOINTS:
         raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
-    points, triangles = cloud_points(mesh), _triangles(mesh)
+    points, (kind, tensor) = cloud_points(mesh), open3d_class(mesh)
     if not np.isfinite(points).all():
         raise InvalidCloudError("the surface has points that are not finite: drop them first")
     (low, high), (least, most) = ((each.min(axis=0), each.max(axis=0)) for each in (forest.vertices, points))
@@ -120,8 +120,10 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
     for name, values in _looks(mesh, len(points)).items():
         attributes[name] = buffer.add(values, "f4", "VEC3")
     primitive: dict[str, Any] = {"attributes": attributes, "mode": POINTS_MODE}
-    if len(triangles):
-        primitive |= {"indices": buffer.add(triangles.reshape(-1), "u4", "SCALAR"), "mode": TRIANGLES_MODE}
+    if kind == "TriangleMesh":
+        triangles = mesh.triangle.indices.cpu().numpy() if tensor else np.asarray(mesh.triangles)
+        if len(triangles):
+            primitive |= {"indices": buffer.add(triangles.reshape(-1), "u4", "SCALAR"), "mode": TRIANGLES_MODE}
     place = {"translation": _upright(origin, up), "rotation": UPRIGHT[up]}
     roots = np.flatnonzero(bone_before(forest) < 0).tolist()
     n = len(nodes)
@@ -156,11 +158,11 @@ def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
         return {}
     if tensor:
         held = mesh.vertex if name == "TriangleMesh" else mesh.point
-        keys = (key if key in held else "" for key in ("normals", "colors"))
-        normals, colors = (held[key].cpu().numpy() if key else np.empty((0, 3)) for key in keys)
+        parts = (held[key].cpu().numpy() if key in held else np.empty((0, 3)) for key in ("normals", "colors"))
     else:
         start = "vertex_" if name == "TriangleMesh" else ""
-        normals, colors = (np.asarray(getattr(mesh, f"{start}{key}")) for key in ("normals", "colors"))
+        parts = (np.asarray(getattr(mesh, f"{start}{key}")) for key in ("normals", "colors"))
+    normals, colors = parts
     found = {}
     if len(normals) == n and (norm(normals) > 0).all():
         found["NORMAL"] = unit(normals)
@@ -168,13 +170,6 @@ def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
         shades = colors / 255 if colors.dtype == np.uint8 else colors
         found["COLOR_0"] = np.where(shades <= SRGB_KNEE, shades / 12.92, ((shades + 0.055) / 1.055) ** 2.4)
     return found
-
-
-def _triangles(mesh: Any) -> np.ndarray:
-    name, tensor = open3d_class(mesh)
-    if name != "TriangleMesh":
-        return np.empty((0, 3), int)
-    return mesh.triangle.indices.cpu().numpy() if tensor else np.asarray(mesh.triangles)
 
 
 def _bones(forest: Skeleton, origin: np.ndarray) -> tuple[list[dict[str, Any]], np.ndarray]:

@@ -1,36 +1,33 @@
-"""Skeletons of what files hold, checked."""
+"""What the formats of skeletons have in common: graphs that are checked, trees with a root, lines of text."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...skeleton import Skeleton
+from ...analysis.branches import branch_table
+from ...editing.graphs import cut_loops, reroot
+from ...errors import FileFormatError
+from ...refinement.rooted import RootPlace, numbered_from
+from ...skeleton import OF_VERTICES, Skeleton
+
+FLOAT32_SHARE = 0.01  # derived: an error of a hundredth of a radius is below what any fit of the axis knows
 
 
 class NoEdges(Exception):
     """A file in a format that clouds have too holds no edges, and was not written as a skeleton."""
 
 
+# -------------------------------------------------------------------------------------------------------------- graphs
+
+
 def graph_skeleton(
     vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | None = None, **known: ArrayLike
 ) -> Skeleton:
-    """A skeleton without a cloud, its edges sorted and each once.
-
-    Parameters
-    ----------
-    vertices : (M, 3) array_like
-    edges : (E, 2) array_like of int
-        In any order; repeated ones and those from a vertex to itself are dropped.
-    radii : (M,) array_like, optional
-        By default unknown: NaN.
-    **known : (M,) array_like
-        What else is known of the vertices, by the name of the field.
-
-    Raises
-    ------
-    ValueError
-        As from `checked`.
+    """A skeleton without a cloud, of edges in any order: they are sorted, and repeated ones and those from a vertex to
+    itself are dropped. Radii are NaN by default; `known` are other fields of the vertices. Errors as from `checked`.
     """
     vertices = np.asarray(vertices, float).reshape(-1, 3)
     edges = np.sort(np.asarray(edges, np.int64).reshape(-1, 2), axis=1)
@@ -41,28 +38,89 @@ def graph_skeleton(
 
 
 def checked(skeleton: Skeleton) -> Skeleton:
-    """A skeleton, if its arrays fit together and can be true; ValueError where lengths differ, something names a vertex
-    that is not there, a vertex is nowhere, a radius is negative, or a confidence is none.
-    """
+    """The same skeleton; ValueError where its arrays do not fit together or cannot be true."""
     m, vertex_of_point = len(skeleton.vertices), skeleton.vertex_of_point
     if skeleton.edges.size and (skeleton.edges.min() < 0 or skeleton.edges.max() >= m):
         raise ValueError(f"an edge names a vertex that is not there: there are {m}")
     if vertex_of_point.size and (vertex_of_point.min() < -1 or vertex_of_point.max() >= m):
         raise ValueError(f"vertex_of_point names a vertex that is not there: there are {m}")
-    if len(skeleton.radii) != m:
-        raise ValueError(f"{len(skeleton.radii)} radii for {m} vertices")
     if len({len(array) for array in (vertex_of_point, skeleton.points, skeleton.normals)} - {0}) > 1:
         raise ValueError("points, normals and vertex_of_point differ in length")
     if not np.isfinite(skeleton.vertices).all():
         raise ValueError("a vertex has coordinates that are not finite")
-    for name, values, high in (
-        ("radius", skeleton.radii, np.inf),
-        ("confidence", skeleton.confidence, 1.0),
-        ("half_width", skeleton.half_width, np.inf),
-        ("half_thickness", skeleton.half_thickness, skeleton.half_width),
-        ("support", skeleton.support, 1.0),
-    ):
-        wrong = values[(values < 0) | (values > high)]
+    highest = {"confidence": 1.0, "half_thickness": skeleton.half_width, "support": 1.0}
+    for name in OF_VERTICES:
+        values = getattr(skeleton, name)
+        if len(values) != m:
+            raise ValueError(f"{name} has {len(values)} values for {m} vertices")
+        wrong = values[(values < 0) | (values > highest.get(name, np.inf))]
         if len(wrong):
-            raise ValueError(f"a {name} is {wrong[0]:g}")
+            raise ValueError(f"{name} has the value {wrong[0]:g}")
     return skeleton
+
+
+# --------------------------------------------------------------------------------------------------------------- trees
+
+
+def as_forest(skeleton: Skeleton, cut: bool, root: RootPlace | None) -> Skeleton:
+    """A skeleton as one tree per component, numbered from the roots outwards: every other vertex has one neighbour of
+    lower number. Loops are cut if `cut`, else FileFormatError; `root` is as for `save_skeleton`.
+    """
+    if skeleton.n_loops and not cut:
+        raise FileFormatError(
+            f"this format holds trees only and the skeleton has {skeleton.n_loops} loop(s): "
+            "pass cut_loops=True to drop an edge of each, or choose another format"
+        )
+    forest = cut_loops(skeleton)[0] if skeleton.n_loops else skeleton
+    if len(forest.vertices) == 0:
+        return forest
+    if root is not None:
+        return reroot(forest, root)
+    if is_outward(forest):
+        return forest
+    table = branch_table(forest)
+    return numbered_from(forest, int(table.start[np.argmin(table.level)]))
+
+
+def is_outward(skeleton: Skeleton) -> bool:
+    """Whether no vertex has two neighbours of lower number: then it is a forest, numbered from its roots outwards."""
+    return len(np.unique(skeleton.edges[:, 1])) == len(skeleton.edges)
+
+
+def parents(forest: Skeleton) -> np.ndarray:
+    """The vertex before each of a forest that is numbered outwards, (M,) int array; -1 for roots."""
+    parent = np.full(len(forest.vertices), -1)
+    parent[forest.edges[:, 1]] = forest.edges[:, 0]
+    return parent
+
+
+def global_shift(skeleton: Skeleton) -> np.ndarray:
+    """What to take off coordinates so that float32 holds them, (3,) float array of whole numbers; 0 along axes where
+    float32 holds them as they are.
+    """
+    finite = skeleton.vertices[np.isfinite(skeleton.vertices).all(axis=1)]
+    sizes = np.concatenate([skeleton.radii, skeleton.edge_lengths])
+    sizes = sizes[sizes > 0]
+    if len(finite) == 0 or len(sizes) == 0:
+        return np.zeros(3)
+    lost = np.abs(finite).max(axis=0) * np.finfo(np.float32).eps > FLOAT32_SHARE * np.median(sizes)
+    return np.where(lost, np.floor(finite.min(axis=0)), 0.0)
+
+
+# ---------------------------------------------------------------------------------------------------------------- text
+
+
+def line(*words: object) -> str:
+    """Words and numbers with spaces between them; floats keep their full precision."""
+    return " ".join(map(str, words))  # str of a float is its shortest exact form
+
+
+def text(lines: Iterable[str]) -> bytes:
+    """Lines as the content of a file."""
+    return ("\n".join(lines) + "\n").encode()
+
+
+def words_by_line(data: bytes) -> list[list[str]]:
+    """The words of every line that has some, comments left out."""
+    lines = (line.partition("#")[0].split() for line in data.decode("utf-8", "replace").splitlines())
+    return [words for words in lines if words]

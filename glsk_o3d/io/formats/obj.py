@@ -9,8 +9,7 @@ from itertools import pairwise
 from typing import BinaryIO
 
 from ...skeleton import Skeleton
-from .graphs import NoEdges, graph_skeleton
-from .text import line, text, words_by_line
+from .graphs import NoEdges, graph_skeleton, line, text, words_by_line
 
 _MARK = b"# curve skeleton written by glsk-o3d"
 

@@ -10,13 +10,7 @@ _WORDS = {"u1": "uchar", "i4": "int", "f4": "float", "f8": "double"}  # those th
 
 
 def is_written(kind: np.dtype) -> bool:
-    """Whether there is a word for a type: of PLY's others Open3D leaves the whole column out.
-
-    Examples
-    --------
-    >>> is_written(np.dtype(np.uint8)), is_written(np.dtype(np.uint16))
-    (True, False)
-    """
+    """Whether there is a word for a type: of PLY's others Open3D leaves the whole column out."""
     return kind.str[1:] in _WORDS
 
 
@@ -30,9 +24,8 @@ def table(columns: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def header(row: np.dtype, n: int, *, width: int = 0, more: str = "") -> bytes:
-    """What stands before n such rows.
-
-    The count can be padded to a width, so that another one fits in its place; `more` are lines of elements that follow.
+    """What stands before n such rows; the count can be padded to a width, so that another one fits in its place, and
+    `more` are lines of elements that follow.
     """
     properties = "".join(f"property {_WORDS[row[name].str[1:]]} {name}\n" for name in row.names or ())
     vertices = f"element vertex {n:{width}d}\n"

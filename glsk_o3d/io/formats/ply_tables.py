@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Sequence
 from itertools import islice
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
+
+from ..paths import breaks_off
 
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _KINDS = {
@@ -91,24 +93,9 @@ def read_header(stream: BinaryIO) -> tuple[str, list[Element]]:
 
 
 def read_tables(stream: BinaryIO, wanted: Iterable[str]) -> dict[str, Table]:
-    """Read elements of a PLY file; those that it has none of are left out.
+    """The wanted elements of a PLY file, columns by name, those left out that it has none of; text becomes float64.
 
-    Parameters
-    ----------
-    stream : binary stream
-        At its beginning; it can be sought.
-    wanted : iterable of str
-        The names of the elements. What follows the last of them is not looked at.
-
-    Returns
-    -------
-    dict of str to dict
-        By element and column: arrays, float64 in text; or `Lists`.
-
-    Raises
-    ------
-    ValueError
-        It is no PLY file, or damaged, or it ends before an element does.
+    What follows the last of them is not looked at. ValueError where the file is damaged or ends before an element does.
     """
     order, elements = read_header(stream)
     last = max((i for i, element in enumerate(elements) if element.name in set(wanted)), default=-1)
@@ -120,27 +107,10 @@ def read_tables(stream: BinaryIO, wanted: Iterable[str]) -> dict[str, Table]:
 
 
 def find_rows(stream: BinaryIO, name: str, without: Iterable[str] = ()) -> tuple[np.dtype, int] | None:
-    """Find an element whose rows can be read a few at a time.
+    """What a row of an element is, and how many there are, where these can be read a few at a time: the stream is left
+    at the first. None for text, lists in it or before it, rows of an element in `without`, or where there is none.
 
-    Parameters
-    ----------
-    stream : binary stream
-        At its beginning; it can be sought, and is left at the first row.
-    name : str
-        Of the element.
-    without : iterable of str
-        Elements that the file must not have a row of.
-
-    Returns
-    -------
-    dtype and int, or None
-        What a row is, and how many there are. None if the data are text, or there are lists in it or before it, or
-        there is none.
-
-    Raises
-    ------
-    ValueError
-        It is no PLY file, or damaged, or it ends before the element does.
+    ValueError where the file is damaged, or ends before the element does.
     """
     order, elements = read_header(stream)
     at = next((i for i, element in enumerate(elements) if element.name == name), None)
@@ -164,48 +134,23 @@ def _check_names(elements: Iterable[Element]) -> None:
 
 
 def _broken_off(element: Element, found: int) -> ValueError:
-    what = "points" if element.name == "vertex" else f"rows of {element.name!r}"
-    return ValueError(f"it promises {element.rows} {what} and holds {found}: it breaks off")
+    return breaks_off(element.rows, found, "points" if element.name == "vertex" else f"rows of {element.name!r}")
 
 
 def _text(stream: BinaryIO, element: Element) -> Table:
-    lines = [line.decode("ascii", "replace") for line in islice(_not_blank(stream), element.rows)]
+    not_blank = (line.decode("ascii", "replace") for line in stream if line.strip())
+    lines = list(islice(not_blank, element.rows))
     if len(lines) < element.rows:
         raise _broken_off(element, len(lines))
-    if not lines or not element.columns:
-        return {column.name: _joined([], column.counts) for column in element.columns}
-    first = _row(lines[0], element)
-    counts = [len(values) for values, column in zip(first, element.columns, strict=True) if column.counts]
-    rows = _even_rows(lines, len(counts) + sum(map(len, first)), bool(counts))
-    start, table = 0, dict[str, "np.ndarray | Lists"]()
-    for values, column in zip(first, element.columns, strict=True):
-        head = start
-        start += bool(column.counts)
-        if rows is None or (column.counts and (rows[:, head] != len(values)).any()):
-            return _walked_text(lines, element)  # lists differ in length
-        part = rows[:, start : start + len(values)]
-        table[column.name] = Lists(rows[:, head].astype(np.int64), part.ravel()) if column.counts else part[:, 0]
-        start += len(values)
-    return table
-
-
-def _even_rows(lines: list[str], width: int, may_differ: bool) -> np.ndarray | None:
-    """All lines at once, (n, width) float array; None where some are shorter, if they may be."""
-    try:
-        return np.loadtxt(lines, ndmin=2, comments=None, usecols=range(width))
-    except ValueError:
-        if not may_differ:
-            raise
-        return None
-
-
-def _walked_text(lines: list[str], element: Element) -> Table:
-    rows = [_row(line, element) for line in lines]
-    return {column.name: _joined([row[i] for row in rows], column.counts) for i, column in enumerate(element.columns)}
+    if any(column.counts for column in element.columns):
+        return _joined(element, [_row(line, element) for line in lines], float)
+    shape = len(lines), len(element.columns)
+    rows = np.loadtxt(lines, ndmin=2, comments=None, usecols=range(shape[1])) if all(shape) else np.empty(shape)
+    return dict(zip(element.names, rows.T, strict=True))
 
 
 def _row(line: str, element: Element) -> list[list[float]]:
-    """The values of a line, by column."""
+    """The values of a line of text, by column."""
     words, found = iter(map(float, line.split())), list[list[float]]()
     for column in element.columns:
         n = int(next(words, -1)) if column.counts else 1
@@ -216,67 +161,58 @@ def _row(line: str, element: Element) -> list[list[float]]:
     return found
 
 
-def _joined(rows: list[list[float]], counts: str | None) -> np.ndarray | Lists:
-    values = np.array([value for row in rows for value in row], float)
-    return values if counts is None else Lists(np.array([len(row) for row in rows], np.int64), values)
-
-
-def _not_blank(stream: BinaryIO) -> Iterator[bytes]:
-    return (line for line in stream if line.strip())
-
-
 def _binary(stream: BinaryIO, element: Element, order: str) -> Table:
-    left = _bytes_left(stream)
+    """Rows at once where all lists of a column are as long as that of the first row, or else one after the other."""
+    start, left = stream.tell(), _bytes_left(stream)
     lists = [i for i, column in enumerate(element.columns) if column.counts]
-    counts = _first_counts(stream, element, order) if lists and element.rows else [0] * len(lists)
-    dtype = element.dtype(order, counts)
-    if not element.rows:
-        none = Lists(np.empty(0, np.int64), np.empty(0))
-        return {name: np.empty(0, kind) if count is None else none for name, kind, count in element.columns}
-    if left >= element.rows * dtype.itemsize:
-        start = stream.tell()
-        rows = np.frombuffer(stream.read(element.rows * dtype.itemsize), dtype)
-        if all((rows[f"{i} counts"] == n).all() for i, n in zip(lists, counts, strict=True)):
+    if lists and element.rows:
+        first = _walked(stream, element._replace(rows=1), order)
+        stream.seek(start)
+        lengths = [int(column.counts[0]) for column in first.values() if isinstance(column, Lists)]
+    else:
+        lengths = [0] * len(lists)
+    row = element.dtype(order, lengths)
+    if left >= element.rows * row.itemsize > 0:
+        rows = np.frombuffer(stream.read(element.rows * row.itemsize), row)
+        if all((rows[f"{i} counts"] == n).all() for i, n in zip(lists, lengths, strict=True)):
             return {
                 name: rows[name] if count is None else Lists(rows[f"{i} counts"].astype(np.int64), rows[name].ravel())
                 for i, (name, _, count) in enumerate(element.columns)
             }
         stream.seek(start)
-    if not lists:
-        raise _broken_off(element, left // max(dtype.itemsize, 1))
+    if element.rows and not lists:
+        raise _broken_off(element, left // max(row.itemsize, 1))
     return _walked(stream, element, order)
 
 
-def _first_counts(stream: BinaryIO, element: Element, order: str) -> list[int]:
-    """How long the lists of the first row are."""
-    start = stream.tell()
-    table = _walked(stream, element._replace(rows=1), order)
-    stream.seek(start)
-    return [int(column.counts[0]) for column in table.values() if isinstance(column, Lists)]
-
-
 def _walked(stream: BinaryIO, element: Element, order: str) -> Table:
-    """Rows whose lists differ in length, one after the other."""
+    """Rows of binary data one after the other."""
+    left, rows = _bytes_left(stream), list[list[np.ndarray]]()
     kinds = [np.dtype(f"{order}{kind}") for _, kind, _ in element.columns]
     heads = [np.dtype(f"{order}{counts}") if counts else None for _, _, counts in element.columns]
-    found: dict[str, list[np.ndarray]] = {name: [] for name in element.names}
-    left = _bytes_left(stream)
-    for row in range(element.rows):
-        for name, kind, head in zip(element.names, kinds, heads, strict=True):
+    for _ in range(element.rows):
+        row = []
+        for value, head in zip(kinds, heads, strict=True):
             n = 1
             if head is not None:
                 data, left = stream.read(head.itemsize), left - head.itemsize
                 n = int(np.frombuffer(data, head)[0]) if left >= 0 else -1
-            left -= n * kind.itemsize
+            left -= n * value.itemsize
             if n < 0 or left < 0:
-                raise _broken_off(element, row)
-            found[name].append(np.frombuffer(stream.read(n * kind.itemsize), kind))
-    empty = [np.empty(0, kind) for kind in kinds]
-    flat = {name: np.concatenate([none, *rows]) for none, (name, rows) in zip(empty, found.items(), strict=True)}
-    return {
-        name: flat[name] if counts is None else Lists(np.array([len(row) for row in found[name]], np.int64), flat[name])
-        for name, _, counts in element.columns
-    }
+                raise _broken_off(element, len(rows))
+            row.append(np.frombuffer(stream.read(n * value.itemsize), value))
+        rows.append(row)
+    return _joined(element, rows, None)
+
+
+def _joined(element: Element, rows: Sequence[Sequence[Any]], dtype: type | None) -> Table:
+    """The columns of rows, each a list of values per column; of the element's own types by default."""
+    table: Table = {}
+    for i, (name, kind, counts) in enumerate(element.columns):
+        values = np.concatenate([np.empty(0, dtype or kind), *(row[i] for row in rows)])
+        lengths = np.array([len(row[i]) for row in rows], np.int64)
+        table[name] = values if counts is None else Lists(lengths, values)
+    return table
 
 
 def _bytes_left(stream: BinaryIO) -> int:

@@ -13,9 +13,7 @@ import numpy as np
 
 from ...judgements import coordinates
 from ...skeleton import Skeleton
-from .forests import global_shift, parents
-from .graphs import graph_skeleton
-from .text import line, text, words_by_line
+from .graphs import global_shift, graph_skeleton, line, parents, text, words_by_line
 
 _log = logging.getLogger(__name__)
 

@@ -13,14 +13,13 @@ import numpy as np
 from ...errors import FileFormatError
 from ...numerics.vectors import norm
 from ...skeleton import Skeleton
-from .forests import is_outward, parents
-from .text import line
+from .graphs import line, parents
 
 URDF_DENSITY = 1000.0  # published: of water, in kg/m³; fresh wood and most plants are near it
 
 
 def write(skeleton: Skeleton) -> bytes:
-    """The content of a URDF file.
+    """The content of a URDF file of a forest that is numbered outwards; FileFormatError where it has no radii.
 
     Vertex i has ``link_i``, on the fixed joint ``joint_i``; the links of roots stand on the link ``base``, at the
     origin of the cloud. A link's frame is where it can bend: at the vertex that it comes from, of a root at the vertex
@@ -28,28 +27,6 @@ def write(skeleton: Skeleton) -> bytes:
     cloud is in the joints of the roots alone. Both visual and collision are the ball of the vertex and the cylinder
     that leads to it, as thick as its ends on average; what has no size is left out. Masses are those of solid cylinders
     of `URDF_DENSITY`, of a root that of its ball.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        A forest whose edges lead away from its roots, from the smaller to the larger vertex, as of
-        `glsk_o3d.editing.reroot`; with radii.
-
-    Returns
-    -------
-    bytes
-
-    Raises
-    ------
-    FileFormatError
-        A vertex has two smaller neighbours, as in loops; or coordinates or radii are not known.
-
-    Examples
-    --------
-    >>> from glsk_o3d import Skeleton
-    >>> stick = Skeleton([[0, 0, 0], [0, 0, 1]], [[0, 1]], [0.1, 0.1], (), (), ())
-    >>> [row.strip() for row in write(stick).decode().splitlines() if "<link" in row]
-    ['<link name="base" />', '<link name="link_0">', '<link name="link_1">']
     """
     _check(skeleton)
     vertices, radii = skeleton.vertices, skeleton.radii
@@ -90,11 +67,6 @@ def write(skeleton: Skeleton) -> bytes:
 
 
 def _check(skeleton: Skeleton) -> None:
-    if skeleton.n_loops or not is_outward(skeleton):
-        what = (
-            f"the skeleton has {skeleton.n_loops} loop(s)" if skeleton.n_loops else "the edges do not lead from a root"
-        )
-        raise FileFormatError(f"URDF holds trees only and {what}: see glsk_o3d.editing.cut_loops and reroot")
     if not np.isfinite(skeleton.vertices).all():
         raise FileFormatError("URDF needs finite coordinates, and some vertices have none")
     unknown = np.count_nonzero(~np.isfinite(skeleton.radii))

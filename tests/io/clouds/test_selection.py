@@ -32,9 +32,9 @@ def test_it_means_what_python_means(where):
     ("where", "why"),
     [
         ("lable == 1", "did you mean 'label'"),
-        ("class == 1", "write class_ for class"),
-        ("label = 1", "write == for equal"),
-        ("label == 1 && x > 2", "write 'and' and 'or'"),
+        ("class == 1", "class_ for class"),
+        ("label = 1", "write such as"),
+        ("label == 1 && x > 2", "write such as"),
         ("label in 1, 2", r"write such as 'label in \(1, 2\)'"),
         ("label", "is no condition"),
         ("1 == 1", "is no condition"),

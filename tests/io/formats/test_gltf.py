@@ -8,8 +8,8 @@ import pytest
 from glsk_o3d import Skeleton
 from glsk_o3d.analysis.skinning import skin_weights
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
-from glsk_o3d.io.formats.forests import as_forest
 from glsk_o3d.io.formats.gltf import save_rig
+from glsk_o3d.io.formats.graphs import as_forest
 
 KINDS = {5121: "u1", 5123: "u2", 5125: "u4", 5126: "f4"}
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -132,15 +132,26 @@ def test_without_radii_the_points_are_the_surface(rig):
 
 
 def test_what_cannot_be_rigged(tree, make, tmp_path):
-    path = tmp_path / "r.glb"
-    with pytest.raises(FileFormatError, match="no edges"):
-        save_rig(make([[0, 0, 0]], []), path)
+    path, n = tmp_path / "r.glb", 65538
+    chain = np.column_stack([np.arange(n), np.zeros((n, 2))]), np.column_stack([np.arange(n - 1), np.arange(1, n)])
+    bare = Skeleton([[0, 0, 0], [1, 0, 0]], [[0, 1]], [np.nan] * 2, (), (), ())
+    for wrong, says in (
+        ((make([[0, 0, 0]], []), path), "no edges"),
+        ((Skeleton(*chain, np.ones(n), (), (), ()), path, [[0, 0, 0]]), "at most 65535 bones, not 65537: simplify"),
+        ((bare, path), "a rig needs radii or points"),
+        ((tree, tmp_path / "r.fbx"), r"\.glb"),
+    ):
+        with pytest.raises(FileFormatError, match=says):
+            save_rig(*wrong)
+    for surface, says in (
+        ([[np.nan, 0, 0]], "not finite"),
+        (tree.vertices + 100, "not where the skeleton is"),
+        (tree.vertices * 1000 + 5000, "not where the skeleton is"),
+    ):
+        with pytest.raises(InvalidCloudError, match=says):
+            save_rig(tree, path, surface)
     with pytest.raises(InvalidParameterError, match="up = 'x'"):
         save_rig(tree, path, up="x")
-    with pytest.raises(InvalidCloudError, match="not finite"):
-        save_rig(tree, path, [[np.nan, 0, 0]])
-    with pytest.raises(FileFormatError, match=r"\.glb"):
-        save_rig(tree, tmp_path / "r.fbx")
     assert not list(tmp_path.iterdir())
 
 
@@ -154,25 +165,6 @@ def test_the_file_is_binary_gltf(tree, tmp_path):
     assert len(set(names)) == len(names) == len(tree.edges) + 2
 
 
-def test_more_bones_than_gltf_can_count_are_refused(tmp_path):
-    n = 65538
-    line = Skeleton(np.column_stack([np.arange(n), 0 * np.arange(n), 0 * np.arange(n)]),
-                    np.column_stack([np.arange(n - 1), np.arange(1, n)]), np.ones(n), (), (), ())  # fmt: skip
-    with pytest.raises(FileFormatError, match="at most 65535 bones, not 65537: simplify"):
-        save_rig(line, tmp_path / "r.glb", [[0, 0, 0]])
-
-
-def test_without_radii_and_points_there_is_nothing_to_skin(tmp_path):
-    with pytest.raises(FileFormatError, match="a rig needs radii or points"):
-        save_rig(Skeleton([[0, 0, 0], [1, 0, 0]], [[0, 1]], [np.nan] * 2, (), (), ()), tmp_path / "r.glb")
-
-
-def test_a_surface_elsewhere_or_in_another_unit_is_refused(tree, tmp_path):
-    for far in (tree.vertices + 100, tree.vertices * 1000 + 5000):
-        with pytest.raises(InvalidCloudError, match="not where the skeleton is"):
-            save_rig(tree, tmp_path / "r.glb", far)
-
-
 def test_normals_and_colours_go_along(tree, rig):
     import open3d as o3d
 
@@ -180,6 +172,7 @@ def test_normals_and_colours_go_along(tree, rig):
     for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
         file = rig(tree, given)
         part = file.meshes[0].primitives[0].attributes
+        assert file.meshes[0].primitives[0].mode == 4
         np.testing.assert_allclose(accessor(file, part.NORMAL), np.asarray(mesh.vertex_normals), atol=1e-6)
         # sRGB's half is 0.214 in linear light
         np.testing.assert_allclose(accessor(file, part.COLOR_0)[0], [1, 0.2140, 0], atol=1e-3)

@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 
 from glsk_o3d.io.formats.graphs import graph_skeleton
 
@@ -12,9 +11,3 @@ def test_edges_are_sorted_and_each_is_there_once():
     assert np.isnan(skeleton.radii).all()
     assert len(skeleton.points) == len(skeleton.normals) == len(skeleton.vertex_of_point) == 0
     assert graph_skeleton([], []).vertices.shape == (0, 3)
-
-
-@pytest.mark.parametrize(("edges", "radii"), [([[0, 4]], None), ([[-1, 0]], None), ([[0, 1]], [1.0])])
-def test_what_does_not_fit_together(edges, radii):
-    with pytest.raises(ValueError, match="4"):
-        graph_skeleton(SQUARE, edges, radii)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from glsk_o3d import FileFormatError, Skeleton, editing, pipelines, samples
-from glsk_o3d.io.formats import mtg, plant_csv
-from glsk_o3d.io.formats.plant_axes import plant_axes
+from glsk_o3d.io.formats import plants
+from glsk_o3d.io.formats.plants import plant_axes
 
 HEAD = """\
 CODE:\tFORM-A
@@ -127,7 +127,7 @@ def test_mtg_by_hand():
         "\t+N3\t1.0\t0.0\t1.0\t0.000000001",
         "^<N2\t\t0.0\t0.0\t2.0\t0.2",
     ]
-    assert mtg.write(two_branches()).decode() == HEAD + "\n".join(rows) + "\n"
+    assert plants.write_mtg(two_branches()).decode() == HEAD + "\n".join(rows) + "\n"
 
 
 def test_mtg_in_the_reader_of_openalea(tree, read_mtg_file, tmp_path):
@@ -140,7 +140,7 @@ def test_mtg_in_the_reader_of_openalea(tree, read_mtg_file, tmp_path):
         ),
         "z",
     )
-    (tmp_path / "t.mtg").write_bytes(mtg.write(two))
+    (tmp_path / "t.mtg").write_bytes(plants.write_mtg(two))
     g = read_mtg_file(str(tmp_path / "t.mtg"))
     assert (g.max_scale(), g.nb_vertices(scale=1), g.nb_vertices(scale=2)) == (2, 2, len(two.vertices))
     number = {vertex: int(g.property("index")[vertex]) for vertex in g.vertices(scale=2)}
@@ -155,14 +155,14 @@ def test_mtg_in_the_reader_of_openalea(tree, read_mtg_file, tmp_path):
 
 
 def test_mtg_of_nothing_has_a_header():
-    assert mtg.write(Skeleton((), (), (), (), (), ())).decode() == HEAD + "ENTITY-CODE\tXX\tYY\tZZ\tradius\n"
+    assert plants.write_mtg(Skeleton((), (), (), (), (), ())).decode() == HEAD + "ENTITY-CODE\tXX\tYY\tZZ\tradius\n"
 
 
 # ------------------------------------------------------------------------------------------------------------ TomatoWUR
 
 
 def test_node_list_by_hand():
-    assert plant_csv.write(two_branches()).decode() == (
+    assert plants.write_csv(two_branches()).decode() == (
         "x,y,z,x_skeleton,y_skeleton,z_skeleton,vid,parentid,edgetype,radius\n"
         "0.0,0.0,0.0,0.0,0.0,0.0,0,,,0.2\n"
         "0.0,0.0,1.0,0.0,0.0,1.0,1,0,<,0.2\n"
@@ -174,7 +174,7 @@ def test_node_list_by_hand():
 @pytest.mark.parametrize("load", ["load_csv", "from_nodelist", "from_skeleton_gt_data"])
 def test_node_list_in_tomatowur(tree, skeleton_graph, load, tmp_path):
     path = tmp_path / "t.plant.csv"
-    path.write_bytes(plant_csv.write(tree))
+    path.write_bytes(plants.write_csv(tree))
     found = skeleton_graph(path) if load == "load_csv" else getattr(skeleton_graph, load)(path)
     found.get_node_order()  # fails on what is not a tree from node 0
     places = found.get_node_attribute("pos")
@@ -187,7 +187,7 @@ def test_node_list_in_tomatowur(tree, skeleton_graph, load, tmp_path):
 
 
 def test_mtg_in_tomatowur(tree, skeleton_graph, tmp_path):
-    (tmp_path / "t.mtg").write_bytes(mtg.write(tree))
+    (tmp_path / "t.mtg").write_bytes(plants.write_mtg(tree))
     found = skeleton_graph.from_mtg(str(tmp_path / "t.mtg"))
     ends = found.get_node_attribute("pos")[found.get_edges()]
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(tree.length, rel=1e-12)
@@ -196,7 +196,7 @@ def test_mtg_in_tomatowur(tree, skeleton_graph, tmp_path):
 def test_node_list_holds_one_plant_and_leaves_out_what_is_not_known():
     two = graph([[0, 0, 0], [0, 0, 1]], np.empty((0, 2), int))
     with pytest.raises(FileFormatError, match="one plant and the skeleton has 2 components"):
-        plant_csv.write(two)
+        plants.write_csv(two)
     bare = graph([[0, 0, 0], [0, 0, 1]], [[0, 1]], np.nan)
-    rows = list(csv.DictReader(io.StringIO(plant_csv.write(bare).decode())))
+    rows = list(csv.DictReader(io.StringIO(plants.write_csv(bare).decode())))
     assert [row["radius"] for row in rows] == ["", ""]
