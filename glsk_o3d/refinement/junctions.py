@@ -93,7 +93,8 @@ class Limbs:
         start = 0.0
         if others:
             near = places[: max(np.searchsorted(along, half), 1)]
-            inside = np.flatnonzero(relative_distance(near, self.vertices, self.surface, others) <= AXIS_LEAVES)
+            ratio, _ = relative_distance(near, self.vertices, self.surface, others)
+            inside = np.flatnonzero(ratio <= AXIS_LEAVES)
             start = min(along[inside[-1] + 1], half) if len(inside) else start
         stop = min(start + AXIS_LENGTH * radius, along[-1])
         anchor, back = place_at(places, along, start), place_at(places, along, stop)

@@ -62,7 +62,7 @@ def limb_line(
     curve = place_at(places, along, at)
     clear = np.ones(n)
     if others:
-        left = relative_distance(curve, vertices, surface, others)
+        left, _ = relative_distance(curve, vertices, surface, others)
         clear = np.clip((left - 1) / (2 * (AXIS_LEAVES - 1)), 0, 1)
         clear[:half] = np.minimum.accumulate(clear[:half][::-1])[::-1]  # what left and came back had not left
     start = float((1 - clear[:half]).sum() * step)

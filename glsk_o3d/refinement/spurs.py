@@ -11,7 +11,7 @@ import numpy as np
 
 from ..judgements import Judgement
 from ..numerics.groups import Members
-from ..numerics.polylines import arc_lengths, beyond_surface
+from ..numerics.polylines import arc_lengths, relative_distance
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
 from .evidence import Evidence
@@ -186,4 +186,5 @@ def _standing_out(limbs: Limbs, k: int, junction: int, points: np.ndarray, endin
     vertices = np.concatenate([limbs.vertices, meeting.anchor[longer], meeting.foot[longer]])
     more = len(limbs.vertices) + np.arange(2 * len(longer)).reshape(2, -1).T
     paths = [*(limbs.paths[i] for i in beside), *more]
-    return float(np.quantile(beyond_surface(points, vertices, np.r_[surface, radius, radius], paths), SPUR_QUANTILE))
+    ratio, there = relative_distance(points, vertices, np.r_[surface, radius, radius], paths)
+    return float(np.quantile((ratio - 1) * there, SPUR_QUANTILE))
