@@ -13,19 +13,17 @@ from .numerics.vectors import AXES
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .refinement.air import cut_air
-from .refinement.axis_fit import fit_axis
+from .refinement.axis_fit import fit_axis, pull_back_detached
 from .refinement.bridging import bridge_gaps
 from .refinement.diagnostics import diagnose
 from .refinement.ends import regrow_ends
-from .refinement.evidence import Evidence, in_order
+from .refinement.evidence import Evidence, SurfaceGraph, in_order
 from .refinement.junctions import move_junctions
-from .refinement.loops import close_loops, zip_narrow_loops
+from .refinement.loops import close_loops, collapse_narrow_loops
 from .refinement.merging import binary_size, scaled
-from .refinement.runaways import recall_runaways
 from .refinement.sections import measure_sections
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
-from .refinement.surface_graph import SurfaceGraph
 from .refinement.tracing import trace
 from .refinement.triangles import collapse_triangles
 from .skeleton import Skeleton
@@ -37,8 +35,8 @@ class Refiner(Filter[Skeleton]):
     """Make the graph one-dimensional, close false loops, prune spurs, and centre it in the surface around it.
 
     1. Edges that lie on a triangle are collapsed, the shortest first, until there is no triangle.
-    2. Loops that open less than their tube is thick, two strands in one part, are zipped up.
-    3. Vertices that ran away from their points are brought back, and edges are subdivided, so that chords do not cut
+    2. Loops that open less than their tube is thick, two strands in one part, are collapsed.
+    3. Vertices that left their points are brought back, and edges are subdivided, so that chords do not cut
        corners.
     4. The curve is fitted to the axis of the surface: to the normals of the input points around it, even if only one
        side was scanned, and to the points themselves where noise has spoilt the normals. So are the radii.
@@ -179,9 +177,9 @@ class Refiner(Filter[Skeleton]):
         skeleton = collapse_triangles(skeleton, by_degree=self.collapse == "degree")
         surface = SurfaceGraph.of(skeleton)
         if self.handle:
-            skeleton = zip_narrow_loops(skeleton, surface)
+            skeleton = collapse_narrow_loops(skeleton, surface)
         if self.recentre:
-            skeleton = recall_runaways(skeleton)
+            skeleton = pull_back_detached(skeleton)
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
         return fit_axis(skeleton, self.recentre, surface), surface

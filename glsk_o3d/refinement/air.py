@@ -23,23 +23,9 @@ LEAST_SCATTER = 0.05  # fitted: of winding numbers along a skeleton
 
 
 def cut_air(skeleton: Skeleton, evidence: Evidence, noise: float, least: float) -> tuple[Skeleton, list[Judgement]]:
-    """Cut every branch where it probably crosses air.
+    """Cut every branch where it crosses air with a probability of `least` or more; one judgement for each branch.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Fitted to its axis.
-    evidence : Evidence
-    noise : float
-        Mean share of noise of the cloud, from 0 to 1.
-    least : float
-        Probability from which on a branch is cut.
-
-    Returns
-    -------
-    Skeleton
-    judgements : list of Judgement
-        One for each branch.
+    The skeleton was fitted to its axis; `noise` is the mean share of noise of the cloud, from 0 to 1.
     """
     judgements, gone = [], []
     for branch, place, facts in branch_facts(skeleton, evidence, noise):
@@ -69,13 +55,8 @@ def branch_facts(
     - inner: whether both ends have other branches;
     - length: in radii.
 
-    Yields
-    ------
-    branch : (p,) int array
-        A ring begins where its winding number is greatest.
-    place : int
-        Position in the branch of the first end of the weakest edge.
-    facts : dict of str to float
+    With them comes the branch, (p,) int array, of which a ring begins where its winding number is greatest, and the
+    position in it of the first end of the weakest edge.
     """
     vertices, edges, m = skeleton.vertices, skeleton.edges, len(skeleton.vertices)
     length = np.maximum(skeleton.edge_lengths, TINY)

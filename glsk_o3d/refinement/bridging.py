@@ -37,19 +37,8 @@ class _End(NamedTuple):
 def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
     """Join ends with other ends, or with the side of something, where the object probably goes on; the surest first.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    evidence : Evidence
-    least : float
-        Probability from which on a gap is bridged.
-
-    Returns
-    -------
-    Skeleton
-        With an edge for each bridge.
-    judgements : list of Judgement
-        One for each end that points at something, of its likeliest bridge.
+    A gap is bridged by an edge from a probability of `least` on. There is one judgement for each end that points at
+    something, of its likeliest bridge.
     """
     found = [(probability(BRIDGE_WEIGHTS, facts), pair) for pair, facts in gap_facts(skeleton, evidence)]
     used: set[int] = set()
@@ -67,16 +56,11 @@ def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
 
 
 def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:
-    """What speaks for and against a bridge, for every end and the places that it points at.
+    """What speaks for and against a bridge, for every end and the places that it points at: (leaf, vertex), and facts.
 
-    The facts are: the least winding number along the bridge, over the median on the skeleton; the cosine between
-    bridge and end; and how far the end is closed: the flux of its outward normals through its cross-section, 1 for a
-    cap and 0 for a tube cut open, as a logarithm.
-
-    Yields
-    ------
-    (leaf, vertex) : two int
-    facts : dict of str to float
+    The facts are: the least winding number along the bridge, over the median on the skeleton; the cosine between bridge
+    and end; and how far the end is closed: the flux of its outward normals through its cross-section, 1 for a cap and 0
+    for a tube cut open, as a logarithm.
     """
     ends = list(_ends(skeleton))
     if not ends or not len(evidence.points):

@@ -59,16 +59,9 @@ def regrow_ends(skeleton: Skeleton) -> Skeleton:
     as if it were where the sides stop: twice as far as their mean. The radius r is the sections', of a circle of their
     area, and goes on getting smaller if it does behind: a cone ends in its point. No end leaves its points.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-
-    Returns
-    -------
-    Skeleton
-        With new vertices at the ends, behind all others and as far apart as those that they follow, with the radius and
-        the confidence of the run behind. Points of a vertex that was cut belong to the nearest one of the same end.
-        Loops and vertices without edges stay.
+    New vertices come behind all others, as far apart as those that they follow, with the radius and the confidence of
+    the run behind. Points of a vertex that was cut belong to the nearest one of the same end. Loops and vertices
+    without edges stay.
     """
     if not len(skeleton.leaves):
         return skeleton

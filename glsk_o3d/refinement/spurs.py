@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..judgements import Judgement
-from ..numerics.groups import Members
 from ..numerics.polylines import arc_lengths, relative_distance
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
 from .evidence import Evidence
-from .junctions import Limbs
-from .merging import merge_into, support
+from .limbs import Limbs
+from .merging import merge_into
 from .scores import LIMB_WEIGHTS, probability
 from .sections import measure_sections
+from .vertex_points import VertexPoints
 
 SPUR_POINTS = 128  # measured: of a branch that are enough to say how far it reaches
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
@@ -29,28 +29,16 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     """Cut branches whose points hardly stand out of the surface around the limbs that meet there.
 
     What counts is the points, not the curve: the contraction shortens stubs as thick as they are long, and lets thin
-    ones grow. And it is how far they leave the limbs that meet them, not how far they are from the junction: along
-    a part they may be anywhere. The limbs go on, straight, to where they meet, see `Limbs.meeting`: the contraction
-    draws them together in a sharp corner, and a spur into its tip is left. Another branch with an end may be a spur,
-    too, far from its points: it counts as no thicker than the junction. A branch whose points have no say goes.
+    ones grow. And it is how far they leave the limbs that meet them, not how far they are from the junction: along a
+    part they may be anywhere. The limbs go on, straight, to where they meet, see `Limbs.meeting`: the contraction draws
+    them together in a sharp corner, and a spur into its tip is left. Another branch with an end may be a spur, too, far
+    from its points: it counts as no thicker than the junction. A branch whose points have no say goes.
 
     A flat end draws two prongs of the curve into its corners, and each stands out of the other. So where three branches
     meet, the less probable one of two with ends is a limb only if the other is one, too: without it there is no fork.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    evidence : Evidence
-    least : float
-        Probability of a limb below which a branch is cut. Of every junction the least probable first, until there is
-        none.
-
-    Returns
-    -------
-    Skeleton
-        Points of a cut branch belong to its junction.
-    judgements : list of Judgement
-        One for each branch that leaves a junction and has an end, cut or left; at its end.
+    Of every junction the least probable limb goes first, until none is less probable than `least`; its points belong to
+    the junction. There is one judgement for each branch that leaves a junction and has an end, cut or left; at its end.
     """
     judgements: list[Judgement] = []
     given = skeleton
@@ -77,15 +65,11 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
 
 
 def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, dict[str, float]]]:
-    """What speaks for every branch that leaves a junction and has an end.
+    """What speaks for every branch that leaves a junction and has an end: its leaf, and facts.
 
     The facts are: how far its points (all but a tenth) stand out of the surface around the other limbs, over its own
-    half width, as a logarithm; how far along it the surface goes over to others; and its mean confidence.
-
-    Yields
-    ------
-    leaf : int
-    facts : dict of str to float
+    half width, as a logarithm; how far along it the surface goes over to others; its mean confidence; and how round the
+    part is at the junction.
     """
     return ((twig.tip, twig.facts) for twig in _twigs(skeleton, evidence))
 
@@ -106,9 +90,8 @@ class _Twig(NamedTuple):
 
 def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
     limbs, web = Limbs(skeleton, joined=True), _Web(skeleton, evidence)
-    supporting = skeleton.supporting_points
-    members = Members(skeleton.vertex_of_point[supporting], len(skeleton.vertices))
-    sections, count = measure_sections(skeleton), support(skeleton)
+    cloud, sections = VertexPoints(skeleton), measure_sections(skeleton)
+    count = cloud.mass
     wide = sections.half_width
     roundness = np.nan_to_num(sections.half_thickness / np.maximum(wide, TINY))
     confidence, degree = np.nan_to_num(skeleton.confidence), skeleton.degree
@@ -123,8 +106,8 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
         body = branch[branch != junction]
         share = count[body] / count[body].sum()
         half = float(share @ wide[body])
-        own = supporting[members.of(body)]
-        points = skeleton.points[own[:: len(own) // SPUR_POINTS + 1]]
+        own = cloud.members.of(body)
+        points = cloud.points[own[:: len(own) // SPUR_POINTS + 1]]
         out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * half)
         facts = dict(
             protrusion=float(np.log(out / max(half, TINY) + 0.3)),

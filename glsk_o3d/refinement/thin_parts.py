@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +16,7 @@ from ..numerics.vectors import COLUMNS, ROWS, TINY
 from ..preparation.sampling import sample_cloud
 from ..skeleton import Skeleton
 from .diagnostics import SHEET_SHARE
+from .vertex_points import VertexPoints
 
 SCALE_NEIGHBOUR = 8  # fitted: the nearest point whose distance is the scale of a point
 TRACED_POINTS = 100_000  # measured: points that larger clouds are traced by, about; with fewer, thick parts look thin
@@ -30,11 +30,11 @@ REGION_VERTICES = 400  # measured: vertices in which these are looked for
 FIRM, FIRM_LENGTH = 0.6, 4.0  # fitted: confidence, and length over radius, of a stretch that surely has a surface
 
 
-@dataclass(frozen=True, eq=False)
-class SpacedPoints:
-    """The distinct points that belong to a skeleton, or a sample of very many, and how far they are apart."""
+class SpacedPoints(VertexPoints):
+    """The distinct points that have a vertex, or a sample of very many, and how far they are apart.
 
-    skeleton: Skeleton
+    Those without a normal are among them.
+    """
 
     @cached_property
     def rows(self) -> np.ndarray:
@@ -45,21 +45,6 @@ class SpacedPoints:
         wide = np.ptp(points[some], axis=0).max() if len(some) else 0.0
         cells = np.rint(points[some] / max(SAME_PLACE * wide, TINY))
         return some[np.sort(np.unique(cells, axis=0, return_index=True)[1])]
-
-    @cached_property
-    def points(self) -> np.ndarray:
-        """Where they are."""
-        return self.skeleton.points[self.rows]
-
-    @property
-    def vertex(self) -> np.ndarray:
-        """The vertex of each."""
-        return self.skeleton.vertex_of_point[self.rows]
-
-    @property
-    def normals(self) -> np.ndarray:
-        """The normal of each, NaN where there is none."""
-        return self.skeleton.normals[self.rows]
 
     @cached_property
     def links(self) -> csr_matrix:
@@ -83,14 +68,8 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     There the normals do not agree on an axis. Nor do they where noise has tilted them; but it fills space, and from
     link to link there are more points than on a surface. Nor do they on a sheet; but there they agree with each other,
     and there are more points than along a curve. That is not sure of one vertex alone, and holds at many a junction;
-    but where it holds for a share of the points of a region, it is so.
-
-    Parameters
-    ----------
-    cloud : SpacedPoints
-        Of a skeleton with the confidence of `fit_axis`; where it is unknown there is a surface.
-    least : float
-        Share of the points in the region around a vertex that must show a surface.
+    but where it holds for all but a share of `least` of the points of a region, it is so. Where the confidence is
+    unknown there is a surface.
     """
     skeleton, m = cloud.skeleton, len(cloud.skeleton.vertices)
     owner = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0]
@@ -98,8 +77,7 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     enough = (1 - least) * min(REGION_POINTS, count.sum())  # for one region
     if count[thin].sum() <= enough or len(cloud.rows) < LEAST_POINTS:
         return np.zeros(m, bool)
-    vertex = cloud.vertex
-    count = np.bincount(vertex, minlength=m)
+    vertex, count = cloud.vertex, cloud.count
     _, near = nearest_neighbours(skeleton.vertices, min(REGION_VERTICES, m))
     if (_share_around(near, count, thin) <= 1 - least).all():
         return np.zeros(m, bool)

@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 from glsk_o3d import Refiner, Skeleton
 from glsk_o3d.numerics.polylines import arc_lengths
 from glsk_o3d.refinement.evidence import Evidence
-from glsk_o3d.refinement.junctions import Limbs, _Place, _straightened, move_junctions
-from glsk_o3d.refinement.meeting import Line, limb_line, meet
+from glsk_o3d.refinement.junctions import Line, _Place, _straightened, limb_line, meet, move_junctions
+from glsk_o3d.refinement.limbs import Limbs
 from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from glsk_o3d.refinement.spurs import prune_spurs
 

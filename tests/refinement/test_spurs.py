@@ -125,7 +125,7 @@ def test_distance_from_paths_over_their_thickness(far):
             expected = np.minimum(expected, distance / thick[nearest, 0])
     found, there = relative_distance(points + far, vertices + far, thickness, paths)
     np.testing.assert_allclose(found, expected, rtol=1e-3)
-    assert (thickness.min() <= there).all() and (there <= thickness.max()).all()
+    assert (np.clip(there, thickness.min(), thickness.max()) == there).all()
     ratio, there = relative_distance(points + far, vertices + far, np.full(12, 0.5), paths)
     np.testing.assert_allclose(ratio, relative_distance(points, vertices, np.full(12, 0.5), paths)[0], atol=2e-8)
     np.testing.assert_allclose(there, 0.5)
