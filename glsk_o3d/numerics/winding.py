@@ -12,30 +12,23 @@ LEAST_BALL = 1e-6  # derived: of the extent; what single precision can tell apar
 WINDING_CHUNK = 16  # measured: queries at a time: the work arrays of 4096 points then stay in the cache
 
 
-def orient_by_votes(normals: np.ndarray, votes: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """Turn unit normals (n, 3) outward as their neighbourhoods (n, k) vote.
+def orient_from_axis(
+    points: np.ndarray, normals: np.ndarray, axis_points: np.ndarray, neighbours: np.ndarray
+) -> np.ndarray:
+    """Turn unit normals (n, 3) away from the place on an axis, (n, 3), that each point belongs to.
 
-    A vote (n,) is for the normal as it is, where positive, or against it. Ten times it becomes the mean of the
-    neighbours' votes, each times the cosine between both normals: votes that contradict each other shrink. The sign at
-    the end counts.
+    A point's vote is the cosine between its normal and its way from the axis: little where the axis is not that of its
+    surface, such as around an edge that crosses from one part to another. Ten times it becomes the mean of the votes of
+    its neighbours (n, k), each times the cosine between both normals: votes that contradict each other shrink. The sign
+    at the end counts.
     """
+    away = points - axis_points
+    votes = dot(normals, away) / np.maximum(norm(away), TINY)
     here, there = normals.T, np.ascontiguousarray(normals.T).take(neighbours, axis=1)
     cosines = np.einsum("in,ink->nk", here, there) / neighbours.shape[1]
     for _ in range(VOTING_ROUNDS):
         votes = np.einsum("nk,nk->n", cosines, votes.take(neighbours))
     return normals * np.where(votes < 0, -1.0, 1.0)[:, None]
-
-
-def orient_from_axis(
-    points: np.ndarray, normals: np.ndarray, axis_points: np.ndarray, neighbours: np.ndarray
-) -> np.ndarray:
-    """Turn normals away from the place on an axis, (n, 3), that each point belongs to.
-
-    A point's vote is the cosine between its normal and its way from the axis: little where the axis is not that of its
-    surface, such as around an edge that crosses from one part to another.
-    """
-    away = points - axis_points
-    return orient_by_votes(normals, dot(normals, away) / np.maximum(norm(away), TINY), neighbours)
 
 
 def point_areas(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:

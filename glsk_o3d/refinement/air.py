@@ -83,11 +83,9 @@ def branch_facts(
         edge = numbers(branch)
         # of a line, which has no thickness, what rounding leaves
         radius = max(float(np.median(skeleton.radii[branch])), float(np.finfo(float).eps * length.sum()), TINY)
-        end = np.cumsum(length[edge])
-        window = _Window(end - length[edge] / 2, np.append(0, end), AIR_WINDOW * radius)
-        smooth = window.mean(winding[edge] * length[edge])
+        smooth = _window_means(winding[edge] * length[edge], length[edge], AIR_WINDOW * radius)
         k = int(np.argmin(smooth))
-        surface = window.mean(along[edge])[k] / (2 * np.pi * radius)
+        surface = _window_means(along[edge], length[edge], AIR_WINDOW * radius)[k] / (2 * np.pi * radius)
         facts = dict(
             deficit=np.log1p(max((typical - smooth[k]) / max(scatter, TINY), 0)),
             surface=np.log(max(surface / seen, 0) + 0.05),
@@ -95,23 +93,17 @@ def branch_facts(
             noise=noise,
             bonds=np.log(crossing * spacing / (2 * np.pi * radius) + 0.05),
             inner=float((skeleton.degree[branch[[0, -1]]] > 1).all()),
-            length=np.log(end[-1] / radius + 0.1),
+            length=np.log(np.cumsum(length[edge])[-1] / radius + 0.1),
         )
         yield branch, k, facts
 
 
-class _Window:
-    """Means over a stretch of a path around each of some places."""
-
-    def __init__(self, places: np.ndarray, ends: np.ndarray, width: float) -> None:
-        self._ends = ends
-        self._low, self._high = np.maximum(places - width / 2, 0), np.minimum(places + width / 2, ends[-1])
-
-    def mean(self, amounts: np.ndarray) -> np.ndarray:
-        """Per length, of what is spread evenly over every edge."""
-        total = np.append(0, np.cumsum(amounts))
-        inside = np.interp(self._high, self._ends, total) - np.interp(self._low, self._ends, total)
-        return inside / np.maximum(self._high - self._low, TINY)
+def _window_means(amounts: np.ndarray, lengths: np.ndarray, width: float) -> np.ndarray:
+    """Amounts per length in a window around the middle of every edge of a path, over which they are spread evenly."""
+    stop, total = np.cumsum(lengths), np.append(0, np.cumsum(amounts))
+    ends, middle = np.append(0, stop), stop - lengths / 2
+    low, high = np.maximum(middle - width / 2, 0), np.minimum(middle + width / 2, stop[-1])
+    return (np.interp(high, ends, total) - np.interp(low, ends, total)) / np.maximum(high - low, TINY)
 
 
 def _neighbours(skeleton: Skeleton) -> list[list[tuple[int, float]]]:

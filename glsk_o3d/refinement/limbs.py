@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,14 +18,6 @@ AXIS_LEAVES = 1.3  # distance from the other limbs, over that from them to the s
 AXIS_LENGTH = 2.5  # radii from there over which its line is taken
 AXIS_SHORT = 2.0  # length in radii, from each junction, below which a branch has no undisturbed place
 MEETING_STAY = 0.1  # weight of where the junction was, per meeting: lines that are nearly one meet anywhere
-
-
-class Meeting(NamedTuple):
-    """Where limbs meet that go on straight on."""
-
-    anchor: np.ndarray  # (k, 3), the last undisturbed place of each limb
-    foot: np.ndarray  # (k, 3), where each limb passes the meeting place, or its anchor if that is behind it
-    fits: np.ndarray  # (k,), whether the limb passes within the radius of the thickest
 
 
 class Limbs:
@@ -81,11 +72,13 @@ class Limbs:
         anchor, back = place_at(places, along, start), place_at(places, along, stop)
         return anchor, (anchor - back) / max(np.linalg.norm(anchor - back), TINY), start
 
-    def meeting(self, limbs: list[int], near: np.ndarray) -> Meeting:
+    def meeting(self, limbs: list[int], near: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The place nearest to the axes of some limbs, in the sense of least squares.
 
         The limbs are numbers of paths, at least one; short ones have no say if there are two others. Where lines are
-        nearly one, they meet `near` where the junction was.
+        nearly one, they meet `near` where the junction was. Returned are, of each limb, its last undisturbed place
+        (k, 3), where it passes the meeting place (k, 3), or again its last place if that is behind it, and whether it
+        passes within the radius of the thickest (k,).
         """
         anchor, way, _ = (np.array(values) for values in zip(*map(self.axis, limbs), strict=True))
         radius = self.radius[[self.branch[limb] for limb in limbs]]
@@ -96,4 +89,4 @@ class Limbs:
         place = near + np.linalg.solve(weight, np.einsum("kij,kj->i", across, anchor - near))
         along = dot(place - anchor, way)
         fits = norm(place - anchor - along[:, None] * way) <= radius.max()
-        return Meeting(anchor, anchor + np.maximum(along, 0)[:, None] * way, fits)
+        return anchor, anchor + np.maximum(along, 0)[:, None] * way, fits

@@ -125,12 +125,8 @@ class _Hole(NamedTuple):
 
     centre: np.ndarray
     radius: float
-    winding: float  # the least winding number in it
-    inside: float  # the median one along the loop
-
-    @property
-    def share(self) -> float:
-        return self.winding / max(self.inside, LEAST_INSIDE)
+    inside: float  # median winding number along the loop
+    share: float  # the least winding number in the circle over that
 
 
 def _holes(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[_Hole]:
@@ -147,7 +143,8 @@ def _holes(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> 
     winding = np.zeros(len(skeleton.vertices))
     winding[around] = answers[-len(around) :]
     inside = [float(np.median(winding[cycle])) for cycle in cycles]
-    return [_Hole(*circle, float(hole), along) for circle, hole, along in zip(circles, least, inside, strict=True)]
+    shares = [float(hole) / max(along, LEAST_INSIDE) for hole, along in zip(least, inside, strict=True)]
+    return [_Hole(*circle, *facts) for circle, *facts in zip(circles, inside, shares, strict=True)]
 
 
 def crossings(cycle: np.ndarray, m: int, pairs: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..numerics.groups import group_sum
-from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, dot, norm, unit
+from ..numerics.vectors import COLUMNS, FULL, ROWS, dot, unit
 from ..skeleton import Skeleton
 from .vertex_points import VertexPoints
 
@@ -20,8 +20,11 @@ class Sections(NamedTuple):
     half_width: np.ndarray  # (M,) the larger half axis
     half_thickness: np.ndarray  # (M,) the smaller one
     across: np.ndarray  # (M, 3) unit vectors in the direction of the width, up to their sign
-    radius: np.ndarray  # (M,) the geometric mean of the half axes
-    closed: np.ndarray  # (M,) how far points lie around: 1 all around, .36 around half a tube, 0 on a plane, or none
+
+    @property
+    def radius(self) -> np.ndarray:
+        """Radius of the circle with the area of an ellipse with these half axes, (M,) float array."""
+        return np.sqrt(self.half_width * self.half_thickness)
 
 
 def measure_sections(skeleton: Skeleton) -> Sections:
@@ -37,21 +40,14 @@ def measure_sections(skeleton: Skeleton) -> Sections:
     radius, and around a rectangle, or two sides of it, they are its half axes, however the points are spread. Vertices
     without points have the skeleton's radius for both half axes; where only one side was seen, others have it in the
     direction that nobody knows.
-
-    `closed` is 1 less the length of the sum of the outward unit normals, without what they have along the limb, over
-    the sum of their lengths. A normal is outward if it points from the vertex to its point's tangent plane.
     """
     cloud = VertexPoints(skeleton)
-    vertex, normals, offset = cloud.vertex, cloud.normals, cloud.offset
-    found = half_axes(_around(skeleton, vertex, normal_moments(normals, offset)), skeleton.radii)
+    m, (a, b) = len(skeleton.vertices), skeleton.edges.T
+    sums = group_sum(normal_moments(cloud.normals, cloud.offset), cloud.vertex, m)
+    sums = sums + group_sum(sums[np.concatenate([b, a])], np.concatenate([a, b]), m)
+    found = half_axes(sums, skeleton.radii)
     wide, thick = (np.where(cloud.count == 0, skeleton.radii, half) for half in found[:2])
-
-    along = found.along[vertex]
-    outward = np.where(dot(normals, offset) < 0, -1, 1)[:, None] * normals
-    outward -= dot(outward, along)[:, None] * along
-    sums = _around(skeleton, vertex, np.column_stack([outward, norm(outward)]))
-    one_sided = np.where(sums[:, 3] > 0, norm(sums[:, :3]) / np.maximum(sums[:, 3], TINY), 1)
-    return Sections(wide, thick, found.across, np.sqrt(wide * thick), np.clip(1 - one_sided, 0, 1))
+    return Sections(wide, thick, found.across)
 
 
 def normal_moments(normals: np.ndarray, offset: np.ndarray) -> np.ndarray:
@@ -63,16 +59,7 @@ def normal_moments(normals: np.ndarray, offset: np.ndarray) -> np.ndarray:
     return np.concatenate([squares, np.abs(dot(normals, offset))[:, None] * squares], axis=1)
 
 
-class HalfAxes(NamedTuple):
-    """What the normals around vertices say of their sections."""
-
-    half_width: np.ndarray  # (m,)
-    half_thickness: np.ndarray  # (m,)
-    across: np.ndarray  # (m, 3) unit vectors in the direction of the width
-    along: np.ndarray  # (m, 3) unit vectors along the limb
-
-
-def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> HalfAxes:
+def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> Sections:
     """The half axes of sections, see `measure_sections`, from sums of `normal_moments`, (m, 12).
 
     In a direction that nobody saw it is `otherwise` (m,).
@@ -86,11 +73,4 @@ def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> HalfAxes:
     half, turn = np.linalg.eigh(reach + unseen[:, None] * np.eye(2))
     half = np.maximum(half, 0)  # rounding may leave less than nothing
     across = unit(np.einsum("mik,mk->mi", plane, turn[:, :, 1]))
-    return HalfAxes(half[:, 1], half[:, 0], across, axes[:, :, 0])
-
-
-def _around(skeleton: Skeleton, vertex: np.ndarray, facts: np.ndarray) -> np.ndarray:
-    """Sums of the facts of every vertex's points, and of those of the vertices beside it."""
-    m, (a, b) = len(skeleton.vertices), skeleton.edges.T
-    sums = group_sum(facts, vertex, m)
-    return sums + group_sum(sums[np.concatenate([b, a])], np.concatenate([a, b]), m)
+    return Sections(half[:, 1], half[:, 0], across)

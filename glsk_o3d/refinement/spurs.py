@@ -28,17 +28,14 @@ FAR_OUT = 20.0  # fitted: half widths beyond which a protrusion says no more
 def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
     """Cut branches whose points hardly stand out of the surface around the limbs that meet there.
 
-    What counts is the points, not the curve: the contraction shortens stubs as thick as they are long, and lets thin
-    ones grow. And it is how far they leave the limbs that meet them, not how far they are from the junction: along a
-    part they may be anywhere. The limbs go on, straight, to where they meet, see `Limbs.meeting`: the contraction draws
-    them together in a sharp corner, and a spur into its tip is left. Another branch with an end may be a spur, too, far
-    from its points: it counts as no thicker than the junction. A branch whose points have no say goes.
-
-    A flat end draws two prongs of the curve into its corners, and each stands out of the other. So where three branches
-    meet, the less probable one of two with ends is a limb only if the other is one, too: without it there is no fork.
+    The points count, not the curve, since contraction shortens stubs as thick as they are long, and lets thin ones
+    grow; and how far they leave the limbs that meet them, since along a part they may be anywhere. The limbs go on,
+    straight, to where they meet: contraction draws them together in a sharp corner, and a spur into its tip is left.
+    Another branch with an end may be a spur, too: it counts as no thicker than the junction.
 
     Of every junction the least probable limb goes first, until none is less probable than `least`; its points belong to
-    the junction. There is one judgement for each branch that leaves a junction and has an end, cut or left; at its end.
+    the junction and have no normals any more. There is one judgement for each branch that leaves a junction and has an
+    end, cut or left; at its end.
     """
     judgements: list[Judgement] = []
     given = skeleton
@@ -89,7 +86,7 @@ class _Twig(NamedTuple):
 
 
 def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
-    limbs, web = Limbs(skeleton, joined=True), _Web(skeleton, evidence)
+    limbs, bonds = Limbs(skeleton, joined=True), evidence.bonds(skeleton)
     cloud, sections = VertexPoints(skeleton), measure_sections(skeleton)
     count = cloud.mass
     wide = sections.half_width
@@ -100,7 +97,8 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
         if 1 in degree[branch[[0, -1]]]:
             ending[branch] = degree[branch] < 3
     for k, branch in enumerate(limbs.branches):
-        tip, junction = branch[np.argsort(degree[branch[[0, -1]]]) * (len(branch) - 1)].tolist()
+        path = branch[::-1] if degree[branch[0]] == 1 else branch
+        junction, tip = path[[0, -1]].tolist()
         if degree[tip] != 1 or degree[junction] < 3:
             continue
         body = branch[branch != junction]
@@ -111,7 +109,7 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
         out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * half)
         facts = dict(
             protrusion=float(np.log(out / max(half, TINY) + 0.3)),
-            web=web.of(branch),
+            web=_web(skeleton.vertices, path, *bonds),
             confidence=float(share @ confidence[body]),
             roundness=float(roundness[junction]),
         )
@@ -119,7 +117,11 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
 
 
 def _with_forks(skeleton: Skeleton, twigs: list[_Twig]) -> list[_Twig]:
-    """Twigs, the less probable prong of every fork with the probability that both are limbs."""
+    """Twigs, the less probable prong of every fork with the probability that both are limbs.
+
+    A flat end draws two prongs of the curve into its corners, and each stands out of the other: where three branches
+    meet, one of two with ends is a limb only if the other is one, too.
+    """
     at: defaultdict[int, list[int]] = defaultdict(list)
     for number, twig in enumerate(twigs):
         if skeleton.degree[twig.junction] == 3:
@@ -132,28 +134,17 @@ def _with_forks(skeleton: Skeleton, twigs: list[_Twig]) -> list[_Twig]:
     return found
 
 
-class _Web:
-    """How far along a branch the surface goes over to others."""
+def _web(vertices: np.ndarray, path: np.ndarray, pairs: np.ndarray, weight: np.ndarray) -> float:
+    """Mean share of the way from its junction to its end at which a branch has bonds with others.
 
-    def __init__(self, skeleton: Skeleton, evidence: Evidence) -> None:
-        self._skeleton = skeleton
-        self._pairs, self._weight = evidence.bonds(skeleton)
-
-    def of(self, branch: np.ndarray) -> float:
-        """Mean share of the way from its junction to its end at which a branch is bonded to others.
-
-        Of a limb it is little, since the surface closes around it; of a strand in a flat part one half.
-        """
-        if self._skeleton.degree[branch[0]] == 1:
-            branch = branch[::-1]
-        along = arc_lengths(self._skeleton.vertices[branch])
-        share = np.full(len(self._skeleton.vertices), np.nan)
-        share[branch[1:]] = along[1:] / max(along[-1], TINY)
-        shares = share[self._pairs]
-        # those with the junction itself say nothing
-        out = (np.isfinite(shares).sum(axis=1) == 1) & (self._pairs != branch[0]).all(axis=1)
-        weight = self._weight[out]
-        return float(weight @ np.nansum(shares[out], axis=1) / max(weight.sum(), TINY))
+    Of a limb it is little, since the surface closes around it; of a strand in a flat part one half.
+    """
+    along, share = arc_lengths(vertices[path]), np.full(len(vertices), np.nan)
+    share[path[1:]] = along[1:] / max(along[-1], TINY)
+    shares = share[pairs]
+    # those with the junction itself say nothing
+    out = (np.isfinite(shares).sum(axis=1) == 1) & (pairs != path[0]).all(axis=1)
+    return float(weight[out] @ np.nansum(shares[out], axis=1) / max(weight[out].sum(), TINY))
 
 
 def _standing_out(limbs: Limbs, k: int, junction: int, points: np.ndarray, ending: np.ndarray) -> float:
@@ -162,11 +153,11 @@ def _standing_out(limbs: Limbs, k: int, junction: int, points: np.ndarray, endin
         return 0.0
     around = [i for i in limbs.at[limbs.region[junction]] if limbs.branch[i] != k]
     beside = [i for i in around if limbs.paths[i][0] == junction]
-    meeting = limbs.meeting(around, limbs.vertices[junction])
-    longer = np.flatnonzero(meeting.fits & ~limbs.short[[limbs.branch[i] for i in around]])
+    anchor, foot, fits = limbs.meeting(around, limbs.vertices[junction])
+    longer = np.flatnonzero(fits & ~limbs.short[[limbs.branch[i] for i in around]])
     radius = limbs.radius[[limbs.branch[around[i]] for i in longer]]
     surface = np.where(ending, np.minimum(limbs.surface, limbs.surface[junction]), limbs.surface)
-    vertices = np.concatenate([limbs.vertices, meeting.anchor[longer], meeting.foot[longer]])
+    vertices = np.concatenate([limbs.vertices, anchor[longer], foot[longer]])
     more = len(limbs.vertices) + np.arange(2 * len(longer)).reshape(2, -1).T
     paths = [*(limbs.paths[i] for i in beside), *more]
     ratio, there = relative_distance(points, vertices, np.r_[surface, radius, radius], paths)

@@ -65,11 +65,10 @@ class SpacedPoints(VertexPoints):
 def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     """Vertices around which the cloud shows no surface, (M,) bool array.
 
-    There the normals do not agree on an axis. Nor do they where noise has tilted them; but it fills space, and from
-    link to link there are more points than on a surface. Nor do they on a sheet; but there they agree with each other,
-    and there are more points than along a curve. That is not sure of one vertex alone, and holds at many a junction;
-    but where it holds for all but a share of `least` of the points of a region, it is so. Where the confidence is
-    unknown there is a surface.
+    There the normals do not agree on an axis. Nor do they in noise; but it fills space, and from link to link there are
+    more points than on a surface. Nor do they on a sheet; but there they agree with each other, and there are more
+    points than along a curve. One vertex alone is not sure; but where this holds for more than ``1 - least`` of the
+    points of a region, it is so. Where the confidence is unknown there is a surface.
     """
     skeleton, m = cloud.skeleton, len(cloud.skeleton.vertices)
     owner = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0]

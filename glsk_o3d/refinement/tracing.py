@@ -35,12 +35,10 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     Points are linked with near ones (`near_links`), and with the vertices of parts that have a surface. From a root a
     shortest path leads to every point; those of the farthest points, each until it meets one before, are the parts, and
     cover the points around (Sato et al. 2000, TEASAR). The vertices of a path lie in the middle of slices of geodesic
-    distance.
+    distance, and have the spread of their points for a radius, and confidence 0; their points have no normals any more.
+    Of a tree, vertex 0 is the root, and the first vertex of an edge is nearer to it.
 
-    `surface` is the least share of the points of a region that must show a surface, see `without_surface`; 0 traces
-    none. The root is as `Refiner.root` says. Traced vertices have the spread of their points for a radius, and
-    confidence 0; their points have no normals any more. Of a tree, vertex 0 is the root, and the first vertex of an
-    edge is nearer to it.
+    See `without_surface` for `surface`, 0 for no traced parts, and `Refiner.root` for the root.
     """
     cloud, m = SpacedPoints(skeleton), len(skeleton.vertices)
     thin = np.zeros(m, bool)
