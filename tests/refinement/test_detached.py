@@ -68,10 +68,9 @@ def test_by_its_definition(random_skeleton, seed, m, every):
         np.testing.assert_array_equal(getattr(skeleton, name), getattr(raw, name))
 
 
-def test_goes_with_the_cloud(random_skeleton):
+def test_goes_with_the_cloud(random_skeleton, placed):
     raw = random_skeleton(5)
-    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
-    moved = replace(raw, vertices=raw.vertices @ turn + 1e4, points=raw.points @ turn + 1e4, normals=raw.normals @ turn)
+    moved, turn = placed(raw, shift=1e4)
     np.testing.assert_allclose(
         pull_back_detached(moved).vertices - 1e4, pull_back_detached(raw).vertices @ turn, atol=1e-9
     )

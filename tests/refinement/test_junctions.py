@@ -239,38 +239,20 @@ def test_two_limbs_side_by_side_do_not_close_a_loop():
     assert move_junctions(raw).n_loops == raw.n_loops == 1
 
 
-def test_junctions_turn_and_grow_with_the_shape():
+def test_junctions_turn_and_grow_with_the_shape(placed):
     raw = quadruped(bent=0.8 * R)
-    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
-    turn[:, 0] *= np.sign(np.linalg.det(turn))
-    moved = replace(
-        raw,
-        vertices=7 * raw.vertices @ turn.T,
-        points=7 * raw.points @ turn.T,
-        normals=raw.normals @ turn.T,
-        radii=7 * raw.radii,
-    )
+    moved, turn = placed(raw, 3, 7)
     expected, found = move_junctions(raw), move_junctions(moved)
     np.testing.assert_array_equal(found.edges, expected.edges)
-    np.testing.assert_allclose(found.vertices, 7 * expected.vertices @ turn.T, atol=1e-8)
+    np.testing.assert_allclose(found.vertices, 7 * expected.vertices @ turn, atol=1e-8)
     np.testing.assert_allclose(found.radii, 7 * expected.radii, rtol=1e-9)
 
 
-def test_junctions_do_not_hang_on_the_order_of_points_and_vertices():
+def test_junctions_do_not_hang_on_the_order_of_points_and_vertices(renumbered):
     raw = quadruped(bent=0.8 * R)
     rng = np.random.default_rng(5)
     points, name = rng.permutation(len(raw.points)), rng.permutation(len(raw.vertices))
-    back = np.argsort(name)  # vertex v is now called name[v]
-    shuffled = replace(
-        raw,
-        vertices=raw.vertices[back],
-        radii=raw.radii[back],
-        confidence=raw.confidence[back],
-        edges=np.unique(np.sort(name[raw.edges], axis=1), axis=0),
-        points=raw.points[points],
-        normals=raw.normals[points],
-        vertex_of_point=name[raw.vertex_of_point[points]],
-    )
+    shuffled = renumbered(raw, name, points)
     expected, found = move_junctions(raw), move_junctions(shuffled)
     apart, which = cKDTree(expected.vertices).query(found.vertices)
     assert apart.max() < 1e-9

@@ -212,13 +212,9 @@ def test_least_first_until_it_is_no_junction(ringed):
     np.testing.assert_allclose(skeleton.vertices, [[0, 0, 0], tips[0], tips[2]], atol=1e-15)
 
 
-def test_several_at_one_junction_and_in_any_numbering():
+def test_several_at_one_junction_and_in_any_numbering(renumbered):
     raw = tree((5, 0.03), (5, 0.07), (9, 0.05), (12, 0.5))
-    turn = np.random.default_rng(1).permutation(len(raw.vertices))
-    back = np.argsort(turn)
-    edges = sorted(map(tuple, np.sort(back[raw.edges], axis=1).tolist()))
-    renamed = Skeleton(raw.vertices[turn], edges, raw.radii, back[raw.vertex_of_point], raw.points, raw.normals)
-    for case in (raw, renamed):
+    for case in (raw, renumbered(raw, np.random.default_rng(1).permutation(len(raw.vertices)))):
         skeleton = pruned(case, 1.1)
         assert len(skeleton.vertices) == N + 2
         assert len(skeleton.junctions) == 1
