@@ -50,7 +50,9 @@ def denoise(surface: Surface, passes: int, set_aside: bool) -> Surface:
     denoised = subspace_mean_shift(surface.points, surface.noise, passes, surface.weight)
     k, outlier = surface.neighbours.shape[1], np.zeros(len(denoised), bool)
     neighbours = nearest_moved(denoised, surface.neighbours, surface.noise > 0)
-    found = local_outlier_ratio(_mean_distance(denoised, neighbours), neighbours) > DENOISED_RATIO
+    away = denoised[neighbours[:, 1:]] - denoised[:, None]
+    mean_distance = np.sqrt(np.einsum("nki,nki->nk", away, away)).mean(axis=1)
+    found = local_outlier_ratio(mean_distance, neighbours) > DENOISED_RATIO
     found &= (surface.noise > DENOISED_NOISE) & set_aside
     if 0 < found.sum() <= len(denoised) - max(k, MIN_POINTS):
         outlier = found
@@ -72,11 +74,6 @@ def denoise(surface: Surface, passes: int, set_aside: bool) -> Surface:
         representative=representative[surface.representative],
         outlier=surface.outlier | outlier[surface.representative],
     )
-
-
-def _mean_distance(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    away = points[neighbours[:, 1:]] - points[:, None]
-    return np.sqrt(np.einsum("nki,nki->nk", away, away)).mean(axis=1)
 
 
 def average_noisy(

@@ -30,12 +30,8 @@ def sample_cloud(points: np.ndarray, n: int, counts: np.ndarray | None = None) -
 
     Each of the points may stand for `counts` (m,) points of another cloud already.
     """
-    if counts is None:
-        return sample_grid(points, n) if len(points) > 2 * n else everybody(points)
-    if len(points) <= 2 * n:
-        return everybody(points)._replace(counts=counts)
-    sample = sample_grid(points, n)
-    return sample._replace(counts=np.bincount(sample.representative, counts))
+    sample = sample_grid(points, n) if len(points) > 2 * n else everybody(points)
+    return sample if counts is None else sample._replace(counts=np.bincount(sample.representative, counts))
 
 
 def everybody(points: np.ndarray) -> Sample:

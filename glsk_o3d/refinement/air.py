@@ -12,7 +12,7 @@ from ..numerics.polylines import place_at
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
 from .evidence import Evidence
-from .loops import crossings
+from .loops import crossings, positions
 from .merging import drop_edges, drop_lone_vertices
 from .scores import AIR_WEIGHTS, probability
 
@@ -68,7 +68,7 @@ def branch_facts(
     area = along.sum()
     seen = max(area / max(tubes, area * TINY, TINY), TINY)  # a line has no tubes
     spacing = np.sqrt(np.median(evidence.areas))
-    pairs, weight = evidence.bonds(skeleton)
+    bonds = evidence.bonds(skeleton)
     around, keys = _neighbours(skeleton), edges @ [m, 1]
 
     def numbers(path: np.ndarray) -> np.ndarray:
@@ -77,9 +77,9 @@ def branch_facts(
     for branch in skeleton.branches:
         if branch[0] == branch[-1]:
             ring = np.roll(branch[:-1], -int(np.argmax(winding[numbers(branch)])))
-            branch, crossing = np.append(ring, ring[0]), float(crossings(ring, m, pairs, weight).min()) / 2
+            branch, bonded = np.append(ring, ring[0]), crossings(positions(ring, m), len(ring), bonds, closed=True)
         else:
-            crossing = _crossing(branch, around, m, pairs, weight)
+            bonded = crossings(_sides(branch, around, m), len(branch), bonds, closed=False)[:-1]
         edge = numbers(branch)
         # of a line, which has no thickness, what rounding leaves
         radius = max(float(np.median(skeleton.radii[branch])), float(np.finfo(float).eps * length.sum()), TINY)
@@ -91,7 +91,7 @@ def branch_facts(
             surface=np.log(max(surface / seen, 0) + 0.05),
             straightness=_straightness(vertices, around, branch, k, radius),
             noise=noise,
-            bonds=np.log(crossing * spacing / (2 * np.pi * radius) + 0.05),
+            bonds=np.log(float(bonded.min()) / 2 * spacing / (2 * np.pi * radius) + 0.05),
             inner=float((skeleton.degree[branch[[0, -1]]] > 1).all()),
             length=np.log(np.cumsum(length[edge])[-1] / radius + 0.1),
         )
@@ -114,30 +114,22 @@ def _neighbours(skeleton: Skeleton) -> list[list[tuple[int, float]]]:
     return around
 
 
-def _crossing(
-    branch: np.ndarray, around: list[list[tuple[int, float]]], m: int, pairs: np.ndarray, weight: np.ndarray
-) -> float:
-    """Least weight of the bonds that cross an edge of a branch, from what is on its one side to what is on the other.
+def _sides(branch: np.ndarray, around: list[list[tuple[int, float]]], m: int) -> np.ndarray:
+    """Positions of m vertices in a branch, (m,) int array; -1 of those that do not count.
 
     Vertices beyond its ends, a few edges away, count to their side, but those that are near both.
     """
-    last, inner = len(branch) - 1, set(branch[1:-1].tolist())
-    sides = []
+    inner, sides = set(branch[1:-1].tolist()), []
     for start, stop in ((int(branch[0]), int(branch[-1])), (int(branch[-1]), int(branch[0]))):
         found, front = {start}, [start]
         for _ in range(CROSSING_HOPS):
             front = [v for u in front for v, _ in around[u] if v not in found and v not in inner and v != stop]
             found.update(front)
         sides.append(found)
-    place = np.full(m, -1)
+    place = positions(branch, m)
     place[list(sides[0] - sides[1])] = 0
-    place[list(sides[1] - sides[0])] = last
-    place[branch] = np.arange(last + 1)
-    first, second = np.sort(place[pairs], axis=1).T
-    inside = first >= 0
-    first, second, weight = first[inside], second[inside], weight[inside]
-    steps = np.bincount(first, weight, last + 1) - np.bincount(second, weight, last + 1)
-    return max(float(np.cumsum(steps)[:-1].min()) / 2, 0.0)
+    place[list(sides[1] - sides[0])] = len(branch) - 1
+    return place
 
 
 def _straightness(

@@ -105,11 +105,11 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     if not cycles:
         return []
     surface = VertexPoints(skeleton).distance
-    pairs, weight = evidence.bonds(skeleton)
+    bonds = evidence.bonds(skeleton)
     found = []
     for cycle, hole in zip(cycles, _holes(skeleton, cycles, evidence), strict=True):
         tube = max(float(np.median(surface[cycle])), TINY)
-        crossing = crossings(cycle, len(surface), pairs, weight)
+        crossing = crossings(positions(cycle, len(surface)), len(cycle), bonds, closed=True)
         facts = dict(
             opening=float(np.log(min(hole.radius, WIDE_OPEN * tube) / tube + 0.1)),
             winding=float(np.clip(hole.share, 0, 1.5)),
@@ -147,21 +147,27 @@ def _holes(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> 
     return [_Hole(*circle, *facts) for circle, *facts in zip(circles, inside, shares, strict=True)]
 
 
-def crossings(cycle: np.ndarray, m: int, pairs: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """`Evidence.bonds` among m vertices across the edge from each vertex of a cycle (n,) to the next, (n,).
+def crossings(place: np.ndarray, n: int, bonds: tuple[np.ndarray, np.ndarray], closed: bool) -> np.ndarray:
+    """Weight of the `Evidence.bonds` across each edge of a path, from what is on its one side to the other, (n,).
 
-    They lead from the vertices on its one side to those on the other, the shorter way.
+    `place` (M,) are the positions 0 to n - 1 of the graph's vertices along it, -1 of those that do not count. If it is
+    closed, edges lead from each position to the next, and bonds the shorter way; else the last one is none.
     """
-    n = len(cycle)
-    place = np.full(m, -1)
-    place[cycle] = np.arange(n)
+    pairs, weight = bonds
     first, last = np.sort(place[pairs], axis=1).T
     inside = first >= 0
     first, last, weight = first[inside], last[inside], weight[inside]
-    around = last - first > n / 2
+    around = closed & (last - first > n / 2)
     start, stop = np.where(around, last, first), np.where(around, first, last)
     steps = np.bincount(start, weight, n) - np.bincount(stop, weight, n)
     return np.maximum(np.cumsum(steps) + weight[around].sum(), 0)  # rounding leaves less than nothing
+
+
+def positions(path: np.ndarray, m: int) -> np.ndarray:
+    """The position of each of m vertices in a path, (m,) int array; -1 of those that are not in it."""
+    place = np.full(m, -1)
+    place[path] = np.arange(len(path))
+    return place
 
 
 def facing_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
