@@ -17,9 +17,9 @@ SCATTER_CHUNK = 4096  # measured: rows at a time: the (3, rows, k) work array th
 
 
 def nearest_neighbours(points: np.ndarray, k: int, of: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Distances and indices of the k nearest points of every point, itself first, two (n, k) arrays, or of places `of`.
+    """Distances to the k nearest points of every point, itself first, or of places `of` (m, 3), and which these are.
 
-    On all cores, unless ``OMP_NUM_THREADS`` says otherwise.
+    Two arrays (n, k), or (m, k). On all cores, unless ``OMP_NUM_THREADS`` says otherwise.
     """
     # Split at middles, not at medians: a twelfth faster to build and ask together.
     tree, asked = cKDTree(points, leafsize=24, balanced_tree=False), points if of is None else of

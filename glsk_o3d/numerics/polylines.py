@@ -26,8 +26,8 @@ def relative_distance(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Distance of points (n, 3) from some paths over the distance of the surface from these, and the latter, two (n,).
 
-    Of all edges of the paths, which are numbers of `vertices` (M, 3), that one counts where the ratio is least; the
-    distance to the `surface` (M,) is linear along it.
+    Paths are numbers of `vertices` (M, 3), from which the surface is `surface` (M,) away, and linearly between them. Of
+    all edges that one counts where the ratio is least.
     """
     a, b = (np.concatenate([path[part] for path in paths]) for part in (slice(-1), slice(1, None)))
     start, step = vertices[a], vertices[b] - vertices[a]

@@ -145,7 +145,8 @@ def limb_line(
 
     Nothing is decided: every place counts by how far it has left the others, from 0 at their surface on, and less and
     less from `AXIS_LENGTH` radii on. The half towards the limb's other end counts as undisturbed, whatever is there.
-    All paths are numbers of `vertices` (M, 3), the limb's from its junction on; `surface` (M,) is as far from these.
+    All paths are numbers of `vertices` (M, 3), the limb's from its junction on; the surface is `surface` (M,) away from
+    these.
     """
     places = vertices[path]
     along = arc_lengths(places)

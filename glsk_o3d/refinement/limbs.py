@@ -23,10 +23,11 @@ MEETING_STAY = 0.1  # weight of where the junction was, per meeting: lines that 
 class Limbs:
     """The branches of a skeleton seen from their junctions.
 
-    Of every branch there is the `radius` (B,), the median along it; whether it is `inner` (B,), between two junctions;
-    and whether it is `short` (B,), so that the contraction disturbs it all along, if they are to be `joined`: what
-    short inner branches join is one `region` (M,), else every vertex by itself. The `paths` lead from every junction
-    along its branches; `branch` has the number of the branch of each, and `at` those that start in a region.
+    The `surface` (M,) is as far from every vertex; without points, its radius. Of every branch there is the `radius`
+    (B,), the median of that along it; whether it is `inner` (B,), between two junctions; and whether it is `short`
+    (B,), so that the contraction disturbs it all along, if they are to be `joined`: what short inner branches join is
+    one `region` (M,), else every vertex by itself. The `paths` lead from every junction along its branches; `branch`
+    has the number of the branch of each, and `at` those that start in a region.
     """
 
     def __init__(self, skeleton: Skeleton, joined: bool) -> None:
@@ -51,8 +52,8 @@ class Limbs:
                     self.branch.append(number)
         self.axis = cache(self._axis)
 
-    def _axis(self, limb: int) -> tuple[np.ndarray, np.ndarray, float]:
-        """The last undisturbed place of a limb, its direction there, towards the junction, and how far along it is."""
+    def _axis(self, limb: int) -> tuple[np.ndarray, np.ndarray]:
+        """The last undisturbed place of a limb, and its direction there, towards the junction."""
         path, radius = self.paths[limb], self.radius[self.branch[limb]]
         places = self.vertices[path]
         along = arc_lengths(places)
@@ -70,7 +71,7 @@ class Limbs:
             start = min(along[inside[-1] + 1], half) if len(inside) else start
         stop = min(start + AXIS_LENGTH * radius, along[-1])
         anchor, back = place_at(places, along, start), place_at(places, along, stop)
-        return anchor, (anchor - back) / max(np.linalg.norm(anchor - back), TINY), start
+        return anchor, (anchor - back) / max(np.linalg.norm(anchor - back), TINY)
 
     def meeting(self, limbs: list[int], near: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The place nearest to the axes of some limbs, in the sense of least squares.
@@ -80,7 +81,7 @@ class Limbs:
         (k, 3), where it passes the meeting place (k, 3), or again its last place if that is behind it, and whether it
         passes within the radius of the thickest (k,).
         """
-        anchor, way, _ = (np.array(values) for values in zip(*map(self.axis, limbs), strict=True))
+        anchor, way = (np.array(values) for values in zip(*map(self.axis, limbs), strict=True))
         radius = self.radius[[self.branch[limb] for limb in limbs]]
         long = ~self.short[[self.branch[limb] for limb in limbs]]
         say = long if long.sum() > 1 else np.ones(len(long), bool)

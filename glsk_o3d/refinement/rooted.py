@@ -1,4 +1,4 @@
-"""RootPlace a tree grows from, and its vertices in the order in which they grow."""
+"""The place a tree grows from, and its vertices in the order in which they grow."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def normal_moments(normals: np.ndarray, offset: np.ndarray) -> np.ndarray:
 def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> Sections:
     """The half axes of sections, see `measure_sections`, from sums of `normal_moments`, (m, 12).
 
-    In a direction that nobody saw it is `otherwise` (m,).
+    In a direction that nobody saw the half axis is `otherwise` (m,).
     """
     share, axes = np.linalg.eigh(moments[:, :6][:, FULL])
     known = share[:, 1:] > LEAST_SHARE * share.sum(axis=1, keepdims=True)

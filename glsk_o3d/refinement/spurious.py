@@ -34,12 +34,12 @@ def spread_around(skeleton: Skeleton) -> np.ndarray:
 def drop_spurious(
     skeleton: Skeleton, traced: np.ndarray, radii: float, root: int | None = None
 ) -> tuple[Skeleton, np.ndarray]:
-    """Drop twigs whose tip is as near to the rest as points scatter there; with the vertices that stay, in their order.
+    """Drop twigs whose tip is as near to the rest as points scatter there; say which vertices stay, in their order.
 
     Of N points that scatter normally around a curve, with a median distance of r, one is expected to be farther off
     than ``r sqrt(log2 N)``. Only twigs of `traced` (M,) vertices, whose radius is the spread of their points, are
-    dropped, and not the vertex `root`. From a part that has a surface a tip must be some `radii` away. Points of a twig
-    belong to the vertex that it grew from.
+    dropped, and not the vertex `root`. From a part that has a surface a tip must be `radii` of its radii away. Points
+    of a twig belong to the vertex that it grew from.
     """
     stays = np.arange(len(skeleton.vertices))
     scatter = math.sqrt(math.log2(max(int((skeleton.vertex_of_point >= 0).sum()), 1)))

@@ -24,10 +24,11 @@ SAME_PLACE = 1e-6  # derived: share of the cloud's extent below which points are
 LEAST_POINTS = 64  # fitted: of which fewer say nothing about where there is no surface
 SURFACE_GROWTH = 2.5  # measured: growth of links on a surface; noise that fills space has more, a curve 1.7
 SHEET_GROWTH = 2.2  # fitted: growth of links that a sheet surely has
-SHY = 0.4  # fitted: confidence below which the normals around a vertex do not say where the axis is
+UNSURE_CONFIDENCE = 0.4  # fitted: confidence below which the normals around a vertex do not say where the axis is
 REGION_POINTS = 1200  # fitted: points around a vertex of which a share must show a surface
 REGION_VERTICES = 400  # measured: vertices in which these are looked for
-FIRM, FIRM_LENGTH = 0.6, 4.0  # fitted: confidence, and length over radius, of a stretch that surely has a surface
+SURE_CONFIDENCE = 0.6  # fitted: least confidence in a stretch that surely has a surface
+SURE_LENGTH = 4.0  # fitted: and its least length, over its radius
 
 
 class SpacedPoints(VertexPoints):
@@ -72,7 +73,8 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     """
     skeleton, m = cloud.skeleton, len(cloud.skeleton.vertices)
     owner = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0]
-    count, thin = np.bincount(owner, minlength=m) / max(len(owner) / TRACED_POINTS, 1), skeleton.confidence < SHY
+    count = np.bincount(owner, minlength=m) / max(len(owner) / TRACED_POINTS, 1)
+    thin = skeleton.confidence < UNSURE_CONFIDENCE
     enough = (1 - least) * min(REGION_POINTS, count.sum())  # for one region
     if count[thin].sum() <= enough or len(cloud.rows) < LEAST_POINTS:
         return np.zeros(m, bool)
@@ -83,7 +85,7 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     facts = np.column_stack([link_growth(cloud.links), one_direction(cloud.normals, cloud.links)])
     growth, flat = (group_sum(facts, vertex, m) / np.maximum(count, 1)[:, None]).T
     thin &= growth < np.where(flat < SHEET_SHARE, SURFACE_GROWTH, SHEET_GROWTH)
-    return (_share_around(near, count, thin) > 1 - least) & ~_firm(skeleton)
+    return (_share_around(near, count, thin) > 1 - least) & ~_surely_with_surface(skeleton)
 
 
 def one_direction(normals: np.ndarray, links: csr_matrix) -> np.ndarray:
@@ -106,11 +108,11 @@ def _share_around(near: np.ndarray, count: np.ndarray, some: np.ndarray) -> np.n
     return (points * some[near]).sum(axis=1) / np.maximum(points.sum(axis=1), 1)
 
 
-def _firm(skeleton: Skeleton) -> np.ndarray:
+def _surely_with_surface(skeleton: Skeleton) -> np.ndarray:
     """Vertices in stretches that surely have a surface, and are long for their radius."""
-    m, ends, sure = len(skeleton.vertices), skeleton.edges, skeleton.confidence > FIRM
+    m, ends, sure = len(skeleton.vertices), skeleton.edges, skeleton.confidence > SURE_CONFIDENCE
     inside = sure[ends].all(axis=1)
     stretch = component_labels(m, ends[inside])
     length = np.bincount(stretch[ends[inside, 0]], skeleton.edge_lengths[inside], m)
     radius = np.bincount(stretch, skeleton.radii, m) / np.maximum(np.bincount(stretch, minlength=m), 1)
-    return sure & (length > FIRM_LENGTH * radius)[stretch]
+    return sure & (length > SURE_LENGTH * radius)[stretch]
