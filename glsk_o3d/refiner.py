@@ -14,19 +14,17 @@ from .numerics.vectors import AXES
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .refinement.air import cut_air
-from .refinement.axis_fit import fit_axis
+from .refinement.axis_fit import fit_axis, pull_back_detached
 from .refinement.bridging import bridge_gaps
 from .refinement.diagnostics import diagnose
 from .refinement.ends import regrow_ends
-from .refinement.evidence import Evidence, in_order
+from .refinement.evidence import Evidence, SurfaceGraph, in_order
 from .refinement.junctions import move_junctions
-from .refinement.loops import close_loops, zip_narrow_loops
+from .refinement.loops import close_loops, collapse_narrow_loops
 from .refinement.merging import binary_size, scaled
-from .refinement.runaways import recall_runaways
 from .refinement.sections import measure_sections
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
-from .refinement.surface_graph import SurfaceGraph
 from .refinement.tracing import trace
 from .refinement.triangles import collapse_triangles
 from .skeleton import Skeleton
@@ -39,7 +37,7 @@ class Refiner(Filter[Skeleton]):
 
     1. Edges that lie on a triangle are collapsed, the shortest first, until there is none. This step is published, and
        with all options 0 the only one.
-    2. Loops narrower than their tube are zipped up, detached vertices brought back, and edges subdivided.
+    2. Loops narrower than their tube are collapsed, detached vertices brought back, and edges subdivided.
     3. The curve and its radii are fitted to the axis of the surface: to the normals of the points around, even if only
        one side was scanned, and to the points themselves where noise has spoilt the normals.
     4. The topology is judged by the surface around the curve: false loops are closed, spurs pruned, branches that cross
@@ -138,9 +136,9 @@ class Refiner(Filter[Skeleton]):
         skeleton = collapse_triangles(skeleton, by_degree=self.collapse == "degree")
         surface = SurfaceGraph.of(skeleton)
         if self.handle:
-            skeleton = zip_narrow_loops(skeleton, surface)
+            skeleton = collapse_narrow_loops(skeleton, surface)
         if self.recentre:
-            skeleton = recall_runaways(skeleton)
+            skeleton = pull_back_detached(skeleton)
         return self._centred(skeleton, surface), surface
 
     def _judge(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:

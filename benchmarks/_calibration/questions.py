@@ -14,11 +14,11 @@ from glsk_o3d import Pipeline
 from glsk_o3d.analysis import Truth
 from glsk_o3d.analysis.matching import TIP_REACH
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
-from glsk_o3d.refinement.air import branch_facts
+from glsk_o3d.refinement.air import branch_facts, cut_air
 from glsk_o3d.refinement.bridging import gap_facts
 from glsk_o3d.refinement.evidence import Evidence, in_order
-from glsk_o3d.refinement.loops import loop_facts
-from glsk_o3d.refinement.spurs import limb_facts
+from glsk_o3d.refinement.loops import close_loops, loop_facts
+from glsk_o3d.refinement.spurs import limb_facts, prune_spurs
 from glsk_o3d.skeleton import Skeleton
 
 from .labels import Placed
@@ -44,11 +44,12 @@ def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tupl
         return
     evidence = Evidence.of(skeleton, surface)
     yield from _loops(skeleton, evidence, truth)
-    skeleton, _ = refiner._close(skeleton, evidence)
+    skeleton, _ = refiner._asked(close_loops, skeleton, evidence, refiner.handle)
     yield from _limbs(skeleton, evidence, truth)
-    skeleton, _ = refiner._prune(skeleton, evidence)
+    skeleton, _ = refiner._asked(prune_spurs, skeleton, evidence, refiner.limb)
     yield from _branches(skeleton, evidence, truth)
-    skeleton, _ = refiner._prune(refiner._cut(skeleton, evidence)[0], evidence)
+    skeleton, _ = cut_air(skeleton, evidence, skeleton.report.noise, refiner.air)
+    skeleton, _ = refiner._asked(prune_spurs, skeleton, evidence, refiner.limb)
     yield from _gaps(skeleton, evidence, truth)
 
 

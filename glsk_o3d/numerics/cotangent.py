@@ -12,27 +12,15 @@ WEIGHT_CAP = 1e4  # published, in both codes
 
 
 def cotangent_laplacian(points: np.ndarray, rings: Rings, cap: float = WEIGHT_CAP) -> csr_matrix:
-    r"""Cotangent Laplacian of a point cloud with one-rings (Wen et al. 2024, equations 1 and 2).
+    r"""Cotangent Laplacian of points (n, 3) with one-rings, (n, n) csr_matrix (Wen et al. 2024, equations 1 and 2).
 
-    In every fan triangle (i, j, k) the angle at k adds its cotangent to :math:`w_{ij}` and the angle at j adds its
-    cotangent to :math:`w_{ik}`; :math:`L_{ii} = -\sum_j w_{ij}`.
+    In every fan triangle (i, j, k) the angle at k adds its cotangent to :math:`w_{ij}` and the angle at j to
+    :math:`w_{ik}`; :math:`L_{ii} = -\sum_j w_{ij}`. A row whose weights sum to more than `cap` in absolute value is
+    scaled down to it, as in the published codes; triangles without area add nothing. Rows sum to zero, ``L @ points``
+    are the Laplacian coordinates, and the matrix is not symmetric, because rings are not mutual.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-    rings : Rings
-    cap : float
-        A row whose weights sum to more than this, in absolute value, is scaled down to it, as in the published codes.
-
-    Returns
-    -------
-    (n, n) csr_matrix
-        Rows sum to zero; ``L @ points`` are the Laplacian coordinates. Not symmetric, because rings are not mutual.
-
-    Notes
-    -----
-    The weight is the sum of both cotangents, without the factor 1/2: on a closed manifold mesh this matrix is
-    ``2 * igl.cotmatrix(V, F)`` and ``-2 *`` the matrix of robust_laplacian. Triangles without area add nothing.
+    The weight is the sum of both cotangents, without the factor 1/2: on a closed manifold mesh this matrix is ``2 *
+    igl.cotmatrix(V, F)`` and ``-2 *`` the matrix of robust_laplacian.
     """
     x = np.ascontiguousarray(points.T)
     entry, after = rings.fans

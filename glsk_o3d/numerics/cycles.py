@@ -12,24 +12,11 @@ from .vectors import TINY, dot
 
 
 def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[np.ndarray]:
-    """Shortest set of cycles that generates all others (Horton 1987).
+    """Shortest set of cycles that generates all others (Horton 1987): vertices of each in order, shortest cycle first.
 
-    Chains of vertices with two neighbours count as one edge, and trees that hang on the graph are cut off first, so
-    that the cost depends on the number of junctions in the cyclic part alone.
-
-    Parameters
-    ----------
-    n : int
-        Number of vertices.
-    edges : (e, 2) int array
-        Each once, no loops.
-    lengths : (e,) float array
-        Positive.
-
-    Returns
-    -------
-    list of (c,) int array
-        The vertices of each cycle in order, shortest cycle first.
+    Edges (e, 2) come once each, without loops, with positive `lengths` (e,). Chains of vertices with two neighbours
+    count as one edge, and trees that hang on the graph are cut off first: the cost depends on the junctions in the
+    cyclic part alone.
     """
     chains, chain_lengths = _cyclic_chains(n, edges, lengths)
     if not chains:
@@ -142,37 +129,16 @@ def _walk(chains: list[list[int]]) -> list[int]:
 
 
 def inscribed_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Largest circle in the plane of a closed curve that the curve does not enter.
+    """Largest circle in the plane of a closed polygon (n, 3) that the curve does not enter: its centre and its radius.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-        A closed polygon.
-
-    Returns
-    -------
-    centre : (3,) float array
-    radius : float
-        Distance from the centre to the curve. Found on a grid that is refined twice, good to about 1 %.
+    The centre is found on a grid that is refined twice; the radius is good to about 1 %.
     """
     *_, widest = _circles(points)
     return widest
 
 
 def opens_wider(points: np.ndarray, radius: float) -> bool:
-    """Whether the largest circle inside a closed curve has at least this radius.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-        A closed polygon.
-    radius : float
-
-    Returns
-    -------
-    bool
-        As `inscribed_circle` finds it, but without going on once a circle is wide enough.
-    """
+    """Whether `inscribed_circle` has at least this radius; it stops as soon as a circle is wide enough."""
     return any(found >= radius for _, found in _circles(points))
 
 

@@ -11,32 +11,18 @@ COLLINEAR_SINE = 1e-12  # derived: sine below which two directions count as one
 def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Ring of the origin in the 2-D Delaunay triangulation of the origin and its neighbours, for many origins.
 
-    Inversion about the origin, ``q = x / |x|^2``, turns circles through it into lines. A neighbour shares a
-    Delaunay edge with the origin exactly when its image is a corner of the convex hull of the images and of the
-    origin, which stands for infinity. An origin inside the hull gives a closed ring; an origin on the hull is a
-    border point, and its ring is an open fan that starts and ends there. Gift wrapping walks all hulls in step, so
-    no triangulation is made.
+    Inversion about the origin, ``q = x / |x|^2``, turns circles through it into lines. A neighbour shares a Delaunay
+    edge with the origin exactly when its image is a corner of the convex hull of the images and of the origin, which
+    stands for infinity. An origin inside the hull gives a closed ring; an origin on the hull is a border point, and its
+    ring is an open fan that starts and ends there. Gift wrapping walks all hulls in step, so no triangulation is made.
 
-    Parameters
-    ----------
-    offsets : (n, k, 2) float array
-        Neighbours relative to their origin.
-    valid : (n, k) bool array, optional
-        Entries to use; all by default. Neighbours that coincide with the origin are never used.
+    `offsets` (n, k, 2) lead from each origin to its neighbours, of which those that are `valid` (n, k) and do not
+    coincide with it are used. The rings are (n, r) positions in counter-clockwise order, padded with -1; a closed one
+    starts at the nearest neighbour, a fan at its first border neighbour. Also returned is which rings close, (n,) bool.
 
-    Returns
-    -------
-    ring : (n, r) int array
-        Positions ``0 .. k-1`` in counter-clockwise order, padded with -1. A closed ring starts at the nearest
-        neighbour, a fan at its first border neighbour.
-    closed : (n,) bool array
-        Whether the ring closes around the origin.
-
-    Notes
-    -----
-    Of several neighbours on one empty circle through the origin the two outer ones (seen along the circle) are kept;
-    the diagonals of a square grid are therefore not ring edges. Collinear neighbourhoods give the nearest neighbour on
-    each side as a fan. Of coincident neighbours one is kept.
+    Of several neighbours on one empty circle through the origin the two outer ones are kept, so that the diagonals of a
+    square grid are no ring edges. Collinear neighbourhoods give the nearest neighbour on each side as a fan. Of
+    coincident neighbours one is kept.
     """
     offsets = np.asarray(offsets, float)
     if offsets.shape[1] == 0:

@@ -12,17 +12,11 @@ LEAST_BEND = 1e-12  # derived: of what a step may gain, that is more than roundi
 
 
 class Diffusion:
-    r"""Implicit diffusion over the links between near points.
+    r"""Implicit diffusion over the links between points (n, 3) and their nearest neighbours (n, k), itself first.
 
-    One step of backward Euler, :math:`(I + \ell^2 L) u' = u`, with the Laplacian of the links: on a plane their
-    lengths have a mean square :math:`\rho^2` at every point, and :math:`L = 4 / \rho^2 (I - D^{-1} W)` tends to
-    :math:`-\Delta` as points grow. What varies over less than the length :math:`\ell` is smoothed; constants stay.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-    neighbours : (n, k) int array
-        As from `nearest_neighbours`, itself first.
+    One step of backward Euler, :math:`(I + \ell^2 L) u' = u`, with the Laplacian of the links: on a plane their lengths
+    have a mean square :math:`\rho^2` at every point, and :math:`L = 4 / \rho^2 (I - D^{-1} W)` tends to :math:`-\Delta`
+    as points grow. What varies over less than the length :math:`\ell` is smoothed; constants stay.
     """
 
     def __init__(self, points: np.ndarray, neighbours: np.ndarray) -> None:
@@ -37,10 +31,7 @@ class Diffusion:
         self._stiffness = squared / 4  # degree times mean square, over 4
 
     def __call__(self, values: np.ndarray, length: np.ndarray) -> np.ndarray:
-        """Diffuse values of the points, (n, c) float array, over a length of each point, (n,) float array.
-
-        By conjugate gradients from the values themselves.
-        """
+        """Diffuse `values` (n, c) over a `length` (n,) of each point, by conjugate gradients from the values on."""
         # over less than a thousandth of its links a value stays what it is
         hold = self._stiffness / np.maximum(length**2, 1e-6 * np.maximum(self._stiffness, TINY))
         diagonal = np.maximum(hold + self._degree, TINY)[:, None]

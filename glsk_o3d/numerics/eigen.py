@@ -17,35 +17,20 @@ EIGENVALUES_APART = 1e-3
 
 
 def principal_parts(entries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues of symmetric 3 x 3 matrices, and the direction of the least.
-
-    Parameters
-    ----------
-    entries : (6, n) float array
-
-    Returns
-    -------
-    values : (3, n) float array
-        Ascending.
-    direction : (n, 3) float array
-        Unit vectors; any of those with the least eigenvalue, where there is more than one.
-    """
+    """Eigenvalues, (3, n) ascending, and unit eigenvectors of the least, (n, 3); of a multiple one any."""
     mean, size, shape = _reduced(entries)
     least, most = _outer(shape)
     return mean + size * np.stack([least, -least - most, most]), _direction(shape, least, 0)
 
 
 def largest_eigenvalue(entries: np.ndarray) -> np.ndarray:
-    """Largest eigenvalue of symmetric 3 x 3 matrices, (n,) float array from their `entries` (6, n)."""
+    """Largest eigenvalue of each matrix, (n,)."""
     mean, size, shape = _reduced(entries)
     return mean + size * _outer(shape)[1]
 
 
 def main_direction(entries: np.ndarray) -> np.ndarray:
-    """Direction of the largest eigenvalue of symmetric 3 x 3 matrices, (n, 3) float array from their `entries` (6, n).
-
-    Unit vectors; any of those with the largest eigenvalue, where there is more than one.
-    """
+    """Unit eigenvector of the largest eigenvalue of each matrix, (n, 3); of a multiple one any."""
     shape = _reduced(entries)[2]
     return _direction(shape, _outer(shape)[1], 2)
 

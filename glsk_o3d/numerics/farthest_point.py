@@ -13,23 +13,10 @@ def farthest_point_sampling(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sample points until every one lies in the ball of a sample: each is the point farthest from those before.
 
-    Distances from a sample count in units of its own radius, so that samples are dense where the radii are small.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-    radius : (n,) float array
-        Ball radius of each point should it become a sample; positive.
-    start : int, optional
-        First sample; by default the point farthest from the centroid, so that the samples depend neither on the order
-        of the points nor on how they are turned.
-
-    Returns
-    -------
-    samples : (m,) int array
-        In the order taken.
-    representative : (n,) int array
-        For every point the position in `samples` of the sample nearest to it.
+    Distances from a sample count in units of its own `radius` (n,), so that samples are dense where the radii are
+    small. The first sample is the point farthest from the centroid, which depends neither on the order of the points
+    nor on how they are turned, or `start`. Returns the samples (m,) in the order taken, and for every point the
+    position of the sample nearest to it, (n,).
     """
     tree = cKDTree(points)
     nearest = np.full(len(points), np.inf)

@@ -9,20 +9,7 @@ from scipy.sparse import csc_array
 
 
 def group_median(values: np.ndarray, group: np.ndarray, n: int) -> np.ndarray:
-    """Median of the values of each group.
-
-    Parameters
-    ----------
-    values : (m,) float array
-    group : (m,) int array
-        Group 0 .. n-1 of each value.
-    n : int
-
-    Returns
-    -------
-    (n,) float array
-        0 for an empty group.
-    """
+    """Median of the values (m,) of each group 0 .. n-1, (n,) float array; 0 for an empty group."""
     order = np.argsort(values)
     # NumPy sorts small integers by their digits: ten times faster than lexsort
     ordered = values[order[np.argsort(group[order].astype(np.min_scalar_type(n)), kind="stable")]]
@@ -36,14 +23,7 @@ def group_median(values: np.ndarray, group: np.ndarray, n: int) -> np.ndarray:
 
 
 class Members:
-    """The members of every group.
-
-    Parameters
-    ----------
-    group : (m,) int array
-        Group 0 .. n-1 of each member; below 0 of those that have none.
-    n : int
-    """
+    """The members of every group 0 .. n-1; those of a negative group have none."""
 
     def __init__(self, group: np.ndarray, n: int) -> None:
         self._order = np.argsort(group, kind="stable")
@@ -56,20 +36,9 @@ class Members:
 
 
 def group_sum(values: np.ndarray, group: np.ndarray, n: int, weight: np.ndarray | None = None) -> np.ndarray:
-    """Sum of the rows of each group.
+    """Sum of the rows of `values` (m, ...) in each group 0 .. n-1, (n, ...) float array.
 
-    Parameters
-    ----------
-    values : (m, ...) float array
-    group : (m,) int array, or (m, c) int array with `weight`
-        Group 0 .. n-1 of each row, or groups.
-    n : int
-    weight : (m, c) float array, optional
-        Of every row in each of its groups.
-
-    Returns
-    -------
-    (n, ...) float array
+    With `weight` (m, c) every row is in c groups, (m, c), with a weight in each.
     """
     flat = values.reshape(len(values), math.prod(values.shape[1:]))
     if weight is None and flat.shape[1] < 4:

@@ -9,17 +9,9 @@ from .rings import Rings
 
 
 def clean_faces(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Triangles with an area, each once; vertices without a triangle stay, so that rows keep their meaning.
+    """Triangles with an area, each once, (g, 3) int64 array, in the order and with the orientation of their first copy.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-    faces : (f, 3) int array
-
-    Returns
-    -------
-    (g, 3) int64 array
-        In the order given, with the orientation of the first of equal ones.
+    Vertices without a triangle stay, so that rows keep their meaning.
     """
     faces = np.asarray(faces, np.int64).reshape(-1, 3)
     first = np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])
@@ -61,18 +53,9 @@ def border_lengths(n: int, faces: np.ndarray) -> np.ndarray:
 
 
 def mesh_rings(n: int, faces: np.ndarray) -> Rings:
-    """The neighbours of every vertex of a mesh as Rings; ascending, not in rotational order, since there may be none.
+    """The neighbours of every vertex of a mesh of `clean_faces` as Rings; every vertex needs a face.
 
-    Parameters
-    ----------
-    n : int
-    faces : (f, 3) int array
-        As from `clean_faces`; `nearest` and `mean_lengths` need every vertex in one.
-
-    Returns
-    -------
-    Rings
-        Their `triangles` mean nothing.
+    They are ascending, not in rotational order, since there may be none: `triangles` mean nothing.
     """
     edges = np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
     centre, neighbour = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).T
@@ -80,20 +63,10 @@ def mesh_rings(n: int, faces: np.ndarray) -> Rings:
 
 
 def common_share(rings: Rings, faces: np.ndarray) -> np.ndarray:
-    """How much of each ring is in the mesh: triangles in both over triangles in either, (n,) float array.
+    """How much of each ring is in the mesh of `clean_faces`: triangles in both over triangles in either, (n,).
 
-    Parameters
-    ----------
-    rings : Rings
-        Over the vertices of the mesh.
-    faces : (f, 3) int array
-        As from `clean_faces`.
-
-    Returns
-    -------
-    (n,) float array
-        1 where the ring and the mesh's one-ring have the same neighbours in the same cyclic order, whichever way they
-        are walked; 0 where there is no triangle at all.
+    1 where the ring and the mesh's one-ring have the same neighbours in the same cyclic order, whichever way they are
+    walked; 0 where there is no triangle at all.
     """
     n = len(rings)
     fans = rings.triangles

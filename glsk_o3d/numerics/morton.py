@@ -20,20 +20,7 @@ def morton_order(points: np.ndarray) -> np.ndarray:
 
 
 def sort_within(points: np.ndarray, codes: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """An order by codes, in which points of equal codes are sorted by their coordinates.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-    codes : (n,) uint64 array
-    order : (n,) int array
-        That sorts the codes; it is changed in place.
-
-    Returns
-    -------
-    (n,) int array
-        `order`.
-    """
+    """Sort points of equal codes by their coordinates, in an `order` that sorts the codes and is changed in place."""
     ordered = codes.take(order)
     same = ordered[1:] == ordered[:-1]
     if same.any():
@@ -46,20 +33,10 @@ def sort_within(points: np.ndarray, codes: np.ndarray, order: np.ndarray) -> np.
 def morton_codes(
     points: np.ndarray, cells: float, corner: np.ndarray | None = None, extent: float | None = None
 ) -> np.ndarray:
-    """Morton code of the cell of every point, in a cubic grid with its corner in that of the bounding box.
+    """Morton code of the cell of every point, (n,) uint64, in a cubic grid with its corner in that of the bounding box.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-    cells : float
-        Cells along the longest side of the bounding box; at most 2^21 - 1.
-    corner : (3,) float array, optional
-    extent : float, optional
-        Lowest corner and longest side of another box than that of the points, around them.
-
-    Returns
-    -------
-    (n,) uint64 array
+    `cells`, at most 2^21 - 1, lie along the longest side. Another box around the points has the lowest corner `corner`
+    (3,) and the longest side `extent`.
     """
     corner = points.min(axis=0) if corner is None else corner
     extent = max(np.ptp(points, axis=0).max() if extent is None else extent, TINY)

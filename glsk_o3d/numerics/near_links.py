@@ -18,10 +18,9 @@ SPACING_NEIGHBOUR = 3  # fitted: which of the nearest points is as far away as t
 
 
 def linked(places: np.ndarray, ends: np.ndarray) -> csr_matrix:
-    """Links between places, (n, 3) float array, given by their ends, (e, 2) int array: (n, n) matrix of their lengths.
+    """Symmetric (n, n) matrix of the lengths of links between places (n, 3), given by their ends (e, 2).
 
-    Symmetric; a link counts once however often it is given. Those of no length stay links, and a place has none with
-    itself.
+    A link counts once however often it is given. Those of no length stay links, and a place has none with itself.
     """
     n, ends = len(places), ends[ends[:, 0] != ends[:, 1]]
     links = csr_matrix(coo_matrix((np.ones(2 * len(ends)), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n)))
@@ -31,17 +30,7 @@ def linked(places: np.ndarray, ends: np.ndarray) -> csr_matrix:
 
 
 def near_links(points: np.ndarray) -> csr_matrix:
-    """Links of every point with its nearest ones, none longer than twice the spacing around either end.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-
-    Returns
-    -------
-    (n, n) symmetric csr_matrix
-        Lengths.
-    """
+    """Links, as from `linked`, of points with their nearest, none longer than twice the spacing around either end."""
     n = len(points)
     if n == 0:
         return linked(points, np.empty((0, 2), int))
@@ -68,21 +57,9 @@ def link_growth(links: csr_matrix) -> np.ndarray:
 def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> tuple[csr_matrix, np.ndarray]:
     """Join the connected pieces of a graph where they are nearest to each other, until they are one.
 
-    A gap that neither end points across counts twice.
-
-    Parameters
-    ----------
-    places : (n, 3) float array
-    links : (n, n) symmetric csr_matrix
-        Lengths, as from `linked`.
-    longest : (n,) float array
-        Longest link to add at either end; if not infinite there may be several pieces left.
-
-    Returns
-    -------
-    links : (n, n) symmetric csr_matrix
-    added : (a, 2) int array
-        The ends of the links that were added; no loop is closed by them.
+    A gap that neither end points across counts twice. No added link is longer than `longest` (n,) at both of its ends;
+    unless that is infinite, several pieces may be left. Returns the links and the ends of those added, (a, 2), which
+    close no loop.
     """
     added = np.empty((0, 2), int)
     piece = connected_components(links, directed=False)[1]
@@ -142,23 +119,10 @@ def _spanning(piece: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.nda
 
 
 def slice_centres(points: np.ndarray, links: csr_matrix, distance: np.ndarray, width: float) -> np.ndarray:
-    """Where the slice of a part is centred that every point is in the middle of.
+    """The centre of the slice of a part that every point is in the middle of, (n, 3) float array.
 
-    Slices are connected pieces of what lies between two geodesic distances (Verroust and Lazarus 1999, "Extracting
-    skeletal curves from 3D scattered data"), twice, the second time half a width farther on.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-    links : (n, n) symmetric csr_matrix
-    distance : (n,) float array
-        Geodesic distance from the root.
-    width : float
-        Of a slice.
-
-    Returns
-    -------
-    (n, 3) float array
+    Slices are connected pieces of what lies between two geodesic distances from the root, a `width` apart (Verroust and
+    Lazarus 1999, "Extracting skeletal curves from 3D scattered data"), twice, the second time half a width farther on.
     """
     n = len(points)
     row, column = links.nonzero()

@@ -23,21 +23,10 @@ def incident_edges(edges: np.ndarray, m: int) -> np.ndarray:
 def nearest_on_edges(
     x: np.ndarray, edges: np.ndarray, candidates: np.ndarray, p: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The place nearest to each point among some edges.
+    """The place nearest to each point `p` (n, 3) among its candidate edges of a graph with vertices `x` (m, 3).
 
-    Parameters
-    ----------
-    x : (m, 3) float array
-    edges : (e, 2) int array
-    candidates : (n, c) int array
-        Edges to look at for each point, -1 for none; at least one.
-    p : (n, 3) float array
-
-    Returns
-    -------
-    edge : (n,) int array
-    t : (n,) float array
-        From 0 at the first end of the edge to 1 at the second.
+    `candidates` (n, c) are at least one edge for each point, padded with -1. Returns the edges (n,), and t (n,) from 0
+    at the first end of the edge to 1 at the second.
     """
     starts, ways = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
     lengths = np.maximum(dot(ways, ways), TINY)  # squared

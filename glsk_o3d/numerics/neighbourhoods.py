@@ -17,24 +17,9 @@ SCATTER_CHUNK = 4096  # measured: rows at a time: the (3, rows, k) work array th
 
 
 def nearest_neighbours(points: np.ndarray, k: int, of: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """The k nearest points of every point, itself among them.
+    """Distances to the k nearest points of every point, itself first, or of places `of` (m, 3), and which these are.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-    k : int
-    of : (m, 3) float array, optional
-        Whose neighbours; by default those of all points.
-
-    Returns
-    -------
-    distance : (n, k) float array
-    neighbour : (n, k) int array
-        Nearest first.
-
-    Notes
-    -----
-    On all cores, unless ``OMP_NUM_THREADS`` says otherwise.
+    Two arrays (n, k), or (m, k). On all cores, unless ``OMP_NUM_THREADS`` says otherwise.
     """
     # Split at middles, not at medians: a twelfth faster to build and ask together.
     tree, asked = cKDTree(points, leafsize=24, balanced_tree=False), points if of is None else of
@@ -58,22 +43,9 @@ def nearest_neighbours(points: np.ndarray, k: int, of: np.ndarray | None = None)
 
 
 def nearest_left(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, k: int) -> np.ndarray:
-    """The k nearest points of every point left among those left; asked anew only where too few are known.
+    """The k nearest points of every point left among those left, (m, k) positions among these, nearest first.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-    neighbours : (n, c) int array
-        The nearest of every point among all, as from `nearest_neighbours`.
-    left : (n,) bool array
-        At least k.
-    k : int
-        At most c.
-
-    Returns
-    -------
-    (m, k) int array
-        For each of the m points left positions among these, nearest first.
+    `neighbours` (n, c), c >= k, are the nearest among all; points are asked anew only where too few of them are left.
     """
     rows, index = np.flatnonzero(left), np.cumsum(left) - 1
     known = neighbours[rows]
@@ -90,19 +62,8 @@ def nearest_left(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, k
 def nearest_moved(points: np.ndarray, neighbours: np.ndarray, moved: np.ndarray) -> np.ndarray:
     """The nearest points of every point after some have moved a little; asked anew only around these.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-        Where they are now.
-    neighbours : (n, k) int array
-        As from `nearest_neighbours` of where they were.
-    moved : (n,) bool array
-        Those that have moved, not farther than their neighbours were.
-
-    Returns
-    -------
-    (n, k) int array
-        Of the points that have not moved one in a thousand lacks one that came from beyond its old neighbours.
+    `neighbours` (n, k) belong to where the points were, and `moved` (n,) are those that have moved, not farther than
+    their neighbours were. Of the others one in a thousand lacks a neighbour that came from farther away.
     """
     changed = moved[neighbours].any(axis=1)
     changed[neighbours[moved]] = True
@@ -112,26 +73,15 @@ def nearest_moved(points: np.ndarray, neighbours: np.ndarray, moved: np.ndarray)
 
 
 def local_outlier_ratio(mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """How much farther a point is from its neighbours than these are from theirs (after Breunig et al. 2000, LOF).
+    """Mean distance of every point to its neighbours over that of the neighbours to theirs (Breunig et al. 2000, LOF).
 
     Near 1 on a surface, whatever its density; an outlier has more.
-
-    Parameters
-    ----------
-    mean : (n,) float array
-        Distance to the neighbours.
-    neighbours : (n, k) int array
-        As from `nearest_neighbours`.
-
-    Returns
-    -------
-    (n,) float array
     """
     return mean / row_medians(mean.take(neighbours[:, 1:]))
 
 
 def row_medians(values: np.ndarray) -> np.ndarray:
-    """Median of every row, (n,) float array from `values` (n, k): several times faster than NumPy's on short rows."""
+    """Median of every row of (n, k): several times faster than NumPy's on short rows."""
     k = values.shape[1]
     ordered = np.sort(values, axis=1)
     return (ordered[:, (k - 1) // 2] + ordered[:, k // 2]) / 2
@@ -140,7 +90,7 @@ def row_medians(values: np.ndarray) -> np.ndarray:
 def scatter(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Scatter matrix of every neighbourhood: the sums of products of what its points deviate from their mean.
 
-    (6, n) float array from `points` (m, 3) and `neighbours` (n, k): its entries xx, xy, xz, yy, yz, zz.
+    (6, n) float array from points (m, 3) and neighbours (n, k): its entries xx, xy, xz, yy, yz, zz.
     """
     coordinates, entries = np.ascontiguousarray(points.T), np.empty((6, len(neighbours)))
     share = np.full(neighbours.shape[1], 1 / neighbours.shape[1])
@@ -154,55 +104,21 @@ def scatter(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
 
 
 def principal(points: np.ndarray, neighbours: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal components of every neighbourhood.
-
-    Parameters
-    ----------
-    points : (m, 3) float array
-    neighbours : (n, k) int array
-
-    Returns
-    -------
-    spread : (n, 3) float array
-        Sums of squares along the axes, ascending, not negative.
-    normals : (n, 3) float array
-        Unit vectors along the first axis.
-    """
+    """Principal components of every neighbourhood: sums of squares, (n, 3) ascending, and unit normals (n, 3)."""
     values, normals = principal_parts(scatter(points, neighbours))
     return np.maximum(values.T, 0), normals
 
 
 def sphericity(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """Least over largest principal spread, smoothed by the median: how far the surroundings fill space.
-
-    Parameters
-    ----------
-    spread : (n, 3) float array
-        As from `principal`.
-    neighbours : (n, k) int array
-
-    Returns
-    -------
-    (n,) float array
-        0 on a plane or a line, 1 in a ball.
-    """
+    """Least over largest principal spread, smoothed by the median, (n,): 0 on a plane or a line, 1 in a ball."""
     ratio = spread[:, 0] / np.maximum(spread[:, 2], TINY)
     return row_medians(ratio.take(neighbours))
 
 
 def uprightness(points: np.ndarray, normals: np.ndarray, p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """How upright two normals stand on the line between their points: sin^2 times sin^2 of their angles with it.
+    """How upright two normals stand on the line between their points `p` and `q`, (m,): sin^2 times sin^2.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float array
-    p, q : (m,) int array
-        Pairs of points.
-
-    Returns
-    -------
-    (m,) float array
-        1 where a surface goes on from one point to the other, 0 where two surfaces face each other.
+    1 where a surface goes on from one point to the other, 0 where two surfaces face each other.
     """
     line = unit(points[q] - points[p])
     at_p, at_q = (np.maximum(1 - dot(normals[end], line) ** 2, 0) for end in (p, q))

@@ -15,18 +15,9 @@ EQUAL_NORMALS_COST = 1e-6
 def orient_normals(points: np.ndarray, normals: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Turn normals so that neighbours agree (Hoppe et al. 1992): along the tree over which they turn least.
 
-    In every connected part the point farthest from the centroid of all points says which side is out. Open3D's function
-    makes a Delaunay tetrahedralisation first, which breaks down on points of a sphere.
-
-    Parameters
-    ----------
-    points, normals : (n, 3) float array
-    edges : (e, 2) int array
-        Which points are neighbours.
-
-    Returns
-    -------
-    (n, 3) float array
+    `edges` (e, 2) say which points are neighbours. In every connected part the point farthest from the centroid of all
+    points says which side is out. Open3D's function makes a Delaunay tetrahedralisation first, which breaks down on
+    points of a sphere.
     """
     n = len(points)
     a, b = np.unique(np.sort(edges, axis=1), axis=0).T

@@ -1,39 +1,37 @@
-"""Points merged into their nearest neighbours, pair by pair."""
+"""Merge points into their nearest neighbours, pair by pair."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-MERGE_WORTH = 0.01  # fitted: share of the points that another round must merge
+Pairs = tuple[np.ndarray, np.ndarray]
+"""Points that are kept, and for each of them the one that it swallows."""
 
 
-def merge_nearest(points: np.ndarray, neighbours: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Merge mutual nearest neighbours, round by round, as long as it is worth it.
+def merge_pairs(
+    points: np.ndarray,
+    neighbours: np.ndarray,
+    choose: Callable[[Pairs, np.ndarray], Pairs],
+    most: np.ndarray | float = np.inf,
+    least: float = 0,
+) -> np.ndarray:
+    """Merge mutual nearest neighbours, round by round, while `choose` takes pairs and more than `least` are left.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-        All different.
-    neighbours : (n, k) int array
-        Their nearest neighbours, the point itself first.
-    most : (n,) float array
-        Points that may become one with each, itself included.
-
-    Returns
-    -------
-    (n,) int array
-        The point that each was merged into; itself for those that are left.
+    Points (n, 3) are all different, and their nearest neighbours (n, k) begin with the point itself. `choose` is given
+    pairs and the mass of every point: how many it stands for, at most `most`; 0 if it was swallowed. Returned is the
+    point that each was merged into, (n,) int array; itself for those that are left.
     """
-    left, representative, mass = np.ones(len(points), bool), np.arange(len(points)), np.ones(len(points))
-    while True:
-        kept, swallowed = mutual_pairs(points, neighbours, left & (mass + 1 <= most))
-        both = mass[kept] + mass[swallowed]
-        fine = both <= np.minimum(most[kept], most[swallowed])
-        if np.count_nonzero(fine) < MERGE_WORTH * len(points):
-            return final_representatives(representative)
-        kept, swallowed = kept[fine], swallowed[fine]
-        representative[swallowed], mass[kept] = kept, both[fine]
-        left[swallowed] = False
+    representative, mass = np.arange(len(points)), np.ones(len(points))
+    while np.count_nonzero(mass) > least:
+        kept, swallowed = choose(mutual_pairs(points, neighbours, (mass > 0) & (mass + 1 <= most)), mass)
+        if len(kept) == 0:
+            break
+        representative[swallowed] = kept
+        mass[kept] += mass[swallowed]
+        mass[swallowed] = 0
+    return final_representatives(representative)
 
 
 def final_representatives(representative: np.ndarray) -> np.ndarray:
@@ -43,7 +41,7 @@ def final_representatives(representative: np.ndarray) -> np.ndarray:
     return representative
 
 
-def mutual_pairs(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def mutual_pairs(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray) -> Pairs:
     """Pairs of points left that are each other's nearest; of each pair the one with more room around it is kept."""
     rows = np.flatnonzero(left)
     candidates = neighbours[rows, 1:]

@@ -23,36 +23,12 @@ def place_at(path: np.ndarray, lengths: np.ndarray, length: float | np.ndarray) 
 
 def relative_distance(
     points: np.ndarray, vertices: np.ndarray, surface: np.ndarray, paths: Sequence[np.ndarray]
-) -> np.ndarray:
-    """Distance from the edge of some paths from which it is least over that to the surface, linear along an edge.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-    vertices : (M, 3) float array
-    surface : (M,) float array
-        Distance from each vertex to the surface.
-    paths : sequence of (p,) int array
-
-    Returns
-    -------
-    (n,) float array
-        Over the distance to the surface at the nearest place of that edge.
-    """
-    return _over_surface(points, vertices, surface, paths)[0]
-
-
-def beyond_surface(
-    points: np.ndarray, vertices: np.ndarray, surface: np.ndarray, paths: Sequence[np.ndarray]
-) -> np.ndarray:
-    """How far points are out of the surface around some paths, negative inside: as `relative_distance`, in length."""
-    ratio, there = _over_surface(points, vertices, surface, paths)
-    return (ratio - 1) * there
-
-
-def _over_surface(
-    points: np.ndarray, vertices: np.ndarray, surface: np.ndarray, paths: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of points (n, 3) from some paths over the distance of the surface from these, and the latter, two (n,).
+
+    Paths are numbers of `vertices` (M, 3), from which the surface is `surface` (M,) away, and linearly between them. Of
+    all edges that one counts where the ratio is least.
+    """
     a, b = (np.concatenate([path[part] for path in paths]) for part in (slice(-1), slice(1, None)))
     start, step = vertices[a], vertices[b] - vertices[a]
     length, tiny = norm(step), TINY

@@ -22,23 +22,10 @@ def plane_distance_radii(
     normals: np.ndarray,
     otherwise: np.ndarray | float = 0.0,
 ) -> np.ndarray:
-    """Local radius: median distance from each vertex to the tangent planes of the points it owns.
+    """Local radius: median distance from each vertex to the tangent planes of the points it owns, (M,) float array.
 
-    On the axis of a tube this is the tube's radius, however far along the axis a point lies from its vertex.
-
-    Parameters
-    ----------
-    vertices : (M, 3) float array
-    vertex_of_point : (N,) int array
-        -1 for points that belong to no vertex.
-    points, normals : (N, 3) float array
-        Points without a normal (NaN) do not count.
-    otherwise : (M,) float array or float
-        Radius of the vertices without points.
-
-    Returns
-    -------
-    (M,) float array
+    On the axis of a tube this is the tube's radius, however far along the axis a point lies from its vertex. Points
+    without a vertex (-1) or a normal (NaN) do not count; vertices without points have the radius `otherwise`.
     """
     supporting = supporting_points(vertex_of_point, normals)
     vertex = vertex_of_point[supporting]
@@ -51,34 +38,17 @@ def plane_distance_radii(
 def robust_radii(
     planes: np.ndarray, distance: np.ndarray, doubt: np.ndarray, normals: np.ndarray, vertex: np.ndarray
 ) -> np.ndarray:
-    r"""Radii between the distances to the tangent planes of a vertex's points and those to the points themselves.
+    r"""Radii between the distances to the tangent planes of a vertex's points and those to the points themselves, (M,).
 
     The distance to the planes is exact on tubes and cones, and on a flat part it is half its thickness. But noise tilts
     normals, and the plane of a tilted normal passes nearer than its point: radii come out small, most where parts are
-    thin and where they meet. The distance of the points knows no normals. Its weight is
+    thin and where they meet. The `distance` (n,) of the points from the curve knows no normals. Its weight is
 
     .. math:: \sqrt d (1 - \varphi)
 
-    with the doubt d of `fit_axis` and :math:`\varphi = |a - b|`, the difference of the shares a + b = 1 that the two
-    directions across the axis have of the squared normals: 0 around a tube, or half of one, and 1 on a sheet, where the
-    distance of the points would measure its width.
-
-    Parameters
-    ----------
-    planes : (M,) float array
-        Distance to the planes, from `plane_distance_radii`.
-    distance : (n,) float array
-        Of points to the curve.
-    doubt : (M,) float array
-        Share of the squared distances that the normals do not explain, 0 to 1.
-    normals : (n, 3) float array
-    vertex : (n,) int array
-        The vertex of each point.
-
-    Returns
-    -------
-    (M,) float array
-        `planes` at vertices without points.
+    with the `doubt` d (M,) of `fit_axis` and :math:`\varphi = |a - b|`, the difference of the shares a + b = 1 that the
+    two directions across the axis have of the squared normals: 0 around a tube, or half of one, and 1 on a sheet, where
+    the distance of the points would measure its width. Vertices without points keep their `planes` (M,).
     """
     m = len(planes)
     count = np.bincount(vertex, minlength=m)

@@ -18,18 +18,10 @@ STAR_CHUNK = 1536  # measured: rows at a time: the (rows, k) work arrays then st
 class Rings:
     """One-rings of n points in compressed-row form.
 
-    Rings of clouds are never empty: the nearest neighbour of a point is always in its ring. `mean_lengths` and
-    `nearest` rely on that.
-
-    Attributes
-    ----------
-    indptr : (n + 1,) int array
-        The ring of point i is ``indices[indptr[i]:indptr[i + 1]]``.
-    indices : (m,) int array
-        Neighbours in rotational order.
-    closed : (n,) bool array
-        A closed ring is an umbrella: its last and first neighbour share a triangle with the point. An open one is a
-        fan, at the border of a scan.
+    The ring of point i is ``indices[indptr[i]:indptr[i + 1]]``, its neighbours in rotational order. One that is
+    `closed` (n,) is an umbrella: its last and first neighbour share a triangle with the point. An open one is a fan, at
+    the border of a scan. Rings of clouds are never empty, since the nearest neighbour of a point is always in its ring;
+    `mean_lengths` and `nearest` rely on that.
     """
 
     indptr: np.ndarray
@@ -161,22 +153,9 @@ class Rings:
 
 
 def star_rings(points: np.ndarray, centres: np.ndarray, neighbours: np.ndarray, axes: np.ndarray) -> Rings:
-    """Ring of each centre among its neighbours: its Delaunay star in the plane it is projected on.
+    """Ring of each centre (n,) among its neighbours (n, k), padded with -1: its Delaunay star in a plane.
 
-    Parameters
-    ----------
-    points : (m, 3) float array
-    centres : (n,) int array
-        Rows of `points`.
-    neighbours : (n, k) int array
-        Rows of `points`, padded with -1.
-    axes : (n, 3, 2) float array
-        Two orthonormal axes of each centre's plane.
-
-    Returns
-    -------
-    Rings
-        Of length n; the neighbours are rows of `points`.
+    Both are rows of `points`; the plane is that of two orthonormal axes, (n, 3, 2).
     """
     chunks = []
     for start in range(0, len(centres), STAR_CHUNK):

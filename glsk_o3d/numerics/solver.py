@@ -19,19 +19,7 @@ class SolveError(ArithmeticError):
 
 
 def factorised(matrix: csc_array, **options: Any) -> SuperLU:
-    """LU factors of a sparse, symmetric, positive definite matrix: SuperLU in symmetric mode.
-
-    Parameters
-    ----------
-    matrix : (n, n) csc_array or csc_matrix
-    **options
-        More of SuperLU's own.
-
-    Raises
-    ------
-    RuntimeError
-        It is singular.
-    """
+    """LU factors of a sparse, symmetric, positive definite csc matrix; RuntimeError if it is singular."""
     return splu(
         matrix,
         permc_spec="MMD_AT_PLUS_A",
@@ -49,26 +37,12 @@ def solve_contraction(
 
     The normal equations :math:`(L^T W_L^2 L + W_H^2) X = W_H^2 P` are factorised once for the three coordinates, by
     SuperLU in symmetric mode. They are ill-conditioned late in a contraction, so that the factorisation alone is wrong
-    in the second digit; iterative refinement with the residual in factored form,
-    :math:`W_H^2 (P - X) - L^T W_L^2 (L X)`, brings the correction below 1e-7 in one to three steps.
+    in the second digit; iterative refinement with the residual in factored form, :math:`W_H^2 (P - X) - L^T W_L^2 (L
+    X)`, brings the correction below 1e-7 in one to three steps.
 
-    Parameters
-    ----------
-    laplacian : (n, n) sparse array
-    row_weight, position_weight : (n,) float array
-        The diagonals of :math:`W_L` and :math:`W_H`; `position_weight` must be positive.
-    points : (n, 3) float array
-
-    Returns
-    -------
-    contracted : (n, 3) float array
-    error : float
-        The last correction, as a share of the cloud's size: an estimate of the error.
-
-    Raises
-    ------
-    SolveError
-        If the factorisation breaks down or the error estimate stays above 1e-4.
+    The weights (n,) are the diagonals of :math:`W_L` and :math:`W_H`; `position_weight` must be positive. Returns the
+    places (n, 3) and the last correction over the cloud's size, an estimate of the error; SolveError if the
+    factorisation breaks down or the estimate stays above 1e-4.
     """
     system = _stacked(laplacian.tocsr(), row_weight, position_weight)
     transposed = system.T.tocsr()

@@ -12,25 +12,18 @@ LEAST_BALL = 1e-6  # derived: of the extent; what single precision can tell apar
 WINDING_CHUNK = 16  # measured: queries at a time: the work arrays of 4096 points then stay in the cache
 
 
-def orient_by_votes(normals: np.ndarray, votes: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """Turn normals outward as their neighbourhoods vote.
+def orient_from_axis(
+    points: np.ndarray, normals: np.ndarray, axis_points: np.ndarray, neighbours: np.ndarray
+) -> np.ndarray:
+    """Turn unit normals (n, 3) away from the place on an axis, (n, 3), that each point belongs to.
 
-    Ten times a point's vote becomes the mean of its neighbours' votes, each times the cosine between both normals;
-    votes that contradict each other shrink. Its sign at the end is what counts.
-
-    Parameters
-    ----------
-    normals : (n, 3) float array
-        Unit vectors; their signs do not matter.
-    votes : (n,) float array
-        For the normal as it is, where positive, or against it: how clearly each point can tell by itself.
-    neighbours : (n, k) int array
-        As from `nearest_neighbours`.
-
-    Returns
-    -------
-    (n, 3) float array
+    A point's vote is the cosine between its normal and its way from the axis: little where the axis is not that of its
+    surface, such as around an edge that crosses from one part to another. Ten times it becomes the mean of the votes of
+    its neighbours (n, k), each times the cosine between both normals: votes that contradict each other shrink. The sign
+    at the end counts.
     """
+    away = points - axis_points
+    votes = dot(normals, away) / np.maximum(norm(away), TINY)
     here, there = normals.T, np.ascontiguousarray(normals.T).take(neighbours, axis=1)
     cosines = np.einsum("in,ink->nk", here, there) / neighbours.shape[1]
     for _ in range(VOTING_ROUNDS):
@@ -38,46 +31,13 @@ def orient_by_votes(normals: np.ndarray, votes: np.ndarray, neighbours: np.ndarr
     return normals * np.where(votes < 0, -1.0, 1.0)[:, None]
 
 
-def orient_from_axis(
-    points: np.ndarray, normals: np.ndarray, axis_points: np.ndarray, neighbours: np.ndarray
-) -> np.ndarray:
-    """Turn normals away from the place on an axis that each point belongs to.
-
-    A point's vote is the cosine between its normal and its way from the axis: little where the axis is not that of
-    its surface, such as around an edge that crosses from one part to another.
-
-    Parameters
-    ----------
-    points, normals, axis_points : (n, 3) float array
-    neighbours : (n, k) int array
-        As from `nearest_neighbours`.
-
-    Returns
-    -------
-    (n, 3) float array
-    """
-    away = points - axis_points
-    return orient_by_votes(normals, dot(normals, away) / np.maximum(norm(away), TINY), neighbours)
-
-
 def point_areas(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    r"""Area that every point stands for: :math:`\pi r_8^2 / 8`, with the distance of the eighth other point.
+    r"""Area that every point stands for: :math:`\pi r_8^2 / 8`, with the distance of the eighth of its `neighbours`.
 
     It follows the density of the points. Noise thicker than their spacing is counted more than once, and so are two
     sheets nearer to each other than that: noise of 1 and 2 % of the diagonal makes the areas of 4096 points 1.6 and 2.6
-    times the surface's, after `denoise` .9 and 1.3 times. On the rim of an open surface half of the disc is empty,
-    and counts.
-
-    Parameters
-    ----------
-    points : (m, 3) float array
-    neighbours : (n, k) int array
-        Of each of the n points to measure, as from `nearest_neighbours`, itself first; k is at least 9, or m.
-
-    Returns
-    -------
-    (n,) float array
-        In squared units of the points.
+    times the surface's, after `denoise` .9 and 1.3 times. On the rim of an open surface half of the disc is empty, and
+    counts.
     """
     last = min(AREA_NEIGHBOURS, neighbours.shape[1] - 1)
     away = points[neighbours[:, last]] - points[neighbours[:, 0]]
@@ -85,29 +45,14 @@ def point_areas(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
 
 
 def winding_number(points: np.ndarray, normals: np.ndarray, areas: np.ndarray, queries: np.ndarray) -> np.ndarray:
-    r"""How often an oriented point cloud winds around each query: 1 inside, 0 outside.
+    r"""How often an oriented point cloud winds around each query (m, 3): 1 inside, 0 outside, .5 on the surface.
 
     .. math:: w(q) = \sum_i \frac{a_i \, (p_i - q) \cdot n_i}{4 \pi \max(|p_i - q|, h_i)^3}, \quad h_i = \sqrt{a_i}
 
     With h = 0 this is the winding number of a cloud by Barill et al. (2018), which spikes near points. With h every
     dipole is, by Newton's shell theorem, exactly averaged over a ball of radius h around the query; those farther away
-    do not change.
+    do not change. On the axis of a tube of which one half was seen it is .5, too.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float array
-        Normals are unit vectors that point outward.
-    areas : (n,) float array
-        As from `point_areas`.
-    queries : (m, 3) float array
-
-    Returns
-    -------
-    (m,) float array
-        .5 on the surface, and on the axis of a tube of which one half was seen.
-
-    Notes
-    -----
     All n times m pairs are summed, in single precision: exact up to 1e-4, and 2 ns a pair, so that 1000 queries cost
     less than the 16 nearest neighbours of all points. ``igl.fast_winding_number`` with its usual settings takes five
     times as long for 1000 queries of 4096 points, twice for 4000, and crashes on coincident points.

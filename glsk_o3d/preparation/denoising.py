@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from ..numerics.eigen import main_direction
 from ..numerics.groups import group_sum
 from ..numerics.neighbourhoods import local_outlier_ratio, nearest_left, nearest_moved, nearest_neighbours, principal
-from ..numerics.pairing import merge_nearest
+from ..numerics.pairing import Pairs, merge_pairs
 from ..numerics.vectors import PAIRS
 from .frame import MIN_POINTS
 from .surface import Surface
@@ -20,19 +20,13 @@ from .thinning import STEADY_SHARE
 RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
 RIDGE_CHUNK = 1024  # measured: points at a time: the (3, points, 32) work arrays then stay in the cache
 MOST_IN_ONE = 4  # fitted: noisy points that are averaged in a pass
+MERGE_WORTH = 0.01  # fitted: share of the points that another round of a pass must merge
 ENOUGH_NOISY = 4096  # fitted: noisy points that are enough; down to about so many they are averaged
 DENOISED_RATIO, DENOISED_NOISE = 1.8, 0.2  # fitted: local outlier ratio of a denoised outlier, and its least noise
 
 
 def average_noise(surface: Surface, k: Callable[[int], int]) -> Surface:
-    """Put means in the place of noisy points while there are plenty.
-
-    Parameters
-    ----------
-    surface : Surface
-    k : callable
-        Neighbours to look up for so many points.
-    """
+    """Put means in the place of noisy points while there are plenty; of n points `k(n)` neighbours are looked up."""
     while np.count_nonzero(surface.noise) >= 2 * ENOUGH_NOISY:
         representative, mean, weight = average_noisy(
             surface.points, surface.neighbours, surface.noise, surface.weight, ENOUGH_NOISY
@@ -47,27 +41,18 @@ def average_noise(surface: Surface, k: Callable[[int], int]) -> Surface:
 
 
 def denoise(surface: Surface, passes: int, set_aside: bool) -> Surface:
-    """Draw noisy points to the ridges of their density, and set aside those that then are outliers.
+    """Draw noisy points to the ridges of their density, and set aside those that then are outliers, if `set_aside`.
 
-    Parameters
-    ----------
-    surface : Surface
-    passes : int
-        See `subspace_mean_shift`.
-    set_aside : bool
-        Whether points may be set aside.
-
-    Returns
-    -------
-    Surface
-        With the normals of the surface as it came, since a ridge has none.
+    The surface keeps the normals that it came with, since a ridge has none.
     """
     if not (passes and surface.noise.any()):
         return surface
     denoised = subspace_mean_shift(surface.points, surface.noise, passes, surface.weight)
     k, outlier = surface.neighbours.shape[1], np.zeros(len(denoised), bool)
     neighbours = nearest_moved(denoised, surface.neighbours, surface.noise > 0)
-    found = local_outlier_ratio(_mean_distance(denoised, neighbours), neighbours) > DENOISED_RATIO
+    away = denoised[neighbours[:, 1:]] - denoised[:, None]
+    mean_distance = np.sqrt(np.einsum("nki,nki->nk", away, away)).mean(axis=1)
+    found = local_outlier_ratio(mean_distance, neighbours) > DENOISED_RATIO
     found &= (surface.noise > DENOISED_NOISE) & set_aside
     if 0 < found.sum() <= len(denoised) - max(k, MIN_POINTS):
         outlier = found
@@ -91,42 +76,24 @@ def denoise(surface: Surface, passes: int, set_aside: bool) -> Surface:
     )
 
 
-def _mean_distance(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    away = points[neighbours[:, 1:]] - points[:, None]
-    return np.sqrt(np.einsum("nki,nki->nk", away, away)).mean(axis=1)
-
-
 def average_noisy(
     points: np.ndarray, neighbours: np.ndarray, noise: np.ndarray, weight: np.ndarray, n: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Put the mean of at most four points in their place where there is noise, but keep about n of them or more.
 
     A neighbourhood that is narrower than the noise is a ball, wherever the surface is. The mean of m points has less
-    noise, and its neighbourhood is wider.
-
-    Parameters
-    ----------
-    points : (m, 3) float array
-        All different.
-    neighbours : (m, k) int array
-        Their nearest neighbours, the point itself first.
-    noise : (m,) float array
-        Points where it is 0 stay.
-    weight : (m,) float array
-        Of every point in the mean.
-    n : int
-
-    Returns
-    -------
-    representative : (m,) int array
-        The mean that each point is in.
-    mean : (c, 3) float array
-    total : (c,) float array
-        Their weight.
+    noise, and its neighbourhood is wider. Returns the mean that each point is in, (m,) int array, the means (c, 3),
+    and their `weight` (c,), the sum of that of their points (m,).
     """
-    representative = merge_nearest(
-        points, neighbours, np.where(noise > 0, min(MOST_IN_ONE, np.count_nonzero(noise) / n), 1)
-    )
+    most = np.where(noise > 0, min(MOST_IN_ONE, np.count_nonzero(noise) / n), 1)
+
+    def choose(pairs: Pairs, mass: np.ndarray) -> Pairs:
+        kept, swallowed = pairs
+        fine = mass[kept] + mass[swallowed] <= np.minimum(most[kept], most[swallowed])
+        worth_it = np.count_nonzero(fine) >= MERGE_WORTH * len(points)
+        return kept[fine & worth_it], swallowed[fine & worth_it]
+
+    representative = merge_pairs(points, neighbours, choose, most)
     representative = (np.cumsum(representative == np.arange(len(representative))) - 1)[representative]
     total = np.bincount(representative, weight)
     return representative, group_sum(weight[:, None] * points, representative, len(total)) / total[:, None], total
@@ -135,24 +102,12 @@ def average_noisy(
 def subspace_mean_shift(
     points: np.ndarray, noise: np.ndarray, passes: int, weight: np.ndarray | None = None
 ) -> np.ndarray:
-    """Move points with noisy neighbourhoods to the ridge of the density; clean points stay.
+    """Move points with noisy neighbourhoods to the ridge of the density, (n, 3) float array; clean points stay.
 
     Mean shift across the main direction of the neighbourhood (subspace-constrained mean shift, Ozertem and Erdogmus
     2011): along it, points would clump. Neighbours are those of the noisy cloud, weighted by a Gaussian whose variance
-    is their mean squared distance.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-    noise : (n,) float array
-        As from `noise_share`: the share of each step that is taken.
-    passes : int
-    weight : (n,) float array, optional
-        Points that each stands for; one by default.
-
-    Returns
-    -------
-    (n, 3) float array
+    is their mean squared distance, and by `weight` (n,). The `noise` (n,) of a point, see `noise_share`, is the share
+    of each step that is taken.
     """
     noisy = np.flatnonzero(noise)
     if passes == 0 or len(noisy) == 0:

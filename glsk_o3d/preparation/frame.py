@@ -23,46 +23,21 @@ SAME_POINT = 4e-15  # derived: a few roundings in the working frame; points near
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Similarity between the user's units and the working frame, in which weights and thresholds are stated.
+    """Similarity between the user's units and the working frame, in which weights and thresholds are stated."""
 
-    Attributes
-    ----------
-    centre : (3,) float array
-        Centre of the bounding box, in the user's units.
-    scale : float
-        User's units per unit of the frame.
-    half_extent : (3,) float array
-        Half the sides of the bounding box, in the frame.
-    diagonal : float
-        That of the box by which the frame was scaled, in the frame.
-    mean : (3,) float array or None
-        Mean of the points, in the frame, if it does not depend on how the cloud is turned.
-    reach : float
-        Distance of the farthest point from it.
-    """
-
-    centre: np.ndarray
-    scale: float
-    half_extent: np.ndarray
-    diagonal: float
-    mean: np.ndarray | None = None
-    reach: float = 0.0
+    centre: np.ndarray  # (3,) of the bounding box, in the user's units
+    scale: float  # user's units per unit of the frame
+    half_extent: np.ndarray  # (3,) half the sides of the bounding box, in the frame
+    diagonal: float  # of the box by which the frame was scaled, in the frame
+    mean: np.ndarray | None = None  # (3,) of the points, in the frame, if the frame turns with the cloud
+    reach: float = 0.0  # distance of the farthest point from it
 
     @classmethod
     def of(cls, points: np.ndarray, by: str = "box") -> Frame:
         """The frame in which the longest side of a box is 1.6.
 
-        Parameters
-        ----------
-        points : (n, 3) float array
-            Not all in one place.
-        by : {"box", "spread"}
-            The axis-aligned bounding box, as published, or the box that has the points' spread if it is evenly filled,
-            whose longest side and diagonal do not change when the cloud is turned.
-
-        Returns
-        -------
-        Frame
+        `by` is "box" for the axis-aligned bounding box, as published, or "spread" for the box that has the points'
+        spread if it is evenly filled, whose longest side and diagonal do not change when the cloud is turned.
         """
         low, high = points.min(axis=0), points.max(axis=0)
         # Half the difference first: the sum of two large coordinates would cost a digit.
@@ -112,23 +87,7 @@ class DistinctPoints(NamedTuple):
 
 
 def finite_points(points: np.ndarray, drop: bool) -> np.ndarray:
-    """Which points have finite coordinates.
-
-    Parameters
-    ----------
-    points : (N, 3) float array
-    drop : bool
-        Whether some may have none.
-
-    Returns
-    -------
-    (N,) bool array
-
-    Raises
-    ------
-    InvalidCloudError
-        Some have none, and are not to be dropped.
-    """
+    """Which points have finite coordinates, (N,) bool; InvalidCloudError for the others, if they may not `drop`."""
     finite = np.isfinite(points).all(axis=1)
     dropped = int(len(points) - finite.sum())
     if dropped and not drop:
@@ -147,23 +106,10 @@ def not_finite(n: int, total: int, first: int) -> InvalidCloudError:
 
 
 def to_working_frame(points: np.ndarray, counts: np.ndarray, by: str, k: Callable[[int], int]) -> DistinctPoints:
-    """Bring a cloud into its working frame.
+    """Bring points (n, 3), each of which stands for `counts` (n,), into their working frame, see `Frame.of`.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-        In the user's units.
-    counts : (n,) float array
-        Points that each stands for.
-    by : {"box", "spread"}
-        See `Frame.of`.
-    k : callable
-        Neighbours to look up for so many points.
-
-    Raises
-    ------
-    InvalidCloudError
-        Fewer than 8 distinct points, or so large or small that squares overflow.
+    `k` says how many neighbours to look up for so many points. InvalidCloudError if fewer than 8 points are distinct,
+    or if they are so far apart or so near that squares overflow.
     """
     if len(points) < MIN_POINTS:
         raise InvalidCloudError(f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones")

@@ -27,30 +27,10 @@ FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
 def set_aside_outliers(
     points: np.ndarray, counts: np.ndarray, by: str, k: Callable[[int], int], factor: float
 ) -> Surface:
-    """The surface that a cloud shows without its outliers.
+    """The surface that a cloud shows without its outliers, in the frame of the points without these.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-        In the user's units.
-    counts : (n,) float array
-        Points that each stands for.
-    by : {"box", "spread"}
-        See `glsk_o3d.preparation.frame.Frame.of`: the frame is that of the points without outliers.
-    k : callable
-        Neighbours to look up for so many points.
-    factor : float
-        See `inliers`; 0 keeps all.
-
-    Returns
-    -------
-    Surface
-        The representative of an outlier is the point nearest to it.
-
-    Raises
-    ------
-    InvalidCloudError
-        See `to_working_frame`.
+    The arguments are those of `to_working_frame` and, as `factor`, `inliers`; 0 keeps all. The representative of an
+    outlier is the point nearest to it.
     """
     frame, cloud, representative, weight, distance, neighbours = to_working_frame(points, counts, by, k)
     outlier = np.zeros(len(points), bool)
@@ -84,26 +64,8 @@ def inliers(
     """The points left when those far from all others are set aside, round by round.
 
     An outlier is `factor` times farther from its neighbours than these are from theirs. Where there are many, its
-    neighbours are outliers, too; then what floats in space goes, see `in_floating_cluster`.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-    weight : (n,) float array
-        Points that each stands for.
-    distance : (n, k) float array
-    neighbours : (n, k) int array
-        As from `nearest_neighbours`.
-    factor : float
-    least : int
-        Points to leave at least.
-
-    Returns
-    -------
-    left : (m,) int array
-        Rows, ascending.
-    neighbours : (m, k) int array
-        Their nearest neighbours among those left.
+    neighbours are outliers, too; then what floats in space goes, see `in_floating_cluster`. At least `least` points are
+    left. Returned are their rows (m,), ascending, and their nearest neighbours among those left, (m, k).
     """
     left = np.arange(len(points))
     for _ in range(OUTLIER_ROUNDS):
@@ -125,22 +87,10 @@ def inliers(
 
 
 def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """Points that float in space, among others that do.
+    """Points that float in space, among others that do, (n,) bool array.
 
-    They are far from their neighbours for what is some steps away, or anywhere if they are an island; and together
-    they fill space, or are a handful alone. A sparse surface is flat, and a sparse limb long.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-    weight : (n,) float array
-    mean : (n,) float array
-        Distance to the neighbours.
-    neighbours : (n, k) int array
-
-    Returns
-    -------
-    (n,) bool array
+    They are far from their neighbours, a distance `mean` (n,), for what is some steps away, or anywhere if they are an
+    island; and together they fill space, or are a handful alone. A sparse surface is flat, and a sparse limb long.
     """
     densest = row_medians(mean.take(neighbours))
     for _ in range(DENSEST_HOPS):

@@ -28,19 +28,10 @@ class Sample(NamedTuple):
 def sample_cloud(points: np.ndarray, n: int, counts: np.ndarray | None = None) -> Sample:
     """About n points that stand for a cloud of more than twice as many, or all of a smaller one.
 
-    Parameters
-    ----------
-    points : (m, 3) float array
-    n : int
-    counts : (m,) float array, optional
-        Points of another cloud that each of these stands for already.
+    Each of the points may stand for `counts` (m,) points of another cloud already.
     """
-    if counts is None:
-        return sample_grid(points, n) if len(points) > 2 * n else everybody(points)
-    if len(points) <= 2 * n:
-        return everybody(points)._replace(counts=counts)
-    sample = sample_grid(points, n)
-    return sample._replace(counts=np.bincount(sample.representative, counts))
+    sample = sample_grid(points, n) if len(points) > 2 * n else everybody(points)
+    return sample if counts is None else sample._replace(counts=np.bincount(sample.representative, counts))
 
 
 def everybody(points: np.ndarray) -> Sample:
@@ -62,13 +53,7 @@ class Grid(NamedTuple):
 
 
 class Extent:
-    """How far a cloud reaches, told by its points in any number of blocks, whatever their order.
-
-    Attributes
-    ----------
-    n : int
-        Points so far.
-    """
+    """How far a cloud of `n` points reaches, told by its points in any number of blocks, whatever their order."""
 
     def __init__(self) -> None:
         self.n = 0
@@ -89,13 +74,7 @@ class Extent:
         self.n += len(points)
 
     def grid(self) -> Grid:
-        """A grid around the points: a few far off do not decide how wide its cells are.
-
-        Raises
-        ------
-        InvalidCloudError
-            See `check_extent`.
-        """
+        """A grid around the points, see `check_extent`: a few far off do not decide how wide its cells are."""
         ends = np.stack([self._low, self._high])
         check_extent(ends, self.n)
         some = self._some if len(self._some) else ends  # nothing but copies
@@ -117,13 +96,8 @@ def _mixed(points: np.ndarray) -> np.ndarray:
 def occupied_cells(codes: np.ndarray, bits: int, n: int) -> list[int]:
     """Numbers of occupied cells of grids each twice as fine as the one before, from one cell to at least n, or to all.
 
-    Parameters
-    ----------
-    codes : (m,) uint64 array
-        Morton codes of the occupied cells of the finest of them, in order; they may repeat.
-    bits : int
-        Per axis of these.
-    n : int
+    `codes` are sorted Morton codes of the occupied cells of the finest grid, with so many `bits` per axis; they may
+    repeat.
     """
     counts = [1]
     while counts[-1] < n and len(counts) <= bits:
@@ -142,24 +116,7 @@ def cells_along(counts: list[int], n: int) -> float:
 
 
 def sample_grid(points: np.ndarray, n: int) -> Sample:
-    """Keep of every cell of a cubic grid with about n occupied cells the point nearest to the mean of its points.
-
-    Parameters
-    ----------
-    points : (m, 3) float array
-    n : int
-        Less than m.
-
-    Returns
-    -------
-    Sample
-        One point per cell, about n.
-
-    Raises
-    ------
-    InvalidCloudError
-        See `check_extent`.
-    """
+    """Keep of every cell of a cubic grid with about n occupied cells the point nearest to the mean of its points."""
     extent = Extent()
     extent.add(points)
     grid = extent.grid()

@@ -17,21 +17,11 @@ CELLS_KEPT = 8  # derived: cells of the finest grid kept, over those wanted: of 
 
 
 def sample_blocks(blocks: Blocks, size: Callable[[int], int]) -> tuple[np.ndarray, np.ndarray]:
-    """The points that `sample_cloud` keeps, and how many each stands for; memory does not grow with the cloud.
+    """The points (c, 3) that `sample_cloud` keeps, and how many each stands for, (c,); `size` says how many of so many.
 
-    The cloud is read four times: for how far it reaches, how fine the grid must be, the means of the cells, and the
-    points nearest to them; a small one twice. Copies of a point count, unlike those in memory.
-
-    Parameters
-    ----------
-    blocks : callable
-    size : callable
-        How many points are wanted of so many.
-
-    Returns
-    -------
-    points : (c, 3) float array
-    counts : (c,) int array
+    The cloud is read four times, and memory does not grow with it: for how far it reaches, how fine the grid must be,
+    the means of the cells, and the points nearest to them; a small one twice. Copies of a point count, unlike those in
+    memory.
     """
     extent = Extent()
     for points in blocks():

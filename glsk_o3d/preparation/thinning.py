@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 
 from ..numerics.eigen import principal_parts
 from ..numerics.neighbourhoods import nearest_left, principal
-from ..numerics.pairing import final_representatives, mutual_pairs
+from ..numerics.pairing import Pairs, merge_pairs
 from ..numerics.vectors import PAIRS, TINY
 from .surface import Surface
 
@@ -40,14 +40,8 @@ class Thinned(NamedTuple):
 def thin_surface(surface: Surface, around: float, most: int, k: Callable[[int], int]) -> Thinned:
     """Merge points where there are more than enough, and then until no more than `most` are left.
 
-    Parameters
-    ----------
-    surface : Surface
-    around : float
-        Points around a part that are enough, see `spacing_enough`; 0 merges none for this.
-    most : int
-    k : callable
-        Neighbours to have among so many points.
+    See `spacing_enough` for how many points `around` a part are enough; 0 merges none for this. `k` says how many
+    neighbours to have among so many points.
     """
     points, all_of_them = surface.points, np.arange(len(surface))
     thinned = Thinned(all_of_them, all_of_them, surface.neighbours, surface.spread, surface.ring_normals)
@@ -72,40 +66,24 @@ def _merged(points: np.ndarray, thinned: Thinned, representative: np.ndarray, k:
 
 
 def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:
-    """Merge mutual nearest neighbours, round by round, in the last one the nearest, until n points are left.
+    """Merge mutual nearest neighbours, round by round, in the last one the nearest, until n >= 1 points are left.
 
     Gaps stay smaller than in a random sample, and dense parts stay dense: scanners and meshes have them where there is
     detail. No point moves. It does not depend on the order of the points, nor on how they are turned, but where
     distances are equal: on grids a point's nearest neighbour is any of several, and more than n points may be left
-    because no two choose each other.
-
-    Parameters
-    ----------
-    points : (m, 3) float array
-        All different.
-    neighbours : (m, k) int array
-        Their nearest neighbours, the point itself first.
-    n : int
-        At least 1.
-
-    Returns
-    -------
-    (m,) int array
-        The point that each was merged into; itself for those that are left.
+    because no two choose each other. Returned is the point that each was merged into, as by `merge_pairs`.
     """
-    left = np.ones(len(points), bool)
-    representative = np.arange(len(points))
-    while ASK_AGAIN * len(points) < left.sum() > n:
-        kept, swallowed = mutual_pairs(points, neighbours, left)
-        if len(kept) == 0:
-            break
-        most = left.sum() - n
-        if len(kept) > most:
-            nearest = np.argsort(((points[kept] - points[swallowed]) ** 2).sum(axis=1), kind="stable")[:most]
-            kept, swallowed = kept[nearest], swallowed[nearest]
-        representative[swallowed] = kept
-        left[swallowed] = False
-    representative = final_representatives(representative)
+
+    def choose(pairs: Pairs, mass: np.ndarray) -> Pairs:
+        kept, swallowed = pairs
+        too_many = np.count_nonzero(mass) - n
+        if len(kept) <= too_many:
+            return pairs
+        nearest = np.argsort(((points[kept] - points[swallowed]) ** 2).sum(axis=1), kind="stable")[:too_many]
+        return kept[nearest], swallowed[nearest]
+
+    representative = merge_pairs(points, neighbours, choose, least=max(n, ASK_AGAIN * len(points)))
+    left = representative == np.arange(len(points))
     rows = np.flatnonzero(left)
     if n < len(rows) < len(points):
         around = nearest_left(points, neighbours, left, min(neighbours.shape[1], len(rows)))
@@ -116,69 +94,43 @@ def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:
 def thin_nearer(points: np.ndarray, neighbours: np.ndarray, apart: np.ndarray) -> np.ndarray:
     """Merge mutual nearest neighbours that are nearer than they are to be, round by round, as long as it is worth it.
 
-    Of two the one stays that more were merged into, so that none wanders along rows of points that get ever denser.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-        All different.
-    neighbours : (n, k) int array
-        Their nearest neighbours, the point itself first.
-    apart : (n,) float array
-        How far apart they are to be; of two points the lesser counts.
-
-    Returns
-    -------
-    (n,) int array
-        The point that each was merged into; itself for those that are left.
+    Of two points the lesser distance `apart` (n,) counts, and the one stays that more were merged into, so that none
+    wanders along rows of points that get ever denser. Returned is the point that each was merged into.
     """
-    left, representative, mass = np.ones(len(points), bool), np.arange(len(points)), np.ones(len(points), int)
-    while True:
-        pairs = np.stack(mutual_pairs(points, neighbours, left))
-        nearer = ((points[pairs[0]] - points[pairs[1]]) ** 2).sum(axis=1) < apart[pairs].min(axis=0) ** 2
-        if np.count_nonzero(nearer) <= LEAST_MERGED * len(points):
-            return final_representatives(representative)
-        pairs = pairs[:, nearer]
-        kept, swallowed = np.where(mass[pairs[0]] < mass[pairs[1]], pairs[::-1], pairs)
-        mass[kept] += mass[swallowed]
-        representative[swallowed], left[swallowed] = kept, False
+
+    def choose(pairs: Pairs, mass: np.ndarray) -> Pairs:
+        kept, swallowed = pairs
+        reach = np.minimum(apart[kept], apart[swallowed])
+        nearer = ((points[kept] - points[swallowed]) ** 2).sum(axis=1) < reach**2
+        nearer &= np.count_nonzero(nearer) > LEAST_MERGED * len(points)
+        kept, swallowed = kept[nearer], swallowed[nearer]
+        swap = mass[kept] < mass[swallowed]
+        return np.where(swap, swallowed, kept), np.where(swap, kept, swallowed)
+
+    return merge_pairs(points, neighbours, choose)
 
 
 def spacing_enough(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray, around: float) -> np.ndarray:
-    r"""How far apart points may be, so that `around` of them are around every part, and enough on the body.
+    """How far apart points may be, (n,), so that `around` of them are around every part, and enough on the body.
 
     The circumference of the part that a point is on is its points around times their spacing, see `points_around`;
     measured point by point it is rough, and what is left would be as uneven. So its inverse is averaged over the
     surface. Flat and thick parts have no more than their share of 2400 points, spread evenly over all of the surface.
     Nowhere more than twice the spacing that there is: fewer points are measured again, with less noise.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-    neighbours : (n, k) int array
-        Their nearest neighbours, the point itself first.
-    spread : (n, 3) float array
-        As from `principal`.
-    around : float
-        Less than 1 is 1.
-
-    Returns
-    -------
-    (n,) float array
     """
     k = neighbours.shape[1]
     # the variance of a disc is a quarter of R^2, that of a row of points a twelfth of its length squared
     disc = np.sqrt(4 * np.pi * np.sqrt(spread[:, 1] * spread[:, 2])) / k
     spacing = np.maximum(disc, np.sqrt(12 * spread[:, 2] / k) / k)
-    bent = 1 / (np.maximum(points_around(points, neighbours, spread), LEAST_AROUND) * np.maximum(spacing, TINY))
-    mean_over = _mean_over(neighbours)
+    average = mean_over(neighbours)
+    bent = 1 / (np.maximum(points_around(points, average, spread), LEAST_AROUND) * np.maximum(spacing, TINY))
     for _ in range(SMOOTHING):
-        bent = mean_over @ bent
+        bent = average @ bent
     among = np.minimum(1 / (max(around, 1) * np.maximum(bent, TINY)), np.sqrt(spacing @ spacing / ENOUGH))
     return np.minimum(np.sqrt(PACKED) * among, 2 * spacing)
 
 
-def points_around(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray) -> np.ndarray:
+def points_around(points: np.ndarray, average: csr_array, spread: np.ndarray) -> np.ndarray:
     r"""Points around the part that each point is on, its circumference over their spacing, whatever the noise.
 
     A disc of k points of a tube with N points around it rises above its plane by :math:`\sigma_1 / \sigma_3 =
@@ -188,23 +140,13 @@ def points_around(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray
     neighbours, all together. In them edges, gaps and other parts look like thin parts. Where they are no sheet but a
     line, a part with less than ten points around it, all of :math:`\sigma_1` is its thickness.
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-    neighbours : (n, k) int array
-        Their nearest neighbours, the point itself first.
-    spread : (n, 3) float array
-        As from `principal`.
-
-    Returns
-    -------
-    (n,) float array
-        Infinite where nothing but noise is seen.
+    `average` is `mean_over` the neighbours, and `spread` as from `principal`. (n,) float array, infinite where nothing
+    but noise is seen.
     """
-    k, mean_over = neighbours.shape[1], _mean_over(neighbours)
+    k = average.nnz // len(points)
     moments = np.column_stack([points, *(points[:, i] * points[:, j] for i, j in PAIRS)])
     for _ in range(WIDER_STEPS):
-        moments = mean_over @ moments
+        moments = average @ moments
     mean, square = moments[:, :3].T, moments[:, 3:].T
     wider = principal_parts(square - [mean[i] * mean[j] for i, j in PAIRS])[0]
     near = np.maximum(spread.T / k, TINY)
@@ -215,7 +157,7 @@ def points_around(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray
         return WIDER_BIAS * np.sqrt(np.pi * k / 4 * near[2] / bent)
 
 
-def _mean_over(neighbours: np.ndarray) -> csr_array:
+def mean_over(neighbours: np.ndarray) -> csr_array:
     """The matrix that takes values to their means over the neighbours."""
     n, k = neighbours.shape
     return csr_array((np.full(neighbours.size, 1 / k), neighbours.ravel(), k * np.arange(n + 1)), shape=(n, n))

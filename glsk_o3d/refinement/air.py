@@ -12,7 +12,7 @@ from ..numerics.polylines import place_at
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
 from .evidence import Evidence
-from .loops import crossings
+from .loops import crossings, positions
 from .merging import drop_edges, drop_lone_vertices
 from .scores import AIR_WEIGHTS, probability
 
@@ -23,23 +23,9 @@ LEAST_SCATTER = 0.05  # fitted: of winding numbers along a skeleton
 
 
 def cut_air(skeleton: Skeleton, evidence: Evidence, noise: float, least: float) -> tuple[Skeleton, list[Judgement]]:
-    """Cut every branch where it probably crosses air.
+    """Cut every branch where it crosses air with a probability of `least` or more; one judgement for each branch.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Fitted to its axis.
-    evidence : Evidence
-    noise : float
-        Mean share of noise of the cloud, from 0 to 1.
-    least : float
-        Probability from which on a branch is cut.
-
-    Returns
-    -------
-    Skeleton
-    judgements : list of Judgement
-        One for each branch.
+    The skeleton was fitted to its axis; `noise` is the mean share of noise of the cloud, from 0 to 1.
     """
     judgements, gone = [], []
     for branch, place, facts in branch_facts(skeleton, evidence, noise):
@@ -69,13 +55,8 @@ def branch_facts(
     - inner: whether both ends have other branches;
     - length: in radii.
 
-    Yields
-    ------
-    branch : (p,) int array
-        A ring begins where its winding number is greatest.
-    place : int
-        Position in the branch of the first end of the weakest edge.
-    facts : dict of str to float
+    With them comes the branch, (p,) int array, of which a ring begins where its winding number is greatest, and the
+    position in it of the first end of the weakest edge.
     """
     vertices, edges, m = skeleton.vertices, skeleton.edges, len(skeleton.vertices)
     length = np.maximum(skeleton.edge_lengths, TINY)
@@ -87,7 +68,7 @@ def branch_facts(
     area = along.sum()
     seen = max(area / max(tubes, area * TINY, TINY), TINY)  # a line has no tubes
     spacing = np.sqrt(np.median(evidence.areas))
-    pairs, weight = evidence.bonds(skeleton)
+    bonds = evidence.bonds(skeleton)
     around, keys = _neighbours(skeleton), edges @ [m, 1]
 
     def numbers(path: np.ndarray) -> np.ndarray:
@@ -96,41 +77,33 @@ def branch_facts(
     for branch in skeleton.branches:
         if branch[0] == branch[-1]:
             ring = np.roll(branch[:-1], -int(np.argmax(winding[numbers(branch)])))
-            branch, crossing = np.append(ring, ring[0]), float(crossings(ring, m, pairs, weight).min()) / 2
+            branch, bonded = np.append(ring, ring[0]), crossings(positions(ring, m), len(ring), bonds, closed=True)
         else:
-            crossing = _crossing(branch, around, m, pairs, weight)
+            bonded = crossings(_sides(branch, around, m), len(branch), bonds, closed=False)[:-1]
         edge = numbers(branch)
         # of a line, which has no thickness, what rounding leaves
         radius = max(float(np.median(skeleton.radii[branch])), float(np.finfo(float).eps * length.sum()), TINY)
-        end = np.cumsum(length[edge])
-        window = _Window(end - length[edge] / 2, np.append(0, end), AIR_WINDOW * radius)
-        smooth = window.mean(winding[edge] * length[edge])
+        smooth = _window_means(winding[edge] * length[edge], length[edge], AIR_WINDOW * radius)
         k = int(np.argmin(smooth))
-        surface = window.mean(along[edge])[k] / (2 * np.pi * radius)
+        surface = _window_means(along[edge], length[edge], AIR_WINDOW * radius)[k] / (2 * np.pi * radius)
         facts = dict(
             deficit=np.log1p(max((typical - smooth[k]) / max(scatter, TINY), 0)),
             surface=np.log(max(surface / seen, 0) + 0.05),
             straightness=_straightness(vertices, around, branch, k, radius),
             noise=noise,
-            bonds=np.log(crossing * spacing / (2 * np.pi * radius) + 0.05),
+            bonds=np.log(float(bonded.min()) / 2 * spacing / (2 * np.pi * radius) + 0.05),
             inner=float((skeleton.degree[branch[[0, -1]]] > 1).all()),
-            length=np.log(end[-1] / radius + 0.1),
+            length=np.log(np.cumsum(length[edge])[-1] / radius + 0.1),
         )
         yield branch, k, facts
 
 
-class _Window:
-    """Means over a stretch of a path around each of some places."""
-
-    def __init__(self, places: np.ndarray, ends: np.ndarray, width: float) -> None:
-        self._ends = ends
-        self._low, self._high = np.maximum(places - width / 2, 0), np.minimum(places + width / 2, ends[-1])
-
-    def mean(self, amounts: np.ndarray) -> np.ndarray:
-        """Per length, of what is spread evenly over every edge."""
-        total = np.append(0, np.cumsum(amounts))
-        inside = np.interp(self._high, self._ends, total) - np.interp(self._low, self._ends, total)
-        return inside / np.maximum(self._high - self._low, TINY)
+def _window_means(amounts: np.ndarray, lengths: np.ndarray, width: float) -> np.ndarray:
+    """Amounts per length in a window around the middle of every edge of a path, over which they are spread evenly."""
+    stop, total = np.cumsum(lengths), np.append(0, np.cumsum(amounts))
+    ends, middle = np.append(0, stop), stop - lengths / 2
+    low, high = np.maximum(middle - width / 2, 0), np.minimum(middle + width / 2, stop[-1])
+    return (np.interp(high, ends, total) - np.interp(low, ends, total)) / np.maximum(high - low, TINY)
 
 
 def _neighbours(skeleton: Skeleton) -> list[list[tuple[int, float]]]:
@@ -141,30 +114,22 @@ def _neighbours(skeleton: Skeleton) -> list[list[tuple[int, float]]]:
     return around
 
 
-def _crossing(
-    branch: np.ndarray, around: list[list[tuple[int, float]]], m: int, pairs: np.ndarray, weight: np.ndarray
-) -> float:
-    """Least weight of the bonds that cross an edge of a branch, from what is on its one side to what is on the other.
+def _sides(branch: np.ndarray, around: list[list[tuple[int, float]]], m: int) -> np.ndarray:
+    """Positions of m vertices in a branch, (m,) int array; -1 of those that do not count.
 
     Vertices beyond its ends, a few edges away, count to their side, but those that are near both.
     """
-    last, inner = len(branch) - 1, set(branch[1:-1].tolist())
-    sides = []
+    inner, sides = set(branch[1:-1].tolist()), []
     for start, stop in ((int(branch[0]), int(branch[-1])), (int(branch[-1]), int(branch[0]))):
         found, front = {start}, [start]
         for _ in range(CROSSING_HOPS):
             front = [v for u in front for v, _ in around[u] if v not in found and v not in inner and v != stop]
             found.update(front)
         sides.append(found)
-    place = np.full(m, -1)
+    place = positions(branch, m)
     place[list(sides[0] - sides[1])] = 0
-    place[list(sides[1] - sides[0])] = last
-    place[branch] = np.arange(last + 1)
-    first, second = np.sort(place[pairs], axis=1).T
-    inside = first >= 0
-    first, second, weight = first[inside], second[inside], weight[inside]
-    steps = np.bincount(first, weight, last + 1) - np.bincount(second, weight, last + 1)
-    return max(float(np.cumsum(steps)[:-1].min()) / 2, 0.0)
+    place[list(sides[1] - sides[0])] = len(branch) - 1
+    return place
 
 
 def _straightness(

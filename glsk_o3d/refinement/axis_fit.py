@@ -16,8 +16,9 @@ from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
 from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, dot, norm, unit
 from ..skeleton import Skeleton
-from .sections import HalfAxes, half_axes, normal_moments
-from .surface_graph import SurfaceGraph
+from .evidence import SurfaceGraph
+from .sections import Sections, half_axes, normal_moments
+from .vertex_points import VertexPoints
 
 FIT_STIFFNESS = 1.0  # fitted: length over which the curve hardly bends, over the half width of its section
 FIT_DIFFUSION = 0.6  # fitted: length over which the places of points are smoothed on the surface, over that
@@ -28,47 +29,45 @@ FIT_WALK = 3  # measured: vertices by which a point may move along the curve in 
 # derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
 FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
 HALF_SUPPORT = 8  # fitted: points that support a vertex half
+# the axis of half a tube is 2 / pi radii away from the mean of its points, which scatter around that by their standard
+# deviation; no axis is farther off
+HALF_TUBE_REACH = (2 / np.pi) / np.sqrt(1 - (2 / np.pi) ** 2)
+
+
+def pull_back_detached(skeleton: Skeleton) -> Skeleton:
+    """Pull vertices as near to the mean of their points as half a tube's axis is.
+
+    Thin tips leave their points in late solves. A vertex without points stays.
+    """
+    cloud, m = VertexPoints(skeleton), len(skeleton.vertices)
+    count = np.maximum(cloud.count, 1)
+    mean = group_sum(cloud.offset, cloud.vertex, m) / count[:, None]
+    spread = group_sum((cloud.points - (skeleton.vertices + mean)[cloud.vertex]) ** 2, cloud.vertex, m).sum(axis=1)
+    reach = HALF_TUBE_REACH * np.sqrt(spread / count)
+    away = norm(mean)
+    back = 1 - np.minimum(reach, away) / np.maximum(away, TINY)
+    return replace(skeleton, vertices=skeleton.vertices + back[:, None] * mean)
 
 
 def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = None) -> Skeleton:
     r"""Move the vertices to the axis of the surface; measure how well the points say where it is, and how far it is.
 
     The plane through a point p of a limb, spanned by its normal n and the tangent t of the axis, contains the axis:
-    b (x(p) - p) = 0 with b = n x t and x(p) the place of the curve that p belongs to. On a flat section, where the
-    normals of a face do not meet, the same sum of squares has its minimum at the middle of the width. Each pass
-    minimises, over all vertices at once,
+    with b = n x t and the place x(p) of the curve that p belongs to, b (x(p) - p) = 0. On a flat section the same sum
+    of squares is least at the middle of the width. Each pass minimises, over all vertices at once,
 
     .. math:: \sum_p (b \cdot (x(p) - p))^2 + \mu d |(x(p) - p)_\perp|^2
         + \sum_v c (\lambda |x_v - chord|^2 + \epsilon |x_v - old|^2 + ((x_v - old) \cdot t)^2)
 
-    with c the number of points at a vertex. The doubt d, from 0 to 1, is the share of the distance from the curve that
-    the normals do not explain; where it is large, noise is as wide as the part and the
-    points say more than their normals. :math:`\lambda = (w / h)^4` with the half width w and the spacing h of the
-    vertices keeps the curve from bending within a half width, however many vertices there are. The normals say how
-    wide a section is, see `half_axes`, and as far as there is doubt the second moments of its points. A half tube,
-    scanned from one side, has an axis, but the centroid of its points is off it. So the first pass takes the normals
-    alone.
+    with c points at a vertex, and :math:`\lambda = (w / h)^4` with the half width w and the spacing h of the vertices,
+    so that the curve does not bend within a half width. The doubt d, from 0 to 1, is the share of the distance from the
+    curve that the normals do not explain: noise as wide as the part, whose points say more than their normals. The axis
+    of half a tube is off the centroid of its points, so the first pass takes the normals alone. The nearest place of a
+    wiggly curve has its wiggle: it is smoothed on the surface by .6 half widths, and x(p) is the place nearest to that.
 
-    **The place of a point is smoothed on the surface.** The nearest place of a wiggly curve has its wiggle, and a curve
-    fitted to the points that its own wiggle gave it keeps it. So the nearest places, as positions in space, are
-    diffused over the surface by .6 half widths, and x(p) is the place nearest to that. Points may move along the curve
-    by three vertices in every pass.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    passes : int
-        0 leaves the vertices where they are.
-    surface : SurfaceGraph, optional
-        Of this skeleton's points; made anew unless given.
-
-    Returns
-    -------
-    Skeleton
-        With the confidence (1 - d) c / (c + 8), where c counts over the vertex and its neighbours: near 1 on the axis
-        of a limb, near 0 where the normals have no axis in common or points are few; and with radii, those of circles
-        with the area of the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to
-        the vertex nearest to their place.
+    The confidence is (1 - d) c / (c + 8), where c counts over the vertex and its neighbours. The radii are those of
+    circles with the area of the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to
+    the vertex nearest to their place.
     """
     m, ends = len(skeleton.vertices), skeleton.edges
     points = skeleton.supporting_points
@@ -80,8 +79,9 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     vertex, edges_at = skeleton.vertex_of_point[points], incident_edges(ends, m)
     pattern = _Pattern(skeleton, edges_at)
     low, high = axis_box(p)
-    near, place = _nearest(x, ends, edges_at[vertex], p, n, p, skeleton.radii), p
-    smooth = _smoother((surface or SurfaceGraph.of(skeleton)) if passes else None, points, p)
+    near = _nearest(x, ends, edges_at[vertex], p, n, p, skeleton.radii)
+    if passes:
+        smooth = _smoother(surface or SurfaceGraph.of(skeleton), points, p)
     for step in range(passes):
         edge, t = nearest_on_edges(x, ends, edges_at[vertex], p)
         place = x[ends[edge, 0]] + t[:, None] * (x[ends[edge, 1]] - x[ends[edge, 0]])
@@ -101,21 +101,19 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
         skeleton = replace(skeleton, vertex_of_point=owner)
     radii = _plane_radii(skeleton, x + centre)
     if passes:  # the distance from a curve that nobody has centred is no radius
-        equal = np.where(near.support > 0, np.sqrt(near.sections.half_width * near.sections.half_thickness), radii)
+        equal = np.where(near.support > 0, near.sections.radius, radii)
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
     confidence = (1 - near.doubt) * near.support / (near.support + HALF_SUPPORT)
     return replace(skeleton, vertices=x + centre, confidence=confidence, radii=radii)
 
 
 def _smoother(
-    surface: SurfaceGraph | None, points: np.ndarray, p: np.ndarray
+    surface: SurfaceGraph, points: np.ndarray, p: np.ndarray
 ) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     """What smooths places of points on the surface, each over a length of its own.
 
     Points that the surface leaves out move as far as the one nearest to them.
     """
-    if surface is None:
-        return lambda place, length: place
     diffusion, node = surface.diffusion, np.searchsorted(points, surface.supporting)
     node = np.minimum(node, len(points) - 1)
     there = points[node] == surface.supporting  # points of vertices without edges have no place
@@ -154,7 +152,7 @@ class _Nearest(NamedTuple):
     offset: np.ndarray  # x(p) - p
     doubt: np.ndarray  # d, of every vertex
     support: np.ndarray  # points at every vertex and its neighbours
-    sections: HalfAxes  # at every vertex
+    sections: Sections  # at every vertex
     width: np.ndarray  # half of the section's, at every vertex
 
 
@@ -198,8 +196,8 @@ def _nearest(
 def _spread_width(moments: np.ndarray) -> np.ndarray:
     r"""Half width of sections by their points: from second moments around the axis, (m, 6) float array.
 
-    With the eigenvalues a >= b across the limb it is :math:`\sqrt{a (3 - b / a)}`: exact around a circle, where
-    a = b = r^2 / 2, also for half of one, and on a flat strip, where a = w^2 / 3.
+    With the eigenvalues a >= b across the limb it is :math:`\sqrt{a (3 - b / a)}`: exact around a circle, where a = b =
+    r^2 / 2, also for half of one, and on a flat strip, where a = w^2 / 3.
     """
     _, less, most = np.linalg.eigvalsh(moments[:, FULL]).T
     return np.sqrt(np.maximum(3 * most - np.clip(less, 0, most), 0))

@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from ..judgements import Judgement
+from ..numerics.near_links import linked
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
@@ -37,19 +37,8 @@ class _End(NamedTuple):
 def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
     """Join ends with other ends, or with the side of something, where the object probably goes on; the surest first.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    evidence : Evidence
-    least : float
-        Probability from which on a gap is bridged.
-
-    Returns
-    -------
-    Skeleton
-        With an edge for each bridge.
-    judgements : list of Judgement
-        One for each end that points at something, of its likeliest bridge.
+    A gap is bridged by an edge from a probability of `least` on. There is one judgement for each end that points at
+    something, of its likeliest bridge.
     """
     found = [(probability(BRIDGE_WEIGHTS, facts), pair) for pair, facts in gap_facts(skeleton, evidence)]
     used: set[int] = set()
@@ -67,16 +56,11 @@ def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
 
 
 def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:
-    """What speaks for and against a bridge, for every end and the places that it points at.
+    """What speaks for and against a bridge, for every end and the places that it points at: (leaf, vertex), and facts.
 
-    The facts are: the least winding number along the bridge, over the median on the skeleton; the cosine between
-    bridge and end; and how far the end is closed: the flux of its outward normals through its cross-section, 1 for a
-    cap and 0 for a tube cut open, as a logarithm.
-
-    Yields
-    ------
-    (leaf, vertex) : two int
-    facts : dict of str to float
+    The facts are: the least winding number along the bridge, over the median on the skeleton; the cosine between bridge
+    and end; and how far the end is closed: the flux of its outward normals through its cross-section, 1 for a cap and 0
+    for a tube cut open, as a logarithm.
     """
     ends = list(_ends(skeleton))
     if not ends or not len(evidence.points):
@@ -85,7 +69,7 @@ def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[in
     if typical < LEAST_INSIDE:
         return  # parts too thin to have an inside, which could go on across a gap
     leaves = [end.leaf for end in ends]
-    along = _along(skeleton, leaves)
+    along = dijkstra(linked(skeleton.vertices, skeleton.edges), indices=leaves)
     found = [
         (end, other, float(cosine))
         for i, end in enumerate(ends)
@@ -126,13 +110,6 @@ def _aims(
             yield other, cosine[other]
 
 
-def _along(skeleton: Skeleton, starts: list[int]) -> np.ndarray:
-    """Length of the way along the skeleton from some vertices to all, (s, M) float array."""
-    m, (a, b) = len(skeleton.vertices), skeleton.edges.T
-    graph = coo_array((np.maximum(skeleton.edge_lengths, TINY), (a, b)), shape=(m, m)).tocsr()
-    return dijkstra(graph, directed=False, indices=starts)
-
-
 def _cap(end: _End, evidence: Evidence) -> float:
     """Flux of the normals that look out of an end, through its cross-section, at least 0."""
     offset = evidence.points - end.place
@@ -150,12 +127,7 @@ def _ends(skeleton: Skeleton) -> Iterator[_End]:
         radius = float(np.median(skeleton.radii[branch]))
         for path in (branch, branch[::-1]):
             if skeleton.degree[path[0]] == 1 and radius > 0:
-                place = skeleton.vertices[path[0]]
-                yield _End(int(path[0]), place, _outward(skeleton.vertices[path], BRIDGE_LOOK_BACK * radius), radius)
-
-
-def _outward(path: np.ndarray, back: float) -> np.ndarray:
-    """Unit vector from the place so far back along a path to its start."""
-    travelled = arc_lengths(path)[1:]
-    way = path[0] - path[min(int(np.searchsorted(travelled, back)), len(travelled) - 1) + 1]
-    return way / max(np.linalg.norm(way), TINY)
+                places = skeleton.vertices[path]
+                back = int(np.searchsorted(arc_lengths(places)[1:], BRIDGE_LOOK_BACK * radius)) + 1
+                way = places[0] - places[min(back, len(path) - 1)]
+                yield _End(int(path[0]), places[0], way / max(np.linalg.norm(way), TINY), radius)

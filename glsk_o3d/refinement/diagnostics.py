@@ -11,6 +11,7 @@ from ..numerics.components import component_labels
 from ..numerics.groups import group_median, group_sum
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
+from .vertex_points import VertexPoints
 
 # All fitted; what tubes and balls have is derived.
 SHEET_SHARE = 0.9  # of one direction among the normals around a vertex; a tube has 0.5, half a tube too
@@ -34,13 +35,12 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     that is neither, the parts with little confidence are named, and the least certain question about loops, air and
     gaps. No edges at all are a reason, too.
     """
-    supporting = skeleton.supporting_points
-    if len(supporting) == 0:
+    cloud = VertexPoints(skeleton)
+    if len(cloud.rows) == 0:
         return []
-    vertex, normals = skeleton.vertex_of_point[supporting], skeleton.normals[supporting]
+    vertex, normals, count = cloud.vertex, cloud.normals, cloud.count
     along = np.einsum("ni,nj->nij", normals, normals)
 
-    count = np.bincount(vertex, minlength=len(skeleton.vertices))
     one_way = np.linalg.eigvalsh(group_sum(along, vertex, len(count)))[:, 2] > SHEET_SHARE * np.maximum(count, 1)
     sheet = count[one_way].sum() / len(vertex)
     if sheet > MAJORITY:
@@ -51,7 +51,7 @@ def diagnose(skeleton: Skeleton) -> list[str]:
         ]
 
     component, n = skeleton.component_of_vertex[vertex], skeleton.n_components
-    points = skeleton.points[supporting] - skeleton.vertices[0]
+    points = cloud.points - skeleton.vertices[0]
     size = np.bincount(component, minlength=n)[:, None]
     # of every normal line I - n n^T, which takes away what is along it
     weight = (size[:, :, None] + 1e-9 * np.maximum(size, 1)[:, :, None]) * np.eye(3) - group_sum(along, component, n)
@@ -71,8 +71,8 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     spread = group_sum(np.einsum("ni,nj->nij", points, points), component, n) / np.maximum(size, 1)[:, :, None]
     mean = group_sum(points, component, n) / np.maximum(size, 1)
     length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread - mean[:, :, None] * mean[:, None])[:, 2], 0))
-    reach = norm(skeleton.points[supporting] - skeleton.vertices[vertex])
-    share = size[length < STUB_LENGTH * group_median(reach, component, n)].sum() / len(vertex)
+    reach = group_median(norm(cloud.offset), component, n)
+    share = size[length < STUB_LENGTH * reach].sum() / len(vertex)
     if share > MAJORITY:
         return [
             f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
@@ -98,20 +98,8 @@ def _close_calls(skeleton: Skeleton) -> list[str]:
 def otherwise(call: Judgement) -> str:
     """The option with which the Refiner would have answered otherwise, to two digits.
 
-    Parameters
-    ----------
-    call : Judgement
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> otherwise(Judgement("limb", (0.0, 0.0, 0.0), 0.55, changed=False))
-    'Refiner.limb=0.56'
-    >>> otherwise(Judgement("gap", (0.0, 0.0, 0.0), 0.42, changed=False))
-    'Refiner.bridge=0.41'
+    >>> otherwise(Judgement("limb", (0.0, 0.0, 0.0), 0.55, changed=False)) 'Refiner.limb=0.56' >>>
+    otherwise(Judgement("gap", (0.0, 0.0, 0.0), 0.42, changed=False)) 'Refiner.bridge=0.41'
     """
     option, changes = _DECIDED_BY[call.about]
     reached = call.changed == changes

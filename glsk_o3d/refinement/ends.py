@@ -14,7 +14,8 @@ from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import TINY, dot, norm, unit
 from ..skeleton import Skeleton
 from .axis_fit import axis_box
-from .sections import measure_sections
+from .sections import Sections, measure_sections
+from .vertex_points import VertexPoints
 
 END_CUT = 1.75  # fitted: distance from where the points stop, in larger half widths, within which a cap bends the curve
 END_RUN = 2.0  # fitted: radii behind the cut over which the direction of a limb is taken
@@ -39,50 +40,32 @@ ROUND_AREA = 1 / 2  # derived: and the weight over that of a flat cap
 def regrow_ends(skeleton: Skeleton) -> Skeleton:
     r"""Cut every end where a cap may have bent it, and let it grow along its limb to where this stops.
 
-    Contraction draws the end of a limb into an edge or a corner of the face that closes it, and the fit follows: the
-    normals of a cap lead along the axis and do not say where it is. So vertices within 1.75 half widths of where the
-    points of the limb stop, and the last radius of the curve wherever it stops, are cut. The limb goes on in the
-    direction t of the two radii behind, with the turn d and the bend k, across t, that the normals n of its sides ask
-    for:
+    Contraction draws the end of a limb into an edge or a corner of the face that closes it, and the fit follows, since
+    the normals of a cap do not say where the axis is. So vertices within 1.75 half widths of where the points stop, and
+    the last radius of the curve, are cut. The limb goes on in the direction t of the two radii behind, with the turn d
+    and the bend k, across t, that the normals n of its sides ask for:
 
     .. math:: \sum_p w \left((b \cdot (s (t + d) + s^2 k / 2 - p))^2 + \lambda (s^2 |d|^2 + s^4 |k|^2 / 4)\right),
         \quad b = n \times t
 
-    with p and its length s along t seen from the last vertex left; caps, with b = 0, have no say. A point whose plane
-    passes the curve by half a radius counts half, and those beyond the reach do not count. The fit is made three times,
-    each along t + d of the one before.
+    with p and its length s along t seen from the last vertex left. A point whose plane passes the curve by half a
+    radius counts half, and those beyond the reach do not count. The fit is made three times, each along t + d of the
+    one before. See `_End.tip` for where it stops. No end leaves its points.
 
-    It stops half a radius inside a flat cap and at the centre of a round one. Let c be the cosine of an outward normal
-    with the axis. The mean of s with the weights c^3 is on a flat cap, and .8 radii beyond the centre of a round one;
-    the variance is 0 there and 2/75 squared radii here, so mean - r / 2 - 45/4 variance / r is right in both. Averages
-    do not follow single points, as extremes do in noise. What is missing of the cap, of an open pipe all of it, counts
-    as if it were where the sides stop: twice as far as their mean. The radius r is the sections', of a circle of their
-    area, and goes on getting smaller if it does behind: a cone ends in its point. No end leaves its points.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-
-    Returns
-    -------
-    Skeleton
-        With new vertices at the ends, behind all others and as far apart as those that they follow, with the radius and
-        the confidence of the run behind. Points of a vertex that was cut belong to the nearest one of the same end.
-        Loops and vertices without edges stay.
+    New vertices come behind all others, with the radius and the confidence of the run behind. Points of a vertex that
+    was cut belong to the nearest one of the same end. Loops and vertices without edges stay.
     """
     if not len(skeleton.leaves):
         return skeleton
-    cloud, grown = _Cloud(skeleton), list[tuple[np.ndarray, _Grown]]()
-    for path, first, other in _ends(skeleton):
-        found = _grow(cloud, path, first, other)
-        if found is not None:
-            grown.append((path, found))
-    return _replanted(skeleton, cloud, grown) if grown else skeleton
+    cloud, sections = VertexPoints(skeleton), measure_sections(skeleton)
+    grown = [_grow(cloud, sections, *end) for end in _ends(skeleton)]
+    return _replanted(skeleton, [found for found in grown if found])
 
 
 class _Grown(NamedTuple):
     """An end that has grown anew."""
 
+    path: np.ndarray  # (p,) its branch, towards the leaf
     cut: int  # number along the path of the first vertex that goes
     places: np.ndarray  # (k, 3), of the new vertices, outwards
     run: np.ndarray  # vertices behind the cut
@@ -104,61 +87,44 @@ def _ends(skeleton: Skeleton) -> Iterator[tuple[np.ndarray, int, bool]]:
                 yield path, int(stays + 1 if leaf.all() else max(short, 1)), bool(leaf.all())
 
 
-class _Cloud:
-    """The points of every vertex, and how wide they say the section is."""
-
-    def __init__(self, skeleton: Skeleton) -> None:
-        self.skeleton = skeleton
-        sections = measure_sections(skeleton)
-        self.radius = sections.radius  # (M,) float array, of a circle of the section's area
-        self.wide = sections.half_width  # (M,) float array, the larger half width
-        self.members = Members(skeleton.vertex_of_point, len(skeleton.vertices))
-
-    def surface(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points, of some vertices, that have normals, and these; (n, 3) float arrays."""
-        points = self.members.of(vertices)
-        points = points[np.isfinite(self.skeleton.normals[points]).all(axis=1)]
-        return self.skeleton.points[points], self.skeleton.normals[points]
-
-
-def _grow(cloud: _Cloud, path: np.ndarray, first: int, other: bool) -> _Grown | None:
+def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int, other: bool) -> _Grown | None:
     """Cut the end of a path, and let it grow anew; None if too few points say where."""
-    places = cloud.skeleton.vertices[path]
+    places, radii, half_widths = cloud.skeleton.vertices[path], sections.radius[path], sections.half_width[path]
     along = arc_lengths(places)
     length = along[-1]
-    run, cut, way = _within(along, length, END_SIZE * np.median(cloud.radius[path])), len(path), np.zeros(3)
-    stop = max(length - END_TIP * np.median(cloud.radius[path[run]]), length / 2)
+    run, cut, way = _within(along, length, END_SIZE * np.median(radii)), len(path), np.zeros(3)
+    stop = max(length - END_TIP * np.median(radii[run]), length / 2)
     for _ in range(2):  # how far the points reach is seen along a run that is no part of the cap itself
-        radius, wide = np.median(cloud.radius[path[run]]), np.median(cloud.wide[path[run]])
+        radius, wide = np.median(radii[run]), np.median(half_widths[run])
         start = max(stop - END_RUN * radius, 0)
         way, anchor = _way(places, along, start, stop), place_at(places, along, stop)
         # the points of a junction are other limbs', too
-        points, _ = cloud.surface(path[max(np.searchsorted(along, start), 0 if other else 1) :])
-        if len(points) < END_POINTS:
+        own = cloud.members.of(path[max(np.searchsorted(along, start), 0 if other else 1) :])
+        if len(own) < END_POINTS:
             return None
-        reach = np.quantile((points - anchor) @ way, END_REACH)
+        reach = np.quantile((cloud.points[own] - anchor) @ way, END_REACH)
         close = ((places - anchor) @ way > reach - END_CUT * wide) | (along > length - END_TIP * radius)
         close = np.flatnonzero(close & (along > start))
         cut = max(close[0] if len(close) else len(path), first)
         stop = along[cut - 1]
         run = _within(along, stop, END_SIZE * radius)
-    radius, anchor = np.median(cloud.radius[path[run]]), places[cut - 1]
+    radius, anchor = np.median(radii[run]), places[cut - 1]
     if stop > radius / 2:  # of a stub there is no run: it goes on as it was
         way = _way(places, along, max(stop - END_RUN * radius, 0), stop)
-    points, normals = cloud.surface(path[max(cut - 2, 0 if other else min(1, len(path) - 1)) :])
-    points = points - anchor
+    own = cloud.members.of(path[max(cut - 2, 0 if other else min(1, len(path) - 1)) :])
+    points = cloud.points[own] - anchor
     ahead = points @ way > 0
     if ahead.sum() < END_POINTS:
         return None
-    end = _End.of(points[ahead], normals[ahead], way, radius)
+    end = _End.of(points[ahead], cloud.normals[own[ahead]], way, radius)
     behind = _within(along, stop, END_SIZE * radius)
-    tip = end.tip(_Taper.of(along[behind] - stop, cloud.radius[path[behind]], radius))
+    tip = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius))
     steps = np.diff(along[run])
     step = np.median(steps) if len(steps) else length / (len(path) - 1)
     tip = max(tip, step / 2)
     # edges of no length are those of no limb
     number = max(round(min(tip / max(step, TINY), len(points))), 1)
-    return _Grown(cut, anchor + end.curve(np.arange(1, number + 1) / number * tip), path[run])
+    return _Grown(path, cut, anchor + end.curve(np.arange(1, number + 1) / number * tip), path[run])
 
 
 def _within(along: np.ndarray, stop: float, length: float) -> np.ndarray:
@@ -227,7 +193,14 @@ class _End(NamedTuple):
         return step[:, None] * self.way + (step**2 / 2)[:, None] * self.bend
 
     def tip(self, taper: _Taper) -> float:
-        """How far the limb goes on."""
+        """How far the limb goes on: to half a radius inside a flat cap, or the centre of a round one.
+
+        Let c be the cosine of an outward normal with the axis. The mean length s with the weights c^3 is on a flat cap,
+        and .8 radii beyond the centre of a round one; the variance is 0 there and 2/75 squared radii here, so mean - r
+        / 2 - 45/4 variance / r is right in both. Averages do not follow single points, as extremes do in noise. What is
+        missing of the cap, of an open pipe all of it, counts as if it were where the sides stop: twice as far as their
+        mean.
+        """
         reach = np.quantile(self.length, END_REACH)
         start = max(reach - END_WINDOW * taper.at(reach - taper.radius), 0.0)
         late = self.length > start
@@ -268,14 +241,17 @@ def _turn_and_bend(
     return found.reshape(2, 2) @ frame
 
 
-def _replanted(skeleton: Skeleton, cloud: _Cloud, grown: list[tuple[np.ndarray, _Grown]]) -> Skeleton:
+def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
     """With new ends instead of those that were cut."""
+    if not grown:
+        return skeleton
     m = len(skeleton.vertices)
+    members = Members(skeleton.vertex_of_point, m)  # those without a normal, too
     keep, owner = np.ones(m, bool), skeleton.vertex_of_point.copy()
     low, high = axis_box(skeleton.points[skeleton.supporting_points])
     edges, radii, confidence = [skeleton.edges], [skeleton.radii], [skeleton.confidence]
-    planted = [np.clip(found.places, low, high) for _, found in grown]
-    for (path, (cut, _, run)), places in zip(grown, planted, strict=True):
+    planted = [np.clip(found.places, low, high) for found in grown]
+    for (path, cut, _, run), places in zip(grown, planted, strict=True):
         gone, names = path[cut:], m + np.arange(len(places))
         m += len(places)
         keep[gone] = False
@@ -283,7 +259,7 @@ def _replanted(skeleton: Skeleton, cloud: _Cloud, grown: list[tuple[np.ndarray, 
         edges.append(np.column_stack([chain[:-1], chain[1:]]))
         radii.append(np.full(len(places), np.median(skeleton.radii[run])))
         confidence.append(np.full(len(places), np.median(skeleton.confidence[run])))
-        lost = cloud.members.of(gone)
+        lost = members.of(gone)
         near = cKDTree(np.concatenate([skeleton.vertices[chain[:1]], places])).query(skeleton.points[lost])[1]
         owner[lost] = chain[near]
     keep = np.concatenate([keep, np.ones(m - len(keep), bool)])

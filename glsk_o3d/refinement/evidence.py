@@ -1,39 +1,68 @@
-"""What the surface around a fitted skeleton says: which side is out, and what is inside."""
+"""The surface around a skeleton: how it hangs together, which side is out, and what is inside."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from ..numerics.diffusion import Diffusion
 from ..numerics.morton import morton_order
 from ..numerics.nearest_edges import incident_edges, nearest_on_edges
-from ..numerics.neighbourhoods import uprightness
+from ..numerics.neighbourhoods import nearest_neighbours, uprightness
 from ..numerics.vectors import TINY, dot
-from ..numerics.winding import orient_from_axis, point_areas, winding_number
+from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton
-from .surface_graph import SurfaceGraph
 
 # fitted: winding number below which an axis is in nothing; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
 
 
-@dataclass(frozen=True, eq=False)
-class Evidence(SurfaceGraph):
-    """The points that support a skeleton, as an oriented surface; it holds while the graph is changed.
+ENOUGH_POINTS = 4096  # measured: points of one object beyond which a surface hangs together in the same way
+VERTEX_POINTS = 32  # derived: points to a vertex of a tube with 20 around it, whose vertices are half a radius apart
 
-    Attributes
-    ----------
-    normals : (n, 3) float array
-        Unit vectors that point outward.
-    areas : (n,) float array
-        What every point stands for.
+
+@dataclass(frozen=True, eq=False)
+class SurfaceGraph:
+    """Some of the points that support a skeleton, each linked with those nearest to it.
+
+    Of many points it takes every so-manieth, 4096 or more, and 32 for every vertex: an object of many parts takes more.
+    Of points in one place it takes the first.
     """
 
-    normals: np.ndarray
-    areas: np.ndarray
+    supporting: np.ndarray  # (n,) which input points
+    points: np.ndarray  # (n, 3)
+    neighbours: np.ndarray  # (n, k) nearest points, itself first
+
+    @classmethod
+    def of(cls, skeleton: Skeleton) -> SurfaceGraph:
+        """The surface that supports a skeleton."""
+        supporting = skeleton.supporting_points
+        enough = max(ENOUGH_POINTS, VERTEX_POINTS * len(skeleton.vertices))
+        step = max(len(supporting) // enough, 1)
+        if step > 1:  # which they are must not depend on points that have no say
+            supporting = np.sort(supporting[morton_order(skeleton.points[supporting])[::step]])
+        supporting = supporting[_first_in_their_place(skeleton.points[supporting])]
+        points = skeleton.points[supporting]
+        if not len(points):
+            return cls(supporting, points, np.empty((0, 1), int))
+        return cls(supporting, points, nearest_neighbours(points, min(AREA_NEIGHBOURS + 1, len(points)))[1])
+
+    @cached_property
+    def diffusion(self) -> Diffusion:
+        """Over the links."""
+        return Diffusion(self.points, self.neighbours)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence(SurfaceGraph):
+    """The points that support a skeleton, as an oriented surface; it holds while the graph is changed."""
+
+    normals: np.ndarray  # (n, 3) unit vectors that point outward
+    areas: np.ndarray  # (n,) what every point stands for
     _said: dict[str, tuple[Skeleton, Any]] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -69,16 +98,10 @@ class Evidence(SurfaceGraph):
         return np.bincount(edge, self.areas[some] * upright, len(skeleton.edges))
 
     def bonds(self, skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
-        """How far the surface goes on from vertex to vertex.
+        """How far the surface goes on from vertex to vertex: pairs i < j, (B, 2) int array, and weights, (B,).
 
         Every two near points of different vertices count by how far their normals agree and stand upright on the line
         between them, cos^2 times sin^2 times sin^2: not where surfaces of two parts face each other.
-
-        Returns
-        -------
-        pairs : (B, 2) int array
-            Vertices, i < j.
-        weight : (B,) float array
         """
         return self._once("bonds", skeleton, lambda: self._bonds(skeleton))
 
@@ -104,13 +127,8 @@ class Evidence(SurfaceGraph):
 def in_order(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
     """A skeleton with its points in an order that does not depend on the one they came in, along a Morton curve.
 
-    That would show in the last digit of sums, and where one thing is as good as another, as on grids, it decides.
-
-    Returns
-    -------
-    Skeleton
-    back : (N,) int array
-        Where every point is now.
+    That would show in the last digit of sums, and where one thing is as good as another, as on grids, it decides. With
+    it comes where every point is now, (N,) int array.
     """
     finite = np.isfinite(skeleton.points).all(axis=1)
     some = np.flatnonzero(finite)
@@ -129,3 +147,12 @@ def _nearest_edges(skeleton: Skeleton, supporting: np.ndarray) -> tuple[np.ndarr
     around = incident_edges(skeleton.edges, len(skeleton.vertices))[vertex]
     edge, t = nearest_on_edges(skeleton.vertices, skeleton.edges, around, skeleton.points[supporting])
     return np.where(skeleton.degree[vertex] > 0, edge, -1), t
+
+
+def _first_in_their_place(points: np.ndarray) -> np.ndarray:
+    """The first of all points with the same coordinates, bool array: which of them is linked would be chance."""
+    order = np.lexsort(points.T)
+    again = (np.diff(points[order], axis=0) == 0).all(axis=1)
+    first = np.ones(len(points), bool)
+    first[order[1:][again]] = False
+    return first

@@ -1,124 +1,41 @@
-"""Where limbs meet: their axes, taken where nothing disturbs them, say it, and not the contraction."""
+"""Move junctions to where limbs meet: their lines and the surface around say it, and not the contraction."""
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
-from ..numerics.components import component_labels
-from ..numerics.groups import Members
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
-from ..numerics.vectors import TINY, dot, norm
+from ..numerics.vectors import TINY, dot
 from ..skeleton import Skeleton
 from .axis_fit import axis_box
-from .loops import surface_distance
-from .meeting import AXIS_LEAVES, AXIS_LENGTH, Line, limb_line, meet
+from .limbs import AXIS_LEAVES, AXIS_LENGTH, Limbs
 from .merging import merge_into
+from .vertex_points import VertexPoints
 
-# All fitted.
-AXIS_SHORT = 2.0  # length in radii, from each junction, below which a branch has no undisturbed place
-MEETING_STAY = 0.1  # weight of where the junction was, per meeting: lines that are nearly one meet anywhere
-
-
-class Meeting(NamedTuple):
-    """Where limbs meet that go on straight on."""
-
-    anchor: np.ndarray  # (k, 3), the last undisturbed place of each limb
-    foot: np.ndarray  # (k, 3), where each limb passes the meeting place, or its anchor if that is behind it
-    fits: np.ndarray  # (k,), whether the limb passes within the radius of the thickest
+# All fitted, but for the steps.
+LINE_NOISE = 0.05  # radii that a line is off at its middle, on a straight limb
+LINE_STEP = 0.1  # derived: radii from one place on a limb to the next that is asked
+LINE_STEPS = 400  # derived: places at most
+SURFACE_WEIGHT = 12.0  # of the surface that fits a sphere, over that of a line that says exactly where it is
+SURFACE_FIT = 0.25  # distance from the sphere, over the radius, at which a point counts half
+MEETING_HOLD = 0.02  # weight of where the junction was: a straight tube says nothing of where along it
+MEETING_ROUNDS = 10  # measured: from then on hardly anything moves
 
 
-class Limbs:
-    """The branches of a skeleton seen from their junctions.
+class Line(NamedTuple):
+    """What a limb says of where it comes from."""
 
-    Attributes
-    ----------
-    surface : (M,) float array
-        Distance from each vertex to the surface; the radius of vertices without points.
-    branches : tuple of (p,) int array
-        `Skeleton.branches`.
-    radius : (B,) float array
-        Of every branch, the median along it.
-    short : (B,) bool array
-        Branches that the contraction disturbs all along.
-    inner : (B,) bool array
-        Branches between two junctions.
-    paths : list of (p,) int array
-        Once for each junction at an end of a branch, from there.
-    branch : list of int
-        The branch of each path.
-    at : dict
-        Of every region the numbers of the paths that start there.
-    region : (M,) int array
-        What short branches between junctions join is one region, if asked for.
-    """
-
-    def __init__(self, skeleton: Skeleton, joined: bool) -> None:
-        self.vertices, degree = skeleton.vertices, skeleton.degree
-        surface = surface_distance(skeleton)
-        self.surface = np.where(surface > 0, surface, skeleton.radii)
-        self.branches = skeleton.branches
-        ends = np.array([branch[[0, -1]] for branch in self.branches], int).reshape(-1, 2)
-        self.radius = np.array([np.median(self.surface[branch]) for branch in self.branches], float)
-        self.inner = (degree[ends] > 2).all(axis=1) & (ends[:, 0] != ends[:, 1])
-        length = np.array([arc_lengths(self.vertices[branch])[-1] for branch in self.branches], float)
-        self.short = joined & (length < AXIS_SHORT * self.radius * np.where(self.inner, 2, 1))
-        self.region = np.arange(len(degree))
-        if joined:
-            self.region = component_labels(len(degree), ends[self.short & self.inner])
-        self.paths, self.branch, self.at = [], [], defaultdict(list)
-        for number, branch in enumerate(self.branches):
-            for path in (branch, branch[::-1]):
-                if degree[path[0]] > 2:
-                    self.at[self.region[path[0]]].append(len(self.paths))
-                    self.paths.append(path)
-                    self.branch.append(number)
-        self.axis = cache(self._axis)
-
-    def _axis(self, limb: int) -> tuple[np.ndarray, np.ndarray, float]:
-        """The last undisturbed place of a limb, its direction there, towards the junction, and how far along it is."""
-        path, radius = self.paths[limb], self.radius[self.branch[limb]]
-        places = self.vertices[path]
-        along = arc_lengths(places)
-        half = along[-1] / 2  # the other end may be disturbed, too
-        others = [
-            self.paths[k]
-            for k in self.at[self.region[path[0]]]
-            if self.branch[k] != self.branch[limb] and not self.short[self.branch[k]]
-        ]
-        start = 0.0
-        if others:
-            near = places[: max(np.searchsorted(along, half), 1)]
-            inside = np.flatnonzero(relative_distance(near, self.vertices, self.surface, others) <= AXIS_LEAVES)
-            start = min(along[inside[-1] + 1], half) if len(inside) else start
-        stop = min(start + AXIS_LENGTH * radius, along[-1])
-        anchor, back = place_at(places, along, start), place_at(places, along, stop)
-        return anchor, (anchor - back) / max(np.linalg.norm(anchor - back), TINY), start
-
-    def meeting(self, limbs: list[int], near: np.ndarray) -> Meeting:
-        """The place nearest to the axes of some limbs, in the sense of least squares.
-
-        Parameters
-        ----------
-        limbs : list of int
-            Numbers of paths, at least one. Short ones have no say if there are two others.
-        near : (3,) float array
-            Where lines meet that are nearly one.
-        """
-        anchor, way, _ = (np.array(values) for values in zip(*map(self.axis, limbs), strict=True))
-        radius = self.radius[[self.branch[limb] for limb in limbs]]
-        long = ~self.short[[self.branch[limb] for limb in limbs]]
-        say = long if long.sum() > 1 else np.ones(len(long), bool)
-        across = say[:, None, None] * (np.eye(3) - way[:, :, None] * way[:, None])
-        weight = across.sum(axis=0) + MEETING_STAY * np.eye(3)
-        place = near + np.linalg.solve(weight, np.einsum("kij,kj->i", across, anchor - near))
-        along = dot(place - anchor, way)
-        fits = norm(place - anchor - along[:, None] * way) <= radius.max()
-        return Meeting(anchor, anchor + np.maximum(along, 0)[:, None] * way, fits)
+    middle: np.ndarray  # (3,) of the part that nothing disturbs
+    way: np.ndarray  # (3,) unit vector towards the junction, or zero
+    spread: float  # standard deviation along the line of that part
+    bend: float  # root mean square distance from the line
+    start: float  # length along the limb that is disturbed
+    anchor: np.ndarray  # (3,) where that ends
+    radius: float  # of the limb
 
 
 class _Place(NamedTuple):
@@ -155,10 +72,8 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
 
 def _places(skeleton: Skeleton, limbs: Limbs) -> dict[int, _Place]:
     """Where every junction belongs."""
-    supporting = skeleton.supporting_points
-    points, normals = skeleton.points[supporting], skeleton.normals.take(supporting, axis=0)
-    members = Members(skeleton.vertex_of_point[supporting], len(skeleton.vertices))
-    low, high = axis_box(points if len(points) else skeleton.vertices)
+    cloud = VertexPoints(skeleton)
+    low, high = axis_box(cloud.points if len(cloud.points) else skeleton.vertices)
     found = {}
     for junction in skeleton.junctions.tolist():
         here, lines, radius, around = limbs.at[junction], [], 0.0, []
@@ -169,8 +84,8 @@ def _places(skeleton: Skeleton, limbs: Limbs) -> dict[int, _Place]:
             lines.append(line)
             radius = max(radius, float(np.interp(line.start, along, limbs.surface[path])))
             around.append(path[along <= along[-1] / 2])
-        own = members.of(np.unique(np.concatenate(around)))
-        place, touching = meet(lines, skeleton.vertices[junction], radius, points[own], normals[own])
+        own = cloud.members.of(np.unique(np.concatenate(around)))
+        place, touching = meet(lines, skeleton.vertices[junction], radius, cloud.points[own], cloud.normals[own])
         # normals that mean nothing may meet anywhere
         found[junction] = _Place(np.clip(place, low, high), touching, lines)
     return found
@@ -221,3 +136,85 @@ def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -
             radii[path[moved]] = radius
             radii[junction] = max(radii[junction], radius)
     return replace(skeleton, vertices=vertices, radii=radii)
+
+
+def limb_line(
+    vertices: np.ndarray, surface: np.ndarray, path: np.ndarray, radius: float, others: Sequence[np.ndarray]
+) -> Line:
+    """The straight line through the part of a limb that is undisturbed by others, and nearest to its junction.
+
+    Nothing is decided: every place counts by how far it has left the others, from 0 at their surface on, and less and
+    less from `AXIS_LENGTH` radii on. The half towards the limb's other end counts as undisturbed, whatever is there.
+    All paths are numbers of `vertices` (M, 3), the limb's from its junction on; the surface is `surface` (M,) away from
+    these.
+    """
+    places = vertices[path]
+    along = arc_lengths(places)
+    step = max(LINE_STEP * radius, along[-1] / LINE_STEPS, TINY)
+    n = max(int(np.ceil(along[-1] / step)), 8)
+    step, half = along[-1] / n, n // 2
+    at = (np.arange(n) + 0.5) * step
+    curve = place_at(places, along, at)
+    clear = np.ones(n)
+    if others:
+        left, _ = relative_distance(curve, vertices, surface, others)
+        clear = np.clip((left - 1) / (2 * (AXIS_LEAVES - 1)), 0, 1)
+        clear[:half] = np.minimum.accumulate(clear[:half][::-1])[::-1]  # what left and came back had not left
+    start = float((1 - clear[:half]).sum() * step)
+    anchor = place_at(places, along, start)
+    weight = clear * np.clip(1.5 - np.cumsum(clear) * step / max(AXIS_LENGTH * radius, TINY), 0, 1)
+    total = weight.sum()
+    if total * step <= 0:
+        return Line(anchor, np.zeros(3), 0.0, 0.0, start, anchor, radius)
+    weight /= total
+    middle, mean = weight @ curve, weight @ at
+    way = (weight * (mean - at)) @ (curve - middle)
+    way /= max(np.linalg.norm(way), TINY)
+    off = curve - middle - (mean - at)[:, None] * way
+    spread, bend = np.sqrt(weight @ (at - mean) ** 2), np.sqrt(weight @ dot(off, off))
+    return Line(middle, way, float(spread), float(bend), start, anchor, radius)
+
+
+def meet(
+    lines: Sequence[Line], near: np.ndarray, radius: float, points: np.ndarray, normals: np.ndarray
+) -> tuple[np.ndarray, float]:
+    r"""The place that some lines and the surface around agree on, in the sense of least squares.
+
+    .. math:: \sum_i w_i |(x - m_i)_{\perp i}|^2 + W \sum_p u_p (|n_p \cdot (p - x)| - r)^2 / \sum_p g_p
+        + \epsilon |x - x_0|^2
+
+    over x and r, the radius of the sphere, which is returned, too. A line counts by how far it may be off at x, as far
+    ahead of the middle of its part as D: the bend b of the part, and a twentieth of the limb's radius, grow with the
+    square of that over the part's spread s, so that :math:`w = 1 / (1 + ((b / r_i + 0.05) (1 + D^2 / s^2))^2)`, and by
+    how far aside of x it passes. The rest says what is the middle of the surface there, the centre of a sphere that
+    touches as many tangent planes as possible, where limbs are too short to say anything: :math:`g_p` falls like a
+    Gaussian with the distance of a point, and :math:`u_p` with how far its plane is from the sphere, too, so that a
+    surface without such a sphere has no say. The junction was `near`, and `radius` is that of the thickest limb there.
+    """
+    place, touching, radius = near, radius, max(radius, TINY)
+    for _ in range(MEETING_ROUNDS):
+        matrix, right = np.diag([MEETING_HOLD] * 3 + [1e-6]), np.zeros(4)
+        right[:3] = MEETING_HOLD * (near - place)
+        right[3] = 1e-6 * touching
+        for line in lines:
+            if line.spread <= 0 or line.radius <= 0:
+                continue
+            offset = line.middle - place
+            aside = offset - (offset @ line.way) * line.way
+            error = (line.bend / line.radius + LINE_NOISE) * (1 + (offset @ line.way / line.spread) ** 2)
+            weight = 1 / ((1 + error**2) * (1 + aside @ aside / radius**2))
+            matrix[:3, :3] += weight * (np.eye(3) - np.outer(line.way, line.way))
+            right[:3] += weight * aside
+        if len(points):
+            offset = points - place
+            window = np.exp(-dot(offset, offset) / (2 * radius**2))
+            height = dot(offset, normals)
+            fits = window / (1 + ((np.abs(height) - touching) / (SURFACE_FIT * radius)) ** 2)
+            fits *= SURFACE_WEIGHT / max(window.sum(), TINY)
+            plane = np.column_stack([np.where(height < 0, -1, 1)[:, None] * normals, np.ones(len(points))])
+            matrix += (fits[:, None] * plane).T @ plane
+            right += plane.T @ (fits * np.abs(height))
+        *step, touching = np.linalg.solve(matrix, right)
+        touching = float(np.clip(touching, 0, 2 * radius))
+        place = place + step
+    return place, touching

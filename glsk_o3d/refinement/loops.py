@@ -9,15 +9,14 @@ import numpy as np
 from ..judgements import Judgement
 from ..numerics.components import component_labels
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, opens_wider
-from ..numerics.groups import group_median
 from ..numerics.polylines import arc_lengths
-from ..numerics.vectors import TINY, norm
+from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
-from .evidence import LEAST_INSIDE, Evidence
+from .evidence import LEAST_INSIDE, Evidence, SurfaceGraph
 from .merging import drop_edges, merge_vertices
 from .scores import HANDLE_WEIGHTS, probability
-from .surface_graph import SurfaceGraph
 from .triangles import collapse_triangles
+from .vertex_points import VertexPoints
 
 HOLE_WINDING = 0.25  # fitted: winding number in a hole, over that along the loop: near 0, and .5 or more inside a part
 WIDE_LOOP = 1.5  # fitted: opening of a loop that is more than two strands in one part
@@ -26,35 +25,16 @@ HOLE_SHARE = 0.6  # fitted: of the largest circle in a loop, the part of it that
 DIRECTIONS = np.column_stack([f(np.arange(6) * np.pi / 3) for f in (np.cos, np.sin)])  # derived: six, evenly
 
 
-def surface_distance(skeleton: Skeleton) -> np.ndarray:
-    """Median distance from each vertex to the input points it owns, (M,) float array."""
-    supporting = skeleton.supporting_points
-    vertex = skeleton.vertex_of_point[supporting]
-    distance = norm(skeleton.points[supporting] - skeleton.vertices[vertex])
-    return group_median(distance, vertex, len(skeleton.vertices))
-
-
-def zip_narrow_loops(skeleton: Skeleton, graph: SurfaceGraph) -> Skeleton:
-    """Zip up the loops that open less than their tube is thick, before there is a fit: they lie inside one part.
+def collapse_narrow_loops(skeleton: Skeleton, graph: SurfaceGraph) -> Skeleton:
+    """Collapse the loops that open less than their tube is thick, before there is a fit: they lie inside one part.
 
     The opening of a loop is the radius of the largest circle inside it; the tube's is the median over the loop of the
     distance from its vertices to the surface. All such loops of a minimum cycle basis go at once, until there are none.
     A loop around a hole stays, however narrow: the winding number in that circle is near 0.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    graph : SurfaceGraph
-        Of its points.
-
-    Returns
-    -------
-    Skeleton
-        Without triangles.
     """
     evidence: Evidence | None = None
     while True:
-        surface = surface_distance(skeleton)
+        surface = VertexPoints(skeleton).distance
         cycles = minimum_cycle_basis(len(surface), skeleton.edges, skeleton.edge_lengths)
         narrow = [cycle for cycle in cycles if not opens_wider(skeleton.vertices[cycle], np.median(surface[cycle]))]
         if narrow:
@@ -63,33 +43,19 @@ def zip_narrow_loops(skeleton: Skeleton, graph: SurfaceGraph) -> Skeleton:
             narrow = [cycle for cycle, hole in zip(narrow, holes, strict=True) if hole.share > HOLE_WINDING]
         if not narrow:
             return skeleton
-        skeleton = _zipped(skeleton, narrow)
+        skeleton = _collapsed(skeleton, narrow)
 
 
-def _zipped(skeleton: Skeleton, cycles: list[np.ndarray]) -> Skeleton:
-    pairs = np.concatenate([zip_pairs(skeleton.vertices[cycle], cycle) for cycle in cycles])
+def _collapsed(skeleton: Skeleton, cycles: list[np.ndarray]) -> Skeleton:
+    pairs = np.concatenate([facing_pairs(skeleton.vertices[cycle], cycle) for cycle in cycles])
     return collapse_triangles(merge_vertices(skeleton, component_labels(len(skeleton.vertices), pairs)))
 
 
 def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
-    """Close the loops that are probably no handles, until there are none.
+    """Close the loops that are handles with a probability of less than `least`, until there are none.
 
-    Narrow ones, two strands in one part, are zipped up; wide ones are cut where the fewest bonds cross.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Fitted to its axis.
-    evidence : Evidence
-    least : float
-        Probability of a handle below which a loop of a minimum cycle basis is closed.
-
-    Returns
-    -------
-    Skeleton
-        Without triangles.
-    judgements : list of Judgement
-        One for each loop, closed or left.
+    Narrow ones, two strands in one part, are collapsed; wide ones are cut where the fewest bonds cross. There is one
+    judgement for each loop of the minimum cycle bases, closed or left.
     """
     judgements: list[Judgement] = []
     while True:
@@ -111,7 +77,7 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
         if cut:
             skeleton = drop_edges(skeleton, cut)
         if narrow:
-            skeleton = _zipped(skeleton, narrow)
+            skeleton = _collapsed(skeleton, narrow)
 
 
 class LoopEvidence(NamedTuple):
@@ -135,21 +101,15 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     logarithm; the least winding number in that circle, over the median along the loop, since a handle is one if no disc
     that spans it stays inside; the least bonds that cross it somewhere, over their median, as a logarithm; and the mean
     confidence.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    cycles : list of (n,) int array
-    evidence : Evidence
     """
     if not cycles:
         return []
-    surface = surface_distance(skeleton)
-    pairs, weight = evidence.bonds(skeleton)
+    surface = VertexPoints(skeleton).distance
+    bonds = evidence.bonds(skeleton)
     found = []
     for cycle, hole in zip(cycles, _holes(skeleton, cycles, evidence), strict=True):
         tube = max(float(np.median(surface[cycle])), TINY)
-        crossing = crossings(cycle, len(surface), pairs, weight)
+        crossing = crossings(positions(cycle, len(surface)), len(cycle), bonds, closed=True)
         facts = dict(
             opening=float(np.log(min(hole.radius, WIDE_OPEN * tube) / tube + 0.1)),
             winding=float(np.clip(hole.share, 0, 1.5)),
@@ -165,12 +125,8 @@ class _Hole(NamedTuple):
 
     centre: np.ndarray
     radius: float
-    winding: float  # the least winding number in it
-    inside: float  # the median one along the loop
-
-    @property
-    def share(self) -> float:
-        return self.winding / max(self.inside, LEAST_INSIDE)
+    inside: float  # median winding number along the loop
+    share: float  # the least winding number in the circle over that
 
 
 def _holes(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[_Hole]:
@@ -187,51 +143,37 @@ def _holes(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> 
     winding = np.zeros(len(skeleton.vertices))
     winding[around] = answers[-len(around) :]
     inside = [float(np.median(winding[cycle])) for cycle in cycles]
-    return [_Hole(*circle, float(hole), along) for circle, hole, along in zip(circles, least, inside, strict=True)]
+    shares = [float(hole) / max(along, LEAST_INSIDE) for hole, along in zip(least, inside, strict=True)]
+    return [_Hole(*circle, *facts) for circle, *facts in zip(circles, inside, shares, strict=True)]
 
 
-def crossings(cycle: np.ndarray, m: int, pairs: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Bonds across every edge of a cycle, from its vertices on the one side to those on the other, the shorter way.
+def crossings(place: np.ndarray, n: int, bonds: tuple[np.ndarray, np.ndarray], closed: bool) -> np.ndarray:
+    """Weight of the `Evidence.bonds` across each edge of a path, from what is on its one side to the other, (n,).
 
-    Parameters
-    ----------
-    cycle : (n,) int array
-    m : int
-        Vertices of the graph.
-    pairs, weight
-        From `Evidence.bonds`.
-
-    Returns
-    -------
-    (n,) float array
-        For the edge from each vertex of the cycle to the next.
+    `place` (M,) are the positions 0 to n - 1 of the graph's vertices along it, -1 of those that do not count. If it is
+    closed, edges lead from each position to the next, and bonds the shorter way; else the last one is none.
     """
-    n = len(cycle)
-    place = np.full(m, -1)
-    place[cycle] = np.arange(n)
+    pairs, weight = bonds
     first, last = np.sort(place[pairs], axis=1).T
     inside = first >= 0
     first, last, weight = first[inside], last[inside], weight[inside]
-    around = last - first > n / 2
+    around = closed & (last - first > n / 2)
     start, stop = np.where(around, last, first), np.where(around, first, last)
     steps = np.bincount(start, weight, n) - np.bincount(stop, weight, n)
     return np.maximum(np.cumsum(steps) + weight[around].sum(), 0)  # rounding leaves less than nothing
 
 
-def zip_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """Pairs of vertices that meet when a loop is zipped up between its two ends, those farthest apart.
+def positions(path: np.ndarray, m: int) -> np.ndarray:
+    """The position of each of m vertices in a path, (m,) int array; -1 of those that are not in it."""
+    place = np.full(m, -1)
+    place[path] = np.arange(len(path))
+    return place
 
-    Parameters
-    ----------
-    points : (n, 3) float array
-        The loop, in order.
-    labels : (n,) int array
-        What to call its vertices.
 
-    Returns
-    -------
-    (p, 2) int array
-        Every inner vertex of either side with the vertex of the other side that is as far along.
+def facing_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
+    """Pairs of vertices, (p, 2), that meet when a loop collapses onto a line between those farthest apart.
+
+    Every inner vertex of either side meets the vertex of the other side that is as far along.
     """
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     first, last = np.unravel_index(np.argmax(distance), distance.shape)

@@ -11,12 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..numerics.groups import group_sum
 from ..skeleton import OF_VERTICES, Skeleton
-
-
-def support(skeleton: Skeleton) -> np.ndarray:
-    """Input points that each vertex owns, at least 1, (M,) float array."""
-    vertex = skeleton.vertex_of_point[skeleton.supporting_points]
-    return np.maximum(np.bincount(vertex, minlength=len(skeleton.vertices)), 1).astype(float)
+from .vertex_points import VertexPoints
 
 
 def some_vertices(skeleton: Skeleton, which: np.ndarray) -> dict[str, Any]:
@@ -25,21 +20,12 @@ def some_vertices(skeleton: Skeleton, which: np.ndarray) -> dict[str, Any]:
 
 
 def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
-    """Make one vertex of each group, at the mean of its members weighted by the points they own.
+    """Make one vertex of each group (M,), at the mean of its members weighted by the points they own.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    group : (M,) int array
-        Any labels.
-
-    Returns
-    -------
-    Skeleton
-        Points of merged vertices belong to the merged one.
+    Groups have any labels. Points of merged vertices belong to the merged one.
     """
     label, group = np.unique(group, return_inverse=True)
-    n, weight = len(label), support(skeleton)
+    n, weight = len(label), VertexPoints(skeleton).mass
     total = group_sum(weight, group, n)
     edges = np.sort(group[skeleton.edges], axis=1)
     vertex = skeleton.vertex_of_point
@@ -53,18 +39,9 @@ def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
 
 
 def merge_into(skeleton: Skeleton, into: np.ndarray) -> Skeleton:
-    """Merge vertices into others, which stay where and what they are.
+    """Merge vertices `into` others (M,), which stay where and what they are, and in their order.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    into : (M,) int array
-        The vertex that each becomes part of; itself if it stays.
-
-    Returns
-    -------
-    Skeleton
-        Vertices that stay keep their order. Points of merged vertices belong to the one that stays.
+    Points of merged vertices belong to the one that stays.
     """
     stay = np.unique(into)
     return replace(merge_vertices(skeleton, into), **some_vertices(skeleton, stay))

@@ -1,4 +1,4 @@
-"""RootPlace a tree grows from, and its vertices in the order in which they grow."""
+"""The place a tree grows from, and its vertices in the order in which they grow."""
 
 from __future__ import annotations
 
@@ -19,26 +19,11 @@ RootPlace = str | int | Sequence[float] | np.ndarray
 
 
 def root_among(places: np.ndarray, skeleton: Skeleton, which: RootPlace, thick: np.ndarray | None = None) -> int:
-    """Which of some places a tree grows from.
+    """Which of some places (n, 3) a tree grows from.
 
-    Parameters
-    ----------
-    places : (n, 3) float array
-    skeleton : Skeleton
-    which : str, int or (x, y, z)
-        ``"x"`` to ``"-z"`` for the lowest along this axis, ``"thickest"``, a point (also as ``"x,y,z"``), or the number
-        of a place.
-    thick : (k,) int array, optional
-        Ends of the skeleton of which the thickest is taken; if there are none, of all.
-
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    InvalidParameterError
-        There is no such root; or it is the thickest, and radii are not known.
+    That is the lowest along an axis, ``"x"`` to ``"-z"``, a point (also as ``"x,y,z"``), the number of a place, or the
+    ``"thickest"`` of the ends `thick` (k,) of the skeleton; of all, if there are none. InvalidParameterError if there
+    is no such root, or it is the thickest, and radii are not known.
     """
     if isinstance(which, int | np.integer) and not isinstance(which, bool):
         if not 0 <= which < len(places):
@@ -65,19 +50,9 @@ def root_among(places: np.ndarray, skeleton: Skeleton, which: RootPlace, thick: 
 
 
 def numbered_from(skeleton: Skeleton, root: int) -> Skeleton:
-    """The same forest with its vertices numbered from the root outwards.
+    """The same forest with its vertices numbered from the root outwards: edges lead away from it.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Without loops.
-    root : int
-
-    Returns
-    -------
-    Skeleton
-        The first vertex of every edge is nearer to the root. Other components follow, each from its vertex nearest to
-        the root.
+    Other components follow, each from its vertex nearest to the root.
     """
     links, part = linked(skeleton.vertices, skeleton.edges), skeleton.component_of_vertex
     nearest = np.argsort(norm(skeleton.vertices - skeleton.vertices[root]), kind="stable")

@@ -24,14 +24,6 @@ LIMB_WEIGHTS = {"constant": -5.3, "protrusion": 3.0, "web": -4.7, "confidence": 
 
 
 def probability(weights: Mapping[str, float], facts: Mapping[str, float]) -> float:
-    """Logistic model: the probability that the weighted sum of some facts stands for.
-
-    Parameters
-    ----------
-    weights : mapping
-        Of every fact, and ``"constant"``.
-    facts : mapping
-        At least those that have a weight.
-    """
+    """Logistic model: the probability that the weighted sum of some facts, and of a ``"constant"``, stands for."""
     total = weights["constant"] + sum(weight * facts[name] for name, weight in weights.items() if name != "constant")
     return float(1 / (1 + np.exp(-np.clip(total, -50, 50))))

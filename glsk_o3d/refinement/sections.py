@@ -7,33 +7,24 @@ from typing import NamedTuple
 import numpy as np
 
 from ..numerics.groups import group_sum
-from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, dot, norm, unit
+from ..numerics.vectors import COLUMNS, FULL, ROWS, dot, unit
 from ..skeleton import Skeleton
+from .vertex_points import VertexPoints
 
 LEAST_SHARE = 1e-5  # fitted: of the squared normals, above which they say something of a direction: 1/300 of a radian
 
 
 class Sections(NamedTuple):
-    """The section of the part at every vertex.
+    """The section of the part at every vertex, in the cloud's units."""
 
-    Attributes
-    ----------
-    half_width, half_thickness : (M,) float64 array
-        Its half axes, in the cloud's units; the width is never less than the thickness.
-    across : (M, 3) float64 array
-        Unit vectors in the direction of the width, up to their sign.
-    radius : (M,) float64 array
-        The geometric mean of the half axes.
-    closed : (M,) float64 array
-        How far the points lie all around, from 0 to 1: 1 around a whole section, 0.36 around half a tube, 0 where a
-        plane is all that was seen, or nothing.
-    """
+    half_width: np.ndarray  # (M,) the larger half axis
+    half_thickness: np.ndarray  # (M,) the smaller one
+    across: np.ndarray  # (M, 3) unit vectors in the direction of the width, up to their sign
 
-    half_width: np.ndarray
-    half_thickness: np.ndarray
-    across: np.ndarray
-    radius: np.ndarray
-    closed: np.ndarray
+    @property
+    def radius(self) -> np.ndarray:
+        """Radius of the circle with the area of an ellipse with these half axes, (M,) float array."""
+        return np.sqrt(self.half_width * self.half_thickness)
 
 
 def measure_sections(skeleton: Skeleton) -> Sections:
@@ -46,77 +37,32 @@ def measure_sections(skeleton: Skeleton) -> Sections:
     h(e) is the mean distance of the tangent planes, each with the weight that its normal has in the direction e. The
     half axes are the largest and the least h(e) across the limb, that is in the plane of the two eigenvectors of N with
     the largest eigenvalues: along the limb normals have the least share. Around a circle, or any part of it, h is the
-    radius, and around a rectangle, or two sides of it, they are its half axes, however the points are spread.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-
-    Returns
-    -------
-    Sections
-        Vertices without points have the skeleton's radius for both half axes; where only one side was seen, others have
-        it in the direction that nobody knows.
-
-    Notes
-    -----
-    `closed` is 1 less the length of the sum of the outward unit normals, without what they have along the limb, over
-    the sum of their lengths. A normal is outward if it points from the vertex to its point's tangent plane.
+    radius, and around a rectangle, or two sides of it, they are its half axes, however the points are spread. Vertices
+    without points have the skeleton's radius for both half axes; where only one side was seen, others have it in the
+    direction that nobody knows.
     """
-    points = skeleton.supporting_points
-    vertex, normals = skeleton.vertex_of_point[points], skeleton.normals[points]
-    offset = skeleton.points[points] - skeleton.vertices[vertex]
-    m = len(skeleton.vertices)
-    found = half_axes(_around(skeleton, vertex, normal_moments(normals, offset)), skeleton.radii)
-    none = np.bincount(vertex, minlength=m) == 0
-    wide, thick = (np.where(none, skeleton.radii, half) for half in found[:2])
-
-    along = found.along[vertex]
-    outward = np.where(dot(normals, offset) < 0, -1, 1)[:, None] * normals
-    outward -= dot(outward, along)[:, None] * along
-    sums = _around(skeleton, vertex, np.column_stack([outward, norm(outward)]))
-    one_sided = np.where(sums[:, 3] > 0, norm(sums[:, :3]) / np.maximum(sums[:, 3], TINY), 1)
-    return Sections(wide, thick, found.across, np.sqrt(wide * thick), np.clip(1 - one_sided, 0, 1))
+    cloud = VertexPoints(skeleton)
+    m, (a, b) = len(skeleton.vertices), skeleton.edges.T
+    sums = group_sum(normal_moments(cloud.normals, cloud.offset), cloud.vertex, m)
+    sums = sums + group_sum(sums[np.concatenate([b, a])], np.concatenate([a, b]), m)
+    found = half_axes(sums, skeleton.radii)
+    wide, thick = (np.where(cloud.count == 0, skeleton.radii, half) for half in found[:2])
+    return Sections(wide, thick, found.across)
 
 
 def normal_moments(normals: np.ndarray, offset: np.ndarray) -> np.ndarray:
     """What every point adds to N and M of its section, the six different entries of either, (n, 12) float array.
 
-    Parameters
-    ----------
-    normals : (n, 3) float array
-        Unit vectors, up to their sign.
-    offset : (n, 3) float array
-        From each point to its place on the curve, or from there.
+    The offsets (n, 3) lead from each point to its place on the curve, or from there.
     """
     squares = normals[:, ROWS] * normals[:, COLUMNS]
     return np.concatenate([squares, np.abs(dot(normals, offset))[:, None] * squares], axis=1)
 
 
-class HalfAxes(NamedTuple):
-    """What the normals around vertices say of their sections.
+def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> Sections:
+    """The half axes of sections, see `measure_sections`, from sums of `normal_moments`, (m, 12).
 
-    Attributes
-    ----------
-    half_width, half_thickness : (m,) float array
-    across, along : (m, 3) float array
-        Unit vectors in the direction of the width, and along the limb.
-    """
-
-    half_width: np.ndarray
-    half_thickness: np.ndarray
-    across: np.ndarray
-    along: np.ndarray
-
-
-def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> HalfAxes:
-    """The half axes of sections, see `measure_sections`, from sums of `normal_moments`.
-
-    Parameters
-    ----------
-    moments : (m, 12) float array
-    otherwise : (m,) float array
-        The half axis in a direction that nobody saw.
+    In a direction that nobody saw the half axis is `otherwise` (m,).
     """
     share, axes = np.linalg.eigh(moments[:, :6][:, FULL])
     known = share[:, 1:] > LEAST_SHARE * share.sum(axis=1, keepdims=True)
@@ -127,11 +73,4 @@ def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> HalfAxes:
     half, turn = np.linalg.eigh(reach + unseen[:, None] * np.eye(2))
     half = np.maximum(half, 0)  # rounding may leave less than nothing
     across = unit(np.einsum("mik,mk->mi", plane, turn[:, :, 1]))
-    return HalfAxes(half[:, 1], half[:, 0], across, axes[:, :, 0])
-
-
-def _around(skeleton: Skeleton, vertex: np.ndarray, facts: np.ndarray) -> np.ndarray:
-    """Sums of the facts of every vertex's points, and of those of the vertices beside it."""
-    m, (a, b) = len(skeleton.vertices), skeleton.edges.T
-    sums = group_sum(facts, vertex, m)
-    return sums + group_sum(sums[np.concatenate([b, a])], np.concatenate([a, b]), m)
+    return Sections(half[:, 1], half[:, 0], across)

@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..judgements import Judgement
-from ..numerics.groups import Members
-from ..numerics.polylines import arc_lengths, beyond_surface
+from ..numerics.polylines import arc_lengths, relative_distance
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
 from .evidence import Evidence
-from .junctions import Limbs
-from .merging import merge_into, support
+from .limbs import Limbs
+from .merging import merge_into
 from .scores import LIMB_WEIGHTS, probability
 from .sections import measure_sections
+from .vertex_points import VertexPoints
 
 SPUR_POINTS = 128  # measured: of a branch that are enough to say how far it reaches
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
@@ -28,29 +28,14 @@ FAR_OUT = 20.0  # fitted: half widths beyond which a protrusion says no more
 def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
     """Cut branches whose points hardly stand out of the surface around the limbs that meet there.
 
-    What counts is the points, not the curve: the contraction shortens stubs as thick as they are long, and lets thin
-    ones grow. And it is how far they leave the limbs that meet them, not how far they are from the junction: along
-    a part they may be anywhere. The limbs go on, straight, to where they meet, see `Limbs.meeting`: the contraction
-    draws them together in a sharp corner, and a spur into its tip is left. Another branch with an end may be a spur,
-    too, far from its points: it counts as no thicker than the junction. A branch whose points have no say goes.
+    The points count, not the curve, since contraction shortens stubs as thick as they are long, and lets thin ones
+    grow; and how far they leave the limbs that meet them, since along a part they may be anywhere. The limbs go on,
+    straight, to where they meet: contraction draws them together in a sharp corner, and a spur into its tip is left.
+    Another branch with an end may be a spur, too: it counts as no thicker than the junction.
 
-    A flat end draws two prongs of the curve into its corners, and each stands out of the other. So where three branches
-    meet, the less probable one of two with ends is a limb only if the other is one, too: without it there is no fork.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    evidence : Evidence
-    least : float
-        Probability of a limb below which a branch is cut. Of every junction the least probable first, until there is
-        none.
-
-    Returns
-    -------
-    Skeleton
-        Points of a cut branch belong to its junction.
-    judgements : list of Judgement
-        One for each branch that leaves a junction and has an end, cut or left; at its end.
+    Of every junction the least probable limb goes first, until none is less probable than `least`; its points belong to
+    the junction and have no normals any more. There is one judgement for each branch that leaves a junction and has an
+    end, cut or left; at its end.
     """
     judgements: list[Judgement] = []
     given = skeleton
@@ -77,15 +62,11 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
 
 
 def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, dict[str, float]]]:
-    """What speaks for every branch that leaves a junction and has an end.
+    """What speaks for every branch that leaves a junction and has an end: its leaf, and facts.
 
     The facts are: how far its points (all but a tenth) stand out of the surface around the other limbs, over its own
-    half width, as a logarithm; how far along it the surface goes over to others; and its mean confidence.
-
-    Yields
-    ------
-    leaf : int
-    facts : dict of str to float
+    half width, as a logarithm; how far along it the surface goes over to others; its mean confidence; and how round the
+    part is at the junction.
     """
     return ((twig.tip, twig.facts) for twig in _twigs(skeleton, evidence))
 
@@ -105,10 +86,9 @@ class _Twig(NamedTuple):
 
 
 def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
-    limbs, web = Limbs(skeleton, joined=True), _Web(skeleton, evidence)
-    supporting = skeleton.supporting_points
-    members = Members(skeleton.vertex_of_point[supporting], len(skeleton.vertices))
-    sections, count = measure_sections(skeleton), support(skeleton)
+    limbs, bonds = Limbs(skeleton, joined=True), evidence.bonds(skeleton)
+    cloud, sections = VertexPoints(skeleton), measure_sections(skeleton)
+    count = cloud.mass
     wide = sections.half_width
     roundness = np.nan_to_num(sections.half_thickness / np.maximum(wide, TINY))
     confidence, degree = np.nan_to_num(skeleton.confidence), skeleton.degree
@@ -117,18 +97,19 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
         if 1 in degree[branch[[0, -1]]]:
             ending[branch] = degree[branch] < 3
     for k, branch in enumerate(limbs.branches):
-        tip, junction = branch[np.argsort(degree[branch[[0, -1]]]) * (len(branch) - 1)].tolist()
+        path = branch[::-1] if degree[branch[0]] == 1 else branch
+        junction, tip = path[[0, -1]].tolist()
         if degree[tip] != 1 or degree[junction] < 3:
             continue
         body = branch[branch != junction]
         share = count[body] / count[body].sum()
         half = float(share @ wide[body])
-        own = supporting[members.of(body)]
-        points = skeleton.points[own[:: len(own) // SPUR_POINTS + 1]]
+        own = cloud.members.of(body)
+        points = cloud.points[own[:: len(own) // SPUR_POINTS + 1]]
         out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * half)
         facts = dict(
             protrusion=float(np.log(out / max(half, TINY) + 0.3)),
-            web=web.of(branch),
+            web=_web(skeleton.vertices, path, *bonds),
             confidence=float(share @ confidence[body]),
             roundness=float(roundness[junction]),
         )
@@ -136,7 +117,11 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
 
 
 def _with_forks(skeleton: Skeleton, twigs: list[_Twig]) -> list[_Twig]:
-    """Twigs, the less probable prong of every fork with the probability that both are limbs."""
+    """Twigs, the less probable prong of every fork with the probability that both are limbs.
+
+    A flat end draws two prongs of the curve into its corners, and each stands out of the other: where three branches
+    meet, one of two with ends is a limb only if the other is one, too.
+    """
     at: defaultdict[int, list[int]] = defaultdict(list)
     for number, twig in enumerate(twigs):
         if skeleton.degree[twig.junction] == 3:
@@ -149,28 +134,17 @@ def _with_forks(skeleton: Skeleton, twigs: list[_Twig]) -> list[_Twig]:
     return found
 
 
-class _Web:
-    """How far along a branch the surface goes over to others."""
+def _web(vertices: np.ndarray, path: np.ndarray, pairs: np.ndarray, weight: np.ndarray) -> float:
+    """Mean share of the way from its junction to its end at which a branch has bonds with others.
 
-    def __init__(self, skeleton: Skeleton, evidence: Evidence) -> None:
-        self._skeleton = skeleton
-        self._pairs, self._weight = evidence.bonds(skeleton)
-
-    def of(self, branch: np.ndarray) -> float:
-        """Mean share of the way from its junction to its end at which a branch is bonded to others.
-
-        Of a limb it is little, since the surface closes around it; of a strand in a flat part one half.
-        """
-        if self._skeleton.degree[branch[0]] == 1:
-            branch = branch[::-1]
-        along = arc_lengths(self._skeleton.vertices[branch])
-        share = np.full(len(self._skeleton.vertices), np.nan)
-        share[branch[1:]] = along[1:] / max(along[-1], TINY)
-        shares = share[self._pairs]
-        # those with the junction itself say nothing
-        out = (np.isfinite(shares).sum(axis=1) == 1) & (self._pairs != branch[0]).all(axis=1)
-        weight = self._weight[out]
-        return float(weight @ np.nansum(shares[out], axis=1) / max(weight.sum(), TINY))
+    Of a limb it is little, since the surface closes around it; of a strand in a flat part one half.
+    """
+    along, share = arc_lengths(vertices[path]), np.full(len(vertices), np.nan)
+    share[path[1:]] = along[1:] / max(along[-1], TINY)
+    shares = share[pairs]
+    # those with the junction itself say nothing
+    out = (np.isfinite(shares).sum(axis=1) == 1) & (pairs != path[0]).all(axis=1)
+    return float(weight[out] @ np.nansum(shares[out], axis=1) / max(weight[out].sum(), TINY))
 
 
 def _standing_out(limbs: Limbs, k: int, junction: int, points: np.ndarray, ending: np.ndarray) -> float:
@@ -179,11 +153,12 @@ def _standing_out(limbs: Limbs, k: int, junction: int, points: np.ndarray, endin
         return 0.0
     around = [i for i in limbs.at[limbs.region[junction]] if limbs.branch[i] != k]
     beside = [i for i in around if limbs.paths[i][0] == junction]
-    meeting = limbs.meeting(around, limbs.vertices[junction])
-    longer = np.flatnonzero(meeting.fits & ~limbs.short[[limbs.branch[i] for i in around]])
+    anchor, foot, fits = limbs.meeting(around, limbs.vertices[junction])
+    longer = np.flatnonzero(fits & ~limbs.short[[limbs.branch[i] for i in around]])
     radius = limbs.radius[[limbs.branch[around[i]] for i in longer]]
     surface = np.where(ending, np.minimum(limbs.surface, limbs.surface[junction]), limbs.surface)
-    vertices = np.concatenate([limbs.vertices, meeting.anchor[longer], meeting.foot[longer]])
+    vertices = np.concatenate([limbs.vertices, anchor[longer], foot[longer]])
     more = len(limbs.vertices) + np.arange(2 * len(longer)).reshape(2, -1).T
     paths = [*(limbs.paths[i] for i in beside), *more]
-    return float(np.quantile(beyond_surface(points, vertices, np.r_[surface, radius, radius], paths), SPUR_QUANTILE))
+    ratio, there = relative_distance(points, vertices, np.r_[surface, radius, radius], paths)
+    return float(np.quantile((ratio - 1) * there, SPUR_QUANTILE))

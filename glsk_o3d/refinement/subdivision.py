@@ -9,8 +9,8 @@ import numpy as np
 from ..numerics.nearest_edges import incident_edges
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
-from .merging import support
 from .sections import measure_sections
+from .vertex_points import VertexPoints
 
 POINTS_PER_PIECE = 8  # fitted: an edge is cut into at most one piece for every so many input points, begun ones counted
 SUBDIVISION_CHUNK = 65536  # measured: points at a time: memory stays flat
@@ -19,17 +19,13 @@ SUBDIVISION_CHUNK = 65536  # measured: points at a time: memory stays flat
 def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
     """Subdivide the edges to a share of the local radius; points go to the nearest sample around their vertex.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    spacing : float
-        Longest edge afterwards, over the mean radius of its ends; longer where points are few: a piece for 8.
+    No edge is longer than `spacing` times the mean radius of its ends, but where points are few: a piece for 8.
     """
     ends = skeleton.edges
     m = len(skeleton.vertices)
     radii = measure_sections(skeleton).radius
     length = np.maximum(spacing * radii[ends].mean(axis=1), np.maximum(1e-3 * skeleton.edge_lengths, TINY))
-    points = (support(skeleton) / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
+    points = (VertexPoints(skeleton).mass / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
     most = np.maximum(points / POINTS_PER_PIECE, 1)
     pieces = np.ceil(np.clip(skeleton.edge_lengths / length, 1, most)).astype(int)  # also edges of no length are one
     inner = pieces - 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +16,7 @@ from ..numerics.vectors import COLUMNS, ROWS, TINY
 from ..preparation.sampling import sample_cloud
 from ..skeleton import Skeleton
 from .diagnostics import SHEET_SHARE
+from .vertex_points import VertexPoints
 
 SCALE_NEIGHBOUR = 8  # fitted: the nearest point whose distance is the scale of a point
 TRACED_POINTS = 100_000  # measured: points that larger clouds are traced by, about; with fewer, thick parts look thin
@@ -24,17 +24,18 @@ SAME_PLACE = 1e-6  # derived: share of the cloud's extent below which points are
 LEAST_POINTS = 64  # fitted: of which fewer say nothing about where there is no surface
 SURFACE_GROWTH = 2.5  # measured: growth of links on a surface; noise that fills space has more, a curve 1.7
 SHEET_GROWTH = 2.2  # fitted: growth of links that a sheet surely has
-SHY = 0.4  # fitted: confidence below which the normals around a vertex do not say where the axis is
+UNSURE_CONFIDENCE = 0.4  # fitted: confidence below which the normals around a vertex do not say where the axis is
 REGION_POINTS = 1200  # fitted: points around a vertex of which a share must show a surface
 REGION_VERTICES = 400  # measured: vertices in which these are looked for
-FIRM, FIRM_LENGTH = 0.6, 4.0  # fitted: confidence, and length over radius, of a stretch that surely has a surface
+SURE_CONFIDENCE = 0.6  # fitted: least confidence in a stretch that surely has a surface
+SURE_LENGTH = 4.0  # fitted: and its least length, over its radius
 
 
-@dataclass(frozen=True, eq=False)
-class SpacedPoints:
-    """The distinct points that belong to a skeleton, or a sample of very many, and how far they are apart."""
+class SpacedPoints(VertexPoints):
+    """The distinct points that have a vertex, or a sample of very many, and how far they are apart.
 
-    skeleton: Skeleton
+    Those without a normal are among them.
+    """
 
     @cached_property
     def rows(self) -> np.ndarray:
@@ -45,21 +46,6 @@ class SpacedPoints:
         wide = np.ptp(points[some], axis=0).max() if len(some) else 0.0
         cells = np.rint(points[some] / max(SAME_PLACE * wide, TINY))
         return some[np.sort(np.unique(cells, axis=0, return_index=True)[1])]
-
-    @cached_property
-    def points(self) -> np.ndarray:
-        """Where they are."""
-        return self.skeleton.points[self.rows]
-
-    @property
-    def vertex(self) -> np.ndarray:
-        """The vertex of each."""
-        return self.skeleton.vertex_of_point[self.rows]
-
-    @property
-    def normals(self) -> np.ndarray:
-        """The normal of each, NaN where there is none."""
-        return self.skeleton.normals[self.rows]
 
     @cached_property
     def links(self) -> csr_matrix:
@@ -80,33 +66,26 @@ class SpacedPoints:
 def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     """Vertices around which the cloud shows no surface, (M,) bool array.
 
-    There the normals do not agree on an axis. Nor do they where noise has tilted them; but it fills space, and from
-    link to link there are more points than on a surface. Nor do they on a sheet; but there they agree with each other,
-    and there are more points than along a curve. That is not sure of one vertex alone, and holds at many a junction;
-    but where it holds for a share of the points of a region, it is so.
-
-    Parameters
-    ----------
-    cloud : SpacedPoints
-        Of a skeleton with the confidence of `fit_axis`; where it is unknown there is a surface.
-    least : float
-        Share of the points in the region around a vertex that must show a surface.
+    There the normals do not agree on an axis. Nor do they in noise; but it fills space, and from link to link there are
+    more points than on a surface. Nor do they on a sheet; but there they agree with each other, and there are more
+    points than along a curve. One vertex alone is not sure; but where this holds for more than ``1 - least`` of the
+    points of a region, it is so. Where the confidence is unknown there is a surface.
     """
     skeleton, m = cloud.skeleton, len(cloud.skeleton.vertices)
     owner = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0]
-    count, thin = np.bincount(owner, minlength=m) / max(len(owner) / TRACED_POINTS, 1), skeleton.confidence < SHY
+    count = np.bincount(owner, minlength=m) / max(len(owner) / TRACED_POINTS, 1)
+    thin = skeleton.confidence < UNSURE_CONFIDENCE
     enough = (1 - least) * min(REGION_POINTS, count.sum())  # for one region
     if count[thin].sum() <= enough or len(cloud.rows) < LEAST_POINTS:
         return np.zeros(m, bool)
-    vertex = cloud.vertex
-    count = np.bincount(vertex, minlength=m)
+    vertex, count = cloud.vertex, cloud.count
     _, near = nearest_neighbours(skeleton.vertices, min(REGION_VERTICES, m))
     if (_share_around(near, count, thin) <= 1 - least).all():
         return np.zeros(m, bool)
     facts = np.column_stack([link_growth(cloud.links), one_direction(cloud.normals, cloud.links)])
     growth, flat = (group_sum(facts, vertex, m) / np.maximum(count, 1)[:, None]).T
     thin &= growth < np.where(flat < SHEET_SHARE, SURFACE_GROWTH, SHEET_GROWTH)
-    return (_share_around(near, count, thin) > 1 - least) & ~_firm(skeleton)
+    return (_share_around(near, count, thin) > 1 - least) & ~_surely_with_surface(skeleton)
 
 
 def one_direction(normals: np.ndarray, links: csr_matrix) -> np.ndarray:
@@ -129,11 +108,11 @@ def _share_around(near: np.ndarray, count: np.ndarray, some: np.ndarray) -> np.n
     return (points * some[near]).sum(axis=1) / np.maximum(points.sum(axis=1), 1)
 
 
-def _firm(skeleton: Skeleton) -> np.ndarray:
+def _surely_with_surface(skeleton: Skeleton) -> np.ndarray:
     """Vertices in stretches that surely have a surface, and are long for their radius."""
-    m, ends, sure = len(skeleton.vertices), skeleton.edges, skeleton.confidence > FIRM
+    m, ends, sure = len(skeleton.vertices), skeleton.edges, skeleton.confidence > SURE_CONFIDENCE
     inside = sure[ends].all(axis=1)
     stretch = component_labels(m, ends[inside])
     length = np.bincount(stretch[ends[inside, 0]], skeleton.edge_lengths[inside], m)
     radius = np.bincount(stretch, skeleton.radii, m) / np.maximum(np.bincount(stretch, minlength=m), 1)
-    return sure & (length > FIRM_LENGTH * radius)[stretch]
+    return sure & (length > SURE_LENGTH * radius)[stretch]

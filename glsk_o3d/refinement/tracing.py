@@ -16,8 +16,7 @@ from ..numerics.near_links import join_pieces, linked, slice_centres
 from ..numerics.vectors import dot, norm, unit
 from ..skeleton import Skeleton
 from .rooted import numbered_from, root_among
-from .spread import spread_around
-from .strays import drop_strays
+from .spurious import drop_spurious, spread_around
 from .thin_parts import SpacedPoints, without_surface
 
 # All fitted, on trees whose twigs are thinner than their points are far apart; s is the median scale of the points.
@@ -34,23 +33,12 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     """Replace what has no surface by shortest paths through its points; with a root make one tree of everything.
 
     Points are linked with near ones (`near_links`), and with the vertices of parts that have a surface. From a root a
-    shortest path leads to every point; those of the farthest points, each until it meets one before, are the parts,
-    and cover the points around (Sato et al. 2000, TEASAR). The vertices of a path lie in the middle of slices of
-    geodesic distance.
+    shortest path leads to every point; those of the farthest points, each until it meets one before, are the parts, and
+    cover the points around (Sato et al. 2000, TEASAR). The vertices of a path lie in the middle of slices of geodesic
+    distance, and have the spread of their points for a radius, and confidence 0; their points have no normals any more.
+    Of a tree, vertex 0 is the root, and the first vertex of an edge is nearer to it.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    surface : float
-        Least share of the points of a region that must show a surface, see `without_surface`; 0 traces none.
-    root : str or None
-        RootPlace a tree grows from, as `Refiner.root` says.
-
-    Returns
-    -------
-    Skeleton
-        Traced vertices have the spread of their points for a radius, and confidence 0; their points have no normals any
-        more. Of a tree, vertex 0 is the root, and the first vertex of an edge is nearer to it.
+    See `without_surface` for `surface`, 0 for no traced parts, and `Refiner.root` for the root.
     """
     cloud, m = SpacedPoints(skeleton), len(skeleton.vertices)
     thin = np.zeros(m, bool)
@@ -65,7 +53,7 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     traced = _assembled(skeleton, mixed, paths, tree=root is not None)
     if thin.any():
         kept = None if root is None else paths.index[roots[0]]
-        traced, stays = drop_strays(traced, paths.nodes < mixed.n, COVER_RADII, kept)
+        traced, stays = drop_spurious(traced, paths.nodes < mixed.n, COVER_RADII, kept)
     else:
         stays = np.arange(len(paths.nodes))
     loose = thin[skeleton.vertex_of_point] & (skeleton.vertex_of_point >= 0)

@@ -9,27 +9,18 @@ import numpy as np
 
 from ..numerics.pairing import final_representatives
 from ..skeleton import Skeleton
-from .merging import merge_vertices, support
+from .merging import merge_vertices
+from .vertex_points import VertexPoints
 
 
 def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
     """Merge the two ends of edges that lie on a triangle, the shortest edge first, until there is no triangle.
 
-    The published order, least mean degree of the two ends first, is a combinatorial one: another sample of the same
-    surface has another, and finer vertices make it worse. Lengths converge with the vertices' spacing.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    by_degree : bool
-        The published order; length breaks ties.
-
-    Returns
-    -------
-    Skeleton
-        Without triangles; points of merged vertices belong to the vertex they were merged into.
+    The published order, least mean degree of the two ends first and length to break ties, is a combinatorial one:
+    another sample of the same surface has another, and finer vertices make it worse. Lengths converge with the
+    vertices' spacing. Points of merged vertices belong to the vertex they were merged into.
     """
-    position, weight = skeleton.vertices.tolist(), support(skeleton).tolist()
+    position, weight = skeleton.vertices.tolist(), VertexPoints(skeleton).mass.tolist()
     around: list[set[int]] = [set() for _ in position]
     for a, b in skeleton.edges.tolist():
         around[a].add(b)

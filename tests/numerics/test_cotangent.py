@@ -92,14 +92,6 @@ def test_triangle_by_hand():
     np.testing.assert_allclose(cotangent_laplacian(points, rings).toarray(), expected, atol=1e-14)
 
 
-def test_regular_umbrella_by_hand():
-    # each spoke of a regular hexagon lies opposite to two angles of 60 degrees
-    angle = np.arange(6) * np.pi / 3
-    points = np.column_stack([np.r_[0, np.cos(angle)], np.r_[0, np.sin(angle)], np.zeros(7)])
-    laplacian = cotangent_laplacian(points, rings_of([[1, 2, 3, 4, 5, 6], *[[]] * 6], [True] + [False] * 6))
-    np.testing.assert_allclose(laplacian.toarray()[0], [-6 * 2 / np.sqrt(3)] + [2 / np.sqrt(3)] * 6, rtol=1e-14)
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_linear_precision_on_plane_umbrellas(seed):
     rng = np.random.default_rng(seed)

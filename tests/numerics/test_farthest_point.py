@@ -47,18 +47,6 @@ def test_against_brute_force(name, points, size):
         np.testing.assert_array_equal(representative, expected_owner)
 
 
-@pytest.mark.parametrize(("name", "points"), list(clouds()))
-def test_balls_cover_and_centres_keep_apart(name, points):
-    reach = 0.1 * np.linalg.norm(np.ptp(points, axis=0))
-    samples, representative = farthest_point_sampling(points, np.full(len(points), reach))
-    distance = cdist(points, points[samples])
-    np.testing.assert_array_equal(distance[np.arange(len(points)), representative], distance.min(axis=1))
-    assert distance.min(axis=1).max() <= reach
-    between = cdist(points[samples], points[samples])
-    assert between[~np.eye(len(samples), dtype=bool)].min(initial=np.inf) > reach
-    np.testing.assert_array_equal(representative[samples], np.arange(len(samples)))
-
-
 @settings(max_examples=100)
 @given(arrays(float, st.tuples(st.integers(1, 30), st.just(3)), elements=st.integers(-3, 3)), st.data())
 def test_every_point_lies_in_the_ball_of_its_sample(points, data):

@@ -7,12 +7,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
-from glsk_o3d.numerics.winding import (
-    orient_by_votes,
-    orient_from_axis,
-    point_areas,
-    winding_number,
-)
+from glsk_o3d.numerics.winding import orient_from_axis, point_areas, winding_number
 from glsk_o3d.samples import torus
 
 X = np.eye(3)[0]
@@ -201,7 +196,6 @@ def test_normals_without_votes_stay():
     _, normals = ball(20)
     _, neighbours = nearest_neighbours(normals, 8)
     np.testing.assert_array_equal(orient_from_axis(normals, normals, normals, neighbours), normals)
-    np.testing.assert_array_equal(orient_by_votes(normals, np.zeros(20), neighbours), normals)
 
 
 def test_normals_turn_away_from_an_axis():

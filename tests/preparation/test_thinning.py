@@ -8,7 +8,7 @@ from glsk_o3d import samples
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
 from glsk_o3d.preparation.denoising import MOST_IN_ONE, average_noisy
 from glsk_o3d.preparation.sampling import sample_grid
-from glsk_o3d.preparation.thinning import ENOUGH, points_around, spacing_enough, thin, thin_nearer
+from glsk_o3d.preparation.thinning import ENOUGH, mean_over, points_around, spacing_enough, thin, thin_nearer
 
 
 def thinned(points, n, k=16):
@@ -131,7 +131,7 @@ def test_points_around_are_counted_whatever_the_noise(many, noise):
     points = tube(many, noise)
     neighbours = nearest_neighbours(points, 16)[1]
     inner = np.abs(points[:, 2] - 10) < 6
-    found = points_around(points, neighbours, principal(points, neighbours)[0])[inner]
+    found = points_around(points, mean_over(neighbours), principal(points, neighbours)[0])[inner]
     assert np.median(found) == pytest.approx(many, rel=0.15)
 
 

@@ -1,5 +1,6 @@
 """Skeletons made by hand."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -33,6 +34,40 @@ def around():
     def make(vertices, edges, points, normals, radius=0.1):
         owner = cKDTree(vertices).query(points)[1]
         return Skeleton(vertices, edges, np.full(len(vertices), radius), owner, points, normals)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def placed():
+    """A skeleton turned, in another unit of length, and elsewhere."""
+
+    def make(skeleton, turn=1, scale=1.0, shift=0.0):
+        turn = np.linalg.qr(np.random.default_rng(turn).normal(size=(3, 3)))[0] if np.ndim(turn) == 0 else turn
+        vertices, points = (scale * places @ turn + shift for places in (skeleton.vertices, skeleton.points))
+        radii = scale * skeleton.radii
+        return replace(skeleton, vertices=vertices, points=points, normals=skeleton.normals @ turn, radii=radii), turn
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def renumbered():
+    """A skeleton whose vertex v is called name[v], with its points in another order."""
+
+    def make(skeleton, name, order=None):
+        old = np.argsort(name)
+        order = np.arange(len(skeleton.points)) if order is None else order
+        return replace(
+            skeleton,
+            vertices=skeleton.vertices[old],
+            radii=skeleton.radii[old],
+            confidence=skeleton.confidence[old],
+            edges=np.unique(np.sort(name[skeleton.edges], axis=1), axis=0),
+            points=skeleton.points[order],
+            normals=skeleton.normals[order],
+            vertex_of_point=name[skeleton.vertex_of_point[order]],
+        )
 
     return make
 

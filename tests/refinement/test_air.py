@@ -65,16 +65,9 @@ def test_a_probability_of_more_than_one_cuts_nothing(piped):
     assert max(it.probability for it in judgements) > 0.5
 
 
-def test_goes_with_the_cloud(piped):
+def test_goes_with_the_cloud(piped, placed):
     raw = piped(ACROSS, tubes=[0, 1], step=0.04)  # no vertex right at a limit of distance
-    turn = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
-    moved = replace(
-        raw,
-        vertices=7 * raw.vertices @ turn + 5,
-        radii=7 * raw.radii,
-        points=7 * raw.points @ turn + 5,
-        normals=raw.normals @ turn,
-    )
+    moved, _ = placed(raw, 4, 7, 5)
     (here, said), (there, again) = cut(raw), cut(moved)
     np.testing.assert_array_equal(here.edges, there.edges)
     np.testing.assert_allclose([it.probability for it in again], [it.probability for it in said], rtol=1e-3)
@@ -107,7 +100,7 @@ def test_a_surface_along_a_line_without_thickness(piped):
 
 
 @pytest.mark.parametrize("turn", [0, 7, 13])
-def test_a_ring_has_no_seam(around, turn):
+def test_a_ring_has_no_seam(around, renumbered, turn):
     """Its weakest place is where its points are fewest, and bonds cross all of it, whichever vertex is the first."""
     cloud = torus(4000)
     angle = np.arctan2(*cloud.points[:, 1::-1].T)
@@ -122,19 +115,6 @@ def test_a_ring_has_no_seam(around, turn):
     middle = raw.vertices[branch[place : place + 2]].mean(axis=0)
     np.testing.assert_allclose(np.arctan2(middle[1], middle[0]), 1, atol=0.3)
     assert facts["bonds"] > -1
-    ((_, _, other),) = branch_facts(around_again(raw), Evidence.of(around_again(raw)), 0.0)
+    again = renumbered(raw, np.roll(np.arange(20), -5))
+    ((_, _, other),) = branch_facts(again, Evidence.of(again), 0.0)
     assert other == pytest.approx(facts, abs=1e-3)
-
-
-def around_again(skeleton):
-    """The same with its vertices numbered from elsewhere."""
-    m = len(skeleton.vertices)
-    new = (np.arange(m) + 5) % m
-    order = np.argsort(new)
-    return replace(
-        skeleton,
-        vertices=skeleton.vertices[order],
-        radii=skeleton.radii[order],
-        edges=np.unique(np.sort(new[skeleton.edges], axis=1), axis=0),
-        vertex_of_point=new[skeleton.vertex_of_point],
-    )

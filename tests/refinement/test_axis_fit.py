@@ -118,12 +118,9 @@ def test_a_curve_comes_to_the_axis_of_half_a_tube(side, signs):
 
 @pytest.mark.parametrize("turn", [np.eye(3), TURN], ids=["straight", "turned"])
 @pytest.mark.parametrize("degrees", [180, 150, 120])
-def test_a_curve_comes_to_the_axis_of_an_arc_outside_its_points(degrees, turn):
+def test_a_curve_comes_to_the_axis_of_an_arc_outside_its_points(degrees, turn, placed):
     """The axis of less than half a tube is beside all of its points."""
-    skeleton = tube((0, R), arc=np.deg2rad(degrees))
-    turned = replace(
-        skeleton, vertices=skeleton.vertices @ turn, points=skeleton.points @ turn, normals=skeleton.normals @ turn
-    )
+    turned, _ = placed(tube((0, R), arc=np.deg2rad(degrees)), turn)
     assert off_axis(fit_axis(turned, 15)[0] @ turn.T).max() < 0.02 * R
 
 
@@ -377,35 +374,27 @@ def test_confidence_of_few_points_is_small():
     ("turn", "scale", "shift"),
     [(TURN, 1, 0), (-np.eye(3), 1, 0), (np.eye(3), 1, [1e4, -3, 7]), (np.eye(3), 1e-9, 0), (TURN, 1e12, 3e12)],
 )
-def test_goes_with_the_cloud(shape, passes, turn, scale, shift):
+def test_goes_with_the_cloud(shape, passes, turn, scale, shift, placed):
     raw = shape()
-    moved = replace(
-        raw, vertices=scale * raw.vertices @ turn + shift, points=scale * raw.points @ turn + shift,
-        normals=raw.normals @ turn,
-    )  # fmt: skip
+    moved, _ = placed(raw, turn, scale, shift)
     (vertices, confidence, _), (expected, sure, _) = fit_axis(moved, passes), fit_axis(raw, passes)
     np.testing.assert_allclose((vertices - shift) / scale, expected @ turn, atol=1e-8)
     np.testing.assert_allclose(confidence, sure, atol=1e-7)
 
 
-def test_order_of_the_points_and_signs_of_their_normals_do_not_matter():
+def test_order_of_the_points_and_signs_of_their_normals_do_not_matter(renumbered):
     raw, rng = bent(), np.random.default_rng(4)
-    order = rng.permutation(len(raw.points))
-    normals = rng.choice([-1, 1], (len(order), 1)) * raw.normals[order]
-    mixed = replace(raw, points=raw.points[order], normals=normals, vertex_of_point=raw.vertex_of_point[order])
+    mixed = renumbered(raw, np.arange(30), rng.permutation(len(raw.points)))
+    mixed = replace(mixed, normals=rng.choice([-1, 1], (len(raw.points), 1)) * mixed.normals)
     for got, expected in zip(fit_axis(mixed, 3), fit_axis(raw, 3), strict=True):
         np.testing.assert_allclose(got, expected, atol=1e-9)
 
 
-def test_numbers_of_the_vertices_hardly_matter():
+def test_numbers_of_the_vertices_hardly_matter(renumbered):
     """Points beyond a corner are as near to one of its edges as to the other: they go to that with the lower number."""
     raw = bent()
     name = np.random.default_rng(4).permutation(len(raw.vertices))
-    edges = sorted(map(tuple, np.sort(name[raw.edges], axis=1).tolist()))
-    renamed = replace(
-        raw, vertices=raw.vertices[np.argsort(name)], edges=edges, vertex_of_point=name[raw.vertex_of_point]
-    )
-    (vertices, confidence, _), (expected, sure, _) = fit_axis(renamed, 3), fit_axis(raw, 3)
+    (vertices, confidence, _), (expected, sure, _) = fit_axis(renumbered(raw, name), 3), fit_axis(raw, 3)
     np.testing.assert_allclose(vertices[name], expected, atol=0.01 * R)
     np.testing.assert_allclose(confidence[name], sure, atol=0.01)
 

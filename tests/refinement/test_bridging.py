@@ -143,18 +143,10 @@ def test_no_thickness_no_bridge(piped):
 
 @settings(max_examples=10)
 @given(st.integers(0, 10**6))
-def test_numbers_do_not_matter(piped, seed):
+def test_numbers_do_not_matter(piped, renumbered, seed):
     raw = piped(LIMB)
     name = np.random.default_rng(seed).permutation(len(raw.vertices))
-    back = np.argsort(name)
-    edges = np.sort(name[raw.edges], axis=1)
-    renamed = replace(
-        raw,
-        vertices=raw.vertices[back],
-        radii=raw.radii[back],
-        edges=edges[np.lexsort(edges.T[::-1])],
-        vertex_of_point=name[raw.vertex_of_point],
-    )
+    renamed = renumbered(raw, name)
     skeleton, again = bridged(raw)[0], bridged(renamed)[0]
     named = {tuple(sorted(name[list(edge)].tolist())) for edge in new_edges(raw, skeleton)}
     assert set(new_edges(renamed, again)) == named

@@ -178,20 +178,13 @@ def test_both_ends_of_a_stub_grow():
 
 
 @pytest.mark.parametrize("cap", ["flat", "round"])
-def test_it_does_not_matter_where_and_how_large_things_are(cap):
+def test_it_does_not_matter_where_and_how_large_things_are(cap, placed):
     raw = fork(*limb(cap), LENGTH, 1)
-    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
     for size in (1e-3, 1e3):
-        moved = replace(
-            raw,
-            vertices=size * raw.vertices @ turn.T + size,
-            points=size * raw.points @ turn.T + size,
-            normals=raw.normals @ turn.T,
-            radii=size * raw.radii,
-        )
+        moved, turn = placed(raw, 3, size, size)
         found, expected = regrow_ends(moved), regrow_ends(raw)
         np.testing.assert_array_equal(found.edges, expected.edges)
-        np.testing.assert_allclose(found.vertices / size - 1, expected.vertices @ turn.T, atol=1e-6)
+        np.testing.assert_allclose(found.vertices / size - 1, expected.vertices @ turn, atol=1e-6)
         np.testing.assert_array_equal(found.vertex_of_point, expected.vertex_of_point)
 
 

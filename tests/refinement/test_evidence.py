@@ -135,14 +135,11 @@ def test_bonds_join_what_is_side_by_side_in_a_tube_and_not_two_tubes(piped):
 
 @settings(max_examples=40)
 @given(st.integers(0, 10**6))
-def test_bonds_go_with_the_skeleton(random_skeleton, seed):
+def test_bonds_go_with_the_skeleton(random_skeleton, placed, seed):
     raw = random_skeleton(seed)
     if len(raw.edges) == 0:
         return
-    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
-    moved = replace(
-        raw, vertices=3 * raw.vertices @ turn + 1, points=3 * raw.points @ turn + 1, normals=raw.normals @ turn
-    )
+    moved, _ = placed(raw, seed, 3, 1)
     (pairs, weight), (same, as_much) = (Evidence.of(each).bonds(each) for each in (raw, moved))
     np.testing.assert_array_equal(pairs, same)
     np.testing.assert_allclose(weight, as_much, atol=1e-9)

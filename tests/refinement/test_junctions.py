@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 from glsk_o3d import Refiner, Skeleton
 from glsk_o3d.numerics.polylines import arc_lengths
 from glsk_o3d.refinement.evidence import Evidence
-from glsk_o3d.refinement.junctions import Limbs, _Place, _straightened, move_junctions
-from glsk_o3d.refinement.meeting import Line, limb_line, meet
+from glsk_o3d.refinement.junctions import Line, _Place, _straightened, limb_line, meet, move_junctions
+from glsk_o3d.refinement.limbs import Limbs
 from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from glsk_o3d.refinement.spurs import prune_spurs
 
@@ -150,9 +150,9 @@ def test_axes_that_meet_outside_of_the_cloud_hardly_move_their_junction():
         [[(0, 0, 0), meet + 0.38 * way, meet + way] for way in ways], [(meet + 0.5 * w, meet + w) for w in ways]
     )
     limbs = Limbs(raw, joined=False)
-    meeting = limbs.meeting(limbs.at[raw.junctions[0]], np.zeros(3))
-    assert meeting.fits.all()
-    assert (meeting.foot[:, 0] > 2 * R).all()
+    _, foot, fits = limbs.meeting(limbs.at[raw.junctions[0]], np.zeros(3))
+    assert fits.all()
+    assert (foot[:, 0] > 2 * R).all()
     assert raw.points[:, 0].max() < 0
     np.testing.assert_allclose(move_junctions(raw).vertices, raw.vertices, atol=R)
 
@@ -239,38 +239,20 @@ def test_two_limbs_side_by_side_do_not_close_a_loop():
     assert move_junctions(raw).n_loops == raw.n_loops == 1
 
 
-def test_junctions_turn_and_grow_with_the_shape():
+def test_junctions_turn_and_grow_with_the_shape(placed):
     raw = quadruped(bent=0.8 * R)
-    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
-    turn[:, 0] *= np.sign(np.linalg.det(turn))
-    moved = replace(
-        raw,
-        vertices=7 * raw.vertices @ turn.T,
-        points=7 * raw.points @ turn.T,
-        normals=raw.normals @ turn.T,
-        radii=7 * raw.radii,
-    )
+    moved, turn = placed(raw, 3, 7)
     expected, found = move_junctions(raw), move_junctions(moved)
     np.testing.assert_array_equal(found.edges, expected.edges)
-    np.testing.assert_allclose(found.vertices, 7 * expected.vertices @ turn.T, atol=1e-8)
+    np.testing.assert_allclose(found.vertices, 7 * expected.vertices @ turn, atol=1e-8)
     np.testing.assert_allclose(found.radii, 7 * expected.radii, rtol=1e-9)
 
 
-def test_junctions_do_not_hang_on_the_order_of_points_and_vertices():
+def test_junctions_do_not_hang_on_the_order_of_points_and_vertices(renumbered):
     raw = quadruped(bent=0.8 * R)
     rng = np.random.default_rng(5)
     points, name = rng.permutation(len(raw.points)), rng.permutation(len(raw.vertices))
-    back = np.argsort(name)  # vertex v is now called name[v]
-    shuffled = replace(
-        raw,
-        vertices=raw.vertices[back],
-        radii=raw.radii[back],
-        confidence=raw.confidence[back],
-        edges=np.unique(np.sort(name[raw.edges], axis=1), axis=0),
-        points=raw.points[points],
-        normals=raw.normals[points],
-        vertex_of_point=name[raw.vertex_of_point[points]],
-    )
+    shuffled = renumbered(raw, name, points)
     expected, found = move_junctions(raw), move_junctions(shuffled)
     apart, which = cKDTree(expected.vertices).query(found.vertices)
     assert apart.max() < 1e-9

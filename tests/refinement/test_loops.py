@@ -1,4 +1,4 @@
-"""False loops are zipped up, handles stay."""
+"""False loops collapse, handles stay."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from glsk_o3d.numerics.cycles import minimum_cycle_basis, opens_wider
-from glsk_o3d.refinement.evidence import Evidence
-from glsk_o3d.refinement.loops import close_loops, loop_facts, surface_distance, zip_narrow_loops, zip_pairs
-from glsk_o3d.refinement.surface_graph import SurfaceGraph
+from glsk_o3d.refinement.evidence import Evidence, SurfaceGraph
+from glsk_o3d.refinement.loops import close_loops, collapse_narrow_loops, facing_pairs, loop_facts
+from glsk_o3d.refinement.vertex_points import VertexPoints
 
 X, Y, Z = np.eye(3)
 LADDER = [[(-0.8, y, 0), (0, y, 0), (0.8, y, 0)] for y in (0, 0.5)] + [[(x, 0, 0), (x, 0.5, 0)] for x in (-0.8, 0, 0.8)]
@@ -62,13 +62,13 @@ def test_two_strands_in_one_tube_become_a_path(piped, side):
     assert (np.diff(np.sort(skeleton.vertices[:, 0])) < 0.06).all()
 
 
-@pytest.mark.parametrize(("gap", "zipped"), [(0.06, True), (0.12, True), (0.24, False)])
-def test_raw_loops_are_zipped_that_open_less_than_their_tube_is_thick(piped, gap, zipped):
+@pytest.mark.parametrize(("gap", "collapsed"), [(0.06, True), (0.12, True), (0.24, False)])
+def test_raw_loops_are_collapsed_that_open_less_than_their_tube_is_thick(piped, gap, collapsed):
     """The largest circle between two strands has half their distance for its radius."""
     raw = strands(piped, gap=gap)
-    reach = np.median(surface_distance(raw))
-    assert (gap / 2 < reach) == zipped
-    assert zip_narrow_loops(raw, SurfaceGraph.of(raw)).n_loops == (0 if zipped else 1)
+    reach = np.median(VertexPoints(raw).distance)
+    assert (gap / 2 < reach) == collapsed
+    assert collapse_narrow_loops(raw, SurfaceGraph.of(raw)).n_loops == (0 if collapsed else 1)
 
 
 def test_a_raw_loop_around_a_hole_stays_however_narrow(piped):
@@ -79,9 +79,9 @@ def test_a_raw_loop_around_a_hole_stays_however_narrow(piped):
     raw = replace(ring, vertices=0.62 * ring.vertices)
     assert raw.n_loops == 1
     assert not opens_wider(
-        raw.vertices[np.argsort(np.arctan2(*raw.vertices[:, 1::-1].T))], np.median(surface_distance(raw))
+        raw.vertices[np.argsort(np.arctan2(*raw.vertices[:, 1::-1].T))], np.median(VertexPoints(raw).distance)
     )
-    assert zip_narrow_loops(raw, SurfaceGraph.of(raw)).n_loops == 1
+    assert collapse_narrow_loops(raw, SurfaceGraph.of(raw)).n_loops == 1
 
 
 def test_a_wide_loop_is_cut_where_fewest_bonds_cross(piped):
@@ -167,28 +167,28 @@ def test_surface_distance_is_the_median_over_the_owned_supporting_points(ringed)
     normals[4] = np.nan
     vertex[10:] = -1
     skeleton = replace(raw, points=points, normals=normals, vertex_of_point=vertex)
-    np.testing.assert_allclose(surface_distance(skeleton), [2.5, 0.1, 0])
+    np.testing.assert_allclose(VertexPoints(skeleton).distance, [2.5, 0.1, 0])
 
 
 @pytest.mark.parametrize("turn", range(6))
-def test_zip_pairs_join_what_is_as_far_along(turn):
+def test_facing_pairs_join_what_is_as_far_along(turn):
     """The ends are 10 and 13, whichever vertex comes first."""
     points = np.array([[0, 0, 0], [1, 0.1, 0], [2, 0.1, 0], [3, 0, 0], [2, -0.1, 0], [1, -0.1, 0]])
     labels = np.arange(10, 16)
-    pairs = zip_pairs(np.roll(points, turn, axis=0), np.roll(labels, turn))
+    pairs = facing_pairs(np.roll(points, turn, axis=0), np.roll(labels, turn))
     assert {frozenset(pair) for pair in pairs.tolist()} == {frozenset({11, 15}), frozenset({12, 14})}
 
 
 @pytest.mark.parametrize("turn", range(6))
-def test_zip_pairs_of_uneven_sides(turn):
+def test_facing_pairs_of_uneven_sides(turn):
     points = np.array([[0, 0, 0], [0.4, 0.1, 0], [2, 0.1, 0], [3.6, 0.1, 0], [4, 0, 0], [2, -0.1, 0]])
-    pairs = zip_pairs(np.roll(points, turn, axis=0), np.roll(np.arange(6), turn))
+    pairs = facing_pairs(np.roll(points, turn, axis=0), np.roll(np.arange(6), turn))
     # those near an end meet the end
     assert {frozenset(pair) for pair in pairs.tolist()} == {frozenset({0, 1}), frozenset({2, 5}), frozenset({3, 4})}
 
 
-def test_zip_pairs_of_a_loop_in_one_place():
-    assert zip_pairs(np.zeros((4, 3)), np.arange(4)).tolist() == [[0, 1], [0, 2], [0, 3]]
+def test_facing_pairs_of_a_loop_in_one_place():
+    assert facing_pairs(np.zeros((4, 3)), np.arange(4)).tolist() == [[0, 1], [0, 2], [0, 3]]
 
 
 def test_every_inner_vertex_is_in_a_pair():
@@ -197,7 +197,7 @@ def test_every_inner_vertex_is_in_a_pair():
         points = rng.normal(size=(n, 3))
         distance = np.linalg.norm(points[:, None] - points[None], axis=2)
         ends = set(np.unravel_index(np.argmax(distance), (n, n)))
-        pairs = zip_pairs(points, np.arange(n))
+        pairs = facing_pairs(points, np.arange(n))
         assert set(range(n)) - ends <= set(pairs.ravel().tolist())
         # the two ends stay apart
         assert not any(set(pair) == ends for pair in pairs.tolist())

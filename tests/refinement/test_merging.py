@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glsk_o3d.refinement.merging import drop_lone_vertices, merge_vertices, support
+from glsk_o3d.refinement.merging import drop_lone_vertices, merge_vertices
+from glsk_o3d.refinement.vertex_points import VertexPoints
 
 
 def test_support_counts_supporting_points_and_is_at_least_one(ringed):
@@ -15,8 +16,8 @@ def test_support_counts_supporting_points_and_is_at_least_one(ringed):
     normals[[0, 1]] = np.nan  # set aside
     vertex = np.array([0, 0, 0, 1, 1, -1, 1, 1, 1])
     skeleton = replace(raw, normals=normals, vertex_of_point=vertex)
-    assert support(skeleton).tolist() == [1, 5, 1]
-    assert support(skeleton).dtype == float
+    assert VertexPoints(skeleton).mass.tolist() == [1, 5, 1]
+    assert VertexPoints(skeleton).mass.dtype == float
 
 
 @settings(max_examples=100)
@@ -26,7 +27,7 @@ def test_by_its_definition(random_skeleton, seed, labels, every):
     raw = replace(raw, half_width=2 * raw.radii)
     skeleton = merge_vertices(raw, group)
     names = sorted(set(labels))
-    weight = support(raw)
+    weight = VertexPoints(raw).mass
     for v, name in enumerate(names):
         inside = group == name
         for merged, own in ((skeleton.vertices, raw.vertices), (skeleton.half_width, raw.half_width)):

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
-from glsk_o3d.numerics.polylines import beyond_surface, relative_distance
+from glsk_o3d.numerics.polylines import relative_distance
 from glsk_o3d.refinement import spurs
 from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from glsk_o3d.refinement.spurs import SPUR_QUANTILE, limb_facts, prune_spurs
@@ -123,10 +123,12 @@ def test_distance_from_paths_over_their_thickness(far):
             places, thick = (values[a] + share * (values[b] - values[a]) for values in (vertices, thickness[:, None]))
             distance, nearest = cKDTree(places).query(points)
             expected = np.minimum(expected, distance / thick[nearest, 0])
-    found = relative_distance(points + far, vertices + far, thickness, paths)
+    found, there = relative_distance(points + far, vertices + far, thickness, paths)
     np.testing.assert_allclose(found, expected, rtol=1e-3)
-    out = beyond_surface(points + far, vertices + far, np.full(12, 0.5), paths)
-    np.testing.assert_allclose(out, 0.5 * (relative_distance(points, vertices, np.full(12, 0.5), paths) - 1), atol=1e-8)
+    assert (np.clip(there, thickness.min(), thickness.max()) == there).all()
+    ratio, there = relative_distance(points + far, vertices + far, np.full(12, 0.5), paths)
+    np.testing.assert_allclose(ratio, relative_distance(points, vertices, np.full(12, 0.5), paths)[0], atol=2e-8)
+    np.testing.assert_allclose(there, 0.5)
 
 
 @pytest.mark.parametrize(("reach", "length", "cut"), [(0.07, 0.9, True), (0.3, 0.02, False)])
@@ -184,9 +186,10 @@ def test_a_vertex_without_points_is_as_thick_as_its_radius_says():
 def test_far_points_in_chunks(monkeypatch):
     rng = np.random.default_rng(0)
     points, vertices = rng.normal(size=(50, 3)), rng.normal(size=(8, 3))
-    found = relative_distance(points, vertices, np.arange(8) + 1.0, [np.arange(8)])
+    found, _ = relative_distance(points, vertices, np.arange(8) + 1.0, [np.arange(8)])
     monkeypatch.setattr("glsk_o3d.numerics.polylines.POLYLINE_CHUNK", 21)
-    np.testing.assert_array_equal(relative_distance(points, vertices, np.arange(8) + 1.0, [np.arange(8)]), found)
+    again, _ = relative_distance(points, vertices, np.arange(8) + 1.0, [np.arange(8)])
+    np.testing.assert_array_equal(again, found)
 
 
 def test_lines_have_no_thickness():
@@ -209,13 +212,9 @@ def test_least_first_until_it_is_no_junction(ringed):
     np.testing.assert_allclose(skeleton.vertices, [[0, 0, 0], tips[0], tips[2]], atol=1e-15)
 
 
-def test_several_at_one_junction_and_in_any_numbering():
+def test_several_at_one_junction_and_in_any_numbering(renumbered):
     raw = tree((5, 0.03), (5, 0.07), (9, 0.05), (12, 0.5))
-    turn = np.random.default_rng(1).permutation(len(raw.vertices))
-    back = np.argsort(turn)
-    edges = sorted(map(tuple, np.sort(back[raw.edges], axis=1).tolist()))
-    renamed = Skeleton(raw.vertices[turn], edges, raw.radii, back[raw.vertex_of_point], raw.points, raw.normals)
-    for case in (raw, renamed):
+    for case in (raw, renumbered(raw, np.random.default_rng(1).permutation(len(raw.vertices)))):
         skeleton = pruned(case, 1.1)
         assert len(skeleton.vertices) == N + 2
         assert len(skeleton.junctions) == 1
@@ -316,7 +315,7 @@ def test_a_part_with_two_ends_has_no_limbs():
 
 def test_distance_of_a_point_that_is_a_vertex_to_a_line_without_thickness():
     vertices = np.array([[0.0, 0, 0], [0, 0, 1], [0, 99, 0], [0, 99, 1]])
-    found = relative_distance(vertices[:1], vertices, np.zeros(4), [np.array([0, 1]), np.array([2, 3])])
+    found, _ = relative_distance(vertices[:1], vertices, np.zeros(4), [np.array([0, 1]), np.array([2, 3])])
     np.testing.assert_array_equal(found, [0])
-    far = relative_distance(vertices[:1], vertices, np.zeros(4), [np.array([2, 3])])
+    far, _ = relative_distance(vertices[:1], vertices, np.zeros(4), [np.array([2, 3])])
     assert 1e12 < far < np.inf

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glsk_o3d.refinement.merging import support
 from glsk_o3d.refinement.triangles import collapse_triangles
+from glsk_o3d.refinement.vertex_points import VertexPoints
 
 
 def slow(skeleton, by_degree=False):
     """All prices anew before every merge: members, positions and edges of what is left."""
-    position, weight = dict(enumerate(skeleton.vertices)), dict(enumerate(support(skeleton)))
+    position, weight = dict(enumerate(skeleton.vertices)), dict(enumerate(VertexPoints(skeleton).mass))
     members = {v: {v} for v in position}
     links = {v: set() for v in position}
     for a, b in skeleton.edges.tolist():
@@ -71,7 +71,7 @@ def test_what_is_left(random_skeleton, seed, m, reach):
     assert not any(links[a] & links[b] for a, b in skeleton.edges.tolist())
     assert skeleton.n_components == raw.n_components
     # each vertex at the mean of those merged, weighted by the points they own
-    weight, group = support(raw), np.full(m, -1)
+    weight, group = VertexPoints(raw).mass, np.full(m, -1)
     owned = raw.vertex_of_point >= 0
     group[raw.vertex_of_point[owned]] = skeleton.vertex_of_point[owned]
     for v in range(len(skeleton.vertices)):

@@ -1,4 +1,4 @@
-"""Drop traced twigs that are no more than the scatter of the points around what they grow from."""
+"""Drop spurious twigs: traced ones that are no more than the scatter of the points around what they grow from."""
 
 from __future__ import annotations
 
@@ -8,35 +8,38 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..numerics.groups import group_median
+from ..numerics.near_links import linked, steps
+from ..numerics.nearest_edges import incident_edges, nearest_on_edges
+from ..numerics.vectors import norm
 from ..skeleton import Skeleton
 from .merging import merge_into
-from .spread import spread_around
 
 
-def drop_strays(
+def spread_around(skeleton: Skeleton) -> np.ndarray:
+    """Median distance from the curve to the points around every vertex and its neighbours, (M,) float array.
+
+    Of points on a tube its radius, and outliers have little say.
+    """
+    m, edges = len(skeleton.vertices), skeleton.edges
+    some = np.flatnonzero(skeleton.vertex_of_point >= 0)
+    vertex, points = skeleton.vertex_of_point[some], skeleton.points[some]
+    edge, t = nearest_on_edges(skeleton.vertices, edges, incident_edges(edges, m)[vertex], points)
+    start, stop = skeleton.vertices[edges[edge]].transpose(1, 0, 2)
+    away = norm(points - start - t[:, None] * (stop - start))
+    around = steps(linked(skeleton.vertices, edges))[vertex]
+    return group_median(np.repeat(away, np.diff(around.indptr)), around.indices, m)
+
+
+def drop_spurious(
     skeleton: Skeleton, traced: np.ndarray, radii: float, root: int | None = None
 ) -> tuple[Skeleton, np.ndarray]:
-    """Drop twigs whose tip is as near to the rest as points scatter there.
+    """Drop twigs whose tip is as near to the rest as points scatter there; say which vertices stay, in their order.
 
     Of N points that scatter normally around a curve, with a median distance of r, one is expected to be farther off
-    than ``r sqrt(log2 N)``.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    traced : (M,) bool array
-        Vertices whose radius is the spread of their points. Only they are dropped.
-    radii : float
-        How far a tip must be from a part that has a surface, over its radius.
-    root : int, optional
-        A vertex that stays.
-
-    Returns
-    -------
-    Skeleton
-        Points of a twig belong to the vertex that it grew from.
-    stays : (M',) int array
-        The vertices that are left, in their order.
+    than ``r sqrt(log2 N)``. Only twigs of `traced` (M,) vertices, whose radius is the spread of their points, are
+    dropped, and not the vertex `root`. From a part that has a surface a tip must be `radii` of its radii away. Points
+    of a twig belong to the vertex that it grew from.
     """
     stays = np.arange(len(skeleton.vertices))
     scatter = math.sqrt(math.log2(max(int((skeleton.vertex_of_point >= 0).sum()), 1)))

@@ -7,13 +7,12 @@ import pytest
 
 from glsk_o3d import Skeleton, pipelines, samples
 from glsk_o3d.refinement import tracing
-from glsk_o3d.refinement.spread import spread_around
-from glsk_o3d.refinement.strays import drop_strays
+from glsk_o3d.refinement.spurious import drop_spurious, spread_around
 
 
 def drop(skeleton, radii, root=None):
-    """Without strays, all of no confidence being traced."""
-    left, stays = drop_strays(skeleton, skeleton.confidence == 0, radii, root)
+    """Without spurious twigs, all of no confidence being traced."""
+    left, stays = drop_spurious(skeleton, skeleton.confidence == 0, radii, root)
     np.testing.assert_array_equal(left.vertices, skeleton.vertices[stays])
     return left
 
@@ -96,5 +95,5 @@ def test_noise_as_wide_as_twigs_makes_half_as_many_false_tips(seed, monkeypatch)
     points, true = samples.tree(8192, forks=5, noise=0.002, seed=seed).points, 33
     left = pipelines.tree()(points)
     assert left.report.n_traced > 1000
-    monkeypatch.setattr(tracing, "drop_strays", lambda skeleton, *_: (skeleton, np.arange(len(skeleton.vertices))))
+    monkeypatch.setattr(tracing, "drop_spurious", lambda skeleton, *_: (skeleton, np.arange(len(skeleton.vertices))))
     assert true < len(left.leaves) < true + 0.6 * (len(pipelines.tree()(points).leaves) - true)
