@@ -98,8 +98,10 @@ def _close_calls(skeleton: Skeleton) -> list[str]:
 def otherwise(call: Judgement) -> str:
     """The option with which the Refiner would have answered otherwise, to two digits.
 
-    >>> otherwise(Judgement("limb", (0.0, 0.0, 0.0), 0.55, changed=False)) 'Refiner.limb=0.56' >>>
-    otherwise(Judgement("gap", (0.0, 0.0, 0.0), 0.42, changed=False)) 'Refiner.bridge=0.41'
+    >>> otherwise(Judgement("limb", (0.0, 0.0, 0.0), 0.55, changed=False))
+    'Refiner.limb=0.56'
+    >>> otherwise(Judgement("gap", (0.0, 0.0, 0.0), 0.42, changed=False))
+    'Refiner.bridge=0.41'
     """
     option, changes = _DECIDED_BY[call.about]
     reached = call.changed == changes
