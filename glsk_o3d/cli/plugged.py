@@ -20,7 +20,10 @@ def add_plugged(app: typer.Typer) -> None:
     found = {entry.name: entry for entry in entry_points(group=COMMAND_GROUP)}
     for name, entry in sorted(found.items()):
         try:
-            app.add_typer(entry.load(), name=name)
+            plugged = entry.load()
+            if not isinstance(plugged, typer.Typer):
+                raise TypeError(f"it is a {type(plugged).__name__} and should be a typer.Typer")
+            app.add_typer(plugged, name=name)
         except Exception as error:  # the code of others: the other commands work without it
             say("warning", f"the command {name!r} ({entry.value}) is left out: {error}")
     for name in ELSEWHERE.keys() - found.keys():
