@@ -68,7 +68,7 @@ class Connector(Filter[Skeleton]):
     )
     links: Literal["all", "nearest"] = parameter(
         "all",
-        "Join a point's vertex with those of all its foreign ring neighbours, but across gaps, or of the nearest one.",
+        "Join a point's vertex with those of all its foreign ring neighbours, except across gaps, or of the nearest.",
         choices=("all", "nearest"),
     )
     min_support: float = parameter(
