@@ -11,8 +11,10 @@ from .console import say
 from .reporting import reporting
 
 COMMAND_GROUP = "glsk_o3d.commands"
-ELSEWHERE = {"benchmark": ("glsk-bench", "Score any program on shapes with known axes (in a distribution of its own).")}
-"""Commands that are not in this distribution: which has them, and what they do."""
+ELSEWHERE = {
+    "benchmark": ("./benchmarks", "Score any program on shapes with known axes (in a distribution of its own)."),
+}
+"""Commands that are not in this distribution: the folder of the repository that has them, and what they do."""
 
 
 def add_plugged(app: typer.Typer) -> None:
@@ -30,10 +32,11 @@ def add_plugged(app: typer.Typer) -> None:
         _add_absent(app, name, *ELSEWHERE[name])
 
 
-def _add_absent(app: typer.Typer, name: str, distribution: str, text: str) -> None:
+def _add_absent(app: typer.Typer, name: str, folder: str, text: str) -> None:
     def absent(context: typer.Context) -> None:
         with reporting():
-            raise MissingPackageError(f'glsk {name} needs another distribution: pip install "{distribution}"')
+            cure = f"pip install {folder} in a clone of glsk-o3d"
+            raise MissingPackageError(f"glsk {name} needs another distribution: {cure}")
 
     settings = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
     app.command(name, help=text, context_settings=settings)(absent)
