@@ -68,11 +68,14 @@ class Connector(Filter[Skeleton]):
     )
     links: Literal["all", "nearest"] = parameter(
         "all",
-        "Join a point's vertex with those of all its foreign ring neighbours, but across gaps, or of the nearest one.",
+        "Join a point's vertex with those of all its foreign ring neighbours, except across gaps, or of the nearest.",
         choices=("all", "nearest"),
     )
     min_support: float = parameter(
-        0.1, "In noise, vertices with less than this share of a near one's points go. 0 keeps all.", low=0, high=1
+        0.1,
+        "In noise, vertices with less than this share of the points of a near one are dropped. 0 keeps all.",
+        low=0,
+        high=1,
     )
 
     def _run(self, state: Contraction, watch: Watch | None) -> Skeleton:

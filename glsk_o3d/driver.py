@@ -141,8 +141,8 @@ def remove_redundant_points(
     name, tensor = open3d_class(cloud)
     if name == "TriangleMesh":
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
-    rings = rings or RingBuilder(thin_to="all", outlier_factor=0, denoise=0)
-    reducer = reducer or LPRReducer()
+    rings = RingBuilder(thin_to="all", outlier_factor=0, denoise=0) if rings is None else rings
+    reducer = LPRReducer() if reducer is None else reducer
     contraction = Contractor(reducer=reducer, reduce_above=0, max_iterations=int(passes), stop=lambda iterations: None)
     kept = np.sort((rings | contraction)(cloud).point_of_survivor)
     if name == "PointCloud" and not tensor:

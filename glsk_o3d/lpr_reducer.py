@@ -64,7 +64,7 @@ class LPRReducer(Filter[Contraction]):
     phi: float = parameter(1e5, "Merge where F is below phi times the squared ring size.", low=0, open_low=True)
     conserve_mass: bool = parameter(True, "Survivors take over the mass of the points they swallow.")
     mend_rings: bool = parameter(
-        True, "Rebuild rings that no longer surround their point; without, such points later run away."
+        True, "Rebuild rings that no longer surround their point; otherwise such points later run away."
     )
     order: Literal["cheapest", "index"] = parameter(
         "cheapest",

@@ -229,8 +229,7 @@ class Pipeline(Generic[Produced]):
         pipeline: Any = self
         names: dict[tuple[type[Parameters], str], str] = {}
         given = [*(options or {}).items(), *named.items()]
-        # reducers and rules first: what is put in has parameters that others may change
-        for name, value in sorted(given, key=lambda option: not (option[1] is None or callable(option[1]))):
+        for name, value in sorted(given, key=lambda option: _turn(option[1])):
             cls, field = pipeline.class_of_option(name)
             if (cls, field.name) in names:
                 raise InvalidParameterError(f"{names[cls, field.name]} and {name} are one option: give it once")
@@ -284,6 +283,13 @@ def parts(item: Pipeline | Parameters) -> Iterator[Parameters]:
     for part in inner:
         if isinstance(part, Parameters):
             yield from parts(part)
+
+
+def _turn(value: Any) -> int:
+    """When it is the turn of an option: a reducer or a rule is put in, or taken out, before its parameters change."""
+    if callable(value):
+        return 0
+    return 1 if value is None else 2
 
 
 def _changed(item: Any, cls: type[Parameters], name: str, value: Any) -> Any:

@@ -99,7 +99,7 @@ class RingBuilder(Filter[Contraction]):
     )
     around: float = parameter(
         20.0,
-        "Points around a part that are enough: where there are more, near ones are merged. 0 or a `radius`: none.",
+        "Points around a part that are enough: where there are more, near ones are merged; with 0 or a `radius`, none.",
         unit="points",
         low=0,
         high=1000,

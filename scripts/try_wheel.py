@@ -71,7 +71,7 @@ def try_extra(wheel: Path, bench: Path, extra: str, folder: Path) -> tuple[float
     for line in COMMANDS.splitlines():
         done = subprocess.run([binaries / "glsk", *line.split()], cwd=here, capture_output=True, text=True)
         said = done.stderr.strip().splitlines()[-1:] or [""]
-        if wants := re.search(r'pip install "glsk-(?:o3d\[)?(\w+)', done.stderr):
+        if wants := re.search(r'pip install (?:"glsk-o3d\[|\./)(\w+)', done.stderr):
             asked.append(wants[1])
         elif done.returncode and not (line.startswith("info scan") and "not a valid" in said[0]):
             wrong.append(f"glsk {line}: {said[0]}")

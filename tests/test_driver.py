@@ -96,6 +96,8 @@ def test_parameters():
     assert len(remove_redundant_points(POINTS, reducer=LPRReducer(phi=1e-12))[1]) > len(KEPT)
     with pytest.raises(InvalidParameterError, match="phi"):
         remove_redundant_points(POINTS, reducer=LPRReducer(phi=-1))
+    with pytest.raises(InvalidParameterError, match="reducer"):
+        remove_redundant_points(POINTS, reducer=0)
     for passes in (0, 1.0, True):
         with pytest.raises(InvalidParameterError, match="passes"):
             remove_redundant_points(POINTS, passes=passes)

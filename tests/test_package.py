@@ -22,7 +22,8 @@ def test_there_is_one_version(root):
 
 
 def test_is_typed(root):
-    assert (root / "glsk_o3d" / "py.typed").is_file()
+    for package in ("glsk_o3d", "benchmarks/src/glsk_bench"):
+        assert (root / package / "py.typed").is_file()
 
 
 def test_all_names_are_there():

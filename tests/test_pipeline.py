@@ -29,6 +29,7 @@ from glsk_o3d import (
     skeletonize,
 )
 from glsk_o3d.analysis import compare
+from glsk_o3d.parameters import Parameters, parameter
 
 FILTERS = (RingBuilder, Contractor, LPRReducer, Connector, Refiner)
 NAMES = tuple(pipelines.PIPELINES)
@@ -269,6 +270,28 @@ def test_a_rule_of_any_kind_is_put_in_before_its_parameters():
         assert pipelines.default().with_options(options).stages[1].stop == RingSizeRatio(0.5)
     for options in ({"threshold": 0.5, "stop": max}, {"stop": max, "threshold": 0.5}):
         with pytest.raises(InvalidParameterError, match="threshold"):
+            pipelines.default().with_options(options)
+
+
+@dataclasses.dataclass(frozen=True)
+class Patience(Parameters):
+    """A rule with a parameter that may be None."""
+
+    kind = "rule"
+    least: int | None = parameter(None, "Fewest solves.", type="int?")
+
+    def __call__(self, iterations):
+        return None
+
+
+def test_a_rule_is_put_in_before_a_parameter_of_it_that_becomes_none():
+    for options in ({"Patience.least": None, "stop": Patience(3)}, {"stop": Patience(3), "Patience.least": None}):
+        assert pipelines.default().with_options(options).stages[1].stop == Patience(None)
+
+
+def test_a_reducer_that_is_taken_out_has_no_parameters():
+    for options in ({"phi": 3, "reducer": None}, {"reducer": None, "phi": 3}):
+        with pytest.raises(InvalidParameterError, match="'phi'"):
             pipelines.default().with_options(options)
 
 

@@ -11,8 +11,10 @@ from .console import say
 from .reporting import reporting
 
 COMMAND_GROUP = "glsk_o3d.commands"
-ELSEWHERE = {"benchmark": ("glsk-bench", "Score any program on shapes with known axes (in a distribution of its own).")}
-"""Commands that are not in this distribution: which has them, and what they do."""
+ELSEWHERE = {
+    "benchmark": ("./benchmarks", "Score any program on shapes with known axes (in a distribution of its own)."),
+}
+"""Commands that are not in this distribution: the folder of the repository that has them, and what they do."""
 
 
 def add_plugged(app: typer.Typer) -> None:
@@ -20,17 +22,21 @@ def add_plugged(app: typer.Typer) -> None:
     found = {entry.name: entry for entry in entry_points(group=COMMAND_GROUP)}
     for name, entry in sorted(found.items()):
         try:
-            app.add_typer(entry.load(), name=name)
+            plugged = entry.load()
+            if not isinstance(plugged, typer.Typer):
+                raise TypeError(f"it is a {type(plugged).__name__} and should be a typer.Typer")
+            app.add_typer(plugged, name=name)
         except Exception as error:  # the code of others: the other commands work without it
             say("warning", f"the command {name!r} ({entry.value}) is left out: {error}")
     for name in ELSEWHERE.keys() - found.keys():
         _add_absent(app, name, *ELSEWHERE[name])
 
 
-def _add_absent(app: typer.Typer, name: str, distribution: str, text: str) -> None:
+def _add_absent(app: typer.Typer, name: str, folder: str, text: str) -> None:
     def absent(context: typer.Context) -> None:
         with reporting():
-            raise MissingPackageError(f'glsk {name} needs another distribution: pip install "{distribution}"')
+            cure = f"pip install {folder} in a clone of glsk-o3d"
+            raise MissingPackageError(f"glsk {name} needs another distribution: {cure}")
 
     settings = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
     app.command(name, help=text, context_settings=settings)(absent)

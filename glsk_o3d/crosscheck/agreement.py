@@ -49,7 +49,7 @@ class RowAgreement:
     covered: float  # the share of the closed ones that were compared
     one_to_one: bool  # vertices of the mesh are points of the cloud; else mean curvature normals were compared
     same_rings: float | None  # share of compared rings with the mesh's neighbours in its order; None unless one to one
-    common_triangles: float | None  # mean of the triangles in ring and mesh over those in either; None alike
+    common_triangles: float | None  # mean of the triangles in ring and mesh over those in either; None as above
     flat: float  # share of the compared rows that are flat in both, and so have no direction
     angle: dict[str, float]  # quantiles of the angle between ours and the mesh's, in degrees; 0 is best
     length: dict[str, float]  # quantiles of our length over the mesh's; 1 is best

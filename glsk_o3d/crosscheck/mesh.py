@@ -31,7 +31,7 @@ BALL_RADII = (1.0, 2.0, 4.0)  # fitted: of the rolling balls, in spacings
 POISSON_DEPTHS = (5, 9)  # measured: of the octree; below 5 Open3D makes the same mesh, and complains
 INVENTED_DISTANCE = 3.0  # fitted: spacings from the cloud beyond which Poisson's surface is an invention
 COVERED_SHARE = 0.7  # fitted: of the closed rings that a mesh closes too; below it, Poisson follows on ball pivoting
-# derived: of the diagonal; nearer vertices are points of the cloud, the digits of a float32 in whichever file
+# derived: of the diagonal; nearer vertices are points of the cloud: a file may have rounded them to float32
 SAME_VERTEX = 1e-6
 
 

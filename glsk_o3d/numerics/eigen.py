@@ -17,7 +17,7 @@ EIGENVALUES_APART = 1e-3
 
 
 def principal_parts(entries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues, (3, n) ascending, and unit eigenvectors of the least, (n, 3); of a multiple one any."""
+    """Eigenvalues, (3, n) ascending, and unit eigenvectors of the least, (n, 3): any of them if it is multiple."""
     mean, size, shape = _reduced(entries)
     least, most = _outer(shape)
     return mean + size * np.stack([least, -least - most, most]), _direction(shape, least, 0)
@@ -30,7 +30,7 @@ def largest_eigenvalue(entries: np.ndarray) -> np.ndarray:
 
 
 def main_direction(entries: np.ndarray) -> np.ndarray:
-    """Unit eigenvector of the largest eigenvalue of each matrix, (n, 3); of a multiple one any."""
+    """Unit eigenvector of the largest eigenvalue of each matrix, (n, 3): any of them if it is multiple."""
     shape = _reduced(entries)[2]
     return _direction(shape, _outer(shape)[1], 2)
 

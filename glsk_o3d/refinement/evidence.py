@@ -29,7 +29,7 @@ VERTEX_POINTS = 32  # derived: points to a vertex of a tube with 20 around it, w
 class SurfaceGraph:
     """Some of the points that support a skeleton, each linked with those nearest to it.
 
-    Of many points it takes every so-manieth, 4096 or more, and 32 for every vertex: an object of many parts takes more.
+    Of many points it takes a regular sample, 4096 or more, and 32 for every vertex: an object of many parts takes more.
     Of points in one place it takes the first.
     """
 
