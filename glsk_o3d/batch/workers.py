@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,7 @@ class LocalWorkers:
 
     def __init__(self, count: int, load: bool = True):
         self._seats = [_Seat(load) for _ in range(count)]
+        self._stillborn = 0  # how many in a row died before they began
 
     def capacity(self) -> int:
         """How many pieces of work to hand out at a time."""
@@ -49,7 +51,28 @@ class LocalWorkers:
 
     def submit(self, function: Callable, *arguments: Any) -> Future:
         """Hand out one piece of work."""
-        return next(seat for seat in self._seats if seat.work.done()).submit(function, *arguments)
+        seat, told = next(seat for seat in self._seats if seat.work.done()), Future[Any]()
+        seat.work = told
+        seat.submit(function, *arguments).add_done_callback(partial(self._settle, seat, told))
+        return told
+
+    def _settle(self, seat: _Seat, told: Future, done: Future) -> None:
+        """Pass on what came of work; BatchError where more workers in a row died before they began than there are."""
+        if done.cancelled():
+            told.cancel()
+            return
+        error = done.exception()
+        if died(error):
+            self._stillborn = 0 if seat.began() else self._stillborn + 1
+            if self._stillborn > len(self._seats):
+                error = BatchError(
+                    "worker processes die before they begin; stderr may say why. In a script, call run_batch under "
+                    'if __name__ == "__main__": every worker runs the rest of it too'
+                )
+        if error is None:
+            told.set_result(done.result())
+        else:
+            told.set_exception(error)
 
     def close(self, *, at_once: bool) -> None:
         """Let the workers go; at once: without waiting for what they do."""
@@ -71,20 +94,17 @@ class _Seat:
         self.work.set_result(None)
 
     def submit(self, function, *arguments) -> Future:
-        if self.pool is None:
-            self.pool = self._begun()
-        try:
-            self.work = self.pool.submit(function, *arguments)
-        except BrokenExecutor as error:  # it died, perhaps while it was idle
-            self.pool.shutdown(wait=False)
-            if self._first.exception() is not None:
-                raise BatchError(
-                    "worker processes die before they begin; stderr may say why. In a script, call run_batch under "
-                    'if __name__ == "__main__": every worker runs the rest of it too'
-                ) from error
-            self.pool = self._begun()
-            self.work = self.pool.submit(function, *arguments)
-        return self.work
+        if self.pool is not None:
+            try:
+                return self.pool.submit(function, *arguments)
+            except BrokenExecutor:  # it died, perhaps while it was idle
+                self.pool.shutdown(wait=False)
+        self.pool = self._begun()
+        return self.pool.submit(function, *arguments)
+
+    def began(self) -> bool:
+        """Whether the process got as far as work."""
+        return self._first.exception() is None
 
     def _begun(self) -> ProcessPoolExecutor:
         pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin, (self._load,))

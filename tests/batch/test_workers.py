@@ -46,6 +46,26 @@ def test_a_worker_that_dies_costs_its_own_scan_alone(tmp_path, write, rows, sabo
     )  # one that lived, or a new one
 
 
+def test_a_worker_that_dies_before_it_begins_is_replaced(tmp_path, write, rows, monkeypatch):
+    once = tmp_path / "once"
+    once.touch()
+    (tmp_path / "sitecustomize.py").write_text(f"""
+import os
+import sys
+
+if "--multiprocessing-fork" in sys.orig_argv and os.path.exists({str(once)!r}):
+    os.unlink({str(once)!r})
+    os._exit(3)
+""")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    for i in range(3):
+        write(tmp_path / "in" / f"{i}.ply", seed=i)
+    result = run_batch(tmp_path / "in", tmp_path / "out", workers=1)
+    assert not once.exists()
+    assert (result.done, result.failed) == (3, 0)
+    assert len(rows(tmp_path / "out")) == 3
+
+
 def test_a_script_without_a_guard_blames_no_scan(tmp_path, write):
     write(tmp_path / "in" / "a.ply")
     script = tmp_path / "script.py"

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from glsk_o3d import save_mesh, skeletonize
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
 from glsk_o3d.io.scans import read_cloud, read_scan, read_tensor_cloud, save_tensor_cloud
 from glsk_o3d.io.skeletons import READABLE
+from glsk_o3d.samples import torus
 
 
 @pytest.mark.parametrize("name", ["c.ply", "c.pcd", "c.xyz", "c.xyzn", "c.xyzrgb", "c.pts", "C.PLY", "c é.Pcd"])
@@ -195,6 +197,33 @@ def test_off_files_that_break_off(tmp_path, comment):
         path.write_text("".join(lines[:cut]))
         with pytest.raises(FileFormatError, match=r"m\.off"):
             read_cloud(path)
+
+
+@pytest.mark.parametrize("head", ["OFF", "NOFF", "COFF", "CNOFF"])
+@pytest.mark.parametrize("wrong", [None, "", "nan", "1e999", "1_0", "five"])
+def test_vertices_that_lack_numbers_are_refused(tmp_path, head, wrong):
+    """Open3D would stop at the first, and return uninitialised memory for the rest."""
+    more = " 0 0 1" * ("N" in head) + " 10 20 30 255" * ("C" in head)
+    rows = [f"{i} 0 {i % 2}{more}" for i in range(4)]
+    if wrong is not None:
+        rows[2] = f"{rows[2].rpartition(' ')[0]} {wrong}"
+    (tmp_path / "m.off").write_text(f"{head}\n4 1 0\n" + "\n".join([*rows, "3 0 1 2"]))
+    if wrong is None:
+        np.testing.assert_array_equal(read_scan(tmp_path / "m.off").positions, [[i, 0, i % 2] for i in range(4)])
+        return
+    with pytest.raises(FileFormatError, match=r"m\.off: not a valid \.off file"):
+        read_scan(tmp_path / "m.off")
+
+
+@pytest.mark.parametrize("length", [10**6, 2**31, 2**32 - 1])
+def test_a_glb_file_that_promises_more_than_it_has_is_refused_before_memory_is_taken(tmp_path, length):
+    path = tmp_path / "m.glb"
+    save_mesh(skeletonize(torus(1000).points).to_tubes(), path)
+    assert len(read_scan(path)) > 100
+    whole = path.read_bytes()
+    path.write_bytes(whole[:12] + length.to_bytes(4, "little") + whole[16:])
+    with pytest.raises(FileFormatError, match=rf"m\.glb.*its header promises {length} bytes"):
+        read_scan(path)
 
 
 @pytest.mark.parametrize("face", ["3 0 1 3", "3 0 1 -1", "3 0 1", "0.5 0 1 2", "-3 0 1 2", "3 0 1 1e9"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -132,6 +133,8 @@ def _chosen(path: Path, blocks: Iterator[Scan], where: str | None) -> Iterator[S
 def _read_mesh(path: Path) -> Scan:
     if path.suffix.lower() == ".off":
         _check_off(path)
+    if path.suffix.lower() == ".glb":
+        _check_glb(path)
     with path.open("rb"):  # where it may not be read, this says so
         pass
     o3d = import_open3d()
@@ -143,8 +146,8 @@ def _read_mesh(path: Path) -> Scan:
 
 
 def _check_off(path: Path) -> None:
-    """Raise ValueError where an OFF file breaks off: Open3D would return uninitialised memory for the rest; or where a
-    face has a corner that is no vertex: Open3D would look for it in memory, and may crash.
+    """Raise ValueError where an OFF file breaks off or a vertex lacks numbers: Open3D would return uninitialised memory
+    for the rest; or where a face has a corner that is no vertex: Open3D would look for it in memory, and may crash.
     """
     with path.open("rb") as stream:
         rows = (line.split() for line in stream if line.strip() and not line.lstrip().startswith(b"#"))
@@ -156,16 +159,35 @@ def _check_off(path: Path) -> None:
         n, m = (int(word) for word in words[1:3])
         if n < 0 or m < 0:
             raise ValueError("its numbers of vertices and faces are negative")
+        columns = 3 + 3 * (b"N" in words[0]) + 4 * (b"C" in words[0])  # with a normal, with a colour and its alpha
         found = 0
-        for row in islice(rows, n + m):
-            if len([float(word) for word in row[:3]]) < 3:
+        for row in islice(rows, n):
+            numbers = [float(word) for word in row[:columns]]
+            if not all(map(math.isfinite, numbers)) or b"_" in b"".join(row[:columns]):
+                raise ValueError(f"vertex {found} has what Open3D takes for no number")
+            if len(numbers) < columns:
                 break
-            corners = [] if found < n else [int(word) for word in row[1 : 1 + int(row[0])]]
-            if found >= n and (len(corners) != int(row[0]) or not all(0 <= corner < n for corner in corners)):
+            found += 1
+        for row in islice(rows, m):
+            if len(row) < 3:
+                break
+            corners = [int(word) for word in row[1 : 1 + int(row[0])]]
+            if len(corners) != int(row[0]) or not all(0 <= corner < n for corner in corners):
                 raise ValueError(f"a face has {row[0].decode(errors='replace')[:20]} corners, not all of them vertices")
             found += 1
     if found < n + m:
         raise breaks_off(n + m, found, "vertices and faces")
+
+
+def _check_glb(path: Path) -> None:
+    """Raise ValueError where the first part of a GLB file is longer than the file: Open3D takes memory for all of it,
+    gigabytes perhaps, and looks for it behind the end.
+    """
+    with path.open("rb") as stream:
+        length = int.from_bytes(stream.read(16)[12:], "little")
+    size = path.stat().st_size
+    if length > size:
+        raise ValueError(f"its header promises {length} bytes, and the file has {size}")
 
 
 class Reader(NamedTuple):

@@ -9,7 +9,6 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ...interop.packages import import_open3d
 from ..paths import breaks_off
 from .scanned import Scan, named_attributes
 
@@ -20,30 +19,50 @@ _PACKED_COLORS = ("rgb", "rgba")
 
 
 def read(path: Path) -> Scan:
-    """The points of a compressed PCD file, which `blocks` does not read; ValueError where it is damaged."""
+    """The points of a compressed PCD file, which `blocks` does not read; ValueError where it is damaged.
+
+    Unpacked here: Open3D crashes on padding, on fields of one name and on a part of the normals, and mixes up types.
+    """
     row, points, kept, start = _header(path)
     if kept != "binary_compressed":
         raise ValueError(f"its data are {kept!r}, which is not understood")
     with path.open("rb") as stream:
         stream.seek(start)
         packed, size = np.frombuffer(stream.read(8).ljust(8, b"\0"), "<u4").tolist()
-        if len(stream.read(packed)) < packed or size < points * row.itemsize:
-            raise ValueError("its compressed data break off")
-    o3d = import_open3d()
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        point = o3d.t.io.read_point_cloud(str(path)).point
-    held = {name: point[name].numpy() for name in point}
-    if len(held.get("positions", ())) != points:
-        raise ValueError("its compressed data make no sense")
-    single = [name.partition(" ")[2] for name in row.names or () if row[name].shape == (1,)]
-    attributes = named_attributes((name, held[name][:, 0]) for name in single if name in held and name != "_")
-    colors, normals = held.get("colors"), held.get("normals")
-    return Scan(
-        held["positions"].astype(float),
-        None if colors is None else colors / 255,
-        None if normals is None else normals.astype(float),
-        attributes,
-    )
+        data = stream.read(packed)
+    if len(data) < packed or size < points * row.itemsize:
+        raise ValueError("its compressed data break off")
+    unpacked, columns, at = _unpacked(data, size), {}, 0
+    for name in row.names or ():  # one after the other
+        base, n = row[name].base, row[name].shape[0]
+        columns[name] = np.frombuffer(unpacked, base, points * n, at).reshape(points, n)
+        at += points * n * base.itemsize
+    return _scan(columns)
+
+
+def _unpacked(data: bytes, size: int) -> bytes:
+    """What LZF has packed, of so many bytes: runs as they are, and copies of what came before (liblzf's format)."""
+    out, at = bytearray(), 0
+    while at < len(data) and len(out) < size:
+        control = data[at]
+        at += 1
+        if control < 32:
+            out += data[at : at + control + 1]
+            at += control + 1
+            continue
+        length = control >> 5
+        if length == 7:
+            length += data[at]
+            at += 1
+        start = len(out) - ((control & 31) << 8) - data[at] - 1
+        at, length = at + 1, length + 2
+        if start < 0:
+            raise ValueError("its compressed data make no sense")
+        piece = out[start : start + length]
+        out += (piece * (length // len(piece) + 1))[:length]  # it may overlap what it makes
+    if len(out) != size:
+        raise ValueError("its compressed data break off")
+    return bytes(out)
 
 
 def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan] | None:

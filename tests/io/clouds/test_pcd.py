@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.clouds.pcd import _unpacked
 from glsk_o3d.io.scans import read_scan
 
 HEAD = """VERSION 0.7
@@ -33,7 +36,14 @@ def test_what_open3d_writes_comes_back(tmp_path, options):
     np.testing.assert_array_equal(scan.attributes["label"], cloud.point.label.numpy()[:, 0])
 
 
-@pytest.mark.parametrize("kept", ["ascii", "binary"])
+def packed(columns):
+    """The body of compressed data: columns one after the other, as runs as they are."""
+    plain = b"".join(np.ascontiguousarray(values).tobytes() for values in columns)
+    runs = b"".join(bytes([len(plain[i : i + 32]) - 1]) + plain[i : i + 32] for i in range(0, len(plain), 32))
+    return np.array([len(runs), len(plain)], "<u4").tobytes() + runs
+
+
+@pytest.mark.parametrize("kept", ["ascii", "binary", "binary_compressed"])
 def test_padding_and_fields_of_many_values(tmp_path, kept):
     row = np.dtype("<f4,<f4,<f8,<u4,3u1,<u2,2<f4")
     rows = np.array([(1, 2, 3, 0xFF3300, (0, 0, 0), 7, (1, 2)), (4, 5, 6, 0x0000FF, (0, 0, 0), 8, (3, 4))], row)
@@ -42,11 +52,33 @@ def test_padding_and_fields_of_many_values(tmp_path, kept):
         shades = rows["f3"].view("<f4").tolist()
         lines = [(*at, shade, 0, 0, 0, label, 1, 2) for (*at, _, _, label, _), shade in zip(rows.tolist(), shades)]  # noqa: B905
         body = "\n".join(" ".join(map(repr, line)) for line in lines).encode()
+    if kept == "binary_compressed":
+        body = packed(rows[name] for name in rows.dtype.names)
     (tmp_path / "c.pcd").write_bytes(f"{HEAD}DATA {kept}\n".encode() + body)
     scan = read_scan(tmp_path / "c.pcd")
     np.testing.assert_array_equal(scan.positions, [[1, 2, 3], [4, 5, 6]])
     np.testing.assert_allclose(scan.colors, [[1, 0.2, 0], [0, 0, 1]])
     assert {name: values.tolist() for name, values in scan.attributes.items()} == {"label": [7, 8]}
+
+
+@pytest.mark.parametrize(
+    ("fields", "attributes"),
+    [
+        ("x y z normal_x", ["normal_x"]),
+        ("x y z normal_x normal_z", ["normal_x", "normal_z"]),
+        ("x y z intensity intensity", ["intensity"]),
+        ("x y z colors positions", ["colors_2", "positions_2"]),
+    ],
+)
+def test_compressed_fields_that_open3d_would_crash_on(tmp_path, fields, attributes):
+    n = len(fields.split())
+    values = np.arange(2 * n, dtype="<f4").reshape(n, 2)
+    head = f"FIELDS {fields}\nSIZE{' 4' * n}\nTYPE{' F' * n}\nPOINTS 2\nDATA binary_compressed\n"
+    (tmp_path / "c.pcd").write_bytes(head.encode() + packed(values))
+    scan = read_scan(tmp_path / "c.pcd")
+    np.testing.assert_array_equal(scan.positions.T, values[:3])
+    assert list(scan.attributes) == attributes
+    np.testing.assert_array_equal(scan.attributes[attributes[-1]], values[-1])
 
 
 @pytest.mark.parametrize(
@@ -79,3 +111,34 @@ def test_packed_data_that_make_no_sense(cloud, tmp_path, capfd, damage):
     with pytest.raises(FileFormatError, match=r"its compressed data (break off|make no sense)"):
         read_scan(path)
     assert capfd.readouterr() == ("", "")
+
+
+@given(
+    st.lists(
+        st.one_of(st.binary(min_size=1, max_size=32), st.tuples(st.integers(1, 40), st.integers(3, 264))), max_size=12
+    )
+)
+@settings(deadline=None)
+def test_lzf_is_unpacked(pieces):
+    """Runs as they are and copies from behind, packed by the letter of the format."""
+    packed, plain = bytearray(), bytearray()
+    for piece in pieces:
+        if isinstance(piece, bytes):
+            packed += bytes([len(piece) - 1]) + piece
+            plain += piece
+        elif plain:
+            back, length = min(piece[0], len(plain)), piece[1]
+            offset = back - 1
+            if length < 9:
+                packed += bytes([(length - 2) << 5 | offset >> 8, offset & 255])
+            else:
+                packed += bytes([7 << 5 | offset >> 8, length - 9, offset & 255])
+            for _ in range(length):
+                plain.append(plain[-back])
+    assert _unpacked(bytes(packed), len(plain)) == bytes(plain)
+
+
+@pytest.mark.parametrize("data", [b"", b"\xe0", b"\x20\x05", b"\x05ab", b"\x01ab\xff"])
+def test_packed_data_that_break_off(data):
+    with pytest.raises((ValueError, IndexError)):
+        _unpacked(data, 50)
