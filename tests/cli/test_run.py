@@ -135,7 +135,9 @@ def test_scans_that_meshlab_cannot_read(refused, tmp_path, scans):
     pytest.importorskip("pymeshlab")
     (tmp_path / "torn.ply").write_bytes((scans / "sample.ply").read_bytes()[:2000])
     (tmp_path / "odd.obj").write_text("nothing")
-    assert "torn.ply: not a valid .ply file: it promises 1100 points" in refused(1, "run", "scan_cleanup", "torn.ply", "-o", "c.ply")
+    assert "torn.ply: not a valid .ply file: it promises 1100 points" in refused(
+        1, "run", "scan_cleanup", "torn.ply", "-o", "c.ply"
+    )
     assert "odd.obj: " in refused(1, "run", "scan_cleanup", "odd.obj", "-o", "c.ply")
     assert "a.zzz: " in refused(1, "run", "scan_cleanup", "a.zzz", "-o", "c.ply")
 
