@@ -83,9 +83,11 @@ def branch_facts(
         edge = numbers(branch)
         # of a line, which has no thickness, what rounding leaves
         radius = max(float(np.median(skeleton.radii[branch])), float(np.finfo(float).eps * length.sum()), TINY)
-        smooth = _window_means(winding[edge] * length[edge], length[edge], AIR_WINDOW * radius)
+        ends = np.append(0, np.cumsum(length[edge]))
+        amounts = winding[edge] * length[edge], along[edge]
+        smooth, areas = _window_means(ends, ends[1:] - length[edge] / 2, AIR_WINDOW * radius, *amounts)
         k = int(np.argmin(smooth))
-        surface = _window_means(along[edge], length[edge], AIR_WINDOW * radius)[k] / (2 * np.pi * radius)
+        surface = areas[k] / (2 * np.pi * radius)
         facts = dict(
             deficit=np.log1p(max((typical - smooth[k]) / max(scatter, TINY), 0)),
             surface=np.log(max(surface / seen, 0) + 0.05),
@@ -93,17 +95,17 @@ def branch_facts(
             noise=noise,
             bonds=np.log(float(bonded.min()) / 2 * spacing / (2 * np.pi * radius) + 0.05),
             inner=float((skeleton.degree[branch[[0, -1]]] > 1).all()),
-            length=np.log(np.cumsum(length[edge])[-1] / radius + 0.1),
+            length=np.log(ends[-1] / radius + 0.1),
         )
         yield branch, k, facts
 
 
-def _window_means(amounts: np.ndarray, lengths: np.ndarray, width: float) -> np.ndarray:
-    """Amounts per length in a window around the middle of every edge of a path, over which they are spread evenly."""
-    stop, total = np.cumsum(lengths), np.append(0, np.cumsum(amounts))
-    ends, middle = np.append(0, stop), stop - lengths / 2
-    low, high = np.maximum(middle - width / 2, 0), np.minimum(middle + width / 2, stop[-1])
-    return (np.interp(high, ends, total) - np.interp(low, ends, total)) / np.maximum(high - low, TINY)
+def _window_means(ends: np.ndarray, places: np.ndarray, width: float, *amounts: np.ndarray) -> Iterator[np.ndarray]:
+    """Amounts per length in a window around places on a path; they are spread evenly over its edges, between `ends`."""
+    low, high = np.maximum(places - width / 2, 0), np.minimum(places + width / 2, ends[-1])
+    for each in amounts:
+        total = np.append(0, np.cumsum(each))
+        yield (np.interp(high, ends, total) - np.interp(low, ends, total)) / np.maximum(high - low, TINY)
 
 
 def _neighbours(skeleton: Skeleton) -> list[list[tuple[int, float]]]:
