@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
-
 import typer
 
 from ..errors import MissingPackageError
+from ..interop.entry_points import entry_points
 from .console import say
 from .reporting import reporting
 
@@ -19,7 +18,8 @@ ELSEWHERE = {
 
 def add_plugged(app: typer.Typer) -> None:
     """Add what is installed, and for each command of `ELSEWHERE` that is not, one that says how to get it."""
-    found = {entry.name: entry for entry in entry_points(group=COMMAND_GROUP)}
+    problems: list[str] = []
+    found = {entry.name: entry for _, entry in entry_points(COMMAND_GROUP, problems)}
     for name, entry in sorted(found.items()):
         try:
             plugged = entry.load()
@@ -27,13 +27,15 @@ def add_plugged(app: typer.Typer) -> None:
                 raise TypeError(f"it is a {type(plugged).__name__} and should be a typer.Typer")
             app.add_typer(plugged, name=name)
         except Exception as error:  # the code of others: the other commands work without it
-            say("warning", f"the command {name!r} ({entry.value}) is left out: {error}")
+            problems.append(f"the command {name!r} ({entry.value}) is left out: {error}")
+    for problem in problems:
+        say("warning", problem)
     for name in ELSEWHERE.keys() - found.keys():
         _add_absent(app, name, *ELSEWHERE[name])
 
 
 def _add_absent(app: typer.Typer, name: str, folder: str, text: str) -> None:
-    def absent(context: typer.Context) -> None:
+    def absent() -> None:
         with reporting():
             cure = f"pip install {folder} in a clone of glsk-o3d"
             raise MissingPackageError(f"glsk {name} needs another distribution: {cure}")

@@ -6,13 +6,13 @@ import dataclasses
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import redirect_stdout
-from importlib import metadata
 from typing import Any
 
 from ..errors import PluginWarning
 from ..interop.clouds import Cloud
+from ..interop.entry_points import entry_points
 from ..parameters import RESERVED_WORDS, TYPES, Parameters
 from ..pipeline import FLOWS, Filter, Pipeline
 from ..pipelines import BUILTIN, PIPELINES
@@ -83,7 +83,7 @@ def _plugins(group, builtin, check):
 def _load(group, builtin, check, found):
     """Fill `found` with plugins; gives what is wrong with the others."""
     problems: list[str] = []
-    for distribution, entry in _entries(group, problems):
+    for distribution, entry in entry_points(group, problems):
         try:
             if entry.name in builtin or entry.name in found:
                 owner = "the built-in one" if entry.name in builtin else "one of another plugin"
@@ -98,28 +98,6 @@ def _load(group, builtin, check, found):
             cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
             problems.append(f"plugin {entry.name!r} ({entry.value}) of {distribution} left out: {cause}")
     return problems
-
-
-def _entries(group: str, problems: list[str]) -> Iterator[tuple[str, metadata.EntryPoint]]:
-    """Every entry point of a group with its distribution; of a distribution found twice those of the first.
-
-    One by one, since a single malformed file spoils `importlib.metadata.entry_points` for all.
-    """
-    seen = set()
-    for distribution in metadata.distributions():
-        text, name = distribution.read_text("entry_points.txt") or "", str(distribution.metadata["Name"])
-        if group not in text or name in seen:
-            continue
-        seen.add(name)
-        heads = [line for line in map(str.strip, text.splitlines()) if line.strip("[] ") == group]
-        try:
-            if any(head != f"[{group}]" for head in heads):  # importlib.metadata passes over it
-                raise _Unfit(f"a line should be '[{group}]'")
-            entries = list(distribution.entry_points.select(group=group))
-        except Exception as error:
-            problems.append(f"the plugins of {name} left out: its entry_points.txt is malformed: {error}")
-        else:
-            yield from ((f"{name} {distribution.version}", entry) for entry in entries)
 
 
 def _check_filter(name: str, cls: Any) -> None:

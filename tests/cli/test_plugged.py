@@ -15,14 +15,18 @@ def glsk(monkeypatch):
 
     def run(words, **values):
         group = plugged.COMMAND_GROUP
-        found = [EntryPoint(name, value, group) for name, value in values.items()]
-        monkeypatch.setattr(plugged, "entry_points", lambda group: found)
-        app = typer.Typer()
-        app.command("own")(lambda: None)
-        plugged.add_plugged(app)
-        return CliRunner().invoke(app, words)
+        found = [("some 1", EntryPoint(name, value, group)) for name, value in values.items()]
+        monkeypatch.setattr(plugged, "entry_points", lambda group, problems: found)
+        return with_plugged(words)
 
     return run
+
+
+def with_plugged(words):
+    app = typer.Typer()
+    app.command("own")(lambda: None)
+    plugged.add_plugged(app)
+    return CliRunner().invoke(app, words)
 
 
 def test_what_is_installed_is_a_command(glsk):
@@ -47,3 +51,12 @@ def test_what_is_broken_or_no_application_is_left_out(glsk, capsys, value):
     warning = capsys.readouterr().err
     assert warning.count("\n") == 1
     assert warning.startswith(f"glsk: warning: the command 'broken' ({value}) is left out: ")
+
+
+@pytest.mark.parametrize("entries", ["[glsk_o3d.commands\nx = json:dumps\n", "[ glsk_o3d.commands ]\nx = json:dumps\n"])
+def test_a_malformed_file_of_another_distribution_stops_no_command(install, capsys, entries):
+    install("glsk-odd", "1", "", entries)
+    assert with_plugged(["own"]).exit_code == 0
+    warning = capsys.readouterr().err
+    assert warning.count("\n") == 1
+    assert warning.startswith("glsk: warning: the plugins of glsk-odd left out: its entry_points.txt is malformed: ")
