@@ -42,6 +42,7 @@ from .ring_builder import RingBuilder
 from .skeleton import Skeleton
 from .state import Contraction
 from .stopping import ExplainedScore, RingSizeRatio
+from .tracer import Tracer
 from .viewing.page import save_report
 from .viewing.plot import plot_skeleton
 from .viewing.preview import save_assessment, save_preview
@@ -80,6 +81,7 @@ __all__ = [
     "SkeletonWarning",
     "StageError",
     "Supported",
+    "Tracer",
     "analysis",
     "annotate_contraction",
     "annotate_file",

@@ -2,18 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
 
 Place: TypeAlias = tuple[float, float, float]
 
-QUESTIONS = {  # what is asked, and what was done where the graph stayed as it was and where it was changed
-    "air": ("the branch at ({}) crosses air", "branch kept", "branch cut"),
-    "loop": ("the loop at ({}) is a handle", "loop kept", "loop closed"),
-    "gap": ("the object goes on across the gap at ({})", "gap left", "gap bridged"),
-    "limb": ("the branch at ({}) is a limb", "limb kept", "spur pruned"),
+
+
+class Question(NamedTuple):
+    """A question about the topology: a small logistic model of the facts that speak for and against it."""
+
+    asks: str  # what the probability is of, with the place
+    kept: str  # what was done where the graph stayed as it was
+    changed: str  # and where it was changed
+    option: str  # of the Refiner: the probability that decides
+    changes_from: bool  # whether the graph is changed from that on; otherwise below it
+    weights: Mapping[str, float]  # of the facts, and of a constant
+
+    def probability(self, facts: Mapping[str, float]) -> float:
+        """What the weighted sum of some facts stands for."""
+        total = self.weights["constant"] + sum(
+            weight * facts[name] for name, weight in self.weights.items() if name != "constant"
+        )
+        return float(1 / (1 + np.exp(-np.clip(total, -50, 50))))
+
+
+# All weights are fitted, by benchmarks/calibrate.py on random shapes and things as scanners see them; docs/method.md
+# says what the facts are.
+QUESTIONS = {
+    "loop": Question(
+        "the loop at ({}) is a handle",
+        "loop kept",
+        "loop closed",
+        "handle",
+        False,
+        {"constant": -0.9, "opening": 2.9, "winding": -3.3, "bonds": 0.5, "confidence": 3.0},
+    ),
+    "limb": Question(
+        "the branch at ({}) is a limb",
+        "limb kept",
+        "spur pruned",
+        "limb",
+        False,
+        {"constant": -5.3, "protrusion": 3.0, "web": -4.7, "confidence": 4.0, "roundness": 2.5},
+    ),
+    "air": Question(
+        "the branch at ({}) crosses air",
+        "branch kept",
+        "branch cut",
+        "air",
+        True,
+        {
+            "constant": -5.8,
+            "deficit": 1.7,
+            "surface": -0.5,
+            "straightness": -3.2,
+            "noise": 1.9,
+            "bonds": -0.9,
+            "inner": 3.4,
+            "length": -0.5,
+        },
+    ),
+    "gap": Question(
+        "the object goes on across the gap at ({})",
+        "gap left",
+        "gap bridged",
+        "bridge",
+        True,
+        {"constant": -3.7, "winding": 5.8, "straightness": 2.5, "cap": -0.7},
+    ),
 }
+"""What is asked about loops, about branches that leave a junction, about branches, and about ends, in this order."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +118,23 @@ class Judgement:
     @property
     def outcome(self) -> str:
         """What was done, in two words, such as ``"loop closed"`` or ``"gap left"``."""
-        return QUESTIONS[self.about][1 + self.changed]
+        question = QUESTIONS[self.about]
+        return question.changed if self.changed else question.kept
 
     @property
     def question(self) -> str:
         """What the probability is of, such as ``"the loop at (0, 0, 1) is a handle"``."""
-        return QUESTIONS[self.about][0].format(coordinates(self.place))
+        return QUESTIONS[self.about].asks.format(coordinates(self.place))
+
+    @property
+    def otherwise(self) -> str:
+        """The option with which the Refiner would have answered otherwise, such as ``"Refiner.limb=0.56"``."""
+        question = QUESTIONS[self.about]
+        if self.changed == question.changes_from:
+            hundredths = math.ceil(100 * self.probability + 0.5)
+        else:
+            hundredths = math.floor(100 * self.probability - 0.5)
+        return f"Refiner.{question.option}={hundredths / 100:.2f}"
 
     def __str__(self) -> str:
         return f"{self.question}: {self.probability:.2f}, {self.outcome}"

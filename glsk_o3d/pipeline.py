@@ -14,7 +14,7 @@ from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageEr
 from .interop.clouds import Cloud, cloud_points
 from .interop.verbosity import following_open3d
 from .parameters import UNWRITTEN, Parameters
-from .report import STOPPED_BY_CALLER, IterationRecord, Report
+from .report import STOPPED_BY_CALLER, IterationRecord, Report, warn
 from .skeleton import Skeleton
 from .state import Contraction
 
@@ -26,7 +26,7 @@ Next = TypeVar("Next")
 
 FLOWS = (Cloud, Contraction, Skeleton)
 """What runs between filters."""
-ORDER = "the order is RingBuilder | Contractor | Connector | Refiner"
+ORDER = "the order is RingBuilder | Contractor | Connector | Refiner | Tracer"
 RECIPE_VERSION = 1
 SOLVED = (
     "solve %(iteration)d: %(n_points)d points, %(n_merged)d merged, e %(explained).4f, De %(explained_change).4f, "
@@ -80,8 +80,17 @@ class Filter(Parameters, Generic[Produced]):
         StageError
             `data` is not what the filter takes, or what it gives is not what it promises.
         """
-        name = type(self).__name__
         self.check()
+        result = self.run(data, on_iteration=on_iteration, on_state=on_state)
+        warn_of(result, data)
+        return result
+
+    def run(self, data: Any, *, on_iteration: OnIteration | None = None, on_state: OnState | None = None) -> Any:
+        """The same without a check of the parameters and without warnings, but in the report: a pipeline sees to these.
+
+        What a filter warns of may be mended by the next.
+        """
+        name = type(self).__name__
         if not _is_of(data, self.consumes):
             raise StageError(f"{name} takes a {_named(self.consumes)}, not a {type(data).__name__}: {ORDER}")
         start = time.perf_counter()
@@ -174,16 +183,17 @@ class Pipeline(Generic[Produced]):
             Whatever the last filter gives.
         """
         self.check()
-        ahead = Report()
+        ahead, data = Report(), cloud
         for stage in self.stages:
             if on_stage is not None:
                 on_stage(stage)
             start = time.perf_counter()
-            cloud = stage(cloud, on_iteration=on_iteration, on_state=on_state)
+            cloud = stage.run(cloud, on_iteration=on_iteration, on_state=on_state)
             if stage.produces is Cloud:
                 ahead = with_stage(ahead, stage, time.perf_counter() - start)
             elif ahead.stages and stage.consumes is Cloud:
                 cloud = dataclasses.replace(cloud, report=after(cloud.report, ahead))
+        warn_of(cloud, data)
         return cloud
 
     def check(self) -> None:
@@ -271,6 +281,12 @@ class Pipeline(Generic[Produced]):
 
     def __hash__(self) -> int:
         return hash(self.stages)
+
+
+def warn_of(result: Any, data: Any) -> None:
+    """Issue the warnings in the report of a result, but for those that came with the data."""
+    before, now = (getattr(getattr(each, "report", None), "warnings", ()) for each in (data, result))
+    warn(message for message in now if message not in before)
 
 
 def parts(item: Pipeline | Parameters) -> Iterator[Parameters]:

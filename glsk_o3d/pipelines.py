@@ -14,6 +14,7 @@ from .refiner import Refiner
 from .ring_builder import RingBuilder
 from .skeleton import Skeleton
 from .stopping import ExplainedScore, RingSizeRatio
+from .tracer import Tracer
 
 
 def cao2010() -> Pipeline[Skeleton]:
@@ -48,7 +49,7 @@ def _published(**contraction: Any) -> Pipeline[Skeleton]:
         RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
         | Contractor(min_attraction=0, line_hold=1, keep_last=False, retries=0, **contraction)
         | Connector(radius="2%", thickness=0, links="nearest", min_support=0)
-        | Refiner(collapse="degree", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0, surface=0)
+        | Refiner(collapse="degree", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)
     )
 
 
@@ -72,7 +73,7 @@ def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
     Parameters
     ----------
     root : str or (x, y, z)
-        As the option ``root`` of `Refiner`; by default the lowest place in z.
+        As the option ``root`` of `Tracer`; by default the lowest place in z.
 
     Examples
     --------
@@ -81,7 +82,7 @@ def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
     >>> grown.n_components, grown.n_loops, len(grown.leaves)
     (1, 0, 3)
     """
-    return RingBuilder() | Contractor(reducer=LPRReducer()) | Connector() | Refiner(handle=1, root=root)
+    return RingBuilder() | Contractor(reducer=LPRReducer()) | Connector() | Refiner(handle=1) | Tracer(root=root)
 
 
 PIPELINES: dict[str, Callable[[], Pipeline[Skeleton]]] = {
@@ -90,6 +91,6 @@ PIPELINES: dict[str, Callable[[], Pipeline[Skeleton]]] = {
 
 BUILTIN: dict[str, type[Parameters]] = {
     cls.__name__: cls
-    for cls in (RingBuilder, Contractor, LPRReducer, Connector, Refiner, ExplainedScore, RingSizeRatio)
+    for cls in (RingBuilder, Contractor, LPRReducer, Connector, Refiner, Tracer, ExplainedScore, RingSizeRatio)
 }
 """The filters and stopping rules of this package, in the order in which they run."""

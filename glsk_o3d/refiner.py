@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
-import numpy as np
-
-from .judgements import Judgement
-from .numerics.vectors import AXES
+from .judgements import QUESTIONS, Judgement
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .refinement.air import cut_air
 from .refinement.axis_fit import fit_axis, pull_back_detached
 from .refinement.bridging import bridge_gaps
-from .refinement.diagnostics import diagnose
+from .refinement.diagnostics import measured
 from .refinement.ends import regrow_ends
 from .refinement.evidence import Evidence, SurfaceGraph, in_order
 from .refinement.junctions import move_junctions
 from .refinement.loops import close_loops, collapse_narrow_loops
 from .refinement.merging import binary_size, scaled
-from .refinement.sections import measure_sections
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
-from .refinement.tracing import trace
 from .refinement.triangles import collapse_triangles
 from .skeleton import Skeleton
+
+ANSWERS = {"loop": close_loops, "limb": prune_spurs, "air": cut_air, "gap": bridge_gaps}
+ROUNDS = 3  # derived: of the questions; what a cut or a bridge has changed is asked about again, and once more
 
 
 @documented
@@ -43,8 +39,7 @@ class Refiner(Filter[Skeleton]):
     4. The topology is judged by the surface around the curve: false loops are closed, spurs pruned, branches that cross
        air cut, and gaps bridged across which the object goes on.
     5. Junctions move to where limbs meet, and ends grow along their limbs to where these stop.
-    6. Where the cloud shows no surface, the curve is replaced by shortest paths through the points. With a `root` all
-       is made one tree: vertex 0 is the root, and every edge leads from parent to child.
+    6. The sections are measured, and reasons not to trust the skeleton are looked for.
 
     Warns
     -----
@@ -91,45 +86,18 @@ class Refiner(Filter[Skeleton]):
     recentre: int = parameter(
         3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", unit="passes", low=0
     )
-    surface: float = parameter(
-        0.65, "Share of points with a surface below which a region is traced as paths. 0 traces none.", low=0, high=1
-    )
-    root: str | Any = parameter(
-        None,
-        "Where one tree grows from: the lowest place along an axis, the thickest end, or the place nearest to a point. "
-        "None keeps parts and loops.",
-        type="point?",
-        choices=(*AXES, "thickest"),
-    )
-
-    def __post_init__(self) -> None:
-        # as plain text it can be compared, printed and written to files
-        if not isinstance(self.root, str | None):
-            with suppress(TypeError, ValueError):  # what is no point is found when the filter is checked
-                point = np.asarray(self.root, float)
-                if point.shape == (3,):
-                    object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))
-
     def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
-        ordered, back = in_order(given)
-        skeleton = self._refined(ordered)
-        vertex, normals = skeleton.vertex_of_point[back], skeleton.normals.take(back, axis=0)
-        return replace(skeleton, points=given.points, normals=normals, vertex_of_point=vertex)
+        return in_order(self._refined, given)
 
     def _refined(self, skeleton: Skeleton) -> Skeleton:
         skeleton, surface = self._fit(skeleton)
         asks = self.handle or self.limb or self.air or self.bridge
         if len(skeleton.edges) and len(skeleton.supporting_points) and (asks or self.recentre):
-            skeleton = self._judge(skeleton, surface)
+            skeleton = self._decide(skeleton, surface)
         if self.recentre:
             size = binary_size(skeleton)  # fourth powers of lengths must not overflow
             skeleton = scaled(regrow_ends(move_junctions(scaled(skeleton, 1 / size))), size)
-        if self.surface or self.root is not None:
-            skeleton = trace(skeleton, self.surface, self.root)
-        report, sections = skeleton.report, measure_sections(skeleton)
-        for message in diagnose(skeleton):
-            report = report.with_warning(message)
-        return replace(skeleton, report=report, half_width=sections.half_width, half_thickness=sections.half_thickness)
+        return measured(skeleton)
 
     def _fit(self, skeleton: Skeleton) -> tuple[Skeleton, SurfaceGraph]:
         """Make the graph one-dimensional and centre it in the surface around it."""
@@ -141,40 +109,28 @@ class Refiner(Filter[Skeleton]):
             skeleton = pull_back_detached(skeleton)
         return self._centred(skeleton, surface), surface
 
-    def _judge(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
-        """Close false loops, prune spurs, cut what crosses air, bridge gaps; then ask for loops and limbs anew."""
+    def _decide(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
+        """Answer one question after the other, until none changes the graph any more."""
         evidence = Evidence.of(skeleton, surface)
-        skeleton, loops = self._asked(close_loops, skeleton, evidence, self.handle)
-        skeleton, limbs = self._asked(prune_spurs, skeleton, evidence, self.limb)
-        cuts, gaps = [], []
-        if self.air:
-            skeleton, cuts = cut_air(skeleton, evidence, skeleton.report.noise, self.air)
-        if _changed(cuts):
-            skeleton, more = self._asked(prune_spurs, skeleton, evidence, self.limb)
-            limbs = _changed(limbs) + more
-        if self.bridge:
-            skeleton, gaps = bridge_gaps(skeleton, evidence, self.bridge)
-        if _changed([*cuts, *gaps]):
-            skeleton, again = self._asked(close_loops, self._centred(skeleton, evidence), evidence, self.handle)
-            skeleton, more = self._asked(prune_spurs, skeleton, evidence, self.limb)
-            loops, limbs = _changed(loops) + again, _changed(limbs) + more
+        decisions: dict[str, list[Judgement]] = {about: [] for about in ANSWERS}
+        settled: dict[str, Skeleton] = {}  # what each question was last asked about
+        for _ in range(ROUNDS):
+            for about, answer in ANSWERS.items():
+                limit = getattr(self, QUESTIONS[about].option)
+                if limit and settled.get(about) is not skeleton:
+                    skeleton, found = answer(skeleton, evidence, limit)
+                    if _changed(found):
+                        skeleton = self._centred(skeleton, evidence)
+                    decisions[about] = _changed(decisions[about]) + found
+                    settled[about] = skeleton
         report = replace(
             skeleton.report,
-            judgements=(*loops, *cuts, *gaps, *limbs),
-            n_loops_closed=len(_changed(loops)),
-            n_cuts=len(_changed(cuts)),
-            n_bridges=len(_changed(gaps)),
+            judgements=tuple(each for found in decisions.values() for each in found),
+            n_loops_closed=len(_changed(decisions["loop"])),
+            n_cuts=len(_changed(decisions["air"])),
+            n_bridges=len(_changed(decisions["gap"])),
         )
         return replace(skeleton, report=report)
-
-    def _asked(
-        self, answer: Callable[..., Any], skeleton: Skeleton, evidence: Evidence, limit: float
-    ) -> tuple[Skeleton, list[Judgement]]:
-        """A skeleton after a question was answered for its parts, with curves fitted anew where it was changed."""
-        if not limit:
-            return skeleton, []
-        skeleton, judgements = answer(skeleton, evidence, limit)
-        return (self._centred(skeleton, evidence) if _changed(judgements) else skeleton), judgements
 
     def _centred(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
         if self.spacing:

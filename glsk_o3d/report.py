@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 import warnings as _warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
@@ -89,6 +89,13 @@ def _read(value: Any, hint: Any, name: str = "it") -> Any:
     elif kind is Any or isinstance(value, kind):
         return value
     raise ValueError(f"{name} in its report is {repr(value)[:80]}")
+
+
+def warn(messages: Iterable[str]) -> None:
+    """Issue SkeletonWarnings, unless Open3D's verbosity is Error."""
+    for message in messages:
+        if not open3d_is(QUIET):
+            _warnings.warn(message, SkeletonWarning, stacklevel=outside())
 
 
 def outside() -> int:
@@ -187,9 +194,8 @@ class Report:
     versions: dict[str, str] = field(default_factory=_versions)
 
     def with_warning(self, message: str) -> Report:
-        """This report with a warning in it; also issued as a SkeletonWarning, unless Open3D's verbosity is Error."""
-        if not open3d_is(QUIET):
-            _warnings.warn(message, SkeletonWarning, stacklevel=outside())
+        """This report with a warning in it; also issued, see `warn`."""
+        warn([message])
         return dataclasses.replace(self, warnings=(*self.warnings, message))
 
     @property

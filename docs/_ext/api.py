@@ -33,6 +33,7 @@ NAMES = {
     },
     "filters": {
         "The five filters": ("RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner"),
+        "Thin parts and trees": ("Tracer",),
         "When to stop": ("ExplainedScore", "RingSizeRatio"),
     },
     "pipelines": {

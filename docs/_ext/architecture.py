@@ -19,7 +19,7 @@ ROWS = (
     {"files": ("io",), "driver": ("driver", "resampling")},
     {"analysis": ("analysis", "editing"), "recipes and plugins": ("recipes",)},
     {"named pipelines": ("pipelines",)},
-    {"filters": ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "stopping")},
+    {"filters": ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "tracer", "stopping")},
     {"refinement": ("refinement",), "pipeline": ("pipeline",)},
     {"what filters share": ("parameters", "state", "skeleton", "report", "judgements")},
     {"preparation": ("preparation",)},

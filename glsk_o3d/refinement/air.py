@@ -7,14 +7,13 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from ..judgements import Judgement
+from ..judgements import QUESTIONS, Judgement
 from ..numerics.polylines import place_at
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
 from .evidence import Evidence
 from .loops import crossings, positions
 from .merging import drop_edges, drop_lone_vertices
-from .scores import AIR_WEIGHTS, probability
 
 AIR_WINDOW = 1.0  # derived: radii of a branch along which evidence is averaged; a false edge is two radii long or more
 BEYOND_REACH = 3.0  # fitted: radii beyond an edge over which the skeleton should go on straight, but the first third
@@ -22,14 +21,14 @@ CROSSING_HOPS = 6  # fitted: edges around a branch whose vertices count to the s
 LEAST_SCATTER = 0.05  # fitted: of winding numbers along a skeleton
 
 
-def cut_air(skeleton: Skeleton, evidence: Evidence, noise: float, least: float) -> tuple[Skeleton, list[Judgement]]:
+def cut_air(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
     """Cut every branch where it crosses air with a probability of `least` or more; one judgement for each branch.
 
-    The skeleton was fitted to its axis; `noise` is the mean share of noise of the cloud, from 0 to 1.
+    The skeleton was fitted to its axis.
     """
     judgements, gone = [], []
-    for branch, place, facts in branch_facts(skeleton, evidence, noise):
-        weakest, chance = branch[place : place + 2], probability(AIR_WEIGHTS, facts)
+    for branch, place, facts in branch_facts(skeleton, evidence):
+        weakest, chance = branch[place : place + 2], QUESTIONS["air"].probability(facts)
         middle = skeleton.vertices[weakest].mean(axis=0)
         judgements.append(Judgement("air", tuple(middle.tolist()), chance, chance >= least))
         if chance >= least:
@@ -39,9 +38,7 @@ def cut_air(skeleton: Skeleton, evidence: Evidence, noise: float, least: float) 
     return drop_lone_vertices(drop_edges(skeleton, gone)), judgements
 
 
-def branch_facts(
-    skeleton: Skeleton, evidence: Evidence, noise: float
-) -> Iterator[tuple[np.ndarray, int, dict[str, float]]]:
+def branch_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[np.ndarray, int, dict[str, float]]]:
     """What the evidence says about the weakest place of every branch.
 
     The weakest place is where the winding number, averaged over a window of one radius, is least. The facts, of which
@@ -50,7 +47,7 @@ def branch_facts(
     - deficit: by how much it is less than the median over all edges, in units of their scatter;
     - surface: area along the window, over that of a tube, and this over the same of the whole skeleton;
     - straightness: cosine between the edge and how the skeleton goes on beyond, at the better end;
-    - noise: of the cloud;
+    - noise: mean share of it in the cloud, from 0 to 1;
     - bonds: the least that cross the branch, over the points around a tube, 2 pi r over their spacing;
     - inner: whether both ends have other branches;
     - length: in radii.
@@ -92,7 +89,7 @@ def branch_facts(
             deficit=np.log1p(max((typical - smooth[k]) / max(scatter, TINY), 0)),
             surface=np.log(max(surface / seen, 0) + 0.05),
             straightness=_straightness(vertices, around, branch, k, radius),
-            noise=noise,
+            noise=skeleton.report.noise,
             bonds=np.log(float(bonded.min()) / 2 * spacing / (2 * np.pi * radius) + 0.05),
             inner=float((skeleton.degree[branch[[0, -1]]] > 1).all()),
             length=np.log(ends[-1] / radius + 0.1),

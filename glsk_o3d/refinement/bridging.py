@@ -9,13 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ..judgements import Judgement
+from ..judgements import QUESTIONS, Judgement
 from ..numerics.near_links import linked
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
 from .evidence import LEAST_INSIDE, Evidence
-from .scores import BRIDGE_WEIGHTS, probability
 
 # All fitted but where it says otherwise.
 BRIDGE_REACH = 6.0  # longest gap, in radii of the end
@@ -40,7 +39,7 @@ def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     A gap is bridged by an edge from a probability of `least` on. There is one judgement for each end that points at
     something, of its likeliest bridge.
     """
-    found = [(probability(BRIDGE_WEIGHTS, facts), pair) for pair, facts in gap_facts(skeleton, evidence)]
+    found = [(QUESTIONS["gap"].probability(facts), pair) for pair, facts in gap_facts(skeleton, evidence)]
     used: set[int] = set()
     judgements, bridges = [], []
     for chance, pair in sorted(found, key=lambda each: -each[0]):

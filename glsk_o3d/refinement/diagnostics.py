@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 
 import numpy as np
 
-from ..judgements import Judgement, coordinates
+from ..judgements import coordinates
 from ..numerics.components import component_labels
 from ..numerics.groups import group_median, group_sum
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
+from .sections import measure_sections
 from .vertex_points import VertexPoints
 
 # All fitted; what tubes and balls have is derived.
@@ -23,8 +24,12 @@ MAJORITY = 0.5  # derived: of the points, from which on a cloud is called what t
 LOW_CONFIDENCE = 0.1  # below which a vertex is not to be trusted
 LOW_CONFIDENCE_SHARE = 0.25  # of the points around such vertices that is worth a warning
 
-_DECIDED_BY = {"loop": ("handle", False), "air": ("air", True), "gap": ("bridge", True), "limb": ("limb", False)}
-"""The option that decides, and whether the graph is changed where the probability reaches it."""
+
+def measured(skeleton: Skeleton) -> Skeleton:
+    """A finished skeleton with its sections, and with the reasons not to trust it as the warnings of its report."""
+    sections = measure_sections(skeleton)
+    report = replace(skeleton.report, warnings=tuple(diagnose(skeleton)))
+    return replace(skeleton, report=report, half_width=sections.half_width, half_thickness=sections.half_thickness)
 
 
 def diagnose(skeleton: Skeleton) -> list[str]:
@@ -91,22 +96,8 @@ def _close_calls(skeleton: Skeleton) -> list[str]:
     return [
         f"uncertain topology: {len(close)} of {asked} questions about loops, air and gaps were close calls, above all "
         f"whether {close[0].question} (probability {close[0].probability:.2f}): look there; "
-        f"if '{close[0].outcome}' is wrong, set {otherwise(close[0])}"
+        f"if '{close[0].outcome}' is wrong, set {close[0].otherwise}"
     ]
-
-
-def otherwise(call: Judgement) -> str:
-    """The option with which the Refiner would have answered otherwise, to two digits.
-
-    >>> otherwise(Judgement("limb", (0.0, 0.0, 0.0), 0.55, changed=False))
-    'Refiner.limb=0.56'
-    >>> otherwise(Judgement("gap", (0.0, 0.0, 0.0), 0.42, changed=False))
-    'Refiner.bridge=0.41'
-    """
-    option, changes = _DECIDED_BY[call.about]
-    reached = call.changed == changes
-    hundredths = math.ceil(100 * call.probability + 0.5) if reached else math.floor(100 * call.probability - 0.5)
-    return f"Refiner.{option}={hundredths / 100:.2f}"
 
 
 def _weak_region(skeleton: Skeleton, count: np.ndarray) -> list[str]:

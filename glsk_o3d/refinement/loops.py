@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..judgements import Judgement
+from ..judgements import QUESTIONS, Judgement
 from ..numerics.components import component_labels
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, opens_wider
 from ..numerics.polylines import arc_lengths
@@ -14,7 +14,6 @@ from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
 from .evidence import LEAST_INSIDE, Evidence, SurfaceGraph
 from .merging import drop_edges, merge_vertices
-from .scores import HANDLE_WEIGHTS, probability
 from .triangles import collapse_triangles
 from .vertex_points import VertexPoints
 
@@ -91,7 +90,7 @@ class LoopEvidence(NamedTuple):
     @property
     def probability(self) -> float:
         """That it is one; a loop that has no inside itself is none."""
-        return probability(HANDLE_WEIGHTS, self.facts) if self.inside >= LEAST_INSIDE else 0.0
+        return QUESTIONS["loop"].probability(self.facts) if self.inside >= LEAST_INSIDE else 0.0
 
 
 def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:

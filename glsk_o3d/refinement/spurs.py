@@ -9,14 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..judgements import Judgement
+from ..judgements import QUESTIONS, Judgement
 from ..numerics.polylines import arc_lengths, relative_distance
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
 from .evidence import Evidence
 from .limbs import Limbs
 from .merging import merge_into
-from .scores import LIMB_WEIGHTS, probability
 from .sections import measure_sections
 from .vertex_points import VertexPoints
 
@@ -82,7 +81,7 @@ class _Twig(NamedTuple):
 
     @property
     def probability(self) -> float:
-        return self.other * probability(LIMB_WEIGHTS, self.facts)
+        return self.other * QUESTIONS["limb"].probability(self.facts)
 
 
 def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:

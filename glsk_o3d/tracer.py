@@ -1,0 +1,69 @@
+"""Tracer: thin parts without a surface -> shortest paths, and one rooted tree."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from .numerics.vectors import AXES
+from .parameters import documented, parameter
+from .pipeline import Filter, Watch
+from .refinement.diagnostics import measured
+from .refinement.evidence import in_order
+from .refinement.tracing import trace
+from .skeleton import Skeleton
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Tracer(Filter[Skeleton]):
+    """Trace what has no surface, such as twigs thinner than their points are far apart; make one tree of a skeleton.
+
+    Where the cloud shows no surface, the curve is replaced by shortest paths through the points. With a `root` all is
+    made one tree: gaps are joined, loops opened, vertex 0 is the root, and every edge leads from parent to child.
+
+    Warns
+    -----
+    SkeletonWarning
+        As of `Refiner`, about the skeleton with its traced parts.
+
+    References
+    ----------
+    Sato et al. 2000, TEASAR; Verroust and Lazarus 1999.
+
+    Examples
+    --------
+    >>> from glsk_o3d import pipelines
+    >>> from glsk_o3d.samples import y_junction
+    >>> grown = (pipelines.default() | Tracer(root="z"))(y_junction(1000).points)
+    >>> grown.n_components, grown.n_loops, len(grown.leaves)
+    (1, 0, 3)
+    """
+
+    consumes: ClassVar[type] = Skeleton
+    produces: ClassVar[type] = Skeleton
+
+    surface: float = parameter(
+        0.65, "Share of points with a surface below which a region is traced as paths. 0 traces none.", low=0, high=1
+    )
+    root: str | Any = parameter(
+        None,
+        "Where one tree grows from: the lowest place along an axis, the thickest end, or the place nearest to a point. "
+        "None keeps parts and loops.",
+        type="point?",
+        choices=(*AXES, "thickest"),
+    )
+
+    def __post_init__(self) -> None:
+        # as plain text it can be compared, printed and written to files
+        if not isinstance(self.root, str | None):
+            with suppress(TypeError, ValueError):  # what is no point is found when the filter is checked
+                point = np.asarray(self.root, float)
+                if point.shape == (3,):
+                    object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))
+
+    def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
+        return in_order(lambda skeleton: measured(trace(skeleton, self.surface, self.root)), given)
