@@ -8,9 +8,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .numerics.components import component_labels
 from .numerics.farthest_point import farthest_point_sampling
-from .numerics.groups import group_median, group_sum
+from .numerics.groups import component_labels, group_median, group_sum
 from .numerics.neighbourhoods import nearest_neighbours, row_medians, uprightness
 from .numerics.radii import plane_distance_radii
 from .numerics.vectors import norm

@@ -12,7 +12,6 @@ import numpy as np
 Place: TypeAlias = tuple[float, float, float]
 
 
-
 class Question(NamedTuple):
     """A question about the topology: a small logistic model of the facts that speak for and against it."""
 

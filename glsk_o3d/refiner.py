@@ -9,17 +9,15 @@ from .judgements import QUESTIONS, Judgement
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .refinement.air import cut_air
-from .refinement.axis_fit import fit_axis, pull_back_detached
+from .refinement.axis_fit import fit_axis, pull_back_detached, subdivide_edges
 from .refinement.bridging import bridge_gaps
 from .refinement.diagnostics import measured
 from .refinement.ends import regrow_ends
 from .refinement.evidence import Evidence, SurfaceGraph, in_order
 from .refinement.junctions import move_junctions
 from .refinement.loops import close_loops, collapse_narrow_loops
-from .refinement.merging import binary_size, scaled
+from .refinement.merging import binary_size, collapse_triangles, scaled
 from .refinement.spurs import prune_spurs
-from .refinement.subdivision import subdivide_edges
-from .refinement.triangles import collapse_triangles
 from .skeleton import Skeleton
 
 ANSWERS = {"loop": close_loops, "limb": prune_spurs, "air": cut_air, "gap": bridge_gaps}
@@ -86,6 +84,7 @@ class Refiner(Filter[Skeleton]):
     recentre: int = parameter(
         3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", unit="passes", low=0
     )
+
     def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
         return in_order(self._refined, given)
 

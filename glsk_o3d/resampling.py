@@ -17,8 +17,8 @@ from .analysis.matching import matched
 from .driver import chosen_pipeline
 from .errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
 from .judgements import Supported
-from .numerics.components import component_labels
 from .numerics.cycles import minimum_cycle_basis
+from .numerics.groups import component_labels
 from .numerics.polylines import arc_lengths, place_at
 from .numerics.vectors import TINY, norm
 from .pipeline import Pipeline

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .numerics.components import component_labels
+from .numerics.groups import component_labels
 from .numerics.radii import supporting_points
 from .numerics.vectors import norm
 from .report import Report

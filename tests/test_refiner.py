@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 import glsk_o3d as glsk
 from glsk_o3d import Refiner, Report, Skeleton, SkeletonWarning, pipelines, samples
-from glsk_o3d.refinement.triangles import collapse_triangles
+from glsk_o3d.refinement.merging import collapse_triangles
 
 PUBLISHED = pipelines.cao2010().stages[3]
 VARIANTS = {"published": PUBLISHED, "recommended": Refiner()}

@@ -11,7 +11,7 @@ from scipy.spatial.distance import cdist
 
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
-from ..numerics.components import component_labels
+from ..numerics.groups import component_labels
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import dot, norm
 from ..preparation.frame import check_extent

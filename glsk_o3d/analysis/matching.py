@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from ..numerics.components import component_labels
+from ..numerics.groups import component_labels
 
 # derived: one radius from where the axis ends, in the middle of the round end, to the tip, and 1.5 along the axis
 TIP_REACH = 2.5

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
-from ..numerics.nearest_edges import nearest_on_edges
+from ..numerics.polylines import nearest_on_edges
 from .curves import along, pieces
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..numerics.nearest_edges import incident_edges, nearest_on_edges
+from ..numerics.polylines import incident_edges, nearest_on_edges
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton

@@ -11,7 +11,7 @@ from scipy.spatial.distance import cdist
 
 from ..analysis.curves import along, pieces
 from ..analysis.graph import simple_edges
-from ..numerics.components import component_labels
+from ..numerics.groups import component_labels
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
 from .grid import CUT_REACH, Grid, Tile

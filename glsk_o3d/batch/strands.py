@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..numerics.components import component_labels
+from ..numerics.groups import component_labels
 from ..numerics.vectors import norm
 from ..skeleton import Skeleton
 

@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 
 from ..analysis.curves import distances
 from ..interop.packages import require
-from ..numerics.components import component_labels
 from ..numerics.cotangent import cotangent_laplacian
+from ..numerics.groups import component_labels
 from ..numerics.mesh_rings import border_lengths, common_share, umbrellas
 from ..report import REFUSED
 from .mesh import COVERED_SHARE, INVENTED_DISTANCE, curvature_normals, mesh_areas, mesh_laplacian, ring_areas, spacing

@@ -1,11 +1,12 @@
-"""Groups of values: their members, sums and medians."""
+"""Sums, medians and members of groups, and connected components."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from scipy.sparse import csc_array
+from scipy.sparse import coo_matrix, csc_array
+from scipy.sparse.csgraph import connected_components
 
 
 def group_median(values: np.ndarray, group: np.ndarray, n: int) -> np.ndarray:
@@ -49,3 +50,8 @@ def group_sum(values: np.ndarray, group: np.ndarray, n: int, weight: np.ndarray 
         members = csc_array((weight.ravel(), group.ravel(), each), shape=(n, len(group)))
         total = members @ flat
     return total.reshape(n, *values.shape[1:])
+
+
+def component_labels(n: int, edges: np.ndarray) -> np.ndarray:
+    """Connected component of every node, (n,) int array, numbered from 0; edges (E, 2) int array."""
+    return connected_components(coo_matrix((np.ones(len(edges)), edges.T), shape=(n, n)), directed=False)[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .components import component_labels
+from .groups import component_labels
 from .rings import Rings
 
 

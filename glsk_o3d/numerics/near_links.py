@@ -7,8 +7,7 @@ from scipy.sparse import coo_matrix, csr_matrix, identity
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from .components import component_labels
-from .groups import group_sum
+from .groups import component_labels, group_sum
 from .neighbourhoods import nearest_neighbours, row_medians
 from .vectors import TINY, dot, norm, unit
 

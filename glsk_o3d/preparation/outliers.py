@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..numerics.components import component_labels
+from ..numerics.groups import component_labels
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import local_outlier_ratio, nearest_neighbours, principal, row_medians
 from .frame import MIN_POINTS, Frame, to_working_frame

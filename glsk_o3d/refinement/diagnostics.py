@@ -7,12 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..judgements import coordinates
-from ..numerics.components import component_labels
-from ..numerics.groups import group_median, group_sum
+from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
-from .sections import measure_sections
-from .vertex_points import VertexPoints
+from .sections import VertexPoints, measure_sections
 
 # All fitted; what tubes and balls have is derived.
 SHEET_SHARE = 0.9  # of one direction among the normals around a vertex; a tube has 0.5, half a tube too

@@ -14,8 +14,7 @@ from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import TINY, dot, norm, unit
 from ..skeleton import Skeleton
 from .axis_fit import axis_box
-from .sections import Sections, measure_sections
-from .vertex_points import VertexPoints
+from .sections import Sections, VertexPoints, measure_sections
 
 END_CUT = 1.75  # fitted: distance from where the points stop, in larger half widths, within which a cap bends the curve
 END_RUN = 2.0  # fitted: radii behind the cut over which the direction of a limb is taken

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..numerics.diffusion import Diffusion
 from ..numerics.morton import morton_order
-from ..numerics.nearest_edges import incident_edges, nearest_on_edges
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
+from ..numerics.polylines import incident_edges, nearest_on_edges
 from ..numerics.vectors import TINY, dot
 from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton

@@ -14,7 +14,7 @@ from ..skeleton import Skeleton
 from .axis_fit import axis_box
 from .limbs import AXIS_LEAVES, AXIS_LENGTH, Limbs
 from .merging import merge_into
-from .vertex_points import VertexPoints
+from .sections import VertexPoints
 
 # All fitted, but for the steps.
 LINE_NOISE = 0.05  # radii that a line is off at its middle, on a straight limb

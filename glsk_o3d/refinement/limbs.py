@@ -7,11 +7,11 @@ from functools import cache
 
 import numpy as np
 
-from ..numerics.components import component_labels
+from ..numerics.groups import component_labels
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
-from .vertex_points import VertexPoints
+from .sections import VertexPoints
 
 # All fitted.
 AXIS_LEAVES = 1.3  # distance from the other limbs, over that from them to the surface, where half a limb is undisturbed

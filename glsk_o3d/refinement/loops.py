@@ -7,15 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..judgements import QUESTIONS, Judgement
-from ..numerics.components import component_labels
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, opens_wider
+from ..numerics.groups import component_labels
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
 from .evidence import LEAST_INSIDE, Evidence, SurfaceGraph
-from .merging import drop_edges, merge_vertices
-from .triangles import collapse_triangles
-from .vertex_points import VertexPoints
+from .merging import collapse_triangles, drop_edges, merge_vertices
+from .sections import VertexPoints
 
 HOLE_WINDING = 0.25  # fitted: winding number in a hole, over that along the loop: near 0, and .5 or more inside a part
 WIDE_LOOP = 1.5  # fitted: opening of a loop that is more than two strands in one part

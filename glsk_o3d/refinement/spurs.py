@@ -16,8 +16,7 @@ from ..skeleton import Skeleton
 from .evidence import Evidence
 from .limbs import Limbs
 from .merging import merge_into
-from .sections import measure_sections
-from .vertex_points import VertexPoints
+from .sections import VertexPoints, measure_sections
 
 SPUR_POINTS = 128  # measured: of a branch that are enough to say how far it reaches
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers

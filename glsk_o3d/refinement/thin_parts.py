@@ -7,16 +7,15 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..numerics.components import component_labels
 from ..numerics.eigen import largest_eigenvalue
-from ..numerics.groups import group_sum
+from ..numerics.groups import component_labels, group_sum
 from ..numerics.near_links import link_growth, near_links
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import COLUMNS, ROWS, TINY
 from ..preparation.sampling import sample_cloud
 from ..skeleton import Skeleton
 from .diagnostics import SHEET_SHARE
-from .vertex_points import VertexPoints
+from .sections import VertexPoints
 
 SCALE_NEIGHBOUR = 8  # fitted: the nearest point whose distance is the scale of a point
 TRACED_POINTS = 100_000  # measured: points that larger clouds are traced by, about; with fewer, thick parts look thin

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, samples, skeletonize
-from glsk_o3d.numerics.nearest_edges import incident_edges, nearest_on_edges
+from glsk_o3d.numerics.polylines import incident_edges, nearest_on_edges
 from glsk_o3d.numerics.radii import plane_distance_radii
 from glsk_o3d.numerics.vectors import norm
 from glsk_o3d.refinement import axis_fit

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Refiner, Skeleton
@@ -12,7 +13,6 @@ from glsk_o3d.numerics.polylines import arc_lengths
 from glsk_o3d.refinement.evidence import Evidence
 from glsk_o3d.refinement.junctions import Line, _Place, _straightened, limb_line, meet, move_junctions
 from glsk_o3d.refinement.limbs import Limbs
-from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from glsk_o3d.refinement.spurs import prune_spurs
 
 R = 0.1

@@ -9,7 +9,7 @@ import pytest
 from glsk_o3d.numerics.cycles import minimum_cycle_basis, opens_wider
 from glsk_o3d.refinement.evidence import Evidence, SurfaceGraph
 from glsk_o3d.refinement.loops import close_loops, collapse_narrow_loops, facing_pairs, loop_facts
-from glsk_o3d.refinement.vertex_points import VertexPoints
+from glsk_o3d.refinement.sections import VertexPoints
 
 X, Y, Z = np.eye(3)
 LADDER = [[(-0.8, y, 0), (0, y, 0), (0.8, y, 0)] for y in (0, 0.5)] + [[(x, 0, 0), (x, 0.5, 0)] for x in (-0.8, 0, 0.8)]

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d.refinement.merging import drop_lone_vertices, merge_vertices
-from glsk_o3d.refinement.vertex_points import VertexPoints
+from glsk_o3d.refinement.sections import VertexPoints
 
 
 def test_support_counts_supporting_points_and_is_at_least_one(ringed):

@@ -3,9 +3,9 @@
 import math
 
 import pytest
+from glsk_o3d.refinement.scores import probability
 
 from glsk_o3d.refinement import scores
-from glsk_o3d.refinement.scores import probability
 
 WEIGHTS = {"constant": -1.0, "a": 2.0, "b": -0.5}
 

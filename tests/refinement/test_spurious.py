@@ -7,7 +7,7 @@ import pytest
 
 from glsk_o3d import Skeleton, pipelines, samples
 from glsk_o3d.refinement import tracing
-from glsk_o3d.refinement.spurious import drop_spurious, spread_around
+from glsk_o3d.refinement.tracing import drop_spurious, spread_around
 
 
 def drop(skeleton, radii, root=None):

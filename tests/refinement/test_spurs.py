@@ -7,12 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
 from glsk_o3d.numerics.polylines import relative_distance
 from glsk_o3d.refinement import spurs
-from glsk_o3d.refinement.scores import LIMB_WEIGHTS, probability
 from glsk_o3d.refinement.spurs import SPUR_QUANTILE, limb_facts, prune_spurs
 
 N = 21  # vertices of the trunk

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import Skeleton
-from glsk_o3d.refinement.subdivision import POINTS_PER_PIECE, subdivide_edges
+from glsk_o3d.refinement.axis_fit import POINTS_PER_PIECE, subdivide_edges
 
 
 def bar(per, radii=(0.1, 0.2), length=1.0):

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glsk_o3d.refinement.triangles import collapse_triangles
-from glsk_o3d.refinement.vertex_points import VertexPoints
+from glsk_o3d.refinement.merging import collapse_triangles
+from glsk_o3d.refinement.sections import VertexPoints
 
 
 def slow(skeleton, by_degree=False):

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from glsk_o3d.errors import InvalidParameterError
-from glsk_o3d.numerics.components import component_labels
+from glsk_o3d.numerics.groups import component_labels
 from glsk_o3d.numerics.vectors import norm
 
 from .shapes import Shape

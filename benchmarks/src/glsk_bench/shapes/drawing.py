@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from glsk_o3d.errors import InvalidParameterError, did_you_mean
-from glsk_o3d.numerics.components import component_labels
+from glsk_o3d.numerics.groups import component_labels
 from glsk_o3d.numerics.vectors import norm
 
 from ..randomness import generator

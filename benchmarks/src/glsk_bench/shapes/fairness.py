@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from glsk_o3d.numerics.components import component_labels
+from glsk_o3d.numerics.groups import component_labels
 
 from .paths import FINE_STEP, chains, shortest_loop, subdivided
 from .solid import topology
