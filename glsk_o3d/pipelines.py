@@ -62,7 +62,7 @@ def default() -> Pipeline[Skeleton]:
     >>> default()(torus(1000).points).n_loops
     1
     """
-    return RingBuilder() | Contractor(reducer=LPRReducer()) | Connector() | Refiner()
+    return RingBuilder() | Contractor(reducer=LPRReducer()) | Connector() | Refiner() | Tracer()
 
 
 def tree(root: str | Any = "z") -> Pipeline[Skeleton]:

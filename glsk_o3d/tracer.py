@@ -36,9 +36,9 @@ class Tracer(Filter[Skeleton]):
 
     Examples
     --------
-    >>> from glsk_o3d import pipelines
+    >>> from glsk_o3d import skeletonize
     >>> from glsk_o3d.samples import y_junction
-    >>> grown = (pipelines.default() | Tracer(root="z"))(y_junction(1000).points)
+    >>> grown = skeletonize(y_junction(1000).points, root="z")
     >>> grown.n_components, grown.n_loops, len(grown.leaves)
     (1, 0, 3)
     """

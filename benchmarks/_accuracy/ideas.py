@@ -41,7 +41,7 @@ IDEAS = {
     "spurs cut": "Refiner.limb=0",
     "edges subdivided": "Refiner.spacing=0",
     "fit to the axis": "Refiner.recentre=0",
-    "thin parts traced": "Refiner.surface=0",
+    "thin parts traced": "Tracer.surface=0",
 }
 """What `default` adds to the publications, and the settings that switch it off. All of them together (but for the
 reduction and the stop rule, which are published) are `wen2024`."""

@@ -15,7 +15,7 @@ from glsk_o3d.recipes.catalogue import named_pipeline
 from .clouds import CAMERAS
 
 NOISE = 0.001  # share of the diagonal, 7 mm
-PIPELINES = {"default, untraced": ("default", {"Refiner.surface": 0}), "default": ("default", {}), "tree": ("tree", {})}
+PIPELINES = {"default, untraced": ("default", {"Tracer.surface": 0}), "default": ("default", {}), "tree": ("tree", {})}
 
 
 def scan(n: int, forks: int) -> np.ndarray:

@@ -66,7 +66,7 @@ TOOLS: dict[str, Peer] = {
     "tree": Peer("`tree`", (), "points", partial(ours, "tree")),
     "default": PEERS["default"],
     "untraced": Peer(
-        "`default`, `Refiner.surface=0`", (), "points", partial(ours, "default", options={"Refiner.surface": 0})
+        "`default`, `Tracer.surface=0`", (), "points", partial(ours, "default", options={"Tracer.surface": 0})
     ),
     "cao2010": PEERS["cao2010"],
     "levels": Peer("geodesic level sets", (), "points", level_sets),

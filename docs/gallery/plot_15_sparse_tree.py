@@ -25,7 +25,7 @@ with warnings.catch_warnings():
     warnings.simplefilter(
         "ignore", glsk.SkeletonWarning
     )  # it says that the crown is weakly supported
-    before = glsk.pipelines.default().with_options({"Refiner.surface": 0})(cloud)
+    before = glsk.pipelines.default().with_options({"Tracer.surface": 0})(cloud)
 tree = glsk.pipelines.tree()(cloud)
 print(before)
 print(

@@ -63,7 +63,7 @@ def skeletonize(
     from ..resampling import with_support
     from .overrides import choose
 
-    rooted = [f"Refiner.root={root}"] if root is not None else []
+    rooted = [f"Tracer.root={root}"] if root is not None else []
     chosen = choose(pipeline, recipe, [*(settings or []), *rooted], drop_invalid)
     results = [
         *skeleton_files(output, preview, report),

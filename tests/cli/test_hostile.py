@@ -83,7 +83,7 @@ def test_nothing_of_a_file_or_its_name_reaches_the_terminal(tmp_path, monkeypatc
     [
         ["skeletonize", "s.xyz", "--set", "RingBuilder.k={}"],
         ["skeletonize", "s.xyz", "--set", "Contractor.max_iterations={}"],
-        ["skeletonize", "s.xyz", "--set", "Refiner.root={}"],
+        ["skeletonize", "s.xyz", "--set", "Tracer.root={}"],
         ["demo", "-o", "out", "--points", "{}"],
         ["edit", "k.json", "-o", "o.json", "--smooth", "{}"],
         ["edit", "k.json", "-o", "o.json", "--root", "{}"],

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, Refiner, pipelines, samples
+from glsk_o3d import InvalidParameterError, pipelines, samples
 from glsk_o3d.refinement.thin_parts import SpacedPoints, one_direction, without_surface
 
 RNG = np.random.default_rng(3)
@@ -111,11 +111,11 @@ def test_the_thickest_end_of_a_sparse_tree_is_that_of_the_trunk(seed):
 @pytest.mark.parametrize("root", ["up", "1,2", "1,2,nan", 3, (1, 2), ("a", "b", "c"), [[1], [2, 3], 4]])
 def test_no_root(root):
     with pytest.raises(InvalidParameterError, match="a point such as"):
-        Refiner(root=root).check()
+        Tracer(root=root).check()
 
 
 def test_a_point_is_kept_as_text_that_a_recipe_can_hold():
-    assert Refiner(root=(0.1, 2, np.float32(3))) == Refiner(root="0.1,2.0,3.0")
+    assert Tracer(root=(0.1, 2, np.float32(3))) == Tracer(root="0.1,2.0,3.0")
 
 
 def test_gaps_are_joined_and_told(sparse):
@@ -139,7 +139,7 @@ def test_a_ring_of_points_stays_a_loop():
 
 def test_a_trunk_with_a_surface_stays_what_it_was():
     cloud = np.concatenate([tube(1500), scattered([(ROOT, FORK), *TWIGS[1:]], 700)])
-    before = pipelines.default().with_options({"Refiner.surface": 0})(cloud)
+    before = pipelines.default().with_options({"Tracer.surface": 0})(cloud)
     skeleton = pipelines.tree()(cloud)
     assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 0, 3)
     trunk, twigs = skeleton.vertices[:, 2] < -0.3, skeleton.vertices[:, 2] > 0.2
@@ -183,7 +183,7 @@ def test_a_large_cloud_has_the_surface_that_its_points_show():
 
 
 def test_nothing_is_traced_without_a_say(sparse):
-    fitted = pipelines.default().with_options({"Refiner.surface": 0})(sparse)
+    fitted = pipelines.default().with_options({"Tracer.surface": 0})(sparse)
     assert not without_surface(SpacedPoints(fitted), 0.0).any()
     unknown = replace(fitted, confidence=np.full(len(fitted.vertices), np.nan))
     assert not without_surface(SpacedPoints(unknown), 0.65).any()
@@ -203,7 +203,7 @@ def test_without_points_a_graph_becomes_a_tree():
         [[0, 0, 0], [1, 0, 0], [1, 0, 1.1], [0, 0, 1], [0, 0, 3]], [(0, 1), (1, 2), (2, 3), (0, 3)], np.ones(5),
         np.empty(0, int), np.empty((0, 3)), np.empty((0, 3)),
     )  # fmt: skip
-    tree = Refiner(root="z", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(square)
+    tree = Tracer(root="z", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(square)
     assert (tree.n_components, tree.n_loops, len(tree.vertices)) == (1, 0, 5)
     assert tree.report.joined == (((0.0, 0.0, 3.0), (0.0, 0.0, 1.0)),) or tree.report.joined == (
         ((0.0, 0.0, 1.0), (0.0, 0.0, 3.0)),
