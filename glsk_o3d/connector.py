@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .numerics.farthest_point import farthest_point_sampling
-from .numerics.groups import component_labels, group_median, group_sum
+from .numerics.groups import group_median, group_sum
 from .numerics.neighbourhoods import nearest_neighbours, row_medians, uprightness
 from .numerics.radii import plane_distance_radii
 from .numerics.vectors import norm
 from .parameters import documented, parameter, resolve_length
 from .pipeline import Filter, Watch
-from .refinement.merging import some_vertices
 from .skeleton import Skeleton
 from .state import Contraction
 
-UNSUPPORTED_NOISE = 0.3  # fitted: share of noise from which on a vertex may be dropped
 FACING_UPRIGHTNESS = 0.1  # fitted: uprightness of two normals below which their surfaces face each other
 FACING_NOISE = 0.2  # fitted: share of noise below which that counts
 
@@ -70,12 +67,6 @@ class Connector(Filter[Skeleton]):
         "Join a point's vertex with those of all its foreign ring neighbours, except across gaps, or of the nearest.",
         choices=("all", "nearest"),
     )
-    min_support: float = parameter(
-        0.1,
-        "In noise, vertices with less than this share of the points of a near one are dropped. 0 keeps all.",
-        low=0,
-        high=1,
-    )
 
     def _run(self, state: Contraction, watch: Watch | None) -> Skeleton:
         radius = resolve_length(self.radius, state.frame.diagonal * state.frame.scale) / state.frame.scale
@@ -88,7 +79,7 @@ class Connector(Filter[Skeleton]):
         vertex_of_point = np.where(survivor >= 0, vertex_of_survivor[survivor], -1)
         normals = np.full_like(state.points, np.nan)
         normals[state.sampled] = state.normals[state.representative_of_point[state.sampled]]
-        skeleton = Skeleton(
+        return Skeleton(
             vertices=vertices,
             edges=self._edges(state, vertex_of_survivor),
             radii=plane_distance_radii(vertices, vertex_of_point, state.points, normals),
@@ -97,10 +88,6 @@ class Connector(Filter[Skeleton]):
             normals=normals,
             report=state.report,
         )
-        vertex_of_row = vertex_of_survivor[state.representative]
-        count = np.bincount(vertex_of_row, minlength=len(samples))
-        noise = np.bincount(vertex_of_row, state.noise, len(samples)) / np.maximum(count, 1)
-        return drop_unsupported(skeleton, count, (noise > UNSUPPORTED_NOISE) & (self.min_support > 0), self.min_support)
 
     def _edges(self, state: Contraction, vertex_of_survivor: np.ndarray) -> np.ndarray:
         rings = state.rings
@@ -124,40 +111,6 @@ def across_gaps(state: Contraction) -> np.ndarray:
     p, q = state.survivors[state.rings.centres], state.survivors[state.rings.indices]
     facing = uprightness(state.cloud, state.normals, p, q) < FACING_UPRIGHTNESS
     return facing & (np.maximum(state.noise[p], state.noise[q]) < FACING_NOISE)
-
-
-def drop_unsupported(skeleton: Skeleton, count: np.ndarray, noisy: np.ndarray, share: float) -> Skeleton:
-    """Drop the noisy vertices that few points support: what noise leaves between parts, and contraction leaves there.
-
-    They have less than a share of the points, `count`, of another vertex at most two edges away. Adjoining ones that
-    hold other parts together stay. The points of dropped vertices go to the nearest one left, without normals: they
-    have no say.
-    """
-    m, edges = len(skeleton.vertices), skeleton.edges
-    ends, others = np.concatenate([edges, edges[:, ::-1]]).T
-    most = count.copy()
-    for _ in range(2):
-        around = most.copy()
-        np.maximum.at(around, ends, most[others])
-        most = around
-    few = noisy & (count < share * most)
-    if not few.any():
-        return skeleton
-    parts, groups = (component_labels(m, edges[kept[edges].all(axis=1)]) for kept in (~few, few))
-    border = few[ends] & ~few[others]
-    held = np.unique(np.column_stack([groups[ends[border]], parts[others[border]]]), axis=0)[:, 0]
-    dropped = few & (np.bincount(held, minlength=m)[groups] == 1)
-    left = np.flatnonzero(~dropped)
-    representative = np.cumsum(~dropped) - 1
-    representative[dropped] = cKDTree(skeleton.vertices[left]).query(skeleton.vertices[dropped])[1]
-    vertex = skeleton.vertex_of_point
-    return replace(
-        skeleton,
-        **some_vertices(skeleton, left),
-        edges=representative[edges[~dropped[edges].any(axis=1)]],
-        vertex_of_point=np.where(vertex >= 0, representative[vertex], -1),
-        normals=np.where(((vertex >= 0) & dropped[vertex])[:, None], np.nan, skeleton.normals),
-    )
 
 
 def contraction_distance(state: Contraction) -> np.ndarray:

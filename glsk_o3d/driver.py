@@ -143,7 +143,7 @@ def remove_redundant_points(
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
     rings = RingBuilder(thin_to="all", outlier_factor=0, denoise=0) if rings is None else rings
     reducer = LPRReducer() if reducer is None else reducer
-    contraction = Contractor(reducer=reducer, reduce_above=0, max_iterations=int(passes), stop=lambda iterations: None)
+    contraction = Contractor(reducer=reducer, max_iterations=int(passes), stop=lambda iterations: None)
     kept = np.sort((rings | contraction)(cloud).point_of_survivor)
     if name == "PointCloud" and not tensor:
         return cloud.select_by_index(kept), kept.tolist()

@@ -41,7 +41,7 @@ def override(pipeline: Pipeline, settings: Iterable[str]) -> Pipeline:
     --------
     >>> from glsk_o3d import pipelines
     >>> override(pipelines.default(), ["k=20", "Connector.links=nearest"]).stages[2]
-    Connector(radius='1%', thickness=0.6, links='nearest', min_support=0.1)
+    Connector(radius='1%', thickness=0.6, links='nearest')
     """
     settings, ready = list(settings), pipeline
     for setting in settings:  # reducers and rules first: other settings may change what is put in

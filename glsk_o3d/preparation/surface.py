@@ -28,7 +28,6 @@ class Surface:
     merged: np.ndarray  # (m,) distinct points that each is the mean of
     noise: np.ndarray  # (m,) see `noise_share`
     normals: np.ndarray  # (m, 3) of the surface as it came, up to their sign: on a ridge there are none any more
-    spread: np.ndarray  # (m, 3) as from `principal`
     ring_normals: np.ndarray  # (m, 3) of the planes that the rings lie in: those of the points as they are now
     representative: np.ndarray  # (s,) of every sampled point its row
     outlier: np.ndarray  # (s,) sampled points that were set aside
@@ -44,10 +43,10 @@ class Surface:
         representative: np.ndarray,
         outlier: np.ndarray,
     ) -> Surface:
-        """The surface with noise, normals and spread measured in the neighbourhoods."""
+        """The surface with noise and normals measured in the neighbourhoods."""
         spread, normals = principal(points, neighbours)
         noise = noise_share(spread, neighbours)
-        return cls(frame, points, neighbours, weight, merged, noise, normals, spread, normals, representative, outlier)
+        return cls(frame, points, neighbours, weight, merged, noise, normals, normals, representative, outlier)
 
     def __len__(self) -> int:
         return len(self.points)

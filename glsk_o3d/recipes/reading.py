@@ -99,7 +99,7 @@ def from_recipe(recipe: dict[str, Any]) -> Pipeline:
     Examples
     --------
     >>> from_recipe({"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "Connector", "radius": "2%"}]})
-    Connector(radius='2%', thickness=0.6, links='all', min_support=0.1)
+    Connector(radius='2%', thickness=0.6, links='all')
     >>> from_recipe({"glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {"k": 20}}}).stages[0].k
     20
     """

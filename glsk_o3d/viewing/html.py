@@ -24,7 +24,6 @@ _SOLVE_COLUMNS = {  # by heading: the field of a record, and its format
     "solve": ("iteration", "d"),
     "points": ("n_points", ",d"),
     "merged": ("n_merged", ",d"),
-    "held": ("n_held", ",d"),
     "e": ("explained", ".4f"),
     "De": ("explained_change", ".4f"),
     "ring ratio": ("ring_ratio", ".4f"),
