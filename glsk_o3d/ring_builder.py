@@ -17,8 +17,7 @@ from .preparation.denoising import average_noise, denoise
 from .preparation.frame import finite_points
 from .preparation.outliers import set_aside_outliers
 from .preparation.sampling import Sample, sample_cloud
-from .preparation.surface import Surface
-from .preparation.thinning import Thinned, thin_surface
+from .preparation.surface import Surface, Thinned, thin_surface
 from .report import Report
 from .state import Contraction, at_rest
 

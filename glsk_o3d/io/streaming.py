@@ -18,7 +18,7 @@ from ..interop.packages import import_open3d
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..preparation.frame import not_finite
-from ..preparation.streaming import sample_blocks
+from ..preparation.sampling import sample_blocks
 from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from ..ring_builder import RingBuilder
 from .annotation import labels

@@ -14,8 +14,7 @@ from ..numerics.neighbourhoods import local_outlier_ratio, nearest_left, nearest
 from ..numerics.pairing import Pairs, merge_pairs
 from ..numerics.vectors import PAIRS
 from .frame import MIN_POINTS
-from .surface import Surface
-from .thinning import STEADY_SHARE
+from .surface import STEADY_SHARE, Surface
 
 RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
 RIDGE_CHUNK = 1024  # measured: points at a time: the (3, points, 32) work arrays then stay in the cache

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.errors import InvalidCloudError
-from glsk_o3d.preparation.sampling import Extent, sample_cloud, sample_grid
-from glsk_o3d.preparation.streaming import sample_blocks
+from glsk_o3d.preparation.sampling import Extent, sample_blocks, sample_cloud, sample_grid
 from glsk_o3d.samples import torus, y_junction
 
 

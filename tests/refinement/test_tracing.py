@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, pipelines, samples
+from glsk_o3d import InvalidParameterError, Refiner, Tracer, pipelines, samples
 from glsk_o3d.refinement.thin_parts import SpacedPoints, one_direction, without_surface
 
 RNG = np.random.default_rng(3)
@@ -203,7 +203,7 @@ def test_without_points_a_graph_becomes_a_tree():
         [[0, 0, 0], [1, 0, 0], [1, 0, 1.1], [0, 0, 1], [0, 0, 3]], [(0, 1), (1, 2), (2, 3), (0, 3)], np.ones(5),
         np.empty(0, int), np.empty((0, 3)), np.empty((0, 3)),
     )  # fmt: skip
-    tree = Tracer(root="z", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(square)
+    tree = Tracer(root="z")(square)
     assert (tree.n_components, tree.n_loops, len(tree.vertices)) == (1, 0, 5)
     assert tree.report.joined == (((0.0, 0.0, 3.0), (0.0, 0.0, 1.0)),) or tree.report.joined == (
         ((0.0, 0.0, 1.0), (0.0, 0.0, 3.0)),
