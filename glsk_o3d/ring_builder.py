@@ -38,12 +38,12 @@ def published_k(n: int) -> int:
 
 
 def default_size(n: int) -> int:
-    """Points to contract: all of up to 4096, and of more 64 times the square root of their number.
+    """Points to contract: at most 25000, but 64 times the square root of their number from 152588 points on.
 
     More points make the axis hardly more exact, since neither noise nor the thickness of parts shrinks with their
     spacing; they only cost time.
     """
-    return min(n, round(64 * np.sqrt(n)))
+    return min(n, max(25000, round(64 * np.sqrt(n))))
 
 
 @documented
@@ -73,7 +73,7 @@ class RingBuilder(Filter[Contraction]):
     Examples
     --------
     >>> from glsk_o3d.samples import torus
-    >>> state = RingBuilder(k=12)(torus(500).points)
+    >>> state = RingBuilder(k=12, around=0)(torus(500).points)
     >>> len(state), bool(state.rings.closed.mean() > 0.9)
     (500, True)
     """
@@ -96,10 +96,17 @@ class RingBuilder(Filter[Contraction]):
         low=0,
         open_low=True,
     )
+    around: float = parameter(
+        20.0,
+        "Points around a part that are enough: where there are more, near ones are merged; with 0 or a `radius`, none.",
+        unit="points",
+        low=0,
+        high=1000,
+    )
     thin_to: int | Literal["auto", "all"] = parameter(
         "auto",
-        "Most points to contract; others are merged into near ones, which take over their mass. 'auto' is 64 times the "
-        "square root of their number, all of up to 4096; 'all' merges none.",
+        "Most points to contract; others are merged into near ones, which take over their mass. 'auto' is 25000, or 64 "
+        "times the square root of their number if that is more; 'all' merges none, whatever `around` says.",
         type="int",
         unit="points",
         low=8,
@@ -147,7 +154,7 @@ class RingBuilder(Filter[Contraction]):
         if self.denoise and self._may_merge:
             surface = average_noise(surface, self._k)
         surface = denoise(surface, self.denoise, self.outlier_factor > 0)
-        thinned = thin_surface(surface, most, self._k)
+        thinned = thin_surface(surface, self.around if self._may_merge else 0, most, self._k)
         report = Report(n_input=n + dropped, n_dropped=dropped)
         return _contraction(points, finite, sample, surface, thinned, self._rings(surface, thinned), report)
 

@@ -59,6 +59,7 @@ def denoise(surface: Surface, passes: int, set_aside: bool) -> Surface:
     if len(left) < len(denoised):
         representative[outlier] = cKDTree(denoised[left]).query(denoised[outlier])[1]
         denoised, neighbours = denoised[left], nearest_left(denoised, neighbours, ~outlier, k)
+    spread, ring_normals = principal(denoised, neighbours)
     return replace(
         surface,
         points=denoised,
@@ -67,7 +68,8 @@ def denoise(surface: Surface, passes: int, set_aside: bool) -> Surface:
         merged=surface.merged[left],
         noise=surface.noise[left],
         normals=surface.normals[left],
-        ring_normals=principal(denoised, neighbours)[1],
+        spread=spread,
+        ring_normals=ring_normals,
         representative=representative[surface.representative],
         outlier=surface.outlier | outlier[surface.representative],
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, Refiner, Tracer, pipelines, samples
+from glsk_o3d import InvalidParameterError, Tracer, pipelines, samples
 from glsk_o3d.refinement.thin_parts import SpacedPoints, one_direction, without_surface
 
 RNG = np.random.default_rng(3)
