@@ -29,6 +29,7 @@ extensions = [
     "generated",  # these are in _ext
     "keywords",
     "mathml",
+    "numbers",
     "options",
     "sidebar",
     "tables",

@@ -369,8 +369,7 @@ def mass():
     rings = glsk.RingBuilder(around=0)(points)
     variants = (None, glsk.LPRReducer(), glsk.LPRReducer(conserve_mass=False))
     states = [
-        glsk.Contractor(reducer=reducer, reduce_above=0, stop=lambda records: None, max_iterations=4)(rings)
-        for reducer in variants
+        glsk.Contractor(reducer=reducer, stop=lambda records: None, max_iterations=4)(rings) for reducer in variants
     ]
     words = ("no reduction", "mass kept", "mass lost, as published")
     figure, axes = panels([f"{word}: {len(state)} points" for word, state in zip(words, states, strict=True)])

@@ -12,8 +12,8 @@ from .cores import threads
 from .eigen import principal_parts
 from .vectors import PAIRS, TINY, dot, unit
 
-THREAD_POINTS = 4096  # measured: points whose neighbours are worth a thread
-SCATTER_CHUNK = 4096  # measured: rows at a time: the (3, rows, k) work array then stays in the cache
+THREAD_POINTS = 4096  # speed: points whose neighbours are worth a thread
+SCATTER_CHUNK = 4096  # speed: rows at a time: the (3, rows, k) work array then stays in the cache
 
 
 def nearest_neighbours(points: np.ndarray, k: int, of: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:

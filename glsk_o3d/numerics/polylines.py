@@ -8,7 +8,7 @@ import numpy as np
 
 from .vectors import TINY, dot, norm
 
-POLYLINE_CHUNK = 2**20  # measured: pairs of a point and an edge at a time: memory stays flat
+POLYLINE_CHUNK = 2**20  # speed: pairs of a point and an edge at a time: memory stays flat
 
 
 def arc_lengths(path: np.ndarray) -> np.ndarray:

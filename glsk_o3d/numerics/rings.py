@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 
 from .delaunay_star import delaunay_star
 
-STAR_CHUNK = 1536  # measured: rows at a time: the (rows, k) work arrays then stay in the cache
+STAR_CHUNK = 1536  # speed: rows at a time: the (rows, k) work arrays then stay in the cache
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from .vectors import TINY, dot, norm
 VOTING_ROUNDS = 10  # measured: more rounds gain in noise what they lose where thin parts are near
 AREA_NEIGHBOURS = 8  # measured: fewer scatter more, more reach across thin parts
 LEAST_BALL = 1e-6  # derived: of the extent; what single precision can tell apart
-WINDING_CHUNK = 16  # measured: queries at a time: the work arrays of 4096 points then stay in the cache
+WINDING_CHUNK = 16  # speed: queries at a time: the work arrays of 4096 points then stay in the cache
 
 
 def orient_from_axis(

@@ -17,7 +17,7 @@ from .frame import MIN_POINTS
 from .surface import STEADY_SHARE, Surface
 
 RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
-RIDGE_CHUNK = 1024  # measured: points at a time: the (3, points, 32) work arrays then stay in the cache
+RIDGE_CHUNK = 1024  # speed: points at a time: the (3, points, 32) work arrays then stay in the cache
 MOST_IN_ONE = 4  # fitted: noisy points that are averaged in a pass
 MERGE_WORTH = 0.01  # fitted: share of the points that another round of a pass must merge
 ENOUGH_NOISY = 4096  # fitted: noisy points that are enough; down to about so many they are averaged

@@ -70,7 +70,7 @@ def noise_share(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     return np.clip(rise, 0, 1)
 
 
-ASK_AGAIN = 0.25  # measured: share of the points left, below which the neighbours are looked up anew
+ASK_AGAIN = 0.25  # speed: share of the points left, below which the neighbours are looked up anew
 DENSE_FROM = 2000  # fitted: points from which on more than enough are merged
 ENOUGH = 2400  # fitted: points on a body without thin parts
 PACKED = 0.42  # measured: points left on an area of 1 if none are to be nearer than 1

@@ -260,7 +260,7 @@ class _Pattern:
 
 
 POINTS_PER_PIECE = 8  # fitted: an edge is cut into at most one piece for every so many input points, begun ones counted
-SUBDIVISION_CHUNK = 65536  # measured: points at a time: memory stays flat
+SUBDIVISION_CHUNK = 65536  # speed: points at a time: memory stays flat
 
 
 def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:

@@ -18,7 +18,7 @@ from .limbs import Limbs
 from .merging import merge_into
 from .sections import VertexPoints, measure_sections
 
-SPUR_POINTS = 128  # measured: of a branch that are enough to say how far it reaches
+SPUR_POINTS = 128  # speed: of a branch that are enough to say how far it reaches
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
 FAR_OUT = 20.0  # fitted: half widths beyond which a protrusion says no more
 

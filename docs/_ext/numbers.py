@@ -1,0 +1,169 @@
+"""The numbers that steer the skeleton of a cloud: constants and defaults, where each comes from, and a table of them."""
+
+import ast
+import dataclasses
+import re
+from pathlib import Path
+
+from docutils import nodes
+from docutils.parsers.rst import Directive
+
+PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
+ROOMS = ("numerics", "preparation", "refinement")
+FILES = ("ring_builder", "contractor", "lpr_reducer", "stopping", "connector", "refiner", "tracer", "decisions")
+ORIGINS = ("published", "derived", "measured", "fitted", "speed")
+"""Where numbers come from; those for speed, such as the sizes of blocks, change no result."""
+ORIGIN = re.compile(rf"\b({'|'.join(ORIGINS)})\b", re.IGNORECASE)
+
+
+@dataclasses.dataclass(frozen=True)
+class Number:
+    """A constant or the default of an option."""
+
+    place: str
+    """Its file, without ending, or the class that it is an option of."""
+    name: str
+    value: str
+    origin: str
+    what: str
+
+    @property
+    def steers(self):
+        """Whether another value would give another skeleton, and it was chosen: neither derived nor for speed alone."""
+        return self.origin in ("published", "measured", "fitted")
+
+
+def constants(tree):
+    """The upper-case names that a module assigns, each with its statement."""
+    for statement in tree.body:
+        if isinstance(statement, (ast.Assign, ast.AnnAssign)):
+            targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
+            for node in (node for target in targets for node in ast.walk(target)):
+                if isinstance(node, ast.Name) and node.id.isupper():
+                    yield node.id, statement
+
+
+def is_number(value):
+    """Whether an expression is made of plain numbers: one, a tuple of them, or arithmetic."""
+    if isinstance(value, (ast.Tuple, ast.List)):
+        return bool(value.elts) and all(map(is_number, value.elts))
+    if isinstance(value, ast.BinOp):
+        return is_number(value.left) and is_number(value.right)
+    if isinstance(value, ast.UnaryOp):
+        return is_number(value.operand)
+    return ast.unparse(value) == "np.pi" or (isinstance(value, ast.Constant) and type(value.value) in (int, float))
+
+
+def comments(lines, statement):
+    """The comments of a statement: above the group that it is in, directly above it, and at its end."""
+    first, end = statement.lineno - 1, statement.end_lineno
+    top = first
+    while top and lines[top - 1].strip():
+        top -= 1
+    group = next((row for row in range(top, first) if not lines[row].startswith("#")), first)
+    own = next((row + 1 for row in range(first - 1, top - 1, -1) if not lines[row].startswith("#")), top)
+    return [*lines[top:group], *lines[own:first], lines[end - 1].partition("#")[2]]
+
+
+def origin(said):
+    """Where a number comes from by its comments, the nearest first; None if they do not say it."""
+    return next((found[1].lower() for line in reversed(said) if (found := ORIGIN.search(line))), None)
+
+
+def files():
+    """The modules that are asked, those of the filters first."""
+    return [
+        *(PACKAGE / f"{name}.py" for name in FILES),
+        *(p for room in ROOMS for p in sorted((PACKAGE / room).glob("*.py"))),
+    ]
+
+
+def all_constants():
+    """Every constant of the filters and of what they call, as a list of Number."""
+    found = []
+    for path in files():
+        text = path.read_text(encoding="utf-8")
+        for name, statement in constants(ast.parse(text)):
+            if is_number(statement.value):
+                said = comments(text.splitlines(), statement)
+                what = " ".join(line.strip(" #") for line in said).strip()
+                place = path.relative_to(PACKAGE).with_suffix("").as_posix()
+                found.append(Number(place, name, value_of(name, statement), origin(said) or "", what))
+    return found
+
+
+def value_of(name, statement):
+    """What one of the names of a statement is assigned, as it is written."""
+    target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
+    if isinstance(target, ast.Tuple) and isinstance(statement.value, ast.Tuple):
+        return ast.unparse(statement.value.elts[[node.id for node in target.elts].index(name)])
+    return ast.unparse(statement.value)
+
+
+def weights():
+    """The weights of the four questions."""
+    from glsk_o3d.decisions import QUESTIONS
+
+    return [
+        Number(
+            "decisions", f"{about}: {fact}", f"{weight:g}", "fitted", f"whether {question.asks.replace(' at ({})', '')}"
+        )
+        for about, question in QUESTIONS.items()
+        for fact, weight in question.weights.items()
+    ]
+
+
+def defaults():
+    """The numbers that are defaults of options in `default`."""
+    from glsk_o3d import pipelines
+    from glsk_o3d.pipeline import parts
+
+    theirs = {(type(part), field): value for part in parts(pipelines.wen2024()) for field, value in vars(part).items()}
+    found = []
+    for part in parts(pipelines.default()):
+        for field in dataclasses.fields(part):
+            value = getattr(part, field.name)
+            if re.fullmatch(r"[\d.e+-]+%?", str(value)) and type(value) is not bool:
+                where = "published" if theirs.get((type(part), field.name)) == value else "fitted"
+                found.append(Number(type(part).__name__, field.name, str(value), where, field.metadata["doc"]))
+    return found
+
+
+def steering():
+    """All that steer, as a list of Number."""
+    return [number for number in [*defaults(), *weights(), *all_constants()] if number.steers]
+
+
+class Numbers(Directive):
+    """``{numbers}``: the table."""
+
+    def run(self):
+        rows = [(f"{each.place}", each.name, each.value, each.origin, each.what) for each in steering()]
+        table = nodes.table(classes=["numbers"])
+        group = nodes.tgroup(cols=5)
+        table += group
+        for width in (18, 20, 10, 10, 60):
+            group += nodes.colspec(colwidth=width)
+        head, body = nodes.thead(), nodes.tbody()
+        group += [head, body]
+        for part, lines in ((head, [("where", "number", "value", "origin", "what")]), (body, rows)):
+            for line in lines:
+                row = nodes.row()
+                part += row
+                for column, text in enumerate(line):
+                    literal = part is body and column in (1, 2)
+                    row += nodes.entry(
+                        "", nodes.paragraph("", "", nodes.literal(text=text) if literal else nodes.Text(text))
+                    )
+        return [nodes.paragraph(text=f"{len(rows)} numbers:"), table]
+
+
+def setup(app):
+    app.add_directive("numbers", Numbers)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+if __name__ == "__main__":
+    for each in steering():
+        print(f"{each.place:24} {each.name:28} {each.value:10} {each.origin:10} {each.what}")
+    print(len(steering()))
