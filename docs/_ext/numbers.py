@@ -1,4 +1,4 @@
-"""The numbers that steer the skeleton of a cloud: constants and defaults, where each comes from, and a table of them."""
+"""The numbers that steer the skeleton of a cloud: constants and defaults, where each comes from; a table of them."""
 
 import ast
 import dataclasses
@@ -104,13 +104,12 @@ def weights():
     """The weights of the four questions."""
     from glsk_o3d.decisions import QUESTIONS
 
-    return [
-        Number(
-            "decisions", f"{about}: {fact}", f"{weight:g}", "fitted", f"whether {question.asks.replace(' at ({})', '')}"
-        )
-        for about, question in QUESTIONS.items()
-        for fact, weight in question.weights.items()
-    ]
+    found = []
+    for about, question in QUESTIONS.items():
+        what = f"whether {question.asks.replace(' at ({})', '')}"
+        for fact, weight in question.weights.items():
+            found.append(Number("decisions", f"{about}: {fact}", f"{weight:g}", "fitted", what))
+    return found
 
 
 def defaults():
@@ -151,10 +150,9 @@ class Numbers(Directive):
                 row = nodes.row()
                 part += row
                 for column, text in enumerate(line):
-                    literal = part is body and column in (1, 2)
-                    row += nodes.entry(
-                        "", nodes.paragraph("", "", nodes.literal(text=text) if literal else nodes.Text(text))
-                    )
+                    code = part is body and column in (1, 2)
+                    shown = nodes.literal(text=text) if code else nodes.Text(text)
+                    row += nodes.entry("", nodes.paragraph("", "", shown))
         return [nodes.paragraph(text=f"{len(rows)} numbers:"), table]
 
 
