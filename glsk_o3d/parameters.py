@@ -12,6 +12,8 @@ from typing import Any, ClassVar, TypeVar
 
 from .errors import InvalidParameterError
 
+__all__ = ["Parameters", "documented", "parameter", "resolve_length"]  # what plugins use
+
 _Class = TypeVar("_Class", bound=type)
 
 LARGEST_WHOLE = 2**63 - 1  # derived: of the numbers that NumPy counts with
@@ -63,12 +65,7 @@ def documented(cls: _Class) -> _Class:
     Parameters
     ----------
     cls : dataclass
-        All of whose fields are made by `parameter`.
-
-    Returns
-    -------
-    class
-        The same.
+        All of whose fields are made by `parameter`; it is returned.
     """
     lines = []
     for field in dataclasses.fields(cls):
@@ -139,16 +136,7 @@ def _plain(value: Any) -> Any:
 
 
 def shown(value: Any) -> str:
-    """A value as messages show it: as in Python, but no pages of digits.
-
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    str
-    """
+    """A value as messages show it: as in Python, but no pages of digits."""
     if isinstance(value, Integral) and abs(int(value)) > LARGEST_WHOLE:
         digits = round(math.log10(abs(int(value))))  # rounded; Python itself writes no number of more than 4300
         return f"a number of {digits + (abs(int(value)) >= 10**digits)} digits"
@@ -157,19 +145,7 @@ def shown(value: Any) -> str:
 
 
 def problem_with(value: Any, facts: Any) -> str | None:
-    """What is wrong with the value of a parameter.
-
-    Parameters
-    ----------
-    value : object
-    facts : mapping
-        As `parameter` makes it.
-
-    Returns
-    -------
-    str or None
-        None where nothing is.
-    """
+    """What is wrong with the value of a parameter with the facts that `parameter` gave it; None where nothing is."""
     kind, choices = facts["type"].removesuffix("?"), facts["choices"]
     if (isinstance(value, str) and value in choices) or (value is None and facts["type"].endswith("?")):
         return None
@@ -216,21 +192,7 @@ def _point(text: str) -> tuple[float, ...] | None:
 
 
 def resolve_point(text: str) -> tuple[float, ...]:
-    """A point written as ``"x,y,z"``.
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    (x, y, z)
-
-    Examples
-    --------
-    >>> resolve_point("0.5,0,2")
-    (0.5, 0.0, 2.0)
-    """
+    """A point (x, y, z) written as ``"x,y,z"``."""
     numbers = _point(text)
     if numbers is None:
         raise InvalidParameterError(f"point {text!r}: must be three numbers such as '0.5,0,2'")
