@@ -56,17 +56,17 @@ def main(path, folder, api="legacy", ground=0.0, voxel=None, gap=None, least=300
         skeleton = glsk.skeletonize(cloud)
 
         # the cloud, every point with its branch: what Open3D does next goes by these attributes
-        annotated = skeleton.annotate(cloud, color="branch")
+        annotated = glsk.annotate(skeleton, cloud, color="branch")
         o3d.t.io.write_point_cloud(str(folder / f"{number}_cloud.ply"), annotated)
-        table = skeleton.branch_table()
+        table = glsk.analysis.branch_table(skeleton)
         longest = annotated.select_by_mask((annotated.point.branch == int(table.length.argmax())).reshape((-1,)))
         o3d.t.io.write_point_cloud(str(folder / f"{number}_longest.ply"), longest)
 
         # the skeleton: a graph to compute with, lines and tubes to look at, a table to read
-        skeleton.save(folder / f"{number}_skeleton.json")
+        glsk.save_skeleton(skeleton, folder / f"{number}_skeleton.json")
         if len(skeleton.edges):  # a blob may become a single vertex, and Open3D writes no lines where there are none
-            o3d.io.write_line_set(str(folder / f"{number}_lines.ply"), skeleton.to_line_set(color="radius"))
-        o3d.io.write_triangle_mesh(str(folder / f"{number}_tubes.ply"), skeleton.to_tubes())
+            o3d.io.write_line_set(str(folder / f"{number}_lines.ply"), glsk.to_line_set(skeleton, color="radius"))
+        o3d.io.write_triangle_mesh(str(folder / f"{number}_tubes.ply"), glsk.to_tubes(skeleton))
         table.to_csv(folder / f"{number}_branches.csv")
         print(f"object {number}: {len(skeleton.points)} points, {skeleton}")
 

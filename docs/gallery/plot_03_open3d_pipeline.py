@@ -54,8 +54,8 @@ print(f"table {plane.round(2)}, {len(clusters)} objects")
 
 skeletons = [glsk.skeletonize(cluster) for cluster in clusters]
 for cluster, skeleton in zip(clusters, skeletons, strict=True):
-    annotated = skeleton.annotate(cluster, color="branch")
-    lines, tubes = skeleton.to_line_set(color="branch"), skeleton.to_tubes()
+    annotated = glsk.annotate(skeleton, cluster, color="branch")
+    lines, tubes = glsk.to_line_set(skeleton, color="branch"), glsk.to_tubes(skeleton)
     print(skeleton, annotated.point, lines, tubes, sep="\n  ")
 
 # %%
@@ -67,7 +67,7 @@ left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1,
 glsk.plot_skeleton(None, left, cloud=scene).set_title("the scene, thinned")
 glsk.plot_skeleton(None, right, cloud=objects).set_title("objects and skeletons")
 for skeleton in skeletons:
-    lines = skeleton.to_line_set(color="branch")
+    lines = glsk.to_line_set(skeleton, color="branch")
     ends, colours = np.asarray(lines.points)[np.asarray(lines.lines)], np.asarray(lines.colors)
     right.add_collection(
         Line3DCollection(ends, colors=colours, linewidths=2, zorder=2, clip_on=False)

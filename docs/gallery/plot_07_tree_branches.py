@@ -57,7 +57,7 @@ print(f"{len(cloud)} points")
 # The table has a row per branch. The root is given; by default it is the branch with the most volume.
 
 skeleton = glsk.skeletonize(cloud)
-table = skeleton.branch_table(root=(0, 0, 0))
+table = glsk.analysis.branch_table(skeleton, root=(0, 0, 0))
 print(" order  branches  length  (true)  radius  (true)  angle  (true)")
 for order in range(table.level.max() + 1):
     of = table.level == order

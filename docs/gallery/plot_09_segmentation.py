@@ -19,8 +19,8 @@ skeleton = glsk.skeletonize(thinned)
 # ``segment`` labels the points with rows of the branch table. Any cloud in the same place will do: here the skeleton
 # is that of 6000 points, and the labels are for all 30 000.
 
-label = skeleton.segment(scan)
-table = skeleton.branch_table()
+label = glsk.analysis.segment(skeleton, scan)
+table = glsk.analysis.branch_table(skeleton)
 for row in np.argsort(-table.points)[:5]:
     print(
         f"branch {row}: {table.kind[row]}, {(label == row).sum()} points, radius {table.mean_radius[row]:.3f}"
@@ -30,7 +30,7 @@ for row in np.argsort(-table.points)[:5]:
 # The colours of the parts are those of the branches. Around a junction a point goes to the branch whose curve is
 # nearest: look at the shoulders, where that is a convention rather than anatomy.
 
-colours = skeleton.annotate(scan, color="branch").point.colors.numpy() / 255
+colours = glsk.annotate(skeleton, scan, color="branch").point.colors.numpy() / 255
 glsk.plot_skeleton(skeleton, cloud=scan, color=(0.1, 0.1, 0.1), point_colors=colours, line_width=1)
 plt.show()
 

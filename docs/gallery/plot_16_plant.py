@@ -57,7 +57,7 @@ print(plant, *(message.message for message in caught), sep="\n")
 # The stem is order 0, leaves are order 1. Where a leaf begins and its angle are those of the branch; its length is that
 # of its cylinders, which reach as far as its points do.
 
-table, pieces = plant.branch_table(), glsk.analysis.cylinders(plant)
+table, pieces = glsk.analysis.branch_table(plant), glsk.analysis.cylinders(plant)
 leaves = np.flatnonzero(table.order == 1)
 leaves = leaves[np.argsort(plant.vertices[table.start[leaves], 2])]
 print(f"{len(leaves)} leaves")
@@ -72,7 +72,7 @@ for row, height, length in zip(leaves, HEIGHTS, LENGTHS, strict=True):
 # TomatoWUR and pandas read, ``+`` where a leaf leaves the stem; ``table.to_csv("leaves.csv")`` has the measures.
 
 with TemporaryDirectory() as folder:
-    plant.save(f"{folder}/maize.plant.csv")
+    glsk.save_skeleton(plant, f"{folder}/maize.plant.csv")
     nodes = Path(folder, "maize.plant.csv").read_text().splitlines()
 print(
     *nodes[:3],

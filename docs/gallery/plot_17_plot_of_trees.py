@@ -81,7 +81,7 @@ table = glsk.analysis.cylinders(tree)
 for name in ("tree.csv", "tree.qsm.csv", "tree.mat", "trees.txt"):
     glsk.save_cylinders(table, Path(folder.name, name), unit="m")
 print(f"{len(table)} cylinders;", Path(folder.name, "tree.qsm.csv").read_text().splitlines()[0])
-marked = tree.annotate(cloud, color="branch")
+marked = glsk.annotate(tree, cloud, color="branch")
 print(*sorted(marked.point))
 
 figure = plt.figure(figsize=(10, 5), layout="constrained")
