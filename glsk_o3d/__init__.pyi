@@ -23,15 +23,18 @@ from .errors import (
     StageError,
 )
 from .interop.clouds import Cloud
-from .io.annotation import annotate_contraction
+from .io.annotation import annotate, annotate_contraction
 from .io.cylinders import save_cylinders
 from .io.formats.gltf import save_rig
+from .io.line_sets import to_line_set, to_tensor_line_set
 from .io.meshes import save_mesh
 from .io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
 from .io.skeletons import read_skeleton, read_truth, save_skeleton
 from .io.streaming import annotate_file, read_sample
+from .io.tubes import to_tubes
 from .judgements import Judgement, Supported
 from .lpr_reducer import LPRReducer
+from .meshlab import to_pymeshlab
 from .meshlab.meshset import MeshSet
 from .pipeline import Filter, Pipeline
 from .recipes import from_recipe, load_recipe, rerun, save_recipe, to_recipe
@@ -83,6 +86,7 @@ __all__ = [
     "Supported",
     "Tracer",
     "analysis",
+    "annotate",
     "annotate_contraction",
     "annotate_file",
     "batch",
@@ -109,5 +113,9 @@ __all__ = [
     "save_tensor_cloud",
     "skeletonize",
     "support",
+    "to_line_set",
+    "to_pymeshlab",
     "to_recipe",
+    "to_tensor_line_set",
+    "to_tubes",
 ]

@@ -21,7 +21,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 import glsk_o3d as glsk
 from glsk_o3d import pipelines, samples
-from glsk_o3d.analysis import Gripper, grasp_candidates
+from glsk_o3d.analysis import Gripper, grasp_candidates, segment
 from glsk_o3d.analysis.segmentation import branch_of_edge
 from glsk_o3d.io.colors import shades
 from glsk_o3d.numerics.cycles import inscribed_circle, minimum_cycle_basis
@@ -162,7 +162,7 @@ def card_robots():
 def card_trees():
     cloud = samples.tree(16000, forks=4, length=1.0, radius=0.09, seed=4).points
     skeleton = skeletonised(cloud, pipelines.tree(root="z"))
-    colors = shades(skeleton, "order", skeleton.segment(cloud), skeleton.vertex_of_point)
+    colors = shades(skeleton, "order", segment(skeleton, cloud), skeleton.vertex_of_point)
     figure, axes = card()
     portrait(axes, skeleton, cloud, np.array(CARD), colors, 1.2, azimuth=-60, elevation=8)
     return figure
@@ -171,7 +171,7 @@ def card_trees():
 def card_shapes():
     scan = samples.sample_object(12000).points
     skeleton = skeletonised(scan)
-    colors = shades(skeleton, "branch", skeleton.segment(scan), skeleton.vertex_of_point)
+    colors = shades(skeleton, "branch", segment(skeleton, scan), skeleton.vertex_of_point)
     figure, axes = card()
     portrait(axes, skeleton, scan, np.array(CARD), colors, 1.2, [scan], azimuth=-62, elevation=16)
     return figure

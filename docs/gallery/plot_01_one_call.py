@@ -23,8 +23,8 @@ glsk.plot_skeleton(skeleton, color="radius")
 plt.show()
 
 # %%
-# The report says what was done and why it stopped. ``glsk.save_skeleton(skeleton, "toy.ply")`` writes what Open3D and MeshLab read;
-# other endings write other formats.
+# The report says what was done and why it stopped. ``glsk.save_skeleton(skeleton, "toy.ply")``
+# writes what Open3D and MeshLab read; other endings write other formats.
 
 report = skeleton.report
 print(report.stop_reason)

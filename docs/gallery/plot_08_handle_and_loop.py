@@ -39,7 +39,7 @@ for it in skeleton.report.judgements:
 # What remains: the vertices of the loop, the radius of the largest circle inside it, and how probable it is that it is
 # a handle.
 
-(loop,) = glsk.analysis.loops(skeleton)
+(loop,) = glsk.analysis.find_loops(skeleton)
 print(
     f"{len(loop.vertices)} vertices, opening {loop.opening:.3f}, a handle with probability {loop.probability:.2f}"
 )

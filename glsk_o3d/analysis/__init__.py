@@ -8,7 +8,7 @@ from .forestry import TreeMeasures, tree_measures
 from .grasp_rows import GraspCandidates
 from .grasps import grasp_candidates
 from .gripper import Gripper
-from .loops import Loop
+from .loops import Loop, find_loops
 from .segmentation import segment
 from .thickness import thickness
 from .tree_cylinders import Cylinders, cylinders
@@ -30,6 +30,7 @@ __all__ = [
     "compare",
     "curvature_torsion",
     "cylinders",
+    "find_loops",
     "grasp_candidates",
     "segment",
     "thickness",

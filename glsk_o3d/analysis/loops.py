@@ -30,7 +30,7 @@ class Loop:
     --------
     >>> from glsk_o3d import skeletonize
     >>> from glsk_o3d.samples import torus
-    >>> (loop,) = skeletonize(torus(2000).points).loops
+    >>> (loop,) = find_loops(skeletonize(torus(2000).points))
     >>> abs(loop.opening - 0.4) < 0.02, loop.probability > 0.9
     (True, True)
     """
@@ -40,8 +40,24 @@ class Loop:
     probability: float
 
 
-def loops(skeleton: Skeleton) -> tuple[Loop, ...]:
-    """The loops of a minimum cycle basis (Horton 1987), the shortest first: as many as `Skeleton.n_loops`."""
+def find_loops(skeleton: Skeleton) -> tuple[Loop, ...]:
+    """The loops of a minimum cycle basis (Horton 1987), the shortest first: as many as `Skeleton.n_loops`.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    tuple of Loop
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import two_rings
+    >>> len(find_loops(skeletonize(two_rings(2000).points)))
+    2
+    """
     cycles = opening_cycles(skeleton)
     chances = np.full(len(cycles), np.nan)
     if cycles and len(skeleton.supporting_points):

@@ -21,7 +21,7 @@ from .. import __version__
 from ..analysis.summary import summary
 from ..errors import GlskError, InvalidCloudError
 from ..io.scans import read_cloud
-from ..io.skeletons import read_skeleton
+from ..io.skeletons import read_skeleton, save_skeleton
 from ..io.streaming import sample_for
 from ..recipes import from_recipe
 from ..report import Report
@@ -91,7 +91,7 @@ def _skeletonize(job: Job, row: Row, messages: list[str]) -> None:
         if output.endswith(".png"):
             save_preview(skeleton, path, title=os.path.basename(job.source))
         else:
-            skeleton.save(path, cut_loops=job.cut_loops)
+            save_skeleton(skeleton, path, cut_loops=job.cut_loops)
         row["outputs"].append(output)
 
 

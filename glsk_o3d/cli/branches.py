@@ -25,14 +25,14 @@ def branches(
     same axis and order; the level counts branches from the root.
     """
     from .. import FileFormatError, read_skeleton
-    from ..analysis.branches import cell
+    from ..analysis.branches import branch_table, cell
 
     files = output or []
     check_outputs([(path, ".csv", "table is CSV") for path in files], skeleton)
     curve = read_skeleton(skeleton)
     if len(curve.vertices) == 0:
         raise FileFormatError(f"{skeleton}: the skeleton is empty: it has no branches to measure")
-    table = curve.branch_table(root)
+    table = branch_table(curve, root)
     for path in files:
         table.to_csv(path)
     if as_json:

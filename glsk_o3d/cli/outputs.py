@@ -90,9 +90,11 @@ def skeleton_writers(
     recorder: ContractionRecorder | None = None,
 ) -> Writers:
     """What writes a skeleton, its picture and its page; the recorder watched the run, for the page."""
-    from .. import save_preview, save_report
+    from .. import save_preview, save_report, save_skeleton
 
-    writers: Writers = {path: partial(skeleton.save, cut_loops=cut_loops, root=root) for path in outputs or []}
+    writers: Writers = {
+        path: partial(save_skeleton, skeleton, cut_loops=cut_loops, root=root) for path in outputs or []
+    }
     if preview is not None:
         writers[preview] = partial(save_preview, skeleton, title=title)
     if page is not None:

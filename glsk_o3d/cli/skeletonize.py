@@ -56,7 +56,7 @@ def skeletonize(
 
     Everything that can be checked is checked before the computation starts. Files appear complete or not at all.
     """
-    from .. import ContractionRecorder, recipes, save_mesh
+    from .. import ContractionRecorder, recipes, save_mesh, to_tubes
     from ..interop.packages import require
     from ..io.meshes import WRITTEN_MESH_ENDINGS
     from ..io.scans import WRITTEN_CLOUD_ENDINGS
@@ -91,7 +91,7 @@ def skeletonize(
         if save_recipe is not None:
             writers[save_recipe] = partial(recipes.save_recipe, chosen)
         if tubes is not None:
-            writers[tubes] = lambda path: save_mesh(skeleton.to_tubes(), path)
+            writers[tubes] = lambda path: save_mesh(to_tubes(skeleton), path)
         if labelled is not None:
             writers[labelled] = partial(write_labelled, skeleton)
         written, problems = write_each(writers, update)
@@ -127,7 +127,9 @@ def _read(
 
 def _labelled(skeleton: Skeleton, cloud: Any) -> Any:
     """A tensor cloud with labels and their colours; its own colours are attributes."""
-    labelled = skeleton.annotate(cloud, color="branch")
+    from .. import annotate
+
+    labelled = annotate(skeleton, cloud, color="branch")
     if "colors" in cloud.point:
         for column, name in enumerate(("red", "green", "blue")):
             labelled.point[f"scan_{name}"] = cloud.point.colors[:, column : column + 1].to(labelled.point.branch.dtype)

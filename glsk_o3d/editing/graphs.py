@@ -15,7 +15,7 @@ from ..numerics.vectors import norm
 from ..parameters import problem_with
 from ..refinement.merging import merge_into, some_vertices
 from ..refinement.rooted import RootPlace, numbered_from, root_among
-from ..skeleton import Root, Skeleton
+from ..skeleton import Skeleton
 
 
 def largest_component(skeleton: Skeleton) -> Skeleton:
@@ -119,7 +119,12 @@ def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
 
 
 def prune(
-    skeleton: Skeleton, *, length: float = 0.0, radius: float = 0.0, order: int | None = None, root: Root = None
+    skeleton: Skeleton,
+    *,
+    length: float = 0.0,
+    radius: float = 0.0,
+    order: int | None = None,
+    root: RootPlace | None = None,
 ) -> Skeleton:
     """Drop branches that leave a junction and end, and are short, thin, or of a high order.
 
@@ -168,7 +173,7 @@ def prune(
     return skeleton
 
 
-def _without_orders(skeleton: Skeleton, order: int, root: Root) -> Skeleton:
+def _without_orders(skeleton: Skeleton, order: int, root: RootPlace | None) -> Skeleton:
     _refuse_loops(skeleton, "branches have an order in a tree")
     table = branch_table(skeleton, root)
     group = np.arange(len(skeleton.vertices))

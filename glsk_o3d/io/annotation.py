@@ -27,8 +27,8 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     The copy has all attributes of the original, and
 
     - ``skeleton_vertex`` (N, 1) int32: the vertex it belongs to, as in `Skeleton.vertex_of_point`;
-    - ``branch`` (N, 1) int32: the row of `Skeleton.branch_table`, as from `Skeleton.segment`;
-    - ``order`` (N, 1) int32: that of the branch in `Skeleton.branch_table`, 0 for axes at the root;
+    - ``branch`` (N, 1) int32: the row of `glsk_o3d.analysis.branch_table`, as from `glsk_o3d.analysis.segment`;
+    - ``order`` (N, 1) int32: that of the branch in that table, 0 for axes at the root;
     - ``radius`` and ``confidence`` (N, 1), of the type of the positions: those of the vertex;
     - ``thickness`` (N, 1), of that type: the radius over how far the points are apart, see
       `glsk_o3d.analysis.thickness`.

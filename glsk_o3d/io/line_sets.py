@@ -15,22 +15,62 @@ if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 
-def to_line_set(skeleton: Skeleton, color: ColorChoice = (0.85, 0.1, 0.1)) -> Any:
-    """A skeleton as a legacy line set, points and lines in its order, with colours of the edges as from `shades`."""
-    o3d = import_open3d()
-    lines = o3d.geometry.LineSet()
-    lines.points = o3d.utility.Vector3dVector(_rows(skeleton.vertices, float, 3))
-    lines.lines = o3d.utility.Vector2iVector(_rows(skeleton.edges, np.int32, 2))
-    lines.colors = o3d.utility.Vector3dVector(_edge_colors(skeleton, color))
+def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
+    """A skeleton as a legacy line set, coloured by what is known of it.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
+        What the colours of the edges show, or the one colour of all; see `glsk_o3d.io.colors.shades`.
+
+    Returns
+    -------
+    open3d.geometry.LineSet
+
+    Raises
+    ------
+    InvalidParameterError, MissingPackageError
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(1000).points)
+    >>> len(to_line_set(ring, "radius").colors) == len(ring.edges)
+    True
+    """
+    lines = skeleton.to_line_set()
+    lines.colors = import_open3d().utility.Vector3dVector(_rows(_edge_colors(skeleton, color), float, 3))
     return lines
 
 
 def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> Any:
-    """A skeleton as a tensor line set on the CPU.
+    """A skeleton as a tensor line set on the CPU, with all that is known of its vertices and edges.
 
-    It has ``point.positions`` (M, 3), ``point.radius``, ``point.confidence``, ``point.half_width``,
-    ``point.half_thickness`` and ``point.support`` (M, 1) float64, ``line.indices`` (E, 2) int64, ``line.branch`` (E, 1)
-    int32 and, with a color, ``line.colors`` (E, 3) float64.
+    Parameters
+    ----------
+    skeleton : Skeleton
+    color : as of `to_line_set`, optional
+
+    Returns
+    -------
+    open3d.t.geometry.LineSet
+        With ``point.positions`` (M, 3), ``point.radius``, ``point.confidence``, ``point.half_width``,
+        ``point.half_thickness`` and ``point.support`` (M, 1) float64, ``line.indices`` (E, 2) int64, ``line.branch``
+        (E, 1) int32 and, with a color, ``line.colors`` (E, 3) float64.
+
+    Raises
+    ------
+    InvalidParameterError, MissingPackageError
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(1000).points)
+    >>> to_tensor_line_set(ring).line.branch.shape[0] == len(ring.edges)
+    True
     """
     o3d = import_open3d()
     lines = o3d.t.geometry.LineSet()

@@ -92,7 +92,7 @@ def save_skeleton(
     root : str, int or (x, y, z), optional
         For the same formats: where the tree grows from, as for `glsk_o3d.editing.reroot`; the vertices are numbered
         from there. By default vertex 0, if the numbers go outwards from it, as those of `pipelines.tree` do, or else
-        the root of `Skeleton.branch_table`.
+        the root of `glsk_o3d.analysis.branch_table`.
     format : str, optional
         The ending of another format than that of `path`, with or without its dot.
 
@@ -153,7 +153,7 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     >>> from glsk_o3d.samples import torus
     >>> skeleton = skeletonize(torus(1000).points)
     >>> with TemporaryDirectory() as folder:
-    ...     skeleton.save(f"{folder}/ring.json")
+    ...     save_skeleton(skeleton, f"{folder}/ring.json")
     ...     again = read_skeleton(f"{folder}/ring.json")
     >>> bool((again.vertices == skeleton.vertices).all())
     True

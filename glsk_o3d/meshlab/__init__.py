@@ -16,7 +16,28 @@ if TYPE_CHECKING:
 def to_pymeshlab(skeleton: Skeleton) -> Any:
     """A skeleton as a ``pymeshlab.Mesh`` of vertices and edges, with the radii as vertex scalars.
 
-    MeshLab's own PLY writer drops edges, its OBJ writer keeps them; `Skeleton.save` writes both.
+    MeshLab's own PLY writer drops edges, its OBJ writer keeps them; `glsk_o3d.save_skeleton` writes both.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    pymeshlab.Mesh
+
+    Raises
+    ------
+    MissingPackageError
+        Without the extra ``meshlab``.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(1000).points)
+    >>> to_pymeshlab(ring).edge_number() == len(ring.edges)
+    True
     """
     from .layers import Layer
 

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..analysis.segmentation import segment
 from ..contractor import Contractor
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import Cloud
@@ -136,7 +137,7 @@ class SegmentVerb(PipelineVerb):
             skeleton, layer = layer.flow, layer.source or layer
         else:
             skeleton = pipeline(_cloud(layer), on_iteration=on_iteration)
-        labels = skeleton.segment()
+        labels = segment(skeleton)
         colors = shades(skeleton, "branch", labels, skeleton.vertex_of_point)
         return dataclasses.replace(
             self.shown(skeleton.points, layer),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..analysis.branches import branch_table
 from ..analysis.summary import point_count
 from ..io.colors import shades
 from ..judgements import coordinates
@@ -120,7 +121,7 @@ def branches(skeleton: Skeleton) -> str:
     """The longest branches, in the colours that they have in the view; numbered as in `Skeleton.branch_table`."""
     if len(skeleton.edges) == 0:
         return ""
-    listed = [row for row in skeleton.branch_table() if row["kind"] != "isolated"]
+    listed = [row for row in branch_table(skeleton) if row["kind"] != "isolated"]
     listed.sort(key=lambda row: -row["length"])
     colors = branch_colors(skeleton, len(skeleton.branches))
     heads = ("branch", "kind", "length", "mean radius", "tortuosity", "confidence", "points")

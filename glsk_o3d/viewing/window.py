@@ -14,6 +14,8 @@ import numpy as np
 from ..errors import DisplayError
 from ..interop.clouds import to_point_cloud
 from ..interop.packages import import_open3d
+from ..io.line_sets import to_line_set
+from ..io.tubes import to_tubes
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -68,9 +70,9 @@ def layers(skeleton: Skeleton, cloud: Any = None) -> dict[str, list[Any]]:
         box = np.concatenate([np.asarray(cloud.points), skeleton.vertices])
         line = LINE_RADIUS * float(np.linalg.norm(np.ptp(box, axis=0))) or 1.0
         # lines of Open3D are a pixel wide: tubes show better
-        shapes["skeleton"] = [skeleton.to_line_set("branch"), skeleton.to_tubes("branch", radius=line, sides=8)]
+        shapes["skeleton"] = [to_line_set(skeleton, "branch"), to_tubes(skeleton, "branch", radius=line, sides=8)]
         if np.isfinite(skeleton.radii).all():
-            shapes["radius tubes"] = [skeleton.to_tubes("branch")]
+            shapes["radius tubes"] = [to_tubes(skeleton, "branch")]
     return shapes
 
 

@@ -20,6 +20,7 @@ from ...interop.clouds import cloud_points, open3d_class
 from ...numerics.vectors import norm, unit
 from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
+from ..tubes import to_tubes
 from .graphs import as_forest, global_shift
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
@@ -88,7 +89,7 @@ def write(forest: Skeleton) -> bytes:
 
 def _surface(skeleton: Skeleton) -> Any:
     if np.isfinite(skeleton.radii).all():
-        return skeleton.to_tubes((1, 1, 1))
+        return to_tubes(skeleton, (1, 1, 1))
     if len(skeleton.points) == 0:
         raise FileFormatError("a rig needs radii or points: read the skeleton from a .json, .npz, .ply or .swc file")
     return skeleton.points[skeleton.vertex_of_point >= 0]

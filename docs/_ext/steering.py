@@ -133,8 +133,8 @@ def steering():
     return [number for number in [*defaults(), *weights(), *all_constants()] if number.steers]
 
 
-class Numbers(Directive):
-    """``{numbers}``: the table."""
+class Steering(Directive):
+    """``{steering}``: the table."""
 
     def run(self):
         rows = [(f"{each.place}", each.name, each.value, each.origin, each.what) for each in steering()]
@@ -157,7 +157,7 @@ class Numbers(Directive):
 
 
 def setup(app):
-    app.add_directive("numbers", Numbers)
+    app.add_directive("steering", Steering)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
