@@ -249,21 +249,21 @@ class Skeleton:
         color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
             What the colours of the edges show, or the one colour of all.
         """
-        from .io.line_sets import to_line_set
+        from .io.geometry import to_line_set
 
         return to_line_set(self, color)
 
     def to_tensor_line_set(self, color: ColorChoice | None = None) -> open3d.t.geometry.LineSet:
-        """The skeleton as an ``open3d.t.geometry.LineSet``. See ``glsk_o3d.io.line_sets.to_tensor_line_set``."""
-        from .io.line_sets import to_tensor_line_set
+        """The skeleton as an ``open3d.t.geometry.LineSet``. See ``glsk_o3d.io.geometry.to_tensor_line_set``."""
+        from .io.geometry import to_tensor_line_set
 
         return to_tensor_line_set(self, color)
 
     def to_tubes(
         self, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16
     ) -> open3d.geometry.TriangleMesh:
-        """The skeleton as tubes as thick as the object. See `glsk_o3d.io.tubes.to_tubes`."""
-        from .io.tubes import to_tubes
+        """The skeleton as tubes as thick as the object. See `glsk_o3d.io.geometry.to_tubes`."""
+        from .io.geometry import to_tubes
 
         return to_tubes(self, color, radius=radius, sides=sides)
 

@@ -95,8 +95,7 @@ PACKAGES = tuple(dict.fromkeys(module for _, module in TASKS.values()))
 """What users import from."""
 MODULES = {
     "glsk_o3d.io.annotation": "Attributes on clouds",
-    "glsk_o3d.io.clouds.selection": "Some of the points",
-    "glsk_o3d.io.tubes": "Tubes",
+    "glsk_o3d.io.geometry": "Tubes",
     "glsk_o3d.analysis.skinning": "Skins",
     "glsk_o3d.io.colors": "Colours",
     "glsk_o3d.parameters": "Making filters",

@@ -41,11 +41,11 @@ COMFORTS = {
     "skeleton.Skeleton.loops": ("analysis.loops",),
     "skeleton.Skeleton.save": ("io.skeletons",),
     "skeleton.Skeleton.segment": ("analysis.segmentation",),
-    "skeleton.Skeleton.to_line_set": ("io.line_sets",),
+    "skeleton.Skeleton.to_line_set": ("io.geometry",),
     "skeleton.Skeleton.to_networkx": ("analysis.curvature", "analysis.segmentation"),
     "skeleton.Skeleton.to_pymeshlab": ("meshlab",),
-    "skeleton.Skeleton.to_tensor_line_set": ("io.line_sets",),
-    "skeleton.Skeleton.to_tubes": ("io.tubes",),
+    "skeleton.Skeleton.to_tensor_line_set": ("io.geometry",),
+    "skeleton.Skeleton.to_tubes": ("io.geometry",),
 }
 """The only imports that go up: by method, what it fetches when it is called. Comforts for users, used by no filter."""
 

@@ -66,8 +66,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     geometry, put = _copy(points if cloud is None else cloud)
     found = labels(skeleton, points, vertex, thickness_of_points(skeleton, points, vertex), color)
     for name, values in found.items():
-        whole = values.dtype.kind != "f"
-        put(name, values if values.ndim == 2 else values[:, None], values.dtype.name if whole else None)
+        put(name, values)
     return geometry
 
 
@@ -98,13 +97,13 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
     ----------
     state : Contraction
     cloud : cloud, optional
-        As for `annotate`.
+        As for `Skeleton.annotate`.
 
     Returns
     -------
     open3d.t.geometry.PointCloud or TriangleMesh
-        As from `annotate`. Points that were merged away have the position of the one they were merged into; NaN for
-        points that are not finite.
+        As from there. Points that were merged away have the position of the one they were merged into; NaN for points
+        that are not finite.
 
     Raises
     ------
@@ -131,7 +130,7 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
     return geometry
 
 
-def _copy(cloud: Any) -> tuple[Any, Callable[..., None]]:
+def _copy(cloud: Any) -> tuple[Any, Callable[[str, np.ndarray], None]]:
     """A tensor geometry with its own copy of all data, and a function that sets one of its attributes."""
     o3d = import_open3d()
     name, tensor = open3d_class(cloud)
@@ -146,8 +145,9 @@ def _copy(cloud: Any) -> tuple[Any, Callable[..., None]]:
     positions = attributes.positions
     own = positions.dtype if positions.dtype in (o3d.core.float32, o3d.core.float64) else o3d.core.float64
 
-    def put(key: str, values: np.ndarray, dtype: str | None = None) -> None:
-        values = np.ascontiguousarray(values, None if dtype is None else dtype)
-        attributes[key] = o3d.core.Tensor(values, own if dtype is None else None, positions.device)
+    def put(key: str, values: np.ndarray) -> None:
+        values = np.ascontiguousarray(values).reshape(len(values), -1)
+        dtype = own if values.dtype.kind == "f" else None
+        attributes[key] = o3d.core.Tensor(values, dtype, positions.device)
 
     return geometry, put

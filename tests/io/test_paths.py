@@ -3,7 +3,7 @@ import os
 import pytest
 
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io.clouds.text_tables import holds_points
+from glsk_o3d.io.formats.text_tables import holds_points
 from glsk_o3d.io.scans import read_cloud
 from glsk_o3d.io.skeletons import read_skeleton, read_truth
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import InvalidParameterError, Skeleton, samples
-from glsk_o3d.io.tubes import sweep
+from glsk_o3d.io.geometry import sweep
 from glsk_o3d.refinement.sections import measure_sections
 
 

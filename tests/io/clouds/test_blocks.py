@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
-from glsk_o3d.io.clouds.blocks import read_blocks
+from glsk_o3d.io.scans import read_blocks
 from glsk_o3d.io.scans import read_cloud, read_scan
 
 N = 53

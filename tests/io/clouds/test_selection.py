@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError
-from glsk_o3d.io.clouds.scanned import Scan
-from glsk_o3d.io.clouds.selection import select
+from glsk_o3d.io.scan import Scan
+from glsk_o3d.io.scan import select
 
 N = np.arange(20)
 SCAN = Scan(N[:, None] * [1.0, 2, 3], attributes={"label": N % 3, "intensity": N / 4})

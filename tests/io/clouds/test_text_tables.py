@@ -5,7 +5,7 @@ import pytest
 
 from glsk_o3d import read_cloud, read_tensor_cloud
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io.clouds.text_tables import holds_points
+from glsk_o3d.io.formats.text_tables import holds_points
 from glsk_o3d.io.scans import read_scan
 
 XYZ = [[1.5, 2, 3], [4, 5.25, 6]]

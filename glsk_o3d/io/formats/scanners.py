@@ -1,4 +1,7 @@
-"""LAS and LAZ, the files of laser scanners: full digits, and all that is known of each return (laspy, lazrs)."""
+"""LAS, LAZ and E57, the files of laser scanners: full digits, and all that is known of each return.
+
+They are read by laspy with lazrs (extra ``las``) and by pye57 (extra ``e57``), which believe what a header says.
+"""
 
 from __future__ import annotations
 
@@ -11,26 +14,22 @@ import numpy as np
 
 from ...interop.packages import require, require_for
 from ..paths import breaks_off
-from .scanned import COLOR_CHANNELS, Scan, brightest, named_attributes, unit_colors
+from ..scan import COLOR_CHANNELS, NoPoints, Scan, brightest, named_attributes, unit_colors
 
 VLR_BYTES, EVLR_BYTES = 54, 60  # published: LAS 1.4 R15, of the heads of records
 PACKED_RECORD, LAYERED = 22204, 3  # published: LASzip's own record, and its way to pack in which chunks have layers
 LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}  # published: of the parts of a point, by their types; others have one per byte
 MOST_PACKED = 200  # fitted: points of a LAZ file per byte; of flat grids there are 93, of a million in one place 140
+_E57_PLACE = ["cartesianX", "cartesianY", "cartesianZ"]
+_E57_COLORS = ["colorRed", "colorGreen", "colorBlue"]
 
 
-def blocks(path: Path, rows: int, bare: bool = False) -> Iterator[Scan]:
-    """The points of a file, so many at a time, or positions alone if `bare`; unset is what is 0 in a block."""
-    require_for(path.suffix)
-    promised(path)
-    return _blocks(path, rows, bare)
+def blocks(path: Path, rows: int, bare: bool) -> tuple[int, Iterator[Scan]]:
+    """What is 0 in all of a block is unset in it.
 
-
-def promised(path: Path) -> int:
-    """The points of a file.
-
-    ValueError where it promises more than its bytes hold: laspy would look for each, lazrs take memory.
+    ValueError where the file promises more than its bytes hold: laspy would look for each point, lazrs take memory.
     """
+    require_for(path.suffix)
     packed, size = path.suffix.lower() == ".laz", path.stat().st_size
     with path.open("rb") as stream:
         head = stream.read(375)
@@ -40,7 +39,7 @@ def promised(path: Path) -> int:
             _check_packed(stream, size, int.from_bytes(head[94:96], "little"), records, start, points, length)
     if not packed and size - start < points * length:
         raise breaks_off(points, (size - start) // length)
-    return points
+    return points, _blocks(path, rows, bare)
 
 
 def _blocks(path: Path, rows: int, bare: bool) -> Iterator[Scan]:
@@ -158,3 +157,24 @@ def _check_packed(
             break
     if not sound:
         raise ValueError(f"its table of chunks, or one of them, promises more than its {size} bytes can hold")
+
+
+def read_e57(path: Path) -> Scan:
+    """The points of all scans of an E57 file, moved by their poses; ``scan`` says which one each is from."""
+    with require("pye57").E57(str(path)) as file:
+        options = dict(intensity=True, colors=True, ignore_missing_fields=True)
+        scans = [file.read_scan(i, **options) for i in range(file.scan_count)]
+    if not scans:
+        raise NoPoints("it holds no scan")
+    sizes = [len(scan[_E57_PLACE[0]]) for scan in scans]
+
+    def together(names: list[str]) -> np.ndarray:
+        return np.column_stack([np.concatenate([scan[name] for scan in scans]) for name in names])
+
+    attributes = {"scan": np.repeat(np.arange(len(scans)), sizes)}
+    if any("intensity" in scan for scan in scans):
+        held = (scan.get("intensity", np.full(n, np.nan)) for scan, n in zip(scans, sizes, strict=True))
+        attributes["intensity"] = np.concatenate(list(held))
+    colored = all(name in scan for scan in scans for name in _E57_COLORS)
+    colors = unit_colors(together(_E57_COLORS)) if colored else None
+    return Scan(together(_E57_PLACE).astype(float), colors, None, attributes)

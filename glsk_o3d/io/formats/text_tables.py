@@ -11,6 +11,7 @@ import io
 import logging
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple, TextIO
@@ -19,10 +20,11 @@ import numpy as np
 
 from ...interop.verbosity import following_open3d
 from ..paths import breaks_off
-from .scanned import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, named_attributes, unit_colors
+from ..scan import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, named_attributes, unit_colors
 
 _log = logging.getLogger(__name__)
 
+_COMMENTS = ["#", "//", "%"]
 LOOK_AHEAD = 20  # fitted: lines in which a decimal comma shows
 HEADER_LINES = 100  # fitted to nothing: longer headers are those of other files
 UNIT_SLACK = 0.01  # measured: normals in text have two digits at the least
@@ -57,12 +59,9 @@ def holds_points(path: Path) -> bool:
     """Whether a file of text looks like a cloud: a line has three numbers, and columns with names have x, y and z."""
     if not path.is_file():  # a pipe may never end
         return False
-    try:
-        with path.open(encoding="utf-8-sig", errors="replace") as stream:
-            _layout(stream)
-    except (NoPoints, OSError):
-        return False
-    return True
+    with suppress(NoPoints, OSError), path.open(encoding="utf-8-sig", errors="replace") as stream:
+        return bool(_layout(stream))
+    return False
 
 
 def read(path: Path) -> Scan:
@@ -98,7 +97,7 @@ def _layout(stream: TextIO) -> Layout:
     first = ""
     strange: list[str] = []  # names right above the data of which none is x
     for skip, line in enumerate(islice(stream, HEADER_LINES)):
-        comment = re.match(r"\s*(#|//|%)", line)
+        comment = re.match(r"\s*(" + "|".join(_COMMENTS) + ")", line)
         words, delimiter, decimal_comma = _parted(line[comment.end() :] if comment else line)
         columns = [] if comment else [i for i, word in enumerate(words) if _is_number(word)]
         if len(columns) >= 3:
@@ -131,28 +130,30 @@ def _parted(line: str) -> tuple[list[str], str | None, bool]:
 
 def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
     """The numbers, (N, C) float array; cells without a number are NaN, but rows without a place are left out."""
-    lines = islice(stream, layout.skip, None)
-    source = io.StringIO("".join(lines).replace(",", ".")) if layout.decimal_comma else stream
-    comments = ["#", "//", "%"]
-    try:
-        skip = 0 if layout.decimal_comma else layout.skip
+    if layout.decimal_comma:
+        stream = io.StringIO(stream.read().replace(",", "."))
+    with suppress(ValueError):  # some line is not like the others
         return np.loadtxt(
-            source, delimiter=layout.delimiter, comments=comments, skiprows=skip, usecols=layout.columns, ndmin=2
+            stream,
+            delimiter=layout.delimiter,
+            comments=_COMMENTS,
+            skiprows=layout.skip,
+            usecols=layout.columns,
+            ndmin=2,
         )
-    except ValueError:  # some line is not like the others
-        stream.seek(0)
-    found, lost = [], 0
+    stream.seek(0)
+    found, lost, last = [], 0, layout.columns[-1]
     for line in islice(stream, layout.skip, None):
-        text = re.split(r"#|//|%", line, maxsplit=1)[0].strip()
+        text = re.split("|".join(_COMMENTS), line, maxsplit=1)[0].strip()
         if not text:
             continue
-        words = (text.replace(",", ".") if layout.decimal_comma else text).split(layout.delimiter)
+        words = text.split(layout.delimiter)
         row = [float(words[i]) if i < len(words) and _is_number(words[i]) else np.nan for i in layout.columns]
-        broken_off = not line.endswith("\n") and len(words) <= layout.columns[-1]  # its last number may be cut
-        if not broken_off and all(i < len(words) and _is_number(words[i]) for i in layout.columns[:3]):
-            found.append(row)
-        else:
+        broken_off = not line.endswith("\n") and len(words) <= last  # its last number may be cut
+        if broken_off or any(i >= len(words) or not _is_number(words[i]) for i in layout.columns[:3]):
             lost += 1
+        else:
+            found.append(row)
     if lost:
         with following_open3d():
             _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(found))

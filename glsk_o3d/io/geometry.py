@@ -1,23 +1,55 @@
-"""A skeleton as tubes."""
+"""A skeleton as Open3D's line sets, and as a mesh of tubes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..analysis.segmentation import branch_of_edge
 from ..errors import InvalidParameterError
 from ..interop.packages import import_open3d
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import TINY, dot, unit
 from ..refinement.sections import measure_sections
+from ..skeleton import OF_VERTICES, Skeleton
 from .colors import ColorChoice, shades
 
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
-
 __all__ = ["to_tubes"]
+
+
+def to_line_set(skeleton: Skeleton, color: ColorChoice = (0.85, 0.1, 0.1)) -> Any:
+    """A skeleton as a legacy line set, points and lines in its order, with colours of the edges as from `shades`."""
+    o3d = import_open3d()
+    lines = o3d.geometry.LineSet()
+    lines.points = o3d.utility.Vector3dVector(skeleton.vertices)
+    lines.lines = o3d.utility.Vector2iVector(skeleton.edges.astype(np.int32))
+    lines.colors = o3d.utility.Vector3dVector(shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges))
+    return lines
+
+
+def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> Any:
+    """A skeleton as a tensor line set on the CPU.
+
+    It has ``point.positions`` (M, 3), ``point.radius``, ``point.confidence``, ``point.half_width``,
+    ``point.half_thickness`` and ``point.support`` (M, 1) float64, ``line.indices`` (E, 2) int64, ``line.branch`` (E, 1)
+    int32 and, with a color, ``line.colors`` (E, 3) float64.
+    """
+    o3d, branch = import_open3d(), branch_of_edge(skeleton)
+    lines = o3d.t.geometry.LineSet()
+
+    def put(where: Any, name: str, values: np.ndarray, dtype: type, columns: int = 1) -> None:
+        where[name] = o3d.core.Tensor(np.ascontiguousarray(values, dtype).reshape(-1, columns))
+
+    put(lines.point, "positions", skeleton.vertices, float, 3)
+    for name, field in zip(("radius", *OF_VERTICES[1:]), OF_VERTICES, strict=True):
+        put(lines.point, name, getattr(skeleton, field), float)
+    put(lines.line, "indices", skeleton.edges, np.int64, 2)
+    put(lines.line, "branch", branch, np.int32)
+    if color is not None:
+        put(lines.line, "colors", shades(skeleton, color, branch, skeleton.edges), float, 3)
+    return lines
 
 
 def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
