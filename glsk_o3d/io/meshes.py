@@ -181,19 +181,16 @@ def mesh_arrays(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
     InvalidParameterError if it is none, has no triangles, or coordinates or indices are of no use.
     """
     try:
-        if hasattr(mesh, "triangles"):
-            parts = mesh.vertices, mesh.triangles
-        elif hasattr(mesh, "triangle"):
+        if hasattr(mesh, "triangle"):
             parts = mesh.vertex.positions.cpu().numpy(), mesh.triangle.indices.cpu().numpy()
         else:
-            parts = mesh
+            parts = (mesh.vertices, mesh.triangles) if hasattr(mesh, "triangles") else mesh
         vertices, faces = (np.asarray(part) for part in parts)
     except Exception as error:  # whatever a foreign object raises
         raise InvalidParameterError(f"a {type(mesh).__name__} is no triangle mesh: {error}") from error
-    if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3 or len(faces) == 0:
-        raise InvalidParameterError(
-            f"a mesh needs (V, 3) vertices and (F, 3) triangles, not {vertices.shape} and {faces.shape}"
-        )
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,) or len(faces) == 0:
+        shapes = f"{vertices.shape} and {faces.shape}"
+        raise InvalidParameterError(f"a mesh needs (V, 3) vertices and (F, 3) triangles, not {shapes}")
     if vertices.dtype.kind not in "iuf" or not np.isfinite(vertices).all():
         raise InvalidParameterError("the mesh has vertices that are not finite numbers")
     if faces.dtype.kind not in "iu" or faces.min() < 0 or faces.max() >= len(vertices):

@@ -25,20 +25,12 @@ _E57_COLORS = ["colorRed", "colorGreen", "colorBlue"]
 
 
 def blocks(path: Path, rows: int, bare: bool) -> tuple[int, Iterator[Scan]]:
-    """What is 0 in all of a block is unset in it.
-
-    ValueError where the file promises more than its bytes hold: laspy would look for each point, lazrs take memory.
+    """What is 0 in all of a block is unset in it. A file that promises more than its bytes hold is refused: laspy would
+    look for each point, lazrs take memory.
     """
     require_for(path.suffix)
-    packed, size = path.suffix.lower() == ".laz", path.stat().st_size
     with path.open("rb") as stream:
-        head = stream.read(375)
-        points, start, length = _header(head, size, packed)
-        if packed:
-            records = int.from_bytes(head[100:104], "little")
-            _check_packed(stream, size, int.from_bytes(head[94:96], "little"), records, start, points, length)
-    if not packed and size - start < points * length:
-        raise breaks_off(points, (size - start) // length)
+        points = _check_header(stream, path.stat().st_size, path.suffix.lower() == ".laz")
     return points, _blocks(path, rows, bare)
 
 
@@ -99,8 +91,9 @@ def _brightest(path: Path, rows: int) -> float:
     return top
 
 
-def _header(head: bytes, size: int, packed: bool) -> tuple[int, int, int]:
-    """The points of a header, where they begin, and the bytes of each."""
+def _check_header(stream: BinaryIO, size: int, packed: bool) -> int:
+    """The points of a file of so many bytes; ValueError where it promises more than they hold."""
+    head = stream.read(375)
     if len(head) < 227 or head[:4] != b"LASF":
         raise ValueError("it does not start with the header of a LAS file")
 
@@ -108,12 +101,16 @@ def _header(head: bytes, size: int, packed: bool) -> tuple[int, int, int]:
         return int.from_bytes(head[at : at + length], "little")
 
     is_14 = (head[24], head[25]) >= (1, 4) and len(head) >= 255
-    points, point_bytes = number(247, 8) if is_14 else number(107, 4), number(105, 2)
+    points, start, point_bytes = number(247, 8) if is_14 else number(107, 4), number(96, 4), number(105, 2)
     least = 1 / MOST_PACKED if packed else 1
     records = [(number(100, 4), VLR_BYTES), (number(243, 4) * is_14, EVLR_BYTES), (points, least)]
-    if any(count * length > size for count, length in records) or number(96, 4) > size:
+    if any(count * length > size for count, length in records) or start > size:
         raise ValueError(f"its header promises more than its {size} bytes can hold")
-    return points, number(96, 4), point_bytes
+    if packed:
+        _check_packed(stream, size, number(94, 2), number(100, 4), start, points, point_bytes)
+    elif size - start < points * point_bytes:
+        raise breaks_off(points, (size - start) // point_bytes)
+    return points
 
 
 def _check_packed(
@@ -121,31 +118,28 @@ def _check_packed(
 ) -> None:
     """The same of what LASzip says: the bytes of a point, the number of chunks, and how long their layers are."""
 
-    def number(length: int) -> int:
+    def number(length: int, place: int | None = None) -> int:
+        if place is not None:
+            stream.seek(place)
         return int.from_bytes(stream.read(length), "little")
 
     layers, together = 0, 1
     for _ in range(records):
-        stream.seek(at + 18)
-        kind, length = number(2), number(2)
+        kind, length = number(2, at + 18), number(2)
         if kind == PACKED_RECORD:
-            stream.seek(at + VLR_BYTES)
-            layered = number(2) == LAYERED
-            stream.seek(at + VLR_BYTES + 12)
-            together = max(number(4), 1)  # points of a chunk; the largest number if each has its own
-            stream.seek(at + VLR_BYTES + 32)
-            items = np.frombuffer(stream.read(6 * number(2)), "<u2").reshape(-1, 3)  # type, size, version
+            layered = number(2, at + VLR_BYTES) == LAYERED
+            together = max(
+                number(4, at + VLR_BYTES + 12), 1
+            )  # points of a chunk; the largest number if each has its own
+            items = np.frombuffer(stream.read(6 * number(2, at + VLR_BYTES + 32)), "<u2").reshape(-1, 3)
             if items[:, 1].sum() != point_bytes:
                 raise ValueError(f"its points have {point_bytes} bytes, and those that are packed {items[:, 1].sum()}")
-            layers = sum(LAYERS.get(item, wide) for item, wide, _ in items.tolist()) * layered
+            layers = sum(LAYERS.get(kind, wide) for kind, wide, _ in items.tolist()) * layered
         at += VLR_BYTES + length
-    stream.seek(start)
-    table = number(8)
+    table = number(8, start)
     if table == 2**64 - 1:  # it was not known yet, and stands at the end
-        stream.seek(size - 8)
-        table = number(8)
-    stream.seek(min(table, size) + 4)
-    chunks = number(4)
+        table = number(8, size - 8)
+    chunks = number(4, min(table, size) + 4)
     # each has a whole point; of those that the table does not have lazrs would believe all
     place, sound = start + 8, start < table < size and -(-points // together) <= chunks <= size / max(point_bytes, 1)
     for _ in range(chunks * (layers > 0) * sound):

@@ -10,7 +10,6 @@ from __future__ import annotations
 import io
 import logging
 import re
-from collections.abc import Sequence
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
@@ -66,29 +65,32 @@ def holds_points(path: Path) -> bool:
 
 def read(path: Path) -> Scan:
     """The points of a file of text; NoPoints if there is none. Lines that hold no point are skipped and logged."""
-    ending = path.suffix.lower()
+    ending, first = path.suffix.lower(), ""
     with path.open(encoding="utf-8-sig", errors="replace") as stream:
-        first = stream.readline(64).strip()
-        if ending == ".pts" and not first.isdigit():
-            raise ValueError("its first line is not the number of points")
-        stream.seek(0)
+        if ending == ".pts":
+            first = stream.readline(64).strip()
+            if not first.isdigit():
+                raise ValueError("its first line is not the number of points")
+            stream.seek(0)
         layout = _layout(stream)
         stream.seek(0)
         rows = _rows(stream, layout, path)
-    if ending == ".pts" and len(rows) < int(first):
+    if first and len(rows) < int(first):
         raise breaks_off(int(first), len(rows))
     names = [layout.names[column] for column in layout.columns] if layout.names else []
     roles = [_role(name) for name in names] or _guess(rows, ending)
+    used = [roles.index(axis) for axis in "xyz"]
 
-    def together(wanted: Sequence[str]) -> np.ndarray | None:
-        return rows[:, [roles.index(role) for role in wanted]] if set(wanted) <= set(roles) else None
+    def together(wanted: list[str]) -> np.ndarray | None:
+        if not set(wanted) <= set(roles):
+            return None
+        chosen = [roles.index(role) for role in wanted]
+        used.extend(chosen)
+        return rows[:, chosen]
 
-    positions = rows[:, list(map(roles.index, "xyz"))]
-    colors, normals = together(COLOR_CHANNELS), together(NORMAL_NAMES)
-    used = {*"xyz", *(COLOR_CHANNELS if colors is not None else ()), *(NORMAL_NAMES if normals is not None else ())}
-    others = [i for i, role in enumerate(roles) if role not in used or i != roles.index(role)]
+    positions, colors, normals = rows[:, used], together(COLOR_CHANNELS), together(NORMAL_NAMES)
     called = names or [role or f"column_{column + 1}" for role, column in zip(roles, layout.columns, strict=True)]
-    attributes = named_attributes((called[i], _whole(rows[:, i])) for i in others)
+    attributes = named_attributes((name, _whole(rows[:, i])) for i, name in enumerate(called) if i not in used)
     return Scan(positions, None if colors is None else unit_colors(colors), normals, attributes)
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io.clouds.pcd import _unpacked
+from glsk_o3d.io.formats.pcd import _unpacked
 from glsk_o3d.io.scans import read_scan
 
 HEAD = """VERSION 0.7
