@@ -5,8 +5,7 @@ import pytest
 
 from glsk_o3d import read_cloud, read_tensor_cloud
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io.scans import read_blocks
-from glsk_o3d.io.scans import read_scan
+from glsk_o3d.io.scans import read_blocks, read_scan
 
 PLACES = np.array([[471234.5678, 5612345.6789, 123.4567], [471235.5, 5612346.25, 130.0], [471236.0, 5612347.0, 131.5]])
 
