@@ -1,6 +1,5 @@
 """The table of formats: what is true of all of them."""
 
-import contextlib
 import re
 
 import numpy as np
@@ -14,28 +13,7 @@ from glsk_o3d.io.skeletons import FORMATS, READABLE, holds_skeleton, read_skelet
 from glsk_o3d.report import Report
 from glsk_o3d.skeleton import Skeleton
 
-SAME_ORDER = (".ply", ".obj", ".graphml")
-WITH_RADII = (".ply", ".swc", ".graphml")
-ALL = tuple(FORMATS)
-GRAPHS = tuple(ending for ending in READABLE if ending not in (".json", ".npz"))
-
-
-@pytest.mark.parametrize("ending", GRAPHS)
-def test_graph_formats(skeleton, tmp_path, isomorphic, ending):
-    cut = ending == ".swc" and skeleton.n_loops
-    save_skeleton(skeleton, tmp_path / f"s{ending}", cut_loops=bool(cut))
-    back = read_skeleton(tmp_path / f"s{ending}")
-    if cut:
-        return
-    assert isomorphic(back, skeleton, ending in WITH_RADII)
-    if ending in SAME_ORDER:
-        np.testing.assert_array_equal(back.vertices, skeleton.vertices)
-        np.testing.assert_array_equal(back.edges, skeleton.edges)
-    if ending not in WITH_RADII:
-        assert np.isnan(back.radii).all()
-    assert np.isnan(back.confidence).all()
-    assert len(back.confidence) == len(back.radii) == len(back.vertices)
-    assert len(back.points) == len(back.normals) == len(back.vertex_of_point) == 0
+WITH_RADII = (".ply", ".graphml")
 
 
 @st.composite
@@ -55,27 +33,22 @@ def random_skeletons(draw):
 
 
 @given(skeleton=random_skeletons())
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 def test_random_graphs_through_every_format(assert_identical, isomorphic, skeleton):
     for ending in (".json", ".npz"):
         assert_identical(FORMATS[ending].read(FORMATS[ending].write(skeleton)), skeleton)
-    for ending in GRAPHS:
-        if ending != ".swc":
-            back = FORMATS[ending].read(FORMATS[ending].write(skeleton))
-            assert isomorphic(back, skeleton, ending in WITH_RADII)
+    for ending in (".ply", ".obj", ".graphml", ".cgal"):
+        back = FORMATS[ending].read(FORMATS[ending].write(skeleton))
+        assert isomorphic(back, skeleton, ending in WITH_RADII)
+        if ending != ".cgal":
+            np.testing.assert_array_equal(back.vertices, skeleton.vertices)
+            np.testing.assert_array_equal(back.edges, skeleton.edges)
+        assert ending in WITH_RADII or np.isnan(back.radii).all()
+        assert np.isnan(back.confidence).all()
+        assert len(back.points) == len(back.normals) == len(back.vertex_of_point) == 0
     tree = FORMATS[".swc"].read(FORMATS[".swc"].write(as_forest(skeleton, True, None)))
-    assert tree.n_loops == 0
-    assert tree.n_components == skeleton.n_components
+    assert (tree.n_loops, tree.n_components) == (0, skeleton.n_components)
     assert sorted(map(tuple, tree.vertices)) == sorted(map(tuple, skeleton.vertices))
-
-
-@given(data=st.binary(max_size=200), ending=st.sampled_from(ALL))
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
-def test_any_bytes_give_a_skeleton_or_a_format_error(tmp_path_factory, data, ending):
-    path = tmp_path_factory.getbasetemp() / f"any{ending}"
-    path.write_bytes(data)
-    with contextlib.suppress(FileFormatError):
-        assert isinstance(read_skeleton(path), Skeleton)
 
 
 @pytest.mark.parametrize("ending", READABLE)
@@ -95,7 +68,7 @@ def test_broken_off_files(tree, tmp_path, ending):
         assert len(back.vertices) <= len(tree.vertices)
 
 
-@pytest.mark.parametrize("ending", ALL)
+@pytest.mark.parametrize("ending", FORMATS)
 def test_saving_twice_gives_the_same_bytes_and_what_is_only_written_is_not_read(tree, loop, tmp_path, ending):
     for name in "ab":
         tree.save(tmp_path / f"{name}{ending}")

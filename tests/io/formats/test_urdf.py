@@ -115,10 +115,8 @@ def test_every_component_stands_on_the_base(forest):
 def test_what_has_no_size_is_left_out(make, dot):
     path = make(np.array([[0, 0, 0], [0, 0, 0], [0, 0, 1], [0, 0, 2.0]]), [[0, 1], [1, 2], [2, 3]])
     robot = load(replace(path, radii=[0.1, 0.1, 0, 0]))
-    kinds = [
-        ["cylinder" if part.geometry.cylinder else "sphere" for part in link.collisions] for link in robot.robot.links
-    ]
-    assert kinds == [[], ["sphere"], ["sphere"], ["cylinder"], []]
+    balls = [[part.geometry.sphere is not None for part in link.collisions] for link in robot.robot.links]
+    assert balls == [[], [True], [True], [False], []]
     assert [link.name for link in robot.robot.links if link.inertial is not None] == ["link_0", "link_2"]
     np.testing.assert_array_equal(robot.get_transform("link_3", "base")[:3, 3], [0, 0, 1])
     nothing = replace(dot, vertices=(), radii=(), confidence=(), vertex_of_point=(), points=(), normals=())
