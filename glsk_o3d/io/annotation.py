@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,11 +62,8 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     that of labels means nothing where branches meet. Annotate its result once more.
     """
     points, vertex = vertex_of_cloud(skeleton, cloud)
-    geometry, put = _copy(points if cloud is None else cloud)
     found = labels(skeleton, points, vertex, thickness_of_points(skeleton, points, vertex), color)
-    for name, values in found.items():
-        put(name, values)
-    return geometry
+    return _annotated(points if cloud is None else cloud, found)
 
 
 def labels(
@@ -125,13 +121,12 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
     """
     points = state.points if cloud is None else cloud_points(cloud)
     survivor = label_of_nearest(state.points, state.survivor_of_point, points)
-    geometry, put = _copy(points if cloud is None else cloud)
-    put("contracted", np.where((survivor >= 0)[:, None], state.contracted[survivor], np.nan))
-    return geometry
+    places = np.where((survivor >= 0)[:, None], state.contracted[survivor], np.nan)
+    return _annotated(points if cloud is None else cloud, {"contracted": places})
 
 
-def _copy(cloud: Any) -> tuple[Any, Callable[[str, np.ndarray], None]]:
-    """A tensor geometry with its own copy of all data, and a function that sets one of its attributes."""
+def _annotated(cloud: Any, attributes: dict[str, np.ndarray]) -> Any:
+    """A tensor geometry with its own copy of all data, and attributes; floats become what its positions are."""
     o3d = import_open3d()
     name, tensor = open3d_class(cloud)
     if name in ("PointCloud", "TriangleMesh"):
@@ -141,13 +136,10 @@ def _copy(cloud: Any) -> tuple[Any, Callable[[str, np.ndarray], None]]:
         array = cloud.cpu().numpy() if name == "Tensor" else np.asarray(cloud)
         array = np.array(array, np.float32 if array.dtype == np.float32 else np.float64, order="C")
         geometry = o3d.t.geometry.PointCloud(o3d.core.Tensor(array))
-    attributes = geometry.vertex if name == "TriangleMesh" else geometry.point
-    positions = attributes.positions
+    held = geometry.vertex if name == "TriangleMesh" else geometry.point
+    positions = held.positions
     own = positions.dtype if positions.dtype in (o3d.core.float32, o3d.core.float64) else o3d.core.float64
-
-    def put(key: str, values: np.ndarray) -> None:
+    for key, values in attributes.items():
         values = np.ascontiguousarray(values).reshape(len(values), -1)
-        dtype = own if values.dtype.kind == "f" else None
-        attributes[key] = o3d.core.Tensor(values, dtype, positions.device)
-
-    return geometry, put
+        held[key] = o3d.core.Tensor(values, own if values.dtype.kind == "f" else None, positions.device)
+    return geometry

@@ -94,11 +94,6 @@ def save_mesh(mesh: Any, path: str | os.PathLike) -> None:
     OSError
         The folder does not exist, or the file cannot be written.
 
-    Notes
-    -----
-    Open3D writes OBJ and OFF with six digits, GLB such that it cannot read it again, and says of a file that breaks off
-    on a full disk that all went well.
-
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
@@ -128,7 +123,7 @@ def save_mesh(mesh: Any, path: str | os.PathLike) -> None:
                 f"{os.fspath(path)}: {ending} has too few digits for coordinates as large as {largest:.3g}, "
                 f"they would be up to {step:.2g} off: write ply, obj or off"
             )
-    if ending in (".obj", ".off"):
+    if ending in (".obj", ".off"):  # Open3D writes six digits
         data = (_obj if ending == ".obj" else _off)(points, triangles, mesh)
         write_atomically(path, lambda temporary: temporary.write_bytes(data))
     else:
@@ -138,14 +133,14 @@ def save_mesh(mesh: Any, path: str | os.PathLike) -> None:
 def _write_open3d(mesh: Any, path: Path) -> None:
     o3d, ending = import_open3d(), path.suffix.lower()
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        if ending == ".glb":
+        if ending == ".glb":  # that of the other writer it cannot read again
             done = o3d.t.io.write_triangle_mesh(str(path), o3d.t.geometry.TriangleMesh.from_legacy(mesh))
         else:
             done = o3d.io.write_triangle_mesh(str(path), mesh)
     n, m = len(mesh.vertices), len(mesh.triangles)
     vertex = PLY_VERTEX_BYTES + PLY_COLOR_BYTES * mesh.has_vertex_colors()
     least = {".ply": vertex * n + PLY_TRIANGLE_BYTES * m, ".stl": STL_TRIANGLE_BYTES * m}.get(ending, 1)
-    try:
+    try:  # Open3D says of a file that breaks off on a full disk that all went well
         whole = path.stat().st_size >= least and (ending != ".gltf" or json.loads(path.read_bytes()))
     except ValueError:
         whole = False

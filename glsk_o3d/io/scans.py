@@ -50,7 +50,8 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     """Read a point cloud, or the vertices of a mesh.
 
     Open3D returns an empty cloud for a file that it cannot read and uninitialised points for one that breaks off; here
-    both are errors. All coordinates keep their full digits.
+    both are errors. All coordinates keep their full digits. Of a mesh with large triangles, whose vertices say little
+    about the surface, a warning in the log says so.
 
     Parameters
     ----------
@@ -78,11 +79,6 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
         It holds for no point.
     MissingPackageError
 
-    Notes
-    -----
-    Where the triangles of a mesh are large, its vertices say little about the surface: then there is a warning in the
-    log.
-
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
@@ -100,22 +96,14 @@ def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> A
 
     Parameters
     ----------
-    path : path-like
-    where : str, optional
+    path, where
+        As for `read_cloud`, which has the errors, too.
 
     Returns
     -------
     open3d.t.geometry.PointCloud
         Positions are float64. Attributes have the names of the file, such as ``intensity`` and ``classification``;
         what cannot stand in an expression is an underscore. `Skeleton.annotate` keeps them.
-
-    Raises
-    ------
-    FileNotFoundError
-    FileFormatError
-    InvalidParameterError
-    InvalidCloudError
-    MissingPackageError
 
     Examples
     --------
@@ -182,12 +170,9 @@ def read_blocks(
     """Read a scan a few points at a time, in the order of the file, or positions alone if they are to be `bare`.
 
     Joined the blocks are the scan, to the last bit; in a block, attributes are unset that are so there. LAS, LAZ, PCD
-    (text and binary) and binary PLY without faces are read in blocks; everything else is one block. With `where`, as
-    for `glsk_o3d.read_cloud`, blocks have fewer points, and there is none without.
-
-    Errors are those of `glsk_o3d.read_cloud`; what shows only while reading comes then, but where a binary PLY or PCD
-    or a LAS file breaks off, that shows before the first block. Where the scale of colours is not that of their type,
-    they are looked at first, in LAZ until one is found that needs sixteen bits.
+    (text and binary) and binary PLY without faces are read in blocks; everything else is one block. With `where` blocks
+    have fewer points, and there is none without. Errors are those of `read_cloud`, before the first block where the
+    size of the file shows that it breaks off.
     """
     if isinstance(rows, bool) or not isinstance(rows, int) or rows < 1:
         raise InvalidParameterError(f"rows = {rows!r}: must be an int of at least 1")

@@ -81,8 +81,7 @@ def save_skeleton(
     ===================== =============================================== =======================================
 
     Those after CGAL's are only written, not read. Numbers keep their full precision, but in glTF, which has float32.
-    The file appears complete or not at all; on an error an existing file stays as it was. Open3D's ``read_line_set``
-    gives an empty line set for a PLY file without edges.
+    The file appears complete or not at all; on an error an existing file stays as it was.
 
     Parameters
     ----------
@@ -104,10 +103,8 @@ def save_skeleton(
         The ending is unknown, or the skeleton has loops, or lacks what the format needs.
     InvalidParameterError
         There is no such root.
-    FileNotFoundError
-        The folder does not exist.
     OSError
-        The file cannot be written.
+        The folder does not exist, or the file cannot be written.
 
     Examples
     --------

@@ -62,18 +62,8 @@ def read_sample(
 
     Raises
     ------
-    FileNotFoundError
-    FileFormatError
-    InvalidParameterError
-    MissingPackageError
-        As from `read_cloud`.
     InvalidCloudError
-        As from there, and for points that are not finite.
-
-    Notes
-    -----
-    The file is read four times, a small one twice: how far it reaches, how fine the grid must be, means, and nearest
-    points. Points that repeat count, which they do not in memory.
+        There are points that are not finite. Other errors are those of `read_cloud`.
 
     Examples
     --------
@@ -164,6 +154,7 @@ def annotate_file(
     `Skeleton.annotate` for files: the same attributes, coloured by branch. The scan's own colours are attributes
     ``scan_red``, ``scan_green`` and ``scan_blue``. What a binary PLY file holds as float, double, uchar or int stays
     so, and radius, confidence and thickness are float where the coordinates are. All else becomes int, or double.
+    ``thickness`` takes the spacing of the points that the skeleton was made from; NaN if it came without.
 
     Parameters
     ----------
@@ -183,21 +174,12 @@ def annotate_file(
 
     Raises
     ------
-    FileNotFoundError
     FileFormatError
-        The scan cannot be read or changes while it is, or the output is no PLY file, or is the scan.
+        The scan changes while it is read, or the output is no PLY file, or is the scan.
     InvalidParameterError
-        The skeleton is empty, or as from `read_cloud`.
-    InvalidCloudError
-    MissingPackageError
+        The skeleton is empty. Other errors are those of `read_cloud`.
     OSError
         The file cannot be written.
-
-    Notes
-    -----
-    A point belongs where the nearest point belongs that the skeleton was made from, as in `Skeleton.annotate`.
-    ``thickness`` is the one thing that differs: how far the points are apart is that of the cloud that the skeleton was
-    made from, at that point; NaN if it came without.
 
     Examples
     --------
@@ -276,7 +258,7 @@ def _survey(path: str | os.PathLike, where: str | None) -> tuple[int, dict[str, 
 
 def _columns(block: Scan, kinds: dict[str, np.dtype], found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Columns of a PLY file, by name: those of a scan, of the types that its file holds, and labels."""
-    held = {name: kind for name, kind in block.types.items() if ply.is_written(kind)}
+    held = {name: kind for name, kind in block.types.items() if kind.str[1:] in ply.WRITTEN_KINDS}
     columns = dict(zip("xyz", block.positions.T, strict=True))
     if block.normals is not None:
         columns |= dict(zip(NORMAL_NAMES, block.normals.T, strict=True))

@@ -34,7 +34,8 @@ _KINDS = {
     **{"double": "f8", "float64": "f8"},
 }
 _COUNTS = [name for name, kind in _KINDS.items() if kind[0] != "f"]
-_WRITTEN = {"u1": "uchar", "i4": "int", "f4": "float", "f8": "double"}  # of the others Open3D leaves the column out
+WRITTEN_KINDS = {"u1": "uchar", "i4": "int", "f4": "float", "f8": "double"}
+"""The types that Open3D reads: of others it leaves the column out."""
 
 
 # -------------------------------------------------------------------------------------------------------------- header
@@ -218,25 +219,13 @@ def _check_names(elements: Iterable[Element]) -> None:
 
 def write(skeleton: Skeleton) -> bytes:
     """The content of a PLY file of a skeleton."""
-    section = [getattr(skeleton, name) for name in SECTION]
-    vertices = np.column_stack([skeleton.vertices, skeleton.radii, skeleton.radii, *section]).astype("<f8")
-    header = f"""ply
-format binary_little_endian 1.0
-comment curve skeleton written by glsk-o3d
-element vertex {len(vertices)}
-property double x
-property double y
-property double z
-property double radius
-property double quality
-property double half_width
-property double half_thickness
-element edge {len(skeleton.edges)}
-property int vertex1
-property int vertex2
-end_header
-"""
-    return header.encode() + vertices.tobytes() + skeleton.edges.astype("<i4").tobytes()
+    columns = dict(zip("xyz", skeleton.vertices.T, strict=True)) | {"radius": skeleton.radii, "quality": skeleton.radii}
+    vertices = rows_of(columns | {name: getattr(skeleton, name) for name in SECTION})
+    edges = f"element edge {len(skeleton.edges)}\nproperty int vertex1\nproperty int vertex2\n"
+    header = header_of(
+        vertices.dtype, len(vertices), comment="comment curve skeleton written by glsk-o3d\n", more=edges
+    )
+    return header + vertices.tobytes() + skeleton.edges.astype("<i4").tobytes()
 
 
 def read(data: bytes) -> Skeleton:
@@ -340,11 +329,6 @@ def _triangles(faces: Table, n: int) -> np.ndarray:
 # ------------------------------------------------------------------------------------------------------------- writing
 
 
-def is_written(kind: np.dtype) -> bool:
-    """Whether there is a word for a type that Open3D reads."""
-    return kind.str[1:] in _WRITTEN
-
-
 def rows_of(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Columns of equal length, (n,) arrays by name, side by side: a structured array of little-endian rows."""
     n = len(next(iter(columns.values())))
@@ -354,10 +338,10 @@ def rows_of(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     return rows
 
 
-def header_of(row: np.dtype, n: int, *, width: int = 0, more: str = "") -> bytes:
+def header_of(row: np.dtype, n: int, *, width: int = 0, comment: str = "", more: str = "") -> bytes:
     """What stands before n such rows; the count can be padded to a width, so that another one fits in its place, and
     `more` are lines of elements that follow.
     """
-    properties = "".join(f"property {_WRITTEN[row[name].str[1:]]} {name}\n" for name in row.names or ())
-    vertices = f"element vertex {n:{width}d}\n"
+    properties = "".join(f"property {WRITTEN_KINDS[row[name].str[1:]]} {name}\n" for name in row.names or ())
+    vertices = f"{comment}element vertex {n:{width}d}\n"
     return f"ply\nformat binary_little_endian 1.0\n{vertices}{properties}{more}end_header\n".encode()
