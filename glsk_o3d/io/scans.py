@@ -36,7 +36,7 @@ def _whole(read: Callable[[Path], Scan]) -> Reader:
     return lambda path, rows, bare: (None, map(read, [path]))  # not read before it is asked for
 
 
-_READERS: dict[str, Reader] = {
+_SCAN_READERS: dict[str, Reader] = {
     **dict.fromkeys(MESH_ENDINGS, _whole(meshes.read_vertices)),
     **dict.fromkeys(TEXT_ENDINGS, _whole(text_tables.read)),
     **dict.fromkeys((".las", ".laz"), scanners.blocks),
@@ -198,7 +198,7 @@ def _scan_file(path: str | os.PathLike) -> Path:
 
 def _opened(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan]]:
     with _refused_where_damaged(path):
-        return _READERS[path.suffix.lower()](path, rows, bare)
+        return _SCAN_READERS[path.suffix.lower()](path, rows, bare)
 
 
 @contextmanager
@@ -281,7 +281,7 @@ def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
         with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
             done = o3d.t.io.write_point_cloud(str(temporary), written)
         try:  # whether it is whole, which Open3D does not say
-            _READERS[ending](temporary, BLOCK_ROWS, True)
+            _SCAN_READERS[ending](temporary, BLOCK_ROWS, True)
         except ValueError:
             done = False
         if not done:
