@@ -97,7 +97,6 @@ MODULES = {
     "glsk_o3d.io.annotation": "Attributes on clouds",
     "glsk_o3d.io.geometry": "Tubes",
     "glsk_o3d.analysis.skinning": "Skins",
-    "glsk_o3d.io.colors": "Colours",
     "glsk_o3d.parameters": "Making filters",
     "glsk_o3d.interop.clouds": "What counts as a cloud",
     "glsk_o3d.recipes": "Comparing runs",

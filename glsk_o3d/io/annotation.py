@@ -41,7 +41,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
         By default the one the skeleton was made from. Points of another one go with the nearest point of that, or with
         the nearest place on the curve if the skeleton's file held no cloud.
     color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1], optional
-        What the colours of the points are to show, or the one colour of all; see `glsk_o3d.io.colors.shades`.
+        What the colours of the points show, or the one colour of all.
 
     Returns
     -------
@@ -58,8 +58,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
 
     Notes
     -----
-    Integers are int32 because Open3D writes no int64 to PLY. ``voxel_down_sample`` takes the mean of every attribute:
-    that of labels means nothing where branches meet. Annotate its result once more.
+    ``voxel_down_sample`` takes the mean of every attribute: that of labels means nothing. Annotate its result again.
     """
     points, vertex = vertex_of_cloud(skeleton, cloud)
     found = labels(skeleton, points, vertex, thickness_of_points(skeleton, points, vertex), color)
@@ -105,11 +104,6 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
     ------
     InvalidCloudError
     MissingPackageError
-
-    Notes
-    -----
-    Open3D writes the attribute to npz as it is, to PLY as three columns ``contracted_0`` to ``contracted_2``, and not
-    to PCD.
 
     Examples
     --------

@@ -16,8 +16,6 @@ from ..numerics.groups import group_median
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
-__all__ = ["shades"]
-
 ColorChoice: TypeAlias = Literal["branch", "order", "radius", "confidence", "support", "thickness"] | Sequence[float]
 """What colours show, or one colour for all: red, green and blue from 0 to 1."""
 
@@ -27,31 +25,12 @@ THICKNESS_SPAN = 4.0  # fitted: that of the last colour; of the first it is one 
 
 
 def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Colours of things that belong to branches and vertices.
+    """Colours, (n, 3) float array from 0 to 1, of things that each belong to a branch and to one or k vertices.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
-        Branches have 18 colours in turn. All else goes from dark blue to yellow: orders of the branches, as in the
-        table of them, from 0 to the highest of the skeleton; radii from the least to the largest; confidences and
-        support from 0 to 1; and the median thickness of the points of a vertex from a quarter to four, 1 in the middle.
-        Or one colour for all: red, green, blue.
-    branch : (n,) int array
-        -1 for none: grey.
-    vertices : (n,) or (n, k) int array
-        Each thing has the mean value of so many vertices; -1 for none: grey.
-
-    Returns
-    -------
-    (n, 3) float array
-        Red, green and blue from 0 to 1.
-
-    Raises
-    ------
-    InvalidParameterError
-    MissingPackageError
-        matplotlib is not installed, and asked for is not one colour for all.
+    Branches have 18 colours in turn. All else goes from dark blue to yellow: orders of the branches, as in the table of
+    them, from 0 to the highest of the skeleton; radii from the least to the largest; confidences and support from 0 to
+    1; the median thickness of the points of a vertex from a quarter to four, 1 in the middle. Each thing has the mean
+    of its vertices; where `branch` or one of `vertices` is -1, it is grey.
     """
     if not isinstance(color, str) or color not in COLOR_NAMES:
         try:

@@ -10,7 +10,6 @@ parent, counted from 0 in its line, to its own.
 
 from __future__ import annotations
 
-import csv
 import io
 import os
 from collections.abc import Callable
@@ -103,9 +102,8 @@ def treeqsm_table(tree: Cylinders) -> bytes:
         for name, array in treeqsm_fields(tree).items()
         for end, column in zip((".x", ".y", ".z") if array.shape[1] == 3 else ("",), array.T, strict=True)
     }
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerows([columns, *zip(*columns.values(), strict=True)])
-    return stream.getvalue().encode()
+    rows = [columns, *zip(*columns.values(), strict=True)]
+    return text(",".join(map(str, row)) for row in rows)
 
 
 def treeqsm_matrix(tree: Cylinders) -> bytes:

@@ -64,7 +64,7 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     skeleton : Skeleton
         A vertex without edges becomes a ball.
     color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
-        See `glsk_o3d.io.colors.shades`.
+        What the colours of the branches or vertices show, or the one colour of all.
     radius : float, optional
         One radius for all, in the cloud's units, instead of the sections of the vertices.
     sides : int

@@ -161,7 +161,6 @@ def _text(lines: Iterator[str], element: Element) -> Table:
 
 def _binary(data: bytes, at: int, element: Element, order: str) -> tuple[Table, int]:
     """A table and where it ends: at once if the lists of a column are as long as that of the first row."""
-
     place, lists = at, [i for i, column in enumerate(element.columns) if column.counts]
 
     def take(kind: str, n: int) -> np.ndarray:
