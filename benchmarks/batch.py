@@ -27,7 +27,7 @@ from _common.results import save
 from _common.tables import number, show
 
 from glsk_o3d import samples
-from glsk_o3d.io.formats import ply_rows
+from glsk_o3d.io.formats import ply
 
 SHAPES = (
     *(samples.tube, samples.torus, samples.y_junction, samples.two_rings, samples.helix),
@@ -39,8 +39,8 @@ app = typer.Typer(add_completion=False)
 
 def write_ply(path: Path, points) -> None:
     """Write points as binary PLY."""
-    rows = ply_rows.table(dict(zip("xyz", np.asarray(points, float).T, strict=True)))
-    path.write_bytes(ply_rows.header(rows.dtype, len(rows)) + rows.tobytes())
+    rows = ply.rows_of(dict(zip("xyz", np.asarray(points, float).T, strict=True)))
+    path.write_bytes(ply.header_of(rows.dtype, len(rows)) + rows.tobytes())
 
 
 def make_scans(folder: Path, count: int, smallest: int, largest: int) -> None:

@@ -26,12 +26,11 @@ from .interop.clouds import Cloud
 from .io.annotation import annotate, annotate_contraction
 from .io.cylinders import save_cylinders
 from .io.formats.gltf import save_rig
-from .io.line_sets import to_line_set, to_tensor_line_set
+from .io.geometry import to_line_set, to_tensor_line_set, to_tubes
 from .io.meshes import save_mesh
 from .io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
 from .io.skeletons import read_skeleton, read_truth, save_skeleton
 from .io.streaming import annotate_file, read_sample
-from .io.tubes import to_tubes
 from .judgements import Judgement, Supported
 from .lpr_reducer import LPRReducer
 from .meshlab import to_pymeshlab

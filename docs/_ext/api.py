@@ -96,9 +96,7 @@ NAMES = {
 PACKAGES = tuple(dict.fromkeys(module for _, module in TASKS.values()))
 """What users import from."""
 MODULES = {
-    "glsk_o3d.io.clouds.selection": "Some of the points",
     "glsk_o3d.analysis.skinning": "Skins",
-    "glsk_o3d.io.colors": "Colours",
     "glsk_o3d.parameters": "Making filters",
     "glsk_o3d.interop.clouds": "What counts as a cloud",
     "glsk_o3d.recipes": "Comparing runs",

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..errors import InvalidParameterError
-from ..io.clouds.text_tables import holds_points
+from ..io.formats.text_tables import holds_points
 from ..io.paths import SCAN_ENDINGS, check_ends
 
 LISTS = (".txt", ".csv")  # what they are, their endings do not say

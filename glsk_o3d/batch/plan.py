@@ -15,7 +15,7 @@ from typing import Any
 from ..driver import as_pipeline
 from ..errors import FileFormatError, InvalidParameterError
 from ..interop.packages import require_for
-from ..io.clouds.selection import parsed
+from ..io.scan import parsed
 from ..io.skeletons import skeleton_ending
 from ..pipeline import Filter, Pipeline, parts
 from ..recipes import to_recipe

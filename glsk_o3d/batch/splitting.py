@@ -16,9 +16,9 @@ import numpy as np
 
 from ..errors import BatchError, FileFormatError, InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.atomic import write_json
-from ..io.clouds.blocks import read_blocks
-from ..io.clouds.scanned import COLOR_CHANNELS, Scan
-from ..io.formats import ply_rows
+from ..io.formats import ply
+from ..io.scan import COLOR_CHANNELS, Scan
+from ..io.scans import read_blocks
 from ..preparation.frame import not_finite
 from .grid import Grid, TooManyParts, tile_name, tile_of
 from .jobs import Job, Split
@@ -168,7 +168,7 @@ class PartFiles:
         for names, values in ((("nx", "ny", "nz"), scan.normals), (COLOR_CHANNELS, scan.colors)):
             if values is not None:
                 columns |= dict(zip(names, values.astype("<f4").T, strict=True))
-        table = ply_rows.table(columns)
+        table = ply.rows_of(columns)
         self._row = table.dtype
         with _writing(self._folder):
             for label, chosen in rows.items():
@@ -187,7 +187,7 @@ class PartFiles:
                     stream.write(self._header(count))
 
     def _header(self, count: int) -> bytes:
-        return ply_rows.header(self._row, count, width=_COUNT_WIDTH)
+        return ply.header_of(self._row, count, width=_COUNT_WIDTH)
 
 
 @contextmanager

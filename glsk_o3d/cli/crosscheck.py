@@ -39,7 +39,7 @@ def crosscheck(
     from ..crosscheck import cross_check, save_crosscheck_picture
     from ..crosscheck.agreement import UNTOLD
     from ..interop.atomic import write_json
-    from ..io.meshes import read_mesh
+    from ..io.scans import read_mesh
     from ..viewing.figures import printable
     from .overrides import choose
 

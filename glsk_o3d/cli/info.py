@@ -16,7 +16,7 @@ from .running import print_iterations
 if TYPE_CHECKING:
     import numpy as np
 
-    from ..io.clouds.scanned import Scan
+    from ..io.scan import Scan
     from ..skeleton import Skeleton
 
 FEW_VALUES = 12  # fitted: that an attribute may have for all of them to be listed
@@ -77,8 +77,7 @@ def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
     """
     import numpy as np
 
-    from ..io.clouds.blocks import promised_points, read_blocks
-    from ..io.scans import read_scan
+    from ..io.scans import promised_points, read_blocks, read_scan
     from ..io.streaming import LARGE_CLOUD
 
     load_open3d()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,7 +41,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
         By default the one the skeleton was made from. Points of another one go with the nearest point of that, or with
         the nearest place on the curve if the skeleton's file held no cloud.
     color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1], optional
-        What the colours of the points are to show, or the one colour of all; see `glsk_o3d.io.colors.shades`.
+        What the colours of the points show, or the one colour of all.
 
     Returns
     -------
@@ -59,16 +58,11 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
 
     Notes
     -----
-    Integers are int32 because Open3D writes no int64 to PLY. ``voxel_down_sample`` takes the mean of every attribute:
-    that of labels means nothing where branches meet. Annotate its result once more.
+    ``voxel_down_sample`` takes the mean of every attribute: that of labels means nothing. Annotate its result again.
     """
     points, vertex = vertex_of_cloud(skeleton, cloud)
-    geometry, put = _copy(points if cloud is None else cloud)
     found = labels(skeleton, points, vertex, thickness_of_points(skeleton, points, vertex), color)
-    for name, values in found.items():
-        whole = values.dtype.kind != "f"
-        put(name, values if values.ndim == 2 else values[:, None], values.dtype.name if whole else None)
-    return geometry
+    return _annotated(points if cloud is None else cloud, found)
 
 
 def labels(
@@ -98,23 +92,18 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
     ----------
     state : Contraction
     cloud : cloud, optional
-        As for `annotate`.
+        As for `Skeleton.annotate`.
 
     Returns
     -------
     open3d.t.geometry.PointCloud or TriangleMesh
-        As from `annotate`. Points that were merged away have the position of the one they were merged into; NaN for
-        points that are not finite.
+        As from there. Points that were merged away have the position of the one they were merged into; NaN for points
+        that are not finite.
 
     Raises
     ------
     InvalidCloudError
     MissingPackageError
-
-    Notes
-    -----
-    Open3D writes the attribute to npz as it is, to PLY as three columns ``contracted_0`` to ``contracted_2``, and not
-    to PCD.
 
     Examples
     --------
@@ -126,13 +115,12 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
     """
     points = state.points if cloud is None else cloud_points(cloud)
     survivor = label_of_nearest(state.points, state.survivor_of_point, points)
-    geometry, put = _copy(points if cloud is None else cloud)
-    put("contracted", np.where((survivor >= 0)[:, None], state.contracted[survivor], np.nan))
-    return geometry
+    places = np.where((survivor >= 0)[:, None], state.contracted[survivor], np.nan)
+    return _annotated(points if cloud is None else cloud, {"contracted": places})
 
 
-def _copy(cloud: Any) -> tuple[Any, Callable[..., None]]:
-    """A tensor geometry with its own copy of all data, and a function that sets one of its attributes."""
+def _annotated(cloud: Any, attributes: dict[str, np.ndarray]) -> Any:
+    """A tensor geometry with its own copy of all data, and attributes; floats become what its positions are."""
     o3d = import_open3d()
     name, tensor = open3d_class(cloud)
     if name in ("PointCloud", "TriangleMesh"):
@@ -142,12 +130,10 @@ def _copy(cloud: Any) -> tuple[Any, Callable[..., None]]:
         array = cloud.cpu().numpy() if name == "Tensor" else np.asarray(cloud)
         array = np.array(array, np.float32 if array.dtype == np.float32 else np.float64, order="C")
         geometry = o3d.t.geometry.PointCloud(o3d.core.Tensor(array))
-    attributes = geometry.vertex if name == "TriangleMesh" else geometry.point
-    positions = attributes.positions
+    held = geometry.vertex if name == "TriangleMesh" else geometry.point
+    positions = held.positions
     own = positions.dtype if positions.dtype in (o3d.core.float32, o3d.core.float64) else o3d.core.float64
-
-    def put(key: str, values: np.ndarray, dtype: str | None = None) -> None:
-        values = np.ascontiguousarray(values, None if dtype is None else dtype)
-        attributes[key] = o3d.core.Tensor(values, own if dtype is None else None, positions.device)
-
-    return geometry, put
+    for key, values in attributes.items():
+        values = np.ascontiguousarray(values).reshape(len(values), -1)
+        held[key] = o3d.core.Tensor(values, own if values.dtype.kind == "f" else None, positions.device)
+    return geometry

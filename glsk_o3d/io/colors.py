@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
@@ -25,32 +25,12 @@ THICKNESS_SPAN = 4.0  # fitted: that of the last colour; of the first it is one 
 
 
 def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Colours of things that belong to branches and vertices.
+    """Colours, (n, 3) float array from 0 to 1, of things that each belong to a branch and to one or k vertices.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
-        Branches have 18 colours in turn. Orders of the branches, as in the table of them, go from dark blue, 0, to
-        yellow, the highest of the skeleton; radii from the least to the largest likewise, confidences and
-        support from 0 to 1, and
-        the median thickness of the points of a vertex from a quarter to four, 1 in the middle. Or one colour for all:
-        red, green, blue.
-    branch : (n,) int array
-        -1 for none: grey.
-    vertices : (n,) or (n, k) int array
-        Each thing has the mean value of so many vertices; -1 for none: grey.
-
-    Returns
-    -------
-    (n, 3) float array
-        Red, green and blue from 0 to 1.
-
-    Raises
-    ------
-    InvalidParameterError
-    MissingPackageError
-        matplotlib is not installed, and asked for is not one colour for all.
+    Branches have 18 colours in turn. All else goes from dark blue to yellow: orders of the branches, as in the table of
+    them, from 0 to the highest of the skeleton; radii from the least to the largest; confidences and support from 0 to
+    1; the median thickness of the points of a vertex from a quarter to four, 1 in the middle. Each thing has the mean
+    of its vertices; where `branch` or one of `vertices` is -1, it is grey.
     """
     if not isinstance(color, str) or color not in COLOR_NAMES:
         try:
@@ -60,32 +40,20 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
         if one.shape != (3,) or not ((one >= 0) & (one <= 1)).all():
             raise InvalidParameterError(f"color = {color!r}: must be one of {COLOR_NAMES} or three numbers from 0 to 1")
         return np.tile(one, (len(branch), 1))
-    colormaps = require("matplotlib").colormaps
     if color == "branch":
-        palette = np.delete(colormaps["tab20"].colors, [14, 15], axis=0)  # grey is for none
+        palette = np.delete(require("matplotlib").colormaps["tab20"].colors, [14, 15], axis=0)  # grey is for none
         palette = np.concatenate([palette[::2], palette[1::2]])  # the strong ones first
         return np.where((branch >= 0)[:, None], palette[branch % len(palette)], UNKNOWN_GREY)
     if color == "order":
         order = branch_table(skeleton).order if len(branch) else np.zeros(1, int)
         return _ramp(np.where(branch >= 0, order[branch] / max(order.max(), 1), np.nan))
     vertices = vertices if vertices.ndim == 2 else vertices[:, None]
-    values = _OF_VERTICES[color](skeleton)
+    values = _of_vertices(skeleton, color)
     return _ramp(np.where((vertices >= 0).all(axis=1), values[vertices].mean(axis=1), np.nan))
 
 
 def thickness_shades(thickness: np.ndarray) -> np.ndarray:
-    """Colours of thicknesses, as `shades` has them.
-
-    Parameters
-    ----------
-    thickness : (n,) float array
-        As from `glsk_o3d.analysis.thickness`; NaN is grey.
-
-    Returns
-    -------
-    (n, 3) float array
-        Red, green and blue from 0 to 1.
-    """
+    """Colours of thicknesses, (n,) float array, as `shades` has them; NaN is grey."""
     return _ramp(_thickness_share(thickness))
 
 
@@ -95,10 +63,15 @@ def _ramp(shown: np.ndarray) -> np.ndarray:
     return np.where(np.isnan(shown)[:, None], UNKNOWN_GREY, viridis(np.nan_to_num(shown))[:, :3])
 
 
-def _radius_share(skeleton: Skeleton) -> np.ndarray:
-    radii = skeleton.radii
-    low, high = np.nanmin(radii, initial=np.inf), np.nanmax(radii, initial=-np.inf)
-    return (radii - low) / (high - low) if high > low else np.where(np.isnan(radii), np.nan, 0)
+def _of_vertices(skeleton: Skeleton, color: str) -> np.ndarray:
+    """What a colour shows of the vertices, as numbers from 0 to 1."""
+    if color == "radius":
+        radii = skeleton.radii
+        low, high = np.nanmin(radii, initial=np.inf), np.nanmax(radii, initial=-np.inf)
+        return (radii - low) / (high - low) if high > low else np.where(np.isnan(radii), np.nan, 0)
+    if color == "thickness":
+        return _thickness_share(_median_thickness(skeleton))
+    return skeleton.confidence if color == "confidence" else skeleton.support
 
 
 def _thickness_share(thickness: np.ndarray) -> np.ndarray:
@@ -115,11 +88,3 @@ def _median_thickness(skeleton: Skeleton) -> np.ndarray:
         some = np.bincount(vertex, minlength=count) > 0
         found[some] = group_median(values, vertex, count)[some]
     return found
-
-
-_OF_VERTICES: dict[str, Callable[[Skeleton], np.ndarray]] = {
-    "radius": _radius_share,
-    "confidence": lambda skeleton: skeleton.confidence,
-    "support": lambda skeleton: skeleton.support,
-    "thickness": lambda skeleton: _thickness_share(_median_thickness(skeleton)),
-}

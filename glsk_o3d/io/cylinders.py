@@ -1,4 +1,4 @@
-"""Cylinders of trees to files: as tables of TreeQSM and as tree files of treetools.
+"""Cylinders of trees to files: as tables of TreeQSM and as tree files of treetools, both in metres.
 
 A branch of TreeQSM is an axis: from where it leaves its parent to its tip. Its cylinders follow each other, counted
 from 1, and the trunk is branch 1, of order 0 (Raumonen et al. 2013, https://github.com/InverseTampere/TreeQSM).
@@ -10,7 +10,6 @@ parent, counted from 0 in its line, to its own.
 
 from __future__ import annotations
 
-import csv
 import io
 import os
 from collections.abc import Callable
@@ -27,6 +26,8 @@ from ..numerics.vectors import unit as directions
 from .formats.graphs import text
 from .paths import unknown_ending
 
+CYLINDER_ENDINGS = (".qsm.csv", ".mat", ".txt", ".csv")
+"""Longer ones before those that they end in."""
 SEGMENT_NAMES = ("x", "y", "z", "radius", "parent_id", "curve_length", "order")
 """Of the numbers of a segment. treetools itself adds ``length``, ``volume``, ``diameter``, ``branch`` and more, and
 refuses files that have them.
@@ -77,40 +78,36 @@ def save_cylinders(tree: Cylinders, path: str | os.PathLike, unit: float | str =
     ending, factor = cylinders_ending(path), metres(unit)
     if ending == ".csv":
         tree.to_csv(path)
-    else:
-        data = IN_METRES[ending](scaled(tree, factor))
-        write_atomically(path, lambda temporary: temporary.write_bytes(data))
+        return
+    lengths = ("start_point", "end_point", "radius", "length")
+    tree = replace(tree, **{name: factor * getattr(tree, name) for name in lengths})
+    writers: dict[str, Callable[[Cylinders], bytes]]
+    writers = {".qsm.csv": treeqsm_table, ".mat": treeqsm_matrix, ".txt": tree_file}
+    data = writers[ending](tree)
+    write_atomically(path, lambda temporary: temporary.write_bytes(data))
 
 
 def cylinders_ending(path: str | os.PathLike) -> str:
     """The one of `CYLINDER_ENDINGS` that a file name has; FileFormatError if there is none."""
-    name = Path(path).name.lower()
-    found = [ending for ending in CYLINDER_ENDINGS if name.endswith(ending)]
-    if not found:
-        raise unknown_ending(Path(path), CYLINDER_ENDINGS)
-    return found[0]
-
-
-def scaled(tree: Cylinders, factor: float) -> Cylinders:
-    """The same cylinders in another unit: all lengths times a factor."""
-    lengths = ("start_point", "end_point", "radius", "length")
-    return replace(tree, **{name: factor * getattr(tree, name) for name in lengths})
+    for ending in CYLINDER_ENDINGS:
+        if Path(path).name.lower().endswith(ending):
+            return ending
+    raise unknown_ending(Path(path), CYLINDER_ENDINGS)
 
 
 def treeqsm_table(tree: Cylinders) -> bytes:
-    """A CSV file that rTwig's ``run_rtwig`` and ``update_cylinders`` take for a table of TreeQSM; lengths in metres."""
+    """A CSV file that rTwig's ``run_rtwig`` and ``update_cylinders`` take for a table of TreeQSM."""
     columns = {
         f"{name}{end}": column.tolist()
         for name, array in treeqsm_fields(tree).items()
         for end, column in zip((".x", ".y", ".z") if array.shape[1] == 3 else ("",), array.T, strict=True)
     }
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerows([columns, *zip(*columns.values(), strict=True)])
-    return stream.getvalue().encode()
+    rows = [columns, *zip(*columns.values(), strict=True)]
+    return text(",".join(map(str, row)) for row in rows)
 
 
 def treeqsm_matrix(tree: Cylinders) -> bytes:
-    """A MATLAB file with TreeQSM's struct ``cylinder``, as rTwig's ``export_mat`` writes it, too; lengths in metres."""
+    """A MATLAB file with TreeQSM's struct ``cylinder``, as rTwig's ``export_mat`` writes it, too."""
     stream = io.BytesIO()
     savemat(stream, {"cylinder": treeqsm_fields(tree)})
     return stream.getvalue()
@@ -152,21 +149,10 @@ def treeqsm_fields(tree: Cylinders) -> dict[str, np.ndarray]:
 
 def tree_file(*trees: Cylinders) -> bytes:
     """A tree file of raycloudtools and treetools, a line per tree; lengths in metres."""
-    return text(["# trees written by glsk-o3d, in metres", ",".join(SEGMENT_NAMES), *map(_tree_line, trees)])
-
-
-def _tree_line(tree: Cylinders) -> str:
-    root = (*tree.start_point[0].tolist(), float(tree.radius[0]), -1, 0.0, 0)
-    columns = (*tree.end_point.T, tree.radius, tree.parent + 1, tree.length, tree.order)
-    segments = zip(*(column.tolist() for column in columns), strict=True)
-    return ", ".join(",".join(map(str, segment)) for segment in (root, *segments))
-
-
-IN_METRES: dict[str, Callable[[Cylinders], bytes]] = {
-    ".qsm.csv": treeqsm_table,
-    ".mat": treeqsm_matrix,
-    ".txt": tree_file,
-}
-"""Formats of other programs, which take lengths for metres, by the ending of the file."""
-CYLINDER_ENDINGS = (*IN_METRES, ".csv")
-"""All endings, longer ones before those that they end in."""
+    lines = ["# trees written by glsk-o3d, in metres", ",".join(SEGMENT_NAMES)]
+    for tree in trees:
+        root = (*tree.start_point[0].tolist(), float(tree.radius[0]), -1, 0.0, 0)
+        columns = (*tree.end_point.T, tree.radius, tree.parent + 1, tree.length, tree.order)
+        segments = zip(*(column.tolist() for column in columns), strict=True)
+        lines.append(", ".join(",".join(map(str, segment)) for segment in (root, *segments)))
+    return text(lines)

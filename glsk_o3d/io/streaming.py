@@ -22,9 +22,9 @@ from ..preparation.sampling import sample_blocks
 from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from ..ring_builder import RingBuilder
 from .annotation import labels
-from .clouds.blocks import promised_points, read_blocks, refused_where_damaged, scan_file
-from .clouds.scanned import COLOR_CHANNELS, Scan
-from .formats import ply, ply_rows
+from .formats import ply
+from .scan import COLOR_CHANNELS, NORMAL_NAMES, Scan
+from .scans import promised_points, read_blocks
 
 if TYPE_CHECKING:
     from ..pipeline import Pipeline
@@ -45,7 +45,7 @@ def read_sample(
     Parameters
     ----------
     path : path-like
-        As for `read_cloud`. What ``glsk_o3d.io.clouds.blocks.read_blocks`` cannot read in blocks is read whole.
+        As for `read_cloud`. LAS, LAZ, PCD and binary PLY are read in blocks, all else is read whole.
     n : int, optional
         About how many points; all, if they are not more than twice as many. By default what `RingBuilder` takes: twice
         25000 or, from 152588 points on, 128 times the square root of their number, 1.28 of 100 million.
@@ -62,18 +62,8 @@ def read_sample(
 
     Raises
     ------
-    FileNotFoundError
-    FileFormatError
-    InvalidParameterError
-    MissingPackageError
-        As from `read_cloud`.
     InvalidCloudError
-        As from there, and for points that are not finite.
-
-    Notes
-    -----
-    The file is read four times, a small one twice: how far it reaches, how fine the grid must be, means, and nearest
-    points. Points that repeat count, which they do not in memory.
+        There are points that are not finite. Other errors are those of `read_cloud`.
 
     Examples
     --------
@@ -164,6 +154,7 @@ def annotate_file(
     `Skeleton.annotate` for files: the same attributes, coloured by branch. The scan's own colours are attributes
     ``scan_red``, ``scan_green`` and ``scan_blue``. What a binary PLY file holds as float, double, uchar or int stays
     so, and radius, confidence and thickness are float where the coordinates are. All else becomes int, or double.
+    ``thickness`` takes the spacing of the points that the skeleton was made from; NaN if it came without.
 
     Parameters
     ----------
@@ -183,21 +174,12 @@ def annotate_file(
 
     Raises
     ------
-    FileNotFoundError
     FileFormatError
-        The scan cannot be read or changes while it is, or the output is no PLY file, or is the scan.
+        The scan changes while it is read, or the output is no PLY file, or is the scan.
     InvalidParameterError
-        The skeleton is empty, or as from `read_cloud`.
-    InvalidCloudError
-    MissingPackageError
+        The skeleton is empty. Other errors are those of `read_cloud`.
     OSError
         The file cannot be written.
-
-    Notes
-    -----
-    A point belongs where the nearest point belongs that the skeleton was made from, as in `Skeleton.annotate`.
-    ``thickness`` is the one thing that differs: how far the points are apart is that of the cloud that the skeleton was
-    made from, at that point; NaN if it came without.
 
     Examples
     --------
@@ -216,27 +198,24 @@ def annotate_file(
     if Path(output).exists() and Path(path).exists() and os.path.samefile(path, output):
         raise FileFormatError(f"{os.fspath(output)}: is the scan itself: give another name")
     label = _labeller(skeleton)
-    source = scan_file(path)
-    with refused_where_damaged(source):
-        types = ply.types(source) if source.suffix.lower() == ".ply" else {}
-    held = {name: kind for name, kind in types.items() if ply_rows.is_written(kind)}
     n, kinds = _survey(path, where)
+    changed = FileFormatError(f"{os.fspath(path)}: has changed while it was read: label it again when it is complete")
 
     def write(temporary: Path) -> None:
         written, row = 0, None
         with temporary.open("wb") as stream:
             for block in read_blocks(path, where=where):
                 if not kinds.keys() <= block.attributes.keys():
-                    raise _changed(path)
-                table = ply_rows.table(_columns(block, kinds, held, label(block.positions)))
+                    raise changed
+                table = ply.rows_of(_columns(block, kinds, label(block.positions)))
                 if row is None:
-                    stream.write(ply_rows.header(table.dtype, n))
+                    stream.write(ply.header_of(table.dtype, n))
                 elif row != table.dtype:
-                    raise _changed(path)
+                    raise changed
                 written, row = written + len(table), table.dtype
                 stream.write(table.tobytes())
         if written != n:
-            raise _changed(path)
+            raise changed
 
     write_atomically(output, write)
     return n
@@ -277,17 +256,12 @@ def _survey(path: str | os.PathLike, where: str | None) -> tuple[int, dict[str, 
     return n, {name: kinds[name] for name in names if name in kinds}
 
 
-def _changed(path: str | os.PathLike) -> FileFormatError:
-    return FileFormatError(f"{os.fspath(path)}: has changed while it was read: label it again when it is complete")
-
-
-def _columns(
-    block: Scan, kinds: dict[str, np.dtype], held: dict[str, np.dtype], found: dict[str, np.ndarray]
-) -> dict[str, np.ndarray]:
+def _columns(block: Scan, kinds: dict[str, np.dtype], found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Columns of a PLY file, by name: those of a scan, of the types that its file holds, and labels."""
+    held = {name: kind for name, kind in block.types.items() if kind.str[1:] in ply.WRITTEN_KINDS}
     columns = dict(zip("xyz", block.positions.T, strict=True))
     if block.normals is not None:
-        columns |= {f"n{axis}": values for axis, values in zip("xyz", block.normals.T, strict=True)}
+        columns |= dict(zip(NORMAL_NAMES, block.normals.T, strict=True))
     columns |= {name: block.attributes[name].astype(kind) for name, kind in kinds.items()}
     columns = {name: values.astype(held.get(name, values.dtype), copy=False) for name, values in columns.items()}
     colors = found.pop("colors")

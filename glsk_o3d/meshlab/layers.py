@@ -15,11 +15,11 @@ from ..errors import FileFormatError
 from ..interop.atomic import write_atomically
 from ..interop.clouds import cloud_points
 from ..interop.packages import import_open3d, require
-from ..io.clouds.scanned import COLOR_CHANNELS
-from ..io.formats import ply_rows
+from ..io.formats import ply
 from ..io.formats.graphs import graph_skeleton
 from ..io.formats.ply import ply_elements
 from ..io.paths import existing_file
+from ..io.scan import COLOR_CHANNELS
 from ..io.scans import read_scan
 from ..io.skeletons import read_skeleton, save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
@@ -180,12 +180,12 @@ class Layer:
             columns |= dict(zip(COLOR_CHANNELS, shades.T, strict=True))
         if self.scalars is not None:
             columns["quality"] = np.asarray(self.scalars, float)
-        vertices, said = ply_rows.table(columns), ""
+        vertices, said = ply.rows_of(columns), ""
         faces = np.empty(0 if self.faces is None else len(self.faces), [("n", "u1"), ("corners", "<i4", 3)])
         if len(faces):
             faces["n"], faces["corners"] = 3, self.faces
             said = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
-        header = ply_rows.header(vertices.dtype, len(vertices), more=said)
+        header = ply.header_of(vertices.dtype, len(vertices), more=said)
         path.write_bytes(header + vertices.tobytes() + faces.tobytes())
 
     def _write_open3d(self, path: Path) -> None:

@@ -14,8 +14,7 @@ import numpy as np
 from ..errors import DisplayError
 from ..interop.clouds import to_point_cloud
 from ..interop.packages import import_open3d
-from ..io.line_sets import to_line_set
-from ..io.tubes import to_tubes
+from ..io.geometry import to_line_set, to_tubes
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton

@@ -13,9 +13,8 @@ from glsk_o3d.batch import splitting
 from glsk_o3d.batch.grid import tile_of
 from glsk_o3d.batch.ledger import file_hash
 from glsk_o3d.batch.splitting import Cut, PartFiles, Splitter
-from glsk_o3d.io.clouds.blocks import read_blocks
-from glsk_o3d.io.clouds.scanned import Scan
-from glsk_o3d.io.scans import read_scan
+from glsk_o3d.io.scan import Scan
+from glsk_o3d.io.scans import read_blocks, read_scan
 
 
 @pytest.fixture

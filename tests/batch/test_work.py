@@ -7,7 +7,7 @@ from glsk_o3d import pipelines, read_skeleton, save_tensor_cloud, skeletonize, t
 from glsk_o3d.batch.jobs import Job
 from glsk_o3d.batch.work import work
 from glsk_o3d.io import streaming
-from glsk_o3d.io.clouds import blocks
+from glsk_o3d.io.scans import read_blocks
 from glsk_o3d.samples import torus
 
 
@@ -18,7 +18,7 @@ def test_a_large_cloud_is_read_in_blocks(tmp_path, monkeypatch, where):
     points = torus(120000).points
     save_tensor_cloud(o3d.t.geometry.PointCloud(o3d.core.Tensor(points)), tmp_path / "scan.ply")
     monkeypatch.setattr(streaming, "LARGE_CLOUD", 100000)
-    monkeypatch.setitem(blocks.read_blocks.__kwdefaults__, "rows", 30000)
+    monkeypatch.setitem(read_blocks.__kwdefaults__, "rows", 30000)
     recipe = to_recipe(pipelines.default())
     path = str(tmp_path / "scan.ply")
     row = work(Job("scan", path, path, ("s.json",), out_dir=str(tmp_path), recipe=recipe, where=where))

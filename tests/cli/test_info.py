@@ -179,7 +179,7 @@ def test_a_large_cloud_is_told_block_by_block(told, scans, tmp_path, monkeypatch
 
     from glsk_o3d import save_tensor_cloud
     from glsk_o3d.io import streaming
-    from glsk_o3d.io.clouds import blocks
+    from glsk_o3d.io.scans import read_blocks
 
     random = np.random.default_rng(2)
     places = random.normal(size=(500, 3))
@@ -190,7 +190,7 @@ def test_a_large_cloud_is_told_block_by_block(told, scans, tmp_path, monkeypatch
     save_tensor_cloud(cloud, tmp_path / "c.ply")
     whole = told(tmp_path / "c.ply")
     monkeypatch.setattr(streaming, "LARGE_CLOUD", 499)
-    monkeypatch.setitem(blocks.read_blocks.__kwdefaults__, "rows", 60)
+    monkeypatch.setitem(read_blocks.__kwdefaults__, "rows", 60)
     found = told(tmp_path / "c.ply")
     assert whole["attributes"]["time"].pop("distinct") == 500
     assert found == {name: whole[name] for name in whole if name not in ("duplicates", "median_spacing", "triangles")}

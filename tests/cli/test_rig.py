@@ -5,7 +5,7 @@ import open3d as o3d
 import pytest
 
 from glsk_o3d import Skeleton, read_skeleton, save_rig
-from glsk_o3d.io.meshes import read_mesh
+from glsk_o3d.io.scans import read_mesh
 
 
 @pytest.fixture

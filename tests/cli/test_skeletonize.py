@@ -13,7 +13,7 @@ import pytest
 from glsk_o3d import Judgement, read_skeleton, read_tensor_cloud, samples
 from glsk_o3d.cli import running
 from glsk_o3d.cli.options import PipelineName
-from glsk_o3d.io.meshes import read_mesh
+from glsk_o3d.io.scans import read_mesh
 from glsk_o3d.pipelines import PIPELINES
 
 
@@ -260,11 +260,11 @@ def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, monkeypatch):
 
     from glsk_o3d import save_tensor_cloud
     from glsk_o3d.io import streaming
-    from glsk_o3d.io.clouds import blocks
+    from glsk_o3d.io.scans import read_blocks
 
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(samples.torus(120000).points))
     save_tensor_cloud(cloud, tmp_path / "scan.ply")
-    monkeypatch.setitem(blocks.read_blocks.__kwdefaults__, "rows", 30000)
+    monkeypatch.setitem(read_blocks.__kwdefaults__, "rows", 30000)
     whole = invoke("skeletonize", tmp_path / "scan.ply", "-o", "whole.json")
     assert whole.stderr == ""
     monkeypatch.setattr(streaming, "LARGE_CLOUD", 100000)

@@ -13,7 +13,7 @@ from glsk_o3d.crosscheck import cross_check
 from glsk_o3d.crosscheck.agreement import compare_rows, compare_skeletons, mesh_fit
 from glsk_o3d.crosscheck.mesh import spacing
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
-from glsk_o3d.io.meshes import read_mesh
+from glsk_o3d.io.scans import read_mesh
 from glsk_o3d.numerics.mesh_rings import border_lengths
 from glsk_o3d.numerics.solver import SolveError
 from glsk_o3d.report import REFUSED

@@ -19,31 +19,22 @@ def test_what_belongs_to_nothing_is_grey(tree, color):
     assert ((shown >= 0) & (shown <= 1)).all()
 
 
-def test_branches_differ_and_values_are_means_over_vertices(tree):
-    shown = shades(tree, "branch", np.arange(18), np.zeros(18, int))
-    assert len(np.unique(shown, axis=0)) == 18
+def test_branches_differ_orders_go_up_and_values_are_means_over_vertices(tree):
+    assert len(np.unique(shades(tree, "branch", np.arange(18), np.zeros(18, int)), axis=0)) == 18
     pairs = np.array([[0, 0], [5, 5]])
-    np.testing.assert_array_equal(
-        shades(tree, "radius", BRANCH[:2], pairs), shades(tree, "radius", BRANCH[:2], VERTICES[:2])
-    )
-
-
-def test_orders_are_those_of_the_table(tree):
+    by_radius = [shades(tree, "radius", BRANCH[:2], vertices) for vertices in (pairs, VERTICES[:2])]
+    np.testing.assert_array_equal(*by_radius)
     order = tree.branch_table().order
-    assert set(order) == {0, 1}
     shown = shades(tree, "order", np.arange(len(order)), np.zeros(len(order), int))
-    assert len(np.unique(shown[order == 0], axis=0)) == len(np.unique(shown[order == 1], axis=0)) == 1
-    dark, light = shown[order == 0][0], shown[order == 1][0]
+    dark, light = (np.unique(shown[order == each], axis=0) for each in (0, 1))
+    assert len(dark) == len(light) == 1
     assert dark.sum() < light.sum()
 
 
-def test_thickness_is_teal_where_it_is_one():
+def test_thickness_is_teal_where_it_is_one_and_of_a_vertex_the_median_of_its_points():
     shown = thickness_shades(np.array([0.0, 0.25, 1.0, 4.0, np.inf, np.nan]))
     np.testing.assert_array_equal(shown[[0, 4, 5]], [shown[1], shown[3], UNKNOWN_GREY])
     np.testing.assert_allclose(shown[2], [0.128, 0.567, 0.551], atol=0.01)
-
-
-def test_thickness_of_vertices_is_the_median_of_their_points():
     skeleton = skeletonize(samples.torus(500).points)
     of_points, count = thickness(skeleton), np.bincount(skeleton.vertex_of_point)
     vertex = int(np.argmax(count % 2))

@@ -11,7 +11,7 @@ from scipy.io import loadmat
 
 from glsk_o3d import FileFormatError, InvalidParameterError, pipelines, samples
 from glsk_o3d.analysis import Cylinders, cylinders
-from glsk_o3d.io.cylinders import save_cylinders, scaled, tree_file, treeqsm_fields, treeqsm_table
+from glsk_o3d.io.cylinders import save_cylinders, tree_file, treeqsm_fields, treeqsm_table
 
 TREEINFO_ADDS = {"volume", "diameter", "length", "strength", "min_strength", "dominance", "angle", "children", "branch"}
 TREEINFO_ADDS |= {"branch_order", "extension", "pos_in_branch", "segment_length", "branch_angle"}
@@ -31,22 +31,15 @@ def two_branches():
     return Cylinders(*map(np.array, zip(*rows, strict=True)), np.ones(3))
 
 
-def read_trees(data):
-    """Tree files, as strictly as `ForestStructure::load` of raycloudtools: names, and for each tree its segments."""
-    lines = data.decode("ascii").splitlines()
-    head, *rest = [line for line in lines if not line.startswith("#")]
-    assert head.startswith("x,y,z,radius")
-    names = head.split(",")
-    assert names[4] == "parent_id"
-    trees = []
-    for line in rest:
-        words = line.split(",")
-        assert len(words) % len(names) == 0
-        segments = np.array([float(word) for word in words]).reshape(-1, len(names))
-        assert len(segments) > 1  # a root alone is refused where there are parents
-        assert all(word.strip().lstrip("-").isdigit() for word in words[4 :: len(names)])
-        trees.append(segments)
-    return names, trees
+def segments_of(data):
+    """Of a tree file, as strictly as `ForestStructure::load` of raycloudtools reads it: names, and numbers."""
+    names, line = [line for line in data.decode("ascii").splitlines() if not line.startswith("#")]
+    assert names.startswith("x,y,z,radius,parent_id")
+    names, words = names.split(","), line.split(",")
+    assert all(word.strip().lstrip("-").isdigit() for word in words[4 :: len(names)])
+    segments = np.array(words, float).reshape(-1, len(names))
+    assert len(segments) > 1  # a root alone is refused where there are parents
+    return names, segments
 
 
 # ------------------------------------------------------------------------------------------------------------ treetools
@@ -60,7 +53,7 @@ def test_tree_file_by_hand(two_branches):
 
 
 def test_tree_file_keeps_volume_and_parents(tree):
-    names, (segments,) = read_trees(tree_file(tree))
+    names, segments = segments_of(tree_file(tree))
     assert not TREEINFO_ADDS & set(names)
     x, radius, parent, length = segments[:, :3], segments[1:, 3], segments[:, 4].astype(int), segments[1:, 5]
     np.testing.assert_array_equal(x, np.vstack([tree.start_point[:1], tree.end_point]))
@@ -90,16 +83,15 @@ def test_table_of_treeqsm_by_hand(two_branches):
 
 def test_branches_of_treeqsm_are_axes(tree):
     table = {name: column.squeeze() for name, column in treeqsm_fields(tree).items()}
-    number, parent = np.arange(1, len(tree) + 1), table["parent"]
+    number, parent, branch = np.arange(1, len(tree) + 1), table["parent"], table["branch"]
     assert (parent < number).all()
     assert (parent == 0).sum() == 1
-    assert (np.diff(table["branch"]) >= 0).all()
-    onward = np.flatnonzero(table["extension"])
+    assert (np.diff(branch) >= 0).all()
+    onward, first = np.flatnonzero(table["extension"]), table["PositionInBranch"] == 1
     np.testing.assert_array_equal(parent[table["extension"][onward] - 1], number[onward])
-    first = table["PositionInBranch"] == 1
-    assert first.sum() == table["branch"].max()
+    assert first.sum() == branch.max()
     inside, begins = np.flatnonzero(~first), np.flatnonzero(first)[1:]
-    np.testing.assert_array_equal(table["branch"][inside], table["branch"][parent[inside] - 1])
+    np.testing.assert_array_equal(branch[inside], branch[parent[inside] - 1])
     np.testing.assert_array_equal(table["BranchOrder"][begins], table["BranchOrder"][parent[begins] - 1] + 1)
     np.testing.assert_allclose(np.linalg.norm(table["axis"], axis=1), 1)
     by_place = {tuple(place): row for row, place in enumerate(table["start"].tolist())}
@@ -135,7 +127,7 @@ def test_matlab_file_in_the_functions_of_treeqsm(tree, tmp_path):
 
 @pytest.mark.skipif(shutil.which("Rscript") is None, reason="needs R")
 def test_table_of_treeqsm_in_r(tree, tmp_path):
-    save_cylinders(scaled(tree, 1000), tmp_path / "t.qsm.csv", "mm")
+    save_cylinders(tree, tmp_path / "t.qsm.csv", "m")
     (tmp_path / "read.R").write_text(
         """
         q <- read.csv("t.qsm.csv")
@@ -165,7 +157,7 @@ def test_units_and_endings(two_branches, tmp_path):
     assert [float(row["length"]) for row in rows] == two_branches.length.tolist()
     assert [float(row["diameter"]) for row in rows] == [1.0, 0.5, 1.0]
     np.testing.assert_allclose([float(row["volume"]) for row in rows], two_branches.volume)
-    (segments,) = read_trees((tmp_path / "t.txt").read_bytes())[1]
+    segments = segments_of((tmp_path / "t.txt").read_bytes())[1]
     np.testing.assert_allclose(segments[1:, 5], two_branches.length / 100)
     with pytest.raises(FileFormatError, match=r"t\.xlsx: unknown ending; known are \.qsm\.csv, \.mat, \.txt, \.csv"):
         save_cylinders(two_branches, tmp_path / "t.xlsx")

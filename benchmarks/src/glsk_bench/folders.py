@@ -16,7 +16,7 @@ import numpy as np
 from glsk_o3d.analysis.truth import Truth
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.interop.atomic import write_atomically, write_json
-from glsk_o3d.io.formats.ply_rows import header, table
+from glsk_o3d.io.formats.ply import header_of, rows_of
 from glsk_o3d.io.skeletons import read_truth
 
 from .versions import OWN, VERSIONS
@@ -261,5 +261,5 @@ def write_axis(path: Path, axis: Any) -> None:
 
 def write_points(path: Path, points: np.ndarray) -> None:
     """Write a cloud, (n, 3) float32 or float64 array."""
-    rows = table(dict(zip("xyz", points.T, strict=True)))
-    write_atomically(path, partial(Path.write_bytes, data=header(rows.dtype, len(rows)) + rows.tobytes()))
+    rows = rows_of(dict(zip("xyz", points.T, strict=True)))
+    write_atomically(path, partial(Path.write_bytes, data=header_of(rows.dtype, len(rows)) + rows.tobytes()))

@@ -57,15 +57,14 @@ def write_npz(skeleton: Skeleton) -> bytes:
 
 def read_npz(data: bytes) -> Skeleton:
     """The skeleton in the content of an npz file."""
-    words = ("format", "format_version", "report")
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
         if sum(info.file_size for info in packed.infolist()) > max(MOST_EXPANDED * len(data), SMALL_ARCHIVE):
             raise ValueError(f"it would become more than {MOST_EXPANDED} times as large: no skeleton packs so")
+    words = ("format", "format_version", "report")
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         values = {name: archive[name] for name in (*words, *ARRAYS) if name in archive.files}
-    for name in words:
-        values[name] = values[name].item() if name in values and values[name].ndim == 0 else None
-    return _decode({**values, "report": json.loads(values["report"] or "null")})
+    values |= {name: values[name].item() for name in words if name in values and values[name].ndim == 0}
+    return _decode({**values, "report": json.loads(values["report"])})
 
 
 def dumps(value: Any) -> str:
@@ -81,11 +80,10 @@ def _decode(values: Any) -> Skeleton:
     """The skeleton whose fields stand in a dict; ValueError where it is something else, or from a newer release."""
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise ValueError(f"it is not marked as a {FORMAT!r}")
-    if values.get("format_version") != FORMAT_VERSION:
-        found = values.get("format_version")
-        raise ValueError(f"it has format_version {found!r} and this release reads {FORMAT_VERSION}: update glsk-o3d")
-    unknown = np.full(len(values.get("radii", ())), np.nan)
-    values = dict(zip(LATER, (values.get("radii"), values.get("radii"), unknown), strict=True)) | values
+    if (version := values.get("format_version")) != FORMAT_VERSION:
+        raise ValueError(f"it has format_version {version!r} and this release reads {FORMAT_VERSION}: update glsk-o3d")
+    radii = values.get("radii", ())
+    values = dict(zip(LATER, (radii, radii, np.full(len(radii), np.nan)), strict=True)) | values
     missing = [name for name in (*ARRAYS, "report") if name not in values]
     if missing:
         raise ValueError(f"it lacks {', '.join(missing)}")
@@ -105,17 +103,17 @@ def _decode(values: Any) -> Skeleton:
 
 def _plain(value: Any) -> Any:
     """What JSON can hold: NaN becomes null and the infinities strings, in arrays, dicts and lists alike."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
         cells = value.astype(object)
         if value.dtype.kind == "f":
             cells[np.isnan(value)] = None
             cells[np.isposinf(value)], cells[np.isneginf(value)] = "Infinity", "-Infinity"
         return cells.tolist()
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
+    value = value.item() if isinstance(value, np.generic) else value
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
-    value = value.item() if isinstance(value, np.generic) else value
     if isinstance(value, float) and not math.isfinite(value):
         return None if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
     return value

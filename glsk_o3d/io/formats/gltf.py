@@ -20,11 +20,11 @@ from ...interop.clouds import cloud_points, open3d_class
 from ...numerics.vectors import norm, unit
 from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
-from ..tubes import to_tubes
+from ..geometry import to_tubes
 from .graphs import as_forest, global_shift
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
-COMPONENT_TYPES = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
+COMPONENT_TYPES = {"f4": 5126, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
 MOST_JOINTS = 65535  # published: glTF 2.0, 3.7.3.3, in which joints are counted in 16 bits at most
 SRGB_KNEE = 0.04045  # published: IEC 61966-2-1, where the curve of sRGB begins
 POINTS_MODE, TRIANGLES_MODE = 0, 4  # published: glTF 2.0, 5.24
@@ -100,14 +100,13 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
         raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
     if len(forest.edges) > MOST_JOINTS:
         raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
-    points, (kind, tensor) = cloud_points(mesh), open3d_class(mesh)
+    points = cloud_points(mesh)
     if not np.isfinite(points).all():
         raise InvalidCloudError("the surface has points that are not finite: drop them first")
     (low, high), (least, most) = ((each.min(axis=0), each.max(axis=0)) for each in (forest.vertices, points))
     if max((least - high).max(), (low - most).max()) > np.linalg.norm(high - low):  # its own size away
         raise InvalidCloudError("the surface is not where the skeleton is: are they in the same units and place?")
-    origin = global_shift(forest)
-    buffer = _Buffer()
+    origin, buffer = global_shift(forest), _Buffer()
     nodes, heads = _bones(forest, origin)
     found = skin_weights(forest, points, vertex_of_cloud(forest, points)[1])
     bones, weights = (np.pad(each, ((0, 0), (0, 2))) for each in found)  # glTF has four joints for each point
@@ -117,39 +116,34 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
         "POSITION": buffer.add(points - origin, "f4", "VEC3", bounds=True),
         "JOINTS_0": buffer.add(bones * (weights > 0), "u2", "VEC4"),
         "WEIGHTS_0": buffer.add(weights, "f4", "VEC4"),
+        **{name: buffer.add(values, "f4", "VEC3") for name, values in _looks(mesh, len(points)).items()},
     }
-    for name, values in _looks(mesh, len(points)).items():
-        attributes[name] = buffer.add(values, "f4", "VEC3")
     primitive: dict[str, Any] = {"attributes": attributes, "mode": POINTS_MODE}
+    (kind, tensor), triangles = open3d_class(mesh), np.empty((0, 3))
     if kind == "TriangleMesh":
         triangles = mesh.triangle.indices.cpu().numpy() if tensor else np.asarray(mesh.triangles)
-        if len(triangles):
-            primitive |= {"indices": buffer.add(triangles.reshape(-1), "u4", "SCALAR"), "mode": TRIANGLES_MODE}
-    place = {"translation": _upright(origin, up), "rotation": UPRIGHT[up]}
-    roots = np.flatnonzero(bone_before(forest) < 0).tolist()
-    n = len(nodes)
+    if len(triangles):
+        primitive |= {"indices": buffer.add(triangles.reshape(-1), "u4", "SCALAR"), "mode": TRIANGLES_MODE}
+    x, y, z = origin.tolist()
+    armature = {
+        "name": "armature",
+        "children": np.flatnonzero(bone_before(forest) < 0).tolist(),
+        "translation": [x, z, -y] if up == "z" else [x, y, z],
+        "rotation": UPRIGHT[up],
+    }
+    n, at_rest = len(nodes), buffer.add(inverse.transpose(0, 2, 1).reshape(-1, 16), "f4", "MAT4")
     tree = {
         "asset": {"version": "2.0", "generator": "glsk-o3d"},
         "scene": 0,
         "scenes": [{"nodes": [n, n + 1]}],
-        "nodes": [*nodes, {"name": "armature", "children": roots, **place}, {"name": "surface", "mesh": 0, "skin": 0}],
+        "nodes": [*nodes, armature, {"name": "surface", "mesh": 0, "skin": 0}],
         "meshes": [{"primitives": [primitive]}],
-        "skins": [
-            {
-                "joints": list(range(n)),
-                "skeleton": n,
-                "inverseBindMatrices": buffer.add(inverse.transpose(0, 2, 1).reshape(-1, 16), "f4", "MAT4"),
-            }
-        ],
-        **buffer.described(),
+        "skins": [{"joints": list(range(n)), "skeleton": n, "inverseBindMatrices": at_rest}],
+        "accessors": buffer.accessors,
+        "bufferViews": buffer.views,
+        "buffers": [{"byteLength": len(buffer.data)}],
     }
     return _binary(tree, buffer.data)
-
-
-def _upright(place: np.ndarray, up: str) -> list[float]:
-    """A place of the data in glTF's axes."""
-    x, y, z = place.tolist()
-    return [x, z, -y] if up == "z" else [x, y, z]
 
 
 def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
@@ -157,14 +151,12 @@ def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
     name, tensor = open3d_class(mesh)
     if name not in ("PointCloud", "TriangleMesh"):
         return {}
-    if tensor:
-        held = mesh.vertex if name == "TriangleMesh" else mesh.point
-        parts = (held[key].cpu().numpy() if key in held else np.empty((0, 3)) for key in ("normals", "colors"))
-    else:
-        start = "vertex_" if name == "TriangleMesh" else ""
-        parts = (np.asarray(getattr(mesh, f"{start}{key}")) for key in ("normals", "colors"))
-    normals, colors = parts
-    found = {}
+    held = (mesh.vertex if name == "TriangleMesh" else mesh.point) if tensor else {}
+    start, found = "vertex_" if name == "TriangleMesh" else "", {}
+    normals, colors = (
+        held[key].cpu().numpy() if key in held else np.asarray(getattr(mesh, f"{start}{key}", np.empty((0, 3))))
+        for key in ("normals", "colors")
+    )
     if len(normals) == n and (norm(normals) > 0).all():
         found["NORMAL"] = unit(normals)
     if len(colors) == n:
@@ -207,10 +199,6 @@ class _Buffer:
         self.accessors.append({**facts, "type": shape, **limits})
         self.data += array.tobytes()
         return len(self.accessors) - 1
-
-    def described(self) -> dict[str, Any]:
-        """The part of the file's tree that says what is where."""
-        return {"accessors": self.accessors, "bufferViews": self.views, "buffers": [{"byteLength": len(self.data)}]}
 
 
 def _binary(tree: dict[str, Any], data: bytearray) -> bytes:

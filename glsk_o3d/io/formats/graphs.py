@@ -76,15 +76,10 @@ def as_forest(skeleton: Skeleton, cut: bool, root: RootPlace | None) -> Skeleton
         return forest
     if root is not None:
         return reroot(forest, root)
-    if is_outward(forest):
+    if len(np.unique(forest.edges[:, 1])) == len(forest.edges):  # no vertex has two neighbours of lower number
         return forest
     table = branch_table(forest)
     return numbered_from(forest, int(table.start[np.argmin(table.level)]))
-
-
-def is_outward(skeleton: Skeleton) -> bool:
-    """Whether no vertex has two neighbours of lower number: then it is a forest, numbered from its roots outwards."""
-    return len(np.unique(skeleton.edges[:, 1])) == len(skeleton.edges)
 
 
 def parents(forest: Skeleton) -> np.ndarray:

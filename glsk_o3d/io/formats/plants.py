@@ -1,4 +1,7 @@
-"""MTG and the node lists of TomatoWUR: keep places, radii and axes of plants; lose all else.
+"""SWC, MTG and the node lists of TomatoWUR: places, radii and axes of trees numbered from the root; no cloud.
+
+Tools for neurons and plants open SWC; many compute in float32. Where that would lose digits, as in coordinates of a
+map, a shift of whole units is taken off and noted in the header, ``# global_shift: x y z``; reading adds it again.
 
 In MTG, the multiscale tree graphs of Godin and Caraglio (1998) in the syntax of AMAPmod, FORM-A, a plant is decomposed
 into nodes, a line each. ``<`` goes on along an axis, ``+`` branches off one column further right, and ``^`` continues
@@ -9,15 +12,22 @@ has both here, so that all its readers take it.
 
 from __future__ import annotations
 
+import logging
+import re
+
 import numpy as np
 
 from ...analysis.branches import branch_table
 from ...errors import FileFormatError
+from ...judgements import coordinates
 from ...numerics.polylines import arc_lengths
 from ...skeleton import Skeleton
-from .graphs import graph_skeleton, parents, text
+from .graphs import global_shift, graph_skeleton, line, parents, text, words_by_line
+
+_log = logging.getLogger(__name__)
 
 NODE_COLUMNS = ("x", "y", "z", "x_skeleton", "y_skeleton", "z_skeleton", "vid", "parentid", "edgetype", "radius")
+_SHIFT = re.compile(r"#\s*global_shift:\s*(\S+)\s+(\S+)\s+(\S+)")
 _MTG_HEADER = """\
 CODE:\tFORM-A
 
@@ -40,6 +50,37 @@ ZZ\tREAL
 radius\tREAL
 
 MTG:"""
+
+
+def write_swc(forest: Skeleton) -> bytes:
+    """The content of an SWC file of a skeleton that is numbered from its roots outwards."""
+    shift = global_shift(forest)
+    shift *= ((forest.vertices - shift) + shift == forest.vertices).all()  # what is read must be what was
+    header = ["# curve skeleton written by glsk-o3d: id type x y z radius parent"]
+    if shift.any():
+        _log.warning("written less a global shift of (%s), since float32 would lose digits", coordinates(shift))
+        header.append(line("# global_shift:", *shift.tolist()))
+    parent = parents(forest)
+    number = np.where(parent >= 0, parent + 1, -1).tolist()
+    table = np.column_stack([forest.vertices - shift, forest.radii]).tolist()
+    rows = [line(i, 0, *row, before) for i, (row, before) in enumerate(zip(table, number, strict=True), 1)]
+    return text([*header, *rows])
+
+
+def read_swc(data: bytes) -> Skeleton:
+    """The skeleton in the content of an SWC file."""
+    table = np.array([[float(word) for word in words[:7]] for words in words_by_line(data)])
+    if table.ndim != 2 or table.shape[1] != 7:
+        raise ValueError("it has no rows of 7 numbers (id type x y z radius parent)")
+    names, parent = table[:, 0], table[:, 6]
+    order = np.argsort(names)
+    child = np.flatnonzero(parent >= 0)
+    place = np.searchsorted(names[order], parent[child]).clip(max=len(names) - 1)
+    if (names[order][place] != parent[child]).any() or len(np.unique(names)) < len(names):
+        raise ValueError("a parent is not there, or two rows have one id")
+    shift = _SHIFT.search(data.decode("utf-8", "replace"))
+    origin = [float(word) for word in shift.groups()] if shift else 0.0
+    return graph_skeleton(table[:, 2:5] + origin, np.column_stack([child, order[place]]), table[:, 5])
 
 
 def write_mtg(forest: Skeleton) -> bytes:

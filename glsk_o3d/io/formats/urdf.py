@@ -28,8 +28,15 @@ def write(skeleton: Skeleton) -> bytes:
     that leads to it, as thick as its ends on average; what has no size is left out. Masses are those of solid cylinders
     of `URDF_DENSITY`, of a root that of its ball.
     """
-    _check(skeleton)
     vertices, radii = skeleton.vertices, skeleton.radii
+    if not np.isfinite(vertices).all():
+        raise FileFormatError("URDF needs finite coordinates, and some vertices have none")
+    unknown = np.count_nonzero(~np.isfinite(radii))
+    if unknown:
+        raise FileFormatError(
+            f"URDF needs radii, and {unknown} of {len(radii)} vertices have none: read the skeleton from a format that "
+            "holds them, such as .json or .ply, or skeletonise the cloud again"
+        )
     before = parents(skeleton)
     root = before < 0
     parent = np.where(root, np.arange(len(vertices)), before)
@@ -64,17 +71,6 @@ def write(skeleton: Skeleton) -> bytes:
         SubElement(joint, "child", link=f"link_{i}")
     indent(robot)
     return tostring(robot, encoding="utf-8", xml_declaration=True) + b"\n"
-
-
-def _check(skeleton: Skeleton) -> None:
-    if not np.isfinite(skeleton.vertices).all():
-        raise FileFormatError("URDF needs finite coordinates, and some vertices have none")
-    unknown = np.count_nonzero(~np.isfinite(skeleton.radii))
-    if unknown:
-        raise FileFormatError(
-            f"URDF needs radii, and {unknown} of {len(skeleton.radii)} vertices have none: "
-            "read the skeleton from a format that holds them, such as .json or .ply, or skeletonise the cloud again"
-        )
 
 
 def _solids(length: np.ndarray, radius: np.ndarray, ball: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

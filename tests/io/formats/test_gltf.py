@@ -1,9 +1,8 @@
 """A rig: what a glTF library finds in it, and that turning a bone moves what hangs on it and nothing else."""
 
-import json
-
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Skeleton
 from glsk_o3d.analysis.skinning import skin_weights
@@ -29,18 +28,9 @@ def world(file, turned=None):
     def visit(number, above):
         node, here = file.nodes[number], np.eye(4)
         here[:3, 3] = node.translation or 0
-        if node.rotation:
-            x, y, z, w = node.rotation
-            here[:3, :3] = np.array(
-                [
-                    [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                    [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                    [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-                ]
-            )
+        here[:3, :3] = Rotation.from_quat(node.rotation or [0, 0, 0, 1]).as_matrix()
         if turned is not None and turned[0] == number:
-            c, s = np.cos(turned[1]), np.sin(turned[1])
-            here[:3, :3] = here[:3, :3] @ [[1, 0, 0], [0, c, -s], [0, s, c]]
+            here[:3, :3] = here[:3, :3] @ Rotation.from_euler("x", turned[1]).as_matrix()
         found[number] = above @ here
         for child in node.children or ():
             visit(child, found[number])
@@ -80,6 +70,7 @@ def test_at_rest_everything_is_where_it_was(tree, rig, up, offset):
     turn = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]] if up == "z" else np.eye(3))
     np.testing.assert_allclose(skinned(file), (cloud + offset) @ turn.T, rtol=0, atol=1e-5)
     forest = as_forest(moved, True, None)
+    assert len({node.name for node in file.nodes}) == len(forest.edges) + 2
     heads = np.array([world(file)[joint][:3, 3] for joint in file.skins[0].joints])
     np.testing.assert_allclose(heads, forest.vertices[forest.edges[:, 0]] @ turn.T, rtol=0, atol=1e-5)
 
@@ -113,16 +104,21 @@ def test_weights_are_continuous_along_the_curve_and_sum_to_one(tree):
         assert np.abs(np.diff(dense, axis=0)).max() < 0.021  # twice a hundredth of an edge
 
 
-def test_a_mesh_keeps_its_triangles_and_a_cloud_has_none(tree, rig):
+def test_triangles_normals_and_colours_go_along(tree, rig):
     import open3d as o3d
 
-    mesh = o3d.geometry.TriangleMesh.create_octahedron()
+    mesh = tree.to_tubes((1.0, 0.5, 0.0))
     for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
-        part = rig(tree, given).meshes[0].primitives[0]
-        assert part.mode == 4
         file = rig(tree, given)
+        part = file.meshes[0].primitives[0]
+        assert part.mode == 4
         np.testing.assert_array_equal(accessor(file, part.indices).reshape(-1, 3), np.asarray(mesh.triangles))
-    assert rig(tree, np.asarray(mesh.vertices)).meshes[0].primitives[0].mode == 0
+        normals = accessor(file, part.attributes.NORMAL)
+        np.testing.assert_allclose(normals, np.asarray(mesh.vertex_normals), atol=1e-6)
+        # sRGB's half is 0.214 in linear light
+        np.testing.assert_allclose(accessor(file, part.attributes.COLOR_0)[0], [1, 0.2140, 0], atol=1e-3)
+    bare = rig(tree, np.asarray(mesh.vertices)).meshes[0].primitives[0]
+    assert (bare.mode, bare.attributes.NORMAL, bare.attributes.COLOR_0) == (0, None, None)
 
 
 def test_without_radii_the_points_are_the_surface(rig):
@@ -153,29 +149,3 @@ def test_what_cannot_be_rigged(tree, make, tmp_path):
     with pytest.raises(InvalidParameterError, match="up = 'x'"):
         save_rig(tree, path, up="x")
     assert not list(tmp_path.iterdir())
-
-
-def test_the_file_is_binary_gltf(tree, tmp_path):
-    tree.save(tmp_path / "s.glb")
-    data = (tmp_path / "s.glb").read_bytes()
-    assert data[:4] == b"glTF"
-    assert int.from_bytes(data[8:12], "little") == len(data)
-    length = int.from_bytes(data[12:16], "little")
-    names = [node["name"] for node in json.loads(data[20 : 20 + length])["nodes"]]
-    assert len(set(names)) == len(names) == len(tree.edges) + 2
-
-
-def test_normals_and_colours_go_along(tree, rig):
-    import open3d as o3d
-
-    mesh = tree.to_tubes((1.0, 0.5, 0.0))
-    for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
-        file = rig(tree, given)
-        part = file.meshes[0].primitives[0].attributes
-        assert file.meshes[0].primitives[0].mode == 4
-        np.testing.assert_allclose(accessor(file, part.NORMAL), np.asarray(mesh.vertex_normals), atol=1e-6)
-        # sRGB's half is 0.214 in linear light
-        np.testing.assert_allclose(accessor(file, part.COLOR_0)[0], [1, 0.2140, 0], atol=1e-3)
-    bare = rig(tree, np.asarray(mesh.vertices)).meshes[0].primitives[0].attributes
-    assert bare.NORMAL is None
-    assert bare.COLOR_0 is None

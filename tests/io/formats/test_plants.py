@@ -1,4 +1,4 @@
-"""Plants as MTG and as node lists of TomatoWUR: by hand, and as their own readers have them."""
+"""Trees as SWC, MTG and node lists of TomatoWUR: by hand, and as their own readers have them."""
 
 import csv
 import importlib
@@ -13,30 +13,7 @@ import pytest
 from glsk_o3d import FileFormatError, Skeleton, editing, pipelines, samples
 from glsk_o3d.io.formats import plants
 from glsk_o3d.io.formats.plants import plant_axes
-
-HEAD = """\
-CODE:\tFORM-A
-
-CLASSES:
-SYMBOL\tSCALE\tDECOMPOSITION\tINDEXATION\tDEFINITION
-$\t0\tFREE\tFREE\tIMPLICIT
-P\t1\tCONNECTED\tFREE\tIMPLICIT
-N\t2\tNONE\tFREE\tEXPLICIT
-
-DESCRIPTION:
-LEFT\tRIGHT\tRELTYPE\tMAX
-N\tN\t+\t?
-N\tN\t<\t1
-
-FEATURES:
-NAME\tTYPE
-XX\tREAL
-YY\tREAL
-ZZ\tREAL
-radius\tREAL
-
-MTG:
-"""
+from glsk_o3d.io.skeletons import read_skeleton
 
 
 def graph(places, edges, radii=0.1):
@@ -85,6 +62,37 @@ def orders(parent, begins):
     return order
 
 
+# ------------------------------------------------------------------------------------------------------------------ SWC
+
+
+def test_swc_as_others_write_it(tmp_path):
+    path = tmp_path / "s.swc"
+    path.write_bytes("# Bäume\n\n 30 3 1 1 1 0.5 7\n7 1 0 0 0 2 -1\n9 3 2 0 0 .5 30 extra\n".encode("latin-1"))
+    back = read_skeleton(path)
+    np.testing.assert_array_equal(back.edges, [[0, 1], [0, 2]])
+    np.testing.assert_array_equal(back.radii, [0.5, 2, 0.5])
+
+
+def test_swc_cuts_the_longest_edges_and_keeps_those_of_no_length(loop, make, tmp_path):
+    loop.save(tmp_path / "s.swc", cut_loops=True)
+    tree = read_skeleton(tmp_path / "s.swc")
+    assert (len(tree.edges), tree.n_loops, tree.n_components) == (len(loop.edges) - loop.n_loops, 0, 1)
+    # Of two loops sharing the chord both the chord and one more edge go: the chord is the longest.
+    lengths = np.sort(loop.edge_lengths)
+    assert tree.length == pytest.approx(lengths[:5].sum())
+    assert tree.edge_lengths.max() < lengths[-1]
+    make(np.zeros((3, 3)), [[0, 1], [1, 2]]).save(tmp_path / "s.swc")
+    assert len(read_skeleton(tmp_path / "s.swc").edges) == 2
+
+
+def test_coordinates_of_a_map_are_shifted_along_the_axes_that_need_it(tmp_path, caplog):
+    far = graph([[5e5, 5.4e6, -0.05], [5e5 + 0.25, 5.4e6 + 0.125, 10.0]], [[0, 1]], 0.01)
+    far.save(tmp_path / "s.swc")
+    assert "# global_shift: 500000.0 5400000.0 0.0" in (tmp_path / "s.swc").read_text()
+    assert "global shift of (500000.00, 5400000.00, 0)" in caplog.text
+    np.testing.assert_array_equal(read_skeleton(tmp_path / "s.swc").vertices, far.vertices)
+
+
 # ----------------------------------------------------------------------------------------------------------------- axes
 
 
@@ -127,7 +135,9 @@ def test_mtg_by_hand():
         "\t+N3\t1.0\t0.0\t1.0\t0.000000001",
         "^<N2\t\t0.0\t0.0\t2.0\t0.2",
     ]
-    assert plants.write_mtg(two_branches()).decode() == HEAD + "\n".join(rows) + "\n"
+    head = plants._MTG_HEADER + "\n"
+    assert plants.write_mtg(two_branches()).decode() == head + "\n".join(rows) + "\n"
+    assert plants.write_mtg(graph((), (), ())).decode() == head + "ENTITY-CODE\tXX\tYY\tZZ\tradius\n"
 
 
 def test_mtg_in_the_reader_of_openalea(tree, read_mtg_file, tmp_path):
@@ -154,10 +164,6 @@ def test_mtg_in_the_reader_of_openalea(tree, read_mtg_file, tmp_path):
     np.testing.assert_array_equal(place, np.column_stack([two.vertices, two.radii]))
 
 
-def test_mtg_of_nothing_has_a_header():
-    assert plants.write_mtg(Skeleton((), (), (), (), (), ())).decode() == HEAD + "ENTITY-CODE\tXX\tYY\tZZ\tradius\n"
-
-
 # ------------------------------------------------------------------------------------------------------------ TomatoWUR
 
 
@@ -171,26 +177,19 @@ def test_node_list_by_hand():
     )
 
 
-@pytest.mark.parametrize("load", ["load_csv", "from_nodelist", "from_skeleton_gt_data"])
-def test_node_list_in_tomatowur(tree, skeleton_graph, load, tmp_path):
-    path = tmp_path / "t.plant.csv"
-    path.write_bytes(plants.write_csv(tree))
-    found = skeleton_graph(path) if load == "load_csv" else getattr(skeleton_graph, load)(path)
-    found.get_node_order()  # fails on what is not a tree from node 0
-    places = found.get_node_attribute("pos")
-    np.testing.assert_allclose(np.sort(places, axis=0), np.sort(tree.vertices, axis=0), rtol=1e-15)
-    ends = places[found.get_edges()]
-    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(tree.length, rel=1e-12)
-    written = {tuple(pair) for pair in np.round(tree.vertices[tree.edges], 9).reshape(-1, 6).tolist()}
-    assert {tuple(pair) for pair in np.round(ends, 9).reshape(-1, 6).tolist()} == written
-    assert sorted(found.get_node_attribute("node_order")) == sorted(orders(*plant_axes(tree)))
-
-
-def test_mtg_in_tomatowur(tree, skeleton_graph, tmp_path):
-    (tmp_path / "t.mtg").write_bytes(plants.write_mtg(tree))
-    found = skeleton_graph.from_mtg(str(tmp_path / "t.mtg"))
+@pytest.mark.parametrize("load", ["load_csv", "from_nodelist", "from_skeleton_gt_data", "from_mtg"])
+def test_trees_in_tomatowur(tree, skeleton_graph, load, tmp_path):
+    path = tmp_path / ("t.mtg" if load == "from_mtg" else "t.plant.csv")
+    tree.save(path)
+    given = str(path) if load == "from_mtg" else path
+    found = skeleton_graph(path) if load == "load_csv" else getattr(skeleton_graph, load)(given)
     ends = found.get_node_attribute("pos")[found.get_edges()]
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(tree.length, rel=1e-12)
+    if load != "from_mtg":
+        found.get_node_order()  # fails on what is not a tree from node 0
+        written = {tuple(pair) for pair in np.round(tree.vertices[tree.edges], 9).reshape(-1, 6).tolist()}
+        assert {tuple(pair) for pair in np.round(ends, 9).reshape(-1, 6).tolist()} == written
+        assert sorted(found.get_node_attribute("node_order")) == sorted(orders(*plant_axes(tree)))
 
 
 def test_node_list_holds_one_plant_and_leaves_out_what_is_not_known():

@@ -1,33 +1,77 @@
+"""PLY: skeletons in other programs, and tables of all kinds: those that are right are read, others are refused."""
+
+import io
+import struct
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.formats.ply import read_tables
+from glsk_o3d.io.scans import read_scan
 from glsk_o3d.io.skeletons import read_skeleton
 
+CODES = {"uchar": "B", "int": "i", "float": "f", "double": "d", "ushort": "H"}
+FORMATS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+XYZ = ["double x", "double y", "double z"]
+FACE = ["list uchar int vertex_indices"]
+SQUARE = [(0.0, 0.0, 0.5), (1.0, 0.0, 0.5), (1.0, 1.0, 0.5), (0.0, 1.0, 0.5)]
+all_formats = pytest.mark.parametrize("format", FORMATS)
 
-def test_ply_in_open3d(skeleton, tmp_path):
+
+def ply(format, *elements):
+    """A file of elements: their names, columns ("type name", "list count type name"), and rows of values and lists."""
+    head, body = [f"ply\r\nformat {format} 1.0\r\ncomment {'x' * 2000}\n"], b""
+    for name, columns, rows in elements:
+        head += [f"element {name} {len(rows)}\n", *(f"property {column}\n" for column in columns)]
+        for row in rows:
+            words = []
+            for column, value in zip(columns, row, strict=True):
+                *_, count, kind, _ = ["", "", *column.split()]
+                if column.startswith("list"):
+                    words += [(count, len(value)), *((kind, each) for each in value)]
+                else:
+                    words.append((kind, value))
+            if format == "ascii":
+                body += (" ".join(repr(value) for _, value in words) + "\n").encode()
+            else:
+                body += b"".join(struct.pack(FORMATS[format] + CODES[kind], value) for kind, value in words)
+    return "".join([*head, "end_header\n"]).encode() + body
+
+
+@pytest.fixture
+def scan(tmp_path):
+    def read(data):
+        (tmp_path / "m.ply").write_bytes(data)
+        return read_scan(tmp_path / "m.ply")
+
+    return read
+
+
+# ----------------------------------------------------------------------------------------------------------- skeletons
+
+
+def test_ply_in_open3d_and_written_by_it(skeleton, tmp_path):
     import open3d as o3d
 
     if not len(skeleton.edges):
         pytest.skip("Open3D reads no line set without lines")
-    skeleton.save(tmp_path / "s.ply")
-    lines = o3d.io.read_line_set(str(tmp_path / "s.ply"))
+    path = str(tmp_path / "s.ply")
+    skeleton.save(path)
+    lines = o3d.io.read_line_set(path)
     np.testing.assert_array_equal(np.asarray(lines.points), skeleton.vertices)
     np.testing.assert_array_equal(np.asarray(lines.lines), skeleton.edges)
-    cloud = o3d.t.io.read_point_cloud(str(tmp_path / "s.ply"))
+    cloud = o3d.t.io.read_point_cloud(path)
     np.testing.assert_array_equal(cloud.point["radius"].numpy().ravel(), skeleton.radii)
-
-
-def test_meshlab_opens_it(skeleton, tmp_path):
-    pymeshlab = pytest.importorskip("pymeshlab")
-    skeleton.save(tmp_path / "s.ply")
-    meshes = pymeshlab.MeshSet()
-    meshes.load_new_mesh(str(tmp_path / "s.ply"))
-    mesh = meshes.current_mesh()
-    np.testing.assert_array_equal(mesh.vertex_matrix(), skeleton.vertices)
-    np.testing.assert_array_equal(mesh.edge_matrix().reshape(-1, 2), skeleton.edges)
-    np.testing.assert_array_equal(mesh.vertex_scalar_array(), skeleton.radii)  # by which it colours
+    for text in (True, False):
+        o3d.io.write_line_set(path, skeleton.to_line_set(), write_ascii=text)
+        back = read_skeleton(path)
+        np.testing.assert_allclose(back.vertices, skeleton.vertices, rtol=1e-5 if text else 0)
+        np.testing.assert_array_equal(back.edges, skeleton.edges)
+        assert np.isnan(back.radii).all()
 
 
 def test_the_half_axes_come_back(tree, tmp_path):
@@ -40,31 +84,100 @@ def test_the_half_axes_come_back(tree, tmp_path):
     np.testing.assert_array_equal(read_skeleton(tmp_path / "s.ply").half_width, tree.radii)
 
 
-def test_ply_written_by_open3d(tree, tmp_path):
-    import open3d as o3d
+@all_formats
+def test_lines_of_others_in_all_byte_orders(tmp_path, format):
+    vertices = "vertex", [*XYZ, "float radius"], [(0.0, 0.5, 1.0, 2.0), (3.0, 4.0, 5.0, 6.0)]
+    edges = "edge", ["ushort vertex1", "int vertex2"], [(1, 0)]
+    (tmp_path / "s.ply").write_bytes(ply(format, vertices, ("face", FACE, []), edges))
+    back = read_skeleton(tmp_path / "s.ply")
+    np.testing.assert_array_equal(back.vertices, [[0, 0.5, 1], [3, 4, 5]])
+    np.testing.assert_array_equal(back.edges, [[0, 1]])
+    np.testing.assert_array_equal(back.radii, [2, 6])
 
-    for text in (True, False):
-        o3d.io.write_line_set(str(tmp_path / "s.ply"), tree.to_line_set(), write_ascii=text)
-        back = read_skeleton(tmp_path / "s.ply")
-        np.testing.assert_allclose(back.vertices, tree.vertices, rtol=1e-5 if text else 0)
-        np.testing.assert_array_equal(back.edges, tree.edges)
-        assert np.isnan(back.radii).all()
+
+# --------------------------------------------------------------------------------------------------------------- scans
 
 
-def test_ply_of_all_byte_orders_gives_the_same(tmp_path):
-    header = "ply\r\nformat {} 1.0\r\ncomment x\r\nelement vertex 2\r\nproperty double x\r\nproperty double y\r\n"
-    header += (
-        "property double z\r\nproperty float radius\r\nelement face 0\r\nproperty list uchar int vertex_indices\r\n"
-    )
-    header += "element edge 1\r\nproperty ushort vertex1\r\nproperty int vertex2\r\nend_header\r\n"
-    bodies = {"ascii": b"0 0.5 1 2\n3 4 5 6\n1 0\n"}
-    for name, order in (("binary_little_endian", "<"), ("binary_big_endian", ">")):
-        kinds = [(c, order + k) for c, k in zip("xyzr", ("f8", "f8", "f8", "f4"), strict=True)]
-        rows = np.array([(0, 0.5, 1, 2), (3, 4, 5, 6)], kinds)
-        bodies[name] = rows.tobytes() + np.array((1, 0), [("a", order + "u2"), ("b", order + "i4")]).tobytes()
-    for name, body in bodies.items():
-        (tmp_path / "s.ply").write_bytes(header.format(name).encode() + body)
-        back = read_skeleton(tmp_path / "s.ply")
-        np.testing.assert_array_equal(back.vertices, [[0, 0.5, 1], [3, 4, 5]])
-        np.testing.assert_array_equal(back.edges, [[0, 1]])
-        np.testing.assert_array_equal(back.radii, [2, 6])
+@all_formats
+@pytest.mark.parametrize(
+    ("faces", "triangles"),
+    [
+        ([(0, 1, 2), (0, 2, 3)], [[0, 1, 2], [0, 2, 3]]),
+        ([(0, 1, 2, 3)], [[0, 1, 2], [0, 2, 3]]),
+        ([(0, 1, 2, 3), (3, 1, 0)], [[0, 1, 2], [0, 2, 3], [3, 1, 0]]),
+        ([(), (1, 2, 3), (1, 2)], [[1, 2, 3]]),
+        ([(0, 1, 9), (0, 1, 2), (0, -1, 2)], [[0, 1, 2]]),
+        ([(0, 1, 2, 7)], [[0, 1, 2]]),
+        ([], []),
+    ],
+    ids=str,
+)
+def test_faces_become_triangles(scan, format, faces, triangles):
+    mesh = scan(ply(format, ("vertex", XYZ, SQUARE), ("face", FACE, [(face,) for face in faces])))
+    np.testing.assert_array_equal(mesh.positions, SQUARE)
+    np.testing.assert_array_equal(mesh.triangles, np.reshape(triangles, (-1, 3)))
+
+
+@all_formats
+def test_properties_of_all_kinds(scan, format):
+    columns = [*XYZ, *(f"uchar {name}" for name in ("red", "green", "blue")), *(f"float n{axis}" for axis in "xyz")]
+    columns += ["int class", "uchar alpha"]
+    rows = [(*place, 255, 0, 51, 0.0, 0.6, 0.8, i, 7) for i, place in enumerate(SQUARE)]
+    found = scan(ply(format, ("vertex", columns, rows)))
+    np.testing.assert_allclose(found.colors, [[1, 0, 0.2]] * 4)
+    np.testing.assert_allclose(found.normals, [[0, 0.6, 0.8]] * 4, rtol=1e-6)
+    held = {key: values.tolist() for key, values in found.attributes.items()}
+    assert held == {"class_": [0, 1, 2, 3], "alpha": [7] * 4}
+    assert all(values.dtype.isnative for values in found.attributes.values())
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    rows=st.lists(
+        st.tuples(st.lists(st.integers(0, 9), max_size=4), st.integers(-9, 9)),
+        min_size=1,
+        max_size=6,
+    ),
+    format=st.sampled_from(list(FORMATS)),
+)
+def test_lists_of_all_lengths_wherever_they_stand(rows, format):
+    elements = ("odd", ["list uchar ushort some", "int more"], rows), ("vertex", XYZ, SQUARE)
+    tables = read_tables(io.BytesIO(ply(format, *elements)), "vertex", "odd")
+    some = tables["odd"]["some"]
+    np.testing.assert_array_equal(some.counts, [len(values) for values, _ in rows])
+    np.testing.assert_array_equal(some.values, [value for values, _ in rows for value in values])
+    np.testing.assert_array_equal(tables["odd"]["more"], [more for _, more in rows])
+    np.testing.assert_array_equal(np.column_stack([tables["vertex"][axis] for axis in "xyz"]), SQUARE)
+
+
+@pytest.mark.parametrize("lists", [[(), (), (), ()], [(1, 2), (3, 4), (5, 6), (7, 8)], [(1,), (), (2, 3), (4, 5, 6)]])
+@all_formats
+def test_a_file_that_ends_anywhere_before_its_tables_do_is_refused(scan, format, lists):
+    faces = [((0, 1, 2),), ((0, 1, 2, 3),), ((1, 2, 3),)]
+    for elements in (
+        [("odd", ["list uchar ushort some", "int more"], [(each, 7) for each in lists]), ("vertex", XYZ, SQUARE)],
+        [("vertex", [*XYZ, "list uchar int near"], [(*at, each) for at, each in zip(SQUARE, lists, strict=True)])],
+        [("vertex", XYZ, SQUARE), ("face", FACE, faces)],
+    ):
+        whole = ply(format, *elements).rstrip(b"\n")
+        head, last = whole.index(b"end_header\n"), whole.rindex(b"\n") if format == "ascii" else len(whole) - 1
+        for cut in (*range(0, head, 97), *range(head, last, 5), last):
+            with pytest.raises(FileFormatError, match=r"m\.ply"):
+                scan(whole[:cut])
+
+
+@pytest.mark.parametrize(
+    ("header", "says"),
+    [
+        ("element vertex 2\nproperty float x\nproperty float x\nproperty float y\n", "two properties of one name"),
+        ("element vertex 2\nproperty float x\nproperty float y\n", "no x, y and z"),
+        ("element vertex 2\nproperty list float int x\n", "has the line"),
+        ("element vertex 2\n", "m.ply"),
+        ("element face 1\nproperty list uchar int vertex_indices\n", "no element 'vertex'"),
+        ("comment \n" * 9999, "does not end"),
+        ("comment " + "x" * 100_000 + "\n", "has the line"),
+    ],
+)
+def test_headers_that_make_no_sense(scan, header, says):
+    with pytest.raises(FileFormatError, match=says):
+        scan(f"ply\nformat binary_little_endian 1.0\n{header}end_header\n".encode() + b"\1" * 64)

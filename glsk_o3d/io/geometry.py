@@ -1,23 +1,94 @@
-"""A skeleton as tubes."""
+"""A skeleton as Open3D's line sets, and as a mesh of tubes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..analysis.segmentation import branch_of_edge
 from ..errors import InvalidParameterError
 from ..interop.packages import import_open3d
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import TINY, dot, unit
 from ..refinement.sections import measure_sections
+from ..skeleton import OF_VERTICES, Skeleton
 from .colors import ColorChoice, shades
 
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
 
-__all__ = ["to_tubes"]
+def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
+    """A skeleton as a legacy line set, coloured by what is known of it.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
+        What the colours of the edges show, or the one colour of all; see `glsk_o3d.io.colors.shades`.
+
+    Returns
+    -------
+    open3d.geometry.LineSet
+
+    Raises
+    ------
+    InvalidParameterError, MissingPackageError
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(1000).points)
+    >>> len(to_line_set(ring, "radius").colors) == len(ring.edges)
+    True
+    """
+    lines = skeleton.to_line_set()
+    shown = shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
+    lines.colors = import_open3d().utility.Vector3dVector(np.ascontiguousarray(shown).reshape(-1, 3))
+    return lines
+
+
+def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> Any:
+    """A skeleton as a tensor line set on the CPU, with all that is known of its vertices and edges.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    color : as of `to_line_set`, optional
+
+    Returns
+    -------
+    open3d.t.geometry.LineSet
+        With ``point.positions`` (M, 3), ``point.radius``, ``point.confidence``, ``point.half_width``,
+        ``point.half_thickness`` and ``point.support`` (M, 1) float64, ``line.indices`` (E, 2) int64, ``line.branch``
+        (E, 1) int32 and, with a color, ``line.colors`` (E, 3) float64.
+
+    Raises
+    ------
+    InvalidParameterError, MissingPackageError
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(1000).points)
+    >>> to_tensor_line_set(ring).line.branch.shape[0] == len(ring.edges)
+    True
+    """
+    o3d, branch = import_open3d(), branch_of_edge(skeleton)
+    lines = o3d.t.geometry.LineSet()
+
+    def put(where: Any, name: str, values: np.ndarray, dtype: type, columns: int = 1) -> None:
+        where[name] = o3d.core.Tensor(np.ascontiguousarray(values, dtype).reshape(-1, columns))
+
+    put(lines.point, "positions", skeleton.vertices, float, 3)
+    for name, field in zip(("radius", *OF_VERTICES[1:]), OF_VERTICES, strict=True):
+        put(lines.point, name, getattr(skeleton, field), float)
+    put(lines.line, "indices", skeleton.edges, np.int64, 2)
+    put(lines.line, "branch", branch, np.int32)
+    if color is not None:
+        put(lines.line, "colors", shades(skeleton, color, branch, skeleton.edges), float, 3)
+    return lines
 
 
 def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
@@ -32,7 +103,7 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     skeleton : Skeleton
         A vertex without edges becomes a ball.
     color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
-        See `glsk_o3d.io.colors.shades`.
+        What the colours of the branches or vertices show, or the one colour of all.
     radius : float, optional
         One radius for all, in the cloud's units, instead of the sections of the vertices.
     sides : int

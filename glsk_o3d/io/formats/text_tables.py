@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import logging
 import re
-from collections.abc import Sequence
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple, TextIO
@@ -19,10 +19,11 @@ import numpy as np
 
 from ...interop.verbosity import following_open3d
 from ..paths import breaks_off
-from .scanned import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, named_attributes, unit_colors
+from ..scan import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, named_attributes, unit_colors
 
 _log = logging.getLogger(__name__)
 
+_COMMENTS = ["#", "//", "%"]
 LOOK_AHEAD = 20  # fitted: lines in which a decimal comma shows
 HEADER_LINES = 100  # fitted to nothing: longer headers are those of other files
 UNIT_SLACK = 0.01  # measured: normals in text have two digits at the least
@@ -57,39 +58,39 @@ def holds_points(path: Path) -> bool:
     """Whether a file of text looks like a cloud: a line has three numbers, and columns with names have x, y and z."""
     if not path.is_file():  # a pipe may never end
         return False
-    try:
-        with path.open(encoding="utf-8-sig", errors="replace") as stream:
-            _layout(stream)
-    except (NoPoints, OSError):
-        return False
-    return True
+    with suppress(NoPoints, OSError), path.open(encoding="utf-8-sig", errors="replace") as stream:
+        return bool(_layout(stream))
+    return False
 
 
 def read(path: Path) -> Scan:
     """The points of a file of text; NoPoints if there is none. Lines that hold no point are skipped and logged."""
-    ending = path.suffix.lower()
+    ending, first = path.suffix.lower(), ""
     with path.open(encoding="utf-8-sig", errors="replace") as stream:
-        first = stream.readline(64).strip()
-        if ending == ".pts" and not first.isdigit():
-            raise ValueError("its first line is not the number of points")
-        stream.seek(0)
+        if ending == ".pts":
+            first = stream.readline(64).strip()
+            if not first.isdigit():
+                raise ValueError("its first line is not the number of points")
+            stream.seek(0)
         layout = _layout(stream)
         stream.seek(0)
         rows = _rows(stream, layout, path)
-    if ending == ".pts" and len(rows) < int(first):
+    if first and len(rows) < int(first):
         raise breaks_off(int(first), len(rows))
     names = [layout.names[column] for column in layout.columns] if layout.names else []
     roles = [_role(name) for name in names] or _guess(rows, ending)
+    used = [roles.index(axis) for axis in "xyz"]
 
-    def together(wanted: Sequence[str]) -> np.ndarray | None:
-        return rows[:, [roles.index(role) for role in wanted]] if set(wanted) <= set(roles) else None
+    def together(wanted: list[str]) -> np.ndarray | None:
+        if not set(wanted) <= set(roles):
+            return None
+        chosen = [roles.index(role) for role in wanted]
+        used.extend(chosen)
+        return rows[:, chosen]
 
-    positions = rows[:, list(map(roles.index, "xyz"))]
-    colors, normals = together(COLOR_CHANNELS), together(NORMAL_NAMES)
-    used = {*"xyz", *(COLOR_CHANNELS if colors is not None else ()), *(NORMAL_NAMES if normals is not None else ())}
-    others = [i for i, role in enumerate(roles) if role not in used or i != roles.index(role)]
+    positions, colors, normals = rows[:, used], together(COLOR_CHANNELS), together(NORMAL_NAMES)
     called = names or [role or f"column_{column + 1}" for role, column in zip(roles, layout.columns, strict=True)]
-    attributes = named_attributes((called[i], _whole(rows[:, i])) for i in others)
+    attributes = named_attributes((name, _whole(rows[:, i])) for i, name in enumerate(called) if i not in used)
     return Scan(positions, None if colors is None else unit_colors(colors), normals, attributes)
 
 
@@ -98,7 +99,7 @@ def _layout(stream: TextIO) -> Layout:
     first = ""
     strange: list[str] = []  # names right above the data of which none is x
     for skip, line in enumerate(islice(stream, HEADER_LINES)):
-        comment = re.match(r"\s*(#|//|%)", line)
+        comment = re.match(r"\s*(" + "|".join(_COMMENTS) + ")", line)
         words, delimiter, decimal_comma = _parted(line[comment.end() :] if comment else line)
         columns = [] if comment else [i for i, word in enumerate(words) if _is_number(word)]
         if len(columns) >= 3:
@@ -131,28 +132,30 @@ def _parted(line: str) -> tuple[list[str], str | None, bool]:
 
 def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
     """The numbers, (N, C) float array; cells without a number are NaN, but rows without a place are left out."""
-    lines = islice(stream, layout.skip, None)
-    source = io.StringIO("".join(lines).replace(",", ".")) if layout.decimal_comma else stream
-    comments = ["#", "//", "%"]
-    try:
-        skip = 0 if layout.decimal_comma else layout.skip
+    if layout.decimal_comma:
+        stream = io.StringIO(stream.read().replace(",", "."))
+    with suppress(ValueError):  # some line is not like the others
         return np.loadtxt(
-            source, delimiter=layout.delimiter, comments=comments, skiprows=skip, usecols=layout.columns, ndmin=2
+            stream,
+            delimiter=layout.delimiter,
+            comments=_COMMENTS,
+            skiprows=layout.skip,
+            usecols=layout.columns,
+            ndmin=2,
         )
-    except ValueError:  # some line is not like the others
-        stream.seek(0)
-    found, lost = [], 0
+    stream.seek(0)
+    found, lost, last = [], 0, layout.columns[-1]
     for line in islice(stream, layout.skip, None):
-        text = re.split(r"#|//|%", line, maxsplit=1)[0].strip()
+        text = re.split("|".join(_COMMENTS), line, maxsplit=1)[0].strip()
         if not text:
             continue
-        words = (text.replace(",", ".") if layout.decimal_comma else text).split(layout.delimiter)
+        words = text.split(layout.delimiter)
         row = [float(words[i]) if i < len(words) and _is_number(words[i]) else np.nan for i in layout.columns]
-        broken_off = not line.endswith("\n") and len(words) <= layout.columns[-1]  # its last number may be cut
-        if not broken_off and all(i < len(words) and _is_number(words[i]) for i in layout.columns[:3]):
-            found.append(row)
-        else:
+        broken_off = not line.endswith("\n") and len(words) <= last  # its last number may be cut
+        if broken_off or any(i >= len(words) or not _is_number(words[i]) for i in layout.columns[:3]):
             lost += 1
+        else:
+            found.append(row)
     if lost:
         with following_open3d():
             _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(found))

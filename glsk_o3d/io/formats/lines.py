@@ -1,0 +1,167 @@
+"""OBJ, GraphML, CGAL's polylines, DXF and VTP: vertices and edges, or branches, to the last bit; no cloud, no report.
+
+OBJ has edges as ``l`` lines, for MeshLab, Blender and CloudCompare, and no radii; scans are OBJ files, too, and a
+skeleton is one that has lines. GraphML has x, y, z and radius of the nodes and the length of every edge, for networkx,
+Gephi and Cytoscape. CGAL's text has a line per branch, the number of its points and then x y z of each; on reading,
+polylines are joined where their ends have equal coordinates. DXF, release 12, has a 3D polyline per branch, closed for
+a loop without a junction. VTP, VTK's polydata, has the radii and confidences too, and the cell array ``branch`` counts
+the polylines. A vertex without edges is a polyline of one point, or a point.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+from typing import BinaryIO
+from xml.etree import ElementTree as xml
+
+import numpy as np
+
+from ...skeleton import Skeleton
+from .graphs import NoEdges, graph_skeleton, line, text, words_by_line
+
+DXF_LAYER = "skeleton"
+_OBJ_MARK = b"# curve skeleton written by glsk-o3d"
+_KEYS = ("x", "y", "z", "radius")
+_CLOSED, _IN_SPACE, _VERTEX_IN_SPACE = 1, 8, 32  # published: DXF reference, group 70 of POLYLINE and of VERTEX
+_VTK_TYPES = {"f": "Float64", "i": "Int64"}
+
+
+def holds_lines(stream: BinaryIO) -> bool:
+    """Whether an OBJ file is a drawing of lines and no scan: it is one of ours, or has lines and no faces."""
+    if stream.readline().startswith(_OBJ_MARK):
+        return True
+    keywords = {line.split(maxsplit=1)[0] for line in stream if line.strip()}
+    return b"l" in keywords and b"f" not in keywords
+
+
+def write_obj(skeleton: Skeleton) -> bytes:
+    """The content of an OBJ file."""
+    points = [line("v", *vertex) for vertex in skeleton.vertices.tolist()]
+    lines = [line("l", *edge) for edge in (skeleton.edges + 1).tolist()]
+    return text([_OBJ_MARK.decode(), *points, *lines])
+
+
+def read_obj(data: bytes) -> Skeleton:
+    """The skeleton in the content of an OBJ file."""
+    vertices: list[list[float]] = []
+    edges: list[tuple[int, int]] = []
+    for keyword, *words in words_by_line(data):
+        if keyword == "v":
+            vertices.append([float(word) for word in words[:3]])
+        elif keyword == "l":
+            ends = [int(word.partition("/")[0]) for word in words]
+            if 0 in ends:
+                raise ValueError("OBJ counts vertices from 1 and a line names vertex 0")
+            edges += pairwise(end - 1 if end > 0 else end + len(vertices) for end in ends)
+    if not vertices:
+        raise ValueError("it has no 'v' line")
+    if not (edges or data.startswith(_OBJ_MARK)):
+        raise NoEdges
+    return graph_skeleton(vertices, edges)
+
+
+def write_graphml(skeleton: Skeleton) -> bytes:
+    """The content of a GraphML file."""
+    import networkx
+
+    graph = networkx.Graph()
+    table = np.column_stack([skeleton.vertices, skeleton.radii]).tolist()
+    graph.add_nodes_from((i, dict(zip(_KEYS, row, strict=True))) for i, row in enumerate(table))
+    edges = zip(*skeleton.edges.T.tolist(), skeleton.edge_lengths.tolist(), strict=True)
+    graph.add_weighted_edges_from(edges, weight="length")
+    stream = io.BytesIO()
+    networkx.write_graphml_xml(graph, stream)
+    return stream.getvalue()
+
+
+def read_graphml(data: bytes) -> Skeleton:
+    """The skeleton in the content of a GraphML file."""
+    import networkx
+
+    graph = networkx.read_graphml(io.BytesIO(data))
+    lost = [node for node, facts in graph.nodes(data=True) if not {"x", "y", "z"} <= facts.keys()]
+    if lost:
+        raise ValueError(f"node {lost[0]!r} lacks x, y or z")
+    index = {node: i for i, node in enumerate(graph)}
+    rows = [[facts.get(key, math.nan) for key in _KEYS] for _, facts in graph.nodes(data=True)]
+    table = np.array(rows, float).reshape(-1, 4)
+    return graph_skeleton(table[:, :3], [(index[a], index[b]) for a, b in graph.edges()], table[:, 3])
+
+
+def write_cgal(skeleton: Skeleton) -> bytes:
+    """The content of a file of CGAL's polylines."""
+    paths = [*skeleton.branches, *np.flatnonzero(skeleton.degree == 0)[:, None]]
+    return text(line(len(path), *skeleton.vertices[path].ravel().tolist()) for path in paths)
+
+
+def read_cgal(data: bytes) -> Skeleton:
+    """The skeleton in the content of a file of CGAL's polylines."""
+    lines = [[float(word) for word in words] for words in words_by_line(data)]
+    if not lines or any(len(numbers) != 1 + 3 * numbers[0] or numbers[0] < 1 for numbers in lines):
+        raise ValueError("a line must hold the number of its points and then x y z of each")
+    points = np.concatenate([numbers[1:] for numbers in lines]).reshape(-1, 3)
+    stop = np.cumsum([int(numbers[0]) for numbers in lines])
+    start = np.r_[0, stop[:-1]]
+    inner = np.setdiff1d(np.arange(len(points)), stop - 1)  # those with a next point on their line
+    ends = np.concatenate([start, stop - 1])[np.tile(stop - start > 1, 2)]
+    _, first, which = np.unique(points[ends], axis=0, return_index=True, return_inverse=True)
+    label = np.arange(len(points))
+    label[ends] = ends[first][which.ravel()]
+    kept, index = np.unique(label, return_inverse=True)
+    return graph_skeleton(points[kept], index[np.column_stack([inner, inner + 1])])
+
+
+def write_dxf(skeleton: Skeleton) -> bytes:
+    """The content of a DXF file."""
+
+    def place(vertex: list[float]) -> Iterator[tuple[int, object]]:
+        return zip((10, 20, 30), vertex, strict=True)
+
+    groups: list[tuple[int, object]] = [(0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (0, "ENDSEC")]
+    groups += [(0, "SECTION"), (2, "ENTITIES")]
+    for path in skeleton.branches:
+        closed = len(path) > 2 and bool((skeleton.vertices[path[0]] == skeleton.vertices[path[-1]]).all())
+        groups += [(0, "POLYLINE"), (8, DXF_LAYER), (66, 1), *place([0.0] * 3), (70, _IN_SPACE + _CLOSED * closed)]
+        for vertex in skeleton.vertices[path[: len(path) - closed]].tolist():
+            groups += [(0, "VERTEX"), (8, DXF_LAYER), *place(vertex), (70, _VERTEX_IN_SPACE)]
+        groups += [(0, "SEQEND"), (8, DXF_LAYER)]
+    for vertex in skeleton.vertices[skeleton.degree == 0].tolist():
+        groups += [(0, "POINT"), (8, DXF_LAYER), *place(vertex)]
+    groups += [(0, "ENDSEC"), (0, "EOF")]
+    return text(f"{code}\n{value}" for code, value in groups)
+
+
+def write_vtp(skeleton: Skeleton) -> bytes:
+    """The content of a VTP file."""
+    paths, alone = skeleton.branches, np.flatnonzero(skeleton.degree == 0)
+    root = xml.Element("VTKFile", type="PolyData", version="1.0", byte_order="LittleEndian", header_type="UInt64")
+    counts = {"NumberOfPoints": len(skeleton.vertices), "NumberOfVerts": len(alone), "NumberOfLines": len(paths)}
+    piece = xml.SubElement(xml.SubElement(root, "PolyData"), "Piece", {key: str(n) for key, n in counts.items()})
+    data = xml.SubElement(piece, "PointData", Scalars="radius")
+    _vtk_array(data, "radius", skeleton.radii)
+    _vtk_array(data, "confidence", skeleton.confidence)
+    branch = np.r_[np.full(len(alone), -1), np.arange(len(paths))].astype(np.int64)
+    _vtk_array(xml.SubElement(piece, "CellData"), "branch", branch)
+    _vtk_array(xml.SubElement(piece, "Points"), "Points", skeleton.vertices)
+    _vtk_cells(piece, "Verts", alone[:, None])
+    _vtk_cells(piece, "Lines", paths)
+    return xml.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _vtk_cells(piece: xml.Element, name: str, paths: Iterable[np.ndarray]) -> None:
+    cells, paths = xml.SubElement(piece, name), list(paths)
+    _vtk_array(cells, "connectivity", np.concatenate([*paths, np.empty(0, np.int64)]).astype(np.int64))
+    _vtk_array(cells, "offsets", np.cumsum([len(path) for path in paths], dtype=np.int64))
+
+
+def _vtk_array(parent: xml.Element, name: str, values: np.ndarray) -> None:
+    """An array as base64 of its length in bytes and itself."""
+    data = np.ascontiguousarray(values).tobytes()
+    facts = {"type": _VTK_TYPES[values.dtype.kind], "Name": name, "format": "binary"}
+    columns = {"NumberOfComponents": str(values.shape[1])} if values.ndim == 2 else {}
+    element = xml.SubElement(parent, "DataArray", {**facts, **columns})
+    element.text = base64.b64encode(len(data).to_bytes(8, "little") + data).decode()

@@ -1,0 +1,142 @@
+"""PCD, the files of PCL: text, binary and compressed; every field with one value, read without trust."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from ..paths import breaks_off
+from ..scan import Scan, named_attributes
+
+_NORMALS = ["normal_x", "normal_y", "normal_z"]
+_TYPES = {kind + size for kind, sizes in (("F", "48"), ("I", "1248"), ("U", "1248")) for size in sizes}
+_PLACE = (" x", " y", " z")  # after the number of the field
+_PACKED_COLORS = ("rgb", "rgba")
+
+
+def blocks(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan]]:
+    """Compressed data, whose columns follow each other, are read whole."""
+    with path.open("rb") as stream:
+        row, points, kept = read_header(stream)
+        start = stream.tell()
+    if kept == "binary_compressed":
+        return None, map(_compressed, [path])
+    if kept not in ("ascii", "binary"):
+        raise ValueError(f"its data are {kept!r}, which is not understood")
+    held = (path.stat().st_size - start) // row.itemsize
+    if kept == "binary" and held < points:
+        raise breaks_off(points, held)
+    return points, _blocks(path, start, row, points, kept == "binary", rows, bare)
+
+
+def read_header(stream: BinaryIO) -> tuple[np.dtype, int, str]:
+    """The type of a row, the number of points, and how the data are kept, which the stream gives next."""
+    header: dict[str, list[str]] = {}
+    while "DATA" not in header:
+        line = stream.readline(1 << 16)
+        if not line:
+            raise ValueError("its header has no DATA")
+        key, *values = line.decode("ascii", "replace").split() or ["#"]
+        header[key] = values
+    names, sizes, kinds = header["FIELDS"], header["SIZE"], header["TYPE"]
+    counts = [int(count) for count in header.get("COUNT", ["1"] * len(names))]
+    points, (kept,) = int(header["POINTS"][0]), header["DATA"]
+    if points < 0 or min(counts, default=0) < 1:
+        raise ValueError("its header counts less than nothing")
+    if not all(kind + size in _TYPES for kind, size in zip(kinds, sizes, strict=True)):
+        raise ValueError("its header has types that are not understood")
+    fields = zip(names, sizes, kinds, counts, strict=True)
+    row = np.dtype([(f"{i} {name}", f"<{kind.lower()}{size}", (n,)) for i, (name, size, kind, n) in enumerate(fields)])
+    return row, points, kept
+
+
+def _blocks(path: Path, start: int, row: np.dtype, points: int, binary: bool, rows: int, bare: bool) -> Iterator[Scan]:
+    with path.open("rb") as stream:
+        stream.seek(start)
+        for begin in range(0, points, rows):
+            n = min(rows, points - begin)
+            table = np.frombuffer(stream.read(n * row.itemsize), row) if binary else _text(stream, row, n)
+            if len(table) < n:
+                raise breaks_off(points, begin + len(table))
+            yield _scan({name: table[name] for name in row.names or () if not bare or name[-2:] in _PLACE})
+
+
+def _text(stream: BinaryIO, row: np.dtype, n: int) -> np.ndarray:
+    """The next n rows, or those that are left."""
+    lines = [line.decode("ascii", "replace") for line in islice((line for line in stream if line.strip()), n)]
+    table, names = np.empty(len(lines), row), row.names or ()
+    ends = np.cumsum([row[name].shape[0] for name in names])
+    if lines:
+        numbers = np.loadtxt(lines, ndmin=2, comments=None, usecols=range(ends[-1]))
+        with np.errstate(invalid="ignore"):
+            for name, values in zip(names, np.split(numbers, ends[:-1], axis=1), strict=True):
+                table[name] = values
+    return table
+
+
+def _compressed(path: Path) -> Scan:
+    """The points of compressed data.
+
+    Open3D crashes on padding, on fields of one name and on a part of the normals, and mixes up types.
+    """
+    with path.open("rb") as stream:
+        row, points, _ = read_header(stream)
+        packed, size = np.frombuffer(stream.read(8).ljust(8, b"\0"), "<u4").tolist()
+        data = stream.read(packed)
+    if len(data) < packed or size < points * row.itemsize:
+        raise ValueError("its compressed data break off")
+    unpacked, columns, at = _unpacked(data, size), {}, 0
+    for name in row.names or ():  # one after the other
+        base, n = row[name].base, row[name].shape[0]
+        columns[name] = np.frombuffer(unpacked, base, points * n, at).reshape(points, n)
+        at += points * n * base.itemsize
+    return _scan(columns)
+
+
+def _unpacked(data: bytes, size: int) -> bytes:
+    """What LZF has packed, of so many bytes: runs as they are, and copies of what came before (liblzf's format)."""
+    out, at = bytearray(), 0
+    while at < len(data) and len(out) < size:
+        control = data[at]
+        at += 1
+        if control < 32:
+            out += data[at : at + control + 1]
+            at += control + 1
+            continue
+        length = control >> 5
+        if length == 7:
+            length += data[at]
+            at += 1
+        start = len(out) - ((control & 31) << 8) - data[at] - 1
+        at, length = at + 1, length + 2
+        if start < 0:
+            raise ValueError("its compressed data make no sense")
+        piece = out[start : start + length]
+        out += (piece * (length // len(piece) + 1))[:length]  # it may overlap what it makes
+    if len(out) != size:
+        raise ValueError("its compressed data break off")
+    return bytes(out)
+
+
+def _scan(columns: dict[str, np.ndarray]) -> Scan:
+    known = {name.partition(" ")[2]: values[:, 0] for name, values in columns.items() if values.shape[1] == 1}
+    if not set("xyz") <= known.keys():
+        raise ValueError("it has no fields x, y and z")
+    positions = np.column_stack([known.pop(axis) for axis in "xyz"]).astype(float)
+    packed = next((known.pop(name) for name in _PACKED_COLORS if name in known), None)
+    normals = None
+    if set(_NORMALS) <= known.keys():
+        normals = np.column_stack([known.pop(name) for name in _NORMALS]).astype(float)
+    known.pop("_", None)  # padding
+    attributes = named_attributes((name, np.ascontiguousarray(values)) for name, values in known.items())
+    return Scan(positions, None if packed is None else _colors(packed), normals, attributes)
+
+
+def _colors(packed: np.ndarray) -> np.ndarray:
+    """Red, green and blue from 0 to 1 of the bits of a number of four bytes."""
+    bits = np.ascontiguousarray(packed, packed.dtype if packed.dtype.itemsize == 4 else np.uint32).view(np.uint32)
+    return np.stack([bits >> 16 & 255, bits >> 8 & 255, bits & 255], axis=1) / 255

@@ -1,0 +1,191 @@
+"""What a scan holds, points and what a file says of each; and which of them: ``classification == 5 and z > 2``."""
+
+from __future__ import annotations
+
+import ast
+import operator
+import re
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import reduce
+from keyword import iskeyword
+from typing import Any
+
+import numpy as np
+
+from ..errors import InvalidParameterError, did_you_mean
+from ..interop.packages import import_open3d
+
+COLOR_CHANNELS = ["red", "green", "blue"]
+NORMAL_NAMES = ["nx", "ny", "nz"]
+NO_TRIANGLES = np.empty((0, 3), np.int64)
+ALL_ROWS = sys.maxsize  # derived: more than any file has
+
+
+class NoPoints(Exception):
+    """A file is not damaged, but holds no points; why not."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Points, (N, 3) arrays, and what a file says of each."""
+
+    positions: np.ndarray
+    colors: np.ndarray | None = None  # red, green and blue from 0 to 1
+    normals: np.ndarray | None = None
+    attributes: Mapping[str, np.ndarray] = field(default_factory=dict)  # all else; names can stand in an expression
+    triangles: np.ndarray = field(default_factory=lambda: NO_TRIANGLES)  # between the points, if it is a mesh
+    unset: frozenset[str] = frozenset()  # attributes that nobody gave: conditions may name them, results leave them out
+    types: Mapping[str, np.dtype] = field(default_factory=dict)  # of its columns in a binary PLY file
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, rows: np.ndarray) -> Scan:
+        """Some of the points, without triangles."""
+        return Scan(
+            self.positions[rows],
+            None if self.colors is None else self.colors[rows],
+            None if self.normals is None else self.normals[rows],
+            {name: values[rows] for name, values in self.attributes.items()},
+            unset=self.unset,
+            types=self.types,
+        )
+
+    def chosen(self, where: str) -> np.ndarray:
+        """For which points a condition holds, (N,) bool array; InvalidParameterError if it is none, or names what the
+        points do not have.
+        """
+        columns = {**dict(zip("xyz", self.positions.T, strict=True)), **self.attributes}
+        try:
+            chosen = np.asarray(_value(parsed(where), columns))
+        except (TypeError, ValueError) as error:
+            if isinstance(error, InvalidParameterError):
+                raise
+            cure = "write such as 'label in (1, 2)'"
+            raise InvalidParameterError(f"where = {where!r}: cannot be compared: {cure}") from None
+        if chosen.shape != (len(self),) or chosen.dtype != bool:
+            raise InvalidParameterError(f"where = {where!r}: is no condition on points: write such as 'label == 5'")
+        return chosen
+
+    @property
+    def given(self) -> dict[str, np.ndarray]:
+        """The attributes that are not unset."""
+        return {name: values for name, values in self.attributes.items() if name not in self.unset}
+
+    @property
+    def kinds(self) -> dict[str, np.dtype]:
+        """As what Open3D's clouds have the given attributes: int32, since Open3D writes no int64, or floats."""
+        found = {}
+        for name, values in self.given.items():
+            whole = values.dtype.kind in "iub" and np.abs(values.astype(float)).max(initial=0) < 2**31
+            found[name] = np.dtype(np.int32 if whole else values.dtype if values.dtype == np.float32 else float)
+        return found
+
+    @property
+    def shades(self) -> np.ndarray | None:
+        """The colours from 0 to 255, (N, 3) uint8 array or None."""
+        return None if self.colors is None else np.round(255 * np.clip(self.colors, 0, 1)).astype(np.uint8)
+
+    def to_legacy(self) -> Any:
+        """As an ``open3d.geometry.PointCloud``, which has no place for attributes."""
+        vectors = import_open3d().utility.Vector3dVector
+        cloud = import_open3d().geometry.PointCloud(vectors(self.positions))
+        for name in ("colors", "normals"):
+            values = getattr(self, name)
+            if values is not None:
+                setattr(cloud, name, vectors(np.ascontiguousarray(values, float)))
+        return cloud
+
+    def to_tensor(self) -> Any:
+        """As an ``open3d.t.geometry.PointCloud`` with everything."""
+        o3d = import_open3d()
+        cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(np.ascontiguousarray(self.positions, float)))
+        if (shades := self.shades) is not None:
+            cloud.point.colors = o3d.core.Tensor(shades)
+        if self.normals is not None:
+            cloud.point.normals = o3d.core.Tensor(np.ascontiguousarray(self.normals, float))
+        for name, kind in self.kinds.items():
+            cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(self.attributes[name][:, None], kind))
+        return cloud
+
+
+# ---------------------------------------------------------------------------------------------------------- conditions
+
+_COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.In: np.isin,
+    ast.NotIn: lambda values, among: ~np.isin(values, among),
+}
+_JOINS = {ast.And: np.logical_and, ast.Or: np.logical_or}
+
+
+def parsed(where: str) -> ast.expr:
+    """A condition as a tree of Python's grammar; InvalidParameterError if it is none."""
+    try:
+        return ast.parse(where.strip(), mode="eval").body
+    except (SyntaxError, RecursionError, MemoryError) as error:
+        why = getattr(error, "msg", "it is nested too deeply")
+        cure = "write such as 'classification == 5 and not z < 2', and class_ for class"
+        raise InvalidParameterError(f"where = {where[:200]!r}: {why}: {cure}") from None
+
+
+def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
+    """What a part of a condition comes to; nothing is let through but comparisons of columns and numbers, joined."""
+    match node:
+        case ast.BoolOp(op=op, values=parts):
+            return reduce(_JOINS[type(op)], [_value(part, columns) for part in parts])
+        case ast.UnaryOp(op=ast.Not(), operand=part):
+            return np.logical_not(_value(part, columns))
+        case ast.UnaryOp(op=ast.USub(), operand=part):
+            return np.negative(_value(part, columns), dtype=float)
+        case ast.Compare(left=left, ops=ops, comparators=rest) if all(type(op) in _COMPARISONS for op in ops):
+            sides = [_value(part, columns) for part in (left, *rest)]
+            pairs = zip(ops, sides, sides[1:], strict=False)
+            return reduce(np.logical_and, [_COMPARISONS[type(op)](a, b) for op, a, b in pairs])
+        case ast.Tuple(elts=parts) | ast.List(elts=parts) | ast.Set(elts=parts):
+            return [_value(part, columns) for part in parts]
+        case ast.Constant(value=int() | float() as number):
+            return number
+        case ast.Name(id=name):
+            if name not in columns:
+                raise InvalidParameterError(did_you_mean(name, columns, "attribute of the points"))
+            return columns[name]
+    raise InvalidParameterError(f"{ast.unparse(node)!r} is not understood: compare attributes with numbers")
+
+
+# ------------------------------------------------------------------------------------------------- what readers need
+
+
+def named_attributes(columns: Iterable[tuple[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Columns by names that can stand in an expression, each its own: ``class_``, ``Scalar_field_2``, ``column_7``."""
+    found: dict[str, np.ndarray] = {}
+    for text, values in columns:
+        name = re.sub(r"\W+", "_", text).strip("_") or "column"
+        name = f"column_{name}" if name[0].isdigit() else f"{name}_" if iskeyword(name) else name
+        unique, n = name, 2
+        while unique in {"x", "y", "z", "positions", "colors", "normals", *found}:
+            unique, n = f"{name}_{n}", n + 1
+        found[unique] = values
+    return found
+
+
+def brightest(values: np.ndarray) -> float:
+    """The largest number among colours, at least 0; NaN is none."""
+    return float(np.fmax.reduce(values, axis=None, initial=0))
+
+
+def unit_colors(values: np.ndarray, top: float | None = None) -> np.ndarray:
+    """Colours from 0 to 1, of numbers up to 255 or 65535, or up to 1 if they are no integers.
+
+    `top` is the brightest of all, where these are only some.
+    """
+    top = brightest(values) if top is None else top
+    scale = 1 if top <= 1 and values.dtype.kind == "f" else 255 if top <= 255 else 65535
+    return np.asarray(values, float) / scale

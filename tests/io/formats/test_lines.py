@@ -1,0 +1,93 @@
+"""OBJ, GraphML, CGAL's text, DXF in ezdxf, VTP in VTK: as others write them, and as others read ours."""
+
+import networkx
+import numpy as np
+import pytest
+
+from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.skeletons import read_skeleton
+
+
+@pytest.mark.parametrize("ending", [".obj", ".ply"])
+def test_meshlab_opens_it(skeleton, tmp_path, ending):
+    pymeshlab = pytest.importorskip("pymeshlab")
+    skeleton.save(tmp_path / f"s{ending}")
+    meshes = pymeshlab.MeshSet()
+    meshes.load_new_mesh(str(tmp_path / f"s{ending}"))
+    mesh = meshes.current_mesh()
+    np.testing.assert_array_equal(mesh.vertex_matrix(), skeleton.vertices)
+    np.testing.assert_array_equal(mesh.edge_matrix().reshape(-1, 2), skeleton.edges)
+    if ending == ".ply":  # it colours by them
+        np.testing.assert_array_equal(mesh.vertex_scalar_array(), skeleton.radii)
+
+
+def test_obj_as_others_write_it(tmp_path):
+    (tmp_path / "s.obj").write_text(
+        "# x\no name\nv 0 0 0 1\nv 1 0 0\nvn 0 0 1\nv 2 0 0\nl 1/1 2/1 3/2 # c\nl -1 -3\ng\n"
+    )
+    back = read_skeleton(tmp_path / "s.obj")
+    np.testing.assert_array_equal(back.vertices, [[0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    np.testing.assert_array_equal(back.edges, [[0, 1], [0, 2], [1, 2]])
+
+
+def test_graphml_of_others_and_in_networkx(tree, tmp_path):
+    graph = networkx.MultiDiGraph()
+    graph.add_nodes_from([("a", dict(x=0, y=0.5, z=1)), ("b", dict(x=1.0, y=1.0, z=1.0, radius=2.0))])
+    graph.add_edges_from([("b", "a"), ("a", "b"), ("a", "a")])
+    networkx.write_graphml_xml(graph, tmp_path / "s.graphml")
+    back = read_skeleton(tmp_path / "s.graphml")
+    np.testing.assert_array_equal(back.edges, [[0, 1]])
+    np.testing.assert_array_equal(back.radii, [np.nan, 2])
+    tree.save(tmp_path / "s.graphml")
+    graph = networkx.read_graphml(tmp_path / "s.graphml", node_type=int)
+    assert [graph.nodes[i]["radius"] for i in range(6)] == tree.radii.tolist()
+    assert [graph.edges[edge]["length"] for edge in tree.edges.tolist()] == tree.edge_lengths.tolist()
+    networkx.write_graphml_xml(networkx.path_graph(2), tmp_path / "s.graphml")
+    with pytest.raises(FileFormatError, match=r"node '0'.* x, y or z"):
+        read_skeleton(tmp_path / "s.graphml")
+
+
+def test_polylines_have_a_line_per_branch(tree, forest, tmp_path):
+    for skeleton, name, counts in ((tree, "s.cgal", [2, 3, 3]), (forest, "s.polylines.txt", [1, 2, 3])):
+        skeleton.save(tmp_path / name)
+        assert sorted(int(line.split()[0]) for line in (tmp_path / name).read_text().splitlines()) == counts
+
+
+def test_ezdxf_reads_a_polyline_per_branch(skeleton, tmp_path):
+    ezdxf = pytest.importorskip("ezdxf")
+    skeleton.save(tmp_path / "s.dxf")
+    drawing = ezdxf.readfile(tmp_path / "s.dxf")
+    assert not drawing.audit().errors
+    assert drawing.dxfversion == "AC1009"
+    lines = [entity for entity in drawing.modelspace() if entity.dxftype() == "POLYLINE"]
+    points = [entity for entity in drawing.modelspace() if entity.dxftype() == "POINT"]
+    assert len(lines) == len(skeleton.branches)
+    for line, path in zip(lines, skeleton.branches, strict=True):
+        assert line.is_3d_polyline
+        curve = skeleton.vertices[path]
+        closed = len(path) > 2 and path[0] == path[-1]
+        assert line.is_closed == closed
+        np.testing.assert_array_equal([tuple(place) for place in line.points()], curve[: len(curve) - closed])
+    alone = skeleton.vertices[skeleton.degree == 0]
+    np.testing.assert_array_equal(np.reshape([tuple(point.dxf.location) for point in points], (-1, 3)), alone)
+
+
+def test_vtk_reads_vertices_branches_and_radii(skeleton, tmp_path):
+    reader_module = pytest.importorskip("vtkmodules.vtkIOXML", reason="vtk is not installed")
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    skeleton.save(tmp_path / "s.vtp")
+    reader = reader_module.vtkXMLPolyDataReader()
+    reader.SetFileName(str(tmp_path / "s.vtp"))
+    reader.Update()
+    back = reader.GetOutput()
+    np.testing.assert_array_equal(vtk_to_numpy(back.GetPoints().GetData()), skeleton.vertices)
+    for name, values in (("radius", skeleton.radii), ("confidence", skeleton.confidence)):
+        np.testing.assert_array_equal(vtk_to_numpy(back.GetPointData().GetArray(name)), values)
+    alone = int((skeleton.degree == 0).sum())
+    cells = vtk_to_numpy(back.GetCellData().GetArray("branch"))
+    np.testing.assert_array_equal(cells, [*[-1] * alone, *range(len(skeleton.branches))])
+    assert back.GetNumberOfVerts() == alone
+    for i, path in enumerate(skeleton.branches):
+        cell = back.GetCell(alone + i)
+        assert [cell.GetPointId(j) for j in range(cell.GetNumberOfPoints())] == path.tolist()
