@@ -130,12 +130,12 @@ def _print_result(result: BatchResult, left_out: dict[str, str], as_json: bool, 
 
 def _print_plan(plan: Plan, as_json: bool, quiet: bool) -> None:
     if as_json:
-        tasks = [{"input": task.job.source, "why": task.why, "outputs": task.job.outputs} for task in plan.tasks]
+        tasks = [{"input": task.source, "why": task.why, "outputs": task.outputs} for task in plan.tasks]
         facts = {"todo": len(plan.todo), "skipped": plan.skipped, "output": str(plan.out_dir)}
         print_json({**facts, "tasks": tasks, "left_out": plan.left_out})
     elif not quiet:
         for task in plan.todo:
-            echo(f"{task.job.source} ({task.why}) -> {', '.join(task.job.outputs)}")
+            echo(f"{task.source} ({task.why}) -> {', '.join(task.outputs)}")
         echo(f"{len(plan.todo)} to do, {plan.skipped} to skip")
         _tell_left_out(plan.left_out)
 

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from glsk_o3d import Skeleton, samples, skeletonize
 from glsk_o3d.analysis.curves import along, pieces
 from glsk_o3d.batch.grid import Grid
-from glsk_o3d.batch.joining import join_tiles
-from glsk_o3d.batch.strands import Strands
+from glsk_o3d.batch.joining import Strands, join_tiles
 
 NONE = np.empty((0, 3))
 

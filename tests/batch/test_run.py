@@ -30,7 +30,7 @@ def batch(tmp_path):
             run.result = run_batch(
                 inputs or tmp_path / "in", tmp_path / "out", executor=pool, on_plan=plans.append, **options
             )
-        return {task.job.name: task.why for task in plans[0].todo}
+        return {task.name: task.why for task in plans[0].todo}
 
     return run
 
@@ -122,7 +122,7 @@ def test_an_interrupted_change_leaves_no_stale_result(batch, scans, rows, write,
     assert stale
     (scans / f"{stale[0]}.ply").write_text("no")
     for pipeline in ("default", "wen2024"):  # what is there is of the first, and no one's any more
-        why = {task.job.name: task.why for task in plan_batch(scans, out, pipeline=pipeline).tasks}
+        why = {task.name: task.why for task in plan_batch(scans, out, pipeline=pipeline).tasks}
         assert {why[name] for name in stale} == {"interrupted before"}
     batch(pipeline="wen2024")
     assert len({row["parameters"] for row in rows(out).values()}) == 1
@@ -271,8 +271,8 @@ def test_bad_files_stop_nothing(batch, scans, rows, write, tmp_path):
 @pytest.mark.parametrize("change", [{"path": "/no/where/a.ply"}, {"out_dir": "/no/where"}])
 def test_workers_that_see_other_files(scans, rows, tmp_path, change):
     class Elsewhere(ThreadPoolExecutor):
-        def submit(self, work, job):
-            return super().submit(work, replace(job, **change))
+        def submit(self, work, task):
+            return super().submit(work, replace(task, **change))
 
     with Elsewhere(1) as pool:
         run_batch(scans / "a.ply", tmp_path / "out", executor=pool)
@@ -363,6 +363,6 @@ class TestRefusals:
 
     def test_a_plan_writes_nothing(self, scans, tmp_path):
         plan = plan_batch(scans, tmp_path / "out", formats=["ply", ".JSON", "json"], preview=True)
-        assert plan.tasks[0].job.outputs == ("a.ply", "a.json", "a.png")
+        assert plan.tasks[0].outputs == ("a.ply", "a.json", "a.png")
         assert (plan.skipped, len(plan.parameters)) == (0, 64)
         assert not (tmp_path / "out").exists()

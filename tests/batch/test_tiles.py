@@ -33,7 +33,7 @@ def batch(scene, tmp_path):
         plans = []
         with ThreadPoolExecutor(1) as pool:
             run.result = run_batch(scene, tmp_path / out, executor=pool, on_plan=plans.append, **(TILES | options))
-        return {task.job.name: task.why for task in plans[0].todo}
+        return {task.name: task.why for task in plans[0].todo}
 
     return run
 
@@ -121,7 +121,7 @@ def test_no_worker_reads_the_scene(tmp_path, cut):
 
 
 def test_a_tile_that_fails_leaves_the_scene_undone_and_is_tried_again(batch, rows, tmp_path, monkeypatch):
-    import glsk_o3d.batch.work as module
+    import glsk_o3d.batch.tasks as module
 
     real = module._of_tile
 
@@ -159,8 +159,8 @@ def test_a_batch_that_is_killed_goes_on_and_comes_to_the_same(batch, start, unti
 
 def test_the_plan_reads_and_writes_nothing(scene, tmp_path):
     plan = plan_batch(scene, tmp_path / "out", **TILES)
-    assert [task.job.name for task in plan.tasks] == NAMES
-    assert plan.tasks[-1].job.needs == tuple(NAMES[:-1])
+    assert [task.name for task in plan.tasks] == NAMES
+    assert plan.tasks[-1].needs == tuple(NAMES[:-1])
     assert not (tmp_path / "out").exists()
 
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import pipelines, read_skeleton, save_tensor_cloud, skeletonize, to_recipe
-from glsk_o3d.batch.jobs import Job
-from glsk_o3d.batch.work import work
+from glsk_o3d.batch.tasks import Task, work
 from glsk_o3d.io import streaming
 from glsk_o3d.io.clouds import blocks
 from glsk_o3d.samples import torus
@@ -21,7 +20,7 @@ def test_a_large_cloud_is_read_in_blocks(tmp_path, monkeypatch, where):
     monkeypatch.setitem(blocks.read_blocks.__kwdefaults__, "rows", 30000)
     recipe = to_recipe(pipelines.default())
     path = str(tmp_path / "scan.ply")
-    row = work(Job("scan", path, path, ("s.json",), out_dir=str(tmp_path), recipe=recipe, where=where))
+    row = work(Task("scan", path, path, ("s.json",), out_dir=str(tmp_path), recipe=recipe, where=where))
     assert (row["error"], row["points"], row["loops"]) == ("", 120000, 1)
     found = read_skeleton(tmp_path / "s.json")
     assert len(found.points) == row["sampled"] < 60000
