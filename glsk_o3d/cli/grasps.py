@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from .console import echo, print_json, print_table
-from .options import Json, Quiet, Verbose, argument, option, output_option
-from .outputs import check_outputs, tell_files
+from .console import echo, print_table
+from .options import argument, option, output_option
+from .outputs import check_outputs, tell
 from .reporting import WrongUsage
 
 if TYPE_CHECKING:
@@ -45,9 +45,6 @@ def grasps(
     output: Annotated[
         list[Path] | None, output_option("FILE", "json, csv, or ply to look at; may be repeated.")
     ] = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Find where a gripper with two jaws can take an object.
 
@@ -79,11 +76,8 @@ def grasps(
     best = found[:count]
     for path in output or []:
         {".json": best.to_json, ".csv": best.to_csv, ".ply": best.to_ply}[path.suffix.lower()](path)
-    if as_json:
-        print_json({"skeleton": str(skeleton), "found": len(found), **best.as_dict()})
-    elif not quiet:
-        _print(best, len(found))
-        tell_files(output, quiet=quiet)
+    facts = {"skeleton": str(skeleton), "found": len(found), **best.as_dict()}
+    tell(facts, lambda: _print(best, len(found)), output or [])
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:

@@ -6,7 +6,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from glsk_o3d.cli import plugged
+from glsk_o3d.cli import main
 
 
 @pytest.fixture
@@ -14,9 +14,9 @@ def glsk(monkeypatch):
     """Runs a command line of an application with one command of its own and those of some entry points."""
 
     def run(words, **values):
-        group = plugged.COMMAND_GROUP
+        group = main.COMMAND_GROUP
         found = [("some 1", EntryPoint(name, value, group)) for name, value in values.items()]
-        monkeypatch.setattr(plugged, "entry_points", lambda group, problems: found)
+        monkeypatch.setattr(main, "entry_points", lambda group, problems: found)
         return with_plugged(words)
 
     return run
@@ -25,7 +25,7 @@ def glsk(monkeypatch):
 def with_plugged(words):
     app = typer.Typer()
     app.command("own")(lambda: None)
-    plugged.add_plugged(app)
+    main.add_plugged(app)
     return CliRunner().invoke(app, words)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Judgement, read_skeleton, read_tensor_cloud, samples
-from glsk_o3d.cli import running
+from glsk_o3d.cli import skeletonize as module
 from glsk_o3d.cli.options import PipelineName
 from glsk_o3d.io.meshes import read_mesh
 from glsk_o3d.pipelines import PIPELINES
@@ -315,7 +315,7 @@ def test_a_sample_that_cannot_be_taken(refused, scans):
 def test_a_close_call_comes_with_the_option_that_answers_otherwise():
     call = Judgement("gap", (1.0, 2.0, 3.0), 0.42, changed=False)
     told = "the object goes on across the gap at (1, 2, 3): 0.42, gap left; if that is wrong: --set Refiner.bridge=0.41"
-    assert running._close_call(call) == told
+    assert module._close_call(call) == told
 
 
 def test_support_is_told_and_shown(invoke, scans, tmp_path):
