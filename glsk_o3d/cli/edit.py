@@ -83,7 +83,7 @@ def convert(
 
 def _write(skeleton: Skeleton, output: list[Path], done: list[str], **options: Any) -> None:
     written, problems = write_each(skeleton_writers(skeleton, output, **options))
-    tell(None, lambda: [echo(line) for line in done], written, problems)
+    tell(None, lambda: echo("\n".join(done)) if done else None, written, problems)
 
 
 def rig(

@@ -1,0 +1,151 @@
+"""`glsk branches` and `glsk tree`: the numbers, the files, the units, the root."""
+
+import csv
+import json
+import re
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from glsk_o3d import Skeleton, pipelines, read_skeleton, samples
+from glsk_o3d.analysis import BranchTable, cylinders, tree_measures
+from glsk_o3d.analysis.branches import PRINTED_COLUMNS
+from glsk_o3d.io.cylinders import save_cylinders
+
+NO_ROOT = "must be an axis, x to -z, 'thickest', a vertex, or a point"
+
+
+def test_branches_table_file_and_json_agree(invoke, tmp_path, y):
+    result = invoke("branches", y, "-o", "y.csv", "-o", "z.csv")
+    assert (result.exit_code, result.stderr) == (0, "")
+    lines = ["3 branches, 2 orders, length 1.5", *(f"wrote {name}.csv, in the units of y.ply" for name in "yz")]
+    assert result.stdout.splitlines() == lines
+    assert (tmp_path / "y.csv").read_bytes() == (tmp_path / "z.csv").read_bytes()
+    lines = invoke("branches", y).stdout.splitlines()
+    rows = list(read_skeleton(tmp_path / y).branch_table())
+    with (tmp_path / "y.csv").open(newline="") as stream:
+        assert [row["kind"] for row in csv.DictReader(stream)] == [row["kind"] for row in rows]
+    names = ["branch", *(field.name for field in fields(BranchTable))]
+    heads = [head.replace(" ", "_") for head in re.split(r"  +", next(filter(None, lines)).strip())]
+    assert heads == [name for name in PRINTED_COLUMNS if name in names and name != "support"]  # nobody measured it
+    told = [line.split() for line in lines if line.strip()[:1].isdigit()]
+    assert [words[:7] for words in told] == [
+        ["0", "tip", "-", "0", "0", "0", "0.5"],
+        ["1", "tip", "0", "1", "0", "0", "0.5"],
+        ["2", "tip", "0", "1", "2", "1", "0.5"],
+    ]
+    assert [words[-3] for words in told] == ["-", "40.0", "40.0"]
+    facts = json.loads(invoke("branches", y, "--json").stdout)
+    assert facts["branches"][0]["angle"] is None
+    assert [row["length"] for row in facts["branches"]] == [row["length"] for row in rows]
+    assert invoke("branches", y, "-q").stdout == ""
+
+
+def test_a_closed_branch(invoke, tmp_path, ring_file):
+    (row,) = json.loads(invoke("branches", ring_file, "-o", "ring.csv", "--json").stdout)["branches"]
+    assert row["start"] == row["end"]
+    with (tmp_path / "ring.csv").open(newline="") as stream:
+        (line,) = csv.DictReader(stream)
+    assert (row["tortuosity"], line["tortuosity"]) == (None, "")
+    assert {name for name in row if row[name] is None} == {name for name in line if line[name] == ""}
+
+
+@pytest.mark.parametrize(
+    ("root", "start"), [("2", 2), ("-0.3,0,0.4", 2), ("0.4, 0, 1", 3), ("z", 1), ("x", 2), ("-x", 3)]
+)
+def test_a_root_of_branches(invoke, y, root, start):
+    facts = json.loads(invoke("branches", y, "--json", "--root", root).stdout)
+    assert [row["start"] for row in facts["branches"] if row["level"] == 0] == [start]
+
+
+def test_tree_lines_file_and_json_agree(invoke, tmp_path, y):
+    result = invoke("tree", y, "-o", "c.csv", "--root", "0,0,-0.5")
+    assert (result.exit_code, result.stderr) == (0, "")
+    skeleton = read_skeleton(tmp_path / y)
+    measures, table = tree_measures(skeleton, (0, 0, -0.5)), cylinders(skeleton, (0, 0, -0.5))
+    lines = result.stdout.splitlines()
+    assert lines[0] == f"height: {measures.height:.4g} m"
+    assert "stem diameter: not known: the tree is lower than 1.3 m, if a unit of the file is 1 m (--unit)" in lines
+    assert "traced: not known: the file has no confidence: JSON and npz files of a run do" in lines
+    assert lines[-1] == "wrote c.csv, in the units of y.ply"
+    told = [line.split() for line in lines if line.strip()[:1].isdigit()]
+    assert [row[0] for row in told] == ["0", "1"]
+    np.testing.assert_allclose([float(row[3]) for row in told], measures.volume, rtol=1e-3)
+    with (tmp_path / "c.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [int(row["parent"]) for row in rows] == table.parent.tolist()
+    np.testing.assert_allclose([float(row["volume"]) for row in rows], table.volume)
+    facts = json.loads(invoke("tree", y, "--json", "--root", "0,0,-0.5").stdout)
+    assert (facts["volume"], facts["stem_diameter"]) == (list(measures.volume), None)  # it is not so high
+    assert (facts["unit"], facts["up"]) == (1, "z")
+    np.testing.assert_allclose(facts["root"], measures.root)
+    assert invoke("tree", y, "-q").stdout == ""
+
+
+def test_why_a_stem_has_no_diameter(invoke, tmp_path):
+    points = [[0, 0, 0], [0, 0, 1], [3, 0, 1], [0, 0, 2.5]]
+    bent = Skeleton(points, [[0, 1], [1, 2], [1, 3]], [0.2, 0.2, 0.2, 0.01], (), (), ())
+    bent.save(tmp_path / "t.json")
+    said = invoke("tree", "t.json", "--root", "z", "--up", "x").stdout.splitlines()
+    cause = "if x points up (--up), and 0, 0, 0 is the root (--root)"
+    assert f"stem diameter: not known: the stem does not pass 1.3 m above the root, {cause}" in said
+    Skeleton(points[:2], [[0, 1]], [0.2, 0.2], (), (), ()).save(tmp_path / "s.json")
+    assert "crown base: not known: no branch leaves the stem" in invoke("tree", "s.json", "--root", "z").stdout
+
+
+def test_units_and_what_is_up(invoke, tmp_path, y):
+    metres = json.loads(invoke("tree", y, "--json", "--up", "z").stdout)
+    for unit, factor in {"0.001": 0.001, "mm": 0.001, "ft": 0.3048, "m": 1}.items():
+        facts = json.loads(invoke("tree", y, "--json", "--up", "z", "--unit", unit).stdout)
+        assert facts["height"] == pytest.approx(factor * metres["height"])
+        assert facts["unit"] == factor
+    assert json.loads(invoke("tree", y, "--json", "--up", "-z").stdout)["height"] != metres["height"]
+    pipelines.tree("-y")(samples.y_junction(2000).points).save(tmp_path / "t.json")
+    for words, up in (((), "-y"), (("--root", "x"), "x"), (("--up", "z"), "z")):  # as the tree was grown, or as asked
+        assert json.loads(invoke("tree", "t.json", "--json", *words).stdout)["up"] == up
+
+
+@pytest.mark.parametrize("name", ["t.qsm.csv", "t.mat", "t.txt"])
+def test_files_of_other_programs_are_in_metres(invoke, tmp_path, y, name):
+    result = invoke("tree", y, "-o", name, "-o", "c.csv", "--unit", "mm", "--root", "z")
+    assert result.stdout.splitlines()[-2:] == [f"wrote {name}, in metres", "wrote c.csv, in the units of y.ply"]
+    save_cylinders(cylinders(read_skeleton(tmp_path / y), "z"), tmp_path / f"expected-{name}", 0.001)
+    if name != "t.mat":  # which says when it was written
+        assert (tmp_path / name).read_bytes() == (tmp_path / f"expected-{name}").read_bytes()
+    else:
+        found, expected = (loadmat(tmp_path / f"{prefix}t.mat")["cylinder"][0, 0] for prefix in ("", "expected-"))
+        assert all((found[field] == expected[field]).all() for field in expected.dtype.names)
+        assert found["length"].sum() == pytest.approx(1.4e-3, rel=0.1)
+
+
+def test_a_tree_taller_than_any_is_in_doubt(invoke, tmp_path, y):
+    skeleton = read_skeleton(tmp_path / y)
+    replace(skeleton, vertices=1000 * skeleton.vertices, radii=1000 * skeleton.radii).save(tmp_path / "mm.ply")
+    (line,) = invoke("tree", "mm.ply", "--up", "z", "--root", "z").stderr.splitlines()
+    assert line.endswith("none is known above 116 m: is a unit of the cloud 1 m? pass unit=, such as 'mm'")
+    assert invoke("tree", "mm.ply", "--unit", "mm", "--up", "z", "--root", "z").stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("code", "words", "message"),
+    [
+        (2, "branches y.ply --root trunk", f"root = 'trunk': {NO_ROOT}"),
+        (2, "branches y.ply --root 4", "root = 4: there are vertices 0 to 3"),
+        (2, "branches y.ply -o y.txt", "y.txt: the table is CSV"),
+        (1, "branches y.ply -o no/y.csv", "no: no such folder"),
+        (1, "branches z.ply", "z.ply: no such file"),
+        (1, "branches empty.json", "empty.json: the skeleton is empty"),
+        (2, "tree y.ply --root a,b,c", f"root = 'a,b,c': {NO_ROOT}"),
+        (2, "tree y.ply --up w", "up = 'w': must be"),
+        (2, "tree y.ply --unit 0", "unit = '0': must be metres, above 0, or one of m, cm, mm, in, ft"),
+        (2, "tree o.ply", "1 loops: cylinders are of trees; see pipelines.tree()"),
+        (2, "tree two.json", "2 components: cylinders are of one tree; see pipelines.tree()"),
+        (2, "tree y.ply -o c.xlsx", "c.xlsx: the file is a table of cylinders and its name ends in .qsm.csv or .mat"),
+    ],
+)
+def test_refuses(refused, tmp_path, y, ring_file, code, words, message):
+    Skeleton(np.eye(3), [[0, 1]], np.ones(3), (), (), ()).save(tmp_path / "two.json")
+    Skeleton((), (), (), (), (), ()).save(tmp_path / "empty.json")
+    assert message in refused(code, *words.split())
