@@ -135,7 +135,7 @@ def _in_words(value: Any) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{name} {text}" for name, text in value.items())
     if isinstance(value, list | tuple):
-        return ("\n" if isinstance(value, list) else " ").join(map(str, value))
+        return ("\n" if isinstance(value, list) else " ").join(map(_in_words, value))
     return str(value)
 
 

@@ -90,5 +90,4 @@ def _in_words(facts: dict[str, Any]) -> dict[str, Any]:
         shown[words] = f"{skeletons[f'{name}_in_radii']:.2f} local radii ({skeletons[name]:.2%} of the diagonal)"
     for name in ("components", "loops", "leaves"):
         shown[name] = "{} and {}".format(*skeletons[name])
-    shown["contractions"] = "of the cloud: {}\nof the mesh: {}".format(*facts["stop_reasons"])
     return shown

@@ -72,13 +72,7 @@ def _pipeline_facts(name: str, make) -> dict[str, Any]:
 
 
 def limits(metadata) -> str:
-    """The limits of a parameter in words, from what `glsk_o3d.parameters.parameter` made; empty if it has none.
-
-    Examples
-    --------
-    >>> limits({"low": 0, "high": 1, "open_low": True, "choices": ()})
-    'above 0, at most 1'
-    """
+    """The limits of a parameter in words, such as "above 0, at most 1"; empty if it has none."""
     words = [" or ".join(metadata["choices"])] if metadata["choices"] else []
     if metadata["low"] is not None:
         words.append(f"{'above' if metadata['open_low'] else 'at least'} {metadata['low']:g}")
