@@ -19,14 +19,12 @@ def ring():
 
 @pytest.fixture
 def moved(tmp_path, ring):
-    """The axis of the ring, half a radius too high; also in a file, beside a truth and odd files."""
+    """The axis of the ring, half a radius too high; also in a file, beside truths."""
     skeleton = Skeleton(ring.nodes + [0, 0, 0.05], np.sort(ring.edges), 1.1 * ring.radii, (), (), ())
     save_skeleton(skeleton, tmp_path / "s.json")
     save_skeleton(Skeleton([[0, 0, 0]], [], [1], (), (), ()), tmp_path / "dot.ply")
     np.savez(tmp_path / "truth.npz", nodes=ring.nodes, edges=ring.edges, radii=ring.radii)
-    np.savez(tmp_path / "none.npz", nodes=np.empty((0, 3)), edges=np.empty((0, 2), int), radii=[])
     np.savez(tmp_path / "ball.npz", nodes=np.ones((1, 3)), edges=np.empty((0, 2), int), radii=[2.0])
-    np.savetxt(tmp_path / "few.xyz", np.eye(3))
     return skeleton
 
 
@@ -68,28 +66,6 @@ def test_a_vertex_against_a_vertex(invoke, scans):
     assert told["assessment"] is None
     assert told["comparison"]["components"] == 0
     assert "centredness" not in invoke(*words).stdout
-
-
-@pytest.mark.parametrize(
-    ("code", "words", "message"),
-    [
-        (1, "no.ply RING", "no.ply: no such file"),
-        (1, "s.json no.ply", "no.ply: no such file"),
-        (1, "s.json EMPTY", "the file is empty"),
-        (1, "s.json RING --truth no.npz", "no.npz: no such file"),
-        (1, "s.json RING --truth none.npz", "none.npz: the truth has no nodes"),
-        (1, "dot.ply RING", "dot.ply: the skeleton has no edge with a length"),
-        (1, "s.json few.xyz", "few.xyz: no part of the skeleton has 6 points around it"),
-        (2, "s.json RING -o r.txt", "r.txt: the report is JSON and its name ends in .json"),
-        (2, "s.json RING --preview p.jpg", "p.jpg: the picture is a PNG and its name ends in .png"),
-        (2, "s.json RING -o s.json", "s.json: is an input: choose another name"),
-        (1, "s.json RING -o no/r.json", "no: no such folder"),
-    ],
-)
-@pytest.mark.usefixtures("moved")
-def test_refusals(refused, scans, code, words, message):
-    words = words.replace("RING", f"{scans}/ring.ply").replace("EMPTY", f"{scans}/empty.ply")
-    assert message in refused(code, "evaluate", *words.split())
 
 
 @pytest.mark.usefixtures("moved")

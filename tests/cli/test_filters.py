@@ -59,11 +59,6 @@ def test_json_has_every_field(invoke):
     assert expressions == {name: repr(make()) for name, make in PIPELINES.items()}
 
 
-def test_a_name_that_is_not_there(refused):
-    message = "no filter or pipeline is called 'Contracter': did you mean 'Contractor'?"
-    assert refused(2, "filters", "Contracter") == message
-
-
 def test_what_a_plugin_prints_is_no_result(install, capfd):
     code = "print('hello')\nfrom glsk_o3d import pipelines\nmake = pipelines.default\n"
     install("glsk-loud", "1.0", code, "[glsk_o3d.pipelines]\nloud = glsk_loud:make\n")

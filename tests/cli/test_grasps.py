@@ -69,26 +69,3 @@ def test_no_grasp_is_a_warning(invoke, rod):
     assert result.exit_code == 0
     assert result.stderr == "glsk: warning: no grasp at 9 places: 9 too wide\n"
     assert result.stdout == "0 grasps at 9 places\nleft out: 9 too wide\n"
-
-
-@pytest.mark.parametrize(
-    ("code", "words", "message"),
-    [
-        (2, "rod.npz --opening -1", "max_opening = -1.0: must be above 0"),
-        (2, "rod.npz --opening 1 --plane 0,0,1", "--plane 0,0,1: write 4 numbers with commas"),
-        (2, "rod.npz --opening 1 --plane 0,0,0,1", "is no plane"),
-        (2, "rod.npz --opening 1 --cone down,30", "--cone down: write 3 numbers"),
-        (2, "rod.npz --opening 1 --cone z", "--cone"),
-        (2, "rod.npz --opening 1 --cone z,270", "the angle of cone = 270.0: must be"),
-        (2, "rod.npz --opening 1 --up w", "--up w: write 3 numbers"),
-        (2, "rod.npz --opening 1 --finger a,b,c", "--finger a,b,c: write 3 numbers"),
-        (2, "rod.npz --opening 1 -o g.txt", "the grasps are JSON, CSV or PLY and its name ends in .json"),
-        (2, "y.ply --opening 1", "has no confidence, perhaps due to its file: give min_confidence=0"),
-        (2, "y.ply --opening 1 --min-confidence 0", "does not know the points of the object: give cloud="),
-        (1, "rod.npz --opening 1 --scene none.ply", "none.ply"),
-        (1, "rod.npz --opening 1 -o none/g.json", "no such folder"),
-    ],
-)
-@pytest.mark.usefixtures("rod", "y")
-def test_refuses(refused, code, words, message):
-    assert message in refused(code, "grasps", *words.split())

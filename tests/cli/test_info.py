@@ -85,28 +85,6 @@ def test_a_mesh_is_a_cloud(told, invoke, tmp_path):
     assert json.loads(invoke("info", "m.obj", "-q", "--json").stdout)["points"] == 3
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("a.ply", "", "a.ply: the file is empty"),
-        ("a.json", "{}", "a.json: not a valid .json skeleton"),
-        ("a.swc", "1 2", "a.swc: not a valid .swc skeleton"),
-        ("a.docx", "x", "a.docx: unknown ending"),
-        ("b.ply", None, "b.ply: no such file"),
-    ],
-)
-def test_refuses(refused, tmp_path, name, content, message):
-    if content is not None:
-        (tmp_path / name).write_text(content)
-    assert refused(1, "info", name).startswith(message)
-
-
-def test_a_scan_is_no_skeleton_and_a_skeleton_no_scan(refused, scans, y):
-    line = refused(1, "branches", scans / "ring.ply")
-    assert line == f"{scans / 'ring.ply'}: is a cloud, not a skeleton: make one with glsk_o3d.skeletonize"
-    assert refused(1, "skeletonize", y, "-o", "a.ply") == f"{y}: is a skeleton, not a scan"
-
-
 def test_coordinates_of_a_map_keep_their_digits(invoke, told, tmp_path):
     corner = np.array([471234.5678, 5612345.6789, 123.4567])
     np.savetxt(tmp_path / "far.xyz", corner + np.eye(3), fmt="%.4f")
@@ -193,12 +171,10 @@ def test_a_window_shows_a_skeleton_or_a_scan(invoke, scans, tmp_path, y, shown):
     assert len(cloud.points) == len(empty.points) == 1100
 
 
-def test_files_instead_of_a_window(invoke, refused, scans, shown, tmp_path, y):
+def test_files_instead_of_a_window(invoke, scans, shown, tmp_path, y):
     for file in (tmp_path / y, scans / "nan.ply"):
         result = invoke("view", file, "--report", "r.html", "--preview", "p.png")
         assert (result.exit_code, result.stdout) == (0, "wrote p.png\nwrote r.html\n")
         assert f"<title>{file.name}</title>" in (tmp_path / "r.html").read_text("utf-8")
         assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
-    assert "the file is empty" in refused(1, "view", scans / "empty.ply")
-    assert "no such folder" in refused(1, "view", scans / "sample.ply", "--report", "no/r.html")
     assert shown == []

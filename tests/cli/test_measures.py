@@ -14,8 +14,6 @@ from glsk_o3d.analysis import BranchTable, cylinders, tree_measures
 from glsk_o3d.analysis.branches import PRINTED_COLUMNS
 from glsk_o3d.io.cylinders import save_cylinders
 
-NO_ROOT = "must be an axis, x to -z, 'thickest', a vertex, or a point"
-
 
 def test_branches_table_file_and_json_agree(invoke, tmp_path, y):
     result = invoke("branches", y, "-o", "y.csv", "-o", "z.csv")
@@ -126,26 +124,3 @@ def test_a_tree_taller_than_any_is_in_doubt(invoke, tmp_path, y):
     (line,) = invoke("tree", "mm.ply", "--up", "z", "--root", "z").stderr.splitlines()
     assert line.endswith("none is known above 116 m: is a unit of the cloud 1 m? pass unit=, such as 'mm'")
     assert invoke("tree", "mm.ply", "--unit", "mm", "--up", "z", "--root", "z").stderr == ""
-
-
-@pytest.mark.parametrize(
-    ("code", "words", "message"),
-    [
-        (2, "branches y.ply --root trunk", f"root = 'trunk': {NO_ROOT}"),
-        (2, "branches y.ply --root 4", "root = 4: there are vertices 0 to 3"),
-        (2, "branches y.ply -o y.txt", "y.txt: the table is CSV"),
-        (1, "branches y.ply -o no/y.csv", "no: no such folder"),
-        (1, "branches z.ply", "z.ply: no such file"),
-        (1, "branches empty.json", "empty.json: the skeleton is empty"),
-        (2, "tree y.ply --root a,b,c", f"root = 'a,b,c': {NO_ROOT}"),
-        (2, "tree y.ply --up w", "up = 'w': must be"),
-        (2, "tree y.ply --unit 0", "unit = '0': must be metres, above 0, or one of m, cm, mm, in, ft"),
-        (2, "tree o.ply", "1 loops: cylinders are of trees; see pipelines.tree()"),
-        (2, "tree two.json", "2 components: cylinders are of one tree; see pipelines.tree()"),
-        (2, "tree y.ply -o c.xlsx", "c.xlsx: the file is a table of cylinders and its name ends in .qsm.csv or .mat"),
-    ],
-)
-def test_refuses(refused, tmp_path, y, ring_file, code, words, message):
-    Skeleton(np.eye(3), [[0, 1]], np.ones(3), (), (), ()).save(tmp_path / "two.json")
-    Skeleton((), (), (), (), (), ()).save(tmp_path / "empty.json")
-    assert message in refused(code, *words.split())

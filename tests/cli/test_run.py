@@ -91,7 +91,7 @@ def test_the_cross_check_measures_and_writes_nothing(invoke, scans, tmp_path):
 
 
 @pytest.mark.usefixtures("alone")
-def test_points_are_written_with_labels_normals_and_colours(invoke, scans, script, tmp_path):
+def test_points_are_written_with_labels_and_colours(invoke, scans, script, tmp_path):
     outputs = [word for ending in ("ply", "pcd", "xyz") for word in ("-o", f"c.{ending}")]
     result = invoke("run", script("Generate Segmented Cloud (GLSkeleton)"), scans / "sample.ply", *outputs, "-q")
     assert result.exit_code == 0, result.stderr
@@ -101,13 +101,6 @@ def test_points_are_written_with_labels_normals_and_colours(invoke, scans, scrip
     cloud = o3d.t.io.read_point_cloud(str(tmp_path / "c.ply"))
     labels, colours = cloud.point.quality.numpy().ravel(), cloud.point.colors.numpy()
     assert len(np.unique(labels)) == len(np.unique(np.column_stack([labels, colours]), axis=0)) > 1
-    up, colors = np.tile([0.0, 0, 1], (len(points), 1)), np.tile([0.2, 0.4, 0.6, 1], (len(points), 1))
-    Layer(points, normals=up, colors=colors).save(tmp_path / "c.ply")
-    assert invoke("run", script("Generate Reduced Cloud (GLSkeleton)"), "c.ply", "-o", "r.ply").exit_code == 0
-    back = Layer.read(tmp_path / "r.ply")
-    assert 0 < len(back.vertices) < len(points)
-    np.testing.assert_array_equal(back.normals, up[: len(back.vertices)])
-    np.testing.assert_allclose(back.colors, colors[: len(back.vertices)])
 
 
 @pytest.mark.usefixtures("no_run")
@@ -195,27 +188,6 @@ def test_one_file_that_cannot_be_written_does_not_cost_the_others(invoke, scans,
     assert invoke(*words, "--cut-loops").exit_code == 0
     cut, whole = read_skeleton(tmp_path / "1.swc"), read_skeleton(tmp_path / "2.json")
     assert (cut.n_loops, whole.n_loops, len(whole.edges) - len(cut.edges)) == (0, 1, 1)
-
-
-@pytest.mark.parametrize("ending", ["ply", "obj", "stl"])
-def test_scripts_of_ours_alone_and_mixed_see_the_same_scan(invoke, tmp_path, ending):
-    pytest.importorskip("pymeshlab")
-    n_vertices, n_faces = _mesh(tmp_path / f"m.{ending}")
-    ours = '<filter name="Generate Segmented Cloud (GLSkeleton)"/>'
-    (tmp_path / "ours.mlx").write_text(f"<FilterScript>{ours}</FilterScript>")
-    (tmp_path / "mixed.mlx").write_text(f'<FilterScript><filter name="Select None"/>{ours}</FilterScript>')
-    meshes = glsk_o3d.MeshSet()
-    meshes.load_scan(tmp_path / f"m.{ending}")
-    meshes.load_filter_script(tmp_path / "ours.mlx")
-    meshes.apply_filter_script()
-    assert (meshes.current_mesh().vertex_number(), meshes.current_mesh().face_number()) == (n_vertices, n_faces)
-    for name in ("ours", "mixed"):
-        result = invoke("run", f"{name}.mlx", f"m.{ending}", "-o", f"{name}.ply", "-o", f"{name}.obj")
-        assert result.exit_code == 0, result.stderr
-        back = Layer.read(tmp_path / f"{name}.ply")
-        np.testing.assert_array_equal(back.faces, meshes.current_mesh().face_matrix())
-        np.testing.assert_allclose(back.vertices, meshes.current_mesh().vertex_matrix(), rtol=1e-6)
-        np.testing.assert_allclose(back.colors, meshes.current_mesh().vertex_color_matrix())
 
 
 @pytest.mark.usefixtures("alone")
