@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InvalidParameterError
 from ..parameters import problem_with, shown
 
-Tile = tuple[int, int, int]
+Tile = tuple[int, ...]
 
 OVERLAP_SHARE = 1 / 8  # fitted: of the size of a tile, how far it looks beyond itself unless told
 MOST_OVERLAP = 1 / 4  # derived: of the size; tiles may be half as wide: a point is of two along an axis at most
@@ -21,16 +21,12 @@ SEAM_SHARE = 1 / 4  # fitted: of the overlap, how far beyond a tile its skeleton
 CUT_REACH = 2.0  # measured: radii from a cut through a tube up to which its skeleton strays by over 1 % of the radius
 
 
-class TooManyParts(InvalidParameterError):
-    """A scene would be taken apart into more parts than anybody means."""
-
-
 @dataclass(frozen=True)
 class Grid:
     """Boxes of equal size that partition space; those at the border reach to infinity."""
 
-    low: tuple[float, float, float]  # corner of the first one
-    cell: tuple[float, float, float]  # their sides
+    low: tuple[float, ...]  # corner of the first one
+    cell: tuple[float, ...]  # their sides
     counts: Tile  # how many there are along each axis
     overlap: float  # how far beyond its box a tile takes points, at most half a side
 
@@ -39,14 +35,13 @@ class Grid:
         """The grid over a box: along an axis that is longer than `size` as many equal tiles as it takes, else one."""
         extent = np.asarray(high, float) - low
         if not (np.isfinite(extent).all() and (extent / size < 2**20).all()):
-            raise TooManyParts(
+            raise InvalidParameterError(
                 f"tiles = {size:g}: the points span {' x '.join(f'{each:.4g}' for each in extent)}: set far ones aside "
                 "with a condition, or give larger tiles"
             )
         counts = np.maximum(np.ceil(extent / size), 1)
         cell = np.where(counts > 1, extent / counts, size)
-        x, y, z = (int(each) for each in counts)
-        return cls(_triple(low), _triple(cell), (x, y, z), float(overlap))
+        return cls(tuple(map(float, low)), tuple(map(float, cell)), tuple(map(int, counts)), float(overlap))
 
     @property
     def trust(self) -> float:
@@ -87,8 +82,7 @@ class Grid:
         row, tile = row[order], tile[order]
         starts = np.flatnonzero(np.r_[True, (np.diff(tile, axis=0) != 0).any(axis=1)]) if len(row) else []
         for start, stop in zip(starts, [*starts[1:], len(row)], strict=True):
-            x, y, z = tile[start].tolist()
-            yield (x, y, z), row[start:stop]
+            yield tuple(tile[start].tolist()), row[start:stop]
 
 
 def checked_sizes(tiles: Any, overlap: Any) -> tuple[float, float]:
@@ -114,10 +108,5 @@ def tile_name(tile: Tile) -> str:
 
 def tile_of(name: str) -> Tile:
     """The tile that `tile_name` names."""
-    x, y, z = (int(each) for each in name.split("-"))
-    return x, y, z
-
-
-def _triple(values) -> tuple[float, float, float]:
-    x, y, z = (float(each) for each in values)
+    x, y, z = map(int, name.split("-"))
     return x, y, z

@@ -6,7 +6,6 @@ import glob
 import os
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..errors import InvalidParameterError
@@ -18,32 +17,26 @@ RESERVED_STEMS = ("ledger", "recipe")
 """Names of files that a batch itself writes into the output folder."""
 
 
-@dataclass
-class Inputs:
-    """The files that a batch takes, by the names of their results, and those that it leaves out, with the reasons."""
-
-    named: dict[str, Path] = field(default_factory=dict)
-    left_out: dict[str, str] = field(default_factory=dict)
-
-
-def find_inputs(inputs: Iterable[str | os.PathLike], out_dir: str | os.PathLike, *, recursive: bool = False) -> Inputs:
-    """The clouds that are meant by folders, glob patterns, lists and files: absolute paths in the order of their names.
+def find_inputs(
+    inputs: Iterable[str | os.PathLike], out_dir: str | os.PathLike, *, recursive: bool = False
+) -> tuple[dict[str, Path], dict[str, str]]:
+    """The clouds that are meant by folders, glob patterns, lists and files: absolute paths by their sorted names.
 
     A name is the path from the folder that was given, from the part of a pattern without wildcards, or from the folder
     of a list (the whole path for what is not below it); of a file that was given, its own name. It has no ending, but
     where names would be equal without. A file that is meant twice has the first of its names. Nothing in the output
-    folder counts, where that lies below a folder or pattern. Single files of a list need not be there.
+    folder counts, where that lies below a folder or pattern. Single files of a list need not be there. Also gives what
+    folders and patterns have beside clouds, with the reasons why it is left out.
     """
     out = os.path.abspath(out_dir)
     roots: dict[str, str] = {}
-    found = Inputs()
+    left_out: dict[str, str] = {}
     for given in inputs:
-        for root, path in _meant(os.fspath(given), out, recursive, found.left_out):
+        for root, path in _meant(os.fspath(given), out, recursive, left_out):
             roots.setdefault(path, root)
     if not roots:
         raise InvalidParameterError("there is no input: give a folder, a glob pattern, a list (.txt) or clouds")
-    found.named = _named(roots)
-    return found
+    return _named(roots), left_out
 
 
 def one_name(first: object, second: object, name: str) -> InvalidParameterError:

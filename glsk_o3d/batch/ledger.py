@@ -48,23 +48,23 @@ class Ledger:
         rows = [row for line in lines if (row := _checked(line)) is not None]
         for row in rows:
             self._keep(row)
-        self._once()
-        broken = len(lines) - len(rows)
-        if broken:
-            _log.warning("%s: %d broken lines passed over; their inputs are done anew", self.path, broken)
+        self._sort()
+        if len(rows) < len(lines):
+            message = "%s: %d broken lines passed over; their inputs are done anew"
+            _log.warning(message, self.path, len(lines) - len(rows))
 
     def _keep(self, row: Row) -> None:
         self.rows.pop(row["name"], None)  # the last comes last
         self.rows[row["name"]] = row
 
-    def _once(self) -> None:
+    def _sort(self) -> None:
         """Keep one row per input, in the order of the names."""
         last = {row["input"]: name for name, row in self.rows.items()}
         self.rows = {name: self.rows[name] for name in sorted(last.values())}
 
     def rewrite(self) -> None:
         """Write one line per input, in the place of all that was there."""
-        self._once()
+        self._sort()
         data = b"".join(map(_line, self.rows.values()))
         write_atomically(self.path, lambda temporary: temporary.write_bytes(data))
 
@@ -84,37 +84,26 @@ class Ledger:
 def _checked(line: bytes) -> Row | None:
     """The row on a line, None if no batch has written it: its outputs may be removed, so they must be in the folder."""
     try:
-        row = json.loads(line, parse_constant=_refuse)
-    except (ValueError, RecursionError):
+        row = json.loads(line)
+        known = row["status"] in (DONE, FAILED, STALE) and isinstance(row["input"], str)
+        lists = isinstance(row["outputs"], list) and isinstance(row.get("messages", []), list)
+        return row if known and lists and all(map(_is_inside, [row["name"], *row["outputs"]])) else None
+    except (ValueError, KeyError, TypeError, RecursionError):
         return None
-    if not isinstance(row, dict):
-        return None
-    outputs, messages = row.get("outputs", []), row.get("messages", [])
-    if not (isinstance(outputs, list) and isinstance(messages, list) and isinstance(row.get("input"), str)):
-        return None
-    others = [value for name, value in row.items() if name not in ("outputs", "messages")]
-    plain = all(value is None or isinstance(value, str | int | float) for value in [*others, *messages])
-    known = row.get("status") in (DONE, FAILED, STALE)
-    return row if plain and known and all(map(_is_inside, [row.get("name"), *outputs])) else None
-
-
-def _refuse(constant: str) -> float:
-    raise ValueError(f"{constant} is no number of JSON")
 
 
 def _is_inside(path: Any) -> bool:
     """Whether a path is one below a folder, without a way out of it."""
-    if not isinstance(path, str) or not path or "\0" in path:
+    if not isinstance(path, str) or "\0" in path or os.path.isabs(path) or os.path.splitdrive(path)[0]:
         return False
-    parts = path.replace(os.sep, "/").split("/")
-    return not os.path.isabs(path) and not os.path.splitdrive(path)[0] and not {"", ".", ".."} & set(parts)
+    return not {"", ".", ".."} & set(path.replace(os.sep, "/").split("/"))
 
 
 def _line(row: Row) -> bytes:
     try:
-        return json.dumps(row, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+        return json.dumps(row, ensure_ascii=False).encode() + b"\n"
     except UnicodeEncodeError:  # a file name that is no Unicode
-        return json.dumps(row, allow_nan=False).encode() + b"\n"
+        return json.dumps(row).encode() + b"\n"
 
 
 def _cell(value: Any) -> Any:

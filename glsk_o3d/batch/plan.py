@@ -7,23 +7,66 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from ..driver import as_pipeline
-from ..errors import FileFormatError, InvalidParameterError
+from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.packages import require_for
 from ..io.scan import parsed
 from ..io.skeletons import skeleton_ending
 from ..pipeline import Filter, Pipeline, parts
 from ..recipes import to_recipe
-from .grid import TooManyParts, checked_sizes
-from .inputs import Inputs, find_inputs, one_name
-from .jobs import RECIPE_FILE, TILE_ENDING, UP_TO_DATE, Job, Plan, Task
+from .grid import checked_sizes
+from .inputs import find_inputs, one_name
 from .ledger import DONE, STALE, Ledger, file_hash
 from .splitting import Cut, Splitter
+from .tasks import TILE_ENDING, Task
+
+UP_TO_DATE = "done"
+RECIPE_FILE = "recipe.json"
+TILES_FOLDER = ".tiles/"
+"""What follows the name of a scene in those of its tiles."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a batch has to do.
+
+    Attributes
+    ----------
+    out_dir : Path
+        Absolute.
+    recipe : dict
+        The pipeline.
+    parameters : str
+        The hash by which it is known.
+    tasks : tuple of Task
+        One per input, in the order of their names; after those of its tiles that of what is joined from them.
+    ledger : Ledger
+        As it is in the folder.
+    left_out : dict of str to str
+        Files in the folders and patterns that are not taken, with the reason.
+    """
+
+    out_dir: Path
+    recipe: dict[str, Any]
+    parameters: str
+    tasks: tuple[Task, ...]
+    ledger: Ledger
+    left_out: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def todo(self) -> list[Task]:
+        """Those that are not done."""
+        return [task for task in self.tasks if task.why != UP_TO_DATE]
+
+    @property
+    def skipped(self) -> int:
+        """How many are done."""
+        return len(self.tasks) - len(self.todo)
 
 
 def plan_batch(
@@ -101,7 +144,7 @@ def plan_batch(
     >>> with TemporaryDirectory() as folder:
     ...     np.savetxt(f"{folder}/pipe.xyz", tube(1000, radius=0.04).points)
     ...     plan = plan_batch(f"{folder}/pipe.xyz", f"{folder}/skeletons", tiles=0.6)
-    >>> [(task.why, *task.job.outputs) for task in plan.tasks]
+    >>> [(task.why, *task.outputs) for task in plan.tasks]
     [('new', 'pipe.tiles/0-0-0.npz'), ('new', 'pipe.tiles/1-0-0.npz'), ('new', 'pipe.ply')]
     """
     wanted = Wanted(pipeline, formats, preview, cut_loops, recursive, where, by, tiles, overlap, force)
@@ -138,6 +181,11 @@ class Wanted:
         if self.where is not None:
             parsed(self.where)
         self.cut = self._cut(chosen)
+        more: dict[str, Any] = {"cut_loops": True} if self.cut_loops else {}
+        more |= {"where": self.where} if self.where else {}
+        more |= {"tiles": [self.cut.tiles, self.cut.overlap]} if self.cut and self.cut.tiles else {}
+        hashed = json.dumps({"recipe": self.recipe, **more} if more else self.recipe, sort_keys=True)
+        self.parameters = hashlib.sha256(hashed.encode()).hexdigest()
 
     def _cut(self, pipeline: Pipeline) -> Cut | None:
         """How scenes are to be taken apart, if they are."""
@@ -156,15 +204,6 @@ class Wanted:
         drop_invalid = any(getattr(stage, "drop_invalid", False) for stage in stages)
         return Cut(tiles=tiles, overlap=overlap, where=self.where, drop_invalid=drop_invalid)
 
-    @cached_property
-    def parameters(self) -> str:
-        """The hash by which results made with the same options are known."""
-        more: dict[str, Any] = {"cut_loops": True} if self.cut_loops else {}
-        more |= {"where": self.where} if self.where else {}
-        more |= {"tiles": [self.cut.tiles, self.cut.overlap]} if self.cut and self.cut.tiles else {}
-        told = {"recipe": self.recipe, **more} if more else self.recipe
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
-
 
 def planned(inputs: Any, out_dir: str | os.PathLike, wanted: Wanted, *, write: bool) -> Plan:
     """The plan of `plan_batch`; `write` takes scenes apart at once, so that they are read but once."""
@@ -177,59 +216,79 @@ def planned(inputs: Any, out_dir: str | os.PathLike, wanted: Wanted, *, write: b
         _refuse_strangers(out, ledger, ())
         if wanted.tiles is not None:
             planned(given, out, replace(wanted, tiles=None, overlap=None), write=False)
-    found = find_inputs(given, out, recursive=wanted.recursive)
-    jobs = _apart(found, splitter) if splitter else [Job(name, str(p), str(p)) for name, p in found.named.items()]
-    sources = {text for job in jobs for text in (job.source, job.origin or job.path)}
-    jobs = list(_filled(jobs, out, wanted, ledger, sources))
-    tasks = _tasks(jobs, ledger, wanted, hashed)
-    _refuse_strangers(out, ledger, jobs)
+    named, left_out = find_inputs(given, out, recursive=wanted.recursive)
+    tasks = [Task(name, str(path), str(path)) for name, path in named.items()]
+    if splitter is not None:
+        tasks = _apart(named, left_out, splitter)
+    sources = {text for task in tasks for text in (task.source, task.origin or task.path)}
+    tasks = _with_reasons(list(_filled(tasks, out, wanted, ledger, sources)), ledger, wanted, hashed)
+    _refuse_strangers(out, ledger, tasks)
     _refuse_to_replace(tasks, ledger, sources)
-    if splitter is not None and write:
-        splitter.supply(task.job for task in tasks if task.why != UP_TO_DATE)
-    return Plan(out, wanted.recipe, wanted.parameters, tasks, ledger, found.left_out)
+    plan = Plan(out, wanted.recipe, wanted.parameters, tuple(tasks), ledger, left_out)
+    if splitter is not None and write:  # parts of which some are to be done were removed when they had been done
+        missing = [task for task in plan.todo if task.origin and not os.path.exists(task.path)]
+        for folder, origin in {Path(task.path).parent: task.origin for task in missing}.items():
+            splitter.divide(folder.relative_to(splitter.folder).as_posix(), Path(origin))
+    return plan
 
 
-def _apart(found: Inputs, splitter: Splitter) -> list[Job]:
-    """The jobs of files that are taken apart; what cannot be is left out."""
-    jobs: dict[str, Job] = {}
-    for name, path in found.named.items():
+def _apart(named: dict[str, Path], left_out: dict[str, str], splitter: Splitter) -> list[Task]:
+    """The tasks of files that are taken apart; what cannot be is left out."""
+    tasks: dict[str, Task] = {}
+    for name, path in named.items():
         try:
-            new = splitter.jobs(name, path)
-        except TooManyParts:
-            raise
+            new = _parts_of(name, path, splitter)
         except InvalidParameterError as error:
-            found.left_out[str(path)] = str(error)
+            left_out[str(path)] = str(error)
             continue
-        for job in new:
-            if job.name in jobs:
-                raise one_name(jobs[job.name].source, job.source, job.name)
-            jobs[job.name] = job
-    if not jobs:
-        path, reason = next(iter(found.left_out.items()))
+        for task in new:
+            if task.name in tasks:
+                raise one_name(tasks[task.name].source, task.source, task.name)
+            tasks[task.name] = task
+    if not tasks:
+        path, reason = next(iter(left_out.items()))
         raise InvalidParameterError(f"{splitter.cut}: no input can be taken apart; {path}: {reason}")
-    return list(jobs.values())
+    return list(tasks.values())
 
 
-def _filled(jobs: list[Job], out: Path, wanted: Wanted, ledger: Ledger, sources: set[str]) -> Iterator[Job]:
-    """The jobs with what they are to write, and what is there of earlier batches."""
-    results = {job.name + each for job in jobs for each in wanted.endings}
+def _parts_of(name: str, path: Path, splitter: Splitter) -> list[Task]:
+    """A task for each part of a file, and after tiles one for the whole; one for the file if it cannot be read."""
+    whole = Task(name, str(path), str(path))
+    try:
+        split = splitter.split(name, path)
+    except (FileFormatError, InvalidCloudError, OSError):
+        return [whole]  # the worker will say what is wrong
+    between = "-" if split.grid is None else TILES_FOLDER
+    known = replace(split, parts={})
+    tasks = []
+    for label, part in split.parts.items():
+        file = str(splitter.file(name, label))
+        tasks.append(Task(f"{name}{between}{label}", f"{path} {part}", file, origin=str(path), split=known))
+    if split.grid is not None:
+        tasks.append(replace(whole, needs=tuple(task.name for task in tasks), split=known))
+    return tasks
+
+
+def _filled(tasks: list[Task], out: Path, wanted: Wanted, ledger: Ledger, sources: set[str]) -> Iterator[Task]:
+    """The tasks with what they are to write, and what is there of earlier batches."""
+    results = {task.name + each for task in tasks for each in wanted.endings}
     names = {row["input"]: name for name, row in ledger.rows.items()}
-    listed = {output for row in ledger.rows.values() for output in row.get("outputs", ())}
-    for job in jobs:
-        is_tile = job.origin and job.split is not None and job.split.grid is not None
-        outputs = tuple(job.name + ending for ending in ([TILE_ENDING] if is_tile else wanted.endings))
+    listed = {output for row in ledger.rows.values() for output in row["outputs"]}
+    for task in tasks:
+        is_tile = task.origin and task.split is not None and task.split.grid is not None
+        outputs = tuple(task.name + ending for ending in ([TILE_ENDING] if is_tile else wanted.endings))
         for output in outputs:
             if str(out / output) in sources:
                 raise InvalidParameterError(f"{out / output}: is an input: give the results another folder")
-        before = names.get(job.source, job.name)  # otherwise its old results would be nobody's
-        stale = _listed_results(ledger, job.name) | (_listed_results(ledger, before) - results)
+        before = names.get(task.source, task.name)  # otherwise its old results would be nobody's
+        stale = _listed_results(ledger, task.name) | (_listed_results(ledger, before) - results)
         yield replace(
-            job,
+            task,
             out_dir=str(out),
             outputs=outputs,
             recipe=wanted.recipe,
             cut_loops=wanted.cut_loops,
-            where=(wanted.where or "") if job.split is None else "",
+            where=(wanted.where or "") if task.split is None else "",
             stale=tuple(sorted(stale)),
             foreign=tuple(each for each in outputs if each not in listed and os.path.lexists(out / each)),
         )
@@ -237,15 +296,15 @@ def _filled(jobs: list[Job], out: Path, wanted: Wanted, ledger: Ledger, sources:
 
 def _listed_results(ledger: Ledger, name: str) -> set[str]:
     """What the ledger lists for a name, if it is called so: it will be removed, whatever has happened to the ledger."""
-    outputs = ledger.rows.get(name, {}).get("outputs", ())
+    outputs = ledger.rows[name]["outputs"] if name in ledger.rows else ()
     return {each for each in outputs if each.startswith(f"{name}.") and not set(each[len(name) :]) & {"/", os.sep}}
 
 
-def _tasks(jobs: list[Job], ledger: Ledger, wanted: Wanted, hashed: Callable[[Path], str]) -> tuple[Task, ...]:
-    """The jobs, each with why it is to be done, if it is."""
+def _with_reasons(tasks: list[Task], ledger: Ledger, wanted: Wanted, hashed: Callable[[Path], str]) -> list[Task]:
+    """The tasks, each with why it is to be done, if it is."""
 
-    def why(job: Job) -> str:
-        row = ledger.rows.get(job.name)
+    def why(task: Task) -> str:
+        row = ledger.rows.get(task.name)
         if wanted.force:
             return "asked for"
         if row is None:
@@ -254,27 +313,27 @@ def _tasks(jobs: list[Job], ledger: Ledger, wanted: Wanted, hashed: Callable[[Pa
             return "interrupted before" if row["status"] == STALE else "failed before"
         if row.get("parameters") != wanted.parameters:
             return "other parameters"
-        written = row.get("outputs", ())
-        if not all(each in written and Path(job.out_dir, each).is_file() for each in job.outputs):
+        written = row["outputs"]
+        if not all(each in written and Path(task.out_dir, each).is_file() for each in task.outputs):
             return "outputs are gone"
         try:
-            now = hashed(Path(job.path)) if job.split is None else job.split.input_hash
+            now = hashed(Path(task.path)) if task.split is None else task.split.input_hash
         except OSError:  # gone, or not to be read: the worker will say so
             return "input changed"
         return UP_TO_DATE if now == row.get("input_hash") else "input changed"
 
     with ThreadPoolExecutor() as pool:  # a hash takes as long as reading the file
-        reasons = dict(zip((job.name for job in jobs), pool.map(why, jobs), strict=True))
+        reasons = dict(zip((task.name for task in tasks), pool.map(why, tasks), strict=True))
     to_do = {name for name, reason in reasons.items() if reason != UP_TO_DATE}
-    reasons |= {job.name: "tiles to do" for job in jobs if job.name not in to_do and to_do.intersection(job.needs)}
-    return tuple(Task(job, reasons[job.name]) for job in jobs)
+    reasons |= {task.name: "tiles to do" for task in tasks if task.name not in to_do and to_do.intersection(task.needs)}
+    return [replace(task, why=reasons[task.name]) for task in tasks]
 
 
-def _refuse_strangers(out: Path, ledger: Ledger, jobs: Iterable[Job]) -> None:
+def _refuse_strangers(out: Path, ledger: Ledger, tasks: Iterable[Task]) -> None:
     """Raise InvalidParameterError where a batch would replace what no batch has made, since there is no ledger."""
     if ledger.path.exists():
         return
-    strange = [each for job in jobs for each in job.foreign]
+    strange = [each for task in tasks for each in task.foreign]
     strange += [each for each in (ledger.table.name, RECIPE_FILE) if os.path.lexists(out / each)]
     if strange:
         raise InvalidParameterError(
@@ -286,10 +345,9 @@ def _refuse_strangers(out: Path, ledger: Ledger, jobs: Iterable[Job]) -> None:
 def _refuse_to_replace(tasks: Iterable[Task], ledger: Ledger, sources: set[str]) -> None:
     """Raise InvalidParameterError where a result would replace that of another input which is still there."""
     for task in tasks:
-        row = ledger.rows.get(task.job.name, {})
-        theirs = row.get("input", task.job.source)
+        row = ledger.rows.get(task.name, {})
+        theirs = row.get("input", task.source)
         if task.why != UP_TO_DATE and row.get("outputs") and theirs not in sources and os.path.exists(theirs):
             raise InvalidParameterError(
-                f"{task.job.source}: its results, {task.job.name}, would replace those of {theirs}: give another "
-                "folder for them"
+                f"{task.source}: its results, {task.name}, would replace those of {theirs}: give another folder"
             )

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,11 +19,10 @@ from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
 from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
-from .jobs import RECIPE_FILE, UP_TO_DATE, BatchResult, Plan, Task
 from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STALE, Row, locked
-from .plan import Wanted, planned
-from .splitting import PARTS_FOLDER, TILES_FOLDER
-from .work import clear, told, work
+from .plan import RECIPE_FILE, TILES_FOLDER, UP_TO_DATE, Plan, Wanted, planned
+from .splitting import PARTS_FOLDER
+from .tasks import Task, clear, in_one_line, work
 from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, died
 
 if TYPE_CHECKING:
@@ -32,6 +32,33 @@ _POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed
 CANCELLED = "the work was cancelled, or its scheduler has gone: run the same batch to go on"
 WORKER_DIED = "the worker died with it, twice: out of memory, or a crash in native code"
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """What a batch did.
+
+    Attributes
+    ----------
+    rows : dict of str to dict
+        What the ledger says about the inputs, by name, those skipped included.
+    done, skipped, failed : int
+    seconds : float
+        Wall time, from the first cloud handed out.
+    ledger : Path
+    """
+
+    rows: dict[str, Row]
+    done: int
+    skipped: int
+    failed: int
+    seconds: float
+    ledger: Path
+
+    @property
+    def rate(self) -> float:
+        """Clouds done or failed per second."""
+        return (self.done + self.failed) / self.seconds if self.seconds > 0 else 0.0
 
 
 def run_batch(
@@ -120,11 +147,11 @@ def run_batch(
                 _Run(plan, crew, on_result).work_through()
             finally:
                 plan.ledger.close()
-            _sweep(plan)
             complete = True
         finally:
             crew.close(at_once=not complete)
-    rows = {task.job.name: plan.ledger.rows[task.job.name] for task in plan.tasks}
+        _remove_parts(plan)
+    rows = {task.name: plan.ledger.rows[task.name] for task in plan.tasks}
     failed = sum(row["status"] == FAILED for row in rows.values())
     done = len(plan.todo) - failed
     return BatchResult(rows, done, plan.skipped, failed, time.perf_counter() - start, plan.ledger.path)
@@ -152,132 +179,122 @@ def _make_room(plan: Plan) -> None:
     """Mark what is no longer true in the ledger, and make the folders: a worker's own would be where nobody looks."""
     rows = plan.ledger.rows
     for task in plan.tasks:
-        name, source = task.job.name, task.job.source
-        if task.why == UP_TO_DATE and rows[name]["input"] != source:  # the same bytes somewhere else
-            rows[name] = rows.pop(name) | {"input": source}
+        name = task.name
+        if task.why == UP_TO_DATE and rows[name]["input"] != task.source:  # the same bytes somewhere else
+            rows[name] = rows.pop(name) | {"input": task.source}
         elif task.why != UP_TO_DATE and rows.get(name, {}).get("status") == DONE:
             rows[name]["status"] = STALE
-    _forget_tiles(plan)
+        if task.needs and task.why != UP_TO_DATE:
+            _forget_tiles(plan, task)
     plan.ledger.rewrite()
     write_json(plan.out_dir / RECIPE_FILE, plan.recipe)
-    for folder in {(plan.out_dir / task.job.name).parent for task in plan.todo}:
+    for folder in {(plan.out_dir / task.name).parent for task in plan.todo}:
         folder.mkdir(parents=True, exist_ok=True)
 
 
-def _forget_tiles(plan: Plan) -> None:
+def _forget_tiles(plan: Plan, task: Task) -> None:
     """Drop tiles of earlier batches that are none any more, since the size has changed, or the scene."""
-    rows = plan.ledger.rows
-    for job in (task.job for task in plan.todo if task.job.needs):
-        first = job.name + TILES_FOLDER
-        for name in [name for name in rows if name.startswith(first) and name not in job.needs]:
-            for output in rows.pop(name).get("outputs", ()):
-                if output.startswith(first):
-                    Path(plan.out_dir, output).unlink(missing_ok=True)
+    rows, first = plan.ledger.rows, task.name + TILES_FOLDER
+    for name in [name for name in rows if name.startswith(first) and name not in task.needs]:
+        for output in rows.pop(name)["outputs"]:
+            if output.startswith(first):
+                Path(plan.out_dir, output).unlink(missing_ok=True)
 
 
-def _sweep(plan: Plan) -> None:
+def _remove_parts(plan: Plan) -> None:
     """Remove the files of those parts of scenes that are done."""
     for task in plan.tasks:
-        if task.job.origin and plan.ledger.rows[task.job.name]["status"] == DONE:
-            Path(task.job.path).unlink(missing_ok=True)
+        if task.origin and plan.ledger.rows[task.name]["status"] == DONE:
+            Path(task.path).unlink(missing_ok=True)
             with suppress(OSError):  # others are to be done
-                Path(task.job.path).parent.rmdir()
+                Path(task.path).parent.rmdir()
 
 
 class _Run:
-    """A batch at work: tasks that can be handed out, that wait for their tiles, that are in work, or to be retried."""
+    """A batch at work. Scenes are joined when all tiles are done."""
 
     def __init__(self, plan: Plan, workers: Workers, on_result: Callable[[Row], object] | None):
         self._plan, self._workers, self._on_result = plan, workers, on_result
-        self._ready: deque[Task] = deque()
-        self._waiting = plan.todo
-        self._open = {task.job.name for task in plan.todo}
-        self._running: dict[Future, Task] = {}
-        self._again: deque[Task] = deque()  # their workers died; done alone in the end
-        self._retried: set[str] = set()
-        self._release()
+        self._interrupts: list[int] = []
+        self._is_warned = False
 
     def work_through(self) -> None:
         """Hand out all tasks. Ctrl-C hands out no more and waits for what is in work; the second one does not wait."""
-        warned = False
-        with counted_interrupts() as interrupts:  # no line of the ledger is torn
-            while self._running or ((self._ready or self._again) and not interrupts):
-                if not interrupts:
-                    self._hand_out()
-                ended, _ = wait(self._running, _POLL_SECONDS, FIRST_COMPLETED)
-                self._collect(ended)
-                if len(interrupts) > 1:
-                    break
-                if interrupts and not warned:
-                    warned = True
-                    in_work = len(self._running)
-                    _log.warning("finishing what is in work (%d), nothing else: Ctrl-C again stops at once", in_work)
-                if not ended:
-                    self._workers.capacity()  # notices that a scheduler has gone
-            if interrupts:
-                raise KeyboardInterrupt
+        todo = self._plan.todo
+        with counted_interrupts() as self._interrupts:  # no line of the ledger is torn
+            self._do([task for task in todo if not task.needs])
+            self._do([task for task in todo if task.needs and self._has_all_tiles(task)])
 
-    def _hand_out(self) -> None:
-        if self._again and not self._ready and not self._running:
-            self._ready.append(self._again.popleft())
-            self._retried.add(self._ready[0].job.name)
-        while self._ready and len(self._running) < self._workers.capacity():
-            task = self._ready.popleft()
-            self._running[self._workers.submit(work, task.job)] = task
+    def _do(self, tasks: list[Task]) -> None:
+        """Have tasks done, and those whose workers died once more, each by itself."""
+        for task in self._round(tasks):
+            for lost in self._round([task]):
+                self._enter(lost, _failed(lost, WORKER_DIED))
+        if self._interrupts:
+            raise KeyboardInterrupt
 
-    def _collect(self, ended: Iterable[Future]) -> None:
+    def _round(self, tasks: list[Task]) -> list[Task]:
+        """Have tasks done, side by side; gives those whose workers died."""
+        ready, running, lost = deque(tasks), {}, []
+        while running or (ready and not self._interrupts):
+            while ready and not self._interrupts and len(running) < self._workers.capacity():
+                task = ready.popleft()
+                running[self._workers.submit(work, task)] = task
+            ended, _ = wait(running, _POLL_SECONDS, FIRST_COMPLETED)
+            lost += self._collect({future: running.pop(future) for future in ended})
+            if len(self._interrupts) > 1:
+                break
+            if self._interrupts and not self._is_warned:
+                self._is_warned = True
+                _log.warning("finishing what is in work (%d), nothing else: Ctrl-C again stops at once", len(running))
+            if not ended:
+                self._workers.capacity()  # notices that a scheduler has gone
+        return lost
+
+    def _collect(self, ended: dict[Future, Task]) -> list[Task]:
         """Put what came of tasks into the ledger; BatchError, in the end, where there is nobody to work any more."""
-        lost: BatchError | None = None
-        for future in ended:
-            task = self._running.pop(future)
+        gone, lost = None, []
+        for future, task in ended.items():
             error = BatchError(CANCELLED) if future.cancelled() else future.exception()
             if isinstance(error, BatchError):
-                lost = error
+                gone = error
             elif error is None:
                 self._enter(task, self._completed(task, future.result()))
-            elif not died(error):
-                self._enter(task, _failed(task, told(error)))
-            elif task.job.name in self._retried:
-                self._enter(task, _failed(task, WORKER_DIED))
+            elif died(error):
+                lost.append(task)
             else:
-                self._again.append(task)
-        if lost is not None:
-            raise lost
+                self._enter(task, _failed(task, in_one_line(error)))
+        if gone is not None:
+            raise gone
+        return lost
 
     def _completed(self, task: Task, row: Row) -> Row:
         """A worker's row, with what only this process knows."""
-        missing = row["error"].startswith("no such file") or ": no such folder" in row["error"]
-        if missing and Path(task.job.path).exists():
+        if row.pop("absent", False) and Path(task.path).exists():
             row["error"] += f" (on {row['worker']}; there is one here: workers need the same files by the same paths)"
-        if row.get("kept") and row["outputs"]:  # what the line told of them stays, too
-            before = self._plan.ledger.rows.get(task.job.name) or row
+        if row["status"] == FAILED and "points" not in row and row["outputs"]:  # the scan is away, its results stay
+            before = self._plan.ledger.rows.get(task.name) or row
             return before | {name: row[name] for name in ("status", "error", "outputs")}
         return row
 
     def _enter(self, task: Task, row: Row) -> None:
-        """Put a row into the ledger, and let those go on that waited for it."""
-        row = {"parameters": self._plan.parameters} | row | {"name": task.job.name, "input": task.job.source}
+        """Put a row into the ledger."""
+        row = {"parameters": self._plan.parameters} | row | {"name": task.name, "input": task.source}
         row = {name: row[name] for name in LEDGER_COLUMNS if name in row}
         self._plan.ledger.add(row)
-        self._open.discard(task.job.name)
         if self._on_result is not None:
             self._on_result(row)
-        self._release()
 
-    def _release(self) -> None:
-        """Let those go on that wait for nothing any more; a scene of which tiles failed has failed, too."""
-        free = [task for task in self._waiting if self._open.isdisjoint(task.job.needs)]
-        self._waiting = [task for task in self._waiting if not self._open.isdisjoint(task.job.needs)]
-        for task in free:
-            rows = [self._plan.ledger.rows[name] for name in task.job.needs]
-            failed = [row for row in rows if row["status"] != DONE]
-            if failed:
-                why = f"{len(failed)} of {len(rows)} tiles failed, {failed[0]['name']} since {failed[0]['error']}"
-                self._enter(task, _failed(task, f"{why}: the same batch tries them again"))
-            else:
-                self._ready.append(task)
+    def _has_all_tiles(self, task: Task) -> bool:
+        """Whether all that a task needs is done; where tiles failed, it has failed, too."""
+        rows = [self._plan.ledger.rows[name] for name in task.needs]
+        failed = [row for row in rows if row["status"] != DONE]
+        if failed:
+            why = f"{len(failed)} of {len(rows)} tiles failed, {failed[0]['name']} since {failed[0]['error']}"
+            self._enter(task, _failed(task, f"{why}: the same batch tries them again"))
+        return not failed
 
 
 def _failed(task: Task, error: str) -> Row:
-    clear(task.job)
+    clear(task)
     return {"status": FAILED, "error": error, "outputs": [], "version": __version__}

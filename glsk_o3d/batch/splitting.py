@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,18 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BatchError, FileFormatError, InvalidCloudError, InvalidParameterError, did_you_mean
+from ..errors import BatchError, InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.atomic import write_json
 from ..io.formats import ply
 from ..io.scan import COLOR_CHANNELS, Scan
 from ..io.scans import read_blocks
 from ..preparation.frame import not_finite
-from .grid import Grid, TooManyParts, tile_name, tile_of
-from .jobs import Job, Split
+from .grid import Grid, tile_name, tile_of
 
 PARTS_FOLDER = ".parts"
-TILES_FOLDER = ".tiles/"
-"""What follows the name of a scene in those of its tiles."""
 MOST_PARTS = 10_000  # fitted: more things than anybody numbers in a file; fewer than a scanner's intensities
 LONGEST_LABEL = 24  # derived: characters of the longest number of 64 bits, -2.2250738585072014e-308
 SPLIT_VERSION = 1
@@ -46,6 +43,17 @@ class Cut:
         return f"by = {self.by!r}" if self.tiles is None else f"tiles = {self.tiles:g}"
 
 
+@dataclass(frozen=True)
+class Split:
+    """A scene, taken apart: its parts by labels that can stand in names, with words for the points that they hold."""
+
+    input_hash: str
+    parts: dict[str, str]
+    points: int
+    dropped: int  # points that are in no part: without a label, or a place
+    grid: Grid | None = None  # of the tiles
+
+
 class Splitter:
     """Takes scenes apart, each once: what it found is kept in the output folder.
 
@@ -55,44 +63,16 @@ class Splitter:
     def __init__(self, out: Path, cut: Cut, hashed: Callable[[Path], str], write: bool):
         self.cut, self.folder, self._hash, self._write = cut, out / PARTS_FOLDER, hashed, write
 
-    def jobs(self, name: str, path: Path) -> list[Job]:
-        """A job for each part of a file, and after tiles one for the whole; one for the file if it cannot be read.
-
-        InvalidParameterError where the file lacks what is asked for.
-        """
-        try:
-            split = self.split(name, path)
-        except (FileFormatError, InvalidCloudError, OSError):
-            return [Job(name, str(path), str(path))]  # the worker will say what is wrong
-        between = "-" if split.grid is None else TILES_FOLDER
-        known = Split(split.input_hash, {}, split.points, split.dropped, split.grid)
-        jobs = [
-            Job(
-                name=f"{name}{between}{label}",
-                path=str(self.file(name, label)),
-                source=f"{path} {part}",
-                origin=str(path),
-                split=known,
-            )
-            for label, part in split.parts.items()
-        ]
-        if split.grid is not None:
-            jobs.append(Job(name, str(path), str(path), needs=tuple(job.name for job in jobs), split=known))
-        return jobs
-
-    def supply(self, jobs: Iterable[Job]) -> None:
-        """Write the parts of scenes anew of which some are to be done, and were removed when they had been done."""
-        missing = [job for job in jobs if job.origin and not os.path.exists(job.path)]
-        for folder, origin in {Path(job.path).parent: job.origin for job in missing}.items():
-            self._divide(folder.relative_to(self.folder).as_posix(), Path(origin))
-
     def split(self, name: str, path: Path) -> Split:
-        """Take a scene apart, unless that has been done. BatchError where the parts cannot be written."""
+        """Take a scene apart, unless that has been done.
+
+        InvalidParameterError where the file lacks what is asked for, BatchError where the parts cannot be written.
+        """
         self._check_place(name)
         known = self._known(name, path)
         if known is not None:
             return known
-        return self._divide(name, path) if self._write else divided(path, self.cut, self._hash(path), None)
+        return self.divide(name, path) if self._write else divided(path, self.cut, self._hash(path), None)
 
     def file(self, name: str, label: str) -> Path:
         """Where a part is, or will be."""
@@ -101,12 +81,12 @@ class Splitter:
     def _known(self, name: str, path: Path) -> Split | None:
         """What is kept of a scene, None where it is damaged or of something else: files are named by its labels."""
         try:
-            told = json.loads(self._told(name).read_text(encoding="utf-8"))
-            if (SPLIT_VERSION, str(path), asdict(self.cut)) != (told["version"], told["input"], told["cut"]):
+            kept = json.loads(self._list(name).read_text(encoding="utf-8"))
+            if (SPLIT_VERSION, str(path), asdict(self.cut)) != (kept["version"], kept["input"], kept["cut"]):
                 return None
-            found = told["split"]["grid"]
+            found = kept["split"]["grid"]
             grid = found and Grid(tuple(found["low"]), tuple(found["cell"]), tuple(found["counts"]), found["overlap"])
-            split = Split(**{**told["split"], "grid": grid})
+            split = Split(**{**kept["split"], "grid": grid})
             for label, part in split.parts.items():
                 same = label_text(float(label)) if grid is None else tile_name(tile_of(label))
                 if label != same or len(label) > LONGEST_LABEL or not isinstance(part, str):
@@ -119,17 +99,17 @@ class Splitter:
         """Raise BatchError where parts would be somewhere else, through a link, or where others keep something."""
         place = self.folder / name
         straight = Path(os.path.realpath(self.folder.parent), PARTS_FOLDER, name)
-        if Path(os.path.realpath(place)) != straight or (place.exists() and not self._told(name).is_file()):
+        if Path(os.path.realpath(place)) != straight or (place.exists() and not self._list(name).is_file()):
             raise BatchError(
                 f"{place}: is not of a batch, which would keep the parts of a scene there: move it away, or give the "
                 "results another folder"
             )
 
-    def _divide(self, name: str, path: Path) -> Split:
+    def divide(self, name: str, path: Path) -> Split:
         """Write the parts of a scene."""
         with _writing(self.folder):
-            self._told(name).parent.mkdir(parents=True, exist_ok=True)
-            write_json(self._told(name), {})  # of a batch that is killed the next one knows whose the folder is
+            self._list(name).parent.mkdir(parents=True, exist_ok=True)
+            write_json(self._list(name), {})  # of a batch that is killed the next one knows whose the folder is
             shutil.rmtree(self.folder / name, ignore_errors=True)
             (self.folder / name).mkdir(exist_ok=True)
         files = PartFiles(self.folder / name)
@@ -140,18 +120,18 @@ class Splitter:
             self._forget(name)
             raise
         with _writing(self.folder):
-            told = {"version": SPLIT_VERSION, "input": str(path), "cut": asdict(self.cut), "split": asdict(split)}
-            write_json(self._told(name), told)
+            kept = {"version": SPLIT_VERSION, "input": str(path), "cut": asdict(self.cut), "split": asdict(split)}
+            write_json(self._list(name), kept)
         return split
 
     def _forget(self, name: str) -> None:
         shutil.rmtree(self.folder / name, ignore_errors=True)
         with suppress(OSError):  # on Windows nobody removes what is open; above, there may be other scenes
-            self._told(name).unlink()
+            self._list(name).unlink()
             for above in (self.folder / name).relative_to(self.folder.parent).parents[:-1]:
                 (self.folder.parent / above).rmdir()
 
-    def _told(self, name: str) -> Path:
+    def _list(self, name: str) -> Path:
         return self.folder / f"{name}.json"
 
 
@@ -211,7 +191,7 @@ def divided(path: Path, cut: Cut, digest: str, files: PartFiles | None) -> Split
             parts[label], rows[label] = meant, valid[chosen]
         if len(parts) > MOST_PARTS:
             why = "it numbers no things" if grid is None else "give larger tiles"
-            raise TooManyParts(f"{cut}: has {len(parts)} parts or more in {path}: {why}")
+            raise InvalidParameterError(f"has {len(parts)} parts or more: {why}")
         points, kept = points + len(scan), kept + len(valid)
         if files is not None:
             files.add(scan, rows)

@@ -32,9 +32,6 @@ def died(error: BaseException | None) -> bool:
     return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"  # the latter is Dask's
 
 
-# ------------------------------------------------------------------------------------------------------ this machine
-
-
 class LocalWorkers:
     """Processes of this machine with one BLAS thread each; `load` has them load at once what every skeleton needs.
 
@@ -51,37 +48,39 @@ class LocalWorkers:
 
     def submit(self, function: Callable, *arguments: Any) -> Future:
         """Hand out one piece of work."""
-        seat, told = next(seat for seat in self._seats if seat.work.done()), Future[Any]()
-        seat.work = told
-        seat.submit(function, *arguments).add_done_callback(partial(self._settle, seat, told))
-        return told
+        seat = next(seat for seat in self._seats if seat.work.done())
+        seat.work = Future()
+        seat.submit(function, *arguments).add_done_callback(partial(self._settle, seat, seat.work))
+        return seat.work
 
-    def _settle(self, seat: _Seat, told: Future, done: Future) -> None:
+    def _settle(self, seat: _Seat, work: Future, done: Future) -> None:
         """Pass on what came of work; BatchError where more workers in a row died before they began than there are."""
         if done.cancelled():
-            told.cancel()
+            work.cancel()
             return
         error = done.exception()
         if died(error):
-            self._stillborn = 0 if seat.began() else self._stillborn + 1
+            self._stillborn = 0 if seat.first.exception() is None else self._stillborn + 1
             if self._stillborn > len(self._seats):
                 error = BatchError(
                     "worker processes die before they begin; stderr may say why. In a script, call run_batch under "
                     'if __name__ == "__main__": every worker runs the rest of it too'
                 )
         if error is None:
-            told.set_result(done.result())
+            work.set_result(done.result())
         else:
-            told.set_exception(error)
+            work.set_exception(error)
 
     def close(self, *, at_once: bool) -> None:
         """Let the workers go; at once: without waiting for what they do."""
-        for seat in self._seats:
-            if at_once:
-                seat.kill()
-        for seat in self._seats:
-            if seat.pool is not None:
-                seat.pool.shutdown(cancel_futures=True)
+        pools = [seat.pool for seat in self._seats if seat.pool is not None]
+        for pool in pools:
+            for process in (
+                list((pool._processes or {}).values()) if at_once else ()
+            ):  # before Python 3.14 no public name
+                process.kill()
+        for pool in pools:
+            pool.shutdown(cancel_futures=True)
 
 
 class _Seat:
@@ -99,23 +98,10 @@ class _Seat:
                 return self.pool.submit(function, *arguments)
             except BrokenExecutor:  # it died, perhaps while it was idle
                 self.pool.shutdown(wait=False)
-        self.pool = self._begun()
-        return self.pool.submit(function, *arguments)
-
-    def began(self) -> bool:
-        """Whether the process got as far as work."""
-        return self._first.exception() is None
-
-    def _begun(self) -> ProcessPoolExecutor:
-        pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin, (self._load,))
+        self.pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin, (self._load,))
         with _inherited():
-            self._first = pool.submit(os.getpid)
-        return pool
-
-    def kill(self) -> None:
-        processes = getattr(self.pool, "_processes", None) or {}  # before Python 3.14 they have no public name
-        for process in list(processes.values()):
-            process.kill()
+            self.first = self.pool.submit(os.getpid)  # fails if the process does not get as far as work
+        return self.pool.submit(function, *arguments)
 
 
 @contextmanager
@@ -154,9 +140,6 @@ def _follow() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)
-
-
-# ------------------------------------------------------------------------------------------------------ other machines
 
 
 class GivenWorkers:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Option
 
 from . import options
-from .console import echo, print_json, print_rows, progress, say
+from .console import echo, flags, print_rows, progress, say
 from .options import SKELETON_ENDINGS, argument, option, output_option
+from .outputs import tell
 
 if TYPE_CHECKING:
     from ..batch import BatchResult, Plan
@@ -48,9 +49,6 @@ def batch(
     ] = None,
     force: Annotated[bool, Option("--force", help="Do also what is done already.")] = False,
     dry_run: Annotated[bool, Option("--dry-run", help="Only say what would be done, and why.")] = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
 ) -> None:
     """Skeletonise many scans, several at a time.
 
@@ -74,28 +72,27 @@ def batch(
         force=force,
     )
     if dry_run:
-        _print_plan(plan_batch(inputs, output, **what), as_json, quiet)
+        _tell_plan(plan_batch(inputs, output, **what))
         return
-    with progress(not quiet, remaining=True) as update:
-        watch = _Watch(update, quiet, verbose)
+    with progress(not flags.quiet, remaining=True) as update:
+        watch = _Watch(update)
         update("looking for what is done")
         what |= dict(workers=workers, scheduler=scheduler, on_plan=watch.begin, on_result=watch.step)
         result = run_batch(inputs, output, **what)
-    _print_result(result, watch.left_out, as_json, quiet)
+    _tell_result(result, watch.left_out)
 
 
 class _Watch:
     """Shows how far a batch is; says what fails as soon as it does."""
 
-    def __init__(self, update, quiet: bool, verbose: bool):
-        self._update, self._quiet, self._verbose = update, quiet, verbose
-        self._done = self._failed = self._total = 0
-        self.left_out: dict[str, str] = {}
+    def __init__(self, update):
+        self._update = update
+        self._done = self._failed = 0
 
     def begin(self, plan: Plan) -> None:
         self._start, self._total, self.left_out = time.perf_counter(), len(plan.todo), plan.left_out
-        if not self._quiet:
-            _tell_left_out(plan.left_out)
+        if not flags.quiet:
+            _say_left_out(plan)
         self._update("starting", 0, self._total)
 
     def step(self, row: dict[str, Any]) -> None:
@@ -103,13 +100,13 @@ class _Watch:
         self._done, self._failed = self._done + 1, self._failed + failed
         rate = self._done / (time.perf_counter() - self._start)
         self._update(f"{rate:.3g} scans/s" + f", {self._failed} failed" * (self._failed > 0), self._done, self._total)
-        if failed and not self._quiet:
+        if failed and not flags.quiet:
             say("warning", f"{row['input']}: {row['error']}")
-        elif self._verbose:
+        elif flags.verbose:
             say("info", f"{row['input']}: {row['vertices']} vertices in {row['seconds']:.2f} s")
 
 
-def _print_result(result: BatchResult, left_out: dict[str, str], as_json: bool, quiet: bool) -> None:
+def _tell_result(result: BatchResult, left_out: dict[str, str]) -> None:
     """Print what a batch did; BatchError if something failed."""
     from ..errors import BatchError
 
@@ -117,32 +114,30 @@ def _print_result(result: BatchResult, left_out: dict[str, str], as_json: bool, 
     facts = {name: getattr(result, name) for name in ("done", "skipped", "failed")}
     facts |= {"seconds": round(result.seconds, 3), "clouds_per_second": round(result.rate, 3)}
     facts["ledger"] = str(result.ledger)
-    if as_json:
-        failed = [row for row in rows if row["status"] == "failed"]
-        failures = [{"input": row.get("input"), "error": row.get("error")} for row in failed]
-        print_json({**facts, "failures": failures, "left_out": left_out})
-    elif not quiet:
-        warned = sum(bool(row.get("warnings")) for row in rows)
-        print_rows({**facts, "with_warnings": f"{warned}, see ledger.csv" if warned else None})
-    if result.failed:
-        raise BatchError(f"{result.failed} of {len(rows)} scans failed: {result.ledger.with_suffix('.csv')} says why")
+    failed = [row for row in rows if row["status"] == "failed"]
+    failures = [{"input": row["input"], "error": row["error"]} for row in failed]
+    warned = sum(bool(row.get("warnings")) for row in rows)
+    shown = {**facts, "with_warnings": f"{warned}, see ledger.csv" if warned else None}
+    tell({**facts, "failures": failures, "left_out": left_out}, lambda: print_rows(shown))
+    if failed:
+        raise BatchError(f"{len(failed)} of {len(rows)} scans failed: {result.ledger.with_suffix('.csv')} says why")
 
 
-def _print_plan(plan: Plan, as_json: bool, quiet: bool) -> None:
-    if as_json:
-        tasks = [{"input": task.job.source, "why": task.why, "outputs": task.job.outputs} for task in plan.tasks]
-        facts = {"todo": len(plan.todo), "skipped": plan.skipped, "output": str(plan.out_dir)}
-        print_json({**facts, "tasks": tasks, "left_out": plan.left_out})
-    elif not quiet:
+def _tell_plan(plan: Plan) -> None:
+    def words() -> None:
         for task in plan.todo:
-            echo(f"{task.job.source} ({task.why}) -> {', '.join(task.job.outputs)}")
+            echo(f"{task.source} ({task.why}) -> {', '.join(task.outputs)}")
         echo(f"{len(plan.todo)} to do, {plan.skipped} to skip")
-        _tell_left_out(plan.left_out)
+        _say_left_out(plan)
+
+    tasks = [{"input": task.source, "why": task.why, "outputs": task.outputs} for task in plan.tasks]
+    facts = {"todo": len(plan.todo), "skipped": plan.skipped, "output": str(plan.out_dir)}
+    tell({**facts, "tasks": tasks, "left_out": plan.left_out}, words)
 
 
-def _tell_left_out(left_out: dict[str, str]) -> None:
+def _say_left_out(plan: Plan) -> None:
     """Say which files are not taken, and why: the reason once, with the names of the first files."""
-    for reason in dict.fromkeys(left_out.values()):
-        files = sorted(Path(path).name for path, why in left_out.items() if why == reason)
+    for reason in dict.fromkeys(plan.left_out.values()):
+        files = sorted(Path(path).name for path, why in plan.left_out.items() if why == reason)
         named = ", ".join(files[:SHOWN_NAMES]) + ", ..." * (len(files) > SHOWN_NAMES)
         say("info", f"left out {len(files)}: {reason} ({named})")

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import typer
@@ -14,14 +15,20 @@ import typer
 UNBROKEN = 10**5  # more characters than a line of a table has
 
 
-def visible(text: str) -> str:
-    """Text with its control characters, but line ends and tabs, written as Python writes them: terminals obey them.
+@dataclass
+class Flags:
+    """What the command that runs was asked for, about its output."""
 
-    Examples
-    --------
-    >>> print(visible("a\x1b[2Jb"))
-    a\\x1b[2Jb
-    """
+    quiet: bool = False
+    verbose: bool = False
+    as_json: bool = False
+
+
+flags = Flags()
+
+
+def visible(text: str) -> str:
+    """Text with its control characters, but line ends and tabs, written as Python writes them: terminals obey them."""
     return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", lambda found: repr(found[0])[1:-1], text)
 
 
@@ -110,13 +117,26 @@ def print_table(
 def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
     """Print names and values in two columns on stdout, broken to the width of a terminal but not in a file or a pipe.
 
-    Those that are None are left out; floats are printed with six digits.
+    Values that are None or empty are left out; each item of a list has a line.
     """
     if title:
         heading(title)
-    shown = {name.replace("_", " "): value for name, value in rows.items() if value is not None}
-    words = ((name, f"{value:.6g}" if isinstance(value, float) else str(value)) for name, value in shown.items())
-    print_table(words, wrap=console().file.isatty())
+    words = {name.replace("_", " "): _in_words(value) for name, value in rows.items()}
+    print_table(((name, text) for name, text in words.items() if text), wrap=console().file.isatty())
+
+
+def _in_words(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {text}" for name, text in value.items())
+    if isinstance(value, list | tuple):
+        return ("\n" if isinstance(value, list) else " ").join(map(_in_words, value))
+    return str(value)
 
 
 def print_json(data: Any) -> None:

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..errors import InvalidCloudError
-from .console import print_json, print_rows, progress
-from .options import DropInvalid, Json, Numbers, PipelineName, Quiet, ScanFile, Verbose, option
-from .outputs import PICTURE_FILE, REPORT_FILE, check_outputs, tell_files
+from .console import flags, print_rows, progress
+from .options import DropInvalid, Numbers, PipelineName, ScanFile, option
+from .outputs import PICTURE_FILE, REPORT_FILE, check_outputs, tell
 from .reporting import WrongUsage, load_open3d
 
 
@@ -25,9 +25,6 @@ def crosscheck(
     pipeline: PipelineName = "default",
     max_points: Annotated[int, option("N", "Thin larger clouds to so many points; 0 for no limit.")] = 16384,
     drop_invalid: DropInvalid = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Check a scan against a mesh made from it.
 
@@ -47,7 +44,7 @@ def crosscheck(
         raise WrongUsage("--mesh gives a mesh: there is none to make with --method")
     check_outputs([(output, *REPORT_FILE), (picture, *PICTURE_FILE)], scan, mesh)
     chosen = choose(pipeline, drop_invalid=drop_invalid)
-    with progress(not quiet and not verbose) as update:
+    with progress(not flags.quiet and not flags.verbose) as update:
         update(f"reading {scan.name}")
         load_open3d()
         cloud = read_cloud(scan)
@@ -62,11 +59,8 @@ def crosscheck(
             update(f"drawing {picture.name}")
             save_crosscheck_picture(check, picture, title=scan.name)
     files = [path for path in (output, picture) if path is not None]
-    if as_json:
-        print_json({**facts, "files": list(map(str, files))})
-    elif not quiet:
-        print_rows(_in_words(facts), title=f"{scan}: {check.verdict}")
-        tell_files(files, quiet=quiet)
+    whole = {**facts, "files": list(map(str, files))}
+    tell(whole, lambda: print_rows(_in_words(facts), title=f"{scan}: {check.verdict}"), files)
     if check.verdict == UNTOLD:
         raise InvalidCloudError(
             f"the check says nothing about the skeleton: {check.reasons[0]}; give "
@@ -80,7 +74,7 @@ def _in_words(facts: dict[str, Any]) -> dict[str, Any]:
     rows, skeletons, mesh = facts["rows"], facts["skeletons"], facts["mesh"]
     points = "{used} of {given}; {turned} turned by more than 30 degrees, {not_compared} not compared"
     shown = {
-        "because": "\n".join(facts["reasons"]) or None,
+        "because": facts["reasons"],
         "which is": MEANINGS[facts["verdict"]],
         "points": points.format(**facts["points"]),
         "mesh": f"{facts['surface'].replace('_', ' ')}, {mesh['vertices']} vertices, {mesh['faces']} triangles",
@@ -96,5 +90,4 @@ def _in_words(facts: dict[str, Any]) -> dict[str, Any]:
         shown[words] = f"{skeletons[f'{name}_in_radii']:.2f} local radii ({skeletons[name]:.2%} of the diagonal)"
     for name in ("components", "loops", "leaves"):
         shown[name] = "{} and {}".format(*skeletons[name])
-    shown["contractions"] = "of the cloud: {}\nof the mesh: {}".format(*facts["stop_reasons"])
     return shown

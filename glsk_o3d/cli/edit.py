@@ -1,4 +1,4 @@
-"""``glsk edit`` and ``glsk convert``: skeletons from file to file."""
+"""``glsk edit``, ``glsk convert`` and ``glsk rig``: skeletons from file to file."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Option
 
 from .console import echo
-from .options import TREE_ENDINGS, CutLoops, Output, Quiet, SkeletonFile, Verbose, argument, option, root_option
-from .outputs import check_outputs, skeleton_files, skeleton_writers, tell_files, write_each
-from .reporting import WrongUsage
+from .options import TREE_ENDINGS, CutLoops, Output, SkeletonFile, argument, option, output_option, root_option
+from .outputs import check_outputs, skeleton_files, skeleton_writers, tell, write_each
+from .reporting import WrongUsage, load_open3d
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -30,8 +30,6 @@ def edit(
         float | None, option("TOLERANCE", "Drop vertices that leave the curve as near.", "--simplify", min=0)
     ] = None,
     vertices: Annotated[int | None, option("N", "Keep so many vertices, if the graph allows.", min=1)] = None,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Shorten, thin out, smooth or reroot a skeleton.
 
@@ -62,7 +60,7 @@ def edit(
     if tolerance is not None or vertices is not None:
         n_vertices, edited = len(edited.vertices), editing.simplify(edited, tolerance=tolerance, n=vertices)
         done.append(f"kept {len(edited.vertices)} of {n_vertices} vertices")
-    _write(edited, output or [], done, quiet=quiet)
+    _write(edited, output or [], done)
 
 
 def convert(
@@ -70,8 +68,6 @@ def convert(
     output: Annotated[list[Path], argument("FILE...", "Other formats, by their endings.")],
     cut_loops: CutLoops = False,
     root: Annotated[Any, root_option("Where the tree grows from, in formats that hold only trees")] = None,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Write a skeleton in another format."""
     from ..io.skeletons import read_skeleton
@@ -82,11 +78,42 @@ def convert(
         raise WrongUsage(
             f"--root is for formats that hold only trees, {', '.join(TREE_ENDINGS)}: for others use 'glsk edit'"
         )
-    _write(read_skeleton(skeleton), output, [], quiet=quiet, cut_loops=cut_loops, root=root)
+    _write(read_skeleton(skeleton), output, [], cut_loops=cut_loops, root=root)
 
 
-def _write(skeleton: Skeleton, output: list[Path], done: list[str], *, quiet: bool, **options: Any) -> None:
+def _write(skeleton: Skeleton, output: list[Path], done: list[str], **options: Any) -> None:
     written, problems = write_each(skeleton_writers(skeleton, output, **options))
-    for line in () if quiet else done:
-        echo(line)
-    tell_files(written, problems, quiet=quiet)
+    tell(None, lambda: echo("\n".join(done)) if done else None, written, problems)
+
+
+def rig(
+    skeleton: SkeletonFile,
+    mesh: Annotated[Path | None, argument("MESH", "A mesh or a cloud; by default the skeleton's tubes.")] = None,
+    output: Annotated[list[Path] | None, output_option("GLB", "Where to write the rig: binary glTF.")] = None,
+    root: Annotated[Any, root_option("Which joint moves all others")] = None,
+    cut_loops: Annotated[bool, Option("--cut-loops", help="Cut loops open; the surface stays whole.")] = False,
+    up: Annotated[str, option("AXIS", "Which axis of the data points up: z or y.")] = "z",
+) -> None:
+    """Write a mesh with the skeleton's armature, for Blender.
+
+    Every edge of the skeleton is a bone, named by its branch, and moves what is next to it. Textures do not go
+    along.
+    """
+    from .. import FileFormatError, read_cloud, read_skeleton, save_rig
+    from ..io.meshes import read_mesh
+
+    if output is None or len(output) > 1:
+        raise WrongUsage("nothing to write: give one output with -o")
+    check_outputs([(output[0], ".glb", "rig is binary glTF")], skeleton, mesh)
+    curve, moved = read_skeleton(skeleton), "the skeleton's own surface"
+    surface: Any = None
+    if mesh is not None:
+        load_open3d()
+        try:
+            surface = read_mesh(mesh)
+            moved = f"{len(surface.vertices)} vertices and {len(surface.triangles)} triangles"
+        except FileFormatError:
+            surface = read_cloud(mesh)  # knows best what else may be wrong with the file
+            moved = f"{len(surface.points)} points"
+    save_rig(curve, output[0], surface, cut_loops=cut_loops, root=root, up=up)
+    tell(None, lambda: echo(f"{len(curve.vertices) - curve.n_components} bones move {moved}"), output)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
-from .console import print_json, print_table, progress
-from .options import Json, Numbers, Quiet, SkeletonFile, Verbose, argument, option
-from .outputs import PICTURE_FILE, REPORT_FILE, check_outputs, tell_files
+from .console import flags, print_table, progress
+from .options import Numbers, SkeletonFile, argument, option
+from .outputs import PICTURE_FILE, REPORT_FILE, check_outputs, tell
 from .reporting import load_open3d
 
 if TYPE_CHECKING:
@@ -44,9 +44,6 @@ def evaluate(
     ] = None,
     output: Numbers = None,
     preview: Annotated[Path | None, option("PNG", "Draw the skeleton coloured by error or centredness.")] = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Measure how good a skeleton is.
 
@@ -58,7 +55,7 @@ def evaluate(
     from ..interop.clouds import cloud_points
 
     check_outputs([(output, *REPORT_FILE), (preview, *PICTURE_FILE)], skeleton, cloud, truth)
-    with progress(not quiet and not verbose) as update:
+    with progress(not flags.quiet and not flags.verbose) as update:
         update(f"reading {skeleton.name}")
         curve = read_skeleton(skeleton)
         axis = read_truth(truth) if truth is not None else None
@@ -88,11 +85,9 @@ def evaluate(
                 shown = dict(values=assessment.edge_centredness, label="centredness", best=1)
             save_assessment(curve, points, path=preview, unknown=_BLACK_MEANS, title=skeleton.name, **shown)
     files = [path for path in (output, preview) if path is not None]
-    if as_json:
-        print_json({**facts, "files": list(map(str, files))})
-    elif not quiet:
-        print_table(_rows(assessment, comparison), ("measure", "value", "best", "what it is"), left=(0, 3), wrap=True)
-        tell_files(files, quiet=quiet)
+    heads = ("measure", "value", "best", "what it is")
+    whole = {**facts, "files": list(map(str, files))}
+    tell(whole, lambda: print_table(_rows(assessment, comparison), heads, left=(0, 3), wrap=True), files)
 
 
 def _measured(

@@ -7,8 +7,9 @@ import inspect
 import re
 from typing import TYPE_CHECKING, Annotated, Any
 
-from .console import echo, heading, print_json, print_table
-from .options import Json, argument
+from .console import echo, heading, print_table
+from .options import argument
+from .outputs import tell
 from .reporting import WrongUsage
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 def filters(
     name: Annotated[str | None, argument("NAME", "One filter, stopping rule or pipeline, in full.")] = None,
-    as_json: Json = False,
 ) -> None:
     """List filters and their parameters, and pipelines.
 
@@ -31,15 +31,16 @@ def filters(
         raise WrongUsage(did_you_mean(name, [*known, *pipelines], "filter or pipeline"))
     filter_facts = [_filter_facts(cls) for key, cls in known.items() if name in (None, key)]
     pipeline_facts = [_pipeline_facts(key, make) for key, make in pipelines.items() if name in (None, key)]
-    if as_json:
-        print_json({"filters": filter_facts, "pipelines": pipeline_facts})
-        return
-    for facts in filter_facts:
-        flow = f"{facts['consumes']} -> {facts['produces']}" if facts["consumes"] else facts["kind"]
-        _print_facts(facts, flow, map(_parameter_row, facts["parameters"]), full=name is not None)
-    for facts in pipeline_facts:
-        stages = (("  |" if i else "", stage) for i, stage in enumerate(facts["stages"]))
-        _print_facts(facts, "pipeline", stages, full=name is not None)
+
+    def words() -> None:
+        for facts in filter_facts:
+            flow = f"{facts['consumes']} -> {facts['produces']}" if facts["consumes"] else facts["kind"]
+            _print_facts(facts, flow, map(_parameter_row, facts["parameters"]), full=name is not None)
+        for facts in pipeline_facts:
+            stages = (("  |" if i else "", stage) for i, stage in enumerate(facts["stages"]))
+            _print_facts(facts, "pipeline", stages, full=name is not None)
+
+    tell({"filters": filter_facts, "pipelines": pipeline_facts}, words)
 
 
 def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:
@@ -71,13 +72,7 @@ def _pipeline_facts(name: str, make) -> dict[str, Any]:
 
 
 def limits(metadata) -> str:
-    """The limits of a parameter in words, from what `glsk_o3d.parameters.parameter` made; empty if it has none.
-
-    Examples
-    --------
-    >>> limits({"low": 0, "high": 1, "open_low": True, "choices": ()})
-    'above 0, at most 1'
-    """
+    """The limits of a parameter in words, such as "above 0, at most 1"; empty if it has none."""
     words = [" or ".join(metadata["choices"])] if metadata["choices"] else []
     if metadata["low"] is not None:
         words.append(f"{'above' if metadata['open_low'] else 'at least'} {metadata['low']:g}")

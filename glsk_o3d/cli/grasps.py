@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from .console import echo, print_json, print_table
-from .options import Json, Quiet, Verbose, argument, option, output_option
-from .outputs import check_outputs, tell_files
+from .console import echo, print_table
+from .options import argument, option, output_option
+from .outputs import check_outputs, tell
 from .reporting import WrongUsage
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from ..analysis import GraspCandidates
 
 GRASP_ENDINGS = (".json", ".csv", ".ply")
-PRINTED_GRASP = {
-    "position": "",  # with the digits of a map
-    "approach": ".2f",
-    "opening": ".4g",
-    "quality": ".2f",
-    "seen": "d",
-    "branch": "d",
-}
+HEADS = ("x", "y", "z", "approach x", "y", "z", "opening", "quality", "seen", "branch")
 
 
 def grasps(
@@ -45,9 +35,6 @@ def grasps(
     output: Annotated[
         list[Path] | None, output_option("FILE", "json, csv, or ply to look at; may be repeated.")
     ] = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Find where a gripper with two jaws can take an object.
 
@@ -79,11 +66,8 @@ def grasps(
     best = found[:count]
     for path in output or []:
         {".json": best.to_json, ".csv": best.to_csv, ".ply": best.to_ply}[path.suffix.lower()](path)
-    if as_json:
-        print_json({"skeleton": str(skeleton), "found": len(found), **best.as_dict()})
-    elif not quiet:
-        _print(best, len(found))
-        tell_files(output, quiet=quiet)
+    facts = {"skeleton": str(skeleton), "found": len(found), **best.as_dict()}
+    tell(facts, lambda: _print(best, len(found)), output or [])
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
@@ -110,22 +94,16 @@ def _cone(text: str) -> tuple[tuple[float, ...], float]:
 
 
 def _print(best: GraspCandidates, found: int) -> None:
+    from ..judgements import coordinates
+
     echo(f"{found} grasps at {best.places} places")
     for reason, times in best.left_out.items():
         limit = " (confidence below --min-confidence)" if reason == "uncertain" else ""
         echo(f"left out: {times} {reason}{limit}")
-    if len(best):
-        columns = [_cells(getattr(best, name), form) for name, form in PRINTED_GRASP.items()]
-        print_table(list(zip(*columns, strict=True)), list(PRINTED_GRASP))
-
-
-def _cells(values: np.ndarray, form: str) -> Sequence[str]:
-    """A column of the table; numbers of one direction stand below each other."""
-    from ..judgements import coordinates
-
-    rows = [
-        [f"{value:{form}}" for value in row] if form else coordinates(row).split(", ")
-        for row in values.reshape(len(values), -1).tolist()
-    ]
-    widths = [max(map(len, numbers)) for numbers in zip(*rows, strict=True)]
-    return [" ".join(number.rjust(width) for number, width in zip(row, widths, strict=True)) for row in rows]
+    columns = (best.position, best.approach, best.opening, best.quality, best.seen, best.branch)
+    rows = []
+    for place, way, opening, quality, seen, branch in zip(*columns, strict=True):
+        numbers = [f"{opening:.4g}", f"{quality:.2f}", str(seen), str(branch)]
+        rows.append([*coordinates(place).split(", "), *(f"{value:.2f}" for value in way), *numbers])
+    if rows:
+        print_table(rows, HEADS)

@@ -8,15 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from .console import print_json, print_rows
-from .options import Json, Quiet, Verbose, Where, argument
+from .console import flags, print_rows
+from .options import Where, argument
+from .outputs import tell
 from .reporting import load_open3d
-from .running import print_iterations
+from .skeletonize import print_iterations
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from ..io.scan import Scan
     from ..skeleton import Skeleton
 
 FEW_VALUES = 12  # fitted: that an attribute may have for all of them to be listed
@@ -26,30 +24,28 @@ EXTENT_DIGITS = 6  # fitted: of coordinates, counted from the size of the cloud 
 def info(
     file: Annotated[Path | None, argument("[FILE]", "A cloud, mesh or skeleton; or none, for the formats.")] = None,
     where: Where = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Say what is in a cloud or skeleton file."""
     from ..io.skeletons import holds_skeleton, read_skeleton
 
-    iterations: Any = ()
     if file is None:
-        shown = facts = _formats()
-    elif holds_skeleton(file):
+        flags.quiet = False
+        formats = _formats()
+        tell(formats, lambda: print_rows(formats))
+        return
+    iterations: Any = ()
+    if holds_skeleton(file):
         skeleton = read_skeleton(file)
         facts, iterations = _skeleton_facts(skeleton), skeleton.report.iterations
-        shown = _skeleton_in_words(facts, skeleton)
     else:
         facts = _cloud_facts(file, where)
-        shown = _cloud_in_words(facts)
-    if as_json:
-        head = {"file": str(file)} if file else {}
-        tail = {"iterations": list(map(asdict, iterations))} if iterations else {}
-        print_json({**head, **facts, **tail})
-    elif not quiet or file is None:
-        print_rows({name: _words(value) for name, value in shown.items()}, title=str(file or ""))
+
+    def words() -> None:
+        print_rows(facts if "edges" in facts else _cloud_in_words(facts), title=str(file))
         print_iterations(iterations)
+
+    steps = {"iterations": list(map(asdict, iterations))} if iterations else {}
+    tell({"file": str(file), **facts, **steps}, words)
 
 
 def _formats() -> dict[str, Any]:
@@ -76,8 +72,10 @@ def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
     Lengths are in the cloud's units. A large cloud is read in blocks, which say nothing of duplicates and the spacing.
     """
     import numpy as np
+    from scipy.spatial import KDTree
 
-    from ..io.scans import promised_points, read_blocks, read_scan
+    from ..io.clouds.blocks import promised_points, read_blocks
+    from ..io.scans import read_scan
     from ..io.streaming import LARGE_CLOUD
 
     load_open3d()
@@ -92,31 +90,21 @@ def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
         for name, values in block.attributes.items():
             facts = _attribute(values)
             known[name] = _together(known[name], facts) if name in known else facts
+    whole: dict[str, Any] = {}
+    if not large:
+        distinct = np.unique(finite, axis=0)
+        spacing = np.median(KDTree(distinct).query(distinct, k=2)[0][:, 1]) if len(distinct) > 1 else np.nan
+        whole = {"triangles": len(block.triangles) or None, "duplicates": len(finite) - len(distinct)}
+        whole["median_spacing"] = float(spacing)  # to the nearest other point
     low, high = (np.min(ends, axis=0), np.max(ends, axis=0)) if ends else (np.full(3, np.nan),) * 2
     never_set = frozenset.intersection(*unset)
     return {
-        "kind": "cloud",
-        "points": n,
-        "not_finite": lost,
-        **({} if large else _facts_of_whole(block, finite)),
-        "lowest": low.tolist(),
-        "highest": high.tolist(),
-        "diagonal": float(np.linalg.norm(high - low)),
-        "colours": block.colors is not None,
-        "normals": block.normals is not None,
+        **{"kind": "cloud", "points": n, "not_finite": lost},
+        **whole,
+        **{"lowest": low.tolist(), "highest": high.tolist(), "diagonal": float(np.linalg.norm(high - low))},
+        **{"colours": block.colors is not None, "normals": block.normals is not None},
         "attributes": {name: facts for name, facts in known.items() if name not in never_set} or None,
     }
-
-
-def _facts_of_whole(scan: Scan, finite: np.ndarray) -> dict[str, Any]:
-    """What only all points of a cloud together say; the spacing is the median distance to the nearest other point."""
-    import numpy as np
-    from scipy.spatial import KDTree
-
-    distinct = np.unique(finite, axis=0)
-    spacing = np.median(KDTree(distinct).query(distinct, k=2)[0][:, 1]) if len(distinct) > 1 else np.nan
-    duplicates = len(finite) - len(distinct)
-    return {"triangles": len(scan.triangles) or None, "duplicates": duplicates, "median_spacing": float(spacing)}
 
 
 def _attribute(values: Any) -> dict[str, Any]:
@@ -153,7 +141,7 @@ def _cloud_in_words(facts: dict[str, Any]) -> dict[str, Any]:
         decimals = max(EXTENT_DIGITS - math.ceil(math.log10(diagonal)), 0)
     corners = {name: "  ".join(f"{item:.{decimals}f}" for item in facts[name]) for name in ("lowest", "highest")}
     ranges = [f"{name} {_range(attribute)}" for name, attribute in (facts["attributes"] or {}).items()]
-    return {**facts, **corners, "attributes": "\n".join(ranges) or None}
+    return {**facts, **corners, "attributes": ranges}
 
 
 def _range(attribute: dict[str, Any]) -> str:
@@ -174,7 +162,7 @@ def _skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
     facts = {
         "kind": "skeleton",
         **structure(skeleton),
-        "radii": [float(radii.min()), float(radii.max())] if len(radii) else None,
+        "radii": (float(radii.min()), float(radii.max())) if len(radii) else None,
         "points": len(skeleton.points) or None,
     }
     if not report.stages:
@@ -184,7 +172,7 @@ def _skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
         "stages": list(dict.fromkeys(report.stages)),
         "converged": report.converged,
         "stop_reason": report.stop_reason,
-        "repeatable": _repeatable(report.recipe),
+        "repeatable": _is_repeatable(report.recipe),
         "uncertain": list(map(str, report.uncertain)),
         "unsupported": list(map(str, report.unsupported)),
         "warnings": list(report.warnings),
@@ -192,7 +180,7 @@ def _skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
     }
 
 
-def _repeatable(recipe) -> bool:
+def _is_repeatable(recipe: Any) -> bool:
     """Whether a recipe can be run here: some cannot be written, and some need a plugin."""
     from ..errors import RecipeError
     from ..recipes import from_recipe
@@ -201,36 +189,3 @@ def _repeatable(recipe) -> bool:
         return bool(recipe and from_recipe(recipe))
     except RecipeError:
         return False
-
-
-def _skeleton_in_words(facts: dict[str, Any], skeleton: Skeleton) -> dict[str, Any]:
-    """The facts with the filters of the run, as far as they can be repeated, with those options that are no default."""
-    from ..recipes import from_recipe
-
-    shown = {**facts, "radii": " to ".join(f"{radius:.6g}" for radius in facts["radii"] or []) or None}
-    if facts.get("repeatable"):
-        short = {repr(stage): _call(stage) for stage in from_recipe(skeleton.report.recipe).stages}
-        shown["stages"] = [short.get(stage, stage) for stage in facts["stages"]]
-    return shown
-
-
-def _call(made: Any) -> str:
-    """A filter or stopping rule as its name, and its options that are not the default."""
-    from dataclasses import fields, is_dataclass
-
-    if not is_dataclass(made):
-        return repr(made)
-    options = {field: getattr(made, field.name) for field in fields(made) if field.init}
-    chosen = [f"{field.name}={_call(value)}" for field, value in options.items() if value != field.default]
-    return type(made).__name__ + f"({', '.join(chosen)})" * bool(chosen)
-
-
-def _words(value: Any) -> Any:
-    """A value as the table shows it."""
-    if isinstance(value, dict):
-        return ", ".join(f"{name} {text}" for name, text in value.items()) or None
-    if isinstance(value, tuple):
-        return " ".join(value)
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return "\n".join(value) or None if isinstance(value, list) else value

@@ -11,29 +11,31 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from ..errors import MissingPackageError
+from ..interop.entry_points import entry_points
 from .batch import batch
-from .branches import branches
-from .console import echo
+from .console import echo, say
 from .crosscheck import crosscheck
-from .demo import demo
-from .edit import convert, edit
+from .edit import convert, edit, rig
 from .evaluate import evaluate
 from .filters import filters
 from .grasps import grasps
 from .info import info
-from .plugged import add_plugged
-from .reporting import reported
-from .rerun import rerun
-from .rig import rig
+from .measures import branches, tree
+from .reporting import as_command, reporting
 from .run import run
-from .skeletonize import skeletonize
-from .tree import tree
+from .skeletonize import demo, rerun, skeletonize
 from .view import view
 
 EPILOG = (
     "Exit codes: 0 all went well; 1 the input or the run failed; 2 the command line is wrong; 130 interrupted. "
     "Results go to stdout; errors (one line each), warnings and progress to stderr."
 )
+COMMAND_GROUP = "glsk_o3d.commands"
+ELSEWHERE = {
+    "benchmark": ("./benchmarks", "Score any program on shapes with known axes (in a distribution of its own)."),
+}
+"""Commands that are not in this distribution: the folder of the repository that has them, and what they do."""
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -43,9 +45,35 @@ app = typer.Typer(
     epilog=EPILOG,
 )
 ANALYSES = (evaluate, crosscheck, branches, tree, grasps)
-for command in (skeletonize, batch, run, rerun, *ANALYSES, edit, convert, rig, view, demo, filters, info):
-    app.command(epilog=EPILOG if command is skeletonize else None)(reported(command))
-add_plugged(app)
+WITHOUT_JSON = (edit, convert, rig, view, demo)
+
+
+def add_plugged(app: typer.Typer) -> None:
+    """Add the commands of other distributions; those of `ELSEWHERE` that are not there say how to get them."""
+    problems: list[str] = []
+    found = {entry.name: entry for _, entry in entry_points(COMMAND_GROUP, problems)}
+    for name, entry in sorted(found.items()):
+        try:
+            plugged = entry.load()
+            if not isinstance(plugged, typer.Typer):
+                raise TypeError(f"it is a {type(plugged).__name__} and should be a typer.Typer")
+            app.add_typer(plugged, name=name)
+        except Exception as error:  # the code of others: the other commands work without it
+            problems.append(f"the command {name!r} ({entry.value}) is left out: {error}")
+    for problem in problems:
+        say("warning", problem)
+    for name in ELSEWHERE.keys() - found.keys():
+        _add_absent(app, name, *ELSEWHERE[name])
+
+
+def _add_absent(app: typer.Typer, name: str, folder: str, text: str) -> None:
+    def absent() -> None:
+        with reporting():
+            cure = f"pip install {folder} in a clone of glsk-o3d"
+            raise MissingPackageError(f"glsk {name} needs another distribution: {cure}")
+
+    settings = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
+    app.command(name, help=text, context_settings=settings)(absent)
 
 
 def _version(wanted: bool) -> None:
@@ -62,6 +90,11 @@ def main(
 ) -> None:
     """Curve skeletons from point clouds."""
 
+
+for function in (skeletonize, batch, run, rerun, *ANALYSES, edit, convert, rig, view, demo, filters, info):
+    command = as_command(function, with_json=function not in WITHOUT_JSON)
+    app.command(epilog=EPILOG if function is skeletonize else None)(command)
+add_plugged(app)
 
 if __name__ == "__main__":
     app()

@@ -7,11 +7,11 @@ import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..errors import GlskError
 from ..interop.packages import require_for
-from .console import echo
+from .console import echo, flags, print_json
 from .options import SKELETON_ENDINGS
 from .reporting import WrongUsage
 
@@ -34,8 +34,8 @@ def check_outputs(
     """Find out before computing whether files can be written.
 
     Each comes with its ending, or all that it may have, and what it is. WrongUsage for a wrong ending, one file twice,
-    an input, or no file where it is `needed`, which says how to give one; OSError where a folder is missing, or a file
-    cannot be written.
+    an input, or no file where it is `needed`, which says how to give one; MissingPackageError where the package that
+    writes one is not installed; OSError where a folder is missing, or a file cannot be written.
     """
     given = [(path, ending, what) for path, ending, what in files if path is not None]
     if needed and not given:
@@ -50,24 +50,16 @@ def check_outputs(
             raise WrongUsage(f"{path}: {taken[real]}: choose another name")
         taken[real] = "is named twice"
     for path, _, _ in given:
-        check_writable(path)
-
-
-def check_writable(path: Path) -> None:
-    """Raise before the work what would keep the file from being made or replaced after it.
-
-    MissingPackageError where files with this ending are written by a package that is not installed, or OSError.
-    """
-    require_for(path.suffix)
-    folder = Path(os.path.realpath(path)).parent
-    if not folder.is_dir():
-        raise FileNotFoundError(f"{path.parent}: no such folder: make it before writing {path.name}")
-    if path.exists() and not path.is_file():
-        raise OSError(f"{path}: is a folder or a device, not a file to write to")
-    try:
-        tempfile.TemporaryFile(dir=folder).close()
-    except OSError as error:
-        raise OSError(f"{path}: no file can be made in this folder: {error.strerror}") from error
+        require_for(path.suffix)
+        folder = Path(os.path.realpath(path)).parent
+        if not folder.is_dir():
+            raise FileNotFoundError(f"{path.parent}: no such folder: make it before writing {path.name}")
+        if path.exists() and not path.is_file():
+            raise OSError(f"{path}: is a folder or a device, not a file to write to")
+        try:
+            tempfile.TemporaryFile(dir=folder).close()
+        except OSError as error:
+            raise OSError(f"{path}: no file can be made in this folder: {error.strerror}") from error
 
 
 def skeleton_files(
@@ -122,9 +114,16 @@ def write_each(writers: Writers, update: Callable[[str], object] = lambda text: 
     return written, problems
 
 
-def tell_files(written: Sequence[Path] | None, problems: Sequence[str] = (), *, quiet: bool) -> None:
-    """Print which files were written; then raise OSError if some were not."""
-    for path in [] if quiet else written or []:
-        echo(f"wrote {path}")
+def tell(facts: Any, words: Callable[[], object], files: Iterable[object] = (), problems: Sequence[str] = ()) -> None:
+    """Print what a command found, as JSON if that is asked for, else in words and with the files that it wrote.
+
+    Then OSError where files could not be written.
+    """
+    if flags.as_json:
+        print_json(facts)
+    elif not flags.quiet:
+        words()
+        for path in files:
+            echo(f"wrote {path}")
     if problems:
         raise OSError("; ".join(problems))

@@ -36,12 +36,6 @@ def override(pipeline: Pipeline, settings: Iterable[str]) -> Pipeline:
     of that name. Values are written as in Python or as plain words: ``16``, ``1e4``, ``2%``, ``true``, ``none``,
     ``index``; reducers and rules by their names (``Contractor.stop=RingSizeRatio``). InvalidParameterError where a
     setting is malformed, or its filter, parameter or value is wrong.
-
-    Examples
-    --------
-    >>> from glsk_o3d import pipelines
-    >>> override(pipelines.default(), ["k=20", "Connector.links=nearest"]).stages[2]
-    Connector(radius='1%', thickness=0.6, links='nearest')
     """
     settings, ready = list(settings), pipeline
     for setting in settings:  # reducers and rules first: other settings may change what is put in

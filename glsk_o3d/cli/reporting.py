@@ -1,7 +1,8 @@
-"""What went wrong, said in a line and an exit code."""
+"""What all commands have: options about their output, and errors as a line and an exit code."""
 
 from __future__ import annotations
 
+import inspect
 import logging
 import sys
 import traceback
@@ -16,7 +17,8 @@ import typer
 from ..errors import GlskError, InvalidCloudError, InvalidParameterError, PluginWarning, SkeletonWarning
 from ..interop.interrupts import counted_interrupts
 from ..interop.packages import import_open3d
-from .console import echo, say
+from .console import echo, flags, say
+from .options import Json, Quiet, Verbose
 
 FAILURE_CODE, USAGE_CODE, INTERRUPTED_CODE = 1, 2, 130
 
@@ -25,17 +27,27 @@ class WrongUsage(InvalidParameterError):
     """The command line asks for something impossible, whatever the scan holds."""
 
 
-def reported(command: Callable[..., None]) -> Callable[..., None]:
-    """A command whose errors become lines, as `reporting` does it; points may be those of these arguments."""
+def as_command(function: Callable[..., None], *, with_json: bool) -> Callable[..., None]:
+    """A function as a command: with --quiet, --verbose and perhaps --json, and with errors as lines."""
 
-    @wraps(command)
-    def run(**options):
+    @wraps(function)
+    def command(as_json=False, quiet=False, verbose=False, **options):
         clouds = (options.get(name) for name in ("scan", "cloud", "mesh", "result"))
         cloud = next((path for path in clouds if path is not None), None)
-        with reporting(cloud, quiet=options.get("quiet", False), verbose=options.get("verbose", False)):
-            command(**options)
+        flags.as_json = as_json
+        with reporting(cloud, quiet=quiet, verbose=verbose):
+            function(**options)
 
-    return run
+    signature = inspect.signature(function, eval_str=True)  # what Typer makes the options from
+    added = {"as_json": Json} if with_json else {}
+    added |= {"quiet": Quiet, "verbose": Verbose}
+    more = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+        for name, kind in added.items()
+    ]
+    parameters = [*signature.parameters.values(), *more]
+    command.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    return command
 
 
 @contextmanager
@@ -45,10 +57,11 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
     What is wrong with points is said with the name of the file `cloud`. `verbose` shows the log, and the traceback of
     an error before its line. What is no mistake of the user's passes through with its traceback.
     """
+    flags.quiet, flags.verbose = quiet, verbose
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a file name that the terminal cannot show is no reason to fail
     problem: BaseException | None = None
-    with _logging(quiet, verbose), _warnings(quiet):
+    with _log_as_lines(), _warnings_as_lines():
         try:
             yield
         except BrokenPipeError:
@@ -57,11 +70,10 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
             problem = error
     if problem is None:
         return
-    if isinstance(problem, InvalidCloudError) and cloud is not None:
-        problem.args = (f"{cloud}: {problem}",)
     if verbose:
         echo("".join(traceback.format_exception(problem)).rstrip("\n"), err=True)
-    say("error", _message(problem))
+    message = _message(problem)
+    say("error", f"{cloud}: {message}" if isinstance(problem, InvalidCloudError) and cloud is not None else message)
     if isinstance(problem, KeyboardInterrupt):
         raise typer.Exit(INTERRUPTED_CODE)
     raise typer.Exit(USAGE_CODE if isinstance(problem, InvalidParameterError) else FAILURE_CODE)
@@ -78,7 +90,7 @@ def _message(problem: BaseException) -> str:
 
 
 @contextmanager
-def _warnings(quiet: bool) -> Iterator[None]:
+def _warnings_as_lines() -> Iterator[None]:
     """Say in the end each of our own warnings once, whatever Python's filters are."""
     lines: dict[str, None] = {}
 
@@ -95,21 +107,17 @@ def _warnings(quiet: bool) -> Iterator[None]:
         try:
             yield
         finally:
-            for line in () if quiet else lines:
+            for line in () if flags.quiet else lines:
                 say("warning", line)
 
 
-class _Lines(logging.Handler):
-    def emit(self, record):
-        say(record.levelname.lower(), record.getMessage())
-
-
 @contextmanager
-def _logging(quiet: bool, verbose: bool) -> Iterator[None]:
+def _log_as_lines() -> Iterator[None]:
     """What the library logs, on stderr: all of it, or its warnings, or only its errors."""
-    log, handler = logging.getLogger("glsk_o3d"), _Lines()
+    log, handler = logging.getLogger("glsk_o3d"), logging.Handler()
+    handler.emit = lambda record: say(record.levelname.lower(), record.getMessage())  # type: ignore[method-assign]
     before = log.level
-    log.setLevel(logging.DEBUG if verbose else logging.ERROR if quiet else logging.WARNING)
+    log.setLevel(logging.DEBUG if flags.verbose else logging.ERROR if flags.quiet else logging.WARNING)
     log.addHandler(handler)
     try:
         yield

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 from typer import Option
 
 from ..errors import FileFormatError, MissingPackageError
-from .console import echo, print_json, print_table, progress
-from .options import CutLoops, Json, Quiet, Verbose, argument, output_option
-from .outputs import check_outputs, tell_files, write_each
+from .console import echo, flags, print_table, progress
+from .options import CutLoops, argument, output_option
+from .outputs import check_outputs, tell, write_each
 from .reporting import WrongUsage, load_open3d
 
 
@@ -27,9 +27,6 @@ def run(
         bool, Option("--any-meshlab-filter", help="Trust the script: filters may write, read and send files.")
     ] = False,
     cut_loops: CutLoops = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Run a MeshLab filter script, with MeshLab's filters and ours.
 
@@ -40,7 +37,7 @@ def run(
     from ..meshlab.steps import PlainLayers, find_script, read_steps
 
     if listed:
-        _list(as_json)
+        _list()
         return
     if script is None or scan is None:
         raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
@@ -54,7 +51,7 @@ def run(
     except FileFormatError as error:
         raise WrongUsage(str(error)) from None
     check_outputs([(path, "", makes) for path in outputs], scan, needed=None if measures else "an output with -o")
-    with progress(not quiet and not verbose) as update:
+    with progress(not flags.quiet and not flags.verbose) as update:
         update(f"reading {scan.name}")
         load_open3d()
         if any(step.needs_pymeshlab for step in steps):
@@ -71,12 +68,12 @@ def run(
             said = layers.apply_step(step, lambda record, doing=doing: update(f"{doing}, solve {record.iteration}"))
             results.append({"filter": step.call.name, "result": _plain(said or {})})
         written, problems = write_each(dict.fromkeys(outputs, partial(layers.save, cut_loops=cut_loops)), update)
-    if as_json:
-        print_json({"steps": results, "files": [str(path) for path in written]})
-    elif not quiet:
+
+    def words() -> None:
         for i, step in enumerate(results, 1):
             echo(f"{i}. {step['filter']}" + _in_words(step["result"]))
-    tell_files(written, problems, quiet=quiet or as_json)
+
+    tell({"steps": results, "files": list(map(str, written))}, words, written, problems)
 
 
 def _plain(result: Any) -> Any:
@@ -111,7 +108,7 @@ def _words(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _list(as_json: bool) -> None:
+def _list() -> None:
     from ..interop.packages import require
     from ..meshlab.script import comment, read_script
     from ..meshlab.steps import meshlabs_own, scripts
@@ -120,12 +117,13 @@ def _list(as_json: bool) -> None:
         {"name": name, "needs_pymeshlab": bool(meshlabs_own(read_script(path), path)), "doc": comment(path)}
         for name, path in scripts().items()
     ]
-    if as_json:
-        print_json(found)
-        return
-    mark = "\n  needs pymeshlab"
-    print_table([(each["name"] + mark * each["needs_pymeshlab"], each["doc"]) for each in found], wrap=True)
-    try:
-        require("pymeshlab")
-    except MissingPackageError as error:
-        echo(f"\n{error}")
+
+    def words() -> None:
+        mark = "\n  needs pymeshlab"
+        print_table([(each["name"] + mark * each["needs_pymeshlab"], each["doc"]) for each in found], wrap=True)
+        try:
+            require("pymeshlab")
+        except MissingPackageError as error:
+            echo(f"\n{error}")
+
+    tell(found, words)

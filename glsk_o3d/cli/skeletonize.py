@@ -1,8 +1,10 @@
-"""``glsk skeletonize``."""
+"""``glsk skeletonize``, ``glsk rerun`` and ``glsk demo``: from a cloud to a skeleton."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,15 +12,28 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Option
 
 from . import options
-from .console import echo, progress
-from .options import option
-from .outputs import check_outputs, skeleton_files, skeleton_writers, write_each
+from .console import echo, flags, print_rows, print_table, progress, say
+from .options import argument, option, output_option
+from .outputs import check_outputs, skeleton_files, skeleton_writers, tell, write_each
 from .reporting import WrongUsage, load_open3d
-from .running import print_results, run
 
 if TYPE_CHECKING:
+    from ..judgements import Judgement
     from ..pipeline import Pipeline
+    from ..report import IterationRecord, Report
     from ..skeleton import Skeleton
+
+_ITERATIONS = {  # head of a column, field of IterationRecord, format
+    "solve": ("iteration", "d"),
+    "points": ("n_points", "d"),
+    "merged": ("n_merged", "d"),
+    "e": ("explained", ".4f"),
+    "De": ("explained_change", ".4f"),
+    "rings": ("ring_ratio", ".4f"),
+    "w_L": ("contraction_weight", ".4g"),
+    "error": ("solve_error", ".1e"),
+    "seconds": ("seconds", ".3f"),
+}
 
 
 def skeletonize(
@@ -48,9 +63,6 @@ def skeletonize(
     ] = None,
     drop_invalid: options.DropInvalid = False,
     cut_loops: options.CutLoops = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
 ) -> None:
     """Compute the curve skeleton of a scan.
 
@@ -78,10 +90,10 @@ def skeletonize(
     if save_recipe is not None:
         recipes.to_recipe(chosen)  # not all can be written
     recorder = ContractionRecorder() if report is not None else None
-    with progress(not quiet and not verbose) as update:
+    with progress(not flags.quiet and not flags.verbose) as update:
         update(f"reading {scan.name}")
-        cloud, write_labelled = _read(scan, where, chosen, stream, labelled, quiet)
-        skeleton, seconds = run(chosen, cloud, update, recorder)
+        cloud, write_labelled = _read(scan, where, chosen, stream, labelled)
+        skeleton, seconds = _run(chosen, cloud, update, recorder)
         if support is not None:
             comparing = "comparing with the skeleton of sample {} of {}"
             skeleton = with_support(skeleton, chosen, support, on_draw=lambda *n: update(comparing.format(*n), *n))
@@ -95,11 +107,11 @@ def skeletonize(
         if labelled is not None:
             writers[labelled] = partial(write_labelled, skeleton)
         written, problems = write_each(writers, update)
-    print_results(skeleton, seconds, written, problems, quiet=quiet, verbose=verbose, as_json=as_json)
+    _tell(skeleton, seconds, written, problems)
 
 
 def _read(
-    scan: Path, where: str | None, pipeline: Pipeline[Any], stream: bool | None, labelled: Path | None, quiet: bool
+    scan: Path, where: str | None, pipeline: Pipeline[Any], stream: bool | None, labelled: Path | None
 ) -> tuple[Any, Callable[[Skeleton, Path], object]]:
     """The cloud, or the sample of a large one; and what writes all of it with labels."""
     import numpy as np
@@ -112,7 +124,7 @@ def _read(
     if labelled is None or labelled.suffix.lower() == STREAMED_ENDING:
         sample = sample_for(pipeline, scan, where, stream)
         if sample is not None:
-            if not quiet:
+            if not flags.quiet:
                 finite = np.isfinite(sample.point.positions.numpy()).all(axis=1)
                 n, total = int(finite.sum()), int(sample.point.sample_count.numpy()[finite].sum(dtype=np.int64))
                 taken = f"the skeleton is that of a sample of {n} of {total} points"
@@ -134,3 +146,153 @@ def _labelled(skeleton: Skeleton, cloud: Any) -> Any:
         for column, name in enumerate(("red", "green", "blue")):
             labelled.point[f"scan_{name}"] = cloud.point.colors[:, column : column + 1].to(labelled.point.branch.dtype)
     return labelled
+
+
+def rerun(
+    result: Annotated[Path, argument("RESULT", "A skeleton that 'glsk skeletonize' wrote as json or npz.")],
+    scan: Annotated[Path | None, argument("SCAN", "Another cloud to run it on, instead of its points.")] = None,
+    output: options.Output = None,
+    preview: options.Preview = None,
+    report: options.ReportPage = None,
+    cut_loops: options.CutLoops = False,
+) -> None:
+    """Repeat the run that made a result.
+
+    It is run with the recipe that the result holds. On the points of the result the skeleton is the same to the last
+    bit; where other releases make it differ, there is a warning. Without outputs it only says whether it is the same.
+    'glsk skeletonize --recipe' runs recipes from files of their own.
+    """
+    from .. import ContractionRecorder, RecipeError, from_recipe, read_cloud, read_skeleton
+    from .. import rerun as run_again
+    from ..io.streaming import sample_for
+    from ..recipes.rerun import identical, is_of_sample
+
+    check_outputs(skeleton_files(output, preview, report), scan, result)
+    recorder = ContractionRecorder() if report is not None else None
+    with progress(not flags.quiet and not flags.verbose) as update:
+        update(f"reading {result.name}")
+        load_open3d()
+        made, cloud = read_skeleton(result), None
+        try:
+            if scan is not None and is_of_sample(made):
+                cloud = sample_for(from_recipe(made.report.recipe), scan, stream=True)
+            elif scan is not None:
+                cloud = read_cloud(scan)
+            skeleton, seconds = _run(partial(run_again, made), cloud, update, recorder)
+        except RecipeError as error:
+            raise RecipeError(f"{result}: cannot be repeated: {error}") from error
+        title = (scan or result).name
+        writers = skeleton_writers(
+            skeleton, output, preview, report, title=title, cut_loops=cut_loops, recorder=recorder
+        )
+        written, problems = write_each(writers, update)
+    _tell(skeleton, seconds, written, problems, {"identical": identical(skeleton, made)})
+
+
+def demo(
+    folder: Annotated[Path, output_option("FOLDER", "Made if it is not there.")] = Path("demo"),
+    points: Annotated[int, option("N", "How many points the scan has.", "--points", "-n", min=8, max=10**9)] = 8192,
+    pipeline: options.PipelineName = "default",
+) -> None:
+    """Skeletonise the built-in sample object.
+
+    It is a toy dinosaur with a carrying handle on its back, scanned from two sides. Writes cloud.ply (the scan),
+    skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
+    """
+    from .. import MissingPackageError, samples, save_tensor_cloud
+    from ..interop.packages import import_open3d, require_for
+    from .overrides import choose
+
+    chosen = choose(pipeline)
+    if folder.exists() and not folder.is_dir():
+        raise NotADirectoryError(f"{folder}: is a file, not a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    cloud, picture = folder / "cloud.ply", folder / "skeleton.png"
+    outputs, preview, missing = [folder / "skeleton.ply", folder / "skeleton.json"], picture, ""
+    try:
+        require_for(picture.suffix)
+    except MissingPackageError as error:  # all else can be shown
+        preview, missing = None, str(error)
+    check_outputs(skeleton_files([*outputs, cloud], preview))
+    with progress(not flags.quiet and not flags.verbose) as update:
+        update("making the sample")
+        load_open3d()
+        o3d, sample = import_open3d(), samples.sample_object(points)
+        save_tensor_cloud(o3d.t.geometry.PointCloud(o3d.core.Tensor(sample.points)), cloud)
+        skeleton, seconds = _run(chosen, sample.points, update)
+        title = f"{sample.name}: a scan and its curve skeleton"
+        written, problems = write_each(skeleton_writers(skeleton, outputs, preview, title=title), update)
+    _tell(skeleton, seconds, [cloud, *written], problems)
+    if missing and not flags.quiet:
+        say("warning", f"no {picture.name}: {missing}")
+
+
+def _run(pipeline: Callable[..., Skeleton], cloud: Any, update, on_state=None) -> tuple[Skeleton, float]:
+    """Run a pipeline and show how far it is; gives the skeleton, and the seconds it took."""
+    start = time.perf_counter()
+    doing, most = "", None
+
+    def on_stage(stage):
+        nonlocal doing, most
+        doing, most = type(stage).__name__, getattr(stage, "max_iterations", None)
+        update(doing)
+
+    def on_iteration(record):
+        left = record.n_points - record.n_merged
+        update(f"{doing}: solve {record.iteration} of at most {most}, {left} points", record.iteration, most)
+
+    skeleton = pipeline(cloud, on_iteration=on_iteration, on_state=on_state, on_stage=on_stage)
+    return skeleton, time.perf_counter() - start
+
+
+def print_iterations(records: Sequence[IterationRecord], *, err: bool = False) -> None:
+    """Print a contraction's iterations as a table."""
+    rows = [[format(getattr(record, name), form) for name, form in _ITERATIONS.values()] for record in records]
+    if rows:
+        print_table(rows, list(_ITERATIONS), err=err)
+
+
+def _tell(
+    skeleton: Skeleton,
+    seconds: float,
+    written: Sequence[Path],
+    problems: Sequence[str],
+    more: Mapping[str, Any] | None = None,
+) -> None:
+    """Print the summary of a run, with `more` facts, and the files written; then OSError if there were problems."""
+    from ..analysis.summary import summary
+
+    report = skeleton.report
+    if flags.verbose:
+        print_iterations(report.iterations, err=True)
+    facts = {**summary(skeleton, seconds), **(more or {})}
+    supported = {"unsupported": list(map(asdict, report.unsupported))} if report.n_draws else {}
+    whole = {**facts, **supported, "warnings": list(report.warnings), "files": list(map(str, written))}
+    tell(whole, lambda: print_rows(_shown(facts, report)), written, problems)
+
+
+def _shown(facts: Mapping[str, Any], report: Report) -> dict[str, Any]:
+    """The facts that say something of this run, in words."""
+    from ..analysis.summary import ENDING_FACTS, ending
+
+    hidden = {*ENDING_FACTS, "seconds", "agreeing"}
+    hidden.add("loops_closed")  # most clouds have some, true ones are hardly ever among them
+    noted = ("dropped", "outliers", "cuts", "bridges", "traced", "joined")
+    hidden.update(name for name in noted if not facts[name])
+    if not report.is_sampled:
+        hidden.add("sampled")
+    if facts["contracted"] == facts["distinct"]:
+        hidden.add("contracted")
+    shown = {name: value for name, value in facts.items() if name not in hidden}
+    shown["uncertain"] = list(map(_close_call, report.uncertain))
+    if report.n_draws:
+        agreeing = f"{report.n_agreeing} of {report.n_draws} have the same graph"
+        shown["samples"] = [agreeing, *map(str, report.unsupported)]
+    return {**shown, "contraction": ending(facts), "seconds": f"{facts['seconds']:.2f}"}
+
+
+def _close_call(call: Judgement) -> str:
+    """A close call, and what to do where the answer is wrong."""
+    from ..refinement.diagnostics import otherwise
+
+    return f"{call}; if that is wrong: --set {otherwise(call)}"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from .options import Quiet, Verbose, argument, option
-from .outputs import check_outputs, skeleton_files, skeleton_writers, tell_files, write_each
+from .options import argument, option
+from .outputs import check_outputs, skeleton_files, skeleton_writers, tell, write_each
 from .reporting import load_open3d
 
 
@@ -14,8 +14,6 @@ def view(
     file: Annotated[Path, argument("SKELETON|SCAN", "In any format that is read or written; see 'glsk info'.")],
     preview: Annotated[Path | None, option("PNG", "Open no window: draw a picture.")] = None,
     report: Annotated[Path | None, option("HTML", "Open no window: write a page for the browser.")] = None,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Look at a skeleton or a scan in a window.
 
@@ -41,4 +39,4 @@ def view(
         show(skeleton, cloud, title=file.name)
     else:
         written, problems = write_each(skeleton_writers(skeleton, [], preview, report, title=file.name))
-        tell_files(written, problems, quiet=quiet)
+        tell(None, lambda: None, written, problems)

@@ -5,12 +5,14 @@ import os
 import subprocess
 import sys
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from glsk_o3d import read_skeleton
+from glsk_o3d.batch import run_batch
 from glsk_o3d.samples import torus
 
 SABOTEUR = '''
@@ -21,11 +23,11 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from glsk_o3d import Cloud, Filter
 from glsk_o3d.parameters import documented
 from glsk_o3d.interop.clouds import cloud_points
+
+FOLDER = Path(os.environ["SABOTEUR"])
 
 
 @documented
@@ -40,15 +42,12 @@ class Saboteur(Filter):
         order = int(points[0, 0]) // 1000 * 1000
         if order == 1000:
             os.kill(os.getpid(), signal.SIGKILL)
-        if order == 2000 and Path(os.environ["ONCE"]).exists():
-            Path(os.environ["ONCE"]).unlink()
+        if order == 2000 and (FOLDER / "once").exists():
+            (FOLDER / "once").unlink()
             os._exit(3)
-        if order == 3000:
-            raise ZeroDivisionError("a bug")
         if order == 4000:
-            gate = Path(os.environ["GATE"])
-            (gate / str(os.getpid())).touch()
-            while not (gate / "open").exists():
+            (FOLDER / str(os.getpid())).touch()
+            while not (FOLDER / "open").exists():
                 time.sleep(0.01)
         return points
 '''
@@ -59,8 +58,8 @@ def saboteur(install, monkeypatch, tmp_path) -> Path:
     """A recipe with a filter that kills, here and in the processes that tests start; gives the recipe."""
     folder = install("glsk-saboteur", "1", SABOTEUR, "[glsk_o3d.filters]\nSaboteur = glsk_saboteur:Saboteur\n")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]))
-    monkeypatch.setenv("ONCE", str(tmp_path / "once"))
-    monkeypatch.setenv("GATE", str(tmp_path / "gate"))
+    monkeypatch.setenv("SABOTEUR", str(tmp_path / "saboteur"))
+    (tmp_path / "saboteur").mkdir()
     stages = [{"filter": name} for name in ("Saboteur", "RingBuilder", "Contractor", "Connector", "Refiner")]
     recipe = tmp_path / "saboteur.json"
     recipe.write_text(json.dumps({"glsk_o3d": {"version": 1}, "pipeline": stages}))
@@ -68,68 +67,57 @@ def saboteur(install, monkeypatch, tmp_path) -> Path:
 
 
 @pytest.fixture
-def gate(tmp_path, until):
-    """Where workers wait in the middle of a scan of the order 4000, until it opens."""
+def waiting(tmp_path, until):
+    """Wait for workers in the middle of a scan of the order 4000; gives their numbers.
 
-    class Gate:
-        folder = tmp_path / "gate"
-
-        def waiting(self, *processes) -> set[int]:
-            """The workers that have come to it, once there are any."""
-            return until(lambda: {int(path.name) for path in self.folder.glob("[0-9]*")}, *processes)
-
-        def open(self):
-            (self.folder / "open").touch()
-
-        def forget(self):
-            for path in self.folder.iterdir():
-                path.unlink()
-
-    Gate.folder.mkdir()
-    return Gate()
+    They go on when there is a file ``saboteur/open``.
+    """
+    return lambda *processes: until(
+        lambda: {int(path.name) for path in (tmp_path / "saboteur").glob("[0-9]*")}, *processes
+    )
 
 
 @pytest.fixture
-def write_points():
-    """Write points as a binary PLY file; gives its path."""
+def write():
+    """Write a scan of 256 points, or some other ones; gives its path. The first x tells the saboteur what to do."""
 
-    def save(path: Path, points) -> Path:
-        header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
-        header += "property double x\nproperty double y\nproperty double z\nend_header\n"
-        path.write_bytes(header.encode() + np.asarray(points, "<f8").tobytes())
-        return path
-
-    return save
-
-
-@pytest.fixture
-def write(write_points):
-    """Write a scan of 256 points; gives its path. The first `order` thousand say what the saboteur does."""
-
-    def save(path: Path, seed=0, order=0) -> Path:
+    def save(path: Path, seed=0, order=0, points=None) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
-        points = torus(256, seed=seed).points + [order + 500 * bool(order), 0, 0]
-        if path.suffix == ".ply":
-            write_points(path, points)
-        else:
-            np.savetxt(path, points)
+        points = torus(256, seed=seed).points + [order + 500 * bool(order), 0, 0] if points is None else points
+        head = f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n"
+        head += "property double x\nproperty double y\nproperty double z\nend_header"
+        np.savetxt(path, points, fmt="%.17g", header=head if path.suffix == ".ply" else "", comments="")
         return path
 
     return save
 
 
 @pytest.fixture
-def rows():
-    """The lines of the ledger of a folder, which must be sound, by name.
+def run(tmp_path):
+    """Run a batch from ``in``, or other inputs, to ``out`` in a thread; gives what was to be done, with the reasons."""
+
+    def call(inputs=None, out="out", **options):
+        plans = []
+        with ThreadPoolExecutor(1) as pool:
+            inputs = tmp_path / "in" if inputs is None else inputs
+            call.result = run_batch(inputs, tmp_path / out, executor=pool, **{"on_plan": plans.append, **options})
+        return {task.name: task.why for plan in plans for task in plan.todo}
+
+    return call
+
+
+@pytest.fixture
+def rows(tmp_path):
+    """The lines of the ledger in ``out``, which must be sound, by name.
 
     Strictly, there are no other results than those that it tells of.
     """
 
-    def read(out: Path, strict=True) -> dict[str, dict]:
+    def read(out="out", strict=True) -> dict[str, dict]:
+        out = tmp_path / out
         lines = [json.loads(line) for line in (out / "ledger.jsonl").read_bytes().splitlines()]
         for key in ("name", "input"):
             assert max(Counter(line[key] for line in lines).values(), default=1) == 1, f"a {key} is there twice"
-        found = {line["name"]: line for line in lines}
         for line in lines:
             assert (line["status"], line["error"] == "") in (("done", True), ("failed", False))
             for output in line["outputs"]:
@@ -141,24 +129,24 @@ def rows():
         there = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()} - own
         there -= {name for name in there if name.startswith(".parts/") and (name.endswith(".json") or not strict)}
         assert written == there if strict else written <= there
-        return found
+        return {line["name"]: line for line in lines}
 
     return read
 
 
 @pytest.fixture
 def start(tmp_path):
-    """Start ``glsk batch`` in an empty folder, as a terminal does: Ctrl-C goes to all its processes."""
+    """Start ``glsk batch`` as a terminal does: Ctrl-C goes to all its processes."""
     begun = []
 
-    def run(*words) -> subprocess.Popen:
+    def begin(*words) -> subprocess.Popen:
         command = [sys.executable, "-m", "glsk_o3d", "batch", *map(str, words)]
         pipe = subprocess.PIPE
         process = subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
         begun.append(process)
         return process
 
-    yield run
+    yield begin
     for process in begun:
         process.kill()
         process.communicate()

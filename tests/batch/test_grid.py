@@ -37,9 +37,6 @@ def test_an_axis_is_cut_only_where_it_is_longer_than_a_tile():
     assert grid.cell[0] == pytest.approx(10 / 3)
     assert grid.box((1, 0, 0))[0].tolist() == [pytest.approx(10 / 3), -np.inf, -np.inf]
     assert [(axis, round(at, 4)) for axis, at in grid.seams((0, 0, 0))] == [(0, round(10 / 3 - 0.125, 4))]
-
-
-def test_names():
     assert tile_of(tile_name((3, 0, 12))) == (3, 0, 12)
 
 
@@ -50,24 +47,17 @@ def test_names():
         ((float("nan"), None), "tiles = nan: must be finite"),
         ((10**5000, None), "tiles = a number of 5001 digits: must be at most"),
         (("abc", None), "tiles = 'abc': must be a number"),
-        (([1], None), r"tiles = \[1\]: must be a number"),
         ((True, None), "tiles = True: must be a number"),
         ((np.array([1.0]), None), "must be a number"),
         ((4, "1"), "overlap = '1': must be a number"),
-        ((4, True), "overlap = True: must be a number"),
-        ((4, float("nan")), "overlap = nan: must be finite"),
-        ((4, 10**5000), "overlap = a number of 5001 digits: must be at most"),
         ((4, 0), "overlap = 0: must be above 0"),
         ((4, 1.1), r"overlap = 1\.1: must be at most 1\.0 .at most a quarter of the size of a tile"),
     ],
 )
-def test_sizes_that_are_none(sizes, message):
+def test_sizes(sizes, message):
     with pytest.raises(InvalidParameterError, match=message):
         checked_sizes(*sizes)
-
-
-def test_the_overlap_is_an_eighth_unless_told():
-    assert checked_sizes(4, None) == (4, 0.5)
+    assert checked_sizes(4, None) == (4, 0.5)  # an eighth
     assert checked_sizes(np.float32(4), np.int64(1)) == (4.0, 1.0)
 
 

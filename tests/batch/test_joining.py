@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from glsk_o3d import Skeleton, samples, skeletonize
 from glsk_o3d.analysis.curves import along, pieces
 from glsk_o3d.batch.grid import Grid
-from glsk_o3d.batch.joining import join_tiles
-from glsk_o3d.batch.strands import Strands
+from glsk_o3d.batch.joining import Strands, join_tiles
 
 NONE = np.empty((0, 3))
 
@@ -77,7 +76,7 @@ AXES = {
 }
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(st.sampled_from(sorted(AXES)), st.tuples(*[st.floats(0, 1)] * 3), st.integers(0, 1000))
 def test_wherever_the_seams_are_the_graph_is_that_of_the_whole(name, offset, seed):
     axis = AXES[name]
@@ -120,14 +119,14 @@ def test_ends_that_meet_become_their_mean():
 
 
 @pytest.mark.parametrize("shift", [-0.05, 0.0, 1e-12, 0.02, 0.05, 0.075])
-@pytest.mark.parametrize("seed", range(3))
-def test_a_curve_that_runs_along_a_seam_is_there_once(shift, seed):
+def test_a_curve_that_runs_along_a_seam_is_there_once(shift):
     grid = Grid((-1, -1, -1), (1, 1, 2), (2, 2, 1), 0.2)
     axis = together(rod([shift, shift, -0.9], [shift, shift, 0.9]), rod([-0.9, 0.5, 0], [0.9, 0.5, 0]))
-    joined, seams = join_tiles(seen(axis, grid, 0.005, seed), grid)
-    assert structure(joined) == (2, 0, 4)
-    assert joined.length == pytest.approx(axis.length, rel=0.02)
-    assert seams.unmatched == 0
+    for seed in range(3):
+        joined, seams = join_tiles(seen(axis, grid, 0.005, seed), grid)
+        assert structure(joined) == (2, 0, 4)
+        assert joined.length == pytest.approx(axis.length, rel=0.02)
+        assert seams.unmatched == 0
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.03, 0.045, 0.05, 0.055])
@@ -271,13 +270,12 @@ def test_a_torus_over_four_tiles_is_one_loop():
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
-@pytest.mark.parametrize("overlap", [0.001, 0.01])
-def test_an_overlap_that_is_far_too_small_is_told(overlap):
+def test_an_overlap_that_is_far_too_small_is_told():
     sample = samples.torus(4000, ring_radius=0.6, radius=0.05)
     low = sample.points.min(axis=0)
-    joined, seams = tiled(sample, low, 1.2, overlap)
+    joined, seams = tiled(sample, low, 1.2, 0.01)
     assert joined.n_loops == 0  # it is lost, and that is what is to be told
-    grid = Grid.over(low, sample.points.max(axis=0), 1.2, overlap)
+    grid = Grid.over(low, sample.points.max(axis=0), 1.2, 0.01)
     (message,) = seams.messages(grid)
     assert "thicker than the overlap" in message
     assert seams.thickest == pytest.approx(0.05, rel=0.1)

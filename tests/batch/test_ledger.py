@@ -12,12 +12,6 @@ import pytest
 from glsk_o3d import BatchError
 from glsk_o3d.batch.ledger import LEDGER_COLUMNS, Ledger, file_hash, locked
 
-BROKEN = [
-    *(b'{"name": "c", "inp', b'{"name": "c"}', b"\xff\xfe", b"[1]", b"\0" * 100, b"[" * 100_000),
-    b'{"name": "c", "input": "c", "status": "done", "seconds": NaN}',
-]
-"""What may stand at the end of a ledger and is no line of it."""
-
 
 def row(name, **values):
     return {"name": name, "input": f"/in/{name}.ply", "status": "done", "outputs": [f"{name}.ply"]} | values
@@ -27,38 +21,29 @@ def lines(folder):
     return [json.loads(line) for line in (folder / "ledger.jsonl").read_bytes().splitlines()]
 
 
-def test_rows_are_in_the_file_at_once(tmp_path):
-    ledger = Ledger(tmp_path)
-    for name in "ab":
-        ledger.add(row(name))
-        assert lines(tmp_path)[-1] == row(name)
-    assert Ledger(tmp_path).rows == ledger.rows
-    ledger.close()
-
-
-def test_the_last_line_of_a_name_and_of_an_input_counts(tmp_path):
+def test_rows_are_in_the_file_at_once_and_the_last_of_a_name_and_of_an_input_counts(tmp_path):
     ledger = Ledger(tmp_path)
     for each in (row("b", status="failed"), row("a"), row("b"), row("sub/a", input="/in/a.ply")):
         ledger.add(each)
+        assert lines(tmp_path)[-1] == each
     ledger.close()
     assert lines(tmp_path) == [row("b"), row("sub/a", input="/in/a.ply")]
+    assert Ledger(tmp_path).rows == ledger.rows
 
 
-@pytest.mark.parametrize("end", BROKEN, ids=range(len(BROKEN)))
+@pytest.mark.parametrize(
+    "end", [b'{"name": "c", "inp', b'{"name": "c"}', b"\xff\xfe", b"[1]", b"\0" * 100, b"[" * 100_000], ids=range(6)
+)
 def test_a_broken_end_is_mended(tmp_path, end, caplog):
     ledger = Ledger(tmp_path)
     ledger.add(row("a"))
-    ledger.add(row("b"))
-    ledger.close()
-    whole = ledger.path.read_bytes()
-    ledger.path.write_bytes(whole + end)
+    ledger.path.write_bytes(ledger.path.read_bytes() + end)
     again = Ledger(tmp_path)
-    assert list(again.rows) == ["a", "b"]
+    assert list(again.rows) == ["a"]
     assert "1 broken lines passed over" in caplog.text
     again.rewrite()
     again.add(row("c"))
-    again.close()
-    assert lines(tmp_path) == [row("a"), row("b"), row("c")]
+    assert lines(tmp_path) == [row("a"), row("c")]
 
 
 @pytest.mark.parametrize(
@@ -77,64 +62,43 @@ def test_a_broken_end_is_mended(tmp_path, end, caplog):
         dict(name=7),
         dict(input=None),
         dict(status="perhaps"),
-        dict(points={"deep": []}),
-        dict(messages=[[]]),
     ],
     ids=str,
 )
-def test_a_line_that_no_batch_wrote_is_passed_over(tmp_path, caplog, harm):
-    text = json.dumps({**row("a"), **harm})
-    (tmp_path / "ledger.jsonl").write_text(f"{text}\n{json.dumps(row('b'))}\n")
+def test_a_line_that_no_batch_wrote_is_passed_over(tmp_path, harm):
+    (tmp_path / "ledger.jsonl").write_text(f"{json.dumps(row('a') | harm)}\n{json.dumps(row('b'))}\n")
     assert list(Ledger(tmp_path).rows) == ["b"]
-    assert "1 broken lines passed over" in caplog.text
-
-
-def test_no_cell_of_the_table_is_a_formula(tmp_path):
-    ledger = Ledger(tmp_path)
-    ledger.add(row("=cmd|' /C calc'!A0", messages=["+1"], points=-3))
-    ledger.close()
-    (told,) = csv.DictReader((tmp_path / "ledger.csv").read_text().splitlines())
-    assert (told["name"], told["messages"], told["points"]) == ("'=cmd|' /C calc'!A0", "'+1", "-3")
 
 
 def test_the_table(tmp_path):
     ledger = Ledger(tmp_path)
     ledger.add(row('a, \n"b"', messages=["x", "y"], outputs=["a.ply", "a.png"], loops=2, unknown=1))
+    ledger.add(row("=cmd|' /C calc'!A0", messages=["+1"], points=-3))
     ledger.add(row(os.fsdecode(b"\xff"), status="failed", error="no"))
     ledger.close()
     with (tmp_path / "ledger.csv").open(encoding="utf-8", newline="") as stream:
-        table = list(csv.DictReader(stream))
-    assert tuple(table[0]) == LEDGER_COLUMNS
-    assert (table[0]["name"], table[0]["messages"], table[0]["outputs"]) == ('a, \n"b"', "x; y", "a.ply; a.png")
-    assert (table[1]["status"], table[1]["error"], table[1]["loops"]) == ("failed", "no", "")
-    assert list(Ledger(tmp_path).rows)[1] == os.fsdecode(b"\xff")
+        formula, table, odd = csv.DictReader(stream)
+    assert tuple(table) == LEDGER_COLUMNS
+    assert (table["name"], table["messages"], table["outputs"]) == ('a, \n"b"', "x; y", "a.ply; a.png")
+    assert (odd["status"], odd["error"], odd["loops"]) == ("failed", "no", "")
+    assert (formula["name"], formula["messages"], formula["points"]) == ("'=cmd|' /C calc'!A0", "'+1", "-3")
+    assert list(Ledger(tmp_path).rows)[-1] == os.fsdecode(b"\xff")
 
 
 def test_hash(tmp_path):
     data = os.urandom((1 << 20) + 17)
     (tmp_path / "a").write_bytes(data)
     assert file_hash(tmp_path / "a") == hashlib.sha256(data).hexdigest()
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
-def test_a_pipe_has_no_hash(tmp_path):
     os.mkfifo(tmp_path / "pipe.ply")
     with pytest.raises(OSError, match=r"pipe\.ply: is no file"):
         file_hash(tmp_path / "pipe.ply")
 
 
 def test_the_lock_dies_with_its_owner(tmp_path):
-    code = """
-import sys
-from pathlib import Path
-from glsk_o3d.batch.ledger import locked
-with locked(Path(sys.argv[1])):
-    print("mine", flush=True)
-    sys.stdin.read()
-"""
-    owner = subprocess.Popen(
-        [sys.executable, "-c", code, tmp_path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
+    code = "import sys; from pathlib import Path; from glsk_o3d.batch.ledger import locked\n"
+    code += "with locked(Path(sys.argv[1])):\n    print('mine', flush=True)\n    sys.stdin.read()"
+    pipe = subprocess.PIPE
+    owner = subprocess.Popen([sys.executable, "-c", code, tmp_path], stdin=pipe, stdout=pipe, text=True)
     assert owner.stdout.readline() == "mine\n"
     with pytest.raises(BatchError, match=f"process {owner.pid} on"), locked(tmp_path):
         pytest.fail("two hold it")

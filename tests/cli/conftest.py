@@ -47,14 +47,9 @@ def glsk(tmp_path):
     script = Path(sys.executable).with_name("glsk")
 
     def run(*words, **options):
-        return subprocess.run(
-            [script, *map(str, words)],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
-            **options,
-        )
+        environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+        words = [script, *map(str, words)]
+        return subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, env=environment, **options)
 
     return run
 
@@ -75,16 +70,16 @@ def invoke(tmp_path, monkeypatch):
 
 @pytest.fixture
 def refused(invoke, tmp_path):
-    """Run the command in this process; it must fail with one line and leave nothing behind. Gives the line."""
+    """Run the command in this process; it must fail with one line and change no file. Gives the line."""
 
     def run(code, *words):
-        before = list(tmp_path.iterdir())
+        before = {path: path.is_file() and path.read_bytes() for path in tmp_path.iterdir()}
         result = invoke(*words)
         assert result.exit_code == code, result.output
         assert result.stdout == ""
         assert result.stderr.startswith("glsk: error: ")
         assert result.stderr.count("\n") == 1
-        assert list(tmp_path.iterdir()) == before
+        assert {path: path.is_file() and path.read_bytes() for path in tmp_path.iterdir()} == before
         return result.stderr.removeprefix("glsk: error: ").rstrip()
 
     return run
@@ -96,3 +91,13 @@ def y(tmp_path) -> str:
     sample = y_junction(100)
     Skeleton(sample.nodes, sample.edges, sample.radii, (), (), ()).save(tmp_path / "y.ply")
     return "y.ply"
+
+
+@pytest.fixture
+def ring_file(tmp_path) -> str:
+    """The name of a file in the folder of the test with a closed skeleton of twelve vertices."""
+    turn = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    circle = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
+    edges = [*((i, i + 1) for i in range(11)), (0, 11)]
+    Skeleton(circle, edges, np.full(12, 0.1), (), (), ()).save(tmp_path / "o.ply")
+    return "o.ply"

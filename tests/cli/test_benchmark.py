@@ -3,12 +3,12 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 CHOICE = ("--families", "tubes,trees", "--seeds", "100:102", "--variants", "clean, scan2", "--jobs", 1)
 """Rods in the place of the shapes, of which one cloud of eight is not scored."""
+ONE = ("--families", "tubes", "--variants", "clean", "--jobs", 1)
 
 
 @pytest.fixture
@@ -26,9 +26,8 @@ def test_from_nothing_to_a_table(invoke, rods, program, tmp_path):
     made = invoke("benchmark", "make", "bench", *CHOICE)
     assert (made.exit_code, made.stderr) == (0, "")
     rows = dict(line.split(maxsplit=1) for line in made.stdout.splitlines())
-    assert [rows[name] for name in ("folder", "version", "shapes", "clouds", "scored", "whole")] == [
-        *("bench", "v1", "4", "8", "7", "no")
-    ]
+    facts = dict(folder="bench", version="v1", shapes="4", clouds="8", scored="7", whole="no")
+    assert {name: rows[name] for name in facts} == facts
     good = quoted(program("write(skeleton)"))
     ran = invoke("benchmark", "run", "bench", "good", "--command", good, "--ending", ".obj")
     assert (ran.exit_code, ran.stderr) == (0, "")
@@ -54,13 +53,12 @@ def test_from_nothing_to_a_table(invoke, rods, program, tmp_path):
 def test_json(invoke, rods, program):
     made = json.loads(invoke("benchmark", "make", "bench", *CHOICE, "--json").stdout)
     assert (made["clouds"], made["scored"], made["whole"]) == (8, 7, False)
-    words = quoted(program("if name == 'tubes_100_clean': sys.exit(1)\nwrite(skeleton)"))
-    ran = invoke("benchmark", "run", "bench", "out", "--command", words, "--ending", ".obj", "--json")
+    command = quoted(program("if name == 'tubes_100_clean': sys.exit(1)\nwrite(skeleton)"))
+    words = ("benchmark", "run", "bench", "out", "--command", command, "--ending", ".obj", "--json")
+    ran = invoke(*words)
     assert ran.stderr == "glsk: warning: tubes_100_clean: exit code 1\n"
     assert json.loads(ran.stdout)["failures"] == {"tubes_100_clean": "exit code 1"}
-    again = invoke(
-        "benchmark", "run", "bench", "out", "--command", words, "--ending", ".obj", "--json", "--retry", "-q"
-    )
+    again = invoke(*words, "--retry", "-q")
     assert (json.loads(again.stdout)["skipped"], again.stderr) == (6, "")
     words = ("-o", "s.json", "--name", "mine", "--json")
     scored = json.loads(invoke("benchmark", "score", "bench", "out", *words).stdout)
@@ -69,16 +67,13 @@ def test_json(invoke, rods, program):
     assert table["entries"][0]["all"]["perfect"] == scored["perfect"]
 
 
-def test_seeds_in_words(invoke, rods):
-    invoke("benchmark", "make", "a", "--families", "tubes", "--variants", "clean", "--seeds", "7, 100", "--jobs", 1)
-    assert rods == ["tubes_7", "tubes_100"]
-
-
-def test_another_cloud_than_is_meant_is_told(invoke, rods, monkeypatch):
+def test_seeds_in_words_and_another_cloud_than_is_meant(invoke, rods, monkeypatch):
     from glsk_bench import versions
 
+    invoke("benchmark", "make", "a", *ONE, "--seeds", "7, 100")
+    assert rods == ["tubes_7", "tubes_100"]
     monkeypatch.setattr(versions, "fingerprints", lambda name: {"tubes_100_clean": "00000000 1 2"})
-    made = invoke("benchmark", "make", "a", "--families", "tubes", "--variants", "clean", "--seeds", "100", "--jobs", 1)
+    made = invoke("benchmark", "make", "b", *ONE, "--seeds", "100")
     assert made.stderr == "glsk: warning: 1 clouds are not those that v1 means: see benchmark.json\n"
     assert "sameness  1 other" in made.stdout
 
@@ -100,30 +95,23 @@ def test_another_cloud_than_is_meant_is_told(invoke, rods, monkeypatch):
         (2, ("table", "bench/benchmark.json", "-o", "t.csv"), "its name ends in .md or .json"),
     ],
 )
-def test_what_is_wrong_is_one_line(refused, bench, code, words, said):
+@pytest.mark.usefixtures("bench")
+def test_what_is_wrong_is_one_line(refused, code, words, said):
     assert said in refused(code, "benchmark", *words)
 
 
-def test_making_scoring_and_tables_need_no_open3d(bench, perfect_answers, tmp_path):
+def test_making_scoring_and_tables_need_no_open3d(bench, tmp_path):
+    (tmp_path / "answers").mkdir()
+    (tmp_path / "answers" / "tubes_100_clean.obj").write_text("v 0 0 0\nv 1 0 0\nl 1 2\n")
     code = """
 import sys
-sys.path.insert(0, sys.argv[1])
 import glsk_bench.making
 from glsk_o3d.cli.main import app
-app(["benchmark", "score", sys.argv[2], sys.argv[3], "-o", "s.json"], standalone_mode=False)
+app(["benchmark", "score", "bench", "answers", "-o", "s.json"], standalone_mode=False)
 app(["benchmark", "table", "s.json"], standalone_mode=False)
 print(*sorted({name.partition('.')[0] for name in sys.modules}))
 """
-    words = [sys.executable, "-c", code, str(Path(__file__).parents[2]), bench, perfect_answers]
-    run = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     loaded = set(run.stdout.splitlines()[-1].split())
     assert "scipy" in loaded
     assert not {"open3d", "matplotlib", "networkx", "igl"} & loaded
-
-
-@pytest.fixture
-def perfect_answers(bench, tmp_path):
-    """The name of a folder with one answer."""
-    (tmp_path / "perfect").mkdir()
-    (tmp_path / "perfect" / "tubes_100_clean.obj").write_text("v 0 0 0\nv 1 0 0\nl 1 2\n")
-    return "perfect"

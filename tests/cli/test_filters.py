@@ -1,10 +1,14 @@
-"""`glsk filters` says everything that the code knows about itself."""
+"""`glsk filters` says all that the code knows about itself; commands of other distributions."""
 
 import dataclasses
 import json
+from importlib.metadata import EntryPoint
 
 import pytest
+import typer
+from typer.testing import CliRunner
 
+from glsk_o3d.cli import main
 from glsk_o3d.pipeline import Filter
 from glsk_o3d.pipelines import PIPELINES
 from glsk_o3d.recipes.catalogue import catalogue
@@ -17,30 +21,26 @@ def squeezed(invoke, monkeypatch):
     return lambda *words: " ".join(invoke("filters", *words).stdout.split())
 
 
-def test_the_catalogue_is_complete():
-    assert list(catalogue()) == [
-        *("RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner"),
-        *("ExplainedScore", "RingSizeRatio"),
-    ]
-
-
-@pytest.mark.parametrize("name", list(catalogue()))
-def test_every_parameter_is_listed(squeezed, name):
-    whole, one = squeezed(), squeezed(name)
-    for field in dataclasses.fields(catalogue()[name]):
-        facts = field.metadata
-        default = "none" if field.default is None else field.default
-        for text in (whole, one):
-            assert f"{field.name} {facts['doc']}" in text
-            assert f"default {default}" in text
-        for choice in facts["choices"]:
-            assert choice in one
-        if facts["unit"] != "-":
-            assert f"[{facts['unit']}]" in one
-        if facts["low"] is not None:
-            assert f"{'above' if facts['open_low'] else 'at least'} {facts['low']:g}" in one
-        if facts["high"] is not None:
-            assert f"at most {facts['high']:g}" in one
+def test_every_parameter_and_every_pipeline_is_listed(squeezed, invoke):
+    whole = squeezed()
+    assert max(map(len, invoke("filters").stdout.splitlines())) <= 80
+    for name, cls in catalogue().items():
+        one = squeezed(name)
+        for field in dataclasses.fields(cls):
+            facts = field.metadata
+            default = "none" if field.default is None else field.default
+            for text in (whole, one):
+                assert f"{field.name} {facts['doc']}" in text
+                assert f"default {default}" in text
+            unit = [f"[{facts['unit']}]"] if facts["unit"] != "-" else []
+            low = [] if facts["low"] is None else [f"{'above' if facts['open_low'] else 'at least'} {facts['low']:g}"]
+            high = [] if facts["high"] is None else [f"at most {facts['high']:g}"]
+            assert all(words in one for words in [*facts["choices"], *unit, *low, *high])
+    for name, make in PIPELINES.items():
+        one = squeezed(name)
+        assert repr(make()) in whole
+        assert repr(make()) in one
+        assert "RingSizeRatio stopping rule" not in one
 
 
 def test_json_has_every_field(invoke):
@@ -53,28 +53,64 @@ def test_json_has_every_field(invoke):
         assert {each["consumes"], each["produces"]} <= set(flows)
         assert [p["name"] for p in each["parameters"]] == [f.name for f in dataclasses.fields(cls)]
         for parameter, field in zip(each["parameters"], dataclasses.fields(cls), strict=True):
-            assert parameter["type"] == field.metadata["type"]
             plain = field.default if not dataclasses.is_dataclass(field.default) else repr(field.default)
-            assert parameter["default"] == plain
-    assert {each["name"]: each["expression"] for each in told["pipelines"]} == {
-        n: repr(p()) for n, p in PIPELINES.items()
-    }
+            assert (parameter["type"], parameter["default"]) == (field.metadata["type"], plain)
+    expressions = {each["name"]: each["expression"] for each in told["pipelines"]}
+    assert expressions == {name: repr(make()) for name, make in PIPELINES.items()}
 
 
-@pytest.mark.parametrize("name", PIPELINES)
-def test_pipelines_are_spelt_out(squeezed, name):
-    for words in ([], [name]):
-        assert repr(PIPELINES[name]()) in squeezed(*words)
-    assert "RingSizeRatio stopping rule" not in squeezed(name)
+def test_what_a_plugin_prints_is_no_result(install, capfd):
+    code = "print('hello')\nfrom glsk_o3d import pipelines\nmake = pipelines.default\n"
+    install("glsk-loud", "1.0", code, "[glsk_o3d.pipelines]\nloud = glsk_loud:make\n")
+    result = CliRunner().invoke(main.app, ["filters", "--json"])
+    assert "loud" in [made["name"] for made in json.loads(result.stdout)["pipelines"]]
+    assert "hello" in result.stderr
 
 
-def test_fits_eighty_columns(invoke, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    assert max(map(len, invoke("filters").stdout.splitlines())) <= 80
+# ------------------------------------------------------------------------------------- commands of other distributions
 
 
-def test_a_name_that_is_not_there(refused):
-    assert (
-        refused(2, "filters", "Contracter")
-        == "no filter or pipeline is called 'Contracter': did you mean 'Contractor'?"
-    )
+@pytest.fixture
+def glsk(monkeypatch):
+    """Run a command line of an application with one command of its own and those of some entry points."""
+
+    def run(*words, entries=None):
+        if entries is not None:
+            found = [("some 1", EntryPoint(name, value, main.COMMAND_GROUP)) for name, value in entries.items()]
+            monkeypatch.setattr(main, "entry_points", lambda group, problems: found)
+        app = typer.Typer()
+        app.command("own")(lambda: None)
+        main.add_plugged(app)
+        return CliRunner().invoke(app, words)
+
+    return run
+
+
+def test_what_is_installed_is_a_command(glsk):
+    shown = glsk("benchmark", "--help", entries={"benchmark": "glsk_bench.command:app"})
+    assert shown.exit_code == 0
+    assert {"make", "run", "score", "table"} <= set(shown.stdout.split())
+
+
+@pytest.mark.parametrize("more", [[], ["make", "bench", "--jobs", "2"], ["--help"]])
+def test_what_is_not_says_how_to_get_it(glsk, more):
+    absent = glsk("benchmark", *more, entries={})
+    assert (absent.exit_code, absent.stdout) == (1, "")
+    cure = "pip install ./benchmarks in a clone of glsk-o3d"  # it is not on PyPI
+    assert absent.stderr == f"glsk: error: glsk benchmark needs another distribution: {cure}\n"
+
+
+@pytest.mark.parametrize("value", ["no_such_module:app", "json:__name__"])
+def test_what_is_broken_or_no_application_is_left_out(glsk, capsys, value):
+    assert glsk("own", entries={"broken": value}).exit_code == 0
+    warning = capsys.readouterr().err
+    assert warning.count("\n") == 1
+    assert warning.startswith(f"glsk: warning: the command 'broken' ({value}) is left out: ")
+
+
+def test_a_malformed_file_of_another_distribution_stops_no_command(glsk, install, capsys):
+    install("glsk-odd", "1", "", "[glsk_o3d.commands\nx = json:dumps\n")
+    assert glsk("own").exit_code == 0
+    warning = capsys.readouterr().err
+    assert warning.count("\n") == 1
+    assert warning.startswith("glsk: warning: the plugins of glsk-odd left out: its entry_points.txt is malformed: ")

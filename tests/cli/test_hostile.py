@@ -6,11 +6,9 @@ import logging
 import numpy as np
 import pytest
 import typer
-from typer.testing import CliRunner
 
-from glsk_o3d import Skeleton
+from glsk_o3d import InvalidParameterError, RingBuilder, Skeleton
 from glsk_o3d.cli.console import echo, print_json, print_rows, print_table, say, visible
-from glsk_o3d.cli.main import app
 from glsk_o3d.cli.reporting import reporting
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.parameters import shown
@@ -25,18 +23,9 @@ def commands(text):
     return [sign for sign in text if sign in NASTY and not sign.isprintable()]
 
 
-def call(*words):
-    result = CliRunner().invoke(app, [*map(str, words)])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
-
-
-def test_visible_text_says_what_was_there():
+def test_whatever_prints(capfd):
     assert visible(NASTY) == visible(HARMLESS) == HARMLESS
     assert visible("Größe 3 µm\n\tü") == "Größe 3 µm\n\tü"
-
-
-def test_whatever_prints(capfd):
     echo(NASTY)
     say("error", NASTY)
     print_table([[NASTY]], [NASTY])
@@ -65,54 +54,39 @@ def test_whatever_prints(capfd):
         ["filters", "no\x1b[31m"],
     ],
 )
-def test_nothing_of_a_file_or_its_name_reaches_the_terminal(tmp_path, monkeypatch, words):
+def test_nothing_of_a_file_or_its_name_reaches_the_terminal(invoke, tmp_path, monkeypatch, words):
     folder = tmp_path / "x\x1b[31m\x9b1m"
     folder.mkdir()
     np.savetxt(folder / "s\x1b]0;t\x07.xyz", torus(300).points)
     (folder / "bad\x1b[2J.json").write_text('{"format": "\\u001b[31m"}')
     (folder / "bad\x1b[2J.mlx").write_text('<FilterScript><filter name="&#155;x"/></FilterScript>')
     monkeypatch.chdir(folder)
-    result = call(*words)
+    result = invoke(*words)
     assert commands(result.output) == []
     assert result.output.strip()
 
 
-@pytest.mark.parametrize("number", ["9" * 401, "9" * 5000, "-" + "9" * 401])
+@pytest.mark.parametrize("number", ["9" * 5000, "-" + "9" * 401])
 @pytest.mark.parametrize(
     "words",
     [
         ["skeletonize", "s.xyz", "--set", "RingBuilder.k={}"],
-        ["skeletonize", "s.xyz", "--set", "Contractor.max_iterations={}"],
-        ["skeletonize", "s.xyz", "--set", "Tracer.root={}"],
+        ["skeletonize", "s.xyz", "--set", "Refiner.root={}"],
         ["demo", "-o", "out", "--points", "{}"],
         ["edit", "k.json", "-o", "o.json", "--smooth", "{}"],
-        ["edit", "k.json", "-o", "o.json", "--root", "{}"],
         ["branches", "k.json", "--root", "{}"],
     ],
 )
-def test_numbers_too_long_for_any_are_said_in_a_sentence(tmp_path, monkeypatch, number, words):
-    monkeypatch.chdir(tmp_path)
+def test_numbers_too_long_for_any_are_said_in_a_sentence(invoke, number, words):
     np.savetxt("s.xyz", torus(300).points)
     line = np.arange(4)
     Skeleton(np.eye(3)[np.zeros(4, int)] * line[:, None], [[0, 1], [1, 2], [2, 3]], line, [], [], []).save("k.json")
-    result = call(*(word.format(number) for word in words))
+    result = invoke(*(word.format(number) for word in words))
     assert result.exit_code == 2, result.output
     assert "rror: " in result.output
 
 
-def test_numbers_of_python_are_told_without_pages_of_digits():
-    from glsk_o3d import InvalidParameterError, RingBuilder
-
-    with pytest.raises(InvalidParameterError, match=r"RingBuilder\.k = a number of 5001 digits: must be at most 9\.2"):
-        RingBuilder(k=10**5000).check()
-    for number, digits in {10**401 - 1: 401, -(10**401) + 1: 401, 10**401: 402, 2**63: 19, 10**19 - 1: 19}.items():
-        assert shown(number) == f"a number of {digits} digits"
-    with pytest.raises(InvalidParameterError, match=r"around = a number of 401 digits: must be at most 1\.79769e\+308"):
-        RingBuilder(around=10**400).check()
-    RingBuilder(thin_to=2**63 - 1).check()
-
-
-def test_a_file_that_may_not_be_read_is_one_line(tmp_path, monkeypatch):
+def test_a_file_that_may_not_be_read_is_one_line(refused, tmp_path, monkeypatch):
     np.savetxt(tmp_path / "s.xyz", torus(300).points)
     monkeypatch.setattr("os.access", lambda *_, **__: False)
 
@@ -120,13 +94,13 @@ def test_a_file_that_may_not_be_read_is_one_line(tmp_path, monkeypatch):
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr("glsk_o3d.io.scans.read_scan", refuse)
-    result = call("skeletonize", tmp_path / "s.xyz", "-o", tmp_path / "o.json")
-    assert (result.exit_code, result.output) == (1, f"glsk: error: {tmp_path / 's.xyz'}: Permission denied\n")
+    assert refused(1, "skeletonize", "s.xyz", "-o", "o.json") == "s.xyz: Permission denied"
 
 
-def test_what_a_plugin_prints_is_no_result(install, capfd):
-    install("glsk-loud", "1.0", "print('hello')\nfrom glsk_o3d import pipelines\nmake = pipelines.default\n",
-            "[glsk_o3d.pipelines]\nloud = glsk_loud:make\n")  # fmt: skip
-    result = CliRunner().invoke(app, ["filters", "--json"])
-    assert "loud" in [made["name"] for made in json.loads(result.stdout)["pipelines"]]
-    assert "hello" in result.stderr
+def test_numbers_of_python_are_told_without_pages_of_digits():
+    with pytest.raises(InvalidParameterError, match=r"RingBuilder\.k = a number of 5001 digits: must be at most 9\.2"):
+        RingBuilder(k=10**5000).check()
+    for number, digits in {10**401 - 1: 401, -(10**401) + 1: 401, 10**401: 402, 2**63: 19, 10**19 - 1: 19}.items():
+        assert shown(number) == f"a number of {digits} digits"
+    with pytest.raises(InvalidParameterError, match=r"around = a number of 401 digits: must be at most 1\.79769e\+308"):
+        RingBuilder(around=10**400).check()

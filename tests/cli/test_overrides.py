@@ -4,7 +4,7 @@ import dataclasses
 from contextlib import suppress
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import glsk_o3d
@@ -15,16 +15,12 @@ from glsk_o3d.pipelines import PIPELINES, cao2010, default
 from glsk_o3d.recipes.catalogue import catalogue
 
 RULES = {"stop": ["ExplainedScore", "RingSizeRatio"], "reducer": ["LPRReducer"]}
+FIELDS = [(cls, field) for cls in catalogue().values() for field in dataclasses.fields(cls)]
 
 
 def find(pipeline, name):
     (found,) = [part for part in parts(pipeline) if type(part).__name__ == name]
     return found
-
-
-def every_field():
-    classes = catalogue().values()
-    return [pytest.param(cls, f, id=f"{cls.__name__}.{f.name}") for cls in classes for f in dataclasses.fields(cls)]
 
 
 def values(facts):
@@ -53,7 +49,8 @@ def values(facts):
     return plain | st.sampled_from([("none", None), ("None", None)]) if facts["type"].endswith("?") else plain
 
 
-@pytest.mark.parametrize(("cls", "field"), every_field())
+@pytest.mark.parametrize(("cls", "field"), FIELDS, ids=[f"{cls.__name__}.{field.name}" for cls, field in FIELDS])
+@settings(max_examples=20)
 @given(data=st.data())
 def test_every_parameter_can_be_set(cls, field, data):
     text, value = data.draw(values(field.metadata))
@@ -62,16 +59,8 @@ def test_every_parameter_can_be_set(cls, field, data):
     got = getattr(find(changed, cls.__name__), field.name)
     assert got == value
     assert type(got) is type(value)
-    replaced = getattr(find(start, cls.__name__), field.name)  # with all that was set in it
-    for before in parts(start):  # and nothing else changed
-        if before is replaced:
-            continue
-        name = type(before).__name__
-        after = next((part for part in parts(changed) if type(part).__name__ == name), None)
-        for other in dataclasses.fields(before):
-            nested = other.metadata["type"].rstrip("?") in RULES
-            if after is not None and (name, other.name) != (cls.__name__, field.name) and not nested:
-                assert getattr(after, other.name) == getattr(before, other.name)
+    before = getattr(find(start, cls.__name__), field.name)
+    assert changed.with_options({f"{cls.__name__}.{field.name}": before}) == start  # nothing else has changed
 
 
 def test_round_trip_of_every_pipeline():
@@ -89,31 +78,21 @@ def test_round_trip_of_every_pipeline():
         assert eval(repr(changed), vars(glsk_o3d) | {name: getattr(glsk_o3d, name) for name in catalogue()}) == pipeline
 
 
-def test_inner_filters_are_reached_and_the_input_stays():
+def test_where_settings_go():
     before = default()
-    after = override(before, ["LPRReducer.phi=1e4", "ExplainedScore.threshold=0.01"])
+    after = override(before, ["LPRReducer.phi=1e4", "ExplainedScore.threshold=0.01"])  # inside another filter
     assert find(after, "Contractor").reducer.phi == 1e4
     assert find(after, "Contractor").stop.threshold == 0.01
     assert before == default()
-
-
-def test_the_order_does_not_matter_but_the_last_word_counts():
-    settings = ["RingSizeRatio.threshold=0.5", "Contractor.stop=RingSizeRatio"]
-    assert override(default(), settings) == override(default(), settings[::-1])
-    assert find(override(default(), ["RingBuilder.k=9", "RingBuilder.k=10"]), "RingBuilder").k == 10
-    assert find(override(default(), ["Contractor.reducer=none"]), "Contractor").reducer is None
-
-
-def test_a_name_alone_where_one_part_has_it():
-    assert override(default(), ["k=24", "reducer=none"]) == default().with_options(k=24, reducer=None)
+    settings = ["RingSizeRatio.threshold=0.5", "Contractor.stop=RingSizeRatio"]  # in any order
+    assert override(before, settings) == override(before, settings[::-1])
+    assert find(override(before, ["RingBuilder.k=9", "RingBuilder.k=10"]), "RingBuilder").k == 10
+    assert override(before, ["k=24", "reducer=none"]) == before.with_options(k=24, reducer=None)
     settings = ["threshold=0.5", "stop=RingSizeRatio", "RingSizeRatio.threshold=0.6"]
-    assert find(override(default(), settings[:2]), "Contractor").stop.threshold == 0.5
-    assert find(override(default(), settings), "Contractor").stop.threshold == 0.6
-
-
-def test_every_occurrence_is_changed():
-    pipeline = Pipeline(RingBuilder(), Contractor(reducer=LPRReducer()), LPRReducer())
-    changed = override(pipeline, ["LPRReducer.phi=7"])
+    assert find(override(before, settings[:2]), "Contractor").stop.threshold == 0.5
+    assert find(override(before, settings), "Contractor").stop.threshold == 0.6
+    twice = Pipeline(RingBuilder(), Contractor(reducer=LPRReducer()), LPRReducer())
+    changed = override(twice, ["LPRReducer.phi=7"])
     assert [part.phi for part in parts(changed) if isinstance(part, LPRReducer)] == [7, 7]
 
 
@@ -129,20 +108,16 @@ def test_every_occurrence_is_changed():
         ("Connector.radius=", "write it as Filter.parameter=value"),
         ("", "write it as Filter.parameter=value"),
         ("connector.radius=2%", "connector is not in the pipeline, which has RingBuilder, Contractor, LPRReducer,"),
-        ("Connector.Radius=2%", "did you mean 'radius'?"),
-        ("Contractor.max_iteration=2", "no parameter of Contractor is called 'max_iteration': did you mean"),
+        ("Connector.radios=2%", "did you mean 'radius'?"),
         ("RingBuilder.zzz=2", "no parameter of RingBuilder is called 'zzz': there are k, radius, around, thin_to, "),
         ("RingBuilder.consumes=cloud", "no parameter of RingBuilder is called 'consumes'"),
-        ("RingSizeRatio.threshold=1", "RingSizeRatio is not in the pipeline, which has RingBuilder"),
         ("Contractor.stop=RingSizeRati", "no stop is called 'RingSizeRati': did you mean 'RingSizeRatio'?"),
         ("Contractor.stop=LPRReducer", "no stop is called 'LPRReducer'"),
         ("Contractor.reducer=Contractor", "no reducer is called 'Contractor'"),
         ("Contractor.stop=none", "no stop is called 'none'"),
         ("RingBuilder.k=1.5", "RingBuilder.k = 1.5: must be an int"),
         ("RingBuilder.k=many", "RingBuilder.k = 'many': must be an int, or 'auto', or 'published'"),
-        ("RingBuilder.k=1", "RingBuilder.k = 1: must be at least 4"),
         ("LPRReducer.phi=nan", "LPRReducer.phi = nan: must be finite"),
-        ("LPRReducer.phi=0", "LPRReducer.phi = 0.0: must be above 0"),
         ("LPRReducer.order=random", "LPRReducer.order = 'random': must be one of 'cheapest', 'index'"),
         ("LPRReducer.conserve_mass=maybe", "LPRReducer.conserve_mass = 'maybe': must be True or False"),
         ("Connector.radius=101%", "a percentage of the diagonal lies above 0% and up to 100%"),
@@ -156,6 +131,7 @@ def test_refuses(setting, message):
     assert "\n" not in str(caught.value)
 
 
+@settings(max_examples=50)
 @given(st.text() | st.from_regex(r"[A-Z][a-z]+\.[a-z]+=.*", fullmatch=True))
 def test_any_text_is_a_setting_or_refused(text):
     with suppress(InvalidParameterError):

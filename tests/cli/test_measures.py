@@ -1,19 +1,64 @@
-"""`glsk tree`: the numbers, the file, the units."""
+"""`glsk branches` and `glsk tree`: the numbers, the files, the units, the root."""
 
 import csv
 import json
-from dataclasses import replace
+import re
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from scipy.io import loadmat
 
 from glsk_o3d import Skeleton, pipelines, read_skeleton, samples
-from glsk_o3d.analysis import cylinders, tree_measures
+from glsk_o3d.analysis import BranchTable, cylinders, tree_measures
+from glsk_o3d.analysis.branches import PRINTED_COLUMNS
 from glsk_o3d.io.cylinders import save_cylinders
 
 
-def test_lines_file_and_json_agree(invoke, tmp_path, y):
+def test_branches_table_file_and_json_agree(invoke, tmp_path, y):
+    result = invoke("branches", y, "-o", "y.csv", "-o", "z.csv")
+    assert (result.exit_code, result.stderr) == (0, "")
+    lines = ["3 branches, 2 orders, length 1.5", *(f"wrote {name}.csv, in the units of y.ply" for name in "yz")]
+    assert result.stdout.splitlines() == lines
+    assert (tmp_path / "y.csv").read_bytes() == (tmp_path / "z.csv").read_bytes()
+    lines = invoke("branches", y).stdout.splitlines()
+    rows = list(read_skeleton(tmp_path / y).branch_table())
+    with (tmp_path / "y.csv").open(newline="") as stream:
+        assert [row["kind"] for row in csv.DictReader(stream)] == [row["kind"] for row in rows]
+    names = ["branch", *(field.name for field in fields(BranchTable))]
+    heads = [head.replace(" ", "_") for head in re.split(r"  +", next(filter(None, lines)).strip())]
+    assert heads == [name for name in PRINTED_COLUMNS if name in names and name != "support"]  # nobody measured it
+    told = [line.split() for line in lines if line.strip()[:1].isdigit()]
+    assert [words[:7] for words in told] == [
+        ["0", "tip", "-", "0", "0", "0", "0.5"],
+        ["1", "tip", "0", "1", "0", "0", "0.5"],
+        ["2", "tip", "0", "1", "2", "1", "0.5"],
+    ]
+    assert [words[-3] for words in told] == ["-", "40.0", "40.0"]
+    facts = json.loads(invoke("branches", y, "--json").stdout)
+    assert facts["branches"][0]["angle"] is None
+    assert [row["length"] for row in facts["branches"]] == [row["length"] for row in rows]
+    assert invoke("branches", y, "-q").stdout == ""
+
+
+def test_a_closed_branch(invoke, tmp_path, ring_file):
+    (row,) = json.loads(invoke("branches", ring_file, "-o", "ring.csv", "--json").stdout)["branches"]
+    assert row["start"] == row["end"]
+    with (tmp_path / "ring.csv").open(newline="") as stream:
+        (line,) = csv.DictReader(stream)
+    assert (row["tortuosity"], line["tortuosity"]) == (None, "")
+    assert {name for name in row if row[name] is None} == {name for name in line if line[name] == ""}
+
+
+@pytest.mark.parametrize(
+    ("root", "start"), [("2", 2), ("-0.3,0,0.4", 2), ("0.4, 0, 1", 3), ("z", 1), ("x", 2), ("-x", 3)]
+)
+def test_a_root_of_branches(invoke, y, root, start):
+    facts = json.loads(invoke("branches", y, "--json", "--root", root).stdout)
+    assert [row["start"] for row in facts["branches"] if row["level"] == 0] == [start]
+
+
+def test_tree_lines_file_and_json_agree(invoke, tmp_path, y):
     result = invoke("tree", y, "-o", "c.csv", "--root", "0,0,-0.5")
     assert (result.exit_code, result.stderr) == (0, "")
     skeleton = read_skeleton(tmp_path / y)
@@ -30,10 +75,8 @@ def test_lines_file_and_json_agree(invoke, tmp_path, y):
         rows = list(csv.DictReader(stream))
     assert [int(row["parent"]) for row in rows] == table.parent.tolist()
     np.testing.assert_allclose([float(row["volume"]) for row in rows], table.volume)
-    np.testing.assert_allclose([float(row["diameter"]) for row in rows], 2 * table.radius)
     facts = json.loads(invoke("tree", y, "--json", "--root", "0,0,-0.5").stdout)
-    assert facts["volume"] == list(measures.volume)
-    assert facts["stem_diameter"] is None  # it is not so high
+    assert (facts["volume"], facts["stem_diameter"]) == (list(measures.volume), None)  # it is not so high
     assert (facts["unit"], facts["up"]) == (1, "z")
     np.testing.assert_allclose(facts["root"], measures.root)
     assert invoke("tree", y, "-q").stdout == ""
@@ -50,19 +93,22 @@ def test_why_a_stem_has_no_diameter(invoke, tmp_path):
     assert "crown base: not known: no branch leaves the stem" in invoke("tree", "s.json", "--root", "z").stdout
 
 
-def test_units_and_what_is_up(invoke, y):
+def test_units_and_what_is_up(invoke, tmp_path, y):
     metres = json.loads(invoke("tree", y, "--json", "--up", "z").stdout)
-    for unit, factor in {"1": 1, "0.001": 0.001, "mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1}.items():
+    for unit, factor in {"0.001": 0.001, "mm": 0.001, "ft": 0.3048, "m": 1}.items():
         facts = json.loads(invoke("tree", y, "--json", "--up", "z", "--unit", unit).stdout)
         assert facts["height"] == pytest.approx(factor * metres["height"])
         assert facts["unit"] == factor
     assert json.loads(invoke("tree", y, "--json", "--up", "-z").stdout)["height"] != metres["height"]
+    pipelines.tree("-y")(samples.y_junction(2000).points).save(tmp_path / "t.json")
+    for words, up in (((), "-y"), (("--root", "x"), "x"), (("--up", "z"), "z")):  # as the tree was grown, or as asked
+        assert json.loads(invoke("tree", "t.json", "--json", *words).stdout)["up"] == up
 
 
 @pytest.mark.parametrize("name", ["t.qsm.csv", "t.mat", "t.txt"])
 def test_files_of_other_programs_are_in_metres(invoke, tmp_path, y, name):
-    result = invoke("tree", y, "-o", name, "--unit", "mm", "--root", "z")
-    assert result.stdout.splitlines()[-1] == f"wrote {name}, in metres"
+    result = invoke("tree", y, "-o", name, "-o", "c.csv", "--unit", "mm", "--root", "z")
+    assert result.stdout.splitlines()[-2:] == [f"wrote {name}, in metres", "wrote c.csv, in the units of y.ply"]
     save_cylinders(cylinders(read_skeleton(tmp_path / y), "z"), tmp_path / f"expected-{name}", 0.001)
     if name != "t.mat":  # which says when it was written
         assert (tmp_path / name).read_bytes() == (tmp_path / f"expected-{name}").read_bytes()
@@ -72,58 +118,9 @@ def test_files_of_other_programs_are_in_metres(invoke, tmp_path, y, name):
         assert found["length"].sum() == pytest.approx(1.4e-3, rel=0.1)
 
 
-def test_up_is_what_the_tree_was_grown_along(invoke, tmp_path):
-    grown = pipelines.tree("-y")(samples.y_junction(2000).points)
-    grown.save(tmp_path / "t.json")
-    assert json.loads(invoke("tree", "t.json", "--json").stdout)["up"] == "-y"
-    assert json.loads(invoke("tree", "t.json", "--json", "--root", "x").stdout)["up"] == "x"
-    assert json.loads(invoke("tree", "t.json", "--json", "--up", "z").stdout)["up"] == "z"
-    pipelines.tree("thickest")(samples.y_junction(2000).points).save(tmp_path / "u.json")
-    assert json.loads(invoke("tree", "u.json", "--json").stdout)["up"] == "z"
-
-
 def test_a_tree_taller_than_any_is_in_doubt(invoke, tmp_path, y):
     skeleton = read_skeleton(tmp_path / y)
     replace(skeleton, vertices=1000 * skeleton.vertices, radii=1000 * skeleton.radii).save(tmp_path / "mm.ply")
     (line,) = invoke("tree", "mm.ply", "--up", "z", "--root", "z").stderr.splitlines()
     assert line.endswith("none is known above 116 m: is a unit of the cloud 1 m? pass unit=, such as 'mm'")
     assert invoke("tree", "mm.ply", "--unit", "mm", "--up", "z", "--root", "z").stderr == ""
-
-
-@pytest.mark.parametrize(
-    ("code", "words", "message"),
-    [
-        (2, ["y.ply", "--root", "trunk"], "root = 'trunk': must be an axis, x to -z, 'thickest', a vertex, or a point"),
-        (2, ["y.ply", "--root", "a,b,c"], "root = 'a,b,c': must be an axis"),
-        (2, ["y.ply", "--up", "w"], "up = 'w': must be"),
-        (2, ["y.ply", "--unit", "0"], "unit = '0': must be metres, above 0, or one of m, cm, mm, in, ft"),
-        (2, ["y.ply", "--unit", "yard"], "unit = 'yard': must be metres"),
-        (2, ["ring.json"], "1 loops: cylinders are of trees; see pipelines.tree()"),
-        (2, ["two.json"], "2 components: cylinders are of one tree; see pipelines.tree()"),
-        (2, ["y.ply", "-o", "c.xlsx"], "its name ends in .qsm.csv or .mat or .txt or .csv"),
-    ],
-)
-def test_refuses(invoke, tmp_path, y, code, words, message):
-    ring = samples.torus(100)
-    Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ()).save(tmp_path / "ring.json")
-    Skeleton(np.eye(3), [[0, 1]], np.ones(3), (), (), ()).save(tmp_path / "two.json")
-    result = invoke("tree", *words)
-    assert result.exit_code == code
-    assert message in " ".join(result.stderr.split())
-    assert len(result.stderr.splitlines()) == 1 or code == 2
-
-
-def test_every_output_is_written(invoke, tmp_path):
-    from glsk_o3d import pipelines
-    from glsk_o3d.samples import y_junction
-
-    pipelines.tree()(y_junction(2000).points).save(tmp_path / "y.json")
-    names = ["c.csv", "c.txt", "c.mat", "c.qsm.csv"]
-    result = invoke("tree", "y.json", *(word for name in names for word in ("-o", name)))
-    assert result.exit_code == 0, result.output
-    assert all((tmp_path / name).stat().st_size for name in names)
-    assert invoke("branches", "y.json", "-o", "a.csv", "-o", "b.csv").exit_code == 0
-    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
-    assert invoke("grasps", "y.json", "--opening", "1", "-o", "g.json", "-o", "g.csv").exit_code == 0
-    assert (tmp_path / "g.csv").exists()
-    assert invoke("rig", "y.json", "-o", "a.glb", "-o", "b.glb").exit_code == 2

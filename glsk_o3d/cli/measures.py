@@ -1,4 +1,4 @@
-"""``glsk tree``: what foresters read of the skeleton of a tree."""
+"""``glsk branches`` and ``glsk tree``: what can be measured of a skeleton."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from .console import echo, print_json, print_table
-from .options import Json, Quiet, Root, Verbose, argument, option, output_option
-from .outputs import check_outputs
+from .console import echo, print_table
+from .options import Root, SkeletonFile, argument, option, output_option
+from .outputs import check_outputs, tell
 
 if TYPE_CHECKING:
     from ..analysis import TreeMeasures
@@ -25,6 +25,42 @@ UNITS = {
 """Fields of `TreeMeasures` that are printed, and what they are in."""
 
 
+def branches(
+    skeleton: SkeletonFile,
+    output: Annotated[list[Path] | None, output_option("CSV", "Write the whole table; may be repeated.")] = None,
+    root: Root = None,
+) -> None:
+    """Measure every branch of a skeleton.
+
+    Lengths are in the units of the file. A branch starts where it is nearer to the root. Its tortuosity is its length
+    over the distance of its ends, its angle is in degrees to the parent. Branches that continue each other have the
+    same axis and order; the level counts branches from the root.
+    """
+    from .. import FileFormatError, read_skeleton
+    from ..analysis.branches import cell
+
+    files = output or []
+    check_outputs([(path, ".csv", "table is CSV") for path in files], skeleton)
+    curve = read_skeleton(skeleton)
+    if len(curve.vertices) == 0:
+        raise FileFormatError(f"{skeleton}: the skeleton is empty: it has no branches to measure")
+    table = curve.branch_table(root)
+    for path in files:
+        table.to_csv(path)
+
+    def words() -> None:
+        if files:
+            echo(f"{len(table)} branches, {table.order.max() + 1} orders, length {table.length.sum():.4g}")
+            return
+        columns = table.printed_columns
+        left = [i for i, form in enumerate(columns.values()) if form == "s"]
+        rows = [[cell(row, name) for name in columns] for row in table]
+        print_table(rows, [name.replace("_", " ") for name in columns], left=left)
+
+    facts = {"skeleton": str(skeleton), "branches": list(table)}
+    tell(facts, words, [f"{path}, in the units of {skeleton.name}" for path in files])
+
+
 def tree(
     skeleton: Annotated[Path, argument("SKELETON", "Of a tree, with radii: 'glsk skeletonize --pipeline tree'.")],
     output: Annotated[
@@ -34,9 +70,6 @@ def tree(
     root: Root = None,
     up: Annotated[str | None, option("AXIS", "What points up, x to -z; else as it was grown, or z.")] = None,
     unit: Annotated[str, option("UNIT", "One unit of the file: m, cm, mm, in or ft, or its metres.")] = "m",
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Measure a tree: height, stem, crown, volume by order.
 
@@ -51,15 +84,12 @@ def tree(
     check_outputs([(path, CYLINDER_ENDINGS, "file is a table of cylinders") for path in output or []], skeleton)
     curve = read_skeleton(skeleton)
     measures = tree_measures(curve, root, up=up, unit=unit)
+    written = []
     for path in output or []:
         save_cylinders(cylinders(curve, root), path, unit)
-    if as_json:
-        print_json({"skeleton": str(skeleton), **asdict(measures)})
-    elif not quiet:
-        _print(measures)
-        for path in output or []:
-            units = f"the units of {skeleton.name}" if cylinders_ending(path) == ".csv" else "metres"
-            echo(f"wrote {path}, in {units}")
+        units = f"the units of {skeleton.name}" if cylinders_ending(path) == ".csv" else "metres"
+        written.append(f"{path}, in {units}")
+    tell({"skeleton": str(skeleton), **asdict(measures)}, lambda: _print(measures), written)
 
 
 def _print(measures: TreeMeasures) -> None:
