@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from ..errors import MissingPackageError
-from ..interop.entry_points import entry_points
+from ..interop.packages import entry_points
 from .console import say
 from .reporting import reporting
 

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..interop.atomic import write_atomically
-from ..interop.packages import import_open3d
-from ..interop.verbosity import following_open3d
+from ..interop.packages import following_open3d, import_open3d
 from .clouds import pcd
 from .clouds.blocks import read_whole
 from .clouds.scanned import Scan
