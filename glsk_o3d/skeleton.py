@@ -269,9 +269,9 @@ class Skeleton:
 
     def to_pymeshlab(self) -> pymeshlab.Mesh:
         """The skeleton as a ``pymeshlab.Mesh`` of vertices and edges (extra ``meshlab``)."""
-        from .meshlab import to_pymeshlab
+        from .meshlab.layers import Layer
 
-        return to_pymeshlab(self)
+        return Layer.of(self).to_pymeshlab()
 
     def save(
         self, path: str | PathLike[str], *, cut_loops: bool = False, root: Root = None, format: str | None = None

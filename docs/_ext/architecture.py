@@ -43,7 +43,7 @@ COMFORTS = {
     "skeleton.Skeleton.segment": ("analysis.segmentation",),
     "skeleton.Skeleton.to_line_set": ("io.line_sets",),
     "skeleton.Skeleton.to_networkx": ("analysis.curvature", "analysis.segmentation"),
-    "skeleton.Skeleton.to_pymeshlab": ("meshlab",),
+    "skeleton.Skeleton.to_pymeshlab": ("meshlab.layers",),
     "skeleton.Skeleton.to_tensor_line_set": ("io.line_sets",),
     "skeleton.Skeleton.to_tubes": ("io.tubes",),
 }

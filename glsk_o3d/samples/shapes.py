@@ -121,8 +121,8 @@ def torus(n: int = 4096, *, ring_radius: float = 0.4, radius: float = 0.1, noise
     if radius >= ring_radius:
         raise InvalidParameterError(f"radius = {radius}: must be below ring_radius = {ring_radius}")
     rng = np.random.default_rng(seed)
-    points, axis = _ring(n, ring_radius, radius, rng)
-    return Sample(noisy(points, noise, rng), *axis, "torus")
+    points, (nodes, edges, radii) = _ring(n, ring_radius, radius, rng)
+    return Sample(noisy(points, noise, rng), nodes, edges, radii, "torus")
 
 
 def two_rings(
