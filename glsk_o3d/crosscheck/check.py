@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..contractor import Contractor
 from ..errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
 from ..interop.atomic import check_ending
 from ..interop.clouds import cloud_points
@@ -152,8 +153,9 @@ def cross_check(
     ('agrees', (1, 1))
     """
     pipeline = named_pipeline(pipeline) if isinstance(pipeline, str) else pipeline
-    if not isinstance(pipeline, Pipeline) or not isinstance(pipeline.stages[0], RingBuilder):
-        raise InvalidParameterError(f"pipeline = {pipeline!r}: must be one that starts with a RingBuilder")
+    kinds = [type(stage) for stage in pipeline.stages] if isinstance(pipeline, Pipeline) else []
+    if kinds[:1] != [RingBuilder] or Contractor not in kinds:
+        raise InvalidParameterError(f"pipeline = {pipeline!r}: must start with a RingBuilder and have a Contractor")
     if isinstance(mesh, str) and mesh not in ("auto", *SURFACES):
         raise InvalidParameterError(f"mesh = {mesh!r}: must be 'auto', {', '.join(map(repr, SURFACES))}, or a mesh")
     if max_points is not None and not (isinstance(max_points, int | np.integer) and max_points >= MIN_POINTS):
