@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InvalidCloudError
 from .packages import import_open3d
 
-__all__ = ["Cloud", "SearchParam", "cloud_points", "to_point_cloud"]
+__all__ = ["Cloud", "SearchParam", "cloud_points"]
 
 ACCEPTED = "an Open3D point cloud or triangle mesh (legacy or tensor) or an (N, 3) array of real numbers"
 SAMPLE_COUNT = "sample_count"
@@ -35,7 +35,8 @@ class Cloud:
 class SearchParam(Protocol):
     """Open3D's ``KDTreeSearchParamKNN``, ``KDTreeSearchParamRadius`` or ``KDTreeSearchParamHybrid``."""
 
-    def get_search_type(self) -> Any: ...
+    def get_search_type(self) -> Any:
+        """Which of them it is."""
 
 
 def cloud_points(cloud: Any) -> np.ndarray:

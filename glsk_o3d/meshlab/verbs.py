@@ -133,8 +133,10 @@ class Slot:
         if self.kind == "root" and str(value).isdecimal():
             return int(value)
         wrong = problem_with(value, self.facts)
+        if wrong and self.kind == "root":
+            wrong += ", or the number of a vertex"
         if wrong:
-            raise ValueError(wrong + ", or the number of a vertex" * (self.kind == "root"))
+            raise ValueError(wrong)
         return value
 
     def is_of_box(self, value: Any) -> bool:

@@ -22,6 +22,12 @@ class Sample:
     radii : (M,) float64 array
         Distance from each node to the surface of its own part.
     name : str
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> torus(1000).points.shape
+    (1000, 3)
     """
 
     points: np.ndarray
