@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageError, did_you_mean
 from .interop.clouds import Cloud, cloud_points
-from .interop.verbosity import following_open3d
+from .interop.packages import following_open3d
 from .parameters import UNWRITTEN, Parameters
 from .report import STOPPED_BY_CALLER, IterationRecord, Report, warn
 from .skeleton import Skeleton

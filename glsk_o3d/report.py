@@ -14,7 +14,7 @@ from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from .errors import SkeletonWarning
-from .interop.verbosity import QUIET, open3d_is
+from .interop.packages import QUIET, open3d_is
 from .judgements import QUESTIONS, Judgement, Place, Supported
 
 NOT_CONTRACTED = "not contracted"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import samples
-from glsk_o3d.samples.sample import Sample
+from glsk_o3d.samples import Sample
 
 
 @pytest.fixture(scope="module")

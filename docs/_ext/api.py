@@ -102,7 +102,6 @@ MODULES = {
     "glsk_o3d.recipes": "Comparing runs",
     "glsk_o3d.recipes.catalogue": "What there is by name",
     "glsk_o3d.recipes.plugins": "Plugins",
-    "glsk_o3d.meshlab.steps": "Filter scripts",
 }
 """What the package's own parts, and those who extend it, import from."""
 

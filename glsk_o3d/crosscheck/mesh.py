@@ -12,7 +12,7 @@ from scipy.sparse import diags_array
 from scipy.spatial import cKDTree
 
 from ..contractor import Contractor
-from ..errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
+from ..errors import InvalidCloudError, SkeletonWarning
 from ..interop.clouds import to_point_cloud
 from ..interop.packages import import_open3d, require
 from ..io.meshes import mesh_arrays
@@ -177,8 +177,6 @@ def mesh_skeleton(state, vertices, faces, pipeline):
     of the mesh stay gaps. Warnings are in the report alone.
     """
     stages = list(dropwhile(lambda stage: not isinstance(stage, Contractor), pipeline.stages))
-    if not stages:
-        raise InvalidParameterError(f"{pipeline!r} has no Contractor: there is nothing to compare with a mesh")
     begun, faces = mesh_state(state, vertices, faces)
     contractor = replace(stages[0], reducer=None)
     rest = [stage for stage in stages[1:] if not isinstance(stage, LPRReducer)]

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InvalidCloudError
 from .packages import import_open3d
 
-__all__ = ["Cloud", "SearchParam", "cloud_points", "to_point_cloud"]
+__all__ = ["Cloud", "SearchParam", "cloud_points"]
 
 ACCEPTED = "an Open3D point cloud or triangle mesh (legacy or tensor) or an (N, 3) array of real numbers"
 SAMPLE_COUNT = "sample_count"
@@ -45,8 +45,7 @@ def cloud_points(cloud: Any) -> np.ndarray:
     Parameters
     ----------
     cloud : open3d.geometry.PointCloud, TriangleMesh, open3d.t.geometry.PointCloud, TriangleMesh or (N, 3) array_like
-        Of a mesh the vertices are taken. Tensors may have any real dtype and live on any device; by themselves, they
-        and Open3D's vectors count as arrays.
+        Of a mesh the vertices are taken. Tensors may have any real dtype and live on any device.
 
     Returns
     -------
@@ -68,10 +67,9 @@ def cloud_points(cloud: Any) -> np.ndarray:
         raise InvalidCloudError(f"a cloud is not a file name ({cloud!r}): read it first with glsk_o3d.read_cloud")
     if isinstance(cloud, np.ma.MaskedArray):
         raise InvalidCloudError("a cloud cannot be a masked array: drop the masked points, or fill them with NaN")
+    held = _held(cloud)
     try:
-        array = np.asarray(_held(cloud))
-    except InvalidCloudError:
-        raise
+        array = np.asarray(held)
     except Exception as error:  # ragged lists, and whatever a foreign __array__ raises
         raise InvalidCloudError(f"a {type(cloud).__name__} is no cloud ({error}): give {ACCEPTED}") from error
     if array.size == 0 and array.dtype.kind in "iuf":
@@ -88,8 +86,7 @@ def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int
 
     The numbers are those of the attribute ``sample_count`` of a tensor cloud, as `glsk_o3d.read_sample` gives it: (n,)
     float array, None if there is none. Two ints follow: for how many points the finite ones stand together, and all
-    others. An InvalidCloudError says what is wrong with the attribute: it must have a number of at least 1 for each
-    point, and less than 2^63 together.
+    others. InvalidCloudError if they are no counts.
     """
     name, tensor = open3d_class(cloud)
     if not (name == "PointCloud" and tensor and SAMPLE_COUNT in cloud.point):
@@ -97,9 +94,8 @@ def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int
     counts, n = cloud.point[SAMPLE_COUNT].cpu().numpy().astype(float), len(cloud.point.positions)
     if not (counts.shape in ((n, 1), (n,)) and (counts >= 1).all() and counts.sum() <= MOST_COUNTED):
         raise InvalidCloudError(
-            f"the cloud's attribute {SAMPLE_COUNT} of shape {counts.shape} must have a number of at least 1 for each "
-            f"of the {n} points, and less than 2^63 together: it says how many points each one stands for; rename what "
-            "says something else"
+            f"the cloud's attribute {SAMPLE_COUNT} of shape {counts.shape} must say how many points each of the {n} "
+            "stands for: at least 1, and less than 2^63 together; rename what says something else"
         )
     counts = counts.reshape(-1)
     return counts[finite], int(counts[finite].sum()), int(counts[~finite].sum())
@@ -146,15 +142,6 @@ def search_parameters(given: Any) -> dict[str, Any]:
 
 
 def to_point_cloud(points: np.ndarray) -> Any:
-    """Points as an ``open3d.geometry.PointCloud``.
-
-    Parameters
-    ----------
-    points : (N, 3) array_like
-
-    Returns
-    -------
-    open3d.geometry.PointCloud
-    """
+    """Points, (N, 3) array_like, as an ``open3d.geometry.PointCloud``."""
     o3d = import_open3d()
     return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.ascontiguousarray(points, float).reshape(-1, 3)))

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
 
 import numpy as np
 
-from ..errors import did_you_mean
 from ..interop.packages import require
 from .script import BOOL, FLOAT, INT, LENGTH, MATRIX, POINT, TEXT, Param
 
@@ -47,63 +46,61 @@ def trial() -> Any:
     return meshes
 
 
-def arguments(name: str, params: Sequence[Param], any_filter: bool = False) -> dict[str, Any]:
-    """Parameters in a script as keyword arguments for a filter by pymeshlab's name, checked by pymeshlab itself.
+@dataclass(frozen=True)
+class Builtin:
+    """A parameter of a filter of MeshLab's, by pymeshlab's names, with its default."""
 
-    Filters that do not work on layers are refused without `any_filter`. ValueError has the line of the parameter as
-    its second argument, or None.
+    filter: str
+    name: str
+    default: Any
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """The types that it may have in a script."""
+        for kind, types in ((bool, BOOL), (int, INT), (float, FLOAT + LENGTH), (str, TEXT)):
+            if isinstance(self.default, kind):
+                return types
+        if isinstance(self.default, np.ndarray):
+            return POINT if self.default.size == 3 else MATRIX
+        return ("RichColor",) if type(self.default).__name__ == "Color" else ()
+
+    def read(self, param: Param) -> Any:
+        """The value of a parameter in a script as pymeshlab takes it, who is asked; ValueError if it is wrong."""
+        pymeshlab, value = require("pymeshlab"), param.value(self.types)
+        if is_layer(self.name, self.default) and value < 0:
+            raise ValueError(f"there is no layer {value}")
+        try:
+            if param.type in LENGTH and isinstance(value, str):
+                value = pymeshlab.PercentageValue(float(value[:-1]))
+            elif param.type in LENGTH:
+                value = pymeshlab.PureValue(value)
+            elif param.type == "RichColor":
+                value = pymeshlab.Color(*value)
+            elif isinstance(value, list):
+                value = np.reshape(value, np.shape(self.default))
+            trial().filter_parameter_values(self.filter, **{self.name: value})
+        except Exception as error:  # pymeshlab's exceptions have no base of their own
+            reason = str(error).partition("\n")[0]
+            if "Unable to cast" in reason:
+                reason = f"a {param.type} is not what it takes"
+            raise ValueError(reason) from None
+        return value
+
+
+def slots(filter: str, any_filter: bool = False) -> dict[str, Builtin]:
+    """The parameters of a filter by pymeshlab's name, as `pythonic` has their names.
+
+    Filters that do not work on layers are refused without `any_filter`, by a ValueError.
     """
-    if not (any_filter or name.startswith(ON_LAYERS)):
+    if not (any_filter or filter.startswith(ON_LAYERS)):
         raise ValueError(
             "it writes or reads files, or sends them: scripts run only filters that work on layers, unless "
-            "any_filter=True says that this one is trusted",
-            None,
+            "any_filter=True says that this one is trusted"
         )
-    if name not in require("pymeshlab").filter_list():
-        raise ValueError("the pymeshlab that is installed has no such filter", None)
-    known = trial().filter_parameter_values(name)
-    by_name = {key.rstrip("_"): key for key in known}  # the keyword of `lambda` is `lambda_`
-    found: dict[str, Any] = {}
-    for param in params:
-        key = by_name.get(pythonic(param.name))
-        if key is None:
-            raise ValueError(did_you_mean(param.name, known, "parameter"), param.line)
-        if key in found:
-            raise ValueError(f"parameter {param.name!r} is given twice", param.line)
-        try:
-            found[key] = _argument(param, key, known[key])
-            _try(name, key, found[key], param.type)
-        except ValueError as error:
-            raise ValueError(f"parameter {param.name!r}: {error}", param.line) from None
-    return found
-
-
-def _argument(param: Param, key: str, default: Any) -> Any:
-    """The value of a parameter as pymeshlab takes it."""
-    pymeshlab, value = require("pymeshlab"), param.value(_fitting(default))
-    if param.type in LENGTH:
-        try:
-            if isinstance(value, str):
-                return pymeshlab.PercentageValue(float(value[:-1]))
-            return pymeshlab.PureValue(value)
-        except Exception as error:  # pymeshlab's exceptions have no base of their own
-            raise ValueError(str(error)) from None
-    if param.type == "RichColor":
-        return pymeshlab.Color(*value)
-    if isinstance(value, list):
-        return np.reshape(value, np.shape(default))
-    if is_layer(key, default) and value < 0:
-        raise ValueError(f"there is no layer {value}")
-    return value
-
-
-def _try(name: str, key: str, value: Any, type: str) -> None:
-    """Raise ValueError where pymeshlab does not take a value."""
-    try:
-        trial().filter_parameter_values(name, **{key: value})
-    except Exception as error:  # as above
-        reason = str(error).partition("\n")[0]
-        raise ValueError(f"a {type} is not what it takes" if "Unable to cast" in reason else reason) from None
+    if filter not in require("pymeshlab").filter_list():
+        raise ValueError("the pymeshlab that is installed has no such filter")
+    defaults = trial().filter_parameter_values(filter)
+    return {name.rstrip("_"): Builtin(filter, name, value) for name, value in defaults.items()}  # as `lambda_`
 
 
 def is_layer(key: str, value: Any) -> bool:
@@ -118,13 +115,3 @@ def pythonic(name: str) -> str:
     'target_number_x_y'
     """
     return re.sub(r"[().,'\":+]+", "", re.sub(r"[ /-]", "_", name.lower()))
-
-
-def _fitting(default: Any) -> tuple[str, ...]:
-    """The types that a parameter with such a default may have in a script."""
-    for kind, types in ((bool, BOOL), (int, INT), (float, FLOAT + LENGTH), (str, TEXT)):
-        if isinstance(default, kind):
-            return types
-    if isinstance(default, np.ndarray):
-        return POINT if default.size == 3 else MATRIX
-    return ("RichColor",) if type(default).__name__ == "Color" else ()

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError
+from ..errors import FileFormatError, InvalidCloudError
 from ..interop.atomic import write_atomically
 from ..interop.clouds import cloud_points
 from ..interop.packages import import_open3d, require
 from ..io.formats import ply
 from ..io.formats.graphs import graph_skeleton
-from ..io.formats.ply import ply_elements
 from ..io.paths import existing_file
 from ..io.scan import COLOR_CHANNELS
 from ..io.scans import read_scan
-from ..io.skeletons import read_skeleton, save_skeleton, skeleton_ending
+from ..io.skeletons import holds_skeleton, read_skeleton, save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
 from ..state import Contraction
 
@@ -35,7 +33,7 @@ class Layer:
 
     Scalars are the radii of a skeleton, the multiplicities of a contracted cloud, the branches of a segmented one.
     Colours are red, green, blue and alpha from 0 to 1. `flow` is what our filters pass on, of which the vertices are
-    the visible part, and `source` the layer that it was made from; `told` is what else there is to say of how.
+    the visible part, `source` the layer that it was made from, and `cut` the places where loops were cut.
     """
 
     vertices: np.ndarray
@@ -47,7 +45,7 @@ class Layer:
     label: str = "cloud"
     flow: Contraction | Skeleton | None = None
     source: Layer | None = None
-    told: Mapping[str, Any] = field(default_factory=dict)
+    cut: list[list[float]] | None = None
 
     @classmethod
     def of(cls, data: Any, label: str = "cloud", source: Layer | None = None) -> Layer:
@@ -61,31 +59,27 @@ class Layer:
 
     @classmethod
     def read(cls, path: str | os.PathLike) -> Layer:
-        """A scan from a file that `read_cloud` reads, with the faces of a mesh and the quality of a PLY file.
+        """A scan that `read_cloud` reads, with the faces of a mesh and the quality of points; or a skeleton's edges.
 
-        Of a PLY or OBJ file of lines the edges are kept. What STL repeats for every triangle becomes one vertex.
+        What STL repeats for every triangle becomes one vertex.
         """
         path = existing_file(path)
-        held = _elements(path)
-        if "edge" in held and "face" not in held:
+        if holds_skeleton(path):
             drawing = read_skeleton(path)
             edges = drawing.edges if len(drawing.edges) else None
             radii = None if np.isnan(drawing.radii).all() else drawing.radii
             return cls(drawing.vertices, edges=edges, scalars=radii, label=path.name)
-        scan = read_scan(path)  # knows best what may be wrong with the file
+        scan = read_scan(path)
         points, normals, faces, colors = scan.positions, scan.normals, scan.triangles, scan.colors
         if path.suffix.lower() == ".stl":
-            o3d = import_open3d()
-            mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(points), o3d.utility.Vector3iVector(faces))
-            if normals is not None:
-                mesh.vertex_normals = o3d.utility.Vector3dVector(normals)
+            mesh = _open3d_mesh(points, faces, normals)
             mesh.remove_duplicated_vertices()
             points, normals, faces = map(np.array, (mesh.vertices, mesh.vertex_normals, mesh.triangles))
         return cls(
             points,
             faces=faces if len(faces) else None,
             normals=normals,
-            scalars=scan.attributes["quality"].astype(float) if "quality" in held.get("vertex", ()) else None,
+            scalars=scan.attributes["quality"].astype(float) if "quality" in scan.attributes else None,
             colors=None if colors is None else np.column_stack([colors, np.ones(len(colors))]),
             label=path.name,
         )
@@ -94,21 +88,19 @@ class Layer:
     def of_mesh(cls, mesh: Any) -> Layer:
         """A ``pymeshlab.Mesh`` as its matrix shows it; what nobody has set, zeros or white, is left out."""
         normals, scalars, colors = mesh.vertex_normal_matrix(), mesh.vertex_scalar_array(), mesh.vertex_color_matrix()
+        # normals keep their lengths, and stay normal where the matrix is no rotation
+        turned = normals @ np.linalg.pinv(mesh.transform_matrix()[:3, :3])
+        before, after = (np.linalg.norm(vectors, axis=1, keepdims=True) for vectors in (normals, turned))
+        turned *= np.divide(before, after, out=np.ones_like(after), where=after > 0)
         return cls(
             mesh.transformed_vertex_matrix(),
             faces=mesh.face_matrix() if mesh.face_number() else None,
             edges=mesh.edge_matrix().reshape(-1, 2) if mesh.edge_number() else None,
-            normals=_turned(normals, mesh.transform_matrix()) if normals.any() else None,
+            normals=turned if normals.any() else None,
             scalars=scalars if scalars.any() else None,
             colors=None if (colors == 1).all() else colors,
             label=mesh.label(),
         )
-
-    def shows(self, other: Layer) -> bool:
-        """Whether both have the same vertices and edges, so that the one's flow is still the other's."""
-        none = np.empty((0, 2), int)
-        mine, its = (none if layer.edges is None else layer.edges for layer in (self, other))
-        return np.array_equal(self.vertices, other.vertices) and np.array_equal(mine, its)
 
     @property
     def is_skeleton(self) -> bool:
@@ -121,6 +113,29 @@ class Layer:
         finite = self.vertices[np.isfinite(self.vertices).all(axis=1)]
         return math.hypot(*np.ptp(finite, axis=0)) if len(finite) else 0.0
 
+    def holds(self, kind: type) -> bool:
+        """Whether there is a Contraction or a Skeleton to go on from, with its points: those of a file have none."""
+        return isinstance(self.flow, kind) and self.flow is not None and len(self.flow.points) > 0
+
+    def shows(self, other: Layer) -> bool:
+        """Whether both have the same vertices and edges, so that the one's flow is still the other's."""
+        none = np.empty((0, 2), int)
+        mine, its = (none if layer.edges is None else layer.edges for layer in (self, other))
+        return np.array_equal(self.vertices, other.vertices) and np.array_equal(mine, its)
+
+    def cloud(self) -> np.ndarray:
+        """The vertices of a layer that is a scan; InvalidCloudError for a skeleton and a contracted cloud."""
+        flow, what = self.flow, None
+        if self.is_skeleton:
+            what = "a skeleton or another line drawing: make the scan the current layer"
+        elif (
+            isinstance(flow, Contraction) and flow.report.iterations and np.array_equal(self.vertices, flow.contracted)
+        ):
+            what = "contracted and no scan: make the scan the current layer, or go on with generate_skeleton_graph_glsk"
+        if what:
+            raise InvalidCloudError(f"the current layer ({self.label}) is {what}")
+        return self.vertices
+
     def summary(self) -> dict[str, Any]:
         """The layer in a few numbers, as MeshLab's filters return them."""
         found: dict[str, Any] = {"vertices": len(self.vertices)}
@@ -130,7 +145,8 @@ class Layer:
             found |= {"length": flow.length}
         elif self.colors is not None and self.scalars is not None:
             found["branches"] = int(self.scalars.max(initial=-1)) + 1
-        found |= self.told
+        if self.cut is not None:
+            found["cut"] = self.cut
         if flow is not None and flow.report.stages:  # else it is from a file
             report = flow.report
             found |= {"iterations": len(report.iterations), "converged": report.converged}
@@ -168,8 +184,10 @@ class Layer:
             save_skeleton(self.to_skeleton(), path, **options)
             return
         check_ending(path, "points" if self.faces is None else "points or mesh")
-        writers = {".ply": self._write_ply, ".xyz": self._write_xyz}
-        write_atomically(path, writers.get(path.suffix.lower(), self._write_open3d))
+        if path.suffix.lower() == ".xyz":
+            write_atomically(path, lambda temporary: np.savetxt(temporary, self.vertices, fmt="%.17g"))
+        else:
+            write_atomically(path, self._write_ply if path.suffix.lower() == ".ply" else self._write_open3d)
 
     def _write_ply(self, path: Path) -> None:
         columns = dict(zip("xyz", self.vertices.T.astype(float), strict=True))
@@ -190,41 +208,33 @@ class Layer:
 
     def _write_open3d(self, path: Path) -> None:
         o3d = import_open3d()
-        points, normals, colors = (
-            o3d.utility.Vector3dVector(np.empty((0, 3)) if array is None else np.ascontiguousarray(array[:, :3], float))
-            for array in (self.vertices, self.normals, self.colors)
-        )
+        colors = None if self.colors is None else self.colors[:, :3]
         if path.suffix.lower() in LAYER_ENDINGS["points"]:
-            cloud = o3d.geometry.PointCloud(points)
-            cloud.normals, cloud.colors = normals, colors
+            cloud = o3d.geometry.PointCloud(_vectors(self.vertices))
+            cloud.normals, cloud.colors = _vectors(self.normals), _vectors(colors)
             done = o3d.io.write_point_cloud(str(path), cloud)
         else:
-            faces = o3d.utility.Vector3iVector(np.ascontiguousarray(self.faces, np.int32))
-            mesh = o3d.geometry.TriangleMesh(points, faces)
-            mesh.vertex_normals, mesh.vertex_colors = normals, colors
+            mesh = _open3d_mesh(self.vertices, self.faces, self.normals)
+            mesh.vertex_colors = _vectors(colors)
             if path.suffix.lower() == ".stl":
                 mesh.compute_triangle_normals()
             done = o3d.io.write_triangle_mesh(str(path), mesh)
         if not done:
             raise FileFormatError(f"{path}: Open3D cannot write it")
 
-    def _write_xyz(self, path: Path) -> None:
-        np.savetxt(path, self.vertices, fmt="%.17g")
+
+def _vectors(array):
+    """Rows of three, or none, as Open3D holds them."""
+    rows = np.empty((0, 3)) if array is None else np.ascontiguousarray(array, float)
+    return import_open3d().utility.Vector3dVector(rows)
 
 
-def _turned(normals: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Normals as a layer's matrix shows them: they keep their lengths and stay normal where it is no rotation."""
-    turned = normals @ np.linalg.pinv(matrix[:3, :3])
-    before, after = (np.linalg.norm(vectors, axis=1, keepdims=True) for vectors in (normals, turned))
-    return turned * np.divide(before, after, out=np.ones_like(after), where=after > 0)
-
-
-def _elements(path: Path) -> dict[str, list[str]]:
-    """What a PLY or OBJ file holds, with the properties of PLY."""
-    if path.suffix.lower() == ".obj":  # without faces Open3D finds nothing in it
-        with path.open("rb") as stream:
-            return {"face" if any(line.split()[:1] == [b"f"] for line in stream) else "edge": []}
-    return ply_elements(path) if path.suffix.lower() == ".ply" else {}
+def _open3d_mesh(points, faces, normals):
+    o3d = import_open3d()
+    triangles = o3d.utility.Vector3iVector(np.ascontiguousarray(faces, np.int32))
+    mesh = o3d.geometry.TriangleMesh(_vectors(points), triangles)
+    mesh.vertex_normals = _vectors(normals)
+    return mesh
 
 
 def check_ending(path: Path, what: str) -> None:

@@ -15,11 +15,11 @@ from ..errors import FileFormatError, GlskError, InvalidCloudError, InvalidParam
 from ..interop.atomic import write_atomically
 from ..interop.packages import require
 from ..io.paths import SCAN_ENDINGS, existing_file
-from ..io.skeletons import FORMATS
+from ..io.skeletons import FORMATS, holds_skeleton
 from ..skeleton import Skeleton
 from . import builtin
 from .layers import Layer
-from .script import VECTORS, Call, read_script, write_script
+from .script import Call, read_script, script_text, write_script
 from .steps import Step, read_steps, step
 from .verbs import verbs
 
@@ -81,14 +81,12 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         pymeshlab.PyMeshLabException
             A filter of MeshLab's failed.
         """
-        if filter_name in verbs():
+        if _known(filter_name) in verbs():
             done = step(verbs()[filter_name], _plain_lengths(params))
             result = self._run_ours(done)
-        elif filter_name in pymeshlab.filter_list():
+        else:
             result = self._run_theirs(filter_name, params)
             done = Step(filter_name, params, self._last_call())
-        else:
-            raise InvalidParameterError(did_you_mean(str(filter_name), self.filter_list(), "filter"))
         self._script.append(done)
         return result
 
@@ -144,13 +142,14 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
     @staticmethod
     def print_filter_parameter_list(filter_name: str) -> None:
         """Print the parameters of a filter: name, type and default; of ours also limits and meaning."""
-        if filter_name in verbs():
-            print(f"{filter_name} filter - list of parameter names:")
-            print("\n".join(verbs()[filter_name].listing()))
-        elif filter_name in pymeshlab.filter_list():
+        verb = verbs().get(_known(filter_name))
+        if verb is None:
             pymeshlab.print_filter_parameter_list(filter_name)
-        else:
-            raise InvalidParameterError(did_you_mean(filter_name, MeshSet.filter_list(), "filter"))
+            return
+        print(f"{filter_name} filter - list of parameter names:")
+        defaults = verb.values({})
+        for name, slot in verb.slots.items():
+            print(slot.listing(defaults.get(name, "as the pipeline has it")))
 
     @staticmethod
     def search(word: str) -> None:
@@ -188,13 +187,8 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         self._script = []
 
     def print_filter_script(self) -> None:
-        """Print the filters of the current script with their parameters."""
-        print(f"Filter Script Size : {len(self._script)}\n")
-        for i, each in enumerate(self._script):
-            print(f"{i}: {each.name}")
-            for param in each.call.params:
-                values = [param.attributes[key] for key in VECTORS.get(param.type, ("value",))]
-                print(f"\t{param.name} : {param.type} = {', '.join(values)}")
+        """Print the current script as it would be saved."""
+        print(script_text([each.call for each in self._script]))
 
     def add_points(self, points: Any, name: str = "cloud") -> None:
         """Add a cloud, anything that `skeletonize` takes, as a new layer, which becomes the current one."""
@@ -235,7 +229,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         """
         path = existing_file(path)
         try:
-            if path.suffix.lower() in SCAN_ENDINGS:
+            if path.suffix.lower() in SCAN_ENDINGS or holds_skeleton(path):
                 self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)
             else:
                 self.load_new_mesh(str(path))
@@ -273,6 +267,13 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         """Remove all layers. The current script stays."""
         super().clear()
         self._flows = {}
+
+
+def _known(name: Any) -> str:
+    """The name of a filter; InvalidParameterError if there is none."""
+    if name not in MeshSet.filter_list():
+        raise InvalidParameterError(did_you_mean(str(name), MeshSet.filter_list(), "filter"))
+    return name
 
 
 def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:

@@ -15,24 +15,14 @@ from ..interop.packages import require
 from . import builtin
 from .layers import Layer
 from .script import Call, read_script
-from .verb import Verb
-from .verbs import verbs
+from .verbs import Verb, verbs
 
 
 @dataclass(frozen=True)
 class Step:
-    """A filter that is going to be run, or was.
+    """A filter that is going to be run, or was: its name and keyword arguments in Python, and as it stands in a script.
 
-    Attributes
-    ----------
-    name : str
-        In Python.
-    values : dict of str to object
-        Keyword arguments.
-    call : Call
-        The same as it stands in a script.
-    place : str
-        File and line for messages, empty where there is no file.
+    `place` is its file and line for messages, empty where there is no file.
     """
 
     name: str
@@ -66,45 +56,18 @@ class Step:
 def step(verb: Verb, values: Mapping[str, Any]) -> Step:
     """One of our filters with its parameters, checked and as it is written into a script.
 
-    Parameters
-    ----------
-    verb : Verb
-    values : mapping of str to object
-        Those that differ from the defaults; the script gets all of them, so that it stays true when defaults change.
-
-    Returns
-    -------
-    Step
-
-    Raises
-    ------
-    InvalidParameterError
+    `values` are those that differ from the defaults; the script gets all, so that it stays true when defaults change.
     """
-    params = tuple(verb.slots[name].written(value) for name, value in verb.values(values).items())
+    params = [verb.slots[name].written(value) for name, value in verb.values(values).items()]
     return Step(verb.name, dict(values), Call(verb.title, params))
 
 
 def read_steps(path: str | os.PathLike, any_filter: bool = False) -> list[Step]:
-    """Read a filter script and check all of it.
+    """Read a filter script and check all of it; `any_filter` takes also filters that write, read or send files.
 
-    Parameters
-    ----------
-    path : path-like
-    any_filter : bool
-        Take also filters of MeshLab's that write, read or send files, from a script that is trusted.
-
-    Returns
-    -------
-    list of Step
-
-    Raises
-    ------
-    FileNotFoundError, FileFormatError
-    ScriptError
-        It is malformed, or a filter, parameter, type or value is wrong; the message names file, line, filter and the
-        nearest valid name.
-    MissingPackageError
-        It has filters of MeshLab's, and pymeshlab is not there to check and run them; the message names all of them.
+    Errors are those of `read_script`; a ScriptError for a filter, parameter, type or value that is wrong names file,
+    line, filter and the nearest valid name. A MissingPackageError names the filters of MeshLab's own that need
+    pymeshlab, where it is not there to check and run them.
     """
     calls = read_script(path)
     foreign = meshlabs_own(calls, path)
@@ -112,26 +75,13 @@ def read_steps(path: str | os.PathLike, any_filter: bool = False) -> list[Step]:
         try:
             require("pymeshlab")
         except MissingPackageError as error:
-            raise MissingPackageError(f"{path}: {_listed(foreign)}: {error}", name=error.name) from error
-    ours = {verb.title: verb for verb in verbs().values()}
-    return [
-        _ours(ours[call.name], call, path) if call.name in ours else _theirs(call, path, any_filter) for call in calls
-    ]
+            listed = ", ".join(f"{call.name!r} (line {call.line})" for call in foreign)
+            raise MissingPackageError(f"{path}: MeshLab's own filters {listed}: {error}", name=error.name) from error
+    return [_step(call, path, any_filter) for call in calls]
 
 
 def meshlabs_own(calls: Sequence[Call], path: str | os.PathLike) -> list[Call]:
-    """The filters of a script that need pymeshlab; ScriptError if it has one that nobody knows.
-
-    Parameters
-    ----------
-    calls : sequence of Call
-    path : path-like
-        The script, for messages.
-
-    Returns
-    -------
-    list of Call
-    """
+    """The filters of a script that need pymeshlab; ScriptError if it has one that nobody knows."""
     ours = [verb.title for verb in verbs().values()]
     foreign = [call for call in calls if call.name not in ours]
     for call in foreign:
@@ -141,51 +91,43 @@ def meshlabs_own(calls: Sequence[Call], path: str | os.PathLike) -> list[Call]:
     return foreign
 
 
-def _listed(calls: Sequence[Call]) -> str:
-    """Such as "'Select None' (lines 3, 9), 'Close Holes' (line 5) are filters of MeshLab's own"."""
-    lines: dict[str, list[str]] = {}
-    for call in calls:
-        lines.setdefault(call.name, []).append(str(call.line))
-    told = [f"{name!r} (line{'s' * (len(at) > 1)} {', '.join(at)})" for name, at in lines.items()]
-    return f"{', '.join(told)} {'are filters' if len(told) > 1 else 'is a filter'} of MeshLab's own"
+def _step(call: Call, path: str | os.PathLike, any_filter: bool) -> Step:
+    """A filter of a script with its values, all checked."""
 
+    def wrong(message: object, line: int = call.line) -> ScriptError:
+        return ScriptError(f"{path}, line {line}: filter {call.name!r}: {message}")
 
-def _ours(verb: Verb, call: Call, path: str | os.PathLike) -> Step:
-    values = {}
-    for param in call.params:
-        if param.name not in verb.slots:
-            raise _refused(path, call, did_you_mean(param.name, verb.slots, "parameter"), param.line)
-        try:
-            values[param.name] = verb.slots[param.name].read(param)
-        except ValueError as error:
-            raise _refused(path, call, f"parameter {param.name!r}: {error}", param.line) from None
+    verb = next((verb for verb in verbs().values() if verb.title == call.name), None)
+    slots: Mapping[str, Any]
     try:
-        verb.plan(values)
-    except InvalidParameterError as error:
-        raise _refused(path, call, str(error)) from None
-    return Step(verb.name, values, call, f"{path}, line {call.line}")
-
-
-def _theirs(call: Call, path: str | os.PathLike, any_filter: bool) -> Step:
-    name = builtin.names()[call.name]
-    try:
-        values = builtin.arguments(name, call.params, any_filter)
+        if verb is not None:
+            name, slots, spelled = verb.name, verb.slots, str
+        else:
+            name, spelled = builtin.names()[call.name], builtin.pythonic
+            slots = builtin.slots(name, any_filter)
     except ValueError as error:
-        raise _refused(path, call, *error.args) from None
+        raise wrong(error) from None
+    values: dict[str, Any] = {}
+    for param in call.params:
+        slot = slots.get(spelled(param.name))
+        if slot is None:
+            raise wrong(did_you_mean(param.name, slots, "parameter"), param.line)
+        if slot.name in values:
+            raise wrong(f"parameter {param.name!r} is given twice", param.line)
+        try:
+            values[slot.name] = slot.read(param)
+        except ValueError as error:
+            raise wrong(f"parameter {param.name!r}: {error}", param.line) from None
+    try:
+        if verb is not None:
+            verb.plan(values)
+    except InvalidParameterError as error:
+        raise wrong(error) from None
     return Step(name, values, call, f"{path}, line {call.line}")
 
 
-def _refused(path: str | os.PathLike, call: Call, message: str, line: int | None = None) -> ScriptError:
-    return ScriptError(f"{path}, line {line or call.line}: filter {call.name!r}: {message}")
-
-
 def scripts() -> dict[str, Path]:
-    """The filter scripts that come with the package, by name.
-
-    Returns
-    -------
-    dict of str to Path
-    """
+    """The files of the filter scripts that come with the package, by name."""
     package = Path(str(resources.files("glsk_o3d")))
     places = (package / "filters", package.parent / "filters")  # installed, and in a checkout
     folder = next((place for place in places if place.is_dir()), None)
@@ -195,20 +137,8 @@ def scripts() -> dict[str, Path]:
 def find_script(name: str | os.PathLike) -> Path:
     """The file of a script: a path that ends in .mlx or names a folder, or the name of one that comes with the package.
 
-    Such a name may end in .mlx, too, where no such file is in the working folder.
-
-    Parameters
-    ----------
-    name : str or path-like
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    InvalidParameterError
-        There is no script of that name; the message says which there are.
+    Such a name may end in .mlx, too, where no such file is in the working folder. InvalidParameterError if there is
+    none of that name.
     """
     path, known = Path(name), scripts()
     if path.suffix.lower() == ".mlx" or str(name) != path.name:
@@ -219,13 +149,7 @@ def find_script(name: str | os.PathLike) -> Path:
 
 
 class PlainLayers:
-    """Layers, and our filters run on them: what a `MeshSet` does, without pymeshlab.
-
-    Parameters
-    ----------
-    layer : Layer
-        The first one, number 0.
-    """
+    """Layers by number, and our filters run on them: what a `MeshSet` does, without pymeshlab."""
 
     def __init__(self, layer: Layer):
         self.layers = [layer]

@@ -1,57 +1,237 @@
-"""Our filters as MeshLab's users meet them: a verb for every filter of the catalogue, which makes a new layer."""
+"""Our filters as MeshLab's users meet them: a verb for every filter and every edit of skeletons makes a new layer."""
 
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from ..analysis.segmentation import segment
+from .. import editing
 from ..contractor import Contractor
-from ..errors import InvalidCloudError, InvalidParameterError
+from ..errors import InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.clouds import Cloud
 from ..io.colors import shades
+from ..io.formats.graphs import graph_skeleton
 from ..lpr_reducer import LPRReducer
-from ..parameters import Parameters, resolve_length
+from ..numerics.vectors import AXES
+from ..parameters import Parameters, parameter, problem_with, resolve_length
 from ..pipeline import Filter, Pipeline, parts
+from ..pipelines import default
 from ..recipes.catalogue import catalogue, known_pipelines, named_pipeline, serves
 from ..ring_builder import RingBuilder
 from ..skeleton import Skeleton
 from ..state import Contraction
-from .edits import edits
 from .layers import Layer
-from .verb import OF_FRAME, PARTS, Slot, Verb, called, facts_of
+from .script import BOOL, FLOAT, LENGTH, Param
 
-_NAMES = {
+PARTS = ("reducer", "stop")
+OF_FRAME = " of the frame"
+"""What follows a percentage that is as everywhere else in this package, of the box that RingBuilder's `frame` names."""
+_SLOT_TYPES = {
+    "bool": ("bool", BOOL),
+    "int": ("int", ("RichInt",)),
+    "float": ("float", FLOAT),
+    "length": ("PercentageValue", LENGTH),
+    "choice": ("str", ("RichString", "RichEnum")),
+    "root": ("str", ("RichString", "RichInt", "RichPosition")),
+}
+"""What listings call the types of parameters, and those of scripts, of which the first is written; others are words."""
+
+
+def facts_of(doc: str, type: str, choices: tuple[str, ...] = (), low: float | None = None) -> Mapping[str, Any]:
+    """The facts of a parameter that is no filter's."""
+    return parameter(None, doc, type=type, choices=choices, low=low).metadata
+
+
+_FILTER_STEMS = {
     "RingBuilder": "generate_one_rings",
     "Contractor": "generate_contracted_cloud",
     "LPRReducer": "generate_reduced_cloud",
     "Connector": "generate_skeleton_graph",
     "Refiner": "generate_refined_skeleton",
 }
+_EDITS: dict[str, Callable[..., Any]] = {
+    "generate_largest_skeleton_component": editing.largest_component,
+    "generate_skeleton_without_loops": editing.cut_loops,
+    "generate_rerooted_skeleton": editing.reroot,
+    "generate_pruned_skeleton": editing.prune,
+    "generate_smoothed_skeleton": editing.smooth,
+    "generate_simplified_skeleton": editing.simplify,
+}
+_ROOT = "Where the tree grows from: the lowest vertex along an axis, the thickest end, a vertex, or a point."
+_EDIT_PARAMETERS = {
+    "length": facts_of("Least length of a branch that ends, from junction to tip.", "length", low=0),
+    "radius": facts_of("Least mean radius of a branch that ends.", "length", low=0),
+    "order": facts_of("Highest order of branches that stays: 0 for the stem alone.", "int?", low=0),
+    "passes": facts_of("How often; more passes make longer waves disappear.", "int", low=0),
+    "tolerance": facts_of("How far a dropped vertex may be from the simpler curve.", "length?", low=0),
+    "n": facts_of("How many vertices to keep, in place of a tolerance.", "int?", low=1),
+}
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A parameter of a verb, with the facts that `glsk_o3d.parameters.parameter` makes.
+
+    One of a filter, or of what is inside it, has its name in `Pipeline.with_options` as `option`, and its default from
+    the pipeline; the verb's own have a default here.
+    """
+
+    name: str
+    facts: Mapping[str, Any]
+    option: str = ""
+    default: Any = None
+
+    @property
+    def kind(self) -> str:
+        """The type without the mark that it may be None; "root" for a point that may be a vertex by its number."""
+        kind = self.facts["type"].rstrip("?")
+        return "root" if kind == "point" and not self.option else kind
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What it may be in words."""
+        words = self.facts["choices"]
+        if self.kind in PARTS:
+            serving = [name for name, cls in catalogue().items() if serves(cls, self.kind)]
+            words = [name for name in serving if name != self.option.partition(".")[0]]
+        return (*words, *["none"] * self.facts["type"].endswith("?"))
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """The types that it may have in a script; the first is written."""
+        if self.name == "layer":
+            return ("RichMesh", "RichInt")
+        _, types = _SLOT_TYPES.get(self.kind, ("str", ("RichString",)))
+        worded = self.kind == "length" or self.words
+        return (*types, "RichString") if worded and "RichString" not in types else types
+
+    def checked(self, value: Any) -> Any:
+        """The value as the filter takes it, reducers and rules made from their names; ValueError if it is wrong."""
+        if isinstance(value, np.generic):
+            value = value.item()
+        if isinstance(value, list | tuple | np.ndarray) and self.kind == "root":
+            value = ",".join(map(str, np.ravel(value).tolist()))
+        if value == "none" and "none" in self.words:
+            return None
+        if self.kind == "length" and self.option and isinstance(value, str):  # filters alone know the frame
+            value = value.removesuffix(OF_FRAME)
+        if self.kind == "choice" and type(value) is int:
+            if not 0 <= value < len(self.words):
+                raise ValueError(f"must be one of {', '.join(map(repr, self.words))}, or its number from 0")
+            value = self.words[value]
+        if self.kind in PARTS and isinstance(value, str):
+            if value not in self.words:
+                raise ValueError(did_you_mean(value, self.words, self.kind))
+            return catalogue()[value]()
+        if self.kind == "root" and str(value).isdecimal():
+            return int(value)
+        wrong = problem_with(value, self.facts)
+        if wrong and self.kind == "root":
+            wrong += ", or the number of a vertex"
+        if wrong:
+            raise ValueError(wrong)
+        return value
+
+    def is_of_box(self, value: Any) -> bool:
+        """Whether a value is a percentage as MeshLab's are: of the bounding box of the layer."""
+        return self.kind == "length" and isinstance(value, str) and value.rstrip().endswith("%")
+
+    def read(self, param: Param) -> Any:
+        """The value of a parameter in a script, checked but not resolved; ValueError if it is wrong."""
+        value = param.value(self.types)
+        self.checked(value)
+        return value
+
+    def written(self, value: Any) -> Param:
+        """The parameter in a script."""
+        if isinstance(value, Parameters | None):
+            value = "none" if value is None else type(value).__name__
+        text = str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else repr(value)
+        worded = isinstance(value, str) and not self.is_of_box(value)
+        return Param(self.name, "RichString" if worded else self.types[0], {"value": text})
+
+    def listing(self, default: Any) -> str:
+        """Two lines as MeshLab prints them, with limits and meaning."""
+        kind, _ = _SLOT_TYPES.get(self.kind, ("str", ()))
+        limits = {"above" if self.facts["open_low"] else "min": self.facts["low"], "max": self.facts["high"]}
+        limits = {key: limit for key, limit in limits.items() if limit is not None}
+        said = f" [{'; '.join(f'{key}: {limit:g}' for key, limit in limits.items())}]" if limits else ""
+        said += f" ({', '.join(self.words)})" if self.words else ""
+        kind += " or str" if self.words and kind != "str" else ""
+        return f"\t{self.name} : {kind} = {default}{said}\n\t\t{self.facts['doc']}"
+
+
+@dataclass(frozen=True)
+class Verb:
+    """One of our filters for MeshLab, by its name in Python and its title in scripts."""
+
+    name: str
+    title: str
+    doc: str
+    slots: dict[str, Slot]
+    makes: str  # what the result may be, as `check_ending` has it
+
+    def checked(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The given parameters as they are taken; InvalidParameterError for a name or a value that is wrong."""
+        made = {}
+        for name, value in values.items():
+            if name not in self.slots:
+                raise InvalidParameterError(did_you_mean(name, self.slots, f"parameter of {self.name}"))
+            try:
+                made[name] = self.slots[name].checked(value)
+            except ValueError as error:
+                raise InvalidParameterError(f"{name} = {value!r}: {error}") from None
+        return made
+
+    def values(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """All parameters that matter, the given ones and the defaults of the others."""
+        made = self.checked(given)
+        return {name: made.get(name, slot.default) for name, slot in self.slots.items()}
+
+    def in_units(self, values: Mapping[str, Any], diagonal: float) -> dict[str, Any]:
+        """Parameters with lengths in place of the percentages of a layer's diagonal."""
+        percent = {name: value for name, value in values.items() if self.slots[name].is_of_box(value)}
+        return {**values, **{name: resolve_length(value, diagonal) for name, value in percent.items()}}
+
+    def plan(self, values: Mapping[str, Any]) -> Any:
+        """What the verb does with such parameters, all checked; two of the same are equal."""
+        raise NotImplementedError
+
+    def run(self, layer: Layer, given: Mapping[str, Any], on_iteration: Callable[..., Any] | None = None) -> Layer:
+        """The new layer; percentages are of the diagonal of the given layer's bounding box."""
+        raise NotImplementedError
+
+    def shown(self, result: Any, source: Layer) -> Layer:
+        """The layer that shows a result."""
+        return Layer.of(result, f"{self.title.partition(' (')[0].partition(' ')[2]} of {source.label}", source)
 
 
 @dataclass(frozen=True)
 class PipelineVerb(Verb):
-    """A pipeline of filters, run on the vertices of a layer: a cloud, a mesh, or what a filter of ours made."""
+    """A named pipeline, or one filter of it, run on the vertices of a layer: a cloud, a mesh, or what a filter made.
 
-    default: ClassVar[str] = "default"
+    What must run before the one filter runs first, unless the layer comes from there.
+    """
 
-    def start(self, values: Mapping[str, Any]) -> Pipeline:
-        """The pipeline whose parameters the values change."""
-        return named_pipeline(values.get("pipeline", self.default))
+    filter: type[Filter] | None = None
 
     def plan(self, values: Mapping[str, Any]) -> Pipeline:
         """The filters that the verb runs with such parameters; refuses those of a filter that is not among them."""
         made = self.checked(values)
+        if self.filter is None:
+            start = named_pipeline(values.get("pipeline", "default"))
+        else:
+            start = Pipeline(*([stage for stage in default().stages if type(stage) is self.filter] or [self.filter()]))
         names = {self.slots[name].option: name for name in made if self.slots[name].option}
         try:
-            return self.start(made).with_options({option: made[name] for option, name in names.items()})
+            return start.with_options({option: made[name] for option, name in names.items()})
         except InvalidParameterError as error:  # say it with the name that the verb has for it
             option, colon, why = str(error).partition(": ")
             raise InvalidParameterError(f"{names.get(option, option)}{colon}{why}") from None
@@ -71,48 +251,24 @@ class PipelineVerb(Verb):
                 found[slot.name] = slot.written(value).attributes["value"] if slot.kind in PARTS else value
         return found
 
-    def plan_for(self, layer: Layer, given: Mapping[str, Any]) -> Pipeline:
-        """As `plan`; percentages are lengths: of the diagonal of the layer's bounding box."""
-        pipeline, diagonal = self.plan(given), layer.diagonal
-        percent = {name: value for name, value in given.items() if self.slots[name].is_of_box(value)}
-        if not (percent and diagonal):  # a layer without extent is refused in better words
-            return pipeline
-        return self.plan({**given, **{name: resolve_length(value, diagonal) for name, value in percent.items()}})
-
     def run(self, layer, given, on_iteration=None):
-        return self.shown(self.plan_for(layer, given)(_cloud(layer), on_iteration=on_iteration), layer)
-
-
-@dataclass(frozen=True)
-class FilterVerb(PipelineVerb):
-    """One filter of a pipeline. What must run before it runs first, unless the layer comes from there."""
-
-    filter: type[Filter]
-
-    @property
-    def makes(self):
-        return "skeleton" if self.filter.produces is Skeleton else "points"
-
-    def start(self, values):
-        found = [stage for stage in named_pipeline(self.default).stages if type(stage) is self.filter]
-        return Pipeline(*(found or [self.filter()]))
-
-    def run(self, layer, given, on_iteration=None):
-        pipeline = self.plan_for(layer, given)
-        if _goes_on(layer, self.filter.consumes):
+        # a layer without extent is refused by the RingBuilder, in better words than a length of 0
+        pipeline = self.plan(self.in_units(given, layer.diagonal or 1.0))
+        if self.filter is not None and layer.holds(self.filter.consumes):
             return self.shown(pipeline(layer.flow, on_iteration=on_iteration), layer.source or layer)
-        pipeline = Pipeline(*self.before(), *pipeline.stages)
-        return self.shown(pipeline(_cloud(layer), on_iteration=on_iteration), layer)
+        pipeline = Pipeline(*self._before(), *pipeline.stages)
+        return self.shown(pipeline(layer.cloud(), on_iteration=on_iteration), layer)
 
-    def before(self) -> tuple[Filter, ...]:
+    def _before(self) -> tuple[Filter, ...]:
         """What turns a cloud into what the filter takes: the default pipeline's filters before it."""
-        stages = named_pipeline(self.default).stages
+        stages = default().stages
         kinds = [type(stage) for stage in stages]
         if self.filter in kinds:
             return stages[: kinds.index(self.filter)]
-        if self.filter.consumes is Contraction:
+        consumes = self.filter.consumes if self.filter else Cloud
+        if consumes is Contraction:
             return (RingBuilder(thin_to="all"), Contractor(max_iterations=1))
-        return stages if self.filter.consumes is Skeleton else ()
+        return stages if consumes is Skeleton else ()
 
     def shown(self, result, source):
         layer = super().shown(result, source)
@@ -127,17 +283,12 @@ class FilterVerb(PipelineVerb):
 class SegmentVerb(PipelineVerb):
     """Points labelled by the branch of the skeleton that they belong to."""
 
-    @property
-    def makes(self):
-        return "points or mesh"
-
     def run(self, layer, given, on_iteration=None):
-        pipeline = self.plan_for(layer, given)
-        if _goes_on(layer, Skeleton):
+        if layer.holds(Skeleton):
             skeleton, layer = layer.flow, layer.source or layer
         else:
-            skeleton = pipeline(_cloud(layer), on_iteration=on_iteration)
-        labels = segment(skeleton)
+            skeleton = self.plan(given)(layer.cloud(), on_iteration=on_iteration)
+        labels = skeleton.segment()
         colors = shades(skeleton, "branch", labels, skeleton.vertex_of_point)
         return dataclasses.replace(
             self.shown(skeleton.points, layer),
@@ -148,39 +299,72 @@ class SegmentVerb(PipelineVerb):
         )
 
 
+@dataclass(frozen=True)
+class EditVerb(Verb):
+    """A skeleton changed by a function of `glsk_o3d.editing`, with the names and defaults of its parameters."""
+
+    function: Callable[..., Any]
+
+    def plan(self, values):
+        made = self.values(values)
+        del made["layer"]
+        # tried on a line, since the function knows best what goes together; which vertices there are nobody knows yet
+        line = graph_skeleton(np.eye(2, 3), [[0, 1]], np.ones(2))
+        self.function(line, **self.in_units({name: value for name, value in made.items() if name != "root"}, 1.0))
+        return made
+
+    def run(self, layer, given, on_iteration=None):
+        made = self.plan(given)
+        if not layer.is_skeleton:
+            cure = "make one with generate_curve_skeleton_glsk, or name its layer"
+            raise InvalidCloudError(f"the layer ({layer.label}) is no skeleton: {cure}")
+        try:
+            found = self.function(layer.to_skeleton(), **self.in_units(made, layer.diagonal))
+        except InvalidParameterError as error:
+            cure = "cut them with generate_skeleton_without_loops_glsk"
+            raise InvalidParameterError(str(error).replace("see cut_loops()", cure)) from None
+        skeleton, *cut = found if isinstance(found, tuple) else (found,)
+        shown = self.shown(skeleton, layer.source or layer)
+        return dataclasses.replace(shown, cut=cut[0].mean(axis=1).tolist()) if cut else shown
+
+
 @cache
 def verbs() -> dict[str, Verb]:
     """Our filters for MeshLab by their names in Python.
 
     The whole pipeline first, then each filter of the catalogue, the segmentation, and what changes skeletons.
     """
-    segmented = SegmentVerb(
-        *called("generate_segmented_cloud"),
+    whole = "The curve skeleton of the current layer's vertices, with radii as scalars."
+    segmented = (
         "The points that a skeleton was made from, with the branch that each belongs to as scalar and as colour. "
-        "On a layer without skeleton the default pipeline makes one first. Faces are kept.",
-        {},
+        "On a layer without skeleton the default pipeline makes one first. Faces are kept."
     )
-    filters = [_filter_verb(cls) for cls in catalogue().values() if issubclass(cls, Filter)]
+    found = [
+        _verb(PipelineVerb, "generate_curve_skeleton", whole, _slots_of_all(), "skeleton"),
+        *(_filter_verb(cls) for cls in catalogue().values() if issubclass(cls, Filter)),
+        _verb(SegmentVerb, "generate_segmented_cloud", segmented, [], "points or mesh"),
+        *(_edit_verb(stem, function) for stem, function in _EDITS.items()),
+    ]
+    return {verb.name: verb for verb in found}
+
+
+def _verb(kind: type[Verb], stem: str, doc: str, slots: list[Slot], makes: str, *more: Any) -> Verb:
     layer = Slot("layer", facts_of("The layer to act on; -1 is the current one.", "int", low=-1), default=-1)
-    return {
-        verb.name: dataclasses.replace(verb, slots={**verb.slots, layer.name: layer})
-        for verb in (_whole_verb(), *filters, segmented, *edits())
-    }
+    title = f"{stem.replace('_', ' ').title()} (GLSkeleton)"
+    return kind(f"{stem}_glsk", title, doc, {slot.name: slot for slot in (*slots, layer)}, makes, *more)
 
 
-def _whole_verb() -> PipelineVerb:
-    """The verb of a whole pipeline, which has the parameters of all its filters."""
+def _slots_of_all() -> list[Slot]:
+    """The name of a pipeline, and the parameters of all filters that are in one, or may be."""
     about = "The named pipeline; parameters that are not given are as it has them."
     choice = facts_of(about, "choice", tuple(known_pipelines()))
     inside = [type(part) for make in known_pipelines().values() for part in parts(make())]
     inside += [cls for cls in catalogue().values() if any(serves(cls, kind) for kind in PARTS)]
-    slots = [Slot("pipeline", choice, default=PipelineVerb.default)]
-    slots += [slot for cls in dict.fromkeys(inside) for slot in _slots(cls, f"{cls.__name__.lower()}_")]
-    doc = "The curve skeleton of the current layer's vertices, with radii as scalars."
-    return PipelineVerb(*called("generate_curve_skeleton"), doc, {slot.name: slot for slot in slots})
+    prefixed = [slot for cls in dict.fromkeys(inside) for slot in _slots(cls, f"{cls.__name__.lower()}_")]
+    return [Slot("pipeline", choice, default="default"), *prefixed]
 
 
-def _filter_verb(cls: type[Filter]) -> FilterVerb:
+def _filter_verb(cls: type[Filter]) -> Verb:
     """The verb of a filter, which has its parameters and those of what may be inside it."""
     slots = list(_slots(cls))
     kinds = {slot.kind for slot in slots} & set(PARTS)
@@ -188,9 +372,9 @@ def _filter_verb(cls: type[Filter]) -> FilterVerb:
         if part is not cls and any(serves(part, kind) for kind in kinds):
             slots += _slots(part, f"{part.__name__.lower()}_")
     words = "_".join(re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z0-9]*", cls.__name__)).lower()
-    doc = (cls.__doc__ or cls.__name__).partition("\n\n")[0].replace("\n", " ")
-    stem = _NAMES.get(cls.__name__, f"generate_by_{words}")
-    return FilterVerb(*called(stem), doc, {slot.name: slot for slot in slots}, cls)
+    stem = _FILTER_STEMS.get(cls.__name__, f"generate_by_{words}")
+    makes = "skeleton" if cls.produces is Skeleton else "points"
+    return _verb(PipelineVerb, stem, _summary(cls) or cls.__name__, slots, makes, cls)
 
 
 def _slots(cls: type[Parameters], prefix: str = "") -> Iterator[Slot]:
@@ -199,22 +383,13 @@ def _slots(cls: type[Parameters], prefix: str = "") -> Iterator[Slot]:
         yield Slot(prefix + field.name, field.metadata, f"{cls.__name__}.{field.name}")
 
 
-def _goes_on(layer: Layer, kind: type) -> bool:
-    """Whether a layer holds what a filter takes, with the points that it is of: those of a file have none."""
-    flow = layer.flow
-    return flow is not None and kind is not Cloud and isinstance(flow, kind) and len(flow.points) > 0
+def _edit_verb(stem: str, function: Callable[..., Any]) -> Verb:
+    slots = []
+    for each in list(inspect.signature(function).parameters.values())[1:]:  # the first is the skeleton
+        root = facts_of(_ROOT, "point?" if each.default is None else "point", (*AXES, "thickest"))
+        slots.append(Slot(each.name, _EDIT_PARAMETERS.get(each.name, root), default=each.default))
+    return _verb(EditVerb, stem, _summary(function).replace("`", ""), slots, "skeleton", function)
 
 
-def _cloud(layer: Layer) -> np.ndarray:
-    """The vertices of a layer that is a scan; InvalidCloudError for a skeleton and a contracted cloud."""
-    if layer.is_skeleton:
-        raise InvalidCloudError(
-            f"the current layer ({layer.label}) is a skeleton or another line drawing: make the scan the current layer"
-        )
-    flow = layer.flow
-    if isinstance(flow, Contraction) and flow.report.iterations and np.array_equal(layer.vertices, flow.contracted):
-        raise InvalidCloudError(
-            f"the current layer ({layer.label}) is contracted and no scan: make the scan the current layer, or go on "
-            "with generate_skeleton_graph_glsk"
-        )
-    return layer.vertices
+def _summary(thing: Any) -> str:
+    return (inspect.getdoc(thing) or "").partition("\n\n")[0].replace("\n", " ")

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..errors import PluginWarning
 from ..interop.clouds import Cloud
-from ..interop.entry_points import entry_points
+from ..interop.packages import entry_points
 from ..parameters import RESERVED_WORDS, TYPES, Parameters
 from ..pipeline import FLOWS, Filter, Pipeline
 from ..pipelines import BUILTIN, PIPELINES

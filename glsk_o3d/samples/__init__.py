@@ -10,28 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..errors import InvalidParameterError
-from .capsules import signed_distance
-from .sample import Sample
-from .sauropod import TWO_CAMERAS, sauropod
-from .shapes import helix, sheet, sphere, torus, tube, two_rings, y_junction
-from .trees import tree
+from .capsules import Sample, signed_distance
+from .limbs import TWO_CAMERAS, sauropod, tree, y_junction
+from .shapes import helix, sheet, sphere, torus, tube, two_rings
 
-__all__ = [
-    "SAMPLES",
-    "TWO_CAMERAS",
-    "Sample",
-    "helix",
-    "sample_object",
-    "sauropod",
-    "sheet",
-    "signed_distance",
-    "sphere",
-    "torus",
-    "tree",
-    "tube",
-    "two_rings",
-    "y_junction",
-]
+__all__ = ["SAMPLES", "TWO_CAMERAS", "Sample", "sample_object", "signed_distance"]
+__all__ += ["helix", "sauropod", "sheet", "sphere", "torus", "tree", "tube", "two_rings", "y_junction"]
 
 SAMPLES: dict[str, Callable[..., Sample]] = {
     shape.__name__: shape for shape in (sauropod, tube, torus, helix, y_junction, two_rings, tree, sphere, sheet)

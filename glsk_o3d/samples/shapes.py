@@ -1,12 +1,14 @@
-"""Samples of simple shapes: tubes, with ends or closed, and what has no axis worth the name."""
+"""Samples of simple shapes: tubes, with ends or closed, and what has no axis worth the name.
+
+`n`, `noise` and `seed` are everywhere as in `sample_object`.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..errors import InvalidParameterError
-from .capsules import union_sample
-from .sample import Sample, chain, check, collect, directions, noisy
+from .capsules import Sample, chain, check, collect, directions, noisy, union_sample
 
 
 def tube(
@@ -23,23 +25,19 @@ def tube(
     capped : bool
         Whether the ends are closed by half balls.
 
-    Returns
-    -------
-    Sample
-
     Examples
     --------
     >>> tube(500)
     Sample('tube', 500 points, 2 nodes, 1 edges)
     """
     check(n, noise, length=length, radius=radius)
-    nodes, edges, radii = chain([[-length / 2, 0, 0], [length / 2, 0, 0]], radius)
+    axis = chain([[-length / 2, 0, 0], [length / 2, 0, 0]], radius)
     if capped:
-        return union_sample("tube", nodes, edges, radii, n, noise, seed)
+        return union_sample("tube", *axis, n, noise, seed)
     rng = np.random.default_rng(seed)
     angle = rng.uniform(0, 2 * np.pi, n)
     points = np.stack([rng.uniform(-length / 2, length / 2, n), radius * np.cos(angle), radius * np.sin(angle)], axis=1)
-    return Sample(noisy(points, noise, rng), nodes, edges, radii, "tube")
+    return Sample(noisy(points, noise, rng), *axis, "tube")
 
 
 def helix(
@@ -63,10 +61,6 @@ def helix(
     pitch, turns : float
         Rise per turn, and the number of turns.
 
-    Returns
-    -------
-    Sample
-
     Examples
     --------
     >>> helix(500)
@@ -86,16 +80,17 @@ def helix(
         centre = np.stack([coil_radius * np.cos(t), coil_radius * np.sin(t), climb * (t - end / 2)], axis=-1)
         inward = np.stack([-np.cos(t), -np.sin(t), np.zeros_like(t)], axis=-1)
         tangent = np.stack([-coil_radius * np.sin(t), coil_radius * np.cos(t), np.full_like(t, climb)], axis=-1) / speed
-        return centre, inward, tangent, np.cross(tangent, inward)
+        return centre, inward, tangent
 
     def draw(m):
         which = rng.choice(3, m, p=np.array([wire, cap, cap]) / (wire + 2 * cap))
         t, angle = rng.uniform(0, end, m), rng.uniform(0, 2 * np.pi, m)
-        centre, inward, _, across = frame(t)
+        centre, inward, tangent = frame(t)
+        across = np.cross(tangent, inward)
         points = centre + radius * (np.cos(angle)[:, None] * inward + np.sin(angle)[:, None] * across)
         for piece, (at, sign) in enumerate(((0.0, -1), (end, 1)), start=1):
             rows = np.flatnonzero(which == piece)
-            centre, _, tangent, _ = frame(np.array(at))
+            centre, _, tangent = frame(np.array(at))
             out = directions(len(rows), rng)
             out *= np.where(sign * (out @ tangent) < 0, -1, 1)[:, None]
             points[rows] = centre + radius * out
@@ -103,47 +98,8 @@ def helix(
         return points[rng.uniform(0, 1 + radius * curvature, m) < density]
 
     points = collect(draw, n)
-    nodes, edges, radii = chain(frame(np.linspace(0, end, max(2, int(96 * turns) + 1)))[0], radius)
-    return Sample(noisy(points, noise, rng), nodes, edges, radii, "helix")
-
-
-def y_junction(
-    n: int = 4096,
-    *,
-    length: float = 0.5,
-    radii: tuple[float, float, float] = (0.09, 0.07, 0.07),
-    angle: float = 80.0,
-    noise: float = 0.0,
-    seed: int = 0,
-) -> Sample:
-    """Three straight tubes that meet in the origin: a stem downwards and two arms.
-
-    Parameters
-    ----------
-    n, noise, seed : int, float, int
-        As in `sample_object`.
-    length : float
-        Length of each axis.
-    radii : tuple of three floats
-        At the ends of the stem and of the two arms; all have the stem's radius in the middle.
-    angle : float
-        Between the arms, in degrees.
-
-    Returns
-    -------
-    Sample
-
-    Examples
-    --------
-    >>> y_junction(500)
-    Sample('y_junction', 500 points, 4 nodes, 3 edges)
-    """
-    half = np.deg2rad(angle) / 2
-    check(n, noise, length=length, angle=angle, stem=radii[0], left=radii[1], right=radii[2])
-    ends = length * np.array([[0, 0, -1], [-np.sin(half), 0, np.cos(half)], [np.sin(half), 0, np.cos(half)]])
-    nodes = np.concatenate([np.zeros((1, 3)), ends])
-    edges = np.array([[0, 1], [0, 2], [0, 3]])
-    return union_sample("y_junction", nodes, edges, np.array([radii[0], *radii], float), n, noise, seed)
+    axis = chain(frame(np.linspace(0, end, max(2, int(96 * turns) + 1)))[0], radius)
+    return Sample(noisy(points, noise, rng), *axis, "helix")
 
 
 def torus(n: int = 4096, *, ring_radius: float = 0.4, radius: float = 0.1, noise: float = 0.0, seed: int = 0) -> Sample:
@@ -156,10 +112,6 @@ def torus(n: int = 4096, *, ring_radius: float = 0.4, radius: float = 0.1, noise
     ring_radius, radius : float
         Of the axis, a circle, and of the tube, which is smaller.
 
-    Returns
-    -------
-    Sample
-
     Examples
     --------
     >>> torus(500)
@@ -169,8 +121,8 @@ def torus(n: int = 4096, *, ring_radius: float = 0.4, radius: float = 0.1, noise
     if radius >= ring_radius:
         raise InvalidParameterError(f"radius = {radius}: must be below ring_radius = {ring_radius}")
     rng = np.random.default_rng(seed)
-    points, axis = _torus_points(n, ring_radius, radius, rng), _circle(ring_radius, radius)
-    return Sample(noisy(points, noise, rng), *axis, "torus")
+    points, (nodes, edges, radii) = _ring(n, ring_radius, radius, rng)
+    return Sample(noisy(points, noise, rng), nodes, edges, radii, "torus")
 
 
 def two_rings(
@@ -187,10 +139,6 @@ def two_rings(
     radius : float
         Radius of the tubes, below half of `ring_radius`.
 
-    Returns
-    -------
-    Sample
-
     Examples
     --------
     >>> two_rings(500)
@@ -200,7 +148,7 @@ def two_rings(
     if 2 * radius >= ring_radius:
         raise InvalidParameterError(f"radius = {radius}: must be below half of ring_radius = {ring_radius}")
     rng = np.random.default_rng(seed)
-    points, (nodes, edges, radii) = _torus_points(n, ring_radius, radius, rng), _circle(ring_radius, radius)
+    points, (nodes, edges, radii) = _ring(n, ring_radius, radius, rng)
 
     def second(x):  # turned about x, and moved by one ring radius
         return np.stack([x[:, 0] + ring_radius, -x[:, 2], x[:, 1]], axis=1)
@@ -210,20 +158,18 @@ def two_rings(
     return Sample(noisy(points, noise, rng), nodes, edges, np.concatenate([radii, radii]), "two_rings")
 
 
-def _circle(ring_radius: float, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes, edges and radii of a ring around z, in 128 pieces."""
-    angle = np.arange(128) * 2 * np.pi / 128
-    return chain(ring_radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1), radius, closed=True)
+def _ring(n, ring_radius, radius, rng):
+    """Points of a torus around z, and nodes, edges and radii of its axis, in 128 pieces."""
 
-
-def _torus_points(n: int, ring_radius: float, radius: float, rng) -> np.ndarray:
     def draw(m):
         around, tube_angle = rng.uniform(0, 2 * np.pi, (2, m))
         out = ring_radius + radius * np.cos(tube_angle)
         points = np.stack([out * np.cos(around), out * np.sin(around), radius * np.sin(tube_angle)], axis=1)
         return points[rng.uniform(0, ring_radius + radius, m) < out]
 
-    return collect(draw, n)
+    angle = np.arange(128) * 2 * np.pi / 128
+    circle = ring_radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    return collect(draw, n), chain(circle, radius, closed=True)
 
 
 def sphere(n: int = 4096, *, radius: float = 0.5, noise: float = 0.0, seed: int = 0) -> Sample:
@@ -234,10 +180,6 @@ def sphere(n: int = 4096, *, radius: float = 0.5, noise: float = 0.0, seed: int 
     n, noise, seed : int, float, int
         As in `sample_object`.
     radius : float
-
-    Returns
-    -------
-    Sample
 
     Examples
     --------
@@ -262,10 +204,6 @@ def sheet(
     length, width : float
     bend : float
         Angle between the two ends in degrees, below 360; 0 leaves the sheet flat.
-
-    Returns
-    -------
-    Sample
 
     Examples
     --------

@@ -27,9 +27,23 @@ def even_ball():
 
 @pytest.fixture(scope="session")
 def ring():
-    return samples.torus(1500)
+    ring = samples.torus(1500)
+    ring.points.flags.writeable = False  # the input is not changed
+    return ring
 
 
 @pytest.fixture(scope="session")
 def check(ring):
     return cross_check(ring.points)
+
+
+@pytest.fixture(scope="session")
+def grid():
+    """Faces of a grid of n by m vertices, closed in either direction or not."""
+
+    def make(n, m, close_n, close_m, shift=0):
+        i, j = (a.ravel() for a in np.mgrid[: n - 1 + close_n, : m - 1 + close_m])
+        corners = [shift + (i + a) % n * m + (j + b) % m for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        return np.concatenate([np.column_stack([corners[k] for k in which]) for which in ((0, 1, 2), (0, 2, 3))])
+
+    return make

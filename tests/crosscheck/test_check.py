@@ -13,18 +13,14 @@ from glsk_o3d.crosscheck import cross_check
 from glsk_o3d.crosscheck.agreement import compare_rows, compare_skeletons, mesh_fit
 from glsk_o3d.crosscheck.mesh import spacing
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
-from glsk_o3d.io.scans import read_mesh
 from glsk_o3d.numerics.mesh_rings import border_lengths
-from glsk_o3d.numerics.solver import SolveError
-from glsk_o3d.report import REFUSED
 
 SPIKY = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 
 
-@pytest.mark.parametrize("shape", ["tube", "torus", "helix", "y_junction", "two_rings"])
+@pytest.mark.parametrize("shape", ["tube", "helix", "two_rings"])
 def test_clean_and_dense_shapes_agree(shape):
-    sample = samples.SAMPLES[shape](3000)
-    found = cross_check(sample.points)
+    found = cross_check(samples.SAMPLES[shape](3000).points)
     assert (found.verdict, found.reasons, found.surface) == ("agrees", (), "ball_pivoting")
     assert found.rows.one_to_one
     assert found.rows.covered > 0.8
@@ -35,9 +31,8 @@ def test_clean_and_dense_shapes_agree(shape):
     assert found.skeletons.distance_in_radii < 0.05
 
 
-@pytest.mark.parametrize("noise", [0.0025, 0.01])
-def test_noise_turns_the_rows_before_it_moves_the_skeleton(noise):
-    found = cross_check(samples.torus(2048, noise=noise).points)
+def test_noise_turns_the_rows_before_it_moves_the_skeleton():
+    found = cross_check(samples.torus(2048, noise=0.0025).points)
     assert (found.verdict, found.surface) == ("agrees in part", "poisson")
     assert found.rows.angle["median"] > 15
     assert found.skeletons.topology
@@ -46,9 +41,8 @@ def test_noise_turns_the_rows_before_it_moves_the_skeleton(noise):
     assert "a quarter of the Laplacian coordinates" in found.reasons[0]
 
 
-@pytest.mark.parametrize("shape", ["tube", "torus"])
-def test_it_tells_where_the_cloud_is_noisy(shape):
-    points = samples.SAMPLES[shape](3000).points.copy()
+def test_it_tells_where_the_cloud_is_noisy():
+    points = samples.torus(3000).points.copy()
     noisy = points[:, 0] < 0
     points[noisy] += np.random.default_rng(0).normal(scale=0.008, size=(noisy.sum(), 3))
     found = cross_check(points)
@@ -64,7 +58,6 @@ def test_it_tells_where_the_cloud_is_noisy(shape):
     [
         ("do not trust", "sheet", 1024, 0),
         ("do not trust", "sauropod", 128, 0),
-        ("cannot tell", "torus", 128, 0),
         ("cannot tell", "torus", 1024, 0.08),
     ],
 )
@@ -111,36 +104,14 @@ def test_open_ends_that_the_cloud_has_too_are_not_held_against_a_mesh():
     assert found.fit.open < 0.05
 
 
-@SPIKY
-def test_a_mesh_whose_contraction_fails(ring, monkeypatch):
-    """Its skeleton, of the only solve that is left, differs: that says nothing of the cloud's."""
-    solve = Contractor._solve_in_box
-
-    def refuse(self, state, *system):
-        if self.reducer is None and state.report.iterations:
-            raise SolveError("too spiky")
-        return solve(self, state, *system)
-
-    monkeypatch.setattr(Contractor, "_solve_in_box", refuse)
-    found = cross_check(ring.points)
-    assert found.mesh_skeleton.report.stop_reason == f"solve 2 {REFUSED}: too spiky"
-    # of this ring the fit mends what one solve leaves: it may agree in part, but not surely
-    assert found.verdict in ("cannot tell", "agrees in part")
-    if found.verdict == "cannot tell":
-        assert f"the mesh's own contraction failed: {found.mesh_skeleton.report.stop_reason}" in found.reasons
-
-
 # -------------------------------------------------------------------------------------------------------- the numbers
 
 
-@pytest.mark.parametrize("tilt", [0, 0.4])
-def test_flat_rows_have_one_direction(tilt):
-    x, y = (grid.ravel() + 0.0 for grid in np.meshgrid(np.arange(12), np.arange(12)))
-    points = np.column_stack([x, y, tilt * x])
+def test_flat_rows_have_one_direction(grid):
+    x, y = (each.ravel() + 0.0 for each in np.mgrid[:12, :12])
+    points = np.column_stack([x, y, 0.4 * x])
     state = RingBuilder(denoise=0)(points)
-    order = np.lexsort(state.points[state.point_of_survivor].T[:2])  # rows of the grid
-    corner = (np.arange(11)[:, None] * 12 + np.arange(11)).ravel()
-    faces = order[np.concatenate([corner[:, None] + [0, 1, 13], corner[:, None] + [0, 13, 12]])]
+    faces = np.lexsort(state.points[state.point_of_survivor].T[1::-1])[grid(12, 12, 0, 0)]
     (angle, length, _), found = compare_rows(state, state.cloud, faces)
     compared = np.isfinite(angle)
     assert compared.sum() == found.compared > 50
@@ -161,19 +132,19 @@ def test_the_unsupported_end_of_either_skeleton_counts(make):
         assert found.hausdorff95 == pytest.approx(1.85 / 3, rel=0.01)
 
 
-def test_it_is_the_skeleton_of_skeletonize(ring, check):
-    np.testing.assert_array_equal(check.skeleton.vertices, skeletonize(ring.points).vertices)
-
-
 def test_numbers_of_points_fit_the_numbers_of_all(ring, check):
+    np.testing.assert_array_equal(check.skeleton.vertices, skeletonize(ring.points).vertices)
     np.testing.assert_array_equal(check.points, ring.points)
     compared = np.isfinite(check.angle)
     assert check.rows.compared == compared.sum()
     assert check.rows.covered == compared.sum() / check.rows.closed
     assert check.rows.same_rings == (check.ring_share[compared] == 1).mean()
-    np.testing.assert_array_equal(check.angle > 1e-3, compared & (check.ring_share < 1) & (check.angle > 1e-3))
+    assert (check.ring_share[check.angle > 1e-3] < 1).all()
     assert (check.doubtful == (~compared | (check.angle > 30))).all()
-    assert check.to_dict()["points"]["not_compared"] == (~compared).sum()
+    told = json.loads(json.dumps(check.to_dict(), allow_nan=False))
+    assert (told["verdict"], told["skeletons"]["loops"], told["rows"]["one_to_one"]) == ("agrees", [1, 1], True)
+    assert told["points"]["not_compared"] == (~compared).sum()
+    assert "2 igl.cotmatrix" in told["convention"]
 
 
 def test_units_place_turn_and_order_do_not_matter(ring, check):
@@ -190,23 +161,16 @@ def test_units_place_turn_and_order_do_not_matter(ring, check):
     assert scaled.skeletons.distance_in_radii == pytest.approx(check.skeletons.distance_in_radii, rel=1e-6)
 
 
-def test_json(check):
-    told = json.loads(json.dumps(check.to_dict(), allow_nan=False))
-    assert (told["verdict"], told["skeletons"]["loops"], told["rows"]["one_to_one"]) == ("agrees", [1, 1], True)
-    assert "2 igl.cotmatrix" in told["convention"]
-
-
-def test_every_pipeline_and_legacy_and_tensor_clouds(ring, check):
-    for name in ("wen2024", "cao2010"):
-        found = cross_check(ring.points, pipeline=name)
-        np.testing.assert_array_equal(found.skeleton.vertices, skeletonize(ring.points, name).vertices)
-        mesh, cloud = found.mesh_skeleton.report.stages, found.skeleton.report.stages
-        assert mesh[0].startswith("Contractor(reducer=None, ")
-        assert mesh[1:] == cloud[-2:]
-    legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(ring.points))
-    tensor = o3d.t.geometry.PointCloud(ring.points.astype(np.float32))
-    assert cross_check(legacy).rows == check.rows
-    assert cross_check(tensor).verdict == check.verdict
+def test_another_pipeline(ring):
+    pipeline = (
+        RingBuilder() | Contractor(reducer=LPRReducer()) | LPRReducer() | Connector() | Refiner(collapse="degree")
+    )
+    found = cross_check(ring.points, pipeline=pipeline)
+    np.testing.assert_array_equal(found.skeleton.vertices, skeletonize(ring.points, pipeline).vertices)
+    mesh, cloud = found.mesh_skeleton.report.stages, found.skeleton.report.stages
+    assert mesh[0].startswith("Contractor(reducer=None, ")  # without reductions
+    assert mesh[1] == cloud[-2]
+    assert mesh[2].startswith("Refiner(collapse='degree'")
 
 
 # ---------------------------------------------------------------------------------------------------------- the meshes
@@ -221,25 +185,19 @@ def surface(check):
 
 def test_a_mesh_of_the_clouds_own_points(ring, check, surface):
     mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(surface[0]), o3d.utility.Vector3iVector(surface[1]))
-    tensor = o3d.t.geometry.TriangleMesh(o3d.core.Tensor(surface[0].astype(np.float32)), o3d.core.Tensor(surface[1]))
-    for given in (surface, mesh, tensor):
+    for given in (surface, mesh):
         found = cross_check(ring.points, given)
         assert found.surface == "given"
         assert found.rows == check.rows
         assert found.skeletons.distance == pytest.approx(check.skeletons.distance, rel=1e-3)
 
 
-def test_a_mesh_of_other_points(ring):
+def test_a_mesh_of_other_points(ring, grid):
     # a fine regular mesh of the same torus: curvature normals are compared, interpolated
-    u, v = (np.arange(m) * 2 * np.pi / m for m in (160, 40))
     radius, width = np.linalg.norm(ring.nodes[0]), ring.radii[0]
-    u, v = np.meshgrid(u, v, indexing="ij")
-    vertices = np.stack(
-        [(radius + width * np.cos(v)) * np.cos(u), (radius + width * np.cos(v)) * np.sin(u), width * np.sin(v)], -1
-    ).reshape(-1, 3)
-    i, j = np.meshgrid(np.arange(160), np.arange(40), indexing="ij")
-    a, b, c, d = ((i + p) % 160 * 40 + (j + q) % 40 for p, q in ((0, 0), (1, 0), (1, 1), (0, 1)))
-    faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
+    u, v = (each.ravel() * 2 * np.pi / m for each, m in zip(np.mgrid[:160, :40], (160, 40), strict=True))
+    out = radius + width * np.cos(v)
+    vertices, faces = np.stack([out * np.cos(u), out * np.sin(u), width * np.sin(v)], axis=1), grid(160, 40, 1, 1)
     found = cross_check(ring.points, (vertices, faces))
     assert not found.rows.one_to_one
     assert found.rows.same_rings is found.rows.common_triangles is None
@@ -291,17 +249,6 @@ def test_a_mesh_that_lies_elsewhere(ring):
         cross_check(ring.points, (np.eye(3) + 100, [[0, 1, 2]]))
 
 
-def test_a_mesh_is_read_once(surface, tmp_path, monkeypatch):
-    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(surface[0]), o3d.utility.Vector3iVector(surface[1]))
-    read = o3d.io.read_triangle_mesh
-    for ending in ("ply", "off"):
-        o3d.io.write_triangle_mesh(str(tmp_path / f"m.{ending}"), mesh)
-        once = iter([read])
-        for name in ("read_triangle_mesh", "read_point_cloud"):
-            monkeypatch.setattr(o3d.io, name, lambda *words, once=once, **_: next(once)(*words))
-        assert len(read_mesh(tmp_path / f"m.{ending}").triangles) == len(surface[1])
-
-
 # ---------------------------------------------------------------------------------------------------------- the clouds
 
 
@@ -335,13 +282,13 @@ def test_points_that_are_not_finite_and_outliers(ring, check):
 
 @SPIKY
 def test_where_poisson_fails_the_balls_surface_is_better_than_none():
-    ring = samples.torus(800).points
+    ring = samples.torus(500).points
     far = np.vstack([ring, ring + [300, 0, 0]])  # cells as wide as a ring
     found = cross_check(far)
     assert found.surface == "ball_pivoting"
-    assert found.rows.compared > 300
+    assert found.rows.compared > 200
     assert found.skeletons.components == (2, 2)
-    with pytest.raises(InvalidCloudError, match="1600 points by poisson"):
+    with pytest.raises(InvalidCloudError, match="1000 points by poisson"):
         cross_check(far, "poisson")
 
 
@@ -365,17 +312,13 @@ def test_clouds_without_a_surface():
             cross_check(wrong)
 
 
-@pytest.mark.parametrize("pipeline", [Contractor() | Connector(), RingBuilder() | Contractor(), "none", None])
+@pytest.mark.parametrize(
+    "pipeline",
+    [Contractor() | Connector(), RingBuilder() | Contractor(), RingBuilder() | Connector() | Refiner(), "none", None],
+)
 def test_useless_pipelines(ring, pipeline):
-    with pytest.raises(InvalidParameterError):
+    with pytest.raises(InvalidParameterError, match=r"pipeline|lead from a cloud"):
         cross_check(ring.points, pipeline=pipeline)
-
-
-def test_the_input_is_not_changed(ring):
-    points = ring.points.copy()
-    points.flags.writeable = False
-    cross_check(points)
-    np.testing.assert_array_equal(points, ring.points)
 
 
 def test_a_real_scan(shared_dir):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, cKDTree
 
-from glsk_o3d import Connector, Contractor, LPRReducer, Pipeline, Refiner, RingBuilder, pipelines
+from glsk_o3d import Contractor, RingBuilder, pipelines
 from glsk_o3d.crosscheck.mesh import (
     INVENTED_DISTANCE,
     ball_pivoting,
@@ -19,13 +19,11 @@ from glsk_o3d.crosscheck.mesh import (
     poisson,
     ring_areas,
     spacing,
-    without_bare,
 )
-from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.numerics.cotangent import WEIGHT_CAP, cotangent_laplacian
 from glsk_o3d.numerics.mesh_rings import common_share, umbrellas
 from glsk_o3d.numerics.rings import Rings
-from glsk_o3d.samples import sheet, sphere, torus, tube
+from glsk_o3d.samples import sheet, torus, tube
 
 
 def convex_rings(points, faces):
@@ -44,36 +42,22 @@ def convex_rings(points, faces):
     return Rings(np.cumsum([0, *map(len, rows)]), np.concatenate(rows), np.ones(len(rows), bool))
 
 
-def cloud_and_mesh(points, **parameters):
-    """The state, and a ball-pivoting mesh, both in the user's units; the exact copies of points that rows mean."""
+def meshed(points, by=ball_pivoting, **parameters):
+    """The state, the vertices of a mesh of its cloud in the frame, and the faces."""
     state = RingBuilder(thin_to="all", **parameters)(points)
-    _, faces = ball_pivoting(state)
-    return state, state.frame.out_of(state.cloud), faces
+    return state, *by(state)
 
 
 # -------------------------------------------------------------------------------------------------- reconstruction
 
 
-def reconstructed(by, points):
-    state = RingBuilder(thin_to="all")(points)
-    return state, *by(state)
-
-
-def euler_characteristic(n, faces):
-    edges = np.unique(np.sort(np.concatenate([faces[:, p] for p in ([0, 1], [1, 2], [2, 0])]), axis=1), axis=0)
-    return n - len(edges) + len(faces)
-
-
-def test_ball_pivoting_has_the_points_for_vertices(even_ball):
+def test_ball_pivoting_has_the_points_for_vertices_and_leaves_open_ends_open(even_ball):
     points, _ = even_ball(1000)
-    state, vertices, faces = reconstructed(ball_pivoting, points)
+    state, vertices, faces = meshed(points)
     assert vertices is state.cloud
     assert umbrellas(1000, faces).all()
-    assert euler_characteristic(1000, faces) == 2
-
-
-def test_ball_pivoting_leaves_the_ends_of_a_pipe_open():
-    state, vertices, faces = reconstructed(ball_pivoting, tube(3000, capped=False).points)
+    assert igl.euler_characteristic(faces) == 2
+    state, vertices, faces = meshed(tube(3000, capped=False).points)
     border = ~umbrellas(len(vertices), faces)
     ends = np.abs(state.frame.out_of(state.cloud)[:, 0]) > 0.48
     assert border[ends].mean() > 5 * border[~ends].mean()
@@ -81,8 +65,7 @@ def test_ball_pivoting_leaves_the_ends_of_a_pipe_open():
 
 @pytest.mark.parametrize("shape", [torus, sheet])
 def test_poisson_lies_on_the_cloud_and_invents_nothing(shape):
-    sample = shape(4000)
-    state, vertices, faces = reconstructed(poisson, sample.points)
+    state, vertices, faces = meshed(shape(3000).points, poisson)
     np.testing.assert_array_equal(np.unique(faces), np.arange(len(vertices)))
     distance = cKDTree(state.cloud).query(vertices)[0]
     step = spacing(state.cloud)
@@ -91,21 +74,15 @@ def test_poisson_lies_on_the_cloud_and_invents_nothing(shape):
     whole = umbrellas(len(vertices), faces).mean()
     assert whole == 1 if shape is torus else 0.8 < whole < 0.99  # the sheet stays open
     if shape is torus:
-        assert euler_characteristic(len(vertices), faces) == 0
+        assert igl.euler_characteristic(faces) == 0
 
 
 def test_the_same_twice():
-    points = torus(1000, noise=0.01).points
+    points = torus(600, noise=0.01).points
     for by in (ball_pivoting, poisson):
-        first, second = (reconstructed(by, points) for _ in range(2))
+        first, second = (meshed(points, by) for _ in range(2))
         np.testing.assert_array_equal(first[1], second[1])
         np.testing.assert_array_equal(first[2], second[2])
-
-
-def test_bare_vertices_go():
-    vertices, faces = without_bare(np.arange(15.0).reshape(5, 3), np.array([[4, 1, 2]]))
-    np.testing.assert_array_equal(vertices, [[3, 4, 5], [6, 7, 8], [12, 13, 14]])
-    assert faces.tolist() == [[2, 0, 1]]
 
 
 # ------------------------------------------------------------------------------------------------- sign and factor
@@ -133,10 +110,9 @@ def test_the_sign(even_ball):
     assert (np.einsum("ij,ij->i", laplacian @ points, points) < 0).all()  # inward
 
 
-@pytest.mark.parametrize("noise", [0, 0.02])
-def test_it_is_the_gradient_of_the_area(noise):
+def test_it_is_the_gradient_of_the_area():
     # x . L x = -4 area of any mesh, torn or not manifold
-    _, points, faces = cloud_and_mesh(torus(1500, noise=noise).points, denoise=0)
+    _, points, faces = meshed(torus(1500, noise=0.02).points, denoise=0)
     area = igl.doublearea(points, faces).sum() / 2
     found = (points * (mesh_laplacian(points, faces, cap=1e300) @ points)).sum()
     assert found == pytest.approx(-4 * area, rel=1e-9)
@@ -179,7 +155,7 @@ def test_areas_of_rings_are_those_of_the_mesh(even_ball):
 def test_a_sphere_that_is_sampled_evenly_has_two_over_its_radius(even_ball):
     # both parts of the error fall as the square of the spacing, a quarter for four times as many points
     errors = []
-    for n in (500, 2000, 8000):
+    for n in (500, 2000):
         points, faces = even_ball(n)
         state = RingBuilder(thin_to="all")(points)
         assert state.rings.closed.all()
@@ -210,32 +186,6 @@ def test_a_cylinder_that_is_sampled_evenly_has_one_over_its_radius():
     assert angle.max() < 1e-3
 
 
-@pytest.mark.parametrize(("shape", "radius"), [(sphere, 0.5), (tube, 0.1)])
-def test_on_random_samples_directions_converge_and_lengths_do_not(shape, radius):
-    # Both ours and libigl's: the pointwise cotangent Laplacian is consistent in the mean alone.
-    angles, lengths = [], []
-    for n in (1000, 4000, 16000):
-        options = {} if shape is sphere else {"capped": False}
-        state, cloud, faces = cloud_and_mesh(shape(n, **options).points)
-        exact = -2 * cloud / radius**2 if shape is sphere else -cloud * [0, 1, 1] / radius**2
-        ours = curvature_normals(cotangent_laplacian(cloud, state.rings), ring_areas(cloud, state.rings), cloud)
-        areas = mesh_areas(cloud, faces)
-        mesh = curvature_normals(mesh_laplacian(cloud, faces), areas, cloud)
-        whole = umbrellas(len(cloud), faces)
-        found = off(ours, exact, state.rings.closed), off(mesh, exact, whole)
-        lengths.append([np.median(length) for length, _ in found])
-        angles.append([np.median(angle) for _, angle in found])
-        if shape is sphere:  # closed and inscribed: exact in the mean, weighted by area
-            mean = (areas * np.einsum("ij,ij->i", mesh, exact)).sum() / (areas * (exact**2).sum(axis=1)).sum()
-            assert mean == pytest.approx(1, abs=1e-9)
-    angles, lengths = np.array(angles), np.array(lengths)
-    assert (angles[1:] < 0.65 * angles[:-1]).all()  # halved
-    assert (angles[-1] < 0.6).all()
-    assert (lengths[-1] > 0.7 * lengths[-2]).all()
-    assert (lengths[-1] > 0.05).all()
-    assert (lengths[-1] < 0.2).all()
-
-
 # ----------------------------------------------------------------------------------------------------- contraction
 
 
@@ -258,7 +208,7 @@ def test_it_is_the_contractor_where_rings_and_one_rings_are_the_same():
 
 
 def test_points_without_a_triangle_go_to_the_nearest_with_one():
-    state, _, faces = cloud_and_mesh(tube(1500).points)
+    state, _, faces = meshed(tube(1500).points)
     gone = np.flatnonzero(state.cloud[:, 0] > 0.3)
     faces = faces[~np.isin(faces, gone).any(axis=1)]
     begun, local = mesh_state(state, state.cloud, faces)
@@ -272,19 +222,9 @@ def test_points_without_a_triangle_go_to_the_nearest_with_one():
 
 
 def test_the_skeleton_of_a_torus_is_its_axis():
-    state, _, faces = cloud_and_mesh(torus(2000).points)
+    state, _, faces = meshed(torus(2000).points)
     skeleton = mesh_skeleton(state, state.cloud, faces, pipelines.default())
     assert (skeleton.n_components, skeleton.n_loops) == (1, 1)
     ring = torus(10)
     assert np.abs(np.linalg.norm(skeleton.vertices[:, :2], axis=1) - np.linalg.norm(ring.nodes[0])).max() < 0.01
     assert np.abs(skeleton.vertices[:, 2]).max() < 0.01
-
-
-def test_a_reduction_of_its_own_is_left_out_and_a_contractor_is_needed():
-    state, _, faces = cloud_and_mesh(torus(800).points)
-    stages = RingBuilder(), Contractor(reducer=LPRReducer()), LPRReducer(), Connector(), Refiner()
-    skeleton = mesh_skeleton(state, state.cloud, faces, Pipeline(*stages))
-    assert [stage.partition("(")[0] for stage in skeleton.report.stages] == ["Contractor", "Connector", "Refiner"]
-    assert skeleton.report.stages[0].startswith("Contractor(reducer=None, ")
-    with pytest.raises(InvalidParameterError, match="no Contractor"):
-        mesh_skeleton(state, state.cloud, faces, RingBuilder() | Connector())

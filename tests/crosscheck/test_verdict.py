@@ -95,15 +95,7 @@ def test_a_mesh_that_does_not_describe_the_cloud_says_nothing_against_it(changed
     assert judged(rows(covered=0.6), differ)[0] == "cannot tell"
 
 
-def grid(n, m, close_n, close_m, shift=0):
-    """Faces of a grid of n by m vertices, closed or not."""
-    i, j = (a.ravel() for a in np.mgrid[: n - 1 + close_n, : m - 1 + close_m])
-    at = lambda a, b: shift + (a % n) * m + b % m  # noqa: E731
-    corners = at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)
-    return np.concatenate([np.column_stack([corners[k] for k in which]) for which in ((0, 1, 2), (0, 2, 3))])
-
-
-def test_genus_of_meshes():
+def test_genus_of_meshes(grid):
     ring, tube, sheet = grid(8, 9, 1, 1), grid(8, 9, 1, 0), grid(8, 9, 0, 0)
     assert [agreement._genus(faces) for faces in (ring, tube, sheet)] == [1, 0, 0]
     turned = ring.copy()

@@ -37,11 +37,11 @@ def test_written_files_look_like_ordinary_ones(tmp_path):
     assert long.exists()
 
 
-def test_folders_and_devices_are_not_replaced(tree, tmp_path):
-    (tmp_path / "s.ply").mkdir()
-    for path in (tmp_path / "s.ply", os.devnull):
-        with pytest.raises(OSError, match="not a file"):
-            tree.save(path, format="ply")
+@pytest.mark.parametrize("name", ["folder.ply", os.devnull])
+def test_folders_and_devices_are_not_replaced(tmp_path, name):
+    (tmp_path / "folder.ply").mkdir()
+    with pytest.raises(OSError, match="not a file"):
+        write_json(tmp_path / name, {})
 
 
 def test_until_a_file_is_complete_the_old_one_is_there(tmp_path):

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from glsk_o3d.errors import InvalidParameterError, did_you_mean
 from glsk_o3d.numerics.vectors import norm
-from glsk_o3d.samples.sample import check
+from glsk_o3d.samples.capsules import check
 
 from .coverage import coverage
 from .randomness import generator

@@ -17,7 +17,7 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
-from ...interop.verbosity import following_open3d
+from ...interop.packages import following_open3d
 from ..paths import breaks_off
 from ..scan import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, named_attributes, unit_colors
 

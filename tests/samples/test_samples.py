@@ -1,83 +1,65 @@
 """Sample shapes against closed forms and brute force."""
 
+import networkx as nx
 import numpy as np
 import pytest
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from scipy.stats import chisquare, kstest
 
 from glsk_o3d import samples
 from glsk_o3d.errors import InvalidParameterError
-from glsk_o3d.samples import SAMPLES, sample_object, signed_distance
+from glsk_o3d.samples import SAMPLES, sample_object, signed_distance, tree
 from glsk_o3d.samples.capsules import union_sample, visible
 
 UNIONS = ("sauropod", "tube", "y_junction", "tree")
 
 
-def components_loops_leaves(sample):
-    n = len(sample.nodes)
-    graph = coo_matrix((np.ones(len(sample.edges)), tuple(sample.edges.T)), shape=(n, n))
-    components = connected_components(graph, directed=False)[0]
-    leaves = np.count_nonzero(np.bincount(sample.edges.ravel(), minlength=n) == 1)
-    return components, len(sample.edges) - n + components, leaves
+TOPOLOGY = {  # components, loops and leaves of the axis
+    "sauropod": (1, 1, 6),
+    "tube": (1, 0, 2),
+    "torus": (1, 1, 0),
+    "helix": (1, 0, 2),
+    "y_junction": (1, 0, 3),
+    "two_rings": (2, 2, 0),
+    "tree": (1, 0, 17),
+    "sphere": (1, 0, 0),
+    "sheet": (0, 0, 0),
+}
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-class TestEverySample:
-    @pytest.mark.parametrize("n", [1, 2, 7, 1000])
-    def test_has_exactly_n_finite_points(self, name, n):
+def test_every_sample(name):
+    for n in (1, 2, 7, 1000):
         sample = SAMPLES[name](n=n, noise=0.01)
-        assert sample.points.shape == (n, 3)
-        assert sample.points.dtype == np.float64
+        assert (sample.name, sample.points.shape, sample.points.dtype) == (name, (n, 3), np.float64)
         assert np.isfinite(sample.points).all()
+    assert sample.nodes.shape == (len(sample.radii), 3)
+    assert (sample.radii > 0).all()
+    assert sample.edges.dtype == np.int64
+    graph = nx.Graph(sample.edges.tolist())
+    graph.add_nodes_from(range(len(sample.nodes)))
+    components = nx.number_connected_components(graph)
+    leaves = sum(degree == 1 for _, degree in graph.degree)
+    assert (components, len(sample.edges) - len(sample.nodes) + components, leaves) == TOPOLOGY[name]
+    assert (graph.number_of_nodes(), graph.number_of_edges()) == (len(sample.nodes), len(sample.edges))
 
-    def test_axis_is_a_sound_graph(self, name):
-        sample = SAMPLES[name](n=10)
-        assert sample.name == name
-        assert sample.nodes.shape == (len(sample.radii), 3)
-        assert sample.edges.shape[1] == 2
-        assert sample.edges.dtype == np.int64
-        assert (sample.edges[:, 0] != sample.edges[:, 1]).all()
-        assert sample.edges.size == 0 or sample.edges.max() < len(sample.nodes)
-        assert (sample.radii > 0).all()
 
-    def test_depends_on_the_seed_alone(self, name):
-        first, again, other = (SAMPLES[name](n=300, noise=0.01, seed=seed).points for seed in (3, 3, 4))
-        np.testing.assert_array_equal(first, again)
-        assert not np.isclose(first, other).all(axis=1).any()
+@pytest.mark.parametrize("name", SAMPLES)
+def test_seed_size_and_noise_of_every_sample(name):
+    clean, again, other = (SAMPLES[name](n=2000, seed=seed).points for seed in (3, 3, 4))
+    np.testing.assert_array_equal(clean, again)
+    assert not np.isclose(clean, other).all(axis=1).any()
+    size = np.ptp(clean, axis=0).max()
+    assert 0.5 < (size / 4 if name == "tree" else size) < 2  # a tree is in metres
+    noise = SAMPLES[name](n=2000, noise=0.01, seed=3).points - clean
+    np.testing.assert_allclose(noise.std(axis=0), 0.01 * np.linalg.norm(np.ptp(clean, axis=0)), rtol=0.06)
 
-    def test_is_about_one_unit_large(self, name):
-        size = np.ptp(SAMPLES[name](n=2000).points, axis=0).max()
-        assert 0.5 < (size / 4 if name == "tree" else size) < 2  # a tree is in metres
 
-    def test_noise_has_the_size_asked_for(self, name):
-        clean, noisy = (SAMPLES[name](n=4000, noise=noise, seed=1).points for noise in (0, 0.01))
-        expected = 0.01 * np.linalg.norm(np.ptp(clean, axis=0))
-        np.testing.assert_allclose((noisy - clean).std(axis=0), expected, rtol=0.05)
-
-    @pytest.mark.parametrize("wrong", [dict(n=0), dict(n=2.5), dict(n=True), dict(noise=-1), dict(noise=np.nan)])
-    def test_refuses_bad_counts_and_noise(self, name, wrong):
+@pytest.mark.parametrize("wrong", [dict(n=0), dict(n=2.5), dict(n=True), dict(noise=-1), dict(noise=np.nan)])
+def test_bad_counts_and_noise_are_refused(wrong):
+    for make in SAMPLES.values():
         with pytest.raises(InvalidParameterError):
-            SAMPLES[name](**wrong)
-
-
-@pytest.mark.parametrize(
-    ("name", "components", "loops", "leaves"),
-    [
-        ("sauropod", 1, 1, 6),
-        ("tube", 1, 0, 2),
-        ("torus", 1, 1, 0),
-        ("helix", 1, 0, 2),
-        ("y_junction", 1, 0, 3),
-        ("two_rings", 2, 2, 0),
-        ("tree", 1, 0, 17),
-        ("sphere", 1, 0, 0),
-        ("sheet", 0, 0, 0),
-    ],
-)
-def test_topology_of_the_axis(name, components, loops, leaves):
-    assert components_loops_leaves(SAMPLES[name](n=1)) == (components, loops, leaves)
+            make(**wrong)
 
 
 # ---- the points lie where the formula says
@@ -85,9 +67,8 @@ def test_topology_of_the_axis(name, components, loops, leaves):
 
 @pytest.mark.parametrize("name", UNIONS)
 def test_points_of_unions_lie_on_the_surface(name):
-    sample = SAMPLES[name](n=5000)
-    distance = signed_distance(sample.points, sample.nodes, sample.edges, sample.radii)
-    np.testing.assert_allclose(distance, 0, atol=2e-9)
+    sample = SAMPLES[name](n=1000)
+    np.testing.assert_allclose(signed_distance(sample.points, *axis_of(sample)), 0, atol=2e-9)
 
 
 def test_torus_lies_on_the_torus():
@@ -121,7 +102,7 @@ def test_helix_keeps_its_distance_from_its_axis():
     assert cKDTree(axis).query(fine.nodes)[0].max() < 1e-3 * 0.3
 
 
-@pytest.mark.parametrize("bend", [0, 1, 90, 350])
+@pytest.mark.parametrize("bend", [0, 90, 350])
 def test_sheet_is_bent_but_not_stretched(bend):
     sample = samples.sheet(n=4000, length=2, width=1, bend=bend)
     x, y, z = sample.points.T
@@ -193,11 +174,11 @@ def test_union_is_uniform_by_area_where_its_parts_overlap():
 def test_signed_distance_of_a_tapered_capsule_against_brute_force():
     rng = np.random.default_rng(0)
     nodes, radii, edges = np.array([[0.0, 0, 0], [0.6, 0.5, -0.2]]), np.array([0.3, 0.1]), np.array([[0, 1]])
-    points = rng.uniform(-1, 1.5, (400, 3))
-    share = np.linspace(0, 1, 20001)[:, None]
+    points = rng.uniform(-1, 1.5, (200, 3))
+    share = np.linspace(0, 1, 4001)[:, None]
     centres, sizes = nodes[0] + share * (nodes[1] - nodes[0]), radii[0] + share[:, 0] * (radii[1] - radii[0])
     brute = np.array([(np.linalg.norm(centres - point, axis=1) - sizes).min() for point in points])
-    np.testing.assert_allclose(signed_distance(points, nodes, edges, radii), brute, atol=1e-7)
+    np.testing.assert_allclose(signed_distance(points, nodes, edges, radii), brute, atol=1e-6)
 
 
 def test_signed_distance_of_swallowed_and_lonely_balls():
@@ -205,6 +186,10 @@ def test_signed_distance_of_swallowed_and_lonely_balls():
     points = np.array([[2.0, 0, 0], [5, 2, 0], [0, 0, 0]])
     for edges in ([[0, 1]], [[1, 0]]):
         np.testing.assert_allclose(signed_distance(points, nodes, np.array(edges), radii), [1, 1.5, -1])
+
+
+def axis_of(sample):
+    return sample.nodes, sample.edges, sample.radii
 
 
 def march(points, camera, sample):
@@ -218,52 +203,40 @@ def march(points, camera, sample):
     travelled, step = np.zeros(len(points)), np.zeros(len(points))
     for _ in range(120):
         here = camera + travelled[:, None] * ray
-        step = np.maximum(signed_distance(here, sample.nodes, sample.edges, sample.radii), 0)
+        step = np.maximum(signed_distance(here, *axis_of(sample)), 0)
         travelled += step
     arrived = travelled > reach - 1e-3
     return arrived, ~arrived & (step < 1e-6)
 
 
 def test_visibility_against_sphere_tracing():
-    whole = samples.sauropod(n=800, cameras=None)
-    for camera in np.array([*samples.TWO_CAMERAS, (0, 0, 3), (2, 0.1, 0.4), (0.01, -2, 0.02)]):
-        seen = visible(whole.points, camera, whole.nodes, whole.edges, whole.radii)
+    whole = samples.sauropod(n=300, cameras=None)
+    for camera in np.array([samples.TWO_CAMERAS[0], (2, 0.1, 0.4), (0.01, -2, 0.02)]):
+        seen = visible(whole.points, camera, *axis_of(whole))
         arrived, stopped = march(whole.points, camera, whole)
         assert (arrived | stopped).mean() > 0.95
-        assert seen.sum() > 80
+        assert seen.sum() > 30
         assert seen[arrived].mean() > 0.99  # a grazing ray may arrive within the tolerance
         assert not seen[stopped].any()
 
 
-def test_scan_misses_what_neither_camera_sees():
-    whole, scan = samples.sauropod(n=20000, cameras=None), samples.sauropod(n=20000)
-    seen = [visible(whole.points, np.array(c), whole.nodes, whole.edges, whole.radii) for c in samples.TWO_CAMERAS]
-    hidden = ~np.any(seen, axis=0)
+def test_the_animal_and_its_scan():
+    whole, scan = samples.sauropod(n=8000, cameras=None), samples.sauropod(n=8000)
+    hidden = ~np.any([visible(whole.points, np.array(c), *axis_of(whole)) for c in samples.TWO_CAMERAS], axis=0)
     assert 0.1 < hidden.mean() < 0.3
     to_scan = cKDTree(scan.points).query(whole.points)[0]
-    assert np.quantile(to_scan[~hidden], 0.999) < 0.03
+    assert np.quantile(to_scan[~hidden], 0.999) < 0.05
     assert to_scan[hidden].max() > 0.05
-    below = (np.abs(whole.points[:, 0]) < 0.1) & (np.abs(whole.points[:, 1]) < 0.02) & (whole.points[:, 2] < 0.3)
-    assert below.sum() > 20
+    x, y, z = whole.points.T
+    below = (np.abs(x) < 0.1) & (np.abs(y) < 0.02) & (z < 0.3)
+    assert below.sum() > 10
     assert hidden[below].all()
-
-
-def test_handle_can_be_gripped_and_every_part_is_thick_enough():
-    sample = sample_object()
-    assert sample.radii.min() >= 0.028
-    area_per_point = np.pi * cKDTree(sample.points).query(sample.points, 9)[0][:, -1] ** 2 / 8.5
-    assert 2 * sample.radii.min() > 4 * np.median(np.sqrt(area_per_point))
-    # a ball of four handle radii across goes through the opening
-    middle = np.array([[0.0, 0, 0.6]])
-    assert signed_distance(middle, sample.nodes, sample.edges, sample.radii)[0] > 2 * 0.03
-
-
-def test_stands_on_its_feet_and_is_symmetric_but_for_the_tail():
-    whole = samples.sauropod(n=20000, cameras=None)
-    assert abs(whole.points[:, 2].min()) < 1e-3
-    front = whole.nodes[:, 0] > -0.2
-    mirrored = whole.nodes[front] * [1, -1, 1]
-    assert cKDTree(whole.nodes).query(mirrored)[0].max() < 1e-12
+    assert abs(z.min()) < 2e-3  # it stands on its feet
+    front = whole.nodes[whole.nodes[:, 0] > -0.2]
+    assert cKDTree(whole.nodes).query(front * [1, -1, 1])[0].max() < 1e-12  # symmetric but for the tail
+    assert scan.radii.min() >= 0.028
+    # a ball of four handle radii across goes through the opening of the handle
+    assert signed_distance(np.array([[0.0, 0, 0.6]]), *axis_of(scan))[0] > 2 * 0.03
 
 
 @pytest.mark.parametrize(
@@ -282,6 +255,7 @@ def test_stands_on_its_feet_and_is_symmetric_but_for_the_tail():
         (samples.sphere, dict(radius=np.inf)),
         (samples.sheet, dict(bend=360)),
         (sample_object, dict(name="teapot")),
+        *((tree, dict(forks=forks)) for forks in (-1, 9, 2.0, True)),
     ],
 )
 def test_refuses_impossible_shapes(make, wrong):
@@ -292,3 +266,28 @@ def test_refuses_impossible_shapes(make, wrong):
 def test_sample_object_by_name():
     assert sample_object().name == "sauropod"
     np.testing.assert_array_equal(sample_object(50, 0, 9, "torus").points, samples.torus(50, seed=9).points)
+
+
+# ---- the tree
+
+
+@pytest.mark.parametrize("forks", [0, 1, 3, 5])
+def test_a_tree_forks_in_two_and_tapers_from_its_foot(forks):
+    drawn = tree(64, forks=forks, radius=0.2, length=2.0, seed=forks)
+    ends = np.bincount(drawn.edges.ravel())
+    assert (np.count_nonzero(ends == 1), np.count_nonzero(ends == 3)) == (2**forks + 1, 2**forks - 1)
+    assert ends.max() == (3 if forks else 2)
+    np.testing.assert_array_equal(drawn.nodes[0], 0)
+    assert drawn.nodes[1, 2] > 0.9 * 2.0 / 6  # upright
+    assert (drawn.edges[:, 0] < drawn.edges[:, 1]).all()
+    assert (np.diff(drawn.radii[drawn.edges], axis=1) < 0).all()
+    tips = np.flatnonzero(ends == 1)[1:]
+    np.testing.assert_allclose(drawn.radii[tips], 0.2 / 2 ** ((forks + 1) / 2), rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_tip_of_a_tree_is_inside_another_limb(seed):
+    drawn = tree(64, forks=5, seed=seed)
+    tips = np.flatnonzero(np.bincount(drawn.edges.ravel()) == 1)[1:]
+    apart = cKDTree(drawn.nodes[tips]).query(drawn.nodes[tips], 2)[0][:, 1]
+    assert (apart > 2 * drawn.radii[tips]).all()

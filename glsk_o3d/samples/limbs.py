@@ -1,0 +1,183 @@
+"""Samples with limbs, unions of tapered capsules: a Y, an animal as two cameras see it, and a tree drawn at random."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from ..errors import InvalidParameterError
+from .capsules import Sample, check, directions, union_sample
+
+TWO_CAMERAS = ((1.1, 1.8, 1.4), (-1.2, -1.7, 1.3))
+"""Where the sauropod is scanned from: front left and rear right, a little above it."""
+
+PIECES = 6  # of which a limb is made
+TRIED = 40  # limbs drawn for each that grows
+SHORTER = 0.76  # a limb than the one before
+THINNER = np.sqrt(0.5)  # at its end than at its beginning, so that two that fork have the cross-section of one
+LEAN, BEND, UPWARDS = 0.7, 0.3, 0.2  # how far limbs turn aside at a fork, on their way, and towards the light
+
+
+def y_junction(
+    n: int = 4096,
+    *,
+    length: float = 0.5,
+    radii: tuple[float, float, float] = (0.09, 0.07, 0.07),
+    angle: float = 80.0,
+    noise: float = 0.0,
+    seed: int = 0,
+) -> Sample:
+    """Three straight tubes that meet in the origin: a stem downwards and two arms.
+
+    Parameters
+    ----------
+    n, noise, seed : int, float, int
+        As in `sample_object`.
+    length : float
+        Length of each axis.
+    radii : tuple of three floats
+        At the ends of the stem and of the two arms; all have the stem's radius in the middle.
+    angle : float
+        Between the arms, in degrees.
+
+    Examples
+    --------
+    >>> y_junction(500)
+    Sample('y_junction', 500 points, 4 nodes, 3 edges)
+    """
+    half = np.deg2rad(angle) / 2
+    check(n, noise, length=length, angle=angle, stem=radii[0], left=radii[1], right=radii[2])
+    ends = length * np.array([[0, 0, -1], [-np.sin(half), 0, np.cos(half)], [np.sin(half), 0, np.cos(half)]])
+    nodes = np.concatenate([np.zeros((1, 3)), ends])
+    edges = np.array([[0, 1], [0, 2], [0, 3]])
+    return union_sample("y_junction", nodes, edges, np.array([radii[0], *radii], float), n, noise, seed)
+
+
+def sauropod(
+    n: int = 8192,
+    *,
+    noise: float = 0.0,
+    seed: int = 0,
+    cameras: tuple[tuple[float, float, float], ...] | None = TWO_CAMERAS,
+) -> Sample:
+    """A toy dinosaur with a carrying handle on its back: one loop, six ends, nothing thinner than 0.05.
+
+    Parameters
+    ----------
+    n, noise, seed : int, float, int
+        As in `sample_object`.
+    cameras : tuple of points, optional
+        Only points that one of these sees are kept, as in a scan: the belly and parts of the legs and of the flanks
+        behind them are missing. None keeps the whole surface.
+
+    Examples
+    --------
+    >>> sauropod(500)
+    Sample('sauropod', 500 points, 54 nodes, 54 edges)
+    """
+    nodes, edges, radii = [], [], []  # x forward, y to its left, z up; the feet stand on z = 0
+
+    def grow(places, sizes, start=None, end=None):
+        """A chain of new nodes from `start`, closed onto `end`; returns its last node."""
+        for place, size in zip(places, sizes, strict=True):
+            if start is not None:
+                edges.append((start, len(nodes)))
+            start = len(nodes)
+            nodes.append(place)
+            radii.append(size)
+        if end is not None:
+            edges.append((start, end))
+        return start
+
+    hip = grow([(-0.20, 0, 0.345)], [0.105])
+    rear = grow([(-0.11, 0, 0.362)], [0.122], hip)
+    front = grow([(0, 0, 0.37), (0.11, 0, 0.368)], [0.128, 0.122], rear)
+    chest = grow([(0.20, 0, 0.36)], [0.1], front)
+    neck = _curve([(0.20, 0, 0.36), (0.33, 0, 0.43), (0.395, 0, 0.57), (0.42, 0, 0.72), (0.47, 0, 0.80)], 8)
+    head = grow(neck, np.linspace(0.08, 0.042, len(neck)), chest)
+    grow([(0.525, 0, 0.803), (0.615, 0, 0.765)], [0.056, 0.04], head)
+    near_hip = [(-0.20, 0, 0.345), (-0.36, 0, 0.29), (-0.50, 0.04, 0.195)]
+    tail = _curve([*near_hip, (-0.64, 0.11, 0.17), (-0.75, 0.10, 0.25), (-0.80, 0, 0.35)], 14)
+    grow(tail, np.linspace(0.084, 0.028, len(tail)), hip)
+    for root, x, sway in ((chest, 0.20, 0.025), (hip, -0.21, -0.025)):
+        for side in (1, -1):
+            leg = [(x, 0.105 * side, 0.25), (x + sway, 0.125 * side, 0.14), (x + sway * 0.4, 0.13 * side, 0.046)]
+            grow(leg, [0.062, 0.05, 0.046], root)
+    arch = np.linspace(np.pi, 0, 15)[1:-1]
+    handle = np.stack([0.14 * np.cos(arch), 0 * arch, 0.46 + 0.27 * np.sin(arch) ** 0.8], axis=1)
+    grow(handle, np.full(len(handle), 0.03), rear, end=front)
+    axis = np.array(nodes), np.array(edges, np.int64), np.array(radii)
+    return union_sample("sauropod", *axis, n, noise, seed, cameras)
+
+
+def _curve(through, pieces):
+    """A Catmull-Rom spline as `pieces` points, without its first."""
+    p = np.asarray(through, float)
+    p = np.concatenate([2 * p[:1] - p[1:2], p, 2 * p[-1:] - p[-2:-1]])
+    t = np.linspace(0, len(p) - 3, pieces + 1)[1:]
+    i = np.minimum(t.astype(int), len(p) - 4)
+    u = (t - i)[:, None]
+    a, b, c, d = p[i], p[i + 1], p[i + 2], p[i + 3]
+    return 0.5 * (2 * b + (c - a) * u + (2 * a - 5 * b + 4 * c - d) * u**2 + (3 * b - a - 3 * c + d) * u**3)
+
+
+def tree(
+    n: int = 16384,
+    *,
+    forks: int = 4,
+    length: float = 1.4,
+    radius: float = 0.1,
+    noise: float = 0.0,
+    seed: int = 0,
+    cameras: np.ndarray | None = None,
+) -> Sample:
+    """A tree drawn at random: a trunk that forks in two and forks again, each limb tapering to half its cross-section.
+
+    The first node is the foot, and each edge leads away from it. Tips are ``2 * radius / 2 ** ((forks + 1) / 2)``
+    thick; where points are farther apart than that, as with 5 forks and 4096 points, twigs are no more than rows of
+    points.
+
+    Parameters
+    ----------
+    n, noise, seed : int, float, int
+        As in `sample_object`; the seed is of the shape, too.
+    forks : int
+        From the foot to a tip; the tree has ``2 ** forks`` tips.
+    length, radius : float
+        Of the trunk, which stands upright in the origin; in metres it is a small tree.
+    cameras : (k, 3) array, optional
+        Where the tree was scanned from: points that none of them sees are missing.
+
+    Examples
+    --------
+    >>> tree(500, forks=2)
+    Sample('tree', 500 points, 43 nodes, 42 edges)
+    """
+    check(n, noise, length=length, radius=radius)
+    if isinstance(forks, bool) or not isinstance(forks, int | np.integer) or not 0 <= forks <= 8:
+        raise InvalidParameterError(f"forks = {forks!r}: must be an int from 0 to 8")
+    rng = np.random.default_rng([seed, 1])
+    nodes, edges, radii = np.zeros((1, 3)), [], np.array([radius])
+    tips = [(0, np.array([0.0, 0.0, 1.0]))]
+    for order in range(forks + 1):
+        grown = []
+        for root, heading in [tip for tip in tips for _ in range(2 if order else 1)]:
+            drawn = nodes[root] + length * SHORTER**order * _limbs(heading, LEAN if order else 0.0, rng)
+            clear = [(cdist(limb[1:], nodes) - radii).min() for limb in drawn]
+            limb, first = drawn[np.argmax(clear)], len(nodes)  # the one farthest from all others grows
+            edges += [(root, first), *((at, at + 1) for at in range(first, first + PIECES - 1))]
+            nodes = np.concatenate([nodes, limb])
+            radii = np.append(radii, np.linspace(radii[root], radii[root] * THINNER, PIECES + 1)[1:])
+            grown.append((len(nodes) - 1, limb[-1] - limb[-2]))
+        tips = grown
+    return union_sample("tree", nodes, np.array(edges, np.int64), radii, n, noise, seed, cameras)
+
+
+def _limbs(heading, lean, rng):
+    """Limbs of unit length, (TRIED, PIECES, 3), that leave the origin, lean aside, and bend up a little."""
+    start = directions(TRIED, rng) * lean + heading / np.linalg.norm(heading)
+    bend = directions(TRIED, rng) * BEND + [0, 0, UPWARDS * (lean > 0)]
+    along = np.linspace(0, 1, PIECES)[:, None, None]
+    steps = start + along * bend
+    steps /= np.linalg.norm(steps, axis=2, keepdims=True)
+    return np.cumsum(steps, axis=0).swapaxes(0, 1) / PIECES
