@@ -57,7 +57,7 @@ NAMES = {
         "Branches": ("branch_table", "BranchTable", "segment", "curvature_torsion", "Loop"),
         "Trees": ("tree_measures", "TreeMeasures", "cylinders", "Cylinders"),
         "Grasps": ("grasp_candidates", "GraspCandidates", "Gripper"),
-        "How good is it?": ("assess", "Assessment", "LoopWidth", "thickness"),
+        "How good is it?": ("assess", "Assessment", "thickness"),
         "How far is it from a known axis?": ("compare", "Comparison", "Truth"),
     },
     "editing": {
@@ -97,7 +97,6 @@ MODULES = {
     "glsk_o3d.io.annotation": "Attributes on clouds",
     "glsk_o3d.io.clouds.selection": "Some of the points",
     "glsk_o3d.io.tubes": "Tubes",
-    "glsk_o3d.analysis.skinning": "Skins",
     "glsk_o3d.io.colors": "Colours",
     "glsk_o3d.parameters": "Making filters",
     "glsk_o3d.interop.clouds": "What counts as a cloud",

@@ -6,7 +6,7 @@ import math
 import warnings
 from collections import Counter
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,14 +14,14 @@ from ..errors import InvalidParameterError, SkeletonWarning
 from ..interop.clouds import cloud_points
 from ..numerics.polylines import arc_lengths
 from ..report import outside
-from .grasp_checks import Scene, Ways, free_ways, obstacle_list
-from .grasp_rows import GraspCandidates, listed
-from .gripper import Gripper, checked
+from .grasp_checks import Ways, free_ways, obstacle_list
+from .gripper import GraspCandidates, Gripper, checked, listed
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 UNIT_FACTOR = 10  # derived: the least factor between metric units that people mistake for each other
+OUTSIDE_CONE = "ways in outside the cone"
 
 
 def grasp_candidates(
@@ -131,50 +131,44 @@ def grasp_candidates(
     if 0 < UNIT_FACTOR * size < gripper.max_opening:
         message = f"the gripper opens {gripper.max_opening:.3g} and the object is {size:.3g} long: is it the same unit?"
         warnings.warn(message, SkeletonWarning, stacklevel=outside())
-    places, left_out = _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence)
-    approach = _directions_around(places.axis, above, around)
-    ways = Ways(places.position, places.axis, approach, np.cross(places.axis[:, None], approach))
-    scene = Scene(points, obstacle_list(obstacles), middle, cone)
-    blocked, opening, depth, seen = free_ways(ways, scene, gripper, places.width, clearance)
-    free, ways_left_out = _sorted_out(blocked, len(approach) * around)
-    quality = places.quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
+    place, branch, width, quality, left_out, looked_at = _fitting(
+        skeleton, gripper, clearance, spacing, margin, min_confidence
+    )
+    position, axis = place[:, :3], place[:, 3:6]
+    approach = _directions_around(axis, above, around)
+    ways = Ways(position, axis, approach, np.cross(axis[:, None], approach))
+    wanted = np.ones(approach.shape[:2], bool) if cone is None else approach @ cone[0] >= cone[1]
+    blocked, opening, depth, seen = free_ways(
+        ways, wanted, points, obstacle_list(obstacles), middle, gripper, width, clearance
+    )
+    free, ways_left_out = _sorted_out({OUTSIDE_CONE: ~wanted, **blocked})
+    quality = quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
     order = np.argsort(-quality.round(9), kind="stable")  # equal ones differ in their last digits
     free, quality = free[order], quality[order]
-    place = free // around
+    row = free // around
     candidates = GraspCandidates(
-        position=places.position[place],
+        position=position[row],
         approach=approach.reshape(-1, 3)[free],
         closing=ways.closing.reshape(-1, 3)[free],
         opening=opening.ravel()[free],
         depth=depth.ravel()[free],
-        branch=places.branch[place],
-        confidence=places.confidence[place],
+        branch=branch[row],
+        confidence=place[row, 8],
         quality=quality,
         seen=seen.ravel()[free],
         gripper=gripper,
-        places=places.looked_at,
+        places=looked_at,
         left_out=left_out | ways_left_out,
     )
     if len(candidates) == 0:
         why = listed(candidates.left_out) or "the skeleton has no branch"
-        warnings.warn(f"no grasp at {places.looked_at} places: {why}", SkeletonWarning, stacklevel=outside())
+        warnings.warn(f"no grasp at {looked_at} places: {why}", SkeletonWarning, stacklevel=outside())
     return candidates
 
 
-class _Places(NamedTuple):
-    """Where the part fits between the jaws: arrays with a row for each place, and how many were looked at."""
-
-    position: np.ndarray
-    axis: np.ndarray
-    width: np.ndarray
-    quality: np.ndarray
-    confidence: np.ndarray
-    branch: np.ndarray
-    looked_at: int
-
-
 def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
-    """Places that fit, and how many do not, by reason."""
+    """Places that fit between the jaws, as of `_places_on`, the branch, width and quality of each, how many do not fit,
+    by reason, and how many were looked at."""
     found = [_places_on(skeleton, path, spacing, margin) for path in skeleton.branches]
     place = np.concatenate([np.empty((0, 9)), *found])
     branch = np.repeat(np.arange(len(found)), list(map(len, found))) if found else np.empty(0, int)
@@ -189,17 +183,16 @@ def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
         "too thin": width <= gripper.min_opening,
         "uncertain": ~(confidence >= min_confidence) if min_confidence > 0 else np.zeros(len(width), bool),
     }
-    some, left_out = _sorted_out(reasons, len(place))
+    some, left_out = _sorted_out(reasons)
     short = sum(len(rows) == 0 for rows in found)
     if short:
         left_out["branches without a place between their margins"] = short
-    place, branch, confidence = place[some], branch[some], confidence[some]
-    return _Places(place[:, :3], place[:, 3:6], width[some], quality[some], confidence, branch, len(width)), left_out
+    return place[some], branch[some], width[some], quality[some], left_out, len(place)
 
 
-def _sorted_out(reasons, n):
+def _sorted_out(reasons):
     """The rows for which no reason holds, and how often each is the first that does."""
-    first = np.select([reason.ravel() for reason in reasons.values()], list(reasons), "") if reasons else np.full(n, "")
+    first = np.select([reason.ravel() for reason in reasons.values()], list(reasons), "")
     return np.flatnonzero(first == ""), dict(Counter(first[first != ""].tolist()))
 
 

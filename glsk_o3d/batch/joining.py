@@ -9,8 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from ..analysis.curves import along, pieces
-from ..analysis.graph import simple_edges
+from ..analysis.curves import along, pieces, simple_edges
 from ..numerics.components import component_labels
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton

@@ -25,7 +25,6 @@ def branches(
     same axis and order; the level counts branches from the root.
     """
     from .. import FileFormatError, read_skeleton
-    from ..analysis.branches import cell
 
     files = output or []
     check_outputs([(path, ".csv", "table is CSV") for path in files], skeleton)
@@ -42,7 +41,6 @@ def branches(
         for path in files:
             echo(f"wrote {path}, in the units of {skeleton.name}")
     elif not quiet:
-        columns = table.printed_columns
-        left = [i for i, form in enumerate(columns.values()) if form == "s"]
-        rows = [[cell(row, name) for name in columns] for row in table]
-        print_table(rows, [name.replace("_", " ") for name in columns], left=left)
+        columns = table.printed()
+        names = [name.replace("_", " ") for name in columns]
+        print_table(list(zip(*columns.values(), strict=True)), names, left=[names.index("kind")])

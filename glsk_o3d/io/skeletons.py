@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis.truth import Truth
+from ..analysis.comparison import Truth
 from ..errors import FileFormatError, InvalidParameterError, MissingPackageError, brief
 from ..interop.atomic import write_atomically
 from ..refinement.rooted import RootPlace

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.analysis import assess, compare
-from glsk_o3d.analysis.cross_sections import cross_sections
+from glsk_o3d.analysis.assessment import cross_sections
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError
 from glsk_o3d.samples import helix, sample_object, torus, tube, two_rings, y_junction
 

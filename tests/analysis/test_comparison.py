@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.analysis import Truth, compare
-from glsk_o3d.analysis.matching import matching_f1, merged_junctions
+from glsk_o3d.analysis.comparison import matching_f1, merged_junctions
 from glsk_o3d.pipelines import cao2010, default, wen2024
 from glsk_o3d.samples import helix, sample_object, sphere, torus, tube, two_rings, y_junction
 from glsk_o3d.skeleton import Skeleton

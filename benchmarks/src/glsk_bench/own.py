@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from glsk_o3d.analysis.curves import radii_from_points
-from glsk_o3d.analysis.graph import check_graph, simple_edges
-from glsk_o3d.analysis.truth import Truth
+from glsk_bench.radii import radii_from_points
+from glsk_o3d.analysis.comparison import Truth
+from glsk_o3d.analysis.curves import check_graph, simple_edges
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.interop.clouds import cloud_points
 
