@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 UNIT_FACTOR = 10  # derived: the least factor between metric units that people mistake for each other
-OUTSIDE_CONE = "ways in outside the cone"
 
 
 def grasp_candidates(
@@ -141,7 +140,7 @@ def grasp_candidates(
     blocked, opening, depth, seen = free_ways(
         ways, wanted, points, obstacle_list(obstacles), middle, gripper, width, clearance
     )
-    free, ways_left_out = _sorted_out({OUTSIDE_CONE: ~wanted, **blocked})
+    free, ways_left_out = _sorted_out({"ways in outside the cone": ~wanted, **blocked})
     quality = quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
     order = np.argsort(-quality.round(9), kind="stable")  # equal ones differ in their last digits
     free, quality = free[order], quality[order]

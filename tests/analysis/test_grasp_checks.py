@@ -226,7 +226,7 @@ def test_a_cone():
     free = grasp(rod())
     found = grasp(rod(), cone=((0, 1, -1), 50))
     assert len(found) == 3 * free.places
-    assert found.left_out == {grasps.OUTSIDE_CONE: 5 * free.places}
+    assert found.left_out == {"ways in outside the cone": 5 * free.places}
     assert (found.approach @ [0, 1, -1] / np.sqrt(2) >= np.cos(np.radians(50))).all()
     narrow = grasp(rod(), cone=((0, 0.2, -1), 1e-3), around=3)  # its own direction is looked at
     np.testing.assert_allclose(narrow.approach, np.tile(np.array([0, 0.2, -1]) / np.hypot(0.2, 1), (free.places, 1)))
