@@ -14,8 +14,9 @@ from ..errors import InvalidParameterError, SkeletonWarning
 from ..interop.clouds import cloud_points
 from ..numerics.polylines import arc_lengths
 from ..report import outside
+from .curves import check_number
 from .grasp_checks import Ways, free_ways, obstacle_list
-from .gripper import GraspCandidates, Gripper, checked, listed
+from .gripper import GraspCandidates, Gripper, listed
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -264,12 +265,12 @@ def _check(skeleton, clearance, around, spacing, margin, min_confidence):
         raise InvalidParameterError("grasps need finite vertices and radii: save skeletons as .json, .npz or .ply")
     if min_confidence != 0 and np.isnan(skeleton.confidence).all():
         raise InvalidParameterError("this skeleton has no confidence, perhaps due to its file: give min_confidence=0")
-    checked("clearance", clearance, low=0)
+    check_number("clearance", clearance, low=0)
     if spacing is not None:
-        checked("spacing", spacing, low=0, open_low=True)
-    checked("margin", margin, low=0)
-    checked("min_confidence", min_confidence, low=0, high=1)
-    checked("around", around, type="int", low=1)
+        check_number("spacing", spacing, low=0, open_low=True)
+    check_number("margin", margin, low=0)
+    check_number("min_confidence", min_confidence, low=0, high=1)
+    check_number("around", around, "int", low=1)
 
 
 def _cone(cone):
@@ -277,7 +278,7 @@ def _cone(cone):
     if not isinstance(cone, Iterable) or isinstance(cone, str) or len(tuple(cone)) != 2:
         raise InvalidParameterError(f"cone = {cone!r}: must be a direction and an angle in degrees")
     direction, degrees = cone
-    angle = checked("the angle of cone", degrees, low=0, high=180)
+    angle = check_number("the angle of cone", degrees, low=0, high=180)
     return _direction("the direction of cone", direction), math.cos(math.radians(angle)) - 1e-9  # rounding
 
 

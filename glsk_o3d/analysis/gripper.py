@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InvalidParameterError
 from ..interop.atomic import write_atomically, write_json
 from ..interop.packages import import_open3d, require
-from ..parameters import parameter, problem_with
+from .curves import check_number
 from .rows import Rows
 
 # Published: shapes of the Franka Hand in its maker's description (franka_description, franka_hand.xacro), which opens
@@ -65,14 +65,14 @@ class Gripper:
     reach: Any = None
 
     def __post_init__(self) -> None:
-        opening = checked("max_opening", self.max_opening, low=0, open_low=True)
+        opening = check_number("max_opening", self.max_opening, low=0, open_low=True)
         finger = _sides("finger", self.finger, FINGER_PER_OPENING, opening)
         reach = opening * REACH_PER_OPENING if self.reach is None else self.reach
         object.__setattr__(self, "max_opening", opening)
-        object.__setattr__(self, "min_opening", checked("min_opening", self.min_opening, low=0, high=opening))
+        object.__setattr__(self, "min_opening", check_number("min_opening", self.min_opening, low=0, high=opening))
         object.__setattr__(self, "finger", finger)
         object.__setattr__(self, "palm", _sides("palm", self.palm, PALM_PER_OPENING, opening))
-        object.__setattr__(self, "reach", checked("reach", reach, low=0, high=finger[2]))
+        object.__setattr__(self, "reach", check_number("reach", reach, low=0, high=finger[2]))
 
     def boxes(self, opening: Any, depth: Any) -> tuple[np.ndarray, np.ndarray]:
         """The two fingers and the palm, in the frame of the gripper: x closing, y along the part, z approach.
@@ -233,12 +233,4 @@ def _sides(name: str, given: Any, ratios: tuple[float, ...], opening: float) -> 
     sides = tuple(given) if isinstance(given, Iterable) else ()
     if len(sides) != 3:
         raise InvalidParameterError(f"{name} = {given!r}: must be three lengths")
-    return tuple(checked(f"a side of {name}", side, low=0, open_low=True) for side in sides)
-
-
-def checked(name: str, value: Any, *, type: str = "float", **limits: Any) -> float:
-    """A number within limits, as those of `parameters.parameter`; InvalidParameterError for anything else."""
-    problem = problem_with(value, parameter(None, "", type=type, **limits).metadata)
-    if problem:
-        raise InvalidParameterError(f"{name} = {value!r}: {problem}")
-    return float(value)
+    return tuple(check_number(f"a side of {name}", side, low=0, open_low=True) for side in sides)
