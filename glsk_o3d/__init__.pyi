@@ -42,10 +42,9 @@ from .ring_builder import RingBuilder
 from .skeleton import Skeleton
 from .state import Contraction
 from .stopping import ExplainedScore, RingSizeRatio
-from .viewing.page import save_report
+from .viewing.page import ContractionRecorder, save_report
 from .viewing.plot import plot_skeleton
 from .viewing.preview import save_assessment, save_preview
-from .viewing.recorder import ContractionRecorder
 
 __version__: str
 

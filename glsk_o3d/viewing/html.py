@@ -1,7 +1,9 @@
-"""The parts of the page below the view: numbers, charts and tables, as HTML in which every text is escaped."""
+"""A skeleton and its run as HTML in which every text is escaped: for a notebook, and the parts of the page."""
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import math
 from collections import Counter
@@ -11,14 +13,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..analysis.summary import point_count
+from ..analysis.summary import point_count, structure, summary
+from ..errors import MissingPackageError
+from ..interop.packages import require
 from ..io.colors import shades
 from ..judgements import coordinates
+from .figures import DPI
+from .preview import draw
 
 if TYPE_CHECKING:
     from ..report import Report
     from ..skeleton import Skeleton
 
+NOTEBOOK_SIZE = (1200, 500)
+NOTEBOOK_MARGIN = 16  # in pixels
+NOTEBOOK_COLOURS = 48  # of the picture: greys, red, and what lies between; a third of the bytes of the full range
 MOST_LISTED_ROWS = 12  # of a table
 _SOLVE_COLUMNS = {  # by heading: the field of a record, and its format
     "solve": ("iteration", "d"),
@@ -37,21 +46,58 @@ _EXTRA = ("held", "e", "w<sub>L</sub>", "solver error", "seconds", "tortuosity",
 _WIDTH, _HEIGHT, _LEFT, _TOP, _BOTTOM = 320, 150, 46, 12, 22  # of a chart and of what surrounds its curve
 
 
+def picture(skeleton: Skeleton) -> str:
+    """The preview as a ``data:`` address, for an HTML image."""
+    require("PIL", "pillow")
+    from PIL import Image
+
+    figure, stream = draw(skeleton, NOTEBOOK_SIZE, None, caption=False), io.BytesIO()
+    figure.set_dpi(DPI)
+    figure.canvas.draw()
+    drawn = np.asarray(figure.canvas.buffer_rgba())[..., :3]
+    rows = np.flatnonzero((drawn < 250).any(axis=(1, 2)))  # without the white bands above and below flat drawings
+    drawn = drawn[max(rows[0] - NOTEBOOK_MARGIN, 0) : rows[-1] + NOTEBOOK_MARGIN]
+    image = Image.fromarray(drawn.copy()).quantize(NOTEBOOK_COLOURS, method=Image.Quantize.MEDIANCUT)
+    image.save(stream, format="png", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
+def counts(skeleton: Skeleton) -> dict[str, str]:
+    """The counts of a skeleton and its length, as people read them."""
+    facts = {"points": point_count(skeleton), **structure(skeleton)}
+    return {name: f"{value:.4g}" if name == "length" else f"{value:,}" for name, value in facts.items()}
+
+
+def to_html(skeleton: Skeleton) -> str:
+    """A picture from three sides and the numbers, as a piece of HTML that needs nothing else.
+
+    Without what draws pictures, the numbers and what to install.
+    """
+    style = 'style="text-align:right;padding:2px 10px"'  # all here, since not every notebook has Jupyter's sheet
+    heads = "".join(f"<th {style}>{name}</th>" for name in counts(skeleton))
+    cells = "".join(f"<td {style}>{text}</td>" for text in counts(skeleton).values())
+    image, missing = "", []
+    try:
+        style = 'style="width:100%;background:#fff;border-radius:4px"'
+        image = f'<img alt="{escape(repr(skeleton))}" {style} src="{picture(skeleton)}">'
+    except MissingPackageError as error:
+        missing = [str(error)]
+    style = 'style="margin:4px 0;border-left:3px solid #c77700;padding-left:8px"'
+    messages = dict.fromkeys([*missing, *skeleton.report.warnings])
+    warnings = "".join(f"<p {style}>{escape(text)}</p>" for text in messages)
+    return (
+        '<div style="max-width:1100px;font:13px/1.5 system-ui,sans-serif">'
+        f'{image}<table style="font:inherit;border-collapse:collapse;margin-top:4px"><thead>'
+        f"<tr>{heads}</tr></thead><tbody><tr>{cells}</tr></tbody></table>{warnings}</div>"
+    )
+
+
 def figures(skeleton: Skeleton) -> str:
-    """The run in a few numbers."""
-    told = {"Points": f"{point_count(skeleton):,}"} if point_count(skeleton) else {}
-    if len(skeleton.vertices):
-        told |= {
-            "Vertices": f"{len(skeleton.vertices):,}",
-            "Branches": f"{len(skeleton.branches):,}",
-            "Components": f"{skeleton.n_components:,}",
-            "Loops": f"{skeleton.n_loops:,}",
-            "Leaves": f"{len(skeleton.leaves):,}",
-            "Length": _number(skeleton.length),
-        }
+    """The skeleton and its run in a few numbers."""
+    numbers = counts(skeleton)
     if skeleton.report.seconds:
-        told["Seconds"] = f"{sum(skeleton.report.seconds.values()):.2f}"
-    return "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in told.items())
+        numbers["seconds"] = f"{sum(skeleton.report.seconds.values()):.2f}"
+    return "".join(f"<div><dt>{name.capitalize()}</dt><dd>{value}</dd></div>" for name, value in numbers.items())
 
 
 def warnings(messages: Iterable[str]) -> str:
@@ -144,26 +190,16 @@ def hexadecimal(colors: np.ndarray) -> list[str]:
     return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(255 * colors[:, :3]).astype(int).tolist()]
 
 
-def origin(report: Report) -> str:
+def origin(skeleton: Skeleton) -> str:
     """What it takes to repeat the run: the recipe, the counts and times of the run, the versions."""
+    report, seconds = skeleton.report, skeleton.report.seconds
     text = json.dumps(report.recipe, indent=2, ensure_ascii=False) if report.recipe else "\n".join(report.stages)
-    told = f"<details><summary>Recipe</summary><pre>{escape(text)}</pre></details>" if text else ""
-    counts = {
-        "input points": report.n_input,
-        "dropped, not finite": report.n_dropped,
-        **({"sampled from a large cloud": report.n_sampled} if report.is_sampled else {}),
-        "set aside as outliers": report.n_outliers,
-        "distinct points": report.n_distinct,
-        "contracted points": report.n_contracted,
-        "loops closed": report.n_loops_closed,
-        "branches cut in air": report.n_cuts,
-        "gaps bridged": report.n_bridges,
-        "traced, no surface": report.n_traced,
-        "gaps joined": len(report.joined),
-    }
-    numbers = {name: f"{n:,}" for name, n in counts.items()} if report.n_input else {}
-    numbers |= {f"{name}, seconds": f"{seconds:.3f}" for name, seconds in report.seconds.items()}
-    return f'{told}<div class="pair">{_facts("The run", numbers, "number")}{_facts("Versions", report.versions)}</div>'
+    recipe = f"<details><summary>Recipe</summary><pre>{escape(text)}</pre></details>" if text else ""
+    facts = summary(skeleton, 0.0) if report.n_input else {}
+    facts = {name: value for name, value in facts.items() if type(value) is int and name not in structure(skeleton)}
+    run = {name.replace("_", " "): f"{value:,}" for name, value in facts.items()}
+    run |= {f"{name}, seconds": f"{value:.3f}" for name, value in seconds.items()}
+    return f'{recipe}<div class="pair">{_facts("The run", run, "number")}{_facts("Versions", report.versions)}</div>'
 
 
 def _number(value: float, form: str = "#.4g") -> str:
