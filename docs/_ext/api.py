@@ -100,7 +100,6 @@ MODULES = {
     "glsk_o3d.io.colors": "Colours",
     "glsk_o3d.parameters": "Making filters",
     "glsk_o3d.interop.clouds": "What counts as a cloud",
-    "glsk_o3d.recipes": "Comparing runs",
     "glsk_o3d.recipes.catalogue": "What there is by name",
     "glsk_o3d.recipes.plugins": "Plugins",
     "glsk_o3d.meshlab.steps": "Filter scripts",
