@@ -1,8 +1,6 @@
 """Filters and pipelines of other distributions: found, merged, and left out where they are broken."""
 
-import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -59,17 +57,12 @@ def test_on_the_command_line(invoke_anywhere, scan):
     assert "Voxel  cloud -> cloud, from glsk_example\n" in listed
     assert "SolveCount  stopping rule, from glsk_example\n" in listed
     assert "coarse  pipeline, from glsk_example\n" in listed
-    told = json.loads(invoke_anywhere("filters", "Voxel", "--json").stdout)["filters"][0]
-    assert (told["plugin"], told["consumes"], told["produces"]) == ("glsk_example", "cloud", "cloud")
-    assert json.loads(invoke_anywhere("filters", "Refiner", "--json").stdout)["filters"][0]["plugin"] is None
-
-    settings = ("--set", "Voxel.size=4%", "--set", "SolveCount.count=5", "--set", "RadiusFloor.share=0.9")
+    settings = ("--set", "Voxel.size=4%", "--set", "SolveCount.count=5")
     result = invoke_anywhere("skeletonize", scan, "--pipeline", "coarse", *settings, "-o", "s.json")
     assert result.exit_code == 0, result.output
     report = glsk.read_skeleton("s.json").report
     assert report.stages[0] == "Voxel(size='4%')"
     assert report.stop_reason == "5 solves are done"
-    assert report.n_input < len(POINTS)
 
 
 @pytest.fixture
@@ -134,13 +127,6 @@ def test_a_filter_that_iterates(install):
     np.testing.assert_array_equal(gather()(glsk.RingBuilder()(POINTS)).positions, states[-1].positions)
 
 
-def test_the_documentation_and_the_example_say_what_the_work_is_given(root):
-    for path in ("docs/plugins.md", "tests/example_plugin/glsk_example.py"):
-        arguments = re.findall(r"def _run\((.*?)\)", (root / path).read_text("utf-8"))
-        assert arguments
-        assert all(words.endswith(", watch") for words in arguments)
-
-
 # ---- in scripts
 
 
@@ -196,10 +182,9 @@ def test_a_filter_of_clouds_gives_a_cloud_and_the_pipeline_tells_of_it(coarse, a
     assert by_hand.report.recipe["pipeline"] == coarse.report.recipe["pipeline"][1:]
 
 
-@pytest.mark.parametrize("ending", ["json", "npz"])
-def test_a_rerun_does_not_thin_the_thinned_points_again(coarse, tmp_path, ending):
-    coarse.save(tmp_path / f"s.{ending}")
-    read = glsk.read_skeleton(tmp_path / f"s.{ending}")
+def test_a_rerun_does_not_thin_the_thinned_points_again(coarse, tmp_path):
+    coarse.save(tmp_path / "s.npz")
+    read = glsk.read_skeleton(tmp_path / "s.npz")
     for again in (glsk.rerun(read), glsk.rerun(read, POINTS), glsk.rerun(glsk.rerun(read))):
         np.testing.assert_array_equal(again.vertices, coarse.vertices)
         np.testing.assert_array_equal(again.radii, coarse.radii)
@@ -243,42 +228,13 @@ def test_a_filter_that_leaves_nothing_is_named():
         nothing()(POINTS)
 
 
-FAILING = """
-from dataclasses import dataclass
-from typing import ClassVar
-from glsk_o3d import Cloud, Filter, pipelines
-
-@dataclass(frozen=True, kw_only=True)
-class Fragile(Filter):
-    \"\"\"Fails.\"\"\"
-
-    consumes: ClassVar[type] = Cloud
-    produces: ClassVar[type] = Cloud
-
-    def _run(self, cloud, watch):
-        raise KeyError("inside")
-
-def fragile():
-    return Fragile() | pipelines.default()
-"""
-
-
-@pytest.mark.usefixtures("fresh_verbs")
-def test_a_filter_that_fails(install, invoke_anywhere, scan, tmp_path):
-    entries = "[glsk_o3d.filters]\nFragile = glsk_fragile:Fragile\n"
-    entries += "[glsk_o3d.pipelines]\nfragile = glsk_fragile:fragile\n"
-    install("glsk-fragile", "1", FAILING, entries)
-    message = "Fragile of glsk_fragile failed: KeyError: 'inside'"
-    with pytest.raises(StageError, match=f"^{message}$") as caught:
-        skeletonize(POINTS, "fragile")
+def test_a_filter_that_fails():
+    fragile = type(
+        "Fragile", (Filter,), {"produces": Cloud, "_run": lambda *_: {}["inside"], "check": lambda self: None}
+    )
+    with pytest.raises(StageError, match=f"^Fragile of {__name__} failed: KeyError: 'inside'$") as caught:
+        fragile()(POINTS)
     assert isinstance(caught.value.__cause__, KeyError)
-    result = invoke_anywhere("skeletonize", scan, "-o", "s.ply", "--pipeline", "fragile")
-    assert (result.exit_code, result.stderr) == (1, f"glsk: error: {message}\n")
-    script = re.sub("<Param.*?/>", "", SCRIPT).replace("By Voxel", "By Fragile")
-    (tmp_path / "s.mlx").write_text(script)
-    result = invoke_anywhere("run", "s.mlx", scan, "-o", "s.ply")
-    place = "s.mlx, line 3: filter 'Generate By Fragile (GLSkeleton)'"
-    assert (result.exit_code, result.stderr) == (1, f"glsk: error: {place}: {message}\n")
 
 
 def test_errors_of_this_package_pass_through_a_filter(example):
@@ -306,18 +262,11 @@ from glsk_o3d.parameters import Parameters, documented, parameter
 @dataclass(frozen=True, kw_only=True)
 """
 BROKEN_FILTERS = {
-    "import error": ("import not_there", "No module named 'not_there'"),
     "syntax error": ("def", "SyntaxError: "),
     "exit": ("raise SystemExit(3)", "SystemExit: 3"),
-    "no Exception": ("raise GeneratorExit('odd')", "GeneratorExit: odd"),
     "no Exception, of its own": ("class Panic(BaseException): pass\nraise Panic('rust')", "Panic: rust"),
     "no such name": ("", "has no attribute 'Thing'"),
-    "function": ("def Thing(): pass", "it is no frozen dataclass derived from glsk_o3d.Filter"),
     "other class": ("class Thing: pass", "it is no frozen dataclass derived from glsk_o3d.Filter"),
-    "no dataclass": (
-        "from glsk_o3d import Filter\nclass Thing(Filter): _run = print",
-        "it is no frozen dataclass derived from glsk_o3d.Filter",
-    ),
     "not frozen": (
         "from dataclasses import dataclass\nfrom glsk_o3d import Filter\n@dataclass\nclass Thing(Filter): _run = print",
         "it is no frozen dataclass derived from glsk_o3d.Filter",
@@ -337,10 +286,6 @@ BROKEN_FILTERS = {
     "strange type": (
         HEAD + "class Thing(Filter):\n    a: int = parameter(3, 'A.', type='strange')\n    _run = print",
         "its parameter 'a' has a type that is none of int, float, bool, length, point, choice, reducer, stop",
-    ),
-    "class as type": (
-        HEAD + "class Thing(Filter):\n    a: int = parameter(3, 'A.', type=int)\n    _run = print",
-        "its parameter 'a' has a type that is none of int, ",
     ),
     "none": (
         HEAD + "class Thing(Filter):\n    a: str = parameter('none', 'A.', type='choice?', choices=('none',))\n"
@@ -364,7 +309,6 @@ BROKEN_FILTERS = {
 }
 BROKEN_PIPELINES = {
     "raises": ("def Thing(): raise OSError('no disk')", "OSError: no disk"),
-    "wrong type": ("def Thing(): return 3", "it must be a callable that returns a Pipeline, and gives a int"),
     "not callable": (
         "from glsk_o3d import pipelines\nThing = pipelines.default()",
         "TypeError: ",  # a pipeline wants a cloud to be called with
@@ -373,7 +317,6 @@ BROKEN_PIPELINES = {
         "from glsk_o3d import Pipeline, Refiner\ndef Thing(): return Pipeline(Refiner(recentre=-1))",
         "InvalidParameterError: Refiner.recentre = -1: must be at least 0",
     ),
-    "needs arguments": ("def Thing(a): pass", "TypeError: "),
 }
 
 
@@ -433,7 +376,6 @@ def test_names_of_pipelines_that_are_taken(install):
         "[glsk_o3d.filters]\nno equals sign\n",
         "[glsk_o3d.filters\nThing = glsk_garbled:Thing\n",
         "[ glsk_o3d.filters ]\nThing = glsk_garbled:Thing\n",
-        "glsk_o3d.filters]\n",
     ],
 )
 def test_a_malformed_file_of_entry_points(install, entries):

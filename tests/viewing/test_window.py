@@ -47,36 +47,28 @@ def no_display(monkeypatch):
 
 @needs_x11
 @pytest.mark.usefixtures("no_display")
-@pytest.mark.parametrize("display", [None, "", ":4242", "nonsense"])
-def test_without_a_display(run, monkeypatch, display):
+@pytest.mark.parametrize("display", [None, "", ":4242"])
+def test_without_a_display(tree, monkeypatch, display):
     if display is not None:
         monkeypatch.setenv("DISPLAY", display)
     assert not has_display()
     with pytest.raises(DisplayError, match=r"no display .*save_report"):
-        show(run[0])
+        show(tree)
 
 
 @needs_x11
 @pytest.mark.usefixtures("no_display")
-def test_a_wayland_socket_that_is_not_there(monkeypatch, tmp_path):
-    monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    assert not has_display()
-
-
-@needs_x11
-@pytest.mark.usefixtures("no_display")
-def test_a_wayland_socket_that_nobody_listens_at_any_more(monkeypatch, tmp_path):
+def test_a_wayland_socket_counts_only_while_somebody_listens(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)  # the names of sockets must be short
     monkeypatch.setenv("XDG_RUNTIME_DIR", ".")
     monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
+    assert not has_display()
     with socket.socket(socket.AF_UNIX) as compositor:
         compositor.bind("wayland-0")
         assert not has_display()
         compositor.listen()
         assert has_display()
-    assert (tmp_path / "wayland-0").is_socket()
-    assert not has_display()
+    assert not has_display()  # though the file is still there
 
 
 @needs_x11
