@@ -54,7 +54,8 @@ class Assessment:
 
     They need no truth, and so cannot see everything: parts of the cloud without a branch, and missing loops, cost
     little or nothing. Noise, and a scan from one side, cost something even on the true axis: compare skeletons of one
-    cloud. The formulas, and what they give on closed forms: docs/evaluation.md.
+    cloud. The properties are those of Wen et al. 2025, arXiv 2504.00032; the formulas, which are ours, and what they
+    give on closed forms: docs/evaluation.md.
 
     Attributes
     ----------
@@ -76,11 +77,6 @@ class Assessment:
     edge_centredness : (E,) float array
         max(0, 1 - d / r) of the cross-section nearest to the middle of each edge, NaN in the empty ball of a junction.
         Not part of `as_dict`.
-
-    References
-    ----------
-    The four properties are those of Wen et al. 2025, "Skeletonization quality evaluation: geometric metrics for point
-    cloud analysis in robotics", arXiv 2504.00032. The formulas are ours: without thresholds in absolute units.
 
     Examples
     --------

@@ -45,16 +45,12 @@ class BranchTable(Rows, row="branch"):
         ``"loop"`` for branches that lie on a loop, ``"tip"`` for others with a free end, ``"inner"`` for others between
         junctions, ``"isolated"`` for a vertex without edges.
     component : (B,) int array
-    parent : (B,) int array
-        The row that a branch grows from, on the shortest way from the root; -1 for those at the root.
-    level : (B,) int array
-        Steps from the root: 0 for those at the root, 1 for their children.
-    start, end : (B,) int arrays
-        Vertices at the ends, `start` towards the root.
-    start_point, end_point : (B, 3) float arrays
-    length : (B,) float array
-    tortuosity : (B,) float array
-        Length over the distance of the ends: 1 for a straight branch, infinite for a closed one.
+    parent, level : (B,) int arrays
+        The row that a branch grows from, on the shortest way from the root, -1 for those at the root; steps from there.
+    start, end, start_point, end_point : (B,) int and (B, 3) float arrays
+        Vertices at the ends, `start` towards the root, and where they are.
+    length, tortuosity : (B,) float arrays
+        Along the curve; over the distance of the ends: 1 for a straight branch, infinite for a closed one.
     mean_radius, start_radius, end_radius : (B,) float arrays
     angle : (B,) float array
         Degrees between the direction in which the parent arrives and that in which the branch leaves: 0 goes straight
@@ -63,13 +59,10 @@ class BranchTable(Rows, row="branch"):
         See `curvature_torsion`.
     points : (B,) int array
         Points of the skeleton's cloud that belong to the branch; see `segment`.
-    confidence : (B,) float array
-        Mean confidence.
-    support : (B,) float array
-        Share of samples of the cloud that show its least shown place, or end; see `glsk_o3d.support`.
-    axis : (B,) int array
-        The first row of the axis that a branch is part of. At a junction the thickest and straightest branch goes on.
-    order : (B,) int array
+    confidence, support : (B,) float arrays
+        Mean confidence; share of samples of the cloud that show its least shown place, or end, see `glsk_o3d.support`.
+    axis, order : (B,) int arrays
+        The first row of the axis that a branch is part of: at a junction the thickest and straightest branch goes on.
         Centrifugal (Gravelius) order: 0 for axes at the root, and one more for each axis that grows from another.
 
     Examples

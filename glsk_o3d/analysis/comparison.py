@@ -77,28 +77,24 @@ class Comparison:
 
     Attributes
     ----------
-    error : float
-        Mean over the skeleton of its distance to the axis over the radius. 0 is best; 1 is the surface.
-    inside : float
-        Share of the skeleton that is less than a radius away from the axis.
+    error, inside : float
+        Mean over the skeleton of its distance to the axis over the radius, of which 1 is the surface; share of it that
+        is less than a radius away.
     completeness : float
         Share of the axis that is less than a radius away from the skeleton.
     length : float or None
-        Length of the skeleton over that of the axis. 1 is best. None if the axis has none.
+        Length of the skeleton over that of the axis. None if the axis has none.
     ends : float or None
         Mean over the axis's leaves of the distance to the nearest leaf of the skeleton (to its nearest vertex, if it
-        has no leaf) over the radius. 0 is best. None if the axis has no leaf.
+        has no leaf) over the radius. None if the axis has no leaf.
     radius_error : float or None
-        Mean over the skeleton of ``|r - radius| / radius``, with its own radii r. 0 is best. None without radii.
+        Mean over the skeleton of ``|r - radius| / radius``, with its own radii r. None without radii.
     tips_f1, junctions_f1 : float
-        F1 of the skeleton's leaves as a guess at the axis's, and of its junctions. 0 to 1, 1 is best, also if neither
-        has any.
+        F1 of the skeleton's leaves as a guess at the axis's, and of its junctions; 1 also if neither has any.
     components, loops, leaves, junctions : int
         Their number in the skeleton minus that in the axis.
-    topology : bool
-        Whether components and loops agree.
-    perfect : bool
-        Whether components and loops agree, and all leaves are matched: `tips_f1` is 1.
+    topology, perfect : bool
+        Whether components and loops agree; and also all leaves are matched: `tips_f1` is 1.
     edge_error : (E,) float array
         `error` of each edge of the skeleton. Not part of `as_dict`.
 

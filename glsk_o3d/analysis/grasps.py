@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,8 +19,6 @@ from .gripper import GraspCandidates, Gripper, listed
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
-
-UNIT_FACTOR = 10  # derived: the least factor between metric units that people mistake for each other
 
 
 def grasp_candidates(
@@ -38,13 +35,14 @@ def grasp_candidates(
     min_confidence: float = 0.5,
     up: Any = None,
 ) -> GraspCandidates:
-    r"""Candidates for grasps with parallel jaws, from the axis and the radii of a skeleton's branches.
+    """Candidates for grasps with parallel jaws, from the axis and the radii of a skeleton's branches.
 
     The jaws close across a branch: at places along its curve, from directions around it. The gripper comes in straight,
     open, from as far away as the diagonal of the object, until its fingertips are past the axis: by its reach, or as
     far as the part if that is less. Ways on which a finger or the palm would sweep over points of the object, or over
     an obstacle, are left out, and so are those on which there is no point between the jaws. What no camera has seen is
-    taken for free.
+    taken for free. The quality ranks; it is no measure of force closure. Its formula, each step, and the sources
+    (Vahrenkamp et al. 2018; ten Pas et al. 2017): docs/grasping.md.
 
     Parameters
     ----------
@@ -91,31 +89,12 @@ def grasp_candidates(
     SkeletonWarning
         There is no candidate; it says why.
 
-    Notes
-    -----
-    With the radius r of the ball on the axis that touches the surface and its change :math:`r' = dr/ds` along the
-    curve, a part of round section is :math:`w = 2 r / \sqrt{1 - r'^2}` wide. The quality, confidence x
-    :math:`(1 - w / w_{max}) \sqrt{1 - r'^2}` x seen / 3, ranks, with 1 for unknown factors; it is no measure of force
-    closure. More on each step: docs/grasping.md.
-
-    References
-    ----------
-    After Vahrenkamp et al. 2018, "Planning high-quality grasps using mean curvature object skeletons", IEEE RA-L 3(2),
-    who place hands along the branches of a mesh's skeleton, and evaluate their contacts. Ten Pas et al. 2017, "Grasp
-    pose detection in point clouds", IJRR 36(13-14), check candidates as here: no point in the hand, some between its
-    fingers.
-
     Examples
     --------
     >>> from glsk_o3d import Skeleton
     >>> from glsk_o3d.samples import tube
     >>> straight = tube(length=1.0, radius=0.1)
     >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), (), confidence=[1, 1])
-    >>> grasps = grasp_candidates(axis, 0.4, cloud=straight.points, clearance=0.05, around=4)
-    >>> grasps
-    GraspCandidates(36 at 9 places)
-    >>> float(grasps.opening[0]), float(grasps.quality[0])
-    (0.25, 0.5)
     >>> table = (0, 0, 1, 0.1)  # z = -0.1: the tube lies on it, and cannot be taken from below, nor from the side
     >>> grasp_candidates(axis, 0.4, cloud=straight.points, obstacles=table, clearance=0.05, around=4)
     GraspCandidates(9 at 9 places; not taken: 27 ways in with a finger in an obstacle)
@@ -127,10 +106,6 @@ def grasp_candidates(
     above = _direction("up", up) if up is not None else np.array([0.0, 0, 1]) if cone is None else -cone[0]
     points = _object(skeleton, cloud)
     middle = points if len(points) else skeleton.vertices
-    size = np.linalg.norm(np.ptp(middle, axis=0))
-    if 0 < UNIT_FACTOR * size < gripper.max_opening:
-        message = f"the gripper opens {gripper.max_opening:.3g} and the object is {size:.3g} long: is it the same unit?"
-        warnings.warn(message, SkeletonWarning, stacklevel=outside())
     place, branch, width, quality, left_out, looked_at = _fitting(
         skeleton, gripper, clearance, spacing, margin, min_confidence
     )
@@ -275,9 +250,10 @@ def _check(skeleton, clearance, around, spacing, margin, min_confidence):
 
 def _cone(cone):
     """Its unit direction, and the least cosine of the angle to it."""
-    if not isinstance(cone, Iterable) or isinstance(cone, str) or len(tuple(cone)) != 2:
-        raise InvalidParameterError(f"cone = {cone!r}: must be a direction and an angle in degrees")
-    direction, degrees = cone
+    try:
+        direction, degrees = cone
+    except (TypeError, ValueError):
+        raise InvalidParameterError(f"cone = {cone!r}: must be a direction and an angle in degrees") from None
     angle = check_number("the angle of cone", degrees, low=0, high=180)
     return _direction("the direction of cone", direction), math.cos(math.radians(angle)) - 1e-9  # rounding
 

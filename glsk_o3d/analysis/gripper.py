@@ -37,11 +37,9 @@ class Gripper:
         Between the jaws, as wide as they open.
     min_opening : float
         Down to which they close; parts that are no wider cannot be held.
-    finger : (3,) tuple of float
-        Thickness of a finger, along the closing direction; its width, along the part; its length, from the palm to its
-        tip.
-    palm : (3,) tuple of float
-        What is behind the fingers: its extent along the closing direction, along the part, and along the approach.
+    finger, palm : (3,) tuples of float
+        Extents along the closing direction, along the part, and along the approach: of a finger, from the palm to its
+        tip, and of what is behind the fingers.
     reach : float
         How far the fingertips reach past the axis of the part; less on parts that are thinner than twice this.
 
@@ -53,9 +51,8 @@ class Gripper:
 
     Examples
     --------
-    >>> hand = Gripper(0.08)
-    >>> [round(length, 4) for length in (*hand.finger, *hand.palm, hand.reach)]
-    [0.0152, 0.0175, 0.0545, 0.18, 0.08, 0.0584, 0.0095]
+    >>> [round(length, 4) for length in Gripper(0.08).finger]
+    [0.0152, 0.0175, 0.0545]
     """
 
     max_opening: float
@@ -99,22 +96,16 @@ class GraspCandidates(Rows, row="grasp"):
 
     Attributes
     ----------
-    position : (G, 3) float array
-        On the axis, midway between the jaws.
-    approach : (G, 3) float array
-        Where the gripper comes in: towards the axis and perpendicular to it.
-    closing : (G, 3) float array
-        From jaw to jaw: perpendicular to the approach and to the axis.
-    opening : (G,) float array
-        Between the jaws as they come in: the width of the part and the clearance, or up to three of it.
-    depth : (G,) float array
-        How far the fingertips are past the position.
+    position, approach, closing : (G, 3) float arrays
+        On the axis, midway between the jaws; where the gripper comes in, perpendicular to the axis; from jaw to jaw,
+        perpendicular to both.
+    opening, depth : (G,) float arrays
+        Between the jaws as they come in: the width of the part and the clearance, or up to three of it. How far the
+        fingertips are past the position.
     branch : (G,) int array
         Position in `Skeleton.branches`.
-    confidence : (G,) float array
-        Of the skeleton there; NaN where it is unknown.
-    quality : (G,) float array
-        From 0 to 1; see `grasp_candidates`.
+    confidence, quality : (G,) float arrays
+        From 0 to 1; the skeleton's confidence there is NaN where it is unknown.
     seen : (G,) int array
         How many have points of the three sides that the gripper is around: those on which the jaws close, and the one
         towards the palm. What was not seen may be in the way. 0 if nobody has looked.

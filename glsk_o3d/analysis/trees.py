@@ -36,16 +36,11 @@ class Cylinders(Rows, row="cylinder"):
     ----------
     start_point, end_point : (K, 3) float arrays
         Ends of the axis, the first towards the root.
-    radius : (K,) float array
-        That of the cylinder with the volume of the part.
-    length : (K,) float array
-        Along the curve.
-    parent : (K,) int array
-        The cylinder that it grows from, -1 at the root.
-    branch : (K,) int array
-        Row of the branch table.
-    order : (K,) int array
-        Order of the branch, see `BranchTable`: 0 for the stem.
+    radius, length : (K,) float arrays
+        Of the cylinder with the volume of the part; along the curve.
+    parent, branch, order : (K,) int arrays
+        The cylinder that it grows from, -1 at the root; row of the branch table, and that branch's order, 0 for the
+        stem.
     confidence : (K,) float array
         Mean confidence along it; 0 where there was no surface to fit it to and its radius is the scatter of its points.
 
@@ -69,7 +64,7 @@ class Cylinders(Rows, row="cylinder"):
 
     @property
     def diameter(self) -> np.ndarray:
-        """Twice the radius."""
+        """Of each cylinder."""
         return 2 * self.radius
 
     @property
@@ -200,27 +195,21 @@ class TreeMeasures:
 
     Attributes
     ----------
-    height : float
-        Of the highest point above the foot of the stem; points farther than three radii from the curve do not count.
-    stem_diameter : float
-        1.3 m above its foot; NaN where the axis of order 0 does not reach so high.
+    height, stem_diameter : float
+        Of the highest point above the foot of the stem, but for points farther than three radii from the curve; 1.3 m
+        above the foot, NaN where the axis of order 0 does not reach so high.
     crown_base : float
         Height at which the lowest branch leaves the stem; NaN without one.
-    crown_width : float
-        Largest horizontal distance of two points of the crown: of branches, and of the stem above the lowest one.
-    crown_area : float
-        Of the convex hull of the crown as seen from above.
+    crown_width, crown_area : float
+        Largest horizontal distance of two points of the crown, of branches and of the stem above the lowest one; of its
+        convex hull as seen from above.
     length, area, volume : tuple of float
         Of the axes, lateral surface and volume of each order, the stem first; see `Cylinders`.
     traced : float
         Share of the volume that has confidence 0: twigs without a surface, leaves, and what noise has spoilt. NaN if
         confidences are not known.
-    root : (x, y, z)
-        The foot of the stem, from which heights count, in the cloud's units.
-    up : str
-        The axis that was taken to point up.
-    unit : float
-        Metres of one unit of the cloud.
+    root, up, unit : (x, y, z), str, float
+        The foot of the stem in the cloud's units, the axis that was taken to point up, and metres of one unit.
 
     Examples
     --------

@@ -255,8 +255,3 @@ def test_files(tmp_path):
     with pytest.raises(InvalidParameterError, match="no grasp to draw"):
         grasps[:0].to_ply(tmp_path / "g.ply")
     assert not (tmp_path / "g.ply").exists()
-
-
-def test_an_opening_in_another_unit_is_doubted():
-    with pytest.warns(SkeletonWarning, match="the gripper opens 80 and the object is 1.*: is it the same unit"):
-        grasp_candidates(TUBE, 80.0)
