@@ -67,7 +67,6 @@ def test_a_tree_with_known_numbers():
     np.testing.assert_allclose(np.sort(table.angle[child]), np.repeat(ANGLES, 7))
     np.testing.assert_array_equal(table.start_point, TREE.vertices[table.start])
     np.testing.assert_array_equal(table.end_point, TREE.vertices[table.end])
-    assert repr(table) == "BranchTable(15 branches, 4 levels)"
 
 
 def test_parents_and_angles_follow_the_root():
@@ -147,16 +146,12 @@ def test_a_closed_branch_has_no_direction(root):
     assert np.isinf(table.tortuosity[loop])
 
 
-def test_means_are_along_the_curve():
-    cone = Skeleton([[0, 0, 0], [1, 0, 0], [3, 0, 0]], [(0, 1), (1, 2)], [1, 2, 4], (), (), ())
-    for root in (0, 2):
-        assert cone.branch_table(root).mean_radius.tolist() == [(1 * 1.5 + 2 * 3) / 3]
-
-
-def test_without_a_choice_the_thicker_end_is_the_start():
-    for radii in ([0.1, 0.2, 0.3], [0.3, 0.2, 0.1]):
-        bar = Skeleton([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1), (1, 2)], radii, (), (), ())
-        assert bar.branch_table().start.tolist() == [2 * (radii[2] > radii[0])]
+def test_means_are_along_the_curve_and_the_thicker_end_is_the_start():
+    for radii, start in (([1, 2, 4], 2), ([4, 2, 1], 0)):
+        cone = Skeleton(np.outer([0, 1, 3], [1, 0, 0]), [(0, 1), (1, 2)], radii, (), (), ())
+        mean = (1 * (radii[0] + radii[1]) + 2 * (radii[1] + radii[2])) / 2 / 3
+        assert {cone.branch_table(root).mean_radius[0] for root in (0, 2, None)} == {mean}
+        assert cone.branch_table().start.tolist() == [start]
 
 
 def test_the_parent_lies_on_the_shortest_way_from_the_root():
@@ -310,22 +305,15 @@ def test_every_point_has_the_branch_of_its_vertex_or_the_nearest_one(y):
     at_junction = np.isin(y.vertex_of_point, y.junctions)
     assert at_junction.any()
     np.testing.assert_allclose(apart[label, np.arange(2000)][at_junction], apart.min(axis=0)[at_junction], atol=1e-9)
-    for vertex, branch in zip(y.vertex_of_point[~at_junction], label[~at_junction], strict=True):
-        assert vertex in y.branches[branch]
+    rows = np.flatnonzero(~at_junction)
+    assert all(y.vertex_of_point[row] in y.branches[label[row]] for row in rows)
     np.testing.assert_array_equal(np.bincount(label, minlength=3), y.branch_table().points)
-    # three arms of known directions: nearly all points away from the middle are where they belong
-    truth = samples.y_junction(2000)
-    sector = np.argmax(y.points @ truth.nodes[1:].T, axis=1)
-    arm = np.argmax(np.stack([y.vertices[np.setdiff1d(p, y.junctions)[-1]] for p in y.branches]) @ truth.nodes[1:].T, 1)
-    far = np.linalg.norm(y.points, axis=1) > 0.2
-    assert (arm[label] == sector)[far].mean() > 0.99
 
 
 def test_other_clouds(y):
     label = y.segment()
     order = RNG.permutation(2000)
-    np.testing.assert_array_equal(y.segment(y.points[order]), label[order])
-    np.testing.assert_array_equal(y.segment(y.points.astype(np.float32)), label)
+    np.testing.assert_array_equal(y.segment(y.points[order].astype(np.float32)), label[order])
     np.testing.assert_array_equal(y.segment(o3d.t.geometry.PointCloud(o3d.core.Tensor(y.points))), label)
     near = y.segment(np.concatenate([y.points[:5] + 1e-7, [[np.nan, 0, 0]]]))
     np.testing.assert_array_equal(near, [*label[:5], -1])
@@ -351,8 +339,7 @@ def test_dropped_points_and_vertices_without_edges():
 
 
 def test_edges_in_any_order():
-    order = RNG.permutation(len(TREE.edges))
-    mixed = Skeleton(TREE.vertices, TREE.edges[order], TREE.radii, (), (), ())
+    mixed = replace(TREE, edges=RNG.permutation(TREE.edges))
     for (a, b), branch in zip(mixed.edges, branch_of_edge(mixed), strict=True):
         assert {a, b} <= set(mixed.branches[branch].tolist())
 
@@ -364,12 +351,9 @@ def in_a_row(vertex, points=None):
 
 
 def test_thickness_is_the_radius_over_the_distance_to_the_eighth_nearest_point():
-    found = thickness(in_a_row(np.repeat([0, 1], 20)))
-    np.testing.assert_allclose(found[4:20], 2 / 4)  # four on each side
-    np.testing.assert_allclose(found[20:36], 1 / 4)
-    np.testing.assert_allclose(found[0], 2 / 8)
-    skeleton = in_a_row(np.zeros(40, int))
-    np.testing.assert_allclose(thickness(skeleton, skeleton.points[::2])[4:16], 2 / 8)
-    copies = np.concatenate([np.zeros((9, 3)), [[np.nan, 0, 0]]])
-    assert [*thickness(in_a_row(np.append(np.zeros(9, int), -1), copies))[[0, 8]]] == [np.inf] * 2
-    assert np.isnan(thickness(in_a_row(np.append(np.zeros(9, int), -1), copies))[9])
+    row = in_a_row(np.repeat([0, 1], 20))
+    np.testing.assert_allclose(thickness(row)[4:36], np.repeat([2 / 4, 1 / 4], 16))  # four on each side
+    np.testing.assert_allclose(thickness(row)[0], 2 / 8)
+    np.testing.assert_allclose(thickness(row, row.points[::2])[4:10], 2 / 8)
+    copies = in_a_row(np.append(np.zeros(9, int), -1), np.concatenate([np.zeros((9, 3)), [[np.nan, 0, 0]]]))
+    np.testing.assert_array_equal(thickness(copies), [*[np.inf] * 9, np.nan])

@@ -9,7 +9,7 @@ import pytest
 
 from glsk_o3d import read_truth
 from glsk_o3d.analysis import Truth, compare
-from glsk_o3d.analysis.comparison import matching_f1, merged_junctions
+from glsk_o3d.analysis.comparison import matching_f1
 from glsk_o3d.analysis.curves import distances
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.samples import helix, sample_object, sphere, torus, tube, two_rings, y_junction
@@ -198,17 +198,6 @@ def test_junctions_are_met_within_two_radii(away, share, curve):
     vertices, edges = cross(0)
     moved = vertices + np.outer([0, 0, 0, 0, away, away], [0, 0, 1])
     assert compare(curve(moved, edges), Truth(vertices, edges, np.full(6, 0.2))).junctions_f1 == share
-
-
-def test_clusters_of_junctions():
-    axis, radius = np.outer(np.arange(100) / 10, [1.0, 0, 0]), np.repeat([0.2, 1.0], 50)
-    chain = np.outer([1, 1.19, 1.38, 3, 7, 7.9], [1.0, 0, 0])
-    means, local = merged_junctions(chain, axis, radius)
-    np.testing.assert_allclose(means[:, 0], [1.19, 3, 7.45])  # link by link; the last two are in the thick half
-    np.testing.assert_allclose(local, [0.2, 0.2, 1])
-    _, local = merged_junctions(np.array([[1.0, 5, 0], [8, 5, 0], [4.5, 0, 0]]), axis, radius)
-    np.testing.assert_allclose(local, [0.2, 1, 1])  # of the nearest place; in both halves, of the thicker
-    assert [len(it) for it in merged_junctions(np.empty((0, 3)), axis, radius)] == [0, 0]
 
 
 # ------------------------------------------------------------------------------------------- two curves, and no axis

@@ -2,16 +2,15 @@
 
 import csv
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from glsk_o3d import InvalidParameterError, Skeleton, SkeletonWarning, samples
-from glsk_o3d.analysis import GraspCandidates, Gripper
+from glsk_o3d.analysis import Gripper
 from glsk_o3d.analysis import grasp_candidates as checked_candidates
 
-ARRAYS = [field.name for field in fields(GraspCandidates)][:9]
 WIDE = 10.0
 
 
@@ -211,10 +210,10 @@ def test_wrong_parameters(options, said):
 
 def test_some_of_them():
     grasps = grasp_candidates(SAUROPOD, 0.2)
-    for some, rows in ((grasps[:3], [0, 1, 2]), (grasps[5], [5]), (grasps[grasps.branch == 2], None)):
-        rows = np.flatnonzero(grasps.branch == 2) if rows is None else rows
-        for name in ARRAYS:
-            np.testing.assert_array_equal(getattr(some, name), getattr(grasps, name)[rows])
+    for which in (slice(3), 5, grasps.branch == 2):
+        for name in ("position", "approach", "closing", "opening", "depth", "branch", "confidence", "quality", "seen"):
+            expected = np.atleast_2d(getattr(grasps, name)[which]).reshape(getattr(grasps[which], name).shape)
+            np.testing.assert_array_equal(getattr(grasps[which], name), expected)
     with pytest.raises(IndexError):
         grasps[len(grasps)]
 

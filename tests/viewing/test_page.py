@@ -15,7 +15,6 @@ from glsk_o3d.judgements import Judgement
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.samples import torus
 from glsk_o3d.viewing import html as sections
-from glsk_o3d.viewing.figures import thinned
 
 
 @pytest.fixture
@@ -57,17 +56,6 @@ def test_a_second_run_starts_a_new_record(run):
     assert recorder.shown.max() < 200
     with pytest.raises(InvalidParameterError, match="another run"):
         save_report(run[0], "never.html", recorder=recorder)
-
-
-def test_thinning_is_random_and_repeatable():
-    points = np.zeros((1000, 3))
-    points[::2] = np.nan
-    shown = thinned(points, 100)
-    assert len(shown) == len(np.unique(shown)) == 100
-    assert (shown % 2 == 1).all()
-    assert len(np.unique(np.diff(shown))) > 3
-    np.testing.assert_array_equal(shown, thinned(points, 100))
-    np.testing.assert_array_equal(thinned(points, 500), np.arange(1, 1000, 2))
 
 
 # -------------------------------------------------------------------------------------------------------------- view
