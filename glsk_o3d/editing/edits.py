@@ -177,7 +177,9 @@ def prune(
 
 def _without_orders(skeleton: Skeleton, order: int, root: Root) -> Skeleton:
     if skeleton.n_loops:
-        raise InvalidParameterError(f"the skeleton has {skeleton.n_loops} loops: orders are of trees; see cut_loops()")
+        raise InvalidParameterError(
+            f"the skeleton has {skeleton.n_loops} loops: branches have an order in a tree; see cut_loops()"
+        )
     table = branch_table(skeleton, root)
     group = np.arange(len(skeleton.vertices))
     for row in np.argsort(table.level, kind="stable").tolist():  # parents before their children

@@ -41,6 +41,7 @@ _SOLVE_COLUMNS = {  # by heading: the field of a record, and its format
     "solver error": ("solve_error", ".1e"),
     "seconds": ("seconds", ".3f"),
 }
+_BRANCH_COLUMNS = ("branch", "kind", "length", "mean_radius", "tortuosity", "confidence", "points")
 _EXTRA = ("held", "e", "w<sub>L</sub>", "solver error", "seconds", "tortuosity", "confidence")
 """Columns that a narrow screen has no room for."""
 _WIDTH, _HEIGHT, _LEFT, _TOP, _BOTTOM = 320, 150, 46, 12, 22  # of a chart and of what surrounds its curve
@@ -117,23 +118,13 @@ def contraction(report: Report) -> str:
         return told
     charts = [
         _chart("Points solved for, <i>n</i>", records, "n_points", ",.10g"),
-        _chart("Change of the explained score, <i>De</i>", records, "explained_change", ".3g", _threshold(report)),
+        _chart("Change of the explained score, <i>De</i>", records, "explained_change", ".3g"),
         _chart("Ring ratio, <i>a</i>", records, "ring_ratio", ".3g"),
     ]
     rows = [[f"{getattr(record, name):{form}}" for name, form in _SOLVE_COLUMNS.values()] for record in records]
     marks = [f' data-solve="{record.iteration:d}"' for record in records]
     table = _table(_SOLVE_COLUMNS, rows, marks=marks)
     return f'{told}<div class="charts">{"".join(charts)}</div><h2>Solve by solve</h2>{table}'
-
-
-def _threshold(report: Report) -> float | None:
-    """The De below which the contraction stops, if that is its rule."""
-    for stage in report.recipe.get("pipeline", ()):
-        rule = stage.get("stop") if isinstance(stage, dict) else None
-        if isinstance(rule, dict) and rule.get("rule") == "ExplainedScore":
-            value = rule.get("threshold")
-            return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
-    return None
 
 
 def topology(report: Report) -> str:
@@ -167,17 +158,14 @@ def branches(skeleton: Skeleton) -> str:
     """The longest branches, in the colours that they have in the view; numbered as in `Skeleton.branch_table`."""
     if len(skeleton.edges) == 0:
         return ""
-    listed = [row for row in skeleton.branch_table() if row["kind"] != "isolated"]
-    listed.sort(key=lambda row: -row["length"])
-    colors = branch_colors(skeleton, len(skeleton.branches))
-    heads = ("branch", "kind", "length", "mean radius", "tortuosity", "confidence", "points")
-    rows = []
-    for row in listed[:MOST_LISTED_ROWS]:
-        swatch = f'<span class="swatch" style="background:{colors[row["branch"]]}"></span>'
-        sizes = _number(row["length"]), _number(row["mean_radius"])
-        ratios = _number(row["tortuosity"], ".2f"), _number(row["confidence"], ".2f")
-        rows.append((f"{swatch}{row['branch']}", row["kind"], *sizes, *ratios, f"{row['points']:,}"))
-    return f"<h2>Longest branches</h2>{_table(heads, rows, 'branches')}{_rest(listed, 'shorter')}"
+    table = skeleton.branch_table()
+    longest = np.argsort(-table.length[: len(skeleton.branches)], kind="stable").tolist()
+    colors, columns = branch_colors(skeleton, len(skeleton.branches)), table.printed()
+    rows = [[columns[name][row] for name in _BRANCH_COLUMNS] for row in longest[:MOST_LISTED_ROWS]]
+    for row, cells in zip(longest, rows, strict=False):
+        cells[0] = f'<span class="swatch" style="background:{colors[row]}"></span>{cells[0]}'
+    heads = [name.replace("_", " ") for name in _BRANCH_COLUMNS]
+    return f"<h2>Longest branches</h2>{_table(heads, rows, 'branches')}{_rest(longest, 'shorter')}"
 
 
 def branch_colors(skeleton: Skeleton, n: int) -> list[str]:
@@ -200,10 +188,6 @@ def origin(skeleton: Skeleton) -> str:
     run = {name.replace("_", " "): f"{value:,}" for name, value in facts.items()}
     run |= {f"{name}, seconds": f"{value:.3f}" for name, value in seconds.items()}
     return f'{recipe}<div class="pair">{_facts("The run", run, "number")}{_facts("Versions", report.versions)}</div>'
-
-
-def _number(value: float, form: str = "#.4g") -> str:
-    return f"{value:{form}}".rstrip(".") if math.isfinite(value) else "–"
 
 
 def _table(heads, rows, kind: str = "", marks=None) -> str:
@@ -232,12 +216,12 @@ def _facts(heading: str, told: dict[str, str], kind: str = "") -> str:
     return f'<div><h2>{heading}</h2><table class="facts"><tbody>{rows}</tbody></table></div>' if rows else ""
 
 
-def _chart(caption: str, records, name: str, form: str, threshold: float | None = None) -> str:
+def _chart(caption: str, records, name: str, form: str) -> str:
     """A number per solve, from zero, as SVG; what is not finite is left out."""
     solves = [record.iteration for record in records]
     values = {record.iteration: float(getattr(record, name)) for record in records}
     values = {solve: value for solve, value in values.items() if math.isfinite(value)}
-    highest = _round_up(max([*values.values(), *([] if threshold is None else [threshold])], default=1.0))
+    highest = _round_up(max(values.values(), default=1.0))
 
     def x(solve):
         share = (solve - solves[0]) / max(solves[-1] - solves[0], 1)
@@ -251,11 +235,6 @@ def _chart(caption: str, records, name: str, form: str, threshold: float | None 
         f'<text x="{_LEFT - 7}" y="{y(value, 4)}" text-anchor="end">{value:{form}}</text>'
         for value in (0, highest / 2, highest)
     )
-    if threshold is not None:
-        grid += (
-            f'<line class="threshold" x1="{_LEFT}" x2="{_WIDTH}" y1="{y(threshold)}" y2="{y(threshold)}"/>'
-            f'<text x="{_WIDTH}" y="{y(threshold, -4)}" text-anchor="end">stops below {threshold:g}</text>'
-        )
     ticks = "".join(
         f'<text x="{x(solve)}" y="{_HEIGHT - 5}" text-anchor="middle">{solve}</text>'
         for solve in solves[:: -(-len(solves) // 10)]

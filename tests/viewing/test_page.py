@@ -156,25 +156,6 @@ def test_charts_end_at_a_round_number(value, top):
     assert float(re.findall(r'text-anchor="end">([^<]+)<', charts[3])[2]) == pytest.approx(top)
 
 
-@pytest.mark.parametrize(
-    ("stop", "words"),
-    [
-        ({"rule": "ExplainedScore", "threshold": 0.2}, ["stops below 0.2"]),
-        ({"rule": "RingSizeRatio", "threshold": 0.2}, []),
-        ({"rule": "ExplainedScore", "threshold": ""}, []),
-        ({}, []),
-        (None, []),
-    ],
-)
-def test_the_chart_of_the_score_shows_where_its_rule_stops(stop, words):
-    recipe = {"pipeline": ["?", {"filter": "Contractor", "stop": stop}]}
-    report = Report(iterations=(record(1, explained_change=0.1),), recipe=recipe)
-    text = sections.contraction(report).split("<figure>")[2]
-    assert re.findall("stops below [0-9.]+", text) == words
-    lines = re.findall(r'class="threshold".*? y1="([\d.]+)"', text)
-    assert [float(y) for y in lines] == [12.0] * len(words)  # the top of the chart
-
-
 def test_warnings_once_each():
     assert sections.warnings(()) == ""
     assert sections.warnings(["<a>", "b", "<a>"]).count("<li>") == 2
