@@ -39,10 +39,8 @@ def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
 
     Raises
     ------
-    InvalidCloudError
-        There is no cloud, or it is none.
-    InvalidParameterError
-        The skeleton is empty.
+    InvalidCloudError, InvalidParameterError
+        There is no cloud, or it is none; the skeleton is empty.
 
     Examples
     --------
@@ -157,10 +155,8 @@ def thickness(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
 
     Raises
     ------
-    InvalidCloudError
-        There is no cloud, or it is none.
-    InvalidParameterError
-        The skeleton is empty.
+    InvalidCloudError, InvalidParameterError
+        There is no cloud, or it is none; the skeleton is empty.
 
     Examples
     --------

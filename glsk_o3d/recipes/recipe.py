@@ -99,10 +99,8 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
 
     Raises
     ------
-    InvalidParameterError
-        A parameter is wrong.
-    RecipeError
-        The ending is unknown, or the pipeline cannot be written; see `to_recipe`.
+    InvalidParameterError, RecipeError
+        See `to_recipe`; or the ending is unknown.
     OSError
         The file cannot be written.
 

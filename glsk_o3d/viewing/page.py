@@ -80,7 +80,7 @@ def save_report(
 
     The page is one HTML file that works offline in any browser with WebGL 2: cloud, skeleton and radius tubes to turn
     and zoom, the contraction on a slider, the run's numbers and charts, warnings, recipe and versions. Without WebGL or
-    scripts there is a still picture.
+    scripts there is a still picture. Of larger clouds 20 000 points are shown, drawn at random.
 
     Parameters
     ----------
@@ -94,17 +94,10 @@ def save_report(
 
     Raises
     ------
-    FileFormatError
-        The ending is neither ``.html`` nor ``.htm``.
     InvalidParameterError
         The recorder watched another run.
-    OSError
-        The folder does not exist, or the file cannot be written.
-
-    Notes
-    -----
-    Of larger clouds 20 000 points are shown, drawn at random; their positions are rounded to 1/50 000 of the diagonal.
-    The page says so. Numbers and charts are those of the whole run.
+    FileFormatError, OSError
+        The ending is neither ``.html`` nor ``.htm``, or the file cannot be written.
 
     Examples
     --------

@@ -60,23 +60,16 @@ def save_preview(
 
     Raises
     ------
-    FileFormatError
-        The ending is not ``.png``.
-    MissingPackageError
-        matplotlib is not installed.
-    OSError
-        The folder does not exist, or the file cannot be written.
+    FileFormatError, MissingPackageError, OSError
+        The ending is not ``.png``, matplotlib is not installed, or the file cannot be written.
 
     Examples
     --------
-    >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> from glsk_o3d import skeletonize
     >>> from glsk_o3d.samples import torus
     >>> with TemporaryDirectory() as folder:
     ...     save_preview(skeletonize(torus(1000).points), f"{folder}/ring.png")
-    ...     Path(folder, "ring.png").stat().st_size > 10_000
-    True
     """
     check_ending(path, "preview is a picture", ".png")
     figures.save_figure(draw(skeleton, size, title, warnings=skeleton.report.warnings), path)
@@ -120,12 +113,8 @@ def save_assessment(
     ------
     InvalidParameterError
         There is not one value per edge.
-    FileFormatError
-        The ending is not ``.png``.
-    MissingPackageError
-        matplotlib is not installed.
-    OSError
-        The folder does not exist, or the file cannot be written.
+    FileFormatError, MissingPackageError, OSError
+        The ending is not ``.png``, matplotlib is not installed, or the file cannot be written.
 
     Examples
     --------
