@@ -22,7 +22,7 @@ import typer
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, samples
-from glsk_o3d.analysis.graph import simple_edges
+from glsk_o3d.analysis.curves import simple_edges
 from glsk_o3d.recipes.catalogue import named_pipeline
 
 Graph = tuple[np.ndarray, np.ndarray]  # vertices (M, 3) and edges (E, 2)

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from .analysis.comparison import matched
 from .analysis.curves import along, pieces
-from .analysis.matching import matched
 from .driver import chosen_pipeline
 from .errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
 from .judgements import Supported

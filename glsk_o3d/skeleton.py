@@ -111,7 +111,7 @@ class Skeleton:
 
     def _repr_html_(self) -> str:
         """A picture and the numbers, for Jupyter."""
-        from .viewing.notebook import to_html
+        from .viewing.html import to_html
 
         return to_html(self)
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glsk_o3d.analysis.graph import simple_edges
+from glsk_o3d.analysis.curves import simple_edges
 from glsk_o3d.errors import FileFormatError
 
 LARGER = 2  # what cloud and axis of one shape may differ by at most, in the diagonals of their boxes

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from glsk_o3d import read_cloud
-from glsk_o3d.analysis.graph import check_graph
+from glsk_o3d.analysis.curves import check_graph
 from glsk_o3d.errors import FileFormatError, InvalidParameterError, brief
 from glsk_o3d.io.formats.graphs import words_by_line
 

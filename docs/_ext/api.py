@@ -33,7 +33,6 @@ NAMES = {
     },
     "filters": {
         "The five filters": ("RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner"),
-        "Thin parts and trees": ("Tracer",),
         "When to stop": ("ExplainedScore", "RingSizeRatio"),
     },
     "pipelines": {
@@ -46,7 +45,6 @@ NAMES = {
         "The same result again": ("rerun",),
     },
     "io": {
-        "As Open3D's and pymeshlab's": ("to_line_set", "to_tensor_line_set", "to_tubes", "to_pymeshlab", "annotate"),
         "Clouds": ("read_cloud", "read_tensor_cloud", "read_sample", "save_tensor_cloud", "annotate_file"),
         "Skeletons": ("read_skeleton", "save_skeleton", "read_truth"),
         "For other programs": ("save_cylinders", "save_rig", "save_mesh"),
@@ -56,10 +54,10 @@ NAMES = {
         "What happened on the way": ("ContractionRecorder",),
     },
     "analysis": {
-        "Branches": ("branch_table", "BranchTable", "segment", "curvature_torsion", "find_loops", "Loop"),
+        "Branches": ("branch_table", "BranchTable", "segment", "curvature_torsion", "Loop"),
         "Trees": ("tree_measures", "TreeMeasures", "cylinders", "Cylinders"),
         "Grasps": ("grasp_candidates", "GraspCandidates", "Gripper"),
-        "How good is it?": ("assess", "Assessment", "LoopWidth", "thickness"),
+        "How good is it?": ("assess", "Assessment", "thickness"),
         "How far is it from a known axis?": ("compare", "Comparison", "Truth"),
     },
     "editing": {
@@ -96,12 +94,15 @@ NAMES = {
 PACKAGES = tuple(dict.fromkeys(module for _, module in TASKS.values()))
 """What users import from."""
 MODULES = {
-    "glsk_o3d.analysis.skinning": "Skins",
+    "glsk_o3d.io.annotation": "Attributes on clouds",
+    "glsk_o3d.io.clouds.selection": "Some of the points",
+    "glsk_o3d.io.tubes": "Tubes",
+    "glsk_o3d.io.colors": "Colours",
     "glsk_o3d.parameters": "Making filters",
     "glsk_o3d.interop.clouds": "What counts as a cloud",
-    "glsk_o3d.recipes": "Comparing runs",
     "glsk_o3d.recipes.catalogue": "What there is by name",
     "glsk_o3d.recipes.plugins": "Plugins",
+    "glsk_o3d.meshlab.steps": "Filter scripts",
 }
 """What the package's own parts, and those who extend it, import from."""
 

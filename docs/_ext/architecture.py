@@ -35,7 +35,7 @@ ASIDE = {
 """Where in the drawing the boxes are that are not in its middle."""
 
 COMFORTS = {
-    "skeleton.Skeleton._repr_html_": ("viewing.notebook",),
+    "skeleton.Skeleton._repr_html_": ("viewing.html",),
     "skeleton.Skeleton.annotate": ("io.annotation",),
     "skeleton.Skeleton.branch_table": ("analysis.branches",),
     "skeleton.Skeleton.loops": ("analysis.loops",),

@@ -1,18 +1,14 @@
 """What a skeleton says about its object, and how good it is: against a known axis, or its cloud alone."""
 
-from .assessment import Assessment, LoopWidth, assess
+from .assessment import Assessment, assess
 from .branches import BranchTable, branch_table
-from .comparison import Comparison, compare
+from .comparison import Comparison, Truth, compare
 from .curvature import curvature_torsion
-from .forestry import TreeMeasures, tree_measures
-from .grasp_rows import GraspCandidates
 from .grasps import grasp_candidates
-from .gripper import Gripper
-from .loops import Loop, find_loops
-from .segmentation import segment
-from .thickness import thickness
-from .tree_cylinders import Cylinders, cylinders
-from .truth import Truth
+from .gripper import GraspCandidates, Gripper
+from .loops import Loop
+from .segmentation import segment, thickness
+from .trees import Cylinders, TreeMeasures, cylinders, tree_measures
 
 __all__ = [
     "Assessment",
@@ -22,7 +18,6 @@ __all__ = [
     "GraspCandidates",
     "Gripper",
     "Loop",
-    "LoopWidth",
     "TreeMeasures",
     "Truth",
     "assess",
@@ -30,7 +25,6 @@ __all__ = [
     "compare",
     "curvature_torsion",
     "cylinders",
-    "find_loops",
     "grasp_candidates",
     "segment",
     "thickness",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,6 @@ from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import norm
 from ..refinement.rooted import root_among
 from .curvature import curvature_torsion
-from .growth import axes, grow
 from .rows import Rows
 from .segmentation import branch_of_point
 
@@ -28,7 +28,7 @@ PRINTED_COLUMNS = {
     **dict(start_radius=".3g", end_radius=".3g", tortuosity=".2f", angle=".1f", points="d"),
     **dict(confidence=".2f", support=".2f"),
 }
-"""Those that people read, each with its format."""
+"""The columns that people read, each with its format."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,16 +45,12 @@ class BranchTable(Rows, row="branch"):
         ``"loop"`` for branches that lie on a loop, ``"tip"`` for others with a free end, ``"inner"`` for others between
         junctions, ``"isolated"`` for a vertex without edges.
     component : (B,) int array
-    parent : (B,) int array
-        The row that a branch grows from, on the shortest way from the root; -1 for those at the root.
-    level : (B,) int array
-        Steps from the root: 0 for those at the root, 1 for their children.
-    start, end : (B,) int arrays
-        Vertices at the ends, `start` towards the root.
-    start_point, end_point : (B, 3) float arrays
-    length : (B,) float array
-    tortuosity : (B,) float array
-        Length over the distance of the ends: 1 for a straight branch, infinite for a closed one.
+    parent, level : (B,) int arrays
+        The row that a branch grows from, on the shortest way from the root, -1 for those at the root; steps from there.
+    start, end, start_point, end_point : (B,) int and (B, 3) float arrays
+        Vertices at the ends, `start` towards the root, and where they are.
+    length, tortuosity : (B,) float arrays
+        Along the curve; over the distance of the ends: 1 for a straight branch, infinite for a closed one.
     mean_radius, start_radius, end_radius : (B,) float arrays
     angle : (B,) float array
         Degrees between the direction in which the parent arrives and that in which the branch leaves: 0 goes straight
@@ -63,13 +59,10 @@ class BranchTable(Rows, row="branch"):
         See `curvature_torsion`.
     points : (B,) int array
         Points of the skeleton's cloud that belong to the branch; see `segment`.
-    confidence : (B,) float array
-        Mean confidence.
-    support : (B,) float array
-        Share of samples of the cloud that show its least shown place, or end; see `glsk_o3d.support`.
-    axis : (B,) int array
-        The first row of the axis that a branch is part of. At a junction the thickest and straightest branch goes on.
-    order : (B,) int array
+    confidence, support : (B,) float arrays
+        Mean confidence; share of samples of the cloud that show its least shown place, or end, see `glsk_o3d.support`.
+    axis, order : (B,) int arrays
+        The first row of the axis that a branch is part of: at a junction the thickest and straightest branch goes on.
         Centrifugal (Gravelius) order: 0 for axes at the root, and one more for each axis that grows from another.
 
     Examples
@@ -106,30 +99,27 @@ class BranchTable(Rows, row="branch"):
     def __repr__(self):
         return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
 
-    @property
-    def printed_columns(self) -> dict[str, str]:
-        """The columns that are read by people, each with its format; the support only if it is known."""
-        known = np.isfinite(self.support).any()
-        return {name: form for name, form in PRINTED_COLUMNS.items() if known or name != "support"}
+    def printed(self) -> dict[str, list[str]]:
+        """The main columns as people read them, a dash for what is unknown; the support only if any is known."""
+        columns = self._columns()
+        if not np.isfinite(self.support).any():
+            del columns["support"]
+
+        def cell(name, value):
+            unknown = math.isnan(value) if isinstance(value, float) else name == "parent" and value < 0
+            return "-" if unknown else format(value, PRINTED_COLUMNS[name])
+
+        return {name: [cell(name, value) for value in columns[name]] for name in PRINTED_COLUMNS if name in columns}
 
     def __str__(self):
-        columns = self.printed_columns
-        rows = [[*columns], *([cell(row, name) for name in columns] for row in self)]
-        if len(rows) > PRINTED_ROWS + 1:
-            rows[PRINTED_ROWS - 4 : -4] = [["..."] + [""] * (len(columns) - 1)]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        sides = ["<" if form == "s" else ">" for form in columns.values()]
-        places = [f"{side}{width}" for side, width in zip(sides, widths, strict=True)]
-        lines = ["  ".join(map(format, row, places)).rstrip() for row in rows]
+        columns = [[name, *cells] for name, cells in self.printed().items()]
+        for column in columns:
+            if len(self) > PRINTED_ROWS:
+                column[PRINTED_ROWS - 4 : -4] = ["..." if column is columns[0] else ""]
+            width = max(map(len, column))
+            column[:] = [text.ljust(width) if column[0] == "kind" else text.rjust(width) for text in column]
+        lines = ["  ".join(row).rstrip() for row in zip(*columns, strict=True)]
         return "\n".join([f"{self!r}: lengths in the cloud's units, angles in degrees", *lines])
-
-
-def cell(row: dict[str, Any], name: str) -> str:
-    """A number of a row of a `BranchTable` as people read it, a dash for what is unknown; `name` is printed."""
-    value = row[name]
-    if (name == "parent" and value < 0) or (isinstance(value, float) and math.isnan(value)):
-        return "-"
-    return format(value, PRINTED_COLUMNS[name])
 
 
 @np.errstate(all="ignore")  # a file may hold coordinates whose squares no float64 holds
@@ -175,7 +165,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         return np.array([_mean(values[path], weight) for path, weight in zip(paths, weights, strict=True)])
 
     section = mean((skeleton.radii / np.nanmax(skeleton.radii, initial=np.finfo(float).tiny)) ** 2)
-    parent, level, backwards = grow(skeleton, paths, length, np.where(np.isnan(section), 1, section), chosen)
+    parent, level, backwards = _grow(skeleton, paths, length, np.where(np.isnan(section), 1, section), chosen)
     outward = [path[::-1] if turn else path for path, turn in zip(paths, backwards, strict=True)]
     start, end = (np.array([path[i] for path in outward]) for i in (0, -1))
     first, last = skeleton.vertices[start], skeleton.vertices[end]
@@ -183,7 +173,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     label = branch_of_point(skeleton, skeleton.points, skeleton.vertex_of_point)
     angle = np.array([_angle(skeleton, outward, i, parent[i]) for i in range(len(paths))])
     mean_radius = mean(skeleton.radii)
-    axis, order = axes(parent, level, start, angle, mean_radius, length)
+    axis, order = _axes(parent, level, start, angle, mean_radius, length)
     return BranchTable(
         kind=_kinds(skeleton, paths),
         component=skeleton.component_of_vertex[start],
@@ -207,6 +197,85 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         axis=axis,
         order=order,
     )
+
+
+def _grow(skeleton, paths, length, section, chosen):
+    """Parent and level of every path, and whether it runs towards the root: three (B,) arrays.
+
+    Paths are reached from the roots, the nearest first. `chosen` is the root vertex of its component, or None; other
+    components grow from the path with the most volume, `length` times `section`.
+    """
+    ends = [(int(path[0]), int(path[-1])) for path in paths]
+    at: dict[int, list[int]] = {}
+    for row, pair in enumerate(ends):
+        for vertex in set(pair):
+            at.setdefault(vertex, []).append(row)
+    parent, level, backwards = np.full(len(paths), -1), np.full(len(paths), -1), np.zeros(len(paths), bool)
+    component = skeleton.component_of_vertex[[pair[0] for pair in ends]]
+    queue: list[tuple[float, int, int]] = []  # distance, vertex, and the path that leads there
+    for part in range(skeleton.n_components):
+        if chosen is not None and skeleton.component_of_vertex[chosen] == part:
+            if chosen in at:
+                queue.append((0.0, chosen, -1))
+                continue
+            (row,) = (row for row, path in enumerate(paths) if chosen in path)
+            place = int(np.argmax(paths[row] == chosen))
+            way = np.linalg.norm(np.diff(skeleton.vertices[paths[row]], axis=0), axis=1)
+            backwards[row] = way[:place].sum() > way[place:].sum()
+        else:
+            rows = np.flatnonzero(component == part)
+            row = rows[np.argmax((length * section)[rows])]
+            free, thick = (np.take(values, ends[row]) for values in (skeleton.degree == 1, skeleton.radii))
+            backwards[row] = free[1] if free[0] != free[1] else thick[1] > thick[0]
+        level[row] = 0
+        queue += [(0.0, vertex, row) for vertex in ends[row]]
+    heapq.heapify(queue)
+    done = set()
+    while queue:
+        distance, vertex, via = heapq.heappop(queue)
+        if vertex in done:
+            continue
+        done.add(vertex)
+        for row in at[vertex]:
+            if level[row] < 0:
+                parent[row], level[row] = via, level[via] + 1 if via >= 0 else 0
+                backwards[row] = ends[row][0] != vertex
+                heapq.heappush(queue, (distance + length[row], ends[row][0 if backwards[row] else 1], row))
+    return parent, level, backwards
+
+
+def _axes(parent, level, start, angle, radius, length):
+    """First row of every row's axis, and the axes before it: of those that begin in one place, one goes on.
+
+    It is the one that is straight and thick, but no stub: one that ends within its own radius is inside the part.
+    """
+    stub = _ahead(parent, level, length) < np.nan_to_num(radius)
+    straight = np.where(stub, 0, np.cos(np.radians(angle)))
+    _, fork = np.unique([parent, start], axis=1, return_inverse=True)
+    fork = fork.ravel()  # NumPy 2.0 gives it two axes
+    unknown = np.isin(fork, fork[(straight > 0) & np.isnan(radius)])  # there the angle alone decides
+    onward = np.nan_to_num(straight * np.where(unknown, 1, radius))
+    straightest: dict[tuple[int, int], int] = {}
+    for row in np.lexsort((-np.arange(len(onward)), onward)).tolist():  # the last one stays
+        if onward[row] > 0:
+            straightest[int(parent[row]), int(start[row])] = row
+    axis, order = np.arange(len(parent)), np.zeros(len(parent), int)
+    for row in np.argsort(level, kind="stable").tolist():
+        before = parent[row]
+        if before >= 0:
+            same = straightest.get((int(before), int(start[row]))) == row
+            axis[row], order[row] = (axis[before], order[before]) if same else (row, order[before] + 1)
+    return axis, order
+
+
+def _ahead(parent, level, length):
+    """The longest way from the start of every row to a tip, away from the root."""
+    ahead = np.array(length, float)
+    for row in np.argsort(-level, kind="stable").tolist():  # those farthest from the root first
+        before = parent[row]
+        if before >= 0:
+            ahead[before] = max(ahead[before], length[before] + ahead[row])
+    return ahead
 
 
 def _mean(values, weights):

@@ -1,4 +1,4 @@
-"""How far a skeleton is from a known axis."""
+"""A known axis, and how far a skeleton is from it."""
 
 from __future__ import annotations
 
@@ -7,16 +7,65 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
+from ..errors import InvalidParameterError
+from ..numerics.components import component_labels
 from ..skeleton import Skeleton
-from .curves import places_along
-from .graph import check_graph, simple_edges
-from .matching import JUNCTION_REACH, TIP_REACH, matching_f1, merged_junctions
+from .curves import check_graph, places_along, simple_edges
 from .summary import structure
-from .truth import Truth
 
 PLACE_SPACING = 0.1  # fitted: of the places where curves are compared, in median true radii
-COUNTS = ("components", "loops", "leaves", "junctions")
+# derived: one radius from where the axis ends, in the middle of the round end, to the tip, and 1.5 along the axis
+TIP_REACH = 2.5
+# derived: where limbs meet is known to a local radius, that of the junction found and that of the true one
+JUNCTION_REACH = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """A known axis: a graph of straight edges with the distance to the surface at its nodes.
+
+    Attributes
+    ----------
+    nodes : (M, 3) float64 array
+    edges : (E, 2) int64 array
+        Without any, the nodes themselves are the axis: a ball has one.
+    radii : (M,) float64 array
+        Positive, in the units of `nodes`.
+
+    Raises
+    ------
+    InvalidParameterError
+        There are no nodes, shapes do not fit, a number is not finite, a radius is not positive, or an edge names a
+        missing node.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> ring = torus(1000)
+    >>> truth = Truth(ring.nodes, ring.edges, ring.radii)
+    >>> len(truth.nodes) == len(ring.nodes)
+    True
+    """
+
+    nodes: np.ndarray
+    edges: np.ndarray
+    radii: np.ndarray
+
+    def __post_init__(self):
+        try:
+            nodes = np.asarray(self.nodes, float).reshape(-1, 3)
+            radii = np.asarray(self.radii, float).reshape(-1)
+        except (TypeError, ValueError) as error:
+            raise InvalidParameterError(f"the truth has nodes or radii of no use: {error}") from None
+        if len(nodes) == 0:
+            raise InvalidParameterError("the truth has no nodes: there is no axis to compare with")
+        if len(radii) != len(nodes) or not (np.isfinite(radii) & (radii > 0)).all():
+            raise InvalidParameterError("the truth must have a positive, finite radius at each of its nodes")
+        edges = check_graph(nodes, self.edges, "truth")
+        for name, array in (("nodes", nodes), ("edges", edges), ("radii", radii)):
+            object.__setattr__(self, name, array)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,28 +77,24 @@ class Comparison:
 
     Attributes
     ----------
-    error : float
-        Mean over the skeleton of its distance to the axis over the radius. 0 is best; 1 is the surface.
-    inside : float
-        Share of the skeleton that is less than a radius away from the axis.
+    error, inside : float
+        Mean over the skeleton of its distance to the axis over the radius, of which 1 is the surface; share of it that
+        is less than a radius away.
     completeness : float
         Share of the axis that is less than a radius away from the skeleton.
     length : float or None
-        Length of the skeleton over that of the axis. 1 is best. None if the axis has none.
+        Length of the skeleton over that of the axis. None if the axis has none.
     ends : float or None
         Mean over the axis's leaves of the distance to the nearest leaf of the skeleton (to its nearest vertex, if it
-        has no leaf) over the radius. 0 is best. None if the axis has no leaf.
+        has no leaf) over the radius. None if the axis has no leaf.
     radius_error : float or None
-        Mean over the skeleton of ``|r - radius| / radius``, with its own radii r. 0 is best. None without radii.
+        Mean over the skeleton of ``|r - radius| / radius``, with its own radii r. None without radii.
     tips_f1, junctions_f1 : float
-        F1 of the skeleton's leaves as a guess at the axis's, and of its junctions. 0 to 1, 1 is best, also if neither
-        has any.
+        F1 of the skeleton's leaves as a guess at the axis's, and of its junctions; 1 also if neither has any.
     components, loops, leaves, junctions : int
         Their number in the skeleton minus that in the axis.
-    topology : bool
-        Whether components and loops agree.
-    perfect : bool
-        Whether components and loops agree, and all leaves are matched: `tips_f1` is 1.
+    topology, perfect : bool
+        Whether components and loops agree; and also all leaves are matched: `tips_f1` is 1.
     edge_error : (E,) float array
         `error` of each edge of the skeleton. Not part of `as_dict`.
 
@@ -129,7 +174,9 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
 
     mine, true = (replace(each, edges=simple_edges(each.edges)) for each in (curve, axis))
     mine_counts, true_counts = structure(mine), structure(true)
-    difference = {name: mine_counts[name] - true_counts[name] for name in COUNTS}
+    difference = {
+        name: mine_counts[name] - true_counts[name] for name in ("components", "loops", "leaves", "junctions")
+    }
     topology = difference["components"] == 0 == difference["loops"]
     tips, tip_radius = true.vertices[true.leaves], true.radii[true.leaves]
     ends = mine.vertices[mine.leaves] if len(mine.leaves) else mine.vertices
@@ -151,3 +198,44 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
         perfect=topology and tips_f1 == 1,
         edge_error=np.bincount(edge, error) / np.bincount(edge) if len(edges) else np.empty(0),
     )
+
+
+def matching_f1(found, true, reach):
+    """F1 of found points as a guess at the true ones, (n, 3) and (m, 3); 1 if there are neither.
+
+    A pair is no further apart than the `reach`, (m,), of its true point. The nearest pairs come first, each point once.
+    """
+    if len(found) == 0 or len(true) == 0:
+        return float(len(found) == len(true))
+    return 2 * len(matched(found, true, reach)) / (len(found) + len(true))
+
+
+def matched(found, true, reach):
+    """The pairs of `matching_f1`: a list of (row of `found`, row of `true`)."""
+    apart = cdist(found, true)
+    apart[apart > reach] = np.inf
+    pairs = []
+    while np.isfinite(apart.min(initial=np.inf)):
+        row, column = np.unravel_index(apart.argmin(), apart.shape)
+        apart[row], apart[:, column] = np.inf, np.inf
+        pairs.append((int(row), int(column)))
+    return pairs
+
+
+def merged_junctions(points, axis, axis_radius):
+    """Clusters of junctions, (n, 3), that are within a local radius of the next one: their means and local radii.
+
+    The local radius of a junction is that of the thickest part whose ball around a place of the axis holds it, else
+    that of the nearest place; of a cluster it is the largest. `axis` (k, 3) and `axis_radius` (k,) are places along the
+    true axis.
+    """
+    away = cdist(points, axis)
+    local = np.where(away < axis_radius, axis_radius, 0.0).max(axis=1)
+    local = np.where(local > 0, local, axis_radius[away.argmin(axis=1)])
+    near = cdist(points, points) <= np.maximum(local[:, None], local)
+    group = component_labels(len(points), np.argwhere(near))
+    size = np.bincount(group)
+    means = np.column_stack([np.bincount(group, values) for values in points.T]) / size[:, None]
+    largest = np.zeros(len(size))
+    np.maximum.at(largest, group, local)
+    return means, largest

@@ -1,19 +1,15 @@
-"""Curves as places along their edges, and how far apart two are."""
+"""Curves as arrays of edges, and as places along these; and numbers that are given, checked."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidParameterError
-from ..numerics.groups import group_median
-from ..numerics.vectors import TINY, dot, norm
-
-NEAREST_PLACES = 20_000  # fitted: along an axis, among which the nearest is sought, and one for each edge
-LEAST_OWNERS = 3  # fitted: points that a radius is measured by, at least: one or two may be anything
-FARTHEST_MEDIAN = 0.5  # derived: no body's points are farther from its middle than so much of its diagonal
+from ..numerics.vectors import norm
+from ..parameters import parameter, problem_with
 
 
 def pieces(nodes, edges, step):
@@ -58,48 +54,30 @@ def places_along(skeleton, step):
     return row, place, radius
 
 
-def radii_from_points(nodes, edges, points):
-    """Radii of an axis that has none, (M,) float array of positive numbers, from a cloud around it.
-
-    The radius at a node is the median distance of the points whose nearest place on the axis is nearer to that node
-    than to the other end of its edge. Nodes with fewer than three such points have the radius of the nearest one with
-    enough, along the axis, or straight where nothing of their part has enough. An InvalidParameterError says that the
-    points are not around the axis: too few for any node, far away, or on it.
-    """
-    node, distance = _owner(nodes, edges, points)
-    count = np.bincount(node, minlength=len(nodes))
-    radii = group_median(distance, node, len(nodes))
-    known = (count >= LEAST_OWNERS) & (radii > 0)
-    if np.median(distance) > FARTHEST_MEDIAN * np.linalg.norm(np.ptp(points, axis=0)):
-        raise InvalidParameterError("the axis has no points near: are it and the cloud in one place and unit?")
-    if not known.any():
-        raise InvalidParameterError(
-            f"no node of the axis has {LEAST_OWNERS} points around it, so that radii cannot be measured: give them"
-        )
-    return radii[_nearest_known(nodes, edges, known)]
+def check_graph(vertices, edges, name):
+    """Edges as an (E, 2) int64 array; an InvalidParameterError says why `name`, as it calls the graph, is none."""
+    edges = np.asarray(edges)
+    edges = edges if edges.size else np.empty((0, 2), np.int64)
+    if len(vertices) == 0:
+        raise InvalidParameterError(f"the {name} is empty")
+    if not np.isfinite(vertices).all():
+        raise InvalidParameterError(f"the {name} has coordinates that are not finite")
+    if edges.ndim != 2 or edges.shape[1] != 2 or edges.dtype.kind not in "iu":
+        raise InvalidParameterError(f"the {name}'s edges must be an (E, 2) array of whole numbers")
+    if edges.size and (edges.min() < 0 or edges.max() >= len(vertices)):
+        raise InvalidParameterError(f"an edge of the {name} names a vertex that is not there")
+    return edges.astype(np.int64)
 
 
-def _owner(nodes, edges, points):
-    """The node that the nearest place on the axis belongs to, and how far that place is; (n,) arrays."""
-    if len(edges) == 0:
-        distance, node = cKDTree(nodes).query(points)
-        return node, distance
-    step = max(norm(nodes[edges[:, 1]] - nodes[edges[:, 0]]).sum() / NEAREST_PLACES, TINY)
-    row, part = pieces(nodes, edges, step)
-    edge = edges[row[cKDTree(along(edges, row, part, nodes)).query(points)[1]]]
-    start, span = nodes[edge[:, 0]], nodes[edge[:, 1]] - nodes[edge[:, 0]]
-    share = np.clip(dot(points - start, span) / np.maximum(dot(span, span), TINY), 0, 1)
-    distance = norm(points - start - share[:, None] * span)
-    return np.where(share < 0.5, edge[:, 0], edge[:, 1]), distance
+def simple_edges(edges):
+    """Edges, (E, 2) int array, as pairs i < j, sorted, each once, and none from a node to itself."""
+    edges = np.unique(np.sort(edges, axis=1), axis=0)
+    return edges[edges[:, 0] != edges[:, 1]]
 
 
-def _nearest_known(nodes, edges, known):
-    """The nearest node that is known, along the edges or else straight, (M,) int array; their own for those."""
-    n, (a, b) = len(nodes), edges.T
-    length = np.maximum(norm(nodes[b] - nodes[a]), TINY)
-    graph = coo_matrix((length, (a, b)), (n, n)).tocsr()
-    source = dijkstra(graph, directed=False, indices=np.flatnonzero(known), return_predecessors=True, min_only=True)[2]
-    apart = np.flatnonzero(source < 0)
-    if len(apart):
-        source[apart] = np.flatnonzero(known)[cKDTree(nodes[known]).query(nodes[apart])[1]]
-    return source
+def check_number(name: str, value: Any, type: str = "float", **limits: Any) -> Any:
+    """A number of a type and within limits of `parameters.parameter`; InvalidParameterError for anything else."""
+    problem = problem_with(value, parameter(None, "", type=type, **limits).metadata)
+    if problem:
+        raise InvalidParameterError(f"{name} = {value!r}: {problem}")
+    return float(value) if type == "float" else value

@@ -18,7 +18,6 @@ CELL_NEIGHBOURS = 8  # measured: of 1230 ways through sparse walls 11 seemed fre
 CLOSE_POINTS = 0.5
 WIDER = (1, 2, 3)  # measured: clearances to try; in noise of 0.5 % of the diagonal the first alone leaves few grasps
 AT_THE_SIDE = np.sqrt(3) / 2  # derived: where a side begins, over the radius: the cosine of 30 degrees
-OUTSIDE_CONE = "ways in outside the cone"
 NOTHING_BETWEEN = "ways in with nothing between the jaws"
 
 
@@ -31,56 +30,51 @@ class Ways(NamedTuple):
     closing: np.ndarray  # (P, A, 3), from jaw to jaw
 
 
-class Scene(NamedTuple):
-    """What the gripper must not meet, and how it may come."""
-
-    points: np.ndarray  # (n, 3), of the object; none if nobody is to look at them
-    obstacles: list[np.ndarray]  # as `obstacle_list` gives them
-    middle: np.ndarray  # (m, 3), where the object is: on this side of planes; the gripper comes from a diagonal away
-    cone: tuple[np.ndarray, float] | None  # a unit direction, and the least cosine of the angle of an approach to it
-
-
 def free_ways(
-    ways: Ways, scene: Scene, gripper: Gripper, width: np.ndarray, clearance: float
+    ways: Ways,
+    wanted: np.ndarray,
+    points: np.ndarray,
+    obstacles: list[np.ndarray],
+    middle: np.ndarray,
+    gripper: Gripper,
+    width: np.ndarray,
+    clearance: float,
 ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
     """What keeps the gripper from coming in, open a little wider than the `width` of the part, (P,), or wider still.
+
+    `wanted`, (P, A) bool array, are the ways to look at, `points` those of the object, if anybody is to look at them,
+    and `obstacles` as `obstacle_list` gives them. Where the object is says `middle`, (m, 3): on this side of planes,
+    and the gripper comes from its diagonal away.
 
     The reasons, (P, A) bool arrays, are those at the least opening, for ways that are free at none. Three (P, A) arrays
     follow: the least opening at which the way is free, the depth of the fingertips past the axis, and the number of
     sides of the part that have points, as in `GraspCandidates`.
     """
-    shape = ways.approach.shape[:2]
-    far = float(np.linalg.norm(np.ptp(scene.middle, axis=0)))
+    far = float(np.linalg.norm(np.ptp(middle, axis=0)))
     close = CLOSE_POINTS * min(gripper.finger[:2])
-    surface = cells(scene.points, close)
-    obstacles = [each if each.ndim == 1 else cells(each, close) for each in scene.obstacles]
+    scene = [("the object", cells(points, close))] if len(points) else []
+    scene += [("an obstacle", each if each.ndim == 1 else cells(each, close)) for each in obstacles]
     depth = np.minimum(gripper.reach, width / 2)
     reasons: dict[str, np.ndarray] = {}
-    opening, seen, free = np.full(shape, np.nan), np.zeros(shape, int), np.zeros(shape, bool)
+    opening, seen, free = np.full(wanted.shape, np.nan), np.zeros(wanted.shape, int), np.zeros(wanted.shape, bool)
     for times in WIDER:
         wide = np.minimum(width + times * clearance, gripper.max_opening)
         low, high = swept(gripper, wide, depth, clearance, far)
-        asked = ~free
-        found: dict[str, np.ndarray] = {}
-        if scene.cone is not None:
-            found[OUTSIDE_CONE] = ways.approach @ scene.cone[0] < scene.cone[1]
-            asked &= ~found[OUTSIDE_CONE]
-        if len(surface):
-            found |= _met(ways, surface, scene.middle, low, high, asked, "the object")
-            asked &= ~np.any(list(found.values()), axis=0)
-            beside = hits(ways, surface, *sides(gripper, wide, depth, width), asked)
-            seen = np.where(asked, beside.sum(axis=2), seen)
-            found[NOTHING_BETWEEN] = asked & ~beside[..., :2].any(axis=2)
-            asked &= ~found[NOTHING_BETWEEN]
-        for obstacle in obstacles:
-            for name, part in _met(ways, obstacle, scene.middle, low, high, asked, "an obstacle").items():
+        asked, found = wanted & ~free, {}
+        for what, surface in scene:
+            for name, part in _met(ways, surface, middle, low, high, asked, what).items():
                 found[name] = found.get(name, False) | part
                 asked &= ~part
+            if what == "the object":
+                beside = hits(ways, surface, *sides(gripper, wide, depth, width), asked)
+                seen = np.where(asked, beside.sum(axis=2), seen)
+                found[NOTHING_BETWEEN] = asked & ~beside[..., :2].any(axis=2)
+                asked &= ~found[NOTHING_BETWEEN]
         opening = np.where(asked, wide[:, None], opening)
         free |= asked
         reasons = reasons or found
     met = {name: part & ~free for name, part in reasons.items()}
-    return met, opening, np.broadcast_to(depth[:, None], shape), seen
+    return met, opening, np.broadcast_to(depth[:, None], wanted.shape), seen
 
 
 def _met(ways, obstacle, middle, low, high, asked, what) -> dict[str, np.ndarray]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,14 +13,12 @@ from ..errors import InvalidParameterError, SkeletonWarning
 from ..interop.clouds import cloud_points
 from ..numerics.polylines import arc_lengths
 from ..report import outside
-from .grasp_checks import Scene, Ways, free_ways, obstacle_list
-from .grasp_rows import GraspCandidates, listed
-from .gripper import Gripper, checked
+from .curves import check_number
+from .grasp_checks import Ways, free_ways, obstacle_list
+from .gripper import GraspCandidates, Gripper, listed
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
-
-UNIT_FACTOR = 10  # derived: the least factor between metric units that people mistake for each other
 
 
 def grasp_candidates(
@@ -38,13 +35,14 @@ def grasp_candidates(
     min_confidence: float = 0.5,
     up: Any = None,
 ) -> GraspCandidates:
-    r"""Candidates for grasps with parallel jaws, from the axis and the radii of a skeleton's branches.
+    """Candidates for grasps with parallel jaws, from the axis and the radii of a skeleton's branches.
 
     The jaws close across a branch: at places along its curve, from directions around it. The gripper comes in straight,
     open, from as far away as the diagonal of the object, until its fingertips are past the axis: by its reach, or as
     far as the part if that is less. Ways on which a finger or the palm would sweep over points of the object, or over
     an obstacle, are left out, and so are those on which there is no point between the jaws. What no camera has seen is
-    taken for free.
+    taken for free. The quality ranks; it is no measure of force closure. Its formula, each step, and the sources
+    (Vahrenkamp et al. 2018; ten Pas et al. 2017): docs/grasping.md.
 
     Parameters
     ----------
@@ -91,31 +89,12 @@ def grasp_candidates(
     SkeletonWarning
         There is no candidate; it says why.
 
-    Notes
-    -----
-    With the radius r of the ball on the axis that touches the surface and its change :math:`r' = dr/ds` along the
-    curve, a part of round section is :math:`w = 2 r / \sqrt{1 - r'^2}` wide. The quality, confidence x
-    :math:`(1 - w / w_{max}) \sqrt{1 - r'^2}` x seen / 3, ranks, with 1 for unknown factors; it is no measure of force
-    closure. More on each step: docs/grasping.md.
-
-    References
-    ----------
-    After Vahrenkamp et al. 2018, "Planning high-quality grasps using mean curvature object skeletons", IEEE RA-L 3(2),
-    who place hands along the branches of a mesh's skeleton, and evaluate their contacts. Ten Pas et al. 2017, "Grasp
-    pose detection in point clouds", IJRR 36(13-14), check candidates as here: no point in the hand, some between its
-    fingers.
-
     Examples
     --------
     >>> from glsk_o3d import Skeleton
     >>> from glsk_o3d.samples import tube
     >>> straight = tube(length=1.0, radius=0.1)
     >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), (), confidence=[1, 1])
-    >>> grasps = grasp_candidates(axis, 0.4, cloud=straight.points, clearance=0.05, around=4)
-    >>> grasps
-    GraspCandidates(36 at 9 places)
-    >>> float(grasps.opening[0]), float(grasps.quality[0])
-    (0.25, 0.5)
     >>> table = (0, 0, 1, 0.1)  # z = -0.1: the tube lies on it, and cannot be taken from below, nor from the side
     >>> grasp_candidates(axis, 0.4, cloud=straight.points, obstacles=table, clearance=0.05, around=4)
     GraspCandidates(9 at 9 places; not taken: 27 ways in with a finger in an obstacle)
@@ -127,54 +106,44 @@ def grasp_candidates(
     above = _direction("up", up) if up is not None else np.array([0.0, 0, 1]) if cone is None else -cone[0]
     points = _object(skeleton, cloud)
     middle = points if len(points) else skeleton.vertices
-    size = np.linalg.norm(np.ptp(middle, axis=0))
-    if 0 < UNIT_FACTOR * size < gripper.max_opening:
-        message = f"the gripper opens {gripper.max_opening:.3g} and the object is {size:.3g} long: is it the same unit?"
-        warnings.warn(message, SkeletonWarning, stacklevel=outside())
-    places, left_out = _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence)
-    approach = _directions_around(places.axis, above, around)
-    ways = Ways(places.position, places.axis, approach, np.cross(places.axis[:, None], approach))
-    scene = Scene(points, obstacle_list(obstacles), middle, cone)
-    blocked, opening, depth, seen = free_ways(ways, scene, gripper, places.width, clearance)
-    free, ways_left_out = _sorted_out(blocked, len(approach) * around)
-    quality = places.quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
+    place, branch, width, quality, left_out, looked_at = _fitting(
+        skeleton, gripper, clearance, spacing, margin, min_confidence
+    )
+    position, axis = place[:, :3], place[:, 3:6]
+    approach = _directions_around(axis, above, around)
+    ways = Ways(position, axis, approach, np.cross(axis[:, None], approach))
+    wanted = np.ones(approach.shape[:2], bool) if cone is None else approach @ cone[0] >= cone[1]
+    blocked, opening, depth, seen = free_ways(
+        ways, wanted, points, obstacle_list(obstacles), middle, gripper, width, clearance
+    )
+    free, ways_left_out = _sorted_out({"ways in outside the cone": ~wanted, **blocked})
+    quality = quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
     order = np.argsort(-quality.round(9), kind="stable")  # equal ones differ in their last digits
     free, quality = free[order], quality[order]
-    place = free // around
+    row = free // around
     candidates = GraspCandidates(
-        position=places.position[place],
+        position=position[row],
         approach=approach.reshape(-1, 3)[free],
         closing=ways.closing.reshape(-1, 3)[free],
         opening=opening.ravel()[free],
         depth=depth.ravel()[free],
-        branch=places.branch[place],
-        confidence=places.confidence[place],
+        branch=branch[row],
+        confidence=place[row, 8],
         quality=quality,
         seen=seen.ravel()[free],
         gripper=gripper,
-        places=places.looked_at,
+        places=looked_at,
         left_out=left_out | ways_left_out,
     )
     if len(candidates) == 0:
         why = listed(candidates.left_out) or "the skeleton has no branch"
-        warnings.warn(f"no grasp at {places.looked_at} places: {why}", SkeletonWarning, stacklevel=outside())
+        warnings.warn(f"no grasp at {looked_at} places: {why}", SkeletonWarning, stacklevel=outside())
     return candidates
 
 
-class _Places(NamedTuple):
-    """Where the part fits between the jaws: arrays with a row for each place, and how many were looked at."""
-
-    position: np.ndarray
-    axis: np.ndarray
-    width: np.ndarray
-    quality: np.ndarray
-    confidence: np.ndarray
-    branch: np.ndarray
-    looked_at: int
-
-
 def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
-    """Places that fit, and how many do not, by reason."""
+    """Places that fit between the jaws, as of `_places_on`, the branch, width and quality of each, how many do not fit,
+    by reason, and how many were looked at."""
     found = [_places_on(skeleton, path, spacing, margin) for path in skeleton.branches]
     place = np.concatenate([np.empty((0, 9)), *found])
     branch = np.repeat(np.arange(len(found)), list(map(len, found))) if found else np.empty(0, int)
@@ -189,17 +158,16 @@ def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
         "too thin": width <= gripper.min_opening,
         "uncertain": ~(confidence >= min_confidence) if min_confidence > 0 else np.zeros(len(width), bool),
     }
-    some, left_out = _sorted_out(reasons, len(place))
+    some, left_out = _sorted_out(reasons)
     short = sum(len(rows) == 0 for rows in found)
     if short:
         left_out["branches without a place between their margins"] = short
-    place, branch, confidence = place[some], branch[some], confidence[some]
-    return _Places(place[:, :3], place[:, 3:6], width[some], quality[some], confidence, branch, len(width)), left_out
+    return place[some], branch[some], width[some], quality[some], left_out, len(place)
 
 
-def _sorted_out(reasons, n):
+def _sorted_out(reasons):
     """The rows for which no reason holds, and how often each is the first that does."""
-    first = np.select([reason.ravel() for reason in reasons.values()], list(reasons), "") if reasons else np.full(n, "")
+    first = np.select([reason.ravel() for reason in reasons.values()], list(reasons), "")
     return np.flatnonzero(first == ""), dict(Counter(first[first != ""].tolist()))
 
 
@@ -272,20 +240,21 @@ def _check(skeleton, clearance, around, spacing, margin, min_confidence):
         raise InvalidParameterError("grasps need finite vertices and radii: save skeletons as .json, .npz or .ply")
     if min_confidence != 0 and np.isnan(skeleton.confidence).all():
         raise InvalidParameterError("this skeleton has no confidence, perhaps due to its file: give min_confidence=0")
-    checked("clearance", clearance, low=0)
+    check_number("clearance", clearance, low=0)
     if spacing is not None:
-        checked("spacing", spacing, low=0, open_low=True)
-    checked("margin", margin, low=0)
-    checked("min_confidence", min_confidence, low=0, high=1)
-    checked("around", around, type="int", low=1)
+        check_number("spacing", spacing, low=0, open_low=True)
+    check_number("margin", margin, low=0)
+    check_number("min_confidence", min_confidence, low=0, high=1)
+    check_number("around", around, "int", low=1)
 
 
 def _cone(cone):
     """Its unit direction, and the least cosine of the angle to it."""
-    if not isinstance(cone, Iterable) or isinstance(cone, str) or len(tuple(cone)) != 2:
-        raise InvalidParameterError(f"cone = {cone!r}: must be a direction and an angle in degrees")
-    direction, degrees = cone
-    angle = checked("the angle of cone", degrees, low=0, high=180)
+    try:
+        direction, degrees = cone
+    except (TypeError, ValueError):
+        raise InvalidParameterError(f"cone = {cone!r}: must be a direction and an angle in degrees") from None
+    angle = check_number("the angle of cone", degrees, low=0, high=180)
     return _direction("the direction of cone", direction), math.cos(math.radians(angle)) - 1e-9  # rounding
 
 

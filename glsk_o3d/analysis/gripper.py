@@ -1,15 +1,21 @@
-"""A gripper with parallel jaws: how far it opens, and the boxes that its fingers and its palm fill."""
+"""A gripper with parallel jaws, and grasps for it: as arrays, as frames, drawn, and in files."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+import math
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InvalidParameterError
-from ..parameters import parameter, problem_with
+from ..interop.atomic import write_atomically, write_json
+from ..interop.packages import import_open3d, require
+from .curves import check_number
+from .rows import Rows
 
 # Published: shapes of the Franka Hand in its maker's description (franka_description, franka_hand.xacro), which opens
 # 80 mm, over that: the fingertip and how far it is from the finger's joint; the capsule around the hand as far as that
@@ -31,11 +37,9 @@ class Gripper:
         Between the jaws, as wide as they open.
     min_opening : float
         Down to which they close; parts that are no wider cannot be held.
-    finger : (3,) tuple of float
-        Thickness of a finger, along the closing direction; its width, along the part; its length, from the palm to its
-        tip.
-    palm : (3,) tuple of float
-        What is behind the fingers: its extent along the closing direction, along the part, and along the approach.
+    finger, palm : (3,) tuples of float
+        Extents along the closing direction, along the part, and along the approach: of a finger, from the palm to its
+        tip, and of what is behind the fingers.
     reach : float
         How far the fingertips reach past the axis of the part; less on parts that are thinner than twice this.
 
@@ -47,9 +51,8 @@ class Gripper:
 
     Examples
     --------
-    >>> hand = Gripper(0.08)
-    >>> [round(length, 4) for length in (*hand.finger, *hand.palm, hand.reach)]
-    [0.0152, 0.0175, 0.0545, 0.18, 0.08, 0.0584, 0.0095]
+    >>> [round(length, 4) for length in Gripper(0.08).finger]
+    [0.0152, 0.0175, 0.0545]
     """
 
     max_opening: float
@@ -59,34 +62,21 @@ class Gripper:
     reach: Any = None
 
     def __post_init__(self) -> None:
-        opening = checked("max_opening", self.max_opening, low=0, open_low=True)
+        opening = check_number("max_opening", self.max_opening, low=0, open_low=True)
         finger = _sides("finger", self.finger, FINGER_PER_OPENING, opening)
-        given = dict(
-            max_opening=opening,
-            min_opening=checked("min_opening", self.min_opening, low=0, high=opening),
-            finger=finger,
-            palm=_sides("palm", self.palm, PALM_PER_OPENING, opening),
-            reach=checked(
-                "reach", opening * REACH_PER_OPENING if self.reach is None else self.reach, low=0, high=finger[2]
-            ),
-        )
-        for name, value in given.items():
-            object.__setattr__(self, name, value)
+        reach = opening * REACH_PER_OPENING if self.reach is None else self.reach
+        object.__setattr__(self, "max_opening", opening)
+        object.__setattr__(self, "min_opening", check_number("min_opening", self.min_opening, low=0, high=opening))
+        object.__setattr__(self, "finger", finger)
+        object.__setattr__(self, "palm", _sides("palm", self.palm, PALM_PER_OPENING, opening))
+        object.__setattr__(self, "reach", check_number("reach", reach, low=0, high=finger[2]))
 
     def boxes(self, opening: Any, depth: Any) -> tuple[np.ndarray, np.ndarray]:
         """The two fingers and the palm, in the frame of the gripper: x closing, y along the part, z approach.
 
-        Parameters
-        ----------
-        opening : float or (n,) array_like
-            Between the jaws.
-        depth : float or (n,) array_like
-            How far the fingertips are past the axis of the part, where the origin is.
-
-        Returns
-        -------
-        low, high : (3, 3) or (n, 3, 3) float array
-            Opposite corners of the finger towards -x, of that towards +x, and of the palm.
+        Of an opening between the jaws, and a depth of the fingertips past the axis of the part, where the origin is,
+        each a number or an (n,) array: `low` and `high`, (3, 3) or (n, 3, 3) float arrays, are opposite corners of the
+        finger towards -x, of that towards +x, and of the palm.
         """
         inner, tip = np.asarray(opening, float)[..., None, None] / 2, np.asarray(depth, float)[..., None, None]
         thickness, width, length = self.finger
@@ -97,6 +87,136 @@ class Gripper:
         return low + moved, high + moved
 
 
+@dataclass(frozen=True, eq=False)
+class GraspCandidates(Rows, row="grasp"):
+    """Places and directions for a gripper with parallel jaws, best first.
+
+    Lengths are in the cloud's units, directions have the length 1. Iteration gives a dict of plain numbers per
+    candidate, with ``position_x`` and so on; an index, a slice or a mask selects some.
+
+    Attributes
+    ----------
+    position, approach, closing : (G, 3) float arrays
+        On the axis, midway between the jaws; where the gripper comes in, perpendicular to the axis; from jaw to jaw,
+        perpendicular to both.
+    opening, depth : (G,) float arrays
+        Between the jaws as they come in: the width of the part and the clearance, or up to three of it. How far the
+        fingertips are past the position.
+    branch : (G,) int array
+        Position in `Skeleton.branches`.
+    confidence, quality : (G,) float arrays
+        From 0 to 1; the skeleton's confidence there is NaN where it is unknown.
+    seen : (G,) int array
+        How many have points of the three sides that the gripper is around: those on which the jaws close, and the one
+        towards the palm. What was not seen may be in the way. 0 if nobody has looked.
+    gripper : Gripper
+        That they are for.
+    places : int
+        Places along the skeleton that were looked at.
+    left_out : dict of str to int
+        How many places were not taken, and how many ways in to the others, by the first reason that holds.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.analysis import grasp_candidates
+    >>> from glsk_o3d.samples import tube
+    >>> best = grasp_candidates(skeletonize(tube(1000).points), 0.4)[:3]
+    >>> best.poses.shape, best.seen
+    ((3, 4, 4), array([3, 3, 3]))
+    """
+
+    position: np.ndarray
+    approach: np.ndarray
+    closing: np.ndarray
+    opening: np.ndarray
+    depth: np.ndarray
+    branch: np.ndarray
+    confidence: np.ndarray
+    quality: np.ndarray
+    seen: np.ndarray
+    gripper: Gripper
+    places: int = 0
+    left_out: dict[str, int] = field(default_factory=dict)
+
+    def __getitem__(self, rows) -> GraspCandidates:
+        rows = np.atleast_1d(np.arange(len(self))[rows])
+        arrays = {name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return replace(self, **arrays)
+
+    def __repr__(self):
+        missed = f"; not taken: {listed(self.left_out)}" if self.left_out else ""
+        return f"GraspCandidates({len(self)} at {self.places} places{missed})"
+
+    @property
+    def axis(self) -> np.ndarray:
+        """Direction of the skeleton, (G, 3) float array: the third one, approach x closing."""
+        return np.cross(self.approach, self.closing)
+
+    @property
+    def poses(self) -> np.ndarray:
+        """Frames of the gripper, (G, 4, 4) float array: x closing, y along the part, z approach."""
+        poses = np.tile(np.eye(4), (len(self), 1, 1))
+        for column, vectors in enumerate((self.closing, self.axis, self.approach, self.position)):
+            poses[:, :3, column] = vectors
+        return poses
+
+    def to_line_set(self):
+        """Each gripper as a fork of four lines, an ``open3d.geometry.LineSet``.
+
+        Two are the fingers, from tip to palm, with the opening between them, one joins them, one is as long as the palm
+        is deep. Colours go from dark blue, the least quality among them, to yellow, the best.
+        """
+        o3d, viridis = import_open3d(), require("matplotlib").colormaps["viridis"]
+        hand = self.gripper
+        side, tip = self.opening[:, None] / 2 * self.closing, self.depth[:, None] * self.approach
+        base = tip - hand.finger[2] * self.approach
+        fork = [side + tip, side + base, -side + base, -side + tip, base, base - hand.palm[2] * self.approach]
+        ends = (self.position + np.array(fork)).transpose(1, 0, 2).reshape(-1, 3)
+        lines = np.array([[0, 1], [1, 2], [2, 3], [4, 5]]) + len(fork) * np.arange(len(self))[:, None, None]
+        drawn = o3d.geometry.LineSet()
+        drawn.points = o3d.utility.Vector3dVector(ends)
+        drawn.lines = o3d.utility.Vector2iVector(lines.reshape(-1, 2).astype(np.int32))
+        worst, best = self.quality.min(initial=1), self.quality.max(initial=0)
+        shade = (self.quality - worst) / (best - worst) if best > worst else np.ones(len(self))
+        drawn.colors = o3d.utility.Vector3dVector(np.repeat(viridis(shade)[:, :3], 4, axis=0))
+        return drawn
+
+    def to_json(self, path: str | os.PathLike) -> None:
+        """Write candidates, poses, gripper, and the reasons for what was left out; an unknown confidence is null."""
+        write_json(path, self.as_dict())
+
+    def as_dict(self) -> dict:
+        """What `to_json` writes: plain numbers, lists and dicts."""
+        columns = {name: value.tolist() for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        columns["confidence"] = [None if math.isnan(value) else value for value in columns["confidence"]]
+        columns["pose"] = self.poses.tolist()
+        return {
+            "frame": "origin on the axis, x closing, y along the part, z approach; the cloud's units",
+            "gripper": asdict(self.gripper),
+            "places": self.places,
+            "left_out": self.left_out,
+            "grasps": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
+        }
+
+    def to_ply(self, path: str | os.PathLike) -> None:
+        """Write the forks of `to_line_set` as a PLY file with coloured edges."""
+        o3d, drawn = import_open3d(), self.to_line_set()
+        if len(self) == 0:
+            raise InvalidParameterError("there is no grasp to draw: write .json or .csv, which may be empty")
+
+        def write(temporary: Path) -> None:
+            if not o3d.io.write_line_set(str(temporary), drawn):
+                raise OSError("Open3D could not write it: is the disk full?")
+
+        write_atomically(path, write)
+
+
+def listed(left_out: Mapping[str, int]) -> str:
+    """How many places and ways in were left out, and why."""
+    return ", ".join(f"{count} {reason}" for reason, count in left_out.items())
+
+
 def _sides(name: str, given: Any, ratios: tuple[float, ...], opening: float) -> tuple[float, ...]:
     """The sides of a box, by default in proportion to the opening."""
     if given is None:
@@ -104,12 +224,4 @@ def _sides(name: str, given: Any, ratios: tuple[float, ...], opening: float) -> 
     sides = tuple(given) if isinstance(given, Iterable) else ()
     if len(sides) != 3:
         raise InvalidParameterError(f"{name} = {given!r}: must be three lengths")
-    return tuple(checked(f"a side of {name}", side, low=0, open_low=True) for side in sides)
-
-
-def checked(name: str, value: Any, *, type: str = "float", **limits: Any) -> float:
-    """A number within limits, as those of `parameters.parameter`; InvalidParameterError for anything else."""
-    problem = problem_with(value, parameter(None, "", type=type, **limits).metadata)
-    if problem:
-        raise InvalidParameterError(f"{name} = {value!r}: {problem}")
-    return float(value)
+    return tuple(check_number(f"a side of {name}", side, low=0, open_low=True) for side in sides)

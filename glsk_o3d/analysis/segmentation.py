@@ -1,4 +1,4 @@
-"""Points of a cloud by branch of its skeleton."""
+"""What every point of a cloud belongs to: its branch, how thick that is, and the bones that move the point."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from scipy.spatial import cKDTree
 
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
-from ..numerics.polylines import nearest_on_edges
+from ..numerics.nearest_edges import incident_edges, nearest_on_edges
+from ..numerics.neighbourhoods import nearest_neighbours
+from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from .curves import along, pieces
 
 if TYPE_CHECKING:
@@ -37,10 +39,8 @@ def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
 
     Raises
     ------
-    InvalidCloudError
-        There is no cloud, or it is none.
-    InvalidParameterError
-        The skeleton is empty.
+    InvalidCloudError, InvalidParameterError
+        There is no cloud, or it is none; the skeleton is empty.
 
     Examples
     --------
@@ -134,3 +134,69 @@ def branch_of_point(skeleton, points, vertex):
         edge = nearest_on_edges(skeleton.vertices, skeleton.edges, candidates, points[rows])[0]
         label[rows] = edge_branch[edge]
     return label
+
+
+def thickness(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
+    """Radius of the part that every point belongs to, over the distance to the eighth nearest point.
+
+    Well above 1 the cloud shows the surface of the part. Below 1 the part is thinner than its points are far apart, and
+    its radius is hardly more than a guess.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    cloud : cloud, optional
+        As for `segment`; how far its own points are apart counts.
+
+    Returns
+    -------
+    (N,) float64 array
+        NaN for points that are not finite, and infinite for those with eight others in their place.
+
+    Raises
+    ------
+    InvalidCloudError, InvalidParameterError
+        There is no cloud, or it is none; the skeleton is empty.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> dense, sparse = (thickness(skeletonize(torus(n).points)) for n in (4000, 500))
+    >>> bool(np.median(dense) > 2 * np.median(sparse) > 1)
+    True
+    """
+    return thickness_of_points(skeleton, *vertex_of_cloud(skeleton, cloud))
+
+
+def thickness_of_points(skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
+    """The same for points, (N, 3) float array, whose vertices are known, (N,) int array."""
+    some = np.flatnonzero(vertex >= 0)
+    found = np.full(len(points), np.nan)
+    if len(some):
+        apart = nearest_neighbours(points[some], min(SCALE_NEIGHBOUR + 1, len(some)))[0][:, -1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found[some] = skeleton.radii[vertex[some]] / apart
+    return found
+
+
+def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which bones move each point, and how much, for linear blend skinning: (N, 2) int and (N, 2) float array.
+
+    The forest has no loops and is numbered from its roots outwards; each edge is a bone with its joint at the end that
+    is nearer to the root. A point goes with the edge nearest to it among those of its vertex. Over the first half of
+    an edge its motion fades in, from that of the bone before it: the motion is continuous along the curve and at
+    junctions. Bones are rows of `forest.edges`: the one before and the point's own, or twice that where none is before.
+    """
+    around = incident_edges(forest.edges, len(forest.vertices))
+    bone, along = nearest_on_edges(forest.vertices, forest.edges, around[vertex], points)
+    parent = bone_before(forest)[bone]
+    own = np.where(parent >= 0, np.minimum(2 * along, 1), 1)
+    return np.column_stack([np.where(parent >= 0, parent, bone), bone]), np.column_stack([1 - own, own])
+
+
+def bone_before(forest: Skeleton) -> np.ndarray:
+    """The bone that each bone hangs on, (E,) int array of rows of `forest.edges`; -1 for bones at a root."""
+    leading = np.full(len(forest.vertices), -1)
+    leading[forest.edges[:, 1]] = np.arange(len(forest.edges))
+    return leading[forest.edges[:, 0]]

@@ -18,7 +18,7 @@ from .reporting import WrongUsage
 if TYPE_CHECKING:
     from ..refinement.rooted import RootPlace
     from ..skeleton import Skeleton
-    from ..viewing.recorder import ContractionRecorder
+    from ..viewing.page import ContractionRecorder
 
 REPORT_FILE, PICTURE_FILE = (".json", "report is JSON"), (".png", "picture is a PNG")
 PAGE_FILE = ((".html", ".htm"), "report is a page")

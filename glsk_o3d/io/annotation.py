@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.branches import branch_table
-from ..analysis.segmentation import branch_of_point, label_of_nearest, vertex_of_cloud
-from ..analysis.thickness import thickness_of_points
+from ..analysis.segmentation import branch_of_point, label_of_nearest, thickness_of_points, vertex_of_cloud
 from ..interop.clouds import cloud_points, open3d_class
 from ..interop.packages import import_open3d
 from .colors import ColorChoice, shades, thickness_shades

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 
 from ..analysis.branches import branch_table
-from ..analysis.thickness import thickness_of_points
+from ..analysis.segmentation import thickness_of_points
 from ..errors import InvalidParameterError
 from ..interop.packages import require
 from ..numerics.groups import group_median

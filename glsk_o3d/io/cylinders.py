@@ -19,8 +19,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import savemat
 
-from ..analysis.forestry import metres
-from ..analysis.tree_cylinders import Cylinders
+from ..analysis.trees import Cylinders, metres
 from ..interop.atomic import write_atomically
 from ..numerics.vectors import unit as directions
 from .formats.graphs import text

@@ -6,8 +6,7 @@ that are left out have their defaults. ``"none"`` stands for None, which TOML la
 be ``"extends"``, the name of a pipeline, and ``"set"``, changes to it by filter and parameter.
 """
 
-from .reading import from_recipe, load_recipe
-from .rerun import identical, rerun
-from .writing import RECIPE_ENDINGS, gaps, save_recipe, to_recipe
+from .recipe import RECIPE_ENDINGS, from_recipe, load_recipe, save_recipe, to_recipe
+from .rerun import rerun
 
-__all__ = ["RECIPE_ENDINGS", "from_recipe", "gaps", "identical", "load_recipe", "rerun", "save_recipe", "to_recipe"]
+__all__ = ["RECIPE_ENDINGS", "from_recipe", "load_recipe", "rerun", "save_recipe", "to_recipe"]

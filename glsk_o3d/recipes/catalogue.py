@@ -9,7 +9,9 @@ from ..parameters import Parameters
 from ..pipeline import Filter, Pipeline
 from ..pipelines import BUILTIN, PIPELINES
 from ..state import Contraction
-from .plugins import plugin_filters, plugin_pipelines
+from .plugins import FILTER_GROUP, PIPELINE_GROUP, plugins
+
+__all__ = ["catalogue", "known_pipelines", "named_pipeline"]
 
 
 def catalogue() -> dict[str, type[Parameters]]:
@@ -19,36 +21,17 @@ def catalogue() -> dict[str, type[Parameters]]:
     -------
     dict of str to class
     """
-    known = {**BUILTIN, **plugin_filters()}
+    known = {**BUILTIN, **plugins(FILTER_GROUP)}
     return dict(sorted(known.items(), key=lambda item: not issubclass(item[1], Filter)))
 
 
 def find(name: str) -> type[Parameters] | None:
-    """The filter or stopping rule of that name, if there is one; plugins are only loaded for names of their own.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    class or None
-    """
+    """The filter or stopping rule of that name, if there is one; plugins are only loaded for names of their own."""
     return BUILTIN.get(name) or catalogue().get(name)
 
 
 def serves(cls: type[Parameters], kind: str) -> bool:
-    """Whether an instance can be a parameter of the type ``"reducer"`` or ``"stop"``, or a stage: ``"filter"``.
-
-    Parameters
-    ----------
-    cls : class
-    kind : {"filter", "reducer", "stop"}
-
-    Returns
-    -------
-    bool
-    """
+    """Whether an instance can be a parameter of the type ``"reducer"`` or ``"stop"``, or a stage: ``"filter"``."""
     if kind == "stop" or not issubclass(cls, Filter):
         return kind == "stop" and not issubclass(cls, Filter)
     return kind == "filter" or cls.consumes is cls.produces is Contraction
@@ -62,7 +45,7 @@ def known_pipelines() -> dict[str, Callable[[], Pipeline]]:
     dict of str to callable
         Each makes a Pipeline.
     """
-    return {**PIPELINES, **plugin_pipelines()}
+    return {**PIPELINES, **plugins(PIPELINE_GROUP)}
 
 
 def named_pipeline(name: str) -> Pipeline:

@@ -6,7 +6,6 @@ import dataclasses
 import sys
 import threading
 import warnings
-from collections.abc import Callable
 from contextlib import redirect_stdout
 from typing import Any
 
@@ -17,6 +16,8 @@ from ..parameters import RESERVED_WORDS, TYPES, Parameters
 from ..pipeline import FLOWS, Filter, Pipeline
 from ..pipelines import BUILTIN, PIPELINES
 from ..report import outside
+
+__all__ = ["forget_plugins"]
 
 FILTER_GROUP, PIPELINE_GROUP = "glsk_o3d.filters", "glsk_o3d.pipelines"
 
@@ -29,44 +30,12 @@ _found: dict[str, dict[str, Any]] = {}
 _lock = threading.RLock()
 
 
-def plugin_filters() -> dict[str, type[Parameters]]:
-    """Filters and stopping rules of the entry-point group ``glsk_o3d.filters``, by name.
+def plugins(group: str) -> dict[str, Any]:
+    """What the entry points of `FILTER_GROUP` or `PIPELINE_GROUP` name: classes, or callables that make a Pipeline.
 
-    Returns
-    -------
-    dict of str to class
-
-    Warns
-    -----
-    PluginWarning
-        Once for each that is broken, with its distribution and what is wrong; it is left out, and the others are not.
+    A PluginWarning says once of each that is broken what is wrong; it is left out, and the others are not.
     """
-    return _plugins(FILTER_GROUP, BUILTIN, _check_filter)
-
-
-def plugin_pipelines() -> dict[str, Callable[[], Pipeline]]:
-    """Pipelines of the entry-point group ``glsk_o3d.pipelines``, by name.
-
-    Returns
-    -------
-    dict of str to callable
-        Each makes a Pipeline.
-
-    Warns
-    -----
-    PluginWarning
-        As `plugin_filters`.
-    """
-    return _plugins(PIPELINE_GROUP, PIPELINES, _check_pipeline)
-
-
-def forget_plugins() -> None:
-    """Look for plugins anew when they are next asked for, after one was installed into a running process."""
-    with _lock:
-        _found.clear()
-
-
-def _plugins(group, builtin, check):
+    builtin, check = (BUILTIN, _check_filter) if group == FILTER_GROUP else (PIPELINES, _check_pipeline)
     with _lock:
         if group not in _found:
             found = _found[group] = {}  # already there for plugins that themselves ask for plugins
@@ -78,6 +47,12 @@ def _plugins(group, builtin, check):
             for problem in problems:
                 warnings.warn(problem, PluginWarning, stacklevel=outside())
         return _found[group]
+
+
+def forget_plugins() -> None:
+    """Look for plugins anew when they are next asked for, after one was installed into a running process."""
+    with _lock:
+        _found.clear()
 
 
 def _load(group, builtin, check, found):

@@ -14,20 +14,11 @@ from ..interop.clouds import Cloud
 from ..pipeline import Pipeline, after, with_stage
 from ..report import Report, outside
 from ..skeleton import Skeleton
-from .reading import from_recipe
+from .recipe import from_recipe
 
 
 def identical(skeleton: Skeleton, other: Skeleton) -> bool:
-    """Whether two skeletons have the same vertices, edges and radii, to the last bit.
-
-    Parameters
-    ----------
-    skeleton, other : Skeleton
-
-    Returns
-    -------
-    bool
-    """
+    """Whether two skeletons have the same vertices, edges and radii, to the last bit."""
     return all(
         np.array_equal(getattr(skeleton, name), getattr(other, name), equal_nan=name == "radii")
         for name in ("vertices", "edges", "radii")

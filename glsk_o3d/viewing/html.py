@@ -1,7 +1,9 @@
-"""The parts of the page below the view: numbers, charts and tables, as HTML in which every text is escaped."""
+"""A skeleton and its run as HTML in which every text is escaped: for a notebook, and the parts of the page."""
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import math
 from collections import Counter
@@ -11,20 +13,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..analysis.branches import branch_table
-from ..analysis.summary import point_count
+from ..analysis.summary import point_count, structure, summary
+from ..errors import MissingPackageError
+from ..interop.packages import require
 from ..io.colors import shades
 from ..judgements import coordinates
+from .figures import DPI
+from .preview import draw
 
 if TYPE_CHECKING:
     from ..report import Report
     from ..skeleton import Skeleton
 
+NOTEBOOK_SIZE = (1200, 500)
+NOTEBOOK_MARGIN = 16  # in pixels
+NOTEBOOK_COLOURS = 48  # of the picture: greys, red, and what lies between; a third of the bytes of the full range
 MOST_LISTED_ROWS = 12  # of a table
 _SOLVE_COLUMNS = {  # by heading: the field of a record, and its format
     "solve": ("iteration", "d"),
     "points": ("n_points", ",d"),
     "merged": ("n_merged", ",d"),
+    "held": ("n_held", ",d"),
     "e": ("explained", ".4f"),
     "De": ("explained_change", ".4f"),
     "ring ratio": ("ring_ratio", ".4f"),
@@ -32,26 +41,64 @@ _SOLVE_COLUMNS = {  # by heading: the field of a record, and its format
     "solver error": ("solve_error", ".1e"),
     "seconds": ("seconds", ".3f"),
 }
+_BRANCH_COLUMNS = ("branch", "kind", "length", "mean_radius", "tortuosity", "confidence", "points")
 _EXTRA = ("held", "e", "w<sub>L</sub>", "solver error", "seconds", "tortuosity", "confidence")
 """Columns that a narrow screen has no room for."""
 _WIDTH, _HEIGHT, _LEFT, _TOP, _BOTTOM = 320, 150, 46, 12, 22  # of a chart and of what surrounds its curve
 
 
+def picture(skeleton: Skeleton) -> str:
+    """The preview as a ``data:`` address, for an HTML image."""
+    require("PIL", "pillow")
+    from PIL import Image
+
+    figure, stream = draw(skeleton, NOTEBOOK_SIZE, None, caption=False), io.BytesIO()
+    figure.set_dpi(DPI)
+    figure.canvas.draw()
+    drawn = np.asarray(figure.canvas.buffer_rgba())[..., :3]
+    rows = np.flatnonzero((drawn < 250).any(axis=(1, 2)))  # without the white bands above and below flat drawings
+    drawn = drawn[max(rows[0] - NOTEBOOK_MARGIN, 0) : rows[-1] + NOTEBOOK_MARGIN]
+    image = Image.fromarray(drawn.copy()).quantize(NOTEBOOK_COLOURS, method=Image.Quantize.MEDIANCUT)
+    image.save(stream, format="png", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
+def counts(skeleton: Skeleton) -> dict[str, str]:
+    """The counts of a skeleton and its length, as people read them."""
+    facts = {"points": point_count(skeleton), **structure(skeleton)}
+    return {name: f"{value:.4g}" if name == "length" else f"{value:,}" for name, value in facts.items()}
+
+
+def to_html(skeleton: Skeleton) -> str:
+    """A picture from three sides and the numbers, as a piece of HTML that needs nothing else.
+
+    Without what draws pictures, the numbers and what to install.
+    """
+    style = 'style="text-align:right;padding:2px 10px"'  # all here, since not every notebook has Jupyter's sheet
+    heads = "".join(f"<th {style}>{name}</th>" for name in counts(skeleton))
+    cells = "".join(f"<td {style}>{text}</td>" for text in counts(skeleton).values())
+    image, missing = "", []
+    try:
+        style = 'style="width:100%;background:#fff;border-radius:4px"'
+        image = f'<img alt="{escape(repr(skeleton))}" {style} src="{picture(skeleton)}">'
+    except MissingPackageError as error:
+        missing = [str(error)]
+    style = 'style="margin:4px 0;border-left:3px solid #c77700;padding-left:8px"'
+    messages = dict.fromkeys([*missing, *skeleton.report.warnings])
+    warnings = "".join(f"<p {style}>{escape(text)}</p>" for text in messages)
+    return (
+        '<div style="max-width:1100px;font:13px/1.5 system-ui,sans-serif">'
+        f'{image}<table style="font:inherit;border-collapse:collapse;margin-top:4px"><thead>'
+        f"<tr>{heads}</tr></thead><tbody><tr>{cells}</tr></tbody></table>{warnings}</div>"
+    )
+
+
 def figures(skeleton: Skeleton) -> str:
-    """The run in a few numbers."""
-    told = {"Points": f"{point_count(skeleton):,}"} if point_count(skeleton) else {}
-    if len(skeleton.vertices):
-        told |= {
-            "Vertices": f"{len(skeleton.vertices):,}",
-            "Branches": f"{len(skeleton.branches):,}",
-            "Components": f"{skeleton.n_components:,}",
-            "Loops": f"{skeleton.n_loops:,}",
-            "Leaves": f"{len(skeleton.leaves):,}",
-            "Length": _number(skeleton.length),
-        }
+    """The skeleton and its run in a few numbers."""
+    numbers = counts(skeleton)
     if skeleton.report.seconds:
-        told["Seconds"] = f"{sum(skeleton.report.seconds.values()):.2f}"
-    return "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in told.items())
+        numbers["seconds"] = f"{sum(skeleton.report.seconds.values()):.2f}"
+    return "".join(f"<div><dt>{name.capitalize()}</dt><dd>{value}</dd></div>" for name, value in numbers.items())
 
 
 def warnings(messages: Iterable[str]) -> str:
@@ -71,23 +118,13 @@ def contraction(report: Report) -> str:
         return told
     charts = [
         _chart("Points solved for, <i>n</i>", records, "n_points", ",.10g"),
-        _chart("Change of the explained score, <i>De</i>", records, "explained_change", ".3g", _threshold(report)),
+        _chart("Change of the explained score, <i>De</i>", records, "explained_change", ".3g"),
         _chart("Ring ratio, <i>a</i>", records, "ring_ratio", ".3g"),
     ]
     rows = [[f"{getattr(record, name):{form}}" for name, form in _SOLVE_COLUMNS.values()] for record in records]
     marks = [f' data-solve="{record.iteration:d}"' for record in records]
     table = _table(_SOLVE_COLUMNS, rows, marks=marks)
     return f'{told}<div class="charts">{"".join(charts)}</div><h2>Solve by solve</h2>{table}'
-
-
-def _threshold(report: Report) -> float | None:
-    """The De below which the contraction stops, if that is its rule."""
-    for stage in report.recipe.get("pipeline", ()):
-        rule = stage.get("stop") if isinstance(stage, dict) else None
-        if isinstance(rule, dict) and rule.get("rule") == "ExplainedScore":
-            value = rule.get("threshold")
-            return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
-    return None
 
 
 def topology(report: Report) -> str:
@@ -121,17 +158,14 @@ def branches(skeleton: Skeleton) -> str:
     """The longest branches, in the colours that they have in the view; numbered as in `Skeleton.branch_table`."""
     if len(skeleton.edges) == 0:
         return ""
-    listed = [row for row in branch_table(skeleton) if row["kind"] != "isolated"]
-    listed.sort(key=lambda row: -row["length"])
-    colors = branch_colors(skeleton, len(skeleton.branches))
-    heads = ("branch", "kind", "length", "mean radius", "tortuosity", "confidence", "points")
-    rows = []
-    for row in listed[:MOST_LISTED_ROWS]:
-        swatch = f'<span class="swatch" style="background:{colors[row["branch"]]}"></span>'
-        sizes = _number(row["length"]), _number(row["mean_radius"])
-        ratios = _number(row["tortuosity"], ".2f"), _number(row["confidence"], ".2f")
-        rows.append((f"{swatch}{row['branch']}", row["kind"], *sizes, *ratios, f"{row['points']:,}"))
-    return f"<h2>Longest branches</h2>{_table(heads, rows, 'branches')}{_rest(listed, 'shorter')}"
+    table = skeleton.branch_table()
+    longest = np.argsort(-table.length[: len(skeleton.branches)], kind="stable").tolist()
+    colors, columns = branch_colors(skeleton, len(skeleton.branches)), table.printed()
+    rows = [[columns[name][row] for name in _BRANCH_COLUMNS] for row in longest[:MOST_LISTED_ROWS]]
+    for row, cells in zip(longest, rows, strict=False):
+        cells[0] = f'<span class="swatch" style="background:{colors[row]}"></span>{cells[0]}'
+    heads = [name.replace("_", " ") for name in _BRANCH_COLUMNS]
+    return f"<h2>Longest branches</h2>{_table(heads, rows, 'branches')}{_rest(longest, 'shorter')}"
 
 
 def branch_colors(skeleton: Skeleton, n: int) -> list[str]:
@@ -144,30 +178,16 @@ def hexadecimal(colors: np.ndarray) -> list[str]:
     return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(255 * colors[:, :3]).astype(int).tolist()]
 
 
-def origin(report: Report) -> str:
+def origin(skeleton: Skeleton) -> str:
     """What it takes to repeat the run: the recipe, the counts and times of the run, the versions."""
+    report, seconds = skeleton.report, skeleton.report.seconds
     text = json.dumps(report.recipe, indent=2, ensure_ascii=False) if report.recipe else "\n".join(report.stages)
-    told = f"<details><summary>Recipe</summary><pre>{escape(text)}</pre></details>" if text else ""
-    counts = {
-        "input points": report.n_input,
-        "dropped, not finite": report.n_dropped,
-        **({"sampled from a large cloud": report.n_sampled} if report.is_sampled else {}),
-        "set aside as outliers": report.n_outliers,
-        "distinct points": report.n_distinct,
-        "contracted points": report.n_contracted,
-        "loops closed": report.n_loops_closed,
-        "branches cut in air": report.n_cuts,
-        "gaps bridged": report.n_bridges,
-        "traced, no surface": report.n_traced,
-        "gaps joined": len(report.joined),
-    }
-    numbers = {name: f"{n:,}" for name, n in counts.items()} if report.n_input else {}
-    numbers |= {f"{name}, seconds": f"{seconds:.3f}" for name, seconds in report.seconds.items()}
-    return f'{told}<div class="pair">{_facts("The run", numbers, "number")}{_facts("Versions", report.versions)}</div>'
-
-
-def _number(value: float, form: str = "#.4g") -> str:
-    return f"{value:{form}}".rstrip(".") if math.isfinite(value) else "–"
+    recipe = f"<details><summary>Recipe</summary><pre>{escape(text)}</pre></details>" if text else ""
+    facts = summary(skeleton, 0.0) if report.n_input else {}
+    facts = {name: value for name, value in facts.items() if type(value) is int and name not in structure(skeleton)}
+    run = {name.replace("_", " "): f"{value:,}" for name, value in facts.items()}
+    run |= {f"{name}, seconds": f"{value:.3f}" for name, value in seconds.items()}
+    return f'{recipe}<div class="pair">{_facts("The run", run, "number")}{_facts("Versions", report.versions)}</div>'
 
 
 def _table(heads, rows, kind: str = "", marks=None) -> str:
@@ -196,12 +216,12 @@ def _facts(heading: str, told: dict[str, str], kind: str = "") -> str:
     return f'<div><h2>{heading}</h2><table class="facts"><tbody>{rows}</tbody></table></div>' if rows else ""
 
 
-def _chart(caption: str, records, name: str, form: str, threshold: float | None = None) -> str:
+def _chart(caption: str, records, name: str, form: str) -> str:
     """A number per solve, from zero, as SVG; what is not finite is left out."""
     solves = [record.iteration for record in records]
     values = {record.iteration: float(getattr(record, name)) for record in records}
     values = {solve: value for solve, value in values.items() if math.isfinite(value)}
-    highest = _round_up(max([*values.values(), *([] if threshold is None else [threshold])], default=1.0))
+    highest = _round_up(max(values.values(), default=1.0))
 
     def x(solve):
         share = (solve - solves[0]) / max(solves[-1] - solves[0], 1)
@@ -215,11 +235,6 @@ def _chart(caption: str, records, name: str, form: str, threshold: float | None 
         f'<text x="{_LEFT - 7}" y="{y(value, 4)}" text-anchor="end">{value:{form}}</text>'
         for value in (0, highest / 2, highest)
     )
-    if threshold is not None:
-        grid += (
-            f'<line class="threshold" x1="{_LEFT}" x2="{_WIDTH}" y1="{y(threshold)}" y2="{y(threshold)}"/>'
-            f'<text x="{_WIDTH}" y="{y(threshold, -4)}" text-anchor="end">stops below {threshold:g}</text>'
-        )
     ticks = "".join(
         f'<text x="{x(solve)}" y="{_HEIGHT - 5}" text-anchor="middle">{solve}</text>'
         for solve in solves[:: -(-len(solves) // 10)]

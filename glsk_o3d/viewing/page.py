@@ -19,16 +19,54 @@ from ..analysis.summary import point_count
 from ..errors import InvalidParameterError
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
+from ..state import Contraction
 from . import html as sections
 from .figures import MOST_DRAWN_POINTS, thinned
-from .notebook import picture
-from .recorder import ContractionRecorder
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
 
 FLAT_SIDE = 0.85  # a box whose least side is less than this share of the next is flat
 _STORED_RANGE = 1.25  # half diagonals that positions are stored as shares of: contracted points may leave the box a bit
+
+
+class ContractionRecorder:
+    """Remembers where the points of a cloud are after each solve: give it as ``on_state``.
+
+    A large cloud is thinned, so that a record stays small: of N points at most `most_points` are followed. One that was
+    merged into another stands where the other does. A second run starts a new record.
+
+    Parameters
+    ----------
+    most_points : int
+
+    Attributes
+    ----------
+    shown : (K,) int array
+        The input points that are followed, ascending; empty before the first solve.
+    positions : list of (K, 3) float64 array
+        The input, and then the contracted points after each solve, in the cloud's units.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Contractor, RingBuilder
+    >>> from glsk_o3d.samples import torus
+    >>> recorder = ContractionRecorder()
+    >>> contracted = (RingBuilder() | Contractor(max_iterations=2))(torus(300).points, on_state=recorder)
+    >>> len(recorder.positions), recorder.positions[2].shape
+    (3, (300, 3))
+    """
+
+    def __init__(self, most_points: int = MOST_DRAWN_POINTS):
+        self.most_points = most_points
+        self.shown = np.empty(0, int)
+        self.positions: list[np.ndarray] = []
+
+    def __call__(self, state: Contraction) -> None:
+        if len(state.report.iterations) == 1:
+            self.shown = thinned(state.points, self.most_points)
+            self.positions = [state.points[self.shown]]
+        self.positions.append(state.contracted[state.survivor_of_point[self.shown]])
 
 
 def save_report(
@@ -42,7 +80,7 @@ def save_report(
 
     The page is one HTML file that works offline in any browser with WebGL 2: cloud, skeleton and radius tubes to turn
     and zoom, the contraction on a slider, the run's numbers and charts, warnings, recipe and versions. Without WebGL or
-    scripts there is a still picture.
+    scripts there is a still picture. Of larger clouds 20 000 points are shown, drawn at random.
 
     Parameters
     ----------
@@ -56,19 +94,10 @@ def save_report(
 
     Raises
     ------
-    FileFormatError
-        The ending is neither ``.html`` nor ``.htm``.
     InvalidParameterError
         The recorder watched another run.
-    FileNotFoundError
-        The folder does not exist.
-    OSError
-        The file cannot be written.
-
-    Notes
-    -----
-    Of larger clouds 20 000 points are shown, drawn at random; their positions are rounded to 1/50 000 of the diagonal.
-    The page says so. Numbers and charts are those of the whole run.
+    FileFormatError, OSError
+        The ending is neither ``.html`` nor ``.htm``, or the file cannot be written.
 
     Examples
     --------
@@ -97,7 +126,7 @@ def _page(skeleton, recorder, title) -> str:
         sections.topology(report),
         sections.support(report),
         sections.branches(skeleton),
-        sections.origin(report),
+        sections.origin(skeleton),
     )
     parts = {
         "title": escape(title),
@@ -106,7 +135,7 @@ def _page(skeleton, recorder, title) -> str:
         "style": css,
         "figures": sections.figures(skeleton),
         "warnings": sections.warnings(report.warnings),
-        "still": picture(skeleton),
+        "still": sections.picture(skeleton),
         "thinning": thinning if len(shown) < finite else "",
         "sections": "".join(below),
         # no "<" in it, so that nothing in it can end the script element

@@ -31,13 +31,6 @@ def show(skeleton: Skeleton, cloud: Any = None, *, title: str = "Curve skeleton"
     H lists Open3D's own, Q closes the window. Branches have colours in turn. A point cloud of Open3D takes the place of
     the skeleton's points. Without a display Open3D itself would render unseen, and wait for ever: that is an error.
     """
-    window = open_window(skeleton, cloud, title)
-    window.run()
-    window.destroy_window()
-
-
-def open_window(skeleton: Skeleton, cloud: Any, title: str) -> Any:
-    """The window of `show`, an Open3D VisualizerWithKeyCallback, before it waits."""
     elsewhere = "save_report and save_preview make files to look at instead"
     if not has_display():
         raise DisplayError(f"there is no display to open a window on: {elsewhere}")
@@ -53,7 +46,8 @@ def open_window(skeleton: Skeleton, cloud: Any, title: str) -> Any:
         for shape in shapes[name] if shown else ():
             window.add_geometry(shape)
         window.register_key_callback(ord(key), _switch(shapes[name], shown))
-    return window
+    window.run()
+    window.destroy_window()
 
 
 def layers(skeleton: Skeleton, cloud: Any = None) -> dict[str, list[Any]]:

@@ -6,21 +6,20 @@ import numpy as np
 import pytest
 
 from glsk_o3d.analysis import assess, compare
-from glsk_o3d.analysis.cross_sections import cross_sections
+from glsk_o3d.analysis.assessment import cross_sections
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError
 from glsk_o3d.samples import helix, sample_object, torus, tube, two_rings, y_junction
 
-SAMPLES = [tube, torus, helix, y_junction, two_rings, sample_object]
 LINE = [[0, 0, 0], [1, 0, 0]]
 
 
 @pytest.mark.parametrize(
-    ("d", "centredness", "boundedness"),
-    [(0, 1, 1), (0.02, 0.8, 1), (0.05, 0.5, 1), (0.09, 0.1, 1), (0.1, 0, 1), (0.14, 0, 0), (0.3, 0, 0)],
+    ("d", "least", "centredness", "boundedness"),
+    [(0, -1, 1, 1), (0, 0, 1, 1), (0.05, -1, 0.5, 1), (0.05, 0, 0.5, 1), (0.1, -1, 0, 1), (0.14, -1, 0, 0)],
 )
-def test_a_tube_and_a_line_beside_its_axis(pipe, d, centredness, boundedness, axis_of):
+def test_a_tube_or_half_of_it_and_a_line_beside_its_axis(pipe, d, least, centredness, boundedness, axis_of):
     """Every point of an open tube lies on the circle that is fitted: exact however few points there are."""
-    found = assess(axis_of(pipe, shift=[0, d, 0]), pipe.points)
+    found = assess(axis_of(pipe, shift=[0, 0, d]), pipe.points[pipe.points[:, 2] > least])
     assert found.centredness == pytest.approx(centredness, abs=1e-12)
     assert found.boundedness == boundedness
     assert found.smoothness == found.topology == 1
@@ -44,7 +43,7 @@ def test_between_two_tubes_is_outside(pipe, axis_of):
         assert assess(axis_of(pipe), both).boundedness == bounded
 
 
-@pytest.mark.parametrize(("ring_radius", "centredness"), [(0.4, 1), (0.35, 0.5), (0.45, 0.5), (0.5, 0), (0.3, 0)])
+@pytest.mark.parametrize(("ring_radius", "centredness"), [(0.4, 1), (0.35, 0.5), (0.5, 0)])
 def test_a_torus_and_circles_beside_its_axis(ring, ring_radius, centredness, axis_of):
     found = assess(axis_of(ring, scale=ring_radius / 0.4), ring.points)
     assert found.centredness == pytest.approx(centredness, abs=2e-3)  # a section is a little longer than thin
@@ -54,15 +53,9 @@ def test_a_torus_and_circles_beside_its_axis(ring, ring_radius, centredness, axi
     assert (loop.wider, found.topology) == (True, 1)
 
 
-def test_a_circle_in_the_hole_of_a_torus_is_outside(ring, axis_of):
-    found = assess(axis_of(ring, scale=0.5), ring.points)
-    assert (found.centredness, found.boundedness) == (0, 0)
-
-
-@pytest.mark.parametrize("make", SAMPLES)
-@pytest.mark.parametrize("n", [1000, 4096])
-def test_the_axis_of_every_sample_is_good(make, n, axis_of):
-    sample = make(n)
+@pytest.mark.parametrize("make", [tube, torus, helix, y_junction, two_rings, sample_object])
+def test_the_axis_of_every_sample_is_good(make, axis_of):
+    sample = make(1000)
     found = assess(axis_of(sample), sample.points)
     assert found.centredness > (0.85 if make is sample_object else 0.97)  # two cameras did not see all of it
     assert found.boundedness > 0.94
@@ -70,13 +63,6 @@ def test_the_axis_of_every_sample_is_good(make, n, axis_of):
     assert found.topology == 1
     assert found.components == found.clusters == (2 if make is two_rings else 1)
     assert len(found.loops) == found.wide_loops == {torus: 1, two_rings: 2, sample_object: 1}.get(make, 0)
-
-
-def test_half_a_tube_has_the_axis_of_the_whole(pipe, axis_of):
-    seen = pipe.points[pipe.points[:, 2] > 0]
-    found = assess(axis_of(pipe), seen)
-    assert found.centredness == pytest.approx(1, abs=1e-12)
-    assert found.boundedness == 1
 
 
 def test_a_bridge_through_the_air_is_outside(pipe, curve):
@@ -88,7 +74,7 @@ def test_a_bridge_through_the_air_is_outside(pipe, curve):
     assert (found.components, found.clusters, found.topology) == (1, 2, 0.5)
 
 
-def test_smoothness_of_a_zigzag(pipe, curve):
+def test_smoothness_of_a_zigzag_and_of_repeated_points(pipe, curve):
     """Turning by 90 degrees every 0.02 in a tube of radius 0.1."""
     x = np.arange(-20, 21) * 0.02 / np.sqrt(2)
     zigzag = curve(np.column_stack([x, 0.02 / np.sqrt(2) * (np.arange(41) % 2), 0 * x]))
@@ -96,9 +82,6 @@ def test_smoothness_of_a_zigzag(pipe, curve):
     coarse = curve([[-0.5, 0, 0], [0, 0, 0], [0, 0.05, 0], [0.5, 0.05, 0]])
     expected = 1 - 2 * (np.pi / 2) * 0.1 / (np.pi * coarse.length)
     assert assess(coarse, pipe.points).smoothness == pytest.approx(expected, rel=0.02)
-
-
-def test_repeated_points_do_not_turn(pipe, curve):
     path = np.linspace([-0.5, 0, 0], [0.5, 0, 0], 9)
     assert assess(curve(np.repeat(path, 2, axis=0)), pipe.points).smoothness == 1
 
@@ -115,9 +98,8 @@ def test_false_loops_open_less_than_their_tube(pipe, curve):
     assert np.isnan(found.edge_centredness).any()  # at its junctions
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1e6])
-def test_assessments_have_no_unit(scale, axis_of):
-    sample = sample_object(2000)
+def test_assessments_have_no_unit(axis_of):
+    sample, scale = sample_object(1000), 1e6
     axis = axis_of(sample)
     expected = assess(axis, sample.points)
     found = assess(replace(axis, vertices=axis.vertices * scale + scale), sample.points * scale + scale)
@@ -132,33 +114,21 @@ def test_outliers_and_points_that_are_not_finite(pipe, axis_of):
     assert found.boundedness == found.topology == 1
 
 
-def test_edges_may_be_given_in_any_way(ring, curve):
+def test_edges_may_be_given_in_any_way_and_nothing_is_modified(ring, curve):
     shuffled = np.random.default_rng(0).permutation(np.concatenate([ring.edges, ring.edges[:5, ::-1], [[7, 7]]]))
-    one, other = (assess(curve(ring.nodes, edges), ring.points) for edges in (ring.edges, shuffled))
-    assert one.as_dict() == other.as_dict()
-    assert other.edge_centredness.shape == (len(shuffled),)
-
-
-def test_nothing_is_modified(ring, axis_of):
-    axis, points = axis_of(ring), ring.points.copy()
-    arrays = (axis.vertices, axis.edges, axis.radii, points)
-    before = [array.copy() for array in arrays]
-    for array in arrays:
+    one, other = (curve(ring.nodes, edges) for edges in (ring.edges, shuffled))
+    points = ring.points.copy()
+    for array in (points, other.vertices, other.edges):
         array.flags.writeable = False
-    assess(axis, points)
-    compare(axis, ring)
-    assert all((a == b).all() for a, b in zip(arrays, before, strict=True))
+    compare(other, ring)
+    found = assess(other, points)
+    assert found.as_dict() == assess(one, ring.points).as_dict()
+    assert found.edge_centredness.shape == (len(shuffled),)
 
 
-@pytest.mark.parametrize("vertices", [[[0, 0, 0]], [[1, 1, 1], [1, 1, 1]]])
-def test_no_curve_to_assess(pipe, vertices, curve):
-    with pytest.raises(InvalidParameterError, match="no edge with a length"):
-        assess(curve(vertices), pipe.points)
-
-
-@pytest.mark.parametrize(("away", "centredness"), [(0, 1), (1, 0), (100, 0)])
+@pytest.mark.parametrize(("away", "centredness"), [(0, 1), (1, 0)])
 def test_points_in_a_row_have_sections_without_a_radius(away, centredness, curve):
-    row = np.linspace(LINE[0], LINE[1], 200) + np.cross(np.subtract(*LINE), [1, 2, 3]) * away
+    row = np.linspace(*LINE, 200) + np.cross(np.subtract(*LINE), [1, 2, 3]) * away
     assert assess(curve(LINE), row).centredness == centredness
 
 
@@ -166,6 +136,12 @@ def test_points_in_a_row_have_sections_without_a_radius(away, centredness, curve
 def test_clouds_with_too_few_points(cloud, curve):
     with pytest.raises(InvalidCloudError, match="6 points around"):
         assess(curve(LINE), cloud)
+
+
+@pytest.mark.parametrize("scale", [1e200, 1e-200])
+def test_clouds_whose_squares_overflow_are_refused(pipe, axis_of, scale):
+    with pytest.raises(InvalidCloudError, match="too extreme for its squares"):
+        assess(axis_of(pipe), pipe.points * scale)
 
 
 @pytest.mark.parametrize(
@@ -183,7 +159,7 @@ def test_skeletons_that_are_none(pipe, vertices, edges, message, curve):
             measure(curve(vertices, edges))
 
 
-@pytest.mark.parametrize("scale", [1e200, 1e-200])
-def test_clouds_whose_squares_overflow_are_refused(pipe, axis_of, scale):
-    with pytest.raises(InvalidCloudError, match="too extreme for its squares"):
-        assess(axis_of(pipe), pipe.points * scale)
+@pytest.mark.parametrize("vertices", [[[0, 0, 0]], [[1, 1, 1], [1, 1, 1]]])
+def test_no_curve_to_assess(pipe, vertices, curve):
+    with pytest.raises(InvalidParameterError, match="no edge with a length"):
+        assess(curve(vertices), pipe.points)

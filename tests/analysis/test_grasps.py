@@ -2,17 +2,15 @@
 
 import csv
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from glsk_o3d import InvalidParameterError, Skeleton, SkeletonWarning, samples, skeletonize
-from glsk_o3d.analysis import GraspCandidates, Gripper
+from glsk_o3d import InvalidParameterError, Skeleton, SkeletonWarning, samples
+from glsk_o3d.analysis import Gripper
 from glsk_o3d.analysis import grasp_candidates as checked_candidates
 
-ARRAYS = [field.name for field in fields(GraspCandidates)][:9]
 WIDE = 10.0
 
 
@@ -61,7 +59,7 @@ def test_a_straight_tube():
     np.testing.assert_allclose(turn, np.tile(np.cos(np.pi / 3 * (step - step[:, None])), (9, 1, 1)), atol=1e-12)
 
 
-@pytest.mark.parametrize("skeleton", [TUBE, cone(), cone(0.25, 0.04), cone(0.02, 0.3)])
+@pytest.mark.parametrize("skeleton", [TUBE, cone(), cone(0.25, 0.04)])
 def test_jaws_without_clearance_touch_the_surface(skeleton):
     grasps = grasp_candidates(skeleton, WIDE, clearance=0, around=5)
     for side in (-1, 1):
@@ -79,11 +77,6 @@ def test_a_cone_is_wider_across_than_the_ball_in_it():
     assert (np.diff(grasps.position[:, 0]) >= 0).all()  # the thin end is best
 
 
-def test_a_cone_that_is_one_ball_has_no_width():
-    with pytest.warns(SkeletonWarning, match="5 too wide"):
-        assert len(grasp_candidates(cone(0.1, 1.2), WIDE, spacing=0.25, margin=0)) == 0
-
-
 def test_a_torus():
     skeleton = axis_of(samples.torus(10, ring_radius=0.4, radius=0.1))
     grasps = grasp_candidates(skeleton, 0.5, clearance=0.05, around=4)
@@ -98,26 +91,12 @@ def test_a_torus():
     np.testing.assert_allclose(grasps.approach[::4], np.tile([0, 0, -1], (25, 1)), atol=1e-9)
 
 
-@pytest.mark.parametrize(("spacing", "count"), [(0.1, 9), (0.8, 2), (0.81, 1), (5.0, 1), (0.05, 17)])
+@pytest.mark.parametrize(("spacing", "count"), [(0.1, 9), (0.8, 2), (0.81, 1), (5.0, 1)])
 def test_places_share_the_room_between_the_margins(spacing, count):
     x = grasp_candidates(TUBE, WIDE, spacing=spacing, around=1).position[:, 0]
     assert len(x) == count
     np.testing.assert_allclose(np.diff(np.sort(x)), spacing)
     np.testing.assert_allclose(x.min(), -x.max(), atol=1e-12)
-
-
-def test_turned_moved_and_scaled():
-    turn, shift, scale = Rotation.from_rotvec([0.3, -1.1, 0.7]), np.array([3.0, -7.0, 1.0]), 25.0
-    moved = replace(SAUROPOD, vertices=scale * turn.apply(SAUROPOD.vertices) + shift, radii=scale * SAUROPOD.radii)
-    here = grasp_candidates(SAUROPOD, 0.2, around=3)
-    there = grasp_candidates(moved, 0.2 * scale, around=3, up=turn.apply([0, 0, 1]))
-    assert len(here) == len(there) > 100
-    assert here.left_out == there.left_out
-    np.testing.assert_allclose(there.position, scale * turn.apply(here.position) + shift, atol=1e-9)
-    np.testing.assert_allclose(there.opening, scale * here.opening)
-    np.testing.assert_allclose(there.quality, here.quality)
-    for name in ("approach", "closing"):
-        np.testing.assert_allclose(getattr(there, name), turn.apply(getattr(here, name)), atol=1e-9)
 
 
 @pytest.mark.parametrize("up", [(1, 0, 0), (-2, 0, 0), (1, 1e-9, 0)])
@@ -168,12 +147,12 @@ def test_every_place_is_taken_or_told():
 @pytest.mark.parametrize(
     ("skeleton", "options", "why"),
     [
+        (cone(0.1, 1.2), dict(gripper=WIDE, spacing=0.25, margin=0), "5 too wide"),  # it is one ball
         (TUBE, dict(gripper=0.2), "no grasp at 9 places: 9 too wide"),
         (TUBE, dict(gripper=Gripper(0.3, 0.21)), "9 too thin"),
         (axis_of(samples.tube(10), 0.3), dict(gripper=1.0), "9 uncertain"),
         (TUBE, dict(gripper=1.0, margin=6), "no grasp at 0 places: 1 branches without a place"),
         (replace(TUBE, edges=()), dict(gripper=1.0), "the skeleton has no branch"),
-        (replace(TUBE, vertices=[[1, 2, 3]] * 2), dict(gripper=1.0), "1 branches without a place"),
     ],
 )
 def test_nothing_to_grasp_is_told(skeleton, options, why, tmp_path):
@@ -214,31 +193,16 @@ def test_unknown_confidence_and_radii():
         (dict(gripper=1.0, margin=np.nan), "margin"),
         (dict(gripper=1.0, min_confidence=1.1), "min_confidence"),
         (dict(gripper=1.0, around=0), "around = 0"),
-        (dict(gripper=1.0, around=2.0), "around = 2.0"),
-        (dict(gripper=1.0, up=(0, 0, 0)), "up"),
         (dict(gripper=1.0, up="z"), "up = 'z'"),
         (dict(gripper=1.0, cone=(0, 0, 1)), r"cone = \(0, 0, 1\): must be a direction and an angle"),
-        (dict(gripper=1.0, cone=((0, 0, 0), 30)), "direction of cone"),
         (dict(gripper=1.0, cone=((0, 0, 1), 200)), "angle of cone = 200: .* at most 180"),
     ],
 )
 def test_wrong_parameters(options, said):
     with pytest.raises(InvalidParameterError, match=said):
         grasp_candidates(TUBE, **options)
-
-
-def test_an_empty_skeleton():
-    with pytest.raises(InvalidParameterError, match="empty"):
+    with pytest.raises(InvalidParameterError, match="the skeleton is empty"):
         grasp_candidates(Skeleton((), (), (), (), (), ()), 1.0)
-
-
-def test_on_the_skeleton_of_a_cloud():
-    sample = samples.tube(2048, radius=0.08, noise=0.001, seed=1)
-    grasps = grasp_candidates(skeletonize(sample.points), 0.5, clearance=0)
-    assert grasps.places > 5
-    np.testing.assert_allclose(grasps.opening, 0.16, rtol=0.05)
-    np.testing.assert_allclose(np.abs(grasps.axis[:, 0]), 1, atol=0.005)
-    assert np.hypot(*grasps.position[:, 1:].T).max() < 0.05 * 0.08
 
 
 # ------------------------------------------------------------------------------------------------------------- results
@@ -246,10 +210,10 @@ def test_on_the_skeleton_of_a_cloud():
 
 def test_some_of_them():
     grasps = grasp_candidates(SAUROPOD, 0.2)
-    for some, rows in ((grasps[:3], [0, 1, 2]), (grasps[5], [5]), (grasps[grasps.branch == 2], None)):
-        rows = np.flatnonzero(grasps.branch == 2) if rows is None else rows
-        for name in ARRAYS:
-            np.testing.assert_array_equal(getattr(some, name), getattr(grasps, name)[rows])
+    for which in (slice(3), [5], grasps.branch == 2):
+        for name in ("position", "approach", "closing", "opening", "depth", "branch", "confidence", "quality", "seen"):
+            np.testing.assert_array_equal(getattr(grasps[which], name), getattr(grasps, name)[which])
+    assert len(grasps[5]) == 1
     with pytest.raises(IndexError):
         grasps[len(grasps)]
 
@@ -287,17 +251,6 @@ def test_files(tmp_path):
     np.testing.assert_array_equal([row["pose"] for row in data["grasps"]], grasps.poses)
     np.testing.assert_array_equal([row["opening"] for row in data["grasps"]], grasps.opening)
     assert {row["confidence"] for row in data["grasps"]} == {None}
-    with pytest.raises(FileNotFoundError):
-        grasps.to_json(tmp_path / "none" / "g.json")
-
-
-def test_no_grasps_are_no_drawing(tmp_path):
-    none = grasp_candidates(axis_of(samples.tube()), 0.4)[:0]
     with pytest.raises(InvalidParameterError, match="no grasp to draw"):
-        none.to_ply(tmp_path / "g.ply")
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_opening_in_another_unit_is_doubted():
-    with pytest.warns(SkeletonWarning, match="the gripper opens 80 and the object is 1.*: is it the same unit"):
-        grasp_candidates(TUBE, 80.0)
+        grasps[:0].to_ply(tmp_path / "g.ply")
+    assert not (tmp_path / "g.ply").exists()

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from glsk_bench import add_shape, leaderboard, make, read_folder, run, score_answers
 from glsk_bench.folders import INDEX_NAME
+from glsk_bench.radii import radii_from_points
 
 from glsk_o3d import Skeleton, read_cloud, samples
-from glsk_o3d.analysis.curves import radii_from_points
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
 
 FORK = samples.y_junction(900)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import samples, skeletonize
-from glsk_o3d.analysis.thickness import thickness
+from glsk_o3d.analysis.segmentation import thickness
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.io.colors import COLOR_NAMES, UNKNOWN_GREY, shades, thickness_shades
 

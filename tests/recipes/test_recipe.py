@@ -4,7 +4,6 @@ import dataclasses
 import json
 import os
 import re
-import time
 
 import numpy as np
 import pytest
@@ -41,6 +40,7 @@ from glsk_o3d.report import Report
 
 POINTS = samples.y_junction(n=500).points
 HEAD = {"glsk_o3d": {"version": 1}}
+RULES = ("ExplainedScore", "RingSizeRatio")
 
 
 # ---- round trips
@@ -56,31 +56,23 @@ def values(facts):
         "int": integers,
         "float": numbers | integers,
         "length": numbers | st.floats(0.001, 100).map(lambda share: f"{share:.6f}%"),
-        "point": st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 3).map(
-            lambda xyz: "{},{},{}".format(*xyz)
-        ),
+        "point": st.lists(numbers, min_size=3, max_size=3).map(lambda xyz: ",".join(map(repr, xyz))),
         "bool": st.booleans(),
         "stop": st.deferred(lambda: parts(ExplainedScore) | parts(RingSizeRatio)),
         "reducer": st.deferred(lambda: parts(LPRReducer)),
         "choice": st.nothing(),
     }[kind]
-    return (
-        strategy | st.sampled_from(facts["choices"] or (None,))
-        if facts["choices"] or facts["type"].endswith("?")
-        else strategy
-    )
+    words = facts["choices"] or (None,) * facts["type"].endswith("?")
+    return strategy | st.sampled_from(words) if words else strategy
 
 
 def parts(cls):
     return st.builds(cls, **{field.name: values(field.metadata) for field in dataclasses.fields(cls)})
 
 
-def stages(*classes):
-    return st.tuples(*map(parts, classes)).map(lambda made: Pipeline(*made))
-
-
-@given(pipeline=stages(RingBuilder, Contractor, LPRReducer, Contractor, Connector, Refiner, Refiner))
-def test_every_parameter_of_every_filter_survives(pipeline):
+@given(made=st.tuples(*map(parts, (RingBuilder, Contractor, LPRReducer, Contractor, Connector, Refiner))))
+def test_every_parameter_of_every_filter_survives(made):
+    pipeline = Pipeline(*made)
     recipe = to_recipe(pipeline)
     for again in (
         from_recipe(recipe),
@@ -93,19 +85,16 @@ def test_every_parameter_of_every_filter_survives(pipeline):
 
 def test_the_round_trip_is_over_everything():
     """So that a new filter is not forgotten above."""
-    assert set(BUILTIN.values()) == {
-        *(RingBuilder, Contractor, LPRReducer, Connector, Refiner, ExplainedScore, RingSizeRatio)
-    }
+    assert {*BUILTIN} == {"RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner", *RULES}
 
 
 @pytest.mark.parametrize("ending", ["json", "toml", "JSON"])
-@pytest.mark.parametrize("name", pipelines.PIPELINES)
-def test_files(tmp_path, name, ending):
-    pipeline, path = pipelines.PIPELINES[name](), tmp_path / f"räcipe.{ending}"
-    save_recipe(pipeline, path)
-    assert load_recipe(path) == load_recipe(str(path)) == pipeline
-    save_recipe(pipeline, tmp_path / "again.json")
-    assert [each.name for each in sorted(tmp_path.iterdir())] == ["again.json", path.name]
+def test_files(tmp_path, ending):
+    path = tmp_path / f"räcipe.{ending}"
+    for make in pipelines.PIPELINES.values():
+        save_recipe(make(), path)
+        assert load_recipe(path) == load_recipe(str(path)) == make()
+    assert [*tmp_path.iterdir()] == [path]
 
 
 def test_what_a_recipe_looks_like():
@@ -127,10 +116,7 @@ def test_values_of_other_types_are_written_as_plain_ones():
 
 
 def test_what_is_left_out_has_its_default():
-    recipe = {
-        **HEAD,
-        "pipeline": [{"filter": "Contractor", "reducer": {"filter": "LPRReducer", "phi": 2}, "max_iterations": 3}],
-    }
+    recipe = one("Contractor", reducer={"filter": "LPRReducer", "phi": 2}, max_iterations=3)
     assert from_recipe(recipe) == Pipeline(Contractor(reducer=LPRReducer(phi=2), max_iterations=3))
     for nothing in (None, "none"):
         recipe["pipeline"][0]["reducer"] = nothing
@@ -165,70 +151,56 @@ def test_extends(tmp_path):
 # ---- refused
 
 GOOD = {"filter": "RingBuilder"}
-# Where it is wrong, and the words that help.
-WRONG = {
-    ("glsk_o3d.version", '{"glsk_o3d": {"version": 1}, "pipeline": [...]}'): {"pipeline": [GOOD]},
-    ("glsk_o3d.version", "update"): {"glsk_o3d": {"version": 2}, "stages": "of whatever shape"},
-    ("glsk_o3d.extra", "there are version"): {"glsk_o3d": {"version": 1, "extra": 4}, "pipeline": [GOOD]},
-    ("glsk_o3d.version", "'1'"): {"glsk_o3d": {"version": "1"}, "pipeline": [GOOD]},
-    ("", "not [{'filter': 'RingBuilder'}]"): [GOOD],
-    ("piepline", "'pipeline'"): {**HEAD, "piepline": [GOOD]},
-    ("", "lacks both"): HEAD,
-    ("", "has both"): {**HEAD, "pipeline": [GOOD], "extends": "default"},
-    ("pipeline", "[]"): {**HEAD, "pipeline": []},
-    ("pipeline", "list"): {**HEAD, "pipeline": GOOD},
-    ("pipeline[1]", '{"filter": NAME, ...}'): {**HEAD, "pipeline": [GOOD, "Contractor"]},
-    ("pipeline[1].filter", "'Contractor'"): {**HEAD, "pipeline": [GOOD, {"filter": "Contracter"}]},
-    ("pipeline[0].filter", "there are RingBuilder, Contractor, LPRReducer, Connector, Refiner"): {
-        **HEAD,
-        "pipeline": [{"filter": "ExplainedScore"}],
-    },
-    ("pipeline[0].kk", "'k'"): {**HEAD, "pipeline": [{"filter": "RingBuilder", "kk": 20}]},
-    ("pipeline[0].k", "7.5"): {**HEAD, "pipeline": [{"filter": "RingBuilder", "k": 7.5}]},
-    ("pipeline[0].drop_invalid", "'yes'"): {**HEAD, "pipeline": [{"filter": "RingBuilder", "drop_invalid": "yes"}]},
-    ("pipeline[0].frame", "'spread', 'box'"): {**HEAD, "pipeline": [{"filter": "RingBuilder", "frame": ["box"]}]},
-    ("pipeline[0].radius", "100%"): {**HEAD, "pipeline": [{"filter": "Connector", "radius": "200%"}]},
-    ("pipeline[0].outlier_factor", "nan"): {
-        **HEAD,
-        "pipeline": [{"filter": "RingBuilder", "outlier_factor": float("nan")}],
-    },
-    ("pipeline[1].reducer.phi", "above 0"): {
-        **HEAD,
-        "pipeline": [GOOD, {"filter": "Contractor", "reducer": {"filter": "LPRReducer", "phi": -1}}],
-    },
-    ("pipeline[0].reducer.filter", "there are Contractor, LPRReducer"): {
-        **HEAD,
-        "pipeline": [{"filter": "Contractor", "reducer": {"filter": "Refiner"}}],
-    },
-    ("pipeline[0].stop", '{"rule": NAME, ...}'): {
-        **HEAD,
-        "pipeline": [{"filter": "Contractor", "stop": {"filter": "RingSizeRatio"}}],
-    },
-    ("pipeline[0].stop.rule", "'RingSizeRatio'"): {
-        **HEAD,
-        "pipeline": [{"filter": "Contractor", "stop": {"rule": "RingRatio"}}],
-    },
-    ("pipeline", "RingBuilder | Contractor | Connector | Refiner"): {
-        **HEAD,
-        "pipeline": [{"filter": "Connector"}, {"filter": "Connector"}],
-    },
-    ("pipeline[0].reducer", "a function"): {
-        **HEAD,
-        "pipeline": [{"filter": "Contractor", "reducer": {"unwritten": "a function"}}],
-    },
-    ("extends", "default, tree, wen2024, cao2010"): {**HEAD, "extends": "best"},
-    ("set", "'extends'"): {**HEAD, "pipeline": [GOOD], "set": {}},
-    ("set.Connecter", "'Connector'"): {**HEAD, "extends": "default", "set": {"Connecter": {"radius": 1}}},
-    ("set.Connector.radios", "'radius'"): {**HEAD, "extends": "default", "set": {"Connector": {"radios": 1}}},
-    ("set.Connector", "5"): {**HEAD, "extends": "default", "set": {"Connector": 5}},
-    ("set", "5"): {**HEAD, "extends": "default", "set": 5},
-    ("set", "LPRReducer.phi: "): {**HEAD, "extends": "cao2010", "set": {"LPRReducer": {"phi": 1}}},
-}
 
 
-@pytest.mark.parametrize(("message", "recipe"), WRONG.items(), ids=range(len(WRONG)))
-def test_wrong_recipes(tmp_path, message, recipe):
-    place, words = message
+def with_stages(*tables):
+    return {**HEAD, "pipeline": [*tables]}
+
+
+def one(name, **options):
+    return with_stages({"filter": name, **options})
+
+
+def changed(**changes):
+    return {**HEAD, "extends": "default", "set": changes}
+
+
+WRONG = [  # where it is wrong, the words that help, and the recipe
+    ("glsk_o3d.version", '{"glsk_o3d": {"version": 1}, "pipeline": [...]}', {"pipeline": [GOOD]}),
+    ("glsk_o3d.version", "update", {"glsk_o3d": {"version": 2}, "stages": "of whatever shape"}),
+    ("glsk_o3d.extra", "there are version", {"glsk_o3d": {"version": 1, "extra": 4}, "pipeline": [GOOD]}),
+    ("", "not [{'filter': 'RingBuilder'}]", [GOOD]),
+    ("piepline", "'pipeline'", {**HEAD, "piepline": [GOOD]}),
+    ("", "lacks both", HEAD),
+    ("", "has both", {**with_stages(GOOD), "extends": "default"}),
+    ("pipeline", "[]", with_stages()),
+    ("pipeline[1]", '{"filter": NAME, ...}', with_stages(GOOD, "Contractor")),
+    ("pipeline[1].filter", "'Contractor'", with_stages(GOOD, {"filter": "Contracter"})),
+    ("pipeline[0].filter", "there are RingBuilder, Contractor, LPRReducer, Connector, Refiner", one("ExplainedScore")),
+    ("pipeline[0].kk", "'k'", one("RingBuilder", kk=20)),
+    ("pipeline[0].frame", "'spread', 'box'", one("RingBuilder", frame=["box"])),
+    ("pipeline[0].radius", "100%", one("Connector", radius="200%")),
+    ("pipeline[0].outlier_factor", "nan", one("RingBuilder", outlier_factor=float("nan"))),
+    ("pipeline[0].reducer.phi", "above 0", one("Contractor", reducer={"filter": "LPRReducer", "phi": -1})),
+    (
+        "pipeline[0].reducer.filter",
+        "there are Contractor, LPRReducer",
+        one("Contractor", reducer={"filter": "Refiner"}),
+    ),
+    ("pipeline[0].stop", '{"rule": NAME, ...}', one("Contractor", stop={"filter": "RingSizeRatio"})),
+    ("pipeline[0].stop.rule", "'RingSizeRatio'", one("Contractor", stop={"rule": "RingRatio"})),
+    ("pipeline", "RingBuilder | Contractor | Connector | Refiner", with_stages(*[{"filter": "Connector"}] * 2)),
+    ("pipeline[0].reducer", "a function", one("Contractor", reducer={"unwritten": "a function"})),
+    ("extends", "default, tree, wen2024, cao2010", {**HEAD, "extends": "best"}),
+    ("set", "'extends'", {**with_stages(GOOD), "set": {}}),
+    ("set.Connecter", "'Connector'", changed(Connecter={"radius": 1})),
+    ("set.Connector.radios", "'radius'", changed(Connector={"radios": 1})),
+    ("set", "LPRReducer.phi: ", {**HEAD, "extends": "cao2010", "set": {"LPRReducer": {"phi": 1}}}),
+]
+
+
+@pytest.mark.parametrize(("place", "words", "recipe"), WRONG, ids=range(len(WRONG)))
+def test_wrong_recipes(tmp_path, place, words, recipe):
     with pytest.raises(RecipeError) as raised:
         from_recipe(recipe)
     assert str(raised.value).startswith(f"{place}: " if place else "")
@@ -236,7 +208,7 @@ def test_wrong_recipes(tmp_path, message, recipe):
     path = tmp_path / "r.json"
     path.write_text(json.dumps(recipe))
     with pytest.raises(RecipeError) as in_file:
-        skeletonize(POINTS, path)
+        load_recipe(path)
     assert str(in_file.value) == f"{path}: {raised.value}"
 
 
@@ -244,10 +216,8 @@ def test_wrong_recipes(tmp_path, message, recipe):
     ("name", "content", "words"),
     [
         ("r.json", b'{"glsk_o3d": {"version": 1},\n "pipeline": [}', "JSON.* line 2"),
-        ("r.json", b"", "JSON.* line 1"),
         ("r.json", b'{"a": 1, "b": {"k": 1, "k": 2}}', "'k'"),
         ("r.json", b"\xff\xfe", "JSON"),
-        ("r.json", b"[" * 100_000, "JSON"),
         ("r.json", b'{"a":' * 600 + b"1" + b"}" * 600, ""),
         ("r.toml", b"[glsk_o3d]\nversion = ", "TOML"),
         ("r.toml", b"[glsk_o3d]\nversion = 1\nversion = 1", "TOML"),
@@ -270,12 +240,8 @@ def test_a_byte_order_mark_is_no_mistake(tmp_path):
 def test_files_that_are_not_there(tmp_path):
     with pytest.raises(FileNotFoundError):
         load_recipe(tmp_path / "none.json")
-    with pytest.raises(FileNotFoundError):
-        skeletonize(POINTS, "none.json")
     with pytest.raises(RecipeError, match=r"none.*\.json"):
         skeletonize(POINTS, tmp_path / "none")  # a path is never a name
-    with pytest.raises(FileNotFoundError):
-        save_recipe(pipelines.default(), tmp_path / "no" / "r.json")
 
 
 def thin(state):
@@ -294,15 +260,15 @@ def never(iterations):
     return None
 
 
-UNWRITABLE = {
-    "reducer": (Contractor(reducer=thin), "pipeline[1].reducer", "thin", "unwritten"),
-    "rule": (Contractor(stop=never), "pipeline[1].stop", "never", "unwritten"),
-    "filter inside": (Contractor(reducer=Homemade()), "pipeline[1].reducer", "Homemade", "from"),
-    "stage": (Homemade(), "pipeline[1]", "Homemade", "from"),
-}
-
-
-@pytest.mark.parametrize(("stage", "place", "name", "key"), UNWRITABLE.values(), ids=UNWRITABLE)
+@pytest.mark.parametrize(
+    ("stage", "place", "name", "key"),
+    [
+        (Contractor(reducer=thin), "pipeline[1].reducer", "thin", "unwritten"),
+        (Contractor(stop=never), "pipeline[1].stop", "never", "unwritten"),
+        (Contractor(reducer=Homemade()), "pipeline[1].reducer", "Homemade", "from"),
+        (Homemade(), "pipeline[1]", "Homemade", "from"),
+    ],
+)
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, place, name, key):
     pipeline = RingBuilder() | stage | Connector() | Refiner()
@@ -314,9 +280,7 @@ def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, place, name, key
     recipe = glsk.read_skeleton(tmp_path / "s.json").report.recipe
     assert recipe == skeleton.report.recipe
     table = recipe["pipeline"][1]
-    for field in place.split(".")[1:]:
-        table = table[field]
-    assert key in table
+    assert key in (table[place.split(".")[1]] if "." in place else table)
     with pytest.raises(RecipeError, match=rf"^{re.escape(place)}.*{name}"):
         rerun(skeleton)
 
@@ -327,16 +291,9 @@ def test_a_class_of_another_module_is_named_with_it():
     assert recipe["pipeline"] == [{"filter": "Homemade", "from": __name__}]
     with pytest.raises(RecipeError, match=re.escape(f"install {__name__}")):
         from_recipe(recipe)
-    for module, right in (("glsk_o3d.lpr_reducer", True), (__name__, False)):
-        recipe = recipe_of({"filter": "LPRReducer", "from": module})
-        if right:
-            assert from_recipe(recipe) == Pipeline(LPRReducer())
-        else:
-            with pytest.raises(RecipeError, match=rf"^pipeline\[0\]\.from: .*{re.escape(module)}"):
-                from_recipe(recipe)
-
-
-def test_a_namesake_is_not_written():
+    assert from_recipe(one("LPRReducer", **{"from": "glsk_o3d.lpr_reducer"})) == Pipeline(LPRReducer())
+    with pytest.raises(RecipeError, match=rf"^pipeline\[0\]\.from: .*{re.escape(__name__)}"):
+        from_recipe(one("LPRReducer", **{"from": __name__}))
     namesake = dataclasses.make_dataclass("Refiner", [], bases=(Homemade,), frozen=True, kw_only=True)
     with pytest.raises(RecipeError, match=r"^pipeline\[0\]: .*Refiner"):
         to_recipe(Pipeline(namesake()))
@@ -367,8 +324,9 @@ def test_the_documentation(root, install):
 # ---- what a report holds, and rerun
 
 
-@pytest.mark.parametrize("name", pipelines.PIPELINES)
-@pytest.mark.parametrize("ending", ["json", "npz"])
+@pytest.mark.parametrize(
+    ("name", "ending"), [("default", "json"), ("tree", "npz"), ("wen2024", "json"), ("cao2010", "npz")]
+)
 def test_results_repeat_to_the_last_bit(tmp_path, name, ending):
     points = POINTS + np.array([1 / 3, 1e3, 0])
     points[[3, 200]] = [[np.nan, 0, 0], [0, np.inf, 0]]
@@ -380,7 +338,7 @@ def test_results_repeat_to_the_last_bit(tmp_path, name, ending):
     skeleton.save(tmp_path / f"s.{ending}")
     read = glsk.read_skeleton(tmp_path / f"s.{ending}")
     assert read.report.recipe == skeleton.report.recipe
-    for again in (rerun(read), rerun(read, points), rerun(rerun(skeleton))):
+    for again in (rerun(read), rerun(rerun(skeleton), points)):
         for field in ARRAYS:
             np.testing.assert_array_equal(getattr(again, field), getattr(skeleton, field))
         assert again.report.recipe == skeleton.report.recipe
@@ -395,12 +353,6 @@ def test_results_composed_by_hand_have_the_same_recipe():
     np.testing.assert_array_equal(rerun(by_hand).vertices, by_hand.vertices)
 
 
-def test_on_another_cloud():
-    other = samples.torus(n=400).points
-    skeleton = skeletonize(POINTS, "wen2024")
-    np.testing.assert_array_equal(rerun(skeleton, other).vertices, skeletonize(other, "wen2024").vertices)
-
-
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 def test_a_run_that_the_caller_stopped_cannot_be_repeated():
     pipeline = RingBuilder() | Contractor(max_iterations=1) | Contractor() | Connector()
@@ -412,15 +364,11 @@ def test_a_run_that_the_caller_stopped_cannot_be_repeated():
     assert whole.report.recipe == to_recipe(pipeline)
 
 
-def test_progress_of_a_rerun():
+def test_progress_of_a_rerun_and_a_result_that_others_made():
     skeleton, told, begun = skeletonize(POINTS), [], []
     rerun(skeleton, on_iteration=told.append, on_stage=begun.append)
     assert len(told) == len(skeleton.report.iterations)
     assert tuple(begun) == pipelines.default().stages
-
-
-def test_a_result_that_others_made_differs():
-    skeleton = skeletonize(POINTS)
     old = {**skeleton.report.versions, "numpy": "1.0"}
     moved = dataclasses.replace(
         skeleton, vertices=skeleton.vertices + 1e-15, report=dataclasses.replace(skeleton.report, versions=old)
@@ -440,22 +388,18 @@ def test_old_results_load_but_have_no_recipe(tmp_path):
     with pytest.raises(RecipeError):
         rerun(old)
     old.save(tmp_path / "s.ply")
-    with pytest.raises(RecipeError):
-        rerun(glsk.read_skeleton(tmp_path / "s.ply"))
-
-
-def test_results_that_do_not_start_from_a_cloud(tmp_path):
-    skeletonize(POINTS).save(tmp_path / "s.ply")
-    refined = Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(glsk.read_skeleton(tmp_path / "s.ply"))
-    with pytest.raises(RecipeError):
-        rerun(refined)
+    read = glsk.read_skeleton(tmp_path / "s.ply")
+    for begun in (read, Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(read)):
+        with pytest.raises(RecipeError):
+            rerun(begun)
 
 
 def test_results_without_their_points():
     skeleton = dataclasses.replace(skeletonize(POINTS), points=np.empty((0, 3)))
     with pytest.raises(RecipeError, match="scan"):
         rerun(skeleton)
-    assert len(rerun(skeleton, POINTS).vertices) == len(skeleton.vertices)
+    other = samples.torus(n=400).points
+    np.testing.assert_array_equal(rerun(skeleton, other).vertices, skeletonize(other).vertices)
 
 
 @pytest.mark.parametrize("recipe", [5, [], "x", {"pipeline": {}}])
@@ -473,37 +417,20 @@ def test_reports_ahead_add_up():
     assert report.n_input == 3
 
 
-def test_a_key_that_stands_twice_is_refused_however_many_there_are(tmp_path):
-    keys = ", ".join(f'"key{i}": 1' for i in range(100_000))
-    (tmp_path / "r.json").write_text(f'{{{keys}, "key7": 2}}')
-    start = time.process_time()
-    with pytest.raises(RecipeError, match="the key 'key7' stands twice"):
-        load_recipe(tmp_path / "r.json")
-    assert time.process_time() - start < 10  # a fraction of a second; counted one by one, a minute
-
-
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
-@pytest.mark.parametrize("name", ["r.json", "r.toml"])
-def test_what_may_never_end_is_not_waited_for(tmp_path, name):
-    os.mkfifo(tmp_path / name)
-    with pytest.raises(RecipeError, match=rf"{name}: is no file .*which may never end"):
-        load_recipe(tmp_path / name)
+def test_what_may_never_end_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "r.toml")
+    with pytest.raises(RecipeError, match=r"r\.toml: is no file .*which may never end"):
+        load_recipe(tmp_path / "r.toml")
 
 
-@pytest.mark.parametrize("place", ["head", "top", "set", "parameter"])
+@pytest.mark.parametrize("place", [(), ("glsk_o3d",), ("set",), ("set", "RingBuilder")])
 def test_an_unknown_name_is_not_repeated_at_length(place):
-    name = "long" * 10_000
-    recipe = {"glsk_o3d": {"version": 1}, "extends": "default"}
-    match place:
-        case "head":
-            recipe["glsk_o3d"][name] = 1
-        case "top":
-            recipe[name] = 1
-        case "set":
-            recipe["set"] = {name: {}}
-        case _:
-            recipe["set"] = {"RingBuilder": {name: 1}}
-    with pytest.raises(RecipeError) as refused:
+    recipe = {**HEAD, "glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {}}}
+    table = recipe
+    for key in place:
+        table = table[key]
+    table["long" * 10_000] = {}
+    with pytest.raises(RecipeError, match="longlong") as refused:
         from_recipe(recipe)
-    assert "longlong" in str(refused.value)
     assert len(str(refused.value)) < 1500

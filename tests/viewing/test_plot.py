@@ -39,8 +39,8 @@ def frame(make, width, height):
     return dataclasses.replace(rectangle, points=(), vertex_of_point=(), normals=())
 
 
-@pytest.mark.parametrize(("width", "height"), [(3, 1), (1, 1), (1, 4), (1e6, 7e5)])
-@pytest.mark.parametrize("grid", [None, (1, 3), (2, 2)])
+@pytest.mark.parametrize(("width", "height"), [(3, 1), (1, 4), (1e6, 7e5)])
+@pytest.mark.parametrize("grid", [None, (2, 2)])
 def test_one_scale_and_all_of_it(make, width, height, grid):
     axes = None
     if grid is not None:
@@ -74,11 +74,10 @@ def test_a_cloud_alone_in_colours():
 
 
 @pytest.mark.parametrize("color", [*COLOR_NAMES, (0, 0, 1)])
-def test_colours_of_edges(skeleton, color):
-    axes = plot_skeleton(skeleton, color=color)
+def test_colours_of_edges(tree, color):
+    axes = plot_skeleton(tree, color=color)
     pixels(axes)
-    for drawn in axes.collections[1:]:
-        assert len(drawn.get_edgecolor()) == len(skeleton.edges)
+    assert len(axes.collections[1].get_edgecolor()) == len(tree.edges)
 
 
 def test_a_map_costs_no_digits(tree):

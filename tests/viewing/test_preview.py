@@ -1,3 +1,5 @@
+"""Pictures of a skeleton in its cloud, plain and coloured by a measure."""
+
 import dataclasses
 import re
 import sys
@@ -5,12 +7,14 @@ import sys
 import numpy as np
 import pytest
 
-from glsk_o3d.errors import FileFormatError, MissingPackageError
+from glsk_o3d import Skeleton
+from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.judgements import Supported
 from glsk_o3d.report import Report
-from glsk_o3d.viewing import figures, preview
+from glsk_o3d.samples import torus
+from glsk_o3d.viewing import preview
 from glsk_o3d.viewing.page import save_report
-from glsk_o3d.viewing.preview import save_preview
+from glsk_o3d.viewing.preview import save_assessment, save_preview
 
 matplotlib = pytest.importorskip("matplotlib")
 from matplotlib.image import imread  # noqa: E402
@@ -43,10 +47,10 @@ def test_picture_of_the_size_asked_for(skeleton, tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["p.png"]
 
 
-@pytest.mark.parametrize("offset", [0, 1e6, -1e9])
+@pytest.mark.parametrize("offset", [0, -1e9])
 def test_three_views_at_one_scale(make, tmp_path, offset):
     corners = np.array([[0, 0, 0], [4, 0, 0], [4, 2, 0], [4, 2, 1]]) * 8.0 + offset
-    box = dataclasses.replace(make(corners, [[0, 1], [1, 2], [2, 3]]), points=(), vertex_of_point=(), normals=())
+    box = dataclasses.replace(make(corners, [[0, 1], [1, 2], [2, 3]]), **WITHOUT_POINTS)
     save_preview(box, tmp_path / "p.png", size=(2400, 800))
     measured = columns_and_rows(is_red(imread(tmp_path / "p.png")))
     expected = np.array([(4, 2), (4, 1), (2, 1)])
@@ -54,27 +58,14 @@ def test_three_views_at_one_scale(make, tmp_path, offset):
     np.testing.assert_allclose(np.array(measured) / unit, expected, atol=0.1)
 
 
-def test_a_map_costs_no_digits(tmp_path, tree):
-    """Something of a millimetre, at the origin and on a map, where float64 tells 1e-9 apart."""
-    offset = np.array([4.5e5, 5.6e6, 310])
-    small = dataclasses.replace(tree, vertices=1e-3 * tree.vertices, points=1e-3 * tree.points)
-    there = dataclasses.replace(small, vertices=small.vertices + offset, points=small.points + offset)
-    images = []
-    for name, skeleton in (("here", small), ("there", there)):
-        save_preview(skeleton, tmp_path / f"{name}.png")
-        images.append(imread(tmp_path / f"{name}.png"))
-    assert np.abs(np.subtract(*images)).mean() < 1e-3
-
-
 def shaped(make, *size):
     corners = np.array(list(np.ndindex(2, 2, 2))) * size
     edges = [(0, 1), (1, 3), (3, 7), (7, 6), (6, 4), (4, 0)]
-    return dataclasses.replace(make(corners, edges), points=(), vertex_of_point=(), normals=())
+    return dataclasses.replace(make(corners, edges), **WITHOUT_POINTS)
 
 
 @pytest.mark.parametrize(
-    ("size", "share"),
-    [((1, 1, 1), 0.75), ((5, 5, 20), 0.8), ((30, 1, 1), 0.85), ((1, 30, 1), 0.85), ((1, 1, 30), 0.8), ((9, 6, 0), 0.8)],
+    ("size", "share"), [((1, 1, 1), 0.75), ((5, 5, 20), 0.8), ((30, 1, 1), 0.85), ((1, 30, 1), 0.85), ((9, 6, 0), 0.8)]
 )
 def test_objects_of_any_shape_fill_their_picture(make, tmp_path, size, share):
     save_preview(shaped(make, *size), tmp_path / "p.png")
@@ -87,32 +78,14 @@ def test_objects_of_any_shape_fill_their_picture(make, tmp_path, size, share):
     assert min(rows.min(), columns.min(), height - rows.max(), width - columns.max()) > 5
 
 
-def test_views_in_several_rows_keep_one_scale(make):
-    figure = preview.draw(shaped(make, 30, 2, 1), None, None)
-    width, _ = figure.get_size_inches()
-    boxes = [axes.get_position() for axes in figure.axes]
-    scale = max(box.width for box in boxes) * width / 30
-    assert len({round(box.x0, 6) for box in boxes}) == 1  # one above the other
-    assert sorted(round(box.width * width / scale, 2) for box in boxes) == [2.4, 30, 30]
-
-
 def test_dots_do_not_bury_short_branches(make):
-    rng = np.random.default_rng(0)
-    ends = rng.random((600, 3))
-    star = make(np.concatenate([[[0.5, 0.5, 0.5]], ends]), [(0, i + 1) for i in range(600)])
-    comb = np.column_stack([np.arange(601) / 600, np.zeros(601), np.zeros(601)])
-    teeth = comb[:600] + [0, 0, 0.002]
-    edges = [(i, i + 1) for i in range(600)] + [(i, 601 + i) for i in range(600)]
-    fine = make(np.concatenate([comb, teeth]), edges)
-    sizes = []
-    for skeleton in (star, fine):
-        axes = preview.draw(skeleton, None, None).axes[0]
-        lines, *spots = axes.collections[1:]
-        dots = [spot for spot in spots[1:] if len(spot.get_offsets())]
-        sizes.append((lines.get_linewidths()[0], len(dots)))
-    assert sizes[0][1] == 2
-    assert sizes[1][1] == 0  # no room for any
-    assert sizes[0][0] > sizes[1][0]
+    star = make(np.random.default_rng(0).random((101, 3)), [(0, i + 1) for i in range(100)])
+    stem = np.column_stack([np.arange(101) / 100, np.zeros(101), np.zeros(101)])
+    edges = [(i, i + 1) for i in range(100)] + [(i, 101 + i) for i in range(100)]
+    comb = make(np.concatenate([stem, stem[:100] + [0, 0, 0.002]]), edges)
+    for skeleton, dots in ((star, 2), (comb, 0)):  # of junctions, and of leaves
+        _, _, *spots = preview.draw(skeleton, None, None).axes[0].collections
+        assert sum(len(spot.get_offsets()) > 0 for spot in spots[1:]) == dots
 
 
 def test_the_root_is_marked(tree):
@@ -127,97 +100,61 @@ def test_the_root_is_marked(tree):
 
 def test_planar_clouds_and_clouds_without_a_skeleton(make, tmp_path):
     flat = np.random.default_rng(0).random((500, 3)) * [1, 1, 0]
-    whole = make(flat[:3], [[0, 1]])
-    save_preview(dataclasses.replace(whole, points=flat), tmp_path / "flat.png")
+    whole = dataclasses.replace(make(flat[:3], [[0, 1]]), points=flat)
     none = dataclasses.replace(whole, vertices=(), edges=(), radii=())
-    save_preview(dataclasses.replace(none, points=flat), tmp_path / "cloud.png")
-    save_preview(dataclasses.replace(none, points=()), tmp_path / "nothing.png")
-    red = {name: is_red(imread(tmp_path / f"{name}.png")).sum() for name in ("flat", "cloud", "nothing")}
-    assert red["flat"] > 0 == red["cloud"] == red["nothing"]
-    assert is_grey(imread(tmp_path / "cloud.png")).sum() > 100
+    colours = []
+    for skeleton in (whole, none, dataclasses.replace(none, points=())):
+        save_preview(skeleton, tmp_path / "p.png")
+        image = imread(tmp_path / "p.png")
+        colours.append((is_red(image).any(), is_grey(image).sum()))
+    (flat_red, _), (cloud_red, dots), (nothing_red, words) = colours
+    assert (flat_red, cloud_red, nothing_red) == (True, False, False)
+    assert dots > words + 100
 
 
-def test_the_same_picture_every_time_also_of_large_clouds(tree, tmp_path):
-    many = dataclasses.replace(tree, points=np.random.default_rng(0).normal(size=(100_001, 3)))
+def test_the_same_picture_every_time_without_global_state(tree, tmp_path):
+    many = dataclasses.replace(tree, points=np.random.default_rng(0).normal(size=(20_001, 3)))
+    before = dict(matplotlib.rcParams)
     for name in "ab":
         save_preview(many, tmp_path / f"{name}.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-
-
-def test_no_global_state(tree, tmp_path):
-    before = dict(matplotlib.rcParams)
-    save_preview(tree, tmp_path / "p.png")
     assert dict(matplotlib.rcParams) == before
     assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
 
 
-def test_caption_counts(tree, forest):
-    assert preview._caption(tree).split("   ")[::2] == (
-        ["7 points", "6 vertices", "5 edges", "1 component", "0 loops", "3 leaves", "1 junction"]
-    )
-    assert "3 components" in preview._caption(forest)
+def test_caption_counts_the_cloud_and_not_what_the_skeleton_holds_of_it(tree, forest):
+    def caption(skeleton, **report):
+        skeleton = dataclasses.replace(skeleton, report=Report(**report))
+        return [text.get_text() for text in preview.draw(skeleton, None, None).texts][-1]
 
-
-def test_caption_counts_the_cloud_and_not_what_the_skeleton_holds_of_it(tree):
-    known = dataclasses.replace(tree.report, n_input=90000)
-    sampled, joined = (dataclasses.replace(tree, report=known, **more) for more in ({}, WITHOUT_POINTS))
-    for skeleton in (sampled, joined):
-        assert preview._caption(skeleton).startswith("90000 points ")
-    assert preview._caption(dataclasses.replace(tree, report=Report(), **WITHOUT_POINTS)).startswith("6 vertices ")
-
-
-@pytest.mark.parametrize(("save", "name"), [(save_preview, "p.png"), (save_report, "r.html")])
-def test_failure_leaves_what_was_there(tree, tmp_path, monkeypatch, save, name):
-    (tmp_path / name).write_text("before")
-    with pytest.raises(FileNotFoundError, match="no such folder"):
-        save(tree, tmp_path / "missing" / name)
-    monkeypatch.setattr("os.replace", lambda *_: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        save(tree, tmp_path / name)
-    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "before")]
+    counts = "6 vertices   ·   5 edges   ·   1 component   ·   0 loops   ·   3 leaves   ·   1 junction"
+    assert caption(tree) == f"7 points   ·   {counts}"
+    assert "3 components" in caption(forest)
+    assert caption(tree, n_input=90000) == f"90000 points   ·   {counts}"
+    assert caption(dataclasses.replace(tree, **WITHOUT_POINTS)) == counts
 
 
 @pytest.mark.parametrize(("save", "ending"), [(save_preview, "png"), (save_report, "html")])
-@pytest.mark.parametrize("name", ["p.jpg", "p", "p.png.bak"])
+@pytest.mark.parametrize("name", ["p.jpg", "p"])
 def test_other_endings_are_refused(tree, tmp_path, save, ending, name):
     with pytest.raises(FileFormatError, match=rf"{name}: .*\.{ending}"):
         save(tree, tmp_path / name)
     assert not list(tmp_path.iterdir())
 
 
-def test_without_matplotlib(tree, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(MissingPackageError, match=r'pip install "glsk-o3d\[pictures\]"$'):
-        save_preview(tree, tmp_path / "p.png")
-
-
 LONG = "weakly supported: around 31% of the points " + "they do not agree on an axis, " * 20
-
-
-WIDE = [
-    (("sheet-like: costs $5 and $6",), r"warning: sheet-like: costs \$5 and \$6"),
-    ((LONG, "second"), r"warning: weakly .* \.\.\. warning: second"),
-    (("one", "two", "three", "four"), "warning: one warning: two and 2 more warnings"),
-    ((), ""),
-]
-LOW = [  # two lines
-    ((LONG,), r"warning: weakly .* \.\.\."),
-    ((LONG, "second"), r"warning: weakly .* \.\.\. warning: second"),
-    (("one", LONG), r"warning: one warning: weakly .* \.\.\."),
-    ((LONG, LONG, LONG), r"warning: weakly .* \.\.\. and 2 more warnings"),
+WARNINGS = [
+    ((900, 400), ("sheet-like: costs $5 and $6",), r"warning: sheet-like: costs \$5 and \$6"),
+    ((900, 400), (LONG, "second"), r"warning: weakly .* \.\.\. warning: second"),
+    ((900, 400), ("one", "two", "three", "four"), "warning: one warning: two and 2 more warnings"),
+    ((900, 400), (), ""),
+    ((900, 200), (LONG, LONG, LONG), r"warning: weakly .* \.\.\."),
 ]
 
 
-@pytest.mark.parametrize(
-    ("size", "warnings", "told"),
-    [
-        *((size, *each) for size in ((1800, 760), (900, 400)) for each in WIDE),
-        *(((900, 200), *each) for each in LOW),
-    ],
-)
-def test_warnings_are_told_below_and_nothing_overlaps(tree, tmp_path, size, warnings, told):
-    warned = dataclasses.replace(tree, report=dataclasses.replace(tree.report, warnings=warnings))
-    figure = preview.draw(warned, size, None, warnings=warnings)
+@pytest.mark.parametrize(("size", "warnings", "told"), WARNINGS)
+def test_warnings_are_told_below_and_nothing_overlaps(tree, size, warnings, told):
+    figure = preview.draw(tree, size, None, warnings=warnings)
     figure.canvas.draw()
     boxes = [text.get_window_extent() for text in figure.texts]
     assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0 for box in boxes)
@@ -225,28 +162,43 @@ def test_warnings_are_told_below_and_nothing_overlaps(tree, tmp_path, size, warn
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
     lines = [text.get_text() for text in reversed(figure.texts) if text.get_color() == preview._AMBER]
     assert re.fullmatch(told, " ".join(lines))
-    assert len(lines) <= 5
-    save_preview(warned, tmp_path / "p.png", size=size)
-    image = imread(tmp_path / "p.png")[-figures.DPI // 4 :]
-    assert (image[..., 0] - image[..., 2] > 0.4).any() == bool(warnings)
 
 
-def test_a_line_for_the_count_comes_first():
-    assert preview._warned([LONG, "two"], 6, 1) == ["2 warnings"]
-    assert preview._warned(["one"], 6, 1) == ["warning: one"]
-    assert preview._warned(["one"], 6, 0) == []
-
-
-def test_what_samples_disagree_with_is_marked(skeleton, tmp_path):
+def test_what_samples_disagree_with_is_marked(tree, tmp_path):
     """Three marks in three views, and none where they agree."""
-    place = tuple(skeleton.vertices[0].tolist())
+    place = tuple(tree.vertices[0].tolist())
     parts = Supported("end", place, 0.5), Supported("end", place, 0.5, present=False), Supported("loop", place, 1.0)
     amber = []
-    for support in ((), parts[2:], parts[:1], parts):
+    for support in (parts[2:], parts[:1], parts):
         report = Report(n_draws=8, n_agreeing=4, support=support)
-        save_preview(dataclasses.replace(skeleton, report=report), tmp_path / "p.png", size=(900, 400))
+        save_preview(dataclasses.replace(tree, report=report), tmp_path / "p.png", size=(900, 400))
         image = imread(tmp_path / "p.png")
         near = np.abs(image[..., :3] - np.array([0xA0, 0x50, 0]) / 255).max(axis=-1) < 0.1
         amber.append(int(near.sum()))
-    assert amber[0] == amber[1] == 0
-    assert 50 < amber[2] < amber[3]
+    assert amber[0] == 0
+    assert 50 < amber[1] < amber[2]
+
+
+# ------------------------------------------------------------------------------------------------ coloured by a measure
+
+
+def test_the_picture_tells_good_from_bad_and_what_black_is(tmp_path):
+    ring = torus(500)
+    moved = Skeleton(ring.nodes + [0, 0, 0.05], np.sort(ring.edges), 1.1 * ring.radii, (), (), ())
+    found = []
+    for value, best in ((0, 0), (7, 0), (0, 1), (np.nan, 1)):
+        values = np.full(len(moved.edges), value, float)
+        save_assessment(moved, ring.points, values, tmp_path / "p.png", label="measure", best=best)
+        image = imread(tmp_path / "p.png")[..., :3]
+        lines, legend = image[110:], image[85:110, 1400:]  # left of the colour bar, and below it
+        blue = (lines[..., 2] > 0.5) & (lines[..., 0] < 0.2) & (lines[..., 1] < 0.1)
+        orange = (lines[..., 0] > 0.9) & (lines[..., 1] > 0.5) & (lines[..., 2] < 0.35)
+        found.append((blue.sum() > 500, orange.sum() > 500, (legend < 0.5).any()))
+    good, bad = (True, False, False), (False, True, False)
+    assert found == [good, bad, bad, (False, False, True)]
+    (tmp_path / "p.png").unlink()
+    with pytest.raises(InvalidParameterError, match="128 edges"):
+        save_assessment(moved, ring.points, np.zeros(3), tmp_path / "p.png", label="measure")
+    with pytest.raises(FileFormatError, match=r"p\.jpg: .*PNG"):
+        save_assessment(moved, ring.points, np.zeros(128), tmp_path / "p.jpg", label="measure")
+    assert list(tmp_path.iterdir()) == []

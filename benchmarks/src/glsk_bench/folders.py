@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from glsk_o3d.analysis.truth import Truth
+from glsk_o3d.analysis.comparison import Truth
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.interop.atomic import write_atomically, write_json
 from glsk_o3d.io.formats.ply import header_of, rows_of

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from glsk_o3d.analysis.curves import radii_from_points
-from glsk_o3d.analysis.graph import check_graph, simple_edges
-from glsk_o3d.analysis.truth import Truth
+from glsk_o3d.analysis.comparison import Truth
+from glsk_o3d.analysis.curves import check_graph, simple_edges
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.interop.clouds import cloud_points
 
 from .folders import BenchmarkFolder, begun, write_axis, write_points
+from .radii import radii_from_points
 from .versions import OWN, fingerprint
 
 FLOAT_ROUNDING = 1e-6  # fitted: how far float32 may move a point, in the diagonal: less than scanners tell apart

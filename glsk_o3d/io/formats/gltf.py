@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.segmentation import branch_of_edge, vertex_of_cloud
-from ...analysis.skinning import bone_before, skin_weights
+from ...analysis.segmentation import bone_before, branch_of_edge, skin_weights, vertex_of_cloud
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...interop.atomic import check_ending, write_atomically
 from ...interop.clouds import cloud_points, open3d_class
@@ -42,8 +41,8 @@ def save_rig(
 ) -> None:
     """Write a mesh or a cloud with a skeleton's armature that moves it, as a binary glTF file.
 
-    Each edge is a bone. Its joint is at the end that is nearer to the root, so that every branch turns by itself. The
-    weights are those of `glsk_o3d.analysis.skinning.skin_weights`.
+    Each edge is a bone. Its joint is at the end that is nearer to the root, so that every branch turns by itself. A
+    point follows the edge nearest to it; over the first half of an edge its motion fades in.
 
     Parameters
     ----------

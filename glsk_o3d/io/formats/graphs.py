@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...analysis.branches import branch_table
-from ...editing.graphs import cut_loops, reroot
+from ...editing.edits import cut_loops, reroot
 from ...errors import FileFormatError
 from ...refinement.rooted import RootPlace, numbered_from
 from ...skeleton import OF_VERTICES, Skeleton

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Skeleton
-from glsk_o3d.analysis.skinning import skin_weights
+from glsk_o3d.analysis.segmentation import skin_weights
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.io.formats.gltf import save_rig
 from glsk_o3d.io.formats.graphs import as_forest

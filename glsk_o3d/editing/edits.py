@@ -1,7 +1,8 @@
-"""One component, no loops, another root, fewer branches."""
+"""One component, no loops, another root, fewer branches, fewer vertices, smoother curves."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,13 +10,16 @@ import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from ..analysis.branches import branch_table
+from ..analysis.curves import check_number
 from ..errors import InvalidParameterError
 from ..numerics.near_links import linked
-from ..numerics.vectors import norm
-from ..parameters import problem_with
+from ..numerics.polylines import arc_lengths
+from ..numerics.vectors import TINY, norm
 from ..refinement.merging import merge_into, some_vertices
 from ..refinement.rooted import RootPlace, numbered_from, root_among
-from ..skeleton import Skeleton
+from ..skeleton import Root, Skeleton
+
+SHRINK, SWELL = 0.5, -0.53  # published: factors of a pass there and back, which leave long waves as they are
 
 
 def largest_component(skeleton: Skeleton) -> Skeleton:
@@ -111,7 +115,10 @@ def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
     >>> bool(line.vertices[0, 0] == line.vertices[:, 0].min())
     True
     """
-    _refuse_loops(skeleton, "only trees have a root")
+    if skeleton.n_loops:
+        raise InvalidParameterError(
+            f"the skeleton has {skeleton.n_loops} loops: only trees have a root; see cut_loops()"
+        )
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: it has no vertex to be the root")
     rooted = numbered_from(skeleton, root_among(skeleton.vertices, skeleton, root))
@@ -119,12 +126,7 @@ def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
 
 
 def prune(
-    skeleton: Skeleton,
-    *,
-    length: float = 0.0,
-    radius: float = 0.0,
-    order: int | None = None,
-    root: RootPlace | None = None,
+    skeleton: Skeleton, *, length: float = 0.0, radius: float = 0.0, order: int | None = None, root: Root = None
 ) -> Skeleton:
     """Drop branches that leave a junction and end, and are short, thin, or of a high order.
 
@@ -159,22 +161,25 @@ def prune(
     >>> len(whole.leaves), len(prune(whole, order=0).leaves)
     (9, 2)
     """
-    check_number("length", length, "float")
-    check_number("radius", radius, "float")
-    check_number("order", order, "int?")
+    check_number("length", length, "float", low=0)
+    check_number("radius", radius, "float", low=0)
+    check_number("order", order, "int?", low=0)
+    if radius and not np.isfinite(skeleton.radii).all():
+        raise InvalidParameterError("the skeleton has no radii: it cannot be pruned by them")
     if order is not None:
         skeleton = _without_orders(skeleton, order, root)
     if length:
         skeleton = _without_ends(skeleton, length, lambda now, path: norm(np.diff(now.vertices[path], axis=0)).sum())
     if radius:
-        if not np.isfinite(skeleton.radii).all():
-            raise InvalidParameterError("the skeleton has no radii: it cannot be pruned by them")
         skeleton = _without_ends(skeleton, radius, lambda now, path: now.radii[path[1:]].mean())
     return skeleton
 
 
-def _without_orders(skeleton: Skeleton, order: int, root: RootPlace | None) -> Skeleton:
-    _refuse_loops(skeleton, "branches have an order in a tree")
+def _without_orders(skeleton: Skeleton, order: int, root: Root) -> Skeleton:
+    if skeleton.n_loops:
+        raise InvalidParameterError(
+            f"the skeleton has {skeleton.n_loops} loops: branches have an order in a tree; see cut_loops()"
+        )
     table = branch_table(skeleton, root)
     group = np.arange(len(skeleton.vertices))
     for row in np.argsort(table.level, kind="stable").tolist():  # parents before their children
@@ -203,13 +208,108 @@ def _without_ends(skeleton: Skeleton, least: float, measure: Callable[[Skeleton,
         skeleton = merge_into(skeleton, group)
 
 
-def _refuse_loops(skeleton: Skeleton, why: str) -> None:
-    if skeleton.n_loops:
-        raise InvalidParameterError(f"the skeleton has {skeleton.n_loops} loops: {why}; see cut_loops()")
+def simplify(skeleton: Skeleton, *, tolerance: float | None = None, n: int | None = None) -> Skeleton:
+    """Drop vertices where the curve is straight, branch by branch (Douglas and Peucker 1973).
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    tolerance : float, optional
+        How far a dropped vertex may be from the simpler curve, in the cloud's units.
+    n : int, optional
+        How many vertices to keep, those first that matter most; one of the two is given. Ends, junctions, and what it
+        takes to keep every loop always stay.
+
+    Returns
+    -------
+    Skeleton
+        Points of a dropped vertex belong to the nearest one left along the branch.
+
+    Raises
+    ------
+    InvalidParameterError
+        None of the two is given, or both, or one is out of its range.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(2000).points)
+    >>> simplify(ring, n=12)
+    Skeleton(12 vertices, 12 edges, 1 components, 1 loops, 0 leaves, 0 junctions)
+    """
+    if (tolerance is None) == (n is None):
+        raise InvalidParameterError("simplify needs either a tolerance or n")
+    check_number("tolerance", tolerance, "float?", low=0)
+    check_number("n", n, "int?", low=1)
+    matters = np.full(len(skeleton.vertices), np.inf)
+    twins = Counter(tuple(sorted((path[0], path[-1]))) for path in skeleton.branches)
+    for path in skeleton.branches:
+        here = _significance(skeleton.vertices[path])
+        if path[0] == path[-1]:  # a ring is at least a triangle
+            here[np.argsort(here[1:-1])[-2:] + 1] = np.inf
+        elif twins[tuple(sorted((path[0], path[-1])))] > 1 and len(path) > 2:
+            here[np.argmax(here[1:-1]) + 1] = np.inf
+        matters[path[1:-1]] = here[1:-1]
+    if n is None:
+        stays = matters > tolerance
+    else:
+        stays = np.zeros(len(matters), bool)
+        stays[np.argsort(-matters, kind="stable")[: max(n, np.isinf(matters).sum())]] = True
+    group = np.arange(len(matters))
+    for path in skeleton.branches:
+        along, kept = arc_lengths(skeleton.vertices[path]), np.flatnonzero(stays[path])
+        if len(kept):  # of a ring without a junction the first vertex may go, and is the last one too
+            nearest = np.abs(along[:, None] - along[kept]).argmin(axis=1)
+            group[path[1:-1]] = path[kept[nearest[1:-1]]]
+    return merge_into(skeleton, group)
 
 
-def check_number(name: str, value: object, type: str, low: int = 0) -> None:
-    """Raise InvalidParameterError unless a value is of a type of `parameters.TYPES` and at least `low`."""
-    wrong = problem_with(value, dict(type=type, low=low, high=None, open_low=False, choices=()))
-    if wrong:
-        raise InvalidParameterError(f"{name} = {value!r}: {wrong}")
+def _significance(curve: np.ndarray) -> np.ndarray:
+    """Largest tolerance at which every place of a curve stays, infinite at its ends, (p,) float array."""
+    found = np.full(len(curve), np.inf)
+    parts = [(0, len(curve) - 1)]
+    while parts:
+        first, last = parts.pop()
+        if last - first < 2:
+            continue
+        offset, chord = curve[first + 1 : last] - curve[first], curve[last] - curve[first]
+        along = np.clip(offset @ chord / max(chord @ chord, TINY), 0, 1)
+        away = norm(offset - along[:, None] * chord)
+        farthest = first + 1 + int(away.argmax())
+        # no more than that of the ends of its part, without which it would not be asked
+        found[farthest] = min(float(away.max()), found[first], found[last])
+        parts += [(first, farthest), (farthest, last)]
+    return found
+
+
+def smooth(skeleton: Skeleton, *, passes: int = 10) -> Skeleton:
+    """Smooth the curves without shrinking them (Taubin 1995, "A signal processing approach to fair surface design").
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    passes : int
+        There and back; more make longer waves disappear. Ends and junctions stay where they are.
+
+    Returns
+    -------
+    Skeleton
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(2000, noise=0.01).points)
+    >>> abs(smooth(ring).length / ring.length - 1) < 0.02
+    True
+    """
+    check_number("passes", passes, "int", low=0)
+    inner = np.flatnonzero(skeleton.degree == 2)
+    ends = np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
+    ends = ends[np.argsort(ends[:, 0], kind="stable")]
+    beside = ends[skeleton.degree[ends[:, 0]] == 2, 1].reshape(-1, 2)  # in the order of `inner`
+    vertices = skeleton.vertices.copy()
+    for factor in (SHRINK, SWELL) * passes:
+        vertices[inner] += factor * (vertices[beside].mean(axis=1) - vertices[inner])
+    return replace(skeleton, vertices=vertices)

@@ -1,4 +1,4 @@
-"""Pipelines from recipes, and these from JSON and TOML files."""
+"""Pipelines as recipes, and these as JSON and TOML files: read and written."""
 
 from __future__ import annotations
 
@@ -11,16 +11,120 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from ..errors import InvalidParameterError, RecipeError, brief, did_you_mean
-from ..parameters import FROM, NONE, Parameters, problem_with, shown
-from ..pipeline import RECIPE_VERSION, Pipeline
+from ..interop.atomic import write_atomically
+from ..parameters import FROM, NONE, UNWRITTEN, Parameters, problem_with, shown
+from ..pipeline import RECIPE_VERSION, Pipeline, recipe_of
 from .catalogue import catalogue, find, named_pipeline, serves
-from .writing import recipe_ending, refuse_gaps
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
+
+RECIPE_ENDINGS = (".json", ".toml")
+"""Files that hold recipes."""
+
+
+def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
+    """A pipeline as a recipe, with every parameter in it.
+
+    Parameters
+    ----------
+    pipeline : Pipeline
+
+    Returns
+    -------
+    dict
+        Of dicts, lists, strings, numbers and bools.
+
+    Raises
+    ------
+    InvalidParameterError
+        A parameter is wrong.
+    RecipeError
+        A filter or rule is not in `glsk_o3d.recipes.catalogue.catalogue`, or a parameter is something that no file can
+        hold.
+
+    Examples
+    --------
+    >>> from glsk_o3d import LPRReducer
+    >>> to_recipe(Pipeline(LPRReducer()))["pipeline"]
+    [{'filter': 'LPRReducer', 'phi': 100000.0, 'conserve_mass': True, 'mend_rings': True, 'order': 'cheapest'}]
+    """
+    pipeline.check()
+    recipe = recipe_of(*(stage.table() for stage in pipeline.stages))
+    for i, stage in enumerate(pipeline.stages):
+        _refuse_unknown(stage, f"pipeline[{i}]")
+    _refuse_gaps(recipe)
+    return recipe
+
+
+def _refuse_gaps(value: Any, path: str = "") -> None:
+    """Raise RecipeError, with its path, for what a recipe says that it could not hold."""
+    if isinstance(value, dict) and UNWRITTEN in value:
+        raise RecipeError(f"{path}: a recipe cannot hold it: {value[UNWRITTEN]}")
+    if isinstance(value, dict):
+        for key, item in value.items():
+            _refuse_gaps(item, f"{path}.{key}" if path else str(key))
+    elif isinstance(value, list):
+        for i, item in enumerate(value):
+            _refuse_gaps(item, f"{path}[{i}]")
+
+
+def _refuse_unknown(part: Parameters, path: str) -> None:
+    """Raise RecipeError if a filter or rule, or one inside it, is none that a recipe could name."""
+    cls = type(part)
+    if find(cls.__name__) is not cls:
+        name = f"{cls.__module__}.{cls.__qualname__}"
+        raise RecipeError(
+            f"{path}: a recipe cannot hold it: {name} is not among the filters and rules of 'glsk filters'"
+        )
+    for field in dataclasses.fields(part):  # type: ignore[arg-type]
+        value = getattr(part, field.name)
+        if isinstance(value, Parameters):
+            _refuse_unknown(value, f"{path}.{field.name}")
+
+
+def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
+    """Write a pipeline as a recipe, with every parameter in it, as JSON or TOML by the ending.
+
+    Parameters
+    ----------
+    pipeline : Pipeline
+    path : path-like
+        It appears complete or not at all.
+
+    Raises
+    ------
+    InvalidParameterError, RecipeError
+        See `to_recipe`; or the ending is unknown.
+    OSError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from glsk_o3d import load_recipe, pipelines
+    >>> with TemporaryDirectory() as folder:
+    ...     save_recipe(pipelines.default(), f"{folder}/usual.toml")
+    ...     load_recipe(f"{folder}/usual.toml") == pipelines.default()
+    True
+    """
+    toml = _ending(path) == ".toml"
+    recipe = to_recipe(pipeline)
+    text = tomli_w.dumps(recipe) if toml else json.dumps(recipe, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    write_atomically(path, lambda temporary: temporary.write_bytes(text.encode()))
+
+
+def _ending(path: str | os.PathLike) -> str:
+    """The ending of a recipe's file name; RecipeError for another one."""
+    ending = Path(path).suffix.lower()
+    if ending not in RECIPE_ENDINGS:
+        raise RecipeError(f"{os.fspath(path)}: unknown ending; recipes are {' or '.join(RECIPE_ENDINGS)} files")
+    return ending
 
 
 def load_recipe(path: str | os.PathLike) -> Pipeline:
@@ -51,12 +155,13 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     ...     load_recipe(path).stages[0].k
     12
     """
-    ending = recipe_ending(path)
+    ending = _ending(path)
     if os.path.exists(path) and not os.path.isfile(path):
         raise RecipeError(f"{os.fspath(path)}: is no file but a folder, or a pipe or a device, which may never end")
     data = Path(path).read_bytes()
     try:
-        recipe = _READERS[ending](data.decode("utf-8-sig"))
+        text = data.decode("utf-8-sig")
+        recipe = json.loads(text, object_pairs_hook=_table) if ending == ".json" else tomllib.loads(text)
     except Exception as error:  # whatever a parser raises on a hostile file
         raise RecipeError(f"{os.fspath(path)}: not valid {ending[1:].upper()}: {error}") from error
     try:
@@ -65,17 +170,12 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
         raise RecipeError(f"{os.fspath(path)}: {error}") from None
 
 
-def _read_json(text: str) -> Any:
-    def table(pairs):
-        often = Counter(key for key, _ in pairs)
-        if len(often) < len(pairs):
-            raise ValueError(f"the key {often.most_common(1)[0][0]!r} stands twice in one table")
-        return dict(pairs)
-
-    return json.loads(text, object_pairs_hook=table)
-
-
-_READERS: dict[str, Callable[[str], Any]] = {".json": _read_json, ".toml": tomllib.loads}
+def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A table of JSON, in which no key may stand twice."""
+    often = Counter(key for key, _ in pairs)
+    if len(often) < len(pairs):
+        raise ValueError(f"the key {often.most_common(1)[0][0]!r} stands twice in one table")
+    return dict(pairs)
 
 
 def from_recipe(recipe: dict[str, Any]) -> Pipeline:
@@ -104,7 +204,7 @@ def from_recipe(recipe: dict[str, Any]) -> Pipeline:
     20
     """
     _check_head(recipe)
-    refuse_gaps(recipe)
+    _refuse_gaps(recipe)
     if "extends" in recipe:
         return _extended(recipe["extends"], recipe.get("set", {}))
     stages = recipe["pipeline"]
