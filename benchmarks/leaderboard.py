@@ -22,7 +22,7 @@ from _leaderboard.kept import SECONDS, Entry, keep, kept, seconds
 from _leaderboard.pictures import board, draw
 from _peers import PEERS, Peer, installed, one_thread, silence, skeleton_of
 from glsk_bench import leaderboard, make, read_folder, score_answers
-from glsk_bench.answers import TIMES_NAME, read_times
+from glsk_bench.scoring import TIMES_NAME, read_times
 from glsk_bench.clouds import cloud
 from glsk_bench.shapes import FAMILIES, shape
 

@@ -7,7 +7,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 from glsk_bench import read_folder, run, score_answers
-from glsk_bench.coverage import coverage
+from glsk_bench.clouds import coverage
 
 from glsk_o3d import Skeleton, samples
 

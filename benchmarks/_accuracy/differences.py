@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 from _common.tables import Tables, number
-from glsk_bench.intervals import mean_with_interval, told
+from glsk_bench.table import mean_with_interval, told
 
 from .known_axes import random_shapes, with_all
 from .measuring import by_pipeline, by_variant

@@ -8,7 +8,7 @@ from pathlib import Path
 from _common.command_line import PUBLISHED
 from _common.results import pick, summary
 from _common.tables import Tables, number
-from glsk_bench.intervals import mean_with_interval, told
+from glsk_bench.table import mean_with_interval, told
 
 from glsk_o3d.interop.atomic import write_atomically
 

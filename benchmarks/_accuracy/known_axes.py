@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from _common.results import summary
 from _common.tables import Table, Tables, number
-from glsk_bench.intervals import mean_with_interval, told
+from glsk_bench.table import mean_with_interval, told
 
 from .measuring import by_family, by_pipeline, by_variant
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from _common.tables import Table, Tables, number
-from glsk_bench.intervals import mean_with_interval, told
+from glsk_bench.table import mean_with_interval, told
 from scipy.stats import rankdata
 
 from .fitting import Answered, fitted, said

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from _common.clouds import Case
 from _common.results import pick
 from _common.tables import Table, number
-from glsk_bench.intervals import mean_with_interval, told
+from glsk_bench.table import mean_with_interval, told
 
 from glsk_o3d.analysis import compare
 from glsk_o3d.pipelines import default

@@ -7,9 +7,9 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from glsk_bench import version
+from glsk_bench.versions import version
 from glsk_bench.clouds import cloud, coverage
-from glsk_bench.randomness import generator
+from glsk_bench.shapes.curves import generator
 from glsk_bench.shapes import Shape
 from glsk_bench.shapes.axis import Axis as Cones
 from glsk_bench.shapes.drawing import SURFACE_POINTS

@@ -9,7 +9,7 @@ import numpy as np
 from _common.plots import BLUE, ORANGE, keep, sheet
 from _peers import PEERS
 from glsk_bench import BenchmarkFolder
-from glsk_bench.answers import answer_files
+from glsk_bench.scoring import answer_files
 
 from glsk_o3d import plot_skeleton, read_cloud, read_skeleton
 from glsk_o3d.interop.atomic import write_atomically

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from _common.tables import Table, number
 from _peers import PEERS
-from glsk_bench.intervals import mean_with_interval, told
+from glsk_bench.table import mean_with_interval, told
 
 from .kept import Entry
 

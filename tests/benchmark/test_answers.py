@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from glsk_bench import Results, answers, read_results, score, score_answers
+from glsk_bench import Results, read_results, score, score_answers, scoring
 
 from glsk_o3d import Skeleton
 from glsk_o3d.errors import FileFormatError
@@ -154,7 +154,7 @@ def test_packed_results_that_are_damaged_or_fill_the_memory(tmp_path, monkeypatc
         packed.write_bytes(data)
         with pytest.raises(FileFormatError, match=r"scores\.json\.gz: not the scores"):
             read_results(packed)
-    monkeypatch.setattr(answers, "MOST_RESULTS", 1000)
+    monkeypatch.setattr(scoring, "MOST_RESULTS", 1000)
     with pytest.raises(FileFormatError, match="it is too large"):
         read_results(packed)
 

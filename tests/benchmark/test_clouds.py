@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from glsk_bench.clouds import VARIANTS, cloud
-from glsk_bench.randomness import generator
+from glsk_bench.shapes.curves import generator
 from glsk_bench.scanning import camera_places, cast, depth_image, seen_cosines
 from glsk_bench.shapes import FAMILIES, Shape
 from scipy.spatial import cKDTree

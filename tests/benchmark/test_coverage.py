@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from glsk_bench.clouds import cloud, coverage
-from glsk_bench.randomness import generator
+from glsk_bench.shapes.curves import generator
 from glsk_bench.shapes import FAMILIES, Shape
 from glsk_bench.shapes.axis import Axis, joined
 from glsk_bench.shapes.surface import surface

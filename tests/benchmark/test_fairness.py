@@ -6,8 +6,9 @@ import pytest
 from glsk_bench.shapes.axis import Axis, joined
 from glsk_bench.shapes.curves import polygon
 from glsk_bench.shapes.fairness import fault
-from glsk_bench.shapes.paths import chains, shortest_loop, subdivided
-from glsk_bench.shapes.solid import topology
+from glsk_bench.shapes.axis import subdivided
+from glsk_bench.shapes.fairness import chains, shortest_loop
+from glsk_bench.shapes.fairness import topology
 
 
 def line(start, end, radius=0.1):

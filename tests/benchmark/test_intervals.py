@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from glsk_bench.intervals import mean_with_interval, told
+from glsk_bench.table import mean_with_interval, told
 from scipy import stats
 
 

@@ -5,8 +5,8 @@ import sys
 import time
 
 import pytest
-from glsk_bench import RunResult, run, score_answers
-from glsk_bench.commands import CAN_LIMIT_MEMORY
+from glsk_bench import run, score_answers
+from glsk_bench.running import CAN_LIMIT_MEMORY, RunResult
 
 from glsk_o3d import pipelines, read_skeleton
 from glsk_o3d.errors import FileFormatError, InvalidParameterError

@@ -5,14 +5,14 @@ from itertools import combinations
 import networkx as nx
 import numpy as np
 import pytest
-from glsk_bench.randomness import generator
+from glsk_bench.shapes.curves import generator
 from glsk_bench.shapes import FAMILIES, Shape, shape
 from glsk_bench.shapes.axis import Axis, UnfitDraw
 from glsk_bench.shapes.curves import across, oval, swelling, wander
 from glsk_bench.shapes.drawing import DRAWN_BY, SURFACE_POINTS
 from glsk_bench.shapes.fairness import fault
-from glsk_bench.shapes.frame_graphs import GRAPHS
-from glsk_bench.shapes.paths import subdivided
+from glsk_bench.shapes.frames import GRAPHS
+from glsk_bench.shapes.axis import subdivided
 from glsk_bench.shapes.trees import Habit, _grow
 from scipy.spatial.distance import cdist
 

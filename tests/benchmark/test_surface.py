@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from glsk_bench.randomness import generator
+from glsk_bench.shapes.curves import generator
 from glsk_bench.shapes import FAMILIES
 from glsk_bench.shapes.surface import INSIDE, buried, surface
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 from glsk_bench import Results, Scores, leaderboard
-from glsk_bench.intervals import mean_with_interval
+from glsk_bench.table import mean_with_interval
 
 from glsk_o3d.errors import InvalidParameterError
 
@@ -63,13 +63,13 @@ def two():
 def test_in_markdown(two, tmp_path):
     board = leaderboard(two)
     assert board.markdown() == GOLDEN
-    board.to_markdown(tmp_path / "table.md")
+    board.save(tmp_path / "table.md")
     assert (tmp_path / "table.md").read_text() == GOLDEN
 
 
 def test_in_json(two, tmp_path):
     board = leaderboard(two)
-    board.to_json(tmp_path / "table.json")
+    board.save(tmp_path / "table.json")
     told = json.loads((tmp_path / "table.json").read_text())
     assert told == board.as_dict()
     good, bad = told["entries"]

@@ -5,8 +5,8 @@ import json
 
 import numpy as np
 import pytest
-from glsk_bench import make, version, versions
-from glsk_bench.versions import fingerprint, fingerprints, sameness
+from glsk_bench import make, versions
+from glsk_bench.versions import fingerprint, fingerprints, sameness, version
 
 from glsk_o3d import read_cloud
 from glsk_o3d.errors import InvalidParameterError
