@@ -112,7 +112,7 @@ def test_topology_of_balls(centres, radius, found):
 def test_edges_are_cut_evenly_and_nothing_else_changes():
     nodes = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 0.04]])
     edges, radii = np.array([[0, 1], [2, 1], [2, 3]]), np.array([0.1, 0.2, 0.3, 0.1])
-    places, links, thick = subdivided(nodes, edges, radii, 0.5)
+    places, links, thick = subdivided(nodes, edges, radii)
     np.testing.assert_array_equal(places[:4], nodes)
     np.testing.assert_array_equal(thick[:4], radii)
     assert len(places) == 4 + 19 + 9 + 0

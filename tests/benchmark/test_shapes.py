@@ -124,7 +124,7 @@ def test_parts_of_groups_keep_their_distance_and_come_near():
         except UnfitDraw:
             refused += 1
             continue
-        nodes, edges, radii = subdivided(axis.nodes, axis.edges, axis.radii, 0.5)
+        nodes, edges, radii = subdivided(axis.nodes, axis.edges, axis.radii)
         parts = [np.array(sorted(part)) for part in nx.connected_components(nx.Graph(edges.tolist()))]
         between = [
             (cdist(nodes[a], nodes[b]) - radii[a][:, None] - radii[b]).min() / min(radii[a].min(), radii[b].min())

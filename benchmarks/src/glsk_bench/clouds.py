@@ -16,7 +16,7 @@ from glsk_o3d.samples.sample import check
 
 from .scanning import camera_places, depth_image, lidar_scan, seen_cosines
 from .shapes import Shape
-from .shapes.axis import FINE_STEP, subdivided
+from .shapes.axis import subdivided
 from .shapes.curves import direction, generator
 from .shapes.drawing import check_seed
 
@@ -209,7 +209,7 @@ def coverage(shape: Shape, points: np.ndarray) -> float:
     points = np.asarray(points, float)
     if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0 or not np.isfinite(points).all():
         raise InvalidParameterError("points must be an (n, 3) array of finite numbers, and not empty")
-    nodes, edges, radii = subdivided(shape.nodes, shape.edges, shape.radii, FINE_STEP)
+    nodes, edges, radii = subdivided(shape.nodes, shape.edges, shape.radii)
     start, end = edges.T
     middle, radius, length = nodes[edges].mean(axis=1), radii[edges].mean(axis=1), norm(nodes[start] - nodes[end])
     whole = _shown(middle, radius, length, shape.points[::EVERY])

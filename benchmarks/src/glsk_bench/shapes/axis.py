@@ -139,12 +139,16 @@ FINE_STEP = 0.5  # fitted: pieces of an axis, in the radius: their balls differ 
 
 
 def subdivided(
-    nodes: np.ndarray, edges: np.ndarray, radii: np.ndarray, step: float
+    nodes: np.ndarray, edges: np.ndarray, radii: np.ndarray, longest: float | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cut every edge in equal pieces no longer than `step` times its smaller radius."""
+    """Nodes, edges and radii once every edge is cut in equal pieces, by default of half its smaller radius at most.
+
+    The new nodes come after those there were, edge by edge, and the pieces of each edge one after another.
+    """
     a, b = edges.T
     span, swell = nodes[b] - nodes[a], radii[b] - radii[a]
-    pieces = np.maximum(np.ceil(norm(span) / (step * np.minimum(radii[a], radii[b]))).astype(int), 1)
+    most = FINE_STEP * np.minimum(radii[a], radii[b]) if longest is None else longest
+    pieces = np.maximum(np.ceil(norm(span) / most).astype(int), 1)
     new = pieces - 1
     edge = np.repeat(np.arange(len(edges)), new)
     t = (_counted(new) + 1) / pieces[edge]

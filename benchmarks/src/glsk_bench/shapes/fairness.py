@@ -12,7 +12,7 @@ from scipy.spatial.distance import cdist
 
 from glsk_o3d.numerics.components import component_labels
 
-from .axis import FINE_STEP, subdivided
+from .axis import subdivided
 
 # Fitted, as all of this page: on draws that people would not agree about.
 GAP = 0.5  # between parts that are not joined nearby, at least, in the smaller radius
@@ -35,7 +35,7 @@ def fault(nodes: np.ndarray, edges: np.ndarray, radii: np.ndarray, spacing: floa
     """
     if radii.min() < THINNEST_SPACINGS * spacing:
         return "thin"
-    places, links, thick = subdivided(nodes, edges, radii, FINE_STEP)
+    places, links, thick = subdivided(nodes, edges, radii)
     if len(places) > MOST_PLACES:
         return "large"
     apart = cdist(places, places)

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from .axis import FINE_STEP, Axis, UnfitDraw, joined, subdivided
+from .axis import Axis, UnfitDraw, joined, subdivided
 from .curves import UP, across, any_rotation, direction, oval, swelling, wander
 
 GAP_RANGE = (0.7, 2.0)  # fitted: between two parts, in the thinner one's least radius
@@ -110,7 +110,7 @@ def _part(rng):
 
 def _finely(axis):
     """Places all along an axis, and the radii there."""
-    places, _, radii = subdivided(axis.nodes, axis.edges, axis.radii, FINE_STEP)
+    places, _, radii = subdivided(axis.nodes, axis.edges, axis.radii)
     return places, radii
 
 
