@@ -1,4 +1,4 @@
-"""Clouds and axes of other people as a benchmark takes them: drawn trees, scanned plants, vessels, neurons, arteries."""
+"""Clouds and axes of other people, as a benchmark takes them: drawn trees, plants, vessels and neurons, arteries."""
 
 from __future__ import annotations
 
