@@ -29,7 +29,7 @@ def write_scene(path, dtype):
     assert o3d.t.io.write_point_cloud(str(path), scene)
 
 
-@pytest.mark.parametrize(("api", "dtype"), [("legacy", "f8"), ("tensor", "f4"), ("tensor", "f8")])
+@pytest.mark.parametrize(("api", "dtype"), [("legacy", "f8"), ("tensor", "f4")])
 def test_open3d_pipeline(root, tmp_path, monkeypatch, capsys, api, dtype):
     write_scene(tmp_path / "scene.ply", dtype)
     example = root / "examples" / "open3d_pipeline.py"
@@ -86,10 +86,6 @@ def test_open3d_pipeline_outlives_skeletons_of_a_single_vertex(root, tmp_path, m
         ([], "usage: "),
         (["none.ply", "out"], "error: none.ply: no such file"),
         (["scene.ply", "out", "--ground", "9"], "error: scene.ply: no point lies above z = 9: give another --ground"),
-        (
-            ["scene.ply", "out", "tensor", "--voxel", "0.5"],
-            "error: scene.ply: no object found: 0 of at least 300",
-        ),
         (["scene.ply", "out", "--least", "9999"], "error: scene.ply: no object found: 0 of at least 9999 points"),
     ],
 )

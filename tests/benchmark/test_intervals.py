@@ -29,10 +29,6 @@ def test_more_clouds_of_a_shape_are_no_more_evidence():
     assert apart[2] - apart[1] == pytest.approx((once[2] - once[1]) / 2, rel=0.15)
 
 
-def test_shapes_weigh_as_much_as_they_have_clouds():
-    assert mean_with_interval(["a", "a", "b"], [1, 1, 0]) == (2 / 3, 0, 1)
-
-
 def test_in_words():
     assert told(0.984, 0.9, 1) == "0.98 [0.90, 1.00]"
     assert told(-0.001, -0.0123, 0.0006, 3, "+") == "-0.001 [-0.012, +0.001]"
