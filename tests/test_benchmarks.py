@@ -30,8 +30,6 @@ def parts(tool):
     """The modules that it is made of, by their names."""
     names = ("accuracy", "clouds", "runs", "stability", "tables")
     return SimpleNamespace(**{name: sys.modules[f"_{name}"] for name in names})
-        **{it: sys.modules[f"_{it}"] for it in ("accuracy", "clouds", "runs", "stability", "tables")}
-    )
 
 
 def row(shape="torus", variant="clean_512", pipeline="default", **values):
@@ -123,18 +121,6 @@ class TestFolders:
 
 
 class TestArithmetic:
-    def test_summary_takes_means_and_counts_failures_as_wrong(self, parts):
-        rows = [row(error=0.1, ends=0.5), row(error=0.3, topology=False, loops=1), row(leaves=1, error=0.2)]
-        mean = parts.tables.summary([*rows, failed("mug")])
-        assert (mean["n"], mean["right"], mean["ends"]) == (4, 2, 0.5)
-        assert mean["error"] == pytest.approx(0.2)
-        assert np.isnan(parts.tables.summary([failed("mug")])["error"])
-
-    def test_wrong_says_what(self, parts):
-        assert parts.accuracy.wrong(row()) == ""
-        assert parts.accuracy.wrong(row(loops=2, components=-1)) == "torus +2 loops -1 components"
-        assert parts.accuracy.wrong(failed("mug")) == "mug (ValueError: no)"
-
     def test_overview_by_cloud_and_by_family(self, parts):
         rows = [row("rings_0", family="rings", seed=0, cpu=0.4), row("rings_1", family="rings", seed=1, perfect=False)]
         rows += [row("knots_0", family="knots", seed=0, error=0.3, topology=False, perfect=False, tips_f1=0.5)]
@@ -315,9 +301,7 @@ class TestCommands:
         "wrong",
         [
             ("truth", "--builtin", "--shapes", "teapot"),
-            ("truth", "--builtin", "--variant", "dirty_512"),
             ("truth", "--builtin", "--pipeline", "wen2023"),
-            ("truth", "no_such_folder"),
             ("truth", "--builtin", "--set", "Refiner.magic=1"),
             ("ablation", "--builtin", "--idea", "magic"),
             ("ablation", "--builtin", "--page", "no_such_page.md"),

@@ -1,7 +1,6 @@
 """The readers of other people's data: tiny files of each kind, made up here, and what is bad in them."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import open3d as o3d
@@ -286,12 +285,3 @@ def test_nothing_there(call, tmp_path, words, said):
 def test_a_folder_of_a_version(call, small, vessels):
     out = call("vessels", vessels, "-o", small.path, code=2)
     assert "has version v1, not own" in " ".join(out.split())
-
-
-def test_places_that_are_one_and_names(reading):
-    """With the largest radius; what no edge joins to another place goes."""
-    places = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0], [9, 9, 9]], float)
-    nodes, edges, radii = reading.welded(places, np.array([[1, 0], [1, 2], [2, 3]]), np.array([1, 2, 5, 3, 4]))
-    assert nodes.tolist() == [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
-    assert (edges.tolist(), radii.tolist()) == ([[0, 1], [1, 2]], [1, 5, 3])
-    assert [reading.plain(Path(name)) for name in ("a b/..c é.x", "../.-")] == ["a-b-..c-é.x", "unnamed"]

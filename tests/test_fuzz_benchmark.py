@@ -2,7 +2,6 @@
 
 import os
 import signal
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -131,8 +130,3 @@ def dies_and_hangs(sender, what, seed, numbers):
         if number == 3:
             signal.pause()
         sender.send(SimpleNamespace(number=number, findings=[]))
-
-
-def test_one_case_alone(call):
-    assert call("files", "--case", 3, "--seed", 1).split(":")[-1].strip() in ("read", "refused")
-    assert Path("ledger.jsonl").exists() is False

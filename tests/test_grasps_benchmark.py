@@ -42,15 +42,6 @@ def test_clouds_of_a_mug(tool):
     assert below[1] < 0.002  # the cameras are above; they see the very edge
 
 
-def test_clouds_of_a_sample(tool):
-    torus = tool.built("torus", 0)
-    whole, seen = (torus.cloud(500, condition, 0) for condition in ("clean", "two cameras"))
-    assert not torus.inside(1.001 * whole + 0.001 * np.sign(whole)).all()
-    assert torus.inside(torus.nodes).all()
-    assert (whole[:, 2] < -0.08).any()
-    assert seen[:, 2].min() > -0.08
-
-
 @pytest.mark.parametrize("name", ["tree", "helix"])
 def test_points_are_on_the_shape_that_judges(tool, name):
     thing = tool.built(name, 1)

@@ -185,12 +185,6 @@ class TestCommands:
         assert (found["cgal"], found["default"]["cpu"]) == (dict(cpu=2.5, where="there"), 0.125)
         assert "one thread" in found["default"]["where"]
 
-    def test_seconds_are_medians_over_the_clouds(self, tool, parts, monkeypatch):
-        monkeypatch.setattr(tool, "TIMED", [("tubes", "clean"), ("tubes", "holes"), ("tubes", "scan2")])
-        monkeypatch.setattr(tool, "shape", lambda family, seed: (family, seed))
-        monkeypatch.setattr(tool, "cloud", lambda shape, variant: len(variant))
-        assert tool.timed(SimpleNamespace(timed=lambda points: (None, float(points)))) == dict(cpu=5.0)
-
     def test_pages_are_filled_or_all_is_printed(self, tool, call, tmp_path, monkeypatch):
         monkeypatch.setattr(tool, "IMAGES", tmp_path)
         one, many = tmp_path / "one.md", tmp_path / "many.md"
@@ -213,11 +207,6 @@ class TestCommands:
     )
     def test_wrong_usage_is_found_at_once(self, call, wrong):
         assert "Invalid value" in call(*wrong, code=2)
-
-    def test_one_that_is_absent_is_named(self, tool, parts, call, monkeypatch):
-        absent = parts.peers.Peer("gone", ("no-such-package",), "points", None)
-        monkeypatch.setattr(tool, "PEERS", {"gone": absent, "default": tool.PEERS["default"]})
-        assert "not installed: gone" in call("seconds", "--tool", "gone", code=2)
 
 
 class TestTools:

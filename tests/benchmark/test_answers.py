@@ -76,13 +76,6 @@ def test_what_is_missing_is_a_failure(perfect, small):
     assert rows_of(results)["trees_100_scan2"]["perfect"]
 
 
-def test_other_files_do_not_count(perfect, small):
-    before = score_answers(small, perfect).rows
-    for name in ("notes.txt", "trees_101_scan2.obj", "tubes_100_clean.log", "else.ply", ".hidden.ply"):
-        (perfect / name).write_text("rubbish")
-    assert score_answers(small, perfect).rows == before
-
-
 def test_two_answers_are_refused(perfect, small):
     (perfect / f"{CLOUD}.swc").write_text("1 0 0 0 0 1 -1\n")
     with pytest.raises(FileFormatError, match=f"{CLOUD}.swc answers the same cloud: keep one"):

@@ -129,20 +129,6 @@ def test_holes_are_four_balls_at_the_same_places_for_every_size(n, drawn):
     assert far > 2 * cKDTree(cloud(one, "clean", n, seed=2)).query(one.points)[0].max() or n < 4096
 
 
-def test_outliers_are_the_last_rows_anywhere_in_a_larger_box(drawn):
-    one = drawn("trees", 0)
-    points = cloud(one, "outliers")
-    assert (rows(one, points[:-41]) >= 0).all()
-    outliers = np.concatenate([cloud(one, "outliers", seed=seed)[-41:] for seed in range(20)])
-    low, size = one.points.min(axis=0), np.ptp(one.points, axis=0)
-    where = (outliers - low) / size
-    assert where.min() > -0.1
-    assert where.max() < 1.1
-    np.testing.assert_allclose(where.mean(axis=0), 0.5, atol=0.05)
-    np.testing.assert_allclose(where.std(axis=0), 1.2 / np.sqrt(12), rtol=0.05)
-    assert len(cloud(one, "outliers", 40)) == 40  # without any
-
-
 @pytest.mark.parametrize(("variant", "size"), [("noise05", 0.005), ("noise1", 0.01), ("noise2", 0.02)])
 def test_noise_is_gaussian_and_as_large_as_said(variant, size, drawn):
     one = drawn("handles", 0)

@@ -110,13 +110,6 @@ def test_edges_are_cut_evenly_and_nothing_else_changes():
     assert graph.number_of_edges() == len(links) == len(places) - 1
 
 
-def test_chains_run_from_fork_to_fork_and_rings_start_anywhere():
-    theta = [[0, 1], [1, 2], [2, 3], [0, 3], [0, 4], [4, 3], [3, 5]]
-    ring_edges = [[6, 7], [7, 8], [8, 6]]
-    found = chains(9, np.array(theta + ring_edges))
-    assert found == [[0, 1, 2, 3], [0, 3], [0, 4, 3], [3, 5], [6, 7, 8, 6]]
-
-
 def test_the_shortest_loop_through_a_chain():
     edges = np.array([[0, 1], [1, 2], [2, 3], [0, 3], [0, 4], [4, 3], [3, 5]])
     lengths = np.array([1, 1, 1, 1.5, 1, 1, 1.0])

@@ -5,7 +5,7 @@ from itertools import combinations
 import networkx as nx
 import numpy as np
 import pytest
-from glsk_bench.shapes import FAMILIES, Shape, shape
+from glsk_bench.shapes import FAMILIES, shape
 from glsk_bench.shapes.axis import Axis, UnfitDraw, subdivided
 from glsk_bench.shapes.curves import generator, wander
 from glsk_bench.shapes.drawing import DRAWN_BY, SURFACE_POINTS
@@ -141,12 +141,6 @@ def test_refused_draws_are_counted(monkeypatch):
 def test_what_makes_no_shape_is_refused(family, seed, message):
     with pytest.raises(InvalidParameterError, match=message):
         shape(family, seed)
-
-
-def test_it_says_what_it_is(drawn):
-    assert repr(drawn("tubes", 0)) == "Shape('tubes_0': 1 component, 0 loops, 2 leaves)"
-    facts = {"n_components": 2, "cycle_rank": 1, "n_leaves": 1}
-    assert repr(Shape("a", "b", 0, *5 * (np.empty(0),), facts)) == "Shape('a': 2 components, 1 loop, 1 leaf)"
 
 
 # ------------------------------------------------------------------------------------------------------ parts of shapes

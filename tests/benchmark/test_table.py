@@ -85,15 +85,6 @@ def test_the_order_is_by_perfect_then_by_topology():
     assert [entry["name"] for entry in leaderboard(made).entries] == ["d", "b", "c", "a"]
 
 
-def test_seconds_of_failures_do_not_count():
-    made = results("a", BEST, FAILED, BEST, FAILED, seconds=(1.0, 600.0, 3.0, 600.0))
-    assert leaderboard([made]).entries[0]["all"]["seconds"] == 2
-
-
-def test_the_whole_version_is_told():
-    assert leaderboard([results("a", *[BEST] * 4, whole=True)]).markdown().startswith("Benchmark v1. Means")
-
-
 def test_what_cannot_be_compared(two):
     bad, good = two
     for other in (Results("v1", "fewer", False, good.rows[1:]), Results("v2", "other", False, good.rows)):
