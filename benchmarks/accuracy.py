@@ -11,19 +11,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
+import _accuracy
+import _stability
 import typer
-from _accuracy.differences import difference_tables, paired
-from _accuracy.ideas import IDEAS, ablation_tables, of_worth, worth_tables, write_effects
-from _accuracy.known_axes import details, overview
-from _accuracy.measuring import measured
-from _accuracy.pictures import draw_ablation, draw_stop, draw_truth
-from _accuracy.real import loop_tables, measure_loops
-from _accuracy.solves import mass_tables, stop_tables, tracking
-from _accuracy.turned import turn_tables, turned
-from _common.clouds import cases, folder_or
-from _common.command_line import (
+from _clouds import cases
+from _runs import (
     PUBLISHED,
-    Folder,
     Folders,
     Jobs,
     Markdown,
@@ -34,11 +27,10 @@ from _common.command_line import (
     Variants,
     application,
     named,
+    run,
     with_solves,
 )
-from _common.results import ROOT, read, read_packed, save, write_packed
-from _common.runs import run
-from _common.tables import Tables, fill, markdown_table, present
+from _tables import ROOT, Tables, fill, markdown_table, present, publish, read, write_packed
 
 from glsk_o3d import Pipeline
 from glsk_o3d.cli.overrides import override
@@ -79,9 +71,8 @@ def truth(
 ) -> None:
     """Pipelines on shapes with known axes: by kind of cloud, by family of shapes, and what is bad."""
     chosen = {name: altered(it, changed) for name, it in named(pipeline).items()}
-    rows = measured(cases(folders, own, variant, shapes, draws), chosen, jobs, repeat)
-    save(output, rows)
-    present(overview(rows) + details(rows), markdown)
+    rows = _accuracy.measured(cases(folders, own, variant, shapes, draws), chosen, jobs, repeat)
+    publish(rows, lambda rows: _accuracy.overview(rows) + _accuracy.details(rows), output, markdown)
 
 
 @app.command()
@@ -92,10 +83,10 @@ def compare(
 ) -> None:
     """What has changed from one result of truth to another, cloud by cloud."""
     earlier, later = (read(path)["rows"] for path in (before, after))
-    pairs = paired(earlier, later)
+    pairs = _accuracy.paired(earlier, later)
     if not pairs:
         raise typer.BadParameter(f"{before} and {after} have no cloud and pipeline in common")
-    present(difference_tables(pairs), markdown)
+    present(_accuracy.difference_tables(pairs), markdown)
 
 
 @app.command()
@@ -104,7 +95,7 @@ def ablation(
     own: Own = False,
     variant: Variants = EVERY,
     shapes: Shapes = "",
-    idea: Annotated[str, typer.Option(metavar="NAMES", help="With commas; else all.")] = ",".join(IDEAS),
+    idea: Annotated[str, typer.Option(metavar="NAMES", help="With commas; else all.")] = ",".join(_accuracy.IDEAS),
     page: Annotated[
         Path | None,
         typer.Option(
@@ -116,18 +107,17 @@ def ablation(
     markdown: Markdown = False,
 ) -> None:
     """The default pipeline with each idea switched off, one at a time: mean error / shapes with right topology."""
-    if unknown := set(idea.split(",")) - set(IDEAS):
-        raise typer.BadParameter(f"no idea {', '.join(unknown)}: there are {', '.join(IDEAS)}")
+    if unknown := set(idea.split(",")) - set(_accuracy.IDEAS):
+        raise typer.BadParameter(f"no idea {', '.join(unknown)}: there are {', '.join(_accuracy.IDEAS)}")
     if page is not None and not page.is_file():
         raise typer.BadParameter(f"there is no page {page}")
     chosen = {"default": default()}
-    chosen |= {name: override(default(), IDEAS[name].split()) for name in idea.split(",")}
+    chosen |= {name: override(default(), _accuracy.IDEAS[name].split()) for name in idea.split(",")}
     chosen |= named(",".join(PUBLISHED))
-    rows = measured(cases(folders, own, variant, shapes), chosen, jobs)
-    save(output, rows)
-    present(ablation_tables(rows), markdown)
+    rows = _accuracy.measured(cases(folders, own, variant, shapes), chosen, jobs)
+    publish(rows, _accuracy.ablation_tables, output, markdown)
     if page is not None:
-        write_effects(page, rows)
+        _accuracy.write_effects(page, rows)
 
 
 @app.command()
@@ -142,9 +132,8 @@ def stop(
 ) -> None:
     """Where the stop rule stops, and what more or fewer solves would give."""
     chosen = {str(n): with_solves(default(), n) for n in SOLVES} | {"rule": default()}
-    rows = measured(cases(folders, own, variant, shapes), chosen, jobs)
-    save(output, rows)
-    present(stop_tables(rows), markdown)
+    rows = _accuracy.measured(cases(folders, own, variant, shapes), chosen, jobs)
+    publish(rows, _stability.stop_tables, output, markdown)
 
 
 @app.command()
@@ -159,9 +148,8 @@ def mass(
 ) -> None:
     """How well the reduced contraction tracks the full one, with the mass of merged points and without."""
     found = cases(folders, own, variant, shapes)
-    rows = run(tracking, [(case.facts, (case,)) for case in found], jobs)
-    save(output, rows)
-    present(mass_tables(rows), markdown)
+    rows = run(_stability.tracking, [(case.facts, (case,)) for case in found], jobs)
+    publish(rows, _stability.mass_tables, output, markdown)
 
 
 @app.command()
@@ -179,31 +167,14 @@ def rotations(
     """Whether the skeleton depends on how the cloud is turned and in which order its points come."""
     found = cases(folders, own, variant, shapes)
     pipeline = altered(default(), changed)
-    rows = run(turned, [(case.facts, (case, count, pipeline)) for case in found], jobs)
-    save(output, rows)
-    present(turn_tables(rows), markdown)
+    rows = run(_stability.turned, [(case.facts, (case, count, pipeline)) for case in found], jobs)
+    publish(rows, _stability.turn_tables, output, markdown)
 
 
-@app.command()
-def loops(
-    folder: Folder = None,
-    pipeline: Pipelines = "default",
-    largest: Annotated[int, typer.Option(help="Clouds with more points are left out.")] = 400_000,
-    jobs: Jobs = 2,
-    output: Output = None,
-    markdown: Markdown = False,
-) -> None:
-    """Loops of real clouds whose number is known, in a folder with a manifest."""
-    folder = folder_or(folder, "GLSK_DATA", "shared/data")
-    rows = measure_loops(folder, named(pipeline), largest, jobs)
-    save(output, rows)
-    present(loop_tables(rows), markdown)
-
-
-PAGE: dict[str, tuple[Callable[[list[dict]], Tables], Callable[[list[dict], Path], Path]]] = {
-    "truth": (overview, draw_truth),
-    "ablation": (ablation_tables, draw_ablation),
-    "stop": (stop_tables, draw_stop),
+PAGE: dict[str, tuple[Callable[[list[dict]], Tables], Callable[[list[dict], Path], None]]] = {
+    "truth": (_accuracy.overview, _accuracy.draw_truth),
+    "ablation": (_accuracy.ablation_tables, _accuracy.draw_ablation),
+    "stop": (_stability.stop_tables, _stability.draw_stop),
 }
 """What a page shows of the results of each command."""
 
@@ -236,14 +207,14 @@ def worth(
     """Put what each idea is worth, cloud by cloud, into a page: of results of ablation, which are kept, or of those."""
     if results is not None:
         found = read(results)
-        write_packed(WORTH_KEPT, {"commit": found["commit"], "rows": of_worth(found["rows"])})
+        write_packed(WORTH_KEPT, {"commit": found["commit"], "rows": _accuracy.of_worth(found["rows"])})
     fill(file, {"worth": worth_text()})
 
 
 def worth_text() -> str:
     """The table of what is kept, and the commit that it is of."""
-    found = read_packed(WORTH_KEPT)
-    tables = "\n".join(markdown_table(*table) for table in worth_tables(found["rows"]))
+    found = read(WORTH_KEPT)
+    tables = "\n".join(markdown_table(*table) for table in _accuracy.worth_tables(found["rows"]))
     return f"Measured with commit {found['commit']}.\n\n{tables}"
 
 

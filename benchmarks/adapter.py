@@ -15,8 +15,7 @@ from typing import Annotated
 import numpy as np
 import typer
 from _peers import PEERS, installed, one_thread, silence, skeleton_of
-from _trees.clouds import upright
-from _trees.tools import TOOLS
+from _trees import TOOLS, upright
 
 from glsk_o3d import read_cloud, save_skeleton
 from glsk_o3d.interop.clouds import cloud_points

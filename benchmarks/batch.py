@@ -22,9 +22,8 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from _common.command_line import Markdown, Output
-from _common.results import save
-from _common.tables import number, show
+from _runs import Markdown, Output
+from _tables import number, present, save
 
 from glsk_o3d import samples
 from glsk_o3d.io.formats import ply
@@ -102,31 +101,30 @@ def ledger(out: Path) -> list[dict]:
     return [json.loads(line) for line in path.read_bytes().splitlines()] if path.exists() else []
 
 
-def kill_test(scans: Path, out: Path, folder: Path, after: int) -> dict:
-    """Kill one of two Dask workers once some scans are done; gives what became of all."""
+def kill_one(scans: Path, out: Path, folder: Path, after: int, *words: str) -> dict:
+    """Kill one of two Dask workers once some scans or tiles are done; gives what became of all."""
+    begun = time.perf_counter()
     with dask_cluster(2, folder) as (file, workers):
-        run = subprocess.Popen(
-            command(scans, out, "--scheduler", file), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-        )
+        line = command(scans, out, *words, "--scheduler", file)
+        run = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         path = out / "ledger.jsonl"
         while not path.exists() or path.read_bytes().count(b"\n") < after:
             time.sleep(0.02)
         workers[0].send_signal(signal.SIGKILL)
-        told, _ = run.communicate()
+        run.wait()
     rows = ledger(out)
     per_worker = Counter(int(row["worker"].split()[-1]) for row in rows)
     done = [row for row in rows if row["status"] == "done"]
     return {
-        "exit_code": run.returncode,
-        "scans": len(list(scans.iterdir())),
+        "exit code": run.returncode,
+        "seconds": time.perf_counter() - begun,
         "lines": len(rows),
-        "inputs_named_twice": len(rows) - len({row["input"] for row in rows}),
+        "inputs named twice": len(rows) - len({row["input"] for row in rows}),
         "done": len(done),
-        "done_without_output": sum(not (out / name).is_file() for row in done for name in row["outputs"]),
+        "done without output": sum(not (out / name).is_file() for row in done for name in row["outputs"]),
         "failed": sorted(row["name"] for row in rows if row["status"] == "failed"),
-        "by_the_killed_worker": per_worker[workers[0].pid],
-        "by_the_other": per_worker[workers[1].pid],
-        "seconds": json.loads(told)["seconds"],
+        "by the killed worker": per_worker[workers[0].pid],
+        "by the other": per_worker[workers[1].pid],
     }
 
 
@@ -158,7 +156,7 @@ def main(
                 after = resource.getrusage(resource.RUSAGE_CHILDREN)
                 row["cpu"] = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
                 rows.append(row)
-        killed = kill_test(scans, folder / "killed", folder, after=count // 4)
+        killed = kill_one(scans, folder / "killed", folder, after=count // 4)
         told = ledger(folder / "local1")
     title = f"{count} clouds of {smallest} to {largest} points and 5 corrupt ones, {os.cpu_count()} cores"
     header = ["where", "workers", "done", "skipped", "failed", "seconds", "CPU s", "clouds/s", "load before"]
@@ -167,10 +165,10 @@ def main(
         + [number(row[key], 1) for key in ("wall", "cpu", "clouds_per_second", "load")]
         for row in rows
     ]
-    show(title, header, cells, markdown)
     failures = [[Path(row["input"]).name, row["error"]] for row in told if row["status"] == "failed"]
-    show("What failed", ["input", "note"], failures, markdown)
-    show("One of two Dask workers killed", ["", "note"], [[key, str(value)] for key, value in killed.items()], markdown)
+    facts = [[key, str(value)] for key, value in killed.items()]
+    tables = [(title, header, cells), ("What failed", ["input", "note"], failures)]
+    present([*tables, ("One of two Dask workers killed", ["", "note"], facts)], markdown)
     save(output, [*rows, {"where": "one of two Dask workers killed", **killed}])
 
 

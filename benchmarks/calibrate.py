@@ -11,18 +11,27 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from _calibration.fitting import WEIGHTS, by_question, fitted, packaged, said
-from _calibration.pictures import draw_reliability
-from _calibration.questions import questions
-from _calibration.reliability import tables, without_family
-from _calibration.transfer import SEEN, UNSEEN, measure, table, weights_of
-from _common.clouds import cases
-from _common.command_line import Jobs, Markdown, Output, Own, Shapes, Variants, application
-from _common.results import read, save
-from _common.runs import run
-from _common.tables import fill, page_with, present
+from _calibration import (
+    SEEN,
+    UNSEEN,
+    WEIGHTS,
+    by_question,
+    draw_reliability,
+    fitted,
+    measure,
+    said,
+    table,
+    tables,
+    weights_of,
+    without_family,
+)
+from _clouds import cases
+from _questions import questions
+from _runs import Jobs, Markdown, Output, Own, Shapes, Variants, application, run
+from _tables import fill, page_with, present, publish, read, save
 
 from glsk_o3d.pipelines import default
+from glsk_o3d.refinement import scores
 
 EVERY = "*_4096"
 Sources = Annotated[
@@ -97,7 +106,7 @@ def check(
         others = by_question(read(learnt)["rows"]) if learnt else found
         told = {about: (without_family(it, others[about]), it) for about, it in found.items()}
     else:
-        told = {about: (said(packaged(about), it), it) for about, it in found.items()}
+        told = {about: (said(getattr(scores, WEIGHTS[about]), it), it) for about, it in found.items()}
     shown = tables(told)
     present(shown, markdown)
     if page is not None:
@@ -125,11 +134,7 @@ def transfer(
     unseen = {family: weights_of(answered, family) for family in {case.facts["family"] for case in found}}
     work = [(dict(weights=SEEN, **case.facts), (case, seen)) for case in found]
     work += [(dict(weights=UNSEEN, **case.facts), (case, unseen[case.facts["family"]])) for case in found]
-    rows = run(measure, work, jobs)
-    save(output, rows)
-    present([table(rows)], markdown)
-    if page is not None:
-        fill(page, {"transfer": [table(rows)]})
+    publish(run(measure, work, jobs), lambda rows: [table(rows)], output, markdown, page=page, part="transfer")
 
 
 if __name__ == "__main__":

@@ -14,11 +14,9 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from _common.clouds import Case, cases
-from _common.command_line import Folder, Jobs, Markdown, Output, Own, Shapes, Variants, application
-from _common.results import save
-from _common.runs import run
-from _common.tables import number, show
+from _clouds import Case, cases
+from _runs import Folder, Jobs, Markdown, Output, Own, Shapes, Variants, application, run
+from _tables import number, present, save
 
 from glsk_o3d import RingBuilder, read_cloud, samples
 from glsk_o3d.analysis import compare
@@ -34,24 +32,20 @@ GOOD = dict(error=0.4, inside=0.9, completeness=0.9)  # and the right topology: 
 app = application(__doc__)
 
 
-def checked(points, axis=None, picture=None, title=None) -> dict:
+def checked(cloud: Case | Path, picture: Path | None = None) -> dict:
     """The check of a cloud in numbers, and whether its skeleton is good if the axis is known."""
+    points, axis = (read_cloud(cloud), None) if isinstance(cloud, Path) else cloud.load()
     start = time.process_time()
     check = cross_check(points)
     seconds = time.process_time() - start
     if picture is not None:
-        save_crosscheck_picture(check, picture, title=title)
+        save_crosscheck_picture(check, picture, title=picture.stem)
     told = check.to_dict() | dict(cpu=seconds)
     if axis is not None:
         true = compare(check.skeleton, axis)
         near = true.error < GOOD["error"] and min(true.inside, true.completeness) > GOOD["inside"]
         told |= dict(error=true.error, good=bool(near and true.topology))
     return told
-
-
-def checked_case(case: Case) -> dict:
-    """The check of a case."""
-    return checked(*case.load())
 
 
 @app.command()
@@ -66,24 +60,21 @@ def verdicts(
 ) -> None:
     """How often each verdict is given, and how often it is right."""
     found = cases(folder, own, variant, shapes)
-    rows = run(checked_case, [(case.facts, (case,)) for case in found], jobs)
+    rows = run(checked, [(case.facts, (case,)) for case in found], jobs)
     save(output, rows)
     lines = []
     for name in (*dict.fromkeys(case.variant for case in found), "all"):
         here = [row for row in rows if "failure" not in row and name in (row["variant"], "all")]
         good = Counter((row["verdict"], row["good"]) for row in here)
+        failed = [row for row in rows if "failure" in row and name in (row["variant"], "all")]
+        note = f"{len(failed)} failed: {failed[0]['failure']}" if failed else ""
         words = [f"{good[verdict, True]} / {good[verdict, True] + good[verdict, False]}" for verdict in VERDICTS]
         angle = np.median([row["rows"]["angle"].get("median", np.nan) for row in here] or [np.nan])
         apart = np.median([row["skeletons"]["distance_in_radii"] for row in here] or [np.nan])
         poisson = sum(row["surface"] == "poisson" for row in here)
-        lines.append([name, *words, number(angle, 1), number(apart, 2), str(poisson), _failures(rows, name)])
+        lines.append([name, *words, number(angle, 1), number(apart, 2), str(poisson), note])
     header = ["clouds", *VERDICTS, "angle", "apart", "by poisson", "note"]
-    show("Good skeletons / verdicts", header, lines, markdown)
-
-
-def _failures(rows, name):
-    failed = [row for row in rows if "failure" in row and name in (row["variant"], "all")]
-    return f"{len(failed)} failed: {failed[0]['failure']}" if failed else ""
+    present([("Good skeletons / verdicts", header, lines)], markdown)
 
 
 def curved(shape: str, n: int) -> dict:
@@ -141,12 +132,7 @@ def curvature(
                 [number(value, 3) for value in (*here["angle"], *here["length"], here["mean"])] if here else ["-"] * 5
             )
             lines.append([row["shape"], str(row["points"]), name, *words, row.get("failure", "")])
-    show("Off the exact mean curvature normal: degrees, and relative", header, lines, markdown)
-
-
-def scanned(path: Path, picture: Path | None) -> dict:
-    """The check of a cloud in a file."""
-    return checked(read_cloud(path), None, picture, path.stem)
+    present([("Off the exact mean curvature normal: degrees, and relative", header, lines)], markdown)
 
 
 @app.command()
@@ -163,7 +149,7 @@ def scans(
     work = [
         (dict(cloud=path.stem), (path, None if pictures is None else pictures / f"{path.stem}.png")) for path in files
     ]
-    rows = run(scanned, work, jobs)
+    rows = run(checked, work, jobs)
     save(output, rows)
     header = ["cloud", "points", "CPU s", "covered", "same rings", "angle", "90 %", "apart", "95 %"]
     header += ["components", "loops", "note"]
@@ -180,7 +166,7 @@ def scans(
         facts = [str(row["points"]["used"]), number(row["cpu"], 1), *shares]
         mesh = f"{row['verdict']} ({row['surface'].replace('_', ' ')})"
         lines.append([row["cloud"], *facts, *angles, *distances, *counts, mesh])
-    show("Cross-checks", header, lines, markdown)
+    present([("Cross-checks", header, lines)], markdown)
 
 
 if __name__ == "__main__":

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from _common.command_line import application
-from _external import aneurisk, plants, trees, vessels
-from _external.entries import Source, check_sizes
+from _external import Source, arteries, check_sizes, plants, trees, vessels
+from _runs import application
 from glsk_bench import add_shape
 from glsk_bench.clouds import VARIANTS
 from glsk_bench.folders import begun
@@ -31,13 +30,13 @@ Only = Annotated[str, typer.Option("--only", metavar="PATTERN", help="Shapes to 
 @app.command("trees")
 def _trees(folder: Data, output: Bench, only: Only = "*") -> None:
     """TreePointCloud: drawn trees, scanned in three resolutions; y is up."""
-    collect(trees.sources(folder), f"no scan_skel/tree_*.obj in {folder}", output, only)
+    collect(trees(folder), f"no scan_skel/tree_*.obj in {folder}", output, only)
 
 
 @app.command("plants")
 def _plants(folder: Data, output: Bench, only: Only = "*") -> None:
     """4D plant registration: tomato and maize; the axes are good to a few percent."""
-    collect(plants.sources(folder), f"no NAME.graph.txt in {folder}", output, only)
+    collect(plants(folder), f"no NAME.graph.txt in {folder}", output, only)
 
 
 @app.command("vessels")
@@ -55,7 +54,7 @@ def _vessels(
     if unknown := [name for name in names if name not in VARIANTS]:
         raise typer.BadParameter(f"no variant {', '.join(unknown)}: there are {', '.join(VARIANTS)}")
     try:
-        found = [*vessels.sources(folder, names, points), *aneurisk.sources(folder, points)]
+        found = [*vessels(folder, names, points), *arteries(folder, points)]
     except GlskError as error:
         raise typer.BadParameter(str(error)) from None
     collect(found, f"no NAME.swc and no CASE/morphology/centerlines.vtp in {folder}", output, only)

@@ -7,21 +7,29 @@ outside of the box of the points, indices out of range, and skeletons that depen
 from __future__ import annotations
 
 import os
+import re
+import resource
 import time
+import traceback
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")  # before NumPy: the same on any machine
 
+import numpy as np
 import typer
-from _common.command_line import application
-from _common.tables import show
-from _fuzz.workers import Outcome, one_case, run_cases
+from _fuzz_arrays import array_case
+from _fuzz_files import file_case
+from _runs import application, cause_of_death
+from _tables import present
 
+LIMIT_S = 60  # of one case; those that are sound take a second at most
+MOST_MEMORY = 2 << 30  # bytes that a case may take more than were taken before
 MOST_CASES = 10**7  # more than there is time for
 
 app = application(__doc__)
@@ -29,6 +37,87 @@ Runs = Annotated[int, typer.Option("--runs", min=1, help="Cases.")]
 Minutes = Annotated[float, typer.Option("--minutes", min=0, help="How long, about.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Of all that is drawn.")]
 Only = Annotated[int | None, typer.Option("--case", min=0, help="Run this one alone, in this process.")]
+
+
+class Outcome(NamedTuple):
+    """What came of a case."""
+
+    number: int
+    kind: str  # of the cloud or file; empty if nobody lived to tell
+    told: str  # skeleton, read, refused or failed
+    findings: list[str]
+
+
+def run_cases(what: str, seed: int, numbers: range) -> Iterator[Outcome]:
+    """Run cases, one after another, in a process that is started anew where it ended."""
+    context = get_context("spawn")
+    first, last = numbers.start, numbers.stop
+    while first < last:
+        receiver, sender = context.Pipe(duplex=False)
+        process = context.Process(target=_work, args=(sender, what, seed, range(first, last)), daemon=True)
+        process.start()
+        sender.close()  # so that the end of the process is the end of the pipe
+        try:
+            receiver.recv()  # after all that is imported, however long that takes
+            while first < last:
+                if not receiver.poll(LIMIT_S):
+                    first += 1
+                    yield Outcome(first - 1, "", "failed", [f"not done after {LIMIT_S} s"])
+                    break
+                yield receiver.recv()
+                first += 1
+        except EOFError:
+            process.join()
+            code = process.exitcode or 0
+            if code == 0:
+                continue  # it ended by itself, having taken too much memory
+            first += 1
+            yield Outcome(first - 1, "", "failed", [f"its process died: {cause_of_death(code)}"])
+        finally:
+            process.kill()
+            process.join()
+            receiver.close()
+
+
+def one_case(what: str, seed: int, number: int, folder: Path) -> Outcome:
+    """Run a case in this process; an error that is not one of the package's own is a finding."""
+    rng = np.random.default_rng([seed, number])
+    try:
+        found = array_case(rng) if what == "arrays" else file_case(rng, folder)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # whatever it is; some is no Exception
+        frames = traceback.extract_tb(error.__traceback__)
+        ours = [frame for frame in frames if "glsk_o3d" in frame.filename] or frames
+        place = f"{Path(ours[-1].filename).name}:{ours[-1].lineno}"
+        return Outcome(number, "", "failed", [f"{type(error).__name__} at {place}: {str(error)[:200]}"])
+    return Outcome(number, *found)
+
+
+def _work(sender, what: str, seed: int, numbers: range) -> None:
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):  # what is logged, and what libraries print past Python, is no finding
+        os.dup2(nowhere, stream)
+    with TemporaryDirectory() as folder:
+        one_case("arrays", 0, 0, Path(folder))  # imports what is imported when first needed
+        one_case("files", 0, 0, Path(folder))
+        sender.send(None)
+        most = _taken() + MOST_MEMORY
+        status = Path("/proc/self/status").read_text() if Path("/proc/self/status").exists() else "VmData: 4194304"
+        data = 1024 * int(re.search(r"VmData:\s*(\d+)", status)[1])  # bytes of it now
+        resource.setrlimit(resource.RLIMIT_DATA, (data + 2 * MOST_MEMORY,) * 2)
+        for number in numbers:
+            outcome = one_case(what, seed, number, Path(folder))
+            if _taken() > most:
+                outcome.findings.append(f"it took more than {MOST_MEMORY >> 20} MiB")
+            sender.send(outcome)
+            if _taken() > most:
+                return  # the most that was ever taken does not fall again
+
+
+def _taken() -> int:
+    """Bytes of memory at most so far."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 @app.command()
@@ -74,24 +163,19 @@ def _tell(what: str, seed: int, outcomes: Iterable[Outcome]) -> bool:
     """Print a table, and the findings with how to repeat them; gives whether there are any."""
     counts: Counter[tuple[str, str]] = Counter()
     findings = []
-    for outcome in _until_interrupted(outcomes):
-        kind = outcome.kind or "not known"
-        counts[kind, outcome.told] += 1
-        counts[kind, "findings"] += len(outcome.findings)
-        findings += [(outcome.number, finding) for finding in outcome.findings]
+    with suppress(KeyboardInterrupt):  # what has come when somebody has seen enough
+        for outcome in outcomes:
+            kind = outcome.kind or "not known"
+            counts[kind, outcome.told] += 1
+            counts[kind, "findings"] += len(outcome.findings)
+            findings += [(outcome.number, finding) for finding in outcome.findings]
     told = sorted({word for _, word in counts} - {"findings"}) + ["findings"]
     rows = [[kind, *(str(counts[kind, word]) for word in told)] for kind in sorted({kind for kind, _ in counts})]
     rows.append(["all", *(str(sum(counts[kind, word] for kind in {kind for kind, _ in counts})) for word in told)])
-    show(f"{what}, seed {seed}", [what, *told], rows, markdown=False)
+    present([(f"{what}, seed {seed}", [what, *told], rows)], markdown=False)
     for number, finding in findings:
         typer.echo(f"benchmarks/fuzz.py {what} --seed {seed} --case {number}  # {finding}")
     return bool(findings)
-
-
-def _until_interrupted(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
-    """What has come when somebody has seen enough."""
-    with suppress(KeyboardInterrupt):
-        yield from outcomes
 
 
 if __name__ == "__main__":

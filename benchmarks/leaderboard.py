@@ -7,23 +7,20 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterable
 from pathlib import Path
 from statistics import median
 from typing import Annotated
 
+import _leaderboard as tables
 import typer
-from _common.command_line import application, writable
-from _common.results import ROOT, machine, read, surroundings
-from _common.runs import run as in_processes
-from _common.tables import fill, markdown_table
-from _leaderboard import recorded, tables
-from _leaderboard.kept import SECONDS, Entry, keep, kept, seconds
-from _leaderboard.pictures import board, draw
+from _leaderboard import SECONDS, Entry, kept, seconds
 from _peers import PEERS, Peer, installed, one_thread, silence, skeleton_of
+from _runs import application, writable
+from _runs import run as in_processes
+from _tables import ROOT, fill, machine, markdown_table, read, surroundings
 from glsk_bench import leaderboard, make, read_folder, score_answers
-from glsk_bench.answers import TIMES_NAME, read_times
 from glsk_bench.clouds import cloud
+from glsk_bench.scoring import TIMES_NAME, read_times
 from glsk_bench.shapes import FAMILIES, shape
 
 from glsk_o3d import read_cloud, save_skeleton
@@ -34,21 +31,13 @@ BENCH = "bench"  # the clouds, in the folder that a run is given; beside it a fo
 TIMED = [(family, variant) for family in FAMILIES for variant in ("clean", "depth2")]  # with the seed 100
 KEPT_AFTER = 20  # skeletons, so that little is lost when a run is stopped
 PRELOADED = (  # by all processes at once, since imports take longer than some skeletons
-    *("glsk_o3d.pipelines", "glsk_bench.answers", "glsk_bench.making", "glsk_bench.table"),
+    *("glsk_o3d.pipelines", "glsk_bench.scoring", "glsk_bench.making", "glsk_bench.table"),
     *("glsk_o3d.refiner", "glsk_o3d.io.scans", "glsk_o3d.viewing.preview", "open3d", "typer", "trimesh", "skeletor"),
     *("pc_skeletor", "pygel3d.graph", "compas_cgal.skeletonization", "compas_cgal.meshing", "skan"),
 )
 IMAGES = ROOT / "docs" / "images"
 PARTS = (
-    "short",
-    "leaderboard",
-    "losses",
-    "unclear",
-    "topologies",
-    "errors",
-    "families",
-    "failures",
-    "runs",
+    *("short", "leaderboard", "losses", "unclear", "topologies", "errors", "families", "failures", "runs"),
     "recorded",
 )
 
@@ -72,14 +61,15 @@ def run_(
     for name, peer in peers.items():
         made, times = begun(place / name, peer, limit)
         todo = [it for it in bench.scored if it.name not in times or (retry and times[it.name]["failure"])]
-        for some in batched(todo, KEPT_AFTER):
+        for first in range(0, len(todo), KEPT_AFTER):
+            some = todo[first : first + KEPT_AFTER]
             work = [(dict(cloud=it.name), (it.path, peer, place / name / f"{it.name}.npz")) for it in some]
             for row in in_processes(answer, work, jobs, fresh=True, limit=limit, preload=PRELOADED):
                 spent = limit if "not done" in row.get("failure", "") else None
                 times[row["cloud"]] = {"seconds": row.get("seconds", spent), "failure": row.get("failure")}
             write_json(place / name / TIMES_NAME, {"made": made, "clouds": times})
         results = score_answers(bench, place / name, name=name)
-        typer.echo(f"{keep(results, made)}: {results.failures} failures")
+        typer.echo(f"{tables.keep_scores(results, made)}: {results.failures} failures")
 
 
 def begun(folder: Path, peer: Peer, limit: float) -> tuple[dict, dict]:
@@ -93,11 +83,6 @@ def begun(folder: Path, peer: Peer, limit: float) -> tuple[dict, dict]:
     if other := [f"{before[it]}" for it in same if before[it] != made[it]]:
         raise typer.BadParameter(f"{folder} has answers of {', '.join(other)}: remove it, or give another folder")
     return before, read_times(folder)
-
-
-def batched(items: list, n: int) -> Iterable[list]:
-    """So many at a time."""
-    return (items[i : i + n] for i in range(0, len(items), n))
 
 
 def answer(cloud: Path, peer: Peer, path: Path) -> dict:
@@ -130,32 +115,28 @@ def timed(peer: Peer) -> dict:
     return dict(cpu=median(peer.timed(points)[1] for points in clouds))
 
 
-def with_parts(path: Path) -> Path:
-    """A page that has places for tables."""
-    if not (path.is_file() and parts_of(path)):
-        raise typer.BadParameter(f"there is no page {path} with a line <!-- NAME -->: {', '.join(PARTS)}")
-    return path
-
-
 def parts_of(path: Path) -> list[str]:
     """The tables for which a page has a place."""
-    text = path.read_text(encoding="utf-8")
-    return [name for name in PARTS if f"<!-- {name} -->\n" in text]
+    text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    names = [name for name in PARTS if f"<!-- {name} -->\n" in text]
+    if not names:
+        raise typer.BadParameter(f"there is no page {path} with a line <!-- NAME -->: {', '.join(PARTS)}")
+    return names
 
 
 @app.command()
 def page(paths: Annotated[list[Path] | None, typer.Argument(metavar="MD...")] = None) -> None:
     """The tables of the scores that are kept, printed; or put into pages, with a picture in docs/images."""
-    pages = [with_parts(path) for path in paths or ()]
+    places = {path: parts_of(path) for path in paths or ()}
     entries = kept()
     rows = leaderboard(entry.results for entry in entries).entries
     found = pieces(entries, rows)
-    if not pages:
+    if not places:
         typer.echo("\n".join(found.values()))
         return
-    for path in pages:
-        fill(path, {name: found[name] for name in parts_of(path)})
-    board(rows, IMAGES)
+    for path, names in places.items():
+        fill(path, {name: found[name] for name in names})
+    tables.draw_board(rows, IMAGES)
 
 
 def pieces(entries: list[Entry], rows: list[dict]) -> dict[str, str]:
@@ -171,7 +152,7 @@ def pieces(entries: list[Entry], rows: list[dict]) -> dict[str, str]:
         "families": tables.by_group(entries, "family", "topology", 2, "right topology, by family of shapes"),
         "failures": tables.failures(entries),
         "runs": tables.runs(entries),
-        "recorded": recorded.table(),
+        "recorded": tables.recorded(),
     }
     told = {name: markdown_table(*table) for name, table in found.items()}
     told["leaderboard"] += "".join(f"\nCPU seconds: {where}\n" for where in {it["where"]: None for it in cpu.values()})
@@ -187,7 +168,9 @@ def picture(
 ) -> None:
     """Draw the answers of some tools to one cloud, side by side."""
     entries = {entry.tool: entry for entry in kept()}
-    draw(read_folder(place / BENCH), place, name, [entries[it] for it in tool.split(",") if it in entries], path)
+    tables.draw_answers(
+        read_folder(place / BENCH), place, name, [entries[it] for it in tool.split(",") if it in entries], path
+    )
 
 
 if __name__ == "__main__":

@@ -11,9 +11,8 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from _common.results import pick, save
-from _common.runs import run
-from _common.tables import Tables, fill, number, page_with, present
+from _runs import run
+from _tables import Tables, fill, number, page_with, pick, present, save
 
 from glsk_o3d import Refiner, samples
 from glsk_o3d.analysis import compare

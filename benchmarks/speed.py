@@ -15,17 +15,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from _common.clouds import BUILTIN
-from _common.command_line import Folder, Jobs, Markdown, Output, Own, Pipelines, Shapes, application, named
-from _common.results import machine, save
-from _common.tables import fill, markdown_table, page_with, present
-from _speed.figures import figure_tables, measure_figures, objects
-from _speed.huge import huge_tables, measure_huge
-from _speed.large import large_tables, measure_large
-from _speed.pictures import draw_figures, draw_stages, tables_of
-from _speed.rate import measure_rate, rate_tables
-from _speed.scans import measure_scans, scan_tables
-from _speed.stages import measure_stages, stage_tables
+from _clouds import BUILTIN
+from _figures import draw_figures, figure_tables, measure_figures, measure_scans, objects, scan_tables
+from _large import huge_tables, large_tables, measure_huge, measure_large
+from _runs import Folder, Jobs, Markdown, Output, Own, Pipelines, Shapes, application, named
+from _stages import draw_growth, draw_shares, measure_rate, measure_stages, rate_tables, stage_tables
+from _tables import fill, machine, page_with, present, publish, save
 
 app = application(__doc__)
 PARTS = ("machine", "stages", "figures", "rate")  # of the page that `all` fills
@@ -70,11 +65,10 @@ def stages(
 ) -> None:
     """What every stage and the whole cost over the size of the cloud, and how they grow."""
     rows = measure_stages(numbers(sizes), named(pipeline), shapes, kind, published_to, repeat, jobs)
-    save(output, rows)
-    tables = stage_tables(rows)
+    tables = publish(rows, stage_tables, output, markdown, machine())
     if pictures is not None:
-        draw_stages(tables, pictures)
-    present(tables, markdown, machine())
+        draw_growth(tables, pictures)
+        draw_shares(tables, pictures)
 
 
 @app.command()
@@ -92,10 +86,9 @@ def figures(
 ) -> None:
     """The contraction against the baseline (figures 4 to 6 of Wen et al. 2024), and what the difference is made of."""
     rows = measure_figures(objects(folder, own, shapes, numbers(sizes)), solves, repeat, jobs)
-    save(output, rows)
+    publish(rows, figure_tables, output, markdown, machine())
     if pictures is not None:
         draw_figures(rows, pictures)
-    present(figure_tables(rows), markdown, machine())
 
 
 @app.command()
@@ -112,8 +105,7 @@ def rate(
     if shape not in BUILTIN:
         raise typer.BadParameter(f"no shape {shape}: there are {', '.join(BUILTIN)}")
     rows = measure_rate(numbers(sizes), pipeline.split(","), shape, repeat, jobs)
-    save(output, rows)
-    present(rate_tables(rows), markdown, machine())
+    publish(rows, rate_tables, output, markdown, machine())
 
 
 @app.command()
@@ -135,11 +127,7 @@ def scans(
     """Clouds as scanners give them: noisy bodies, scans of the shapes in folders, scanned objects."""
     where = machine()
     rows = measure_scans(folder or [], numbers(sizes), pipeline, repeat, jobs)
-    save(output, rows)
-    tables = scan_tables(rows)
-    if page is not None:
-        fill(page, {"scans": "\n".join([where, "", *(markdown_table(*table) for table in tables)])})
-    present(tables, markdown, where)
+    publish(rows, scan_tables, output, markdown, where, page, "scans")
 
 
 @app.command()
@@ -158,11 +146,7 @@ def large(
     """Large clouds: what they cost, and how far their skeletons are from that of the smallest size."""
     where = machine()
     rows = measure_large(numbers(sizes), shapes, file, jobs)
-    save(output, rows)
-    tables = large_tables(rows)
-    if page is not None:
-        fill(page, {"large": "\n".join([where, "", *(markdown_table(*table) for table in tables)])})
-    present(tables, markdown, where)
+    publish(rows, large_tables, output, markdown, where, page, "large")
 
 
 @app.command()
@@ -185,11 +169,7 @@ def huge(
     where = machine()
     chosen = ([ending for ending in given.split(",") if ending] for given in (endings, labelled))
     rows = measure_huge(*chosen, points, against, folder)
-    save(output, rows)
-    tables = huge_tables(rows)
-    if page is not None:
-        fill(page, {"huge": "\n".join([where, "", *(markdown_table(*table) for table in tables)])})
-    present(tables, markdown, where)
+    publish(rows, huge_tables, output, markdown, where, page, "huge")
 
 
 @app.command("all")
@@ -231,21 +211,11 @@ def everything(
         pictures = page.parent / "images"
     if pictures is not None:
         draw_figures(compared, pictures)
-        draw_stages(parts["stages"], pictures)
+        draw_growth(parts["stages"], pictures)
+        draw_shares(parts["stages"], pictures)
     if page is not None:
         fill(page, {"machine": f"{where}\n", **parts})
     present([*chain(*parts.values())], markdown, where)
-
-
-@app.command()
-def redraw(
-    page: Annotated[
-        Path, typer.Argument(metavar="PAGE", help="Markdown page with the tables.", callback=page_with("stages"))
-    ],
-    pictures: Annotated[Path, typer.Argument(metavar="DIR", help="For the pictures.", callback=_folder)],
-) -> None:
-    """The pictures of `stages` once more, from the tables that `all` has put into a page; nothing is measured."""
-    draw_stages(tables_of(page, "stages"), pictures)
 
 
 if __name__ == "__main__":

@@ -8,22 +8,16 @@ from __future__ import annotations
 
 import os
 import resource
-import signal
-import subprocess
 import tempfile
-import time
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import typer
-from _common.command_line import Markdown, Output, writable
-from _common.plots import BLUE, INK, save_figure, sheet
-from _common.results import save
-from _common.tables import number, show
-from batch import command, dask_cluster, glsk_batch, ledger, write_ply
+from _runs import Markdown, Output, writable
+from _tables import BLUE, INK, number, present, save, save_figure, sheet
+from batch import glsk_batch, kill_one, ledger, write_ply
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
@@ -32,16 +26,12 @@ from glsk_o3d import Skeleton, read_skeleton, samples
 from glsk_o3d.analysis.curves import along, pieces
 from glsk_o3d.batch.grid import Grid
 
-COLUMNS, ROWS, ROOM = 10, 5, 1.8
-"""Objects along x and y, and their distance."""
-ON_SEAMS = ((3, 6), (1, 3))
-"""Columns that stand exactly on a seam, and rows: four objects stand on corners of four tiles."""
+COLUMNS, ROWS, ROOM = 10, 5, 1.8  # objects along x and y, and their distance
+ON_SEAMS = ((3, 6), (1, 3))  # columns that stand exactly on a seam, and rows: four objects stand on corners of tiles
 SIZE = 3.0
 NOISE = 0.002
-STEP = 0.01
-"""Between the places at which curves are compared."""
-TIP = 5
-"""Radii from the end of an axis up to which it may be missed: curve skeletons end early, in tiles or not."""
+STEP = 0.01  # between the places at which curves are compared
+TIP = 5  # radii from the end of an axis up to which it may be missed: curve skeletons end early, in tiles or not
 SHAPES = (
     partial(samples.tree, length=0.45, radius=0.045, forks=3),
     partial(samples.sauropod, cameras=None),
@@ -54,17 +44,8 @@ SHAPES = (
 app = typer.Typer(add_completion=False)
 
 
-@dataclass(frozen=True)
-class Scene:
-    """Objects with known axes.
-
-    Attributes
-    ----------
-    points : (n, 3) float array
-    axes : list of Skeleton
-    grid : Grid
-        That of the tiles.
-    """
+class Scene(NamedTuple):
+    """Objects with known axes, and the grid of the tiles."""
 
     points: np.ndarray
     axes: list[Skeleton]
@@ -153,9 +134,7 @@ def _seams(grid: Grid):
 
 
 def _twice(found: Skeleton) -> int:
-    """Vertices with another one nearer than half their radius that is no neighbour: not within three radii along the
-    curve.
-    """
+    """Vertices with another one nearer than half their radius, and farther than three radii along the curve."""
     n = len(found.vertices)
     pairs = cKDTree(found.vertices).query_pairs(found.radii.max() / 2, output_type="ndarray")
     apart = np.linalg.norm(found.vertices[pairs[:, 0]] - found.vertices[pairs[:, 1]], axis=1)
@@ -165,29 +144,6 @@ def _twice(found: Skeleton) -> int:
     reach = dijkstra(graph, directed=False, indices=starts, limit=3 * found.radii.max())
     along_curve = reach[np.searchsorted(starts, pairs[:, 0]), pairs[:, 1]]
     return int((along_curve > 3 * found.radii[pairs].min(axis=1)).sum())
-
-
-def kill_one(scene: Path, out: Path, folder: Path, after: int) -> dict:
-    """Kill one of two Dask workers once some tiles are done; gives what became of all."""
-    begun = time.perf_counter()
-    with dask_cluster(2, folder) as (file, workers):
-        line = command(scene, out, "--tiles", str(SIZE), "--scheduler", file)
-        run = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        path = out / "ledger.jsonl"
-        while not path.exists() or path.read_bytes().count(b"\n") < after:
-            time.sleep(0.02)
-        workers[0].send_signal(signal.SIGKILL)
-        run.wait()
-    rows = ledger(out)
-    return {
-        "exit_code": run.returncode,
-        "seconds": time.perf_counter() - begun,
-        "lines": len(rows),
-        "inputs named twice": len(rows) - len({row["input"] for row in rows}),
-        "done": sum(row["status"] == "done" for row in rows),
-        "by the killed worker": sum(row["worker"].endswith(f" {workers[0].pid}") for row in rows),
-        "by the other": sum(row["worker"].endswith(f" {workers[1].pid}") for row in rows),
-    }
 
 
 def draw(found: Skeleton, scene: Scene, path: Path) -> None:
@@ -223,7 +179,7 @@ def main(
         undisturbed = glsk_batch(path, folder / "whole", "--tiles", str(SIZE), "--workers", "2")
         most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
         rows = {row["name"]: row for row in ledger(folder / "whole")}
-        killed = kill_one(path, folder / "killed", folder, after=max(2, len(rows) // 3))
+        killed = kill_one(path, folder / "killed", folder, max(2, len(rows) // 3), "--tiles", str(SIZE))
         results = [folder / run / "scene.ply" for run in ("whole", "killed")]
         found = read_skeleton(results[1])
         killed["bits as in the undisturbed run"] = results[0].read_bytes() == results[1].read_bytes()
@@ -236,7 +192,7 @@ def main(
     title = f"One scene of {points} points, 50 objects, tiles of {SIZE:g}, two workers, {os.cpu_count()} cores"
     for heading, facts in ((title, told), ("Again on Dask, one of two workers killed", killed)):
         cells = [[key, number(value, 4) if isinstance(value, float) else str(value)] for key, value in facts.items()]
-        show(heading, ["", "note"], cells, markdown)
+        present([(heading, ["", "note"], cells)], markdown)
     save(output, [{"run": "undisturbed", **told}, {"run": "one of two Dask workers killed", **killed}])
 
 

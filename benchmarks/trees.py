@@ -11,18 +11,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
 
+import _trees
 import numpy as np
 import typer
-from _common.command_line import Folder, Jobs, Markdown, Output, application
-from _common.results import machine, save
-from _common.runs import run
-from _common.tables import Tables, fill, markdown_table, page_with, present
 from _peers import installed, one_thread, versions
-from _trees import curves as sparse
-from _trees import large as big
-from _trees import measures as solid
-from _trees.clouds import sparse_trees
-from _trees.tools import TOOLS
+from _runs import Folder, Jobs, Markdown, Output, application, run
+from _tables import Tables, fill, machine, markdown_table, page_with, present, save
+
+from glsk_o3d import samples
 
 app = application(__doc__)
 Trees = Annotated[int, typer.Option("--trees", min=1, help="How many built-in trees.")]
@@ -44,16 +40,16 @@ def curves(
     """Skeletons of sparse trees against their axes: built-in trees, or those of a folder."""
     if up not in "xyz":
         raise typer.BadParameter(f"--up {up}: there are x, y and z")
-    tools = installed(TOOLS, tool)
-    found = sparse_trees(folder, up, trees)
+    tools = installed(_trees.TOOLS, tool)
+    found = _trees.sparse_trees(folder, up, trees)
     if not found:
         raise typer.BadParameter(f"there is no NAME.npz in {folder}")
     where = f"{machine()} {versions(tools.values())}."
     one_thread()
     work = [(dict(tool=name, **it.facts), (it, made)) for name, made in tools.items() for it in found]
-    rows = run(sparse.measure, work, jobs, fresh=True, limit=limit)
+    rows = run(_trees.measure_curve, work, jobs, fresh=True, limit=limit)
     save(output, rows)
-    told("trees of a folder" if folder else "trees", sparse.tables(rows), where, page, markdown)
+    told("trees of a folder" if folder else "trees", _trees.curve_tables(rows), where, page, markdown)
 
 
 @app.command()
@@ -67,9 +63,9 @@ def measures(
     """Volume, diameter and height of trees with a surface, whole and scanned by a lidar."""
     where = machine()
     work = [(dict(condition=it, tree=seed), (seed, it)) for it in ("clean", "lidar") for seed in range(trees)]
-    rows = run(solid.measure, work, jobs)
+    rows = run(_trees.measure_tree, work, jobs)
     save(output, rows)
-    told("measures", solid.tables(rows), where, page, markdown)
+    told("measures", _trees.measure_tables(rows), where, page, markdown)
 
 
 @app.command()
@@ -86,10 +82,11 @@ def large(
     for n in map(int, sizes.split(",")):
         with TemporaryDirectory() as folder:
             path = Path(folder, "scan.npy")
-            np.save(path, big.scan(n, forks))
-            rows += run(big.once, [(dict(n=n, pipeline=name), (path, name)) for name in big.PIPELINES], 1, fresh=True)
+            np.save(path, samples.tree(n, forks=forks, seed=1, noise=_trees.NOISE, cameras=_trees.CAMERAS).points)
+            work = [(dict(n=n, pipeline=name), (path, name)) for name in _trees.PIPELINES]
+            rows += run(_trees.once, work, 1, fresh=True)
     save(output, rows)
-    told("large", big.tables(rows), where, page, markdown)
+    told("large", _trees.large_tables(rows), where, page, markdown)
 
 
 def told(name: str, tables: Tables, where: str, page: Path | None, markdown: bool) -> None:

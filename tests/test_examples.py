@@ -8,7 +8,6 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-import glsk_o3d
 from glsk_o3d import read_skeleton, samples
 
 RNG = np.random.default_rng(0)
@@ -29,7 +28,7 @@ def write_scene(path, dtype):
     assert o3d.t.io.write_point_cloud(str(path), scene)
 
 
-@pytest.mark.parametrize(("api", "dtype"), [("legacy", "f8"), ("tensor", "f4"), ("tensor", "f8")])
+@pytest.mark.parametrize(("api", "dtype"), [("legacy", "f8"), ("tensor", "f4")])
 def test_open3d_pipeline(root, tmp_path, monkeypatch, capsys, api, dtype):
     write_scene(tmp_path / "scene.ply", dtype)
     example = root / "examples" / "open3d_pipeline.py"
@@ -64,32 +63,12 @@ def test_open3d_pipeline(root, tmp_path, monkeypatch, capsys, api, dtype):
     assert shapes == {(1, 0), (0, 3)}
 
 
-@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
-def test_open3d_pipeline_outlives_skeletons_of_a_single_vertex(root, tmp_path, monkeypatch):
-    write_scene(tmp_path / "scene.ply", "f8")
-    coarse = glsk_o3d.RingBuilder() | glsk_o3d.Contractor() | glsk_o3d.Connector(radius="100%") | glsk_o3d.Refiner()
-    monkeypatch.setattr(glsk_o3d, "skeletonize", coarse)
-    main = runpy.run_path(str(root / "examples" / "open3d_pipeline.py"))["main"]
-    main(tmp_path / "scene.ply", tmp_path / "out")
-    names = ("cloud.ply", "longest.ply", "skeleton.json", "tubes.ply", "branches.csv")  # there are no lines
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {f"{i}_{name}" for i in range(2) for name in names}
-    for i in range(2):
-        skeleton = read_skeleton(tmp_path / "out" / f"{i}_skeleton.json")
-        assert len(skeleton.vertices) == 1
-        part = o3d.t.io.read_point_cloud(str(tmp_path / "out" / f"{i}_longest.ply"))
-        assert len(part.point.positions) == len(skeleton.points)
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         ([], "usage: "),
         (["none.ply", "out"], "error: none.ply: no such file"),
         (["scene.ply", "out", "--ground", "9"], "error: scene.ply: no point lies above z = 9: give another --ground"),
-        (
-            ["scene.ply", "out", "tensor", "--voxel", "0.5"],
-            "error: scene.ply: no object found: 0 of at least 300",
-        ),
         (["scene.ply", "out", "--least", "9999"], "error: scene.ply: no object found: 0 of at least 9999 points"),
     ],
 )

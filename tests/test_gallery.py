@@ -41,8 +41,3 @@ def test_runs(script, tmp_path, monkeypatch, capsys):
     said = capsys.readouterr()
     assert "Traceback" not in said.err
     assert variables["__doc__"].split("\n")[2].startswith("===")
-
-
-def test_there_is_one_for_each_subject():
-    titles = [path.read_text().splitlines()[1] for path in sorted(GALLERY.glob("plot_*.py"))]
-    assert len(titles) == len(set(titles)) == 18

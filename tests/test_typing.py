@@ -36,34 +36,20 @@ glsk.save_recipe(whole, "plant.toml")
 again: Skeleton = glsk.load_recipe("plant.toml")(cloud)
 
 RingBuilder(k="twelve")  # wrong
-RingBuilder(12)  # wrong
 RingBuilder(ks=12)  # wrong
 Contractor(reducer="LPRReducer")  # wrong
-Contractor(stop=0.02)  # wrong
 LPRReducer(order="random")  # wrong
 Connector(links="al")  # wrong
-Connector(radius=None)  # wrong
 Refiner(recentre="3")  # wrong
-ExplainedScore(threshold="2%")  # wrong
 RingBuilder() | 12  # wrong
 skeleton.save("x.swc", cut_lops=True)  # wrong
-skeleton.save(12)  # wrong
 skeleton.to_line_set("brnch")  # wrong
-skeleton.to_line_set(colour="branch")  # wrong
 skeleton.to_line_set().colours  # wrong
-skeleton.to_tubes(sides="8")  # wrong
-skeleton.annotate(color="red")  # wrong
-skeleton.report.iterations[0].n_point  # wrong
 glsk.skeletonise(cloud)  # wrong
-glsk.skeletonize(cloud).vertexes  # wrong
 glsk.skeletonize(cloud, 12)  # wrong
 glsk.skeletonize(cloud, on_iteration=lambda record: record.n_point > 100)  # wrong
 pipelines.default()(cloud).n_loop  # wrong
-pipelines.default()(cloud, on_iterations=print)  # wrong
-pipelines.defaults()  # wrong
 (RingBuilder() | Contractor())(cloud).vertices  # wrong
-(start | LPRReducer())(cloud).edges  # wrong
-RingBuilder()(cloud).vertices  # wrong
 """
 
 

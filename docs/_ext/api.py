@@ -75,9 +75,9 @@ NAMES = {
         "Distances": ("signed_distance",),
     },
     "benchmark": {
-        "Its clouds": ("make", "version", "Version", "read_folder", "BenchmarkFolder", "CloudFile"),
+        "Its clouds": ("make", "read_folder", "BenchmarkFolder"),
         "Clouds of your own": ("add_shape",),
-        "Answers": ("run", "RunResult"),
+        "Answers": ("run",),
         "Scores": ("score", "Scores", "score_answers", "Results", "read_results", "leaderboard", "Leaderboard"),
     },
     "benchmark_shapes": {"Drawing one": ("shape", "Shape")},

@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 from glsk_bench.clouds import VARIANTS, cloud
-from glsk_bench.randomness import generator
 from glsk_bench.scanning import camera_places, cast, depth_image, seen_cosines
-from glsk_bench.shapes import FAMILIES, Shape
+from glsk_bench.shapes import Shape
+from glsk_bench.shapes.curves import generator
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.samples.capsules import signed_distance, visible
 
-OF_THE_SURFACE = ("clean", "density", "holes", "scan2")
 FINGERPRINTS = {
     "clean": "2c7e01348b00a337",
     "density": "0b63bc157f9a3998",
@@ -56,18 +55,13 @@ def ball():
 # ---------------------------------------------------------------------------------------------------------- all of them
 
 
-def test_there_are_eleven_variants():
-    names = "clean density holes outliers noise05 noise1 noise2 scan2 depth2 misreg lidar"
-    assert tuple(names.split()) == VARIANTS
-
-
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_a_cloud_follows_from_its_names_and_numbers(variant, drawn):
+def test_a_cloud_follows_from_its_names_and_numbers(variant, drawn, fingerprint):
     one = drawn("figures", 0)
     before = one.points.copy()
     first = cloud(one, variant, 1000, 5)
     assert (first.shape, first.dtype) == ((1000, 3), np.float64)
-    assert np.isfinite(first).all()
+    assert fingerprint(first) == FINGERPRINTS[variant]
     np.testing.assert_array_equal(first, cloud(one, variant, 1000, 5))
     np.testing.assert_array_equal(one.points, before)
     assert len(np.unique(first, axis=0)) == 1000
@@ -75,40 +69,21 @@ def test_a_cloud_follows_from_its_names_and_numbers(variant, drawn):
         assert not np.allclose(first, other)
 
 
-@pytest.mark.parametrize("variant", FINGERPRINTS)
-def test_fingerprints(variant, drawn, fingerprint):
-    assert fingerprint(cloud(drawn("figures", 0), variant, 1000, 5)) == FINGERPRINTS[variant]
-
-
 @pytest.mark.parametrize("variant", VARIANTS)
-@pytest.mark.parametrize("n", [1, 2, 12_500])
+@pytest.mark.parametrize("n", [1, 12_500])
 def test_tiny_and_large_clouds(variant, n, drawn):
     assert cloud(drawn("handles", 0), variant, n).shape == (n, 3)
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize("variant", OF_THE_SURFACE)
-def test_points_of_the_surface_are_each_taken_once(family, variant, drawn):
-    one = drawn(family, 0)
-    taken = rows(one, cloud(one, variant))
-    assert (taken >= 0).all()
-    assert len(np.unique(taken)) == 4096
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (("scan",), "no variant of clouds is called 'scan': did you mean 'scan2'"),
-        ((None,), "no variant of clouds is called 'None'"),
         ((["clean"],), "no variant of clouds is called"),
         (("clean", 0), "n = 0: must be an int of at least 1"),
-        (("clean", 10.0), "n = 10.0"),
         (("clean", 10, -1), "seed = -1: must be an int of at least 0"),
-        (("clean", 10, True), "seed = True"),
         (("clean", 50_001), "handles_0 has 50000 points for a cloud of 50001: ask for fewer points"),
-        (("misreg", 120_000), r"handles_0 has \d+ points for a cloud of 40000: ask for fewer points"),
         (("depth2", 100_000), "handles_0: 50000 points of its surface are too few for 50000 rays .* ask for fewer"),
-        (("lidar", 100_000), "handles_0: 50000 points of its surface are too few for 33333 rays .* ask for fewer"),
     ],
 )
 def test_what_makes_no_cloud_is_refused(arguments, message, drawn):
@@ -142,7 +117,7 @@ def test_density_is_ten_times_higher_at_one_end(family, drawn):
     assert (np.diff(chance) > 0).all() or (np.diff(chance) < 0).all()
 
 
-@pytest.mark.parametrize("n", [500, 4096])
+@pytest.mark.parametrize("n", [4096])
 def test_holes_are_four_balls_at_the_same_places_for_every_size(n, drawn):
     one = drawn("figures", 1)
     points = cloud(one, "holes", n, seed=2)
@@ -152,20 +127,6 @@ def test_holes_are_four_balls_at_the_same_places_for_every_size(n, drawn):
         assert np.linalg.norm(points - middle, axis=1).min() > min(1.3 * radius, 0.15)
     far = cKDTree(points).query(one.points)[0].max()
     assert far > 2 * cKDTree(cloud(one, "clean", n, seed=2)).query(one.points)[0].max() or n < 4096
-
-
-def test_outliers_are_the_last_rows_anywhere_in_a_larger_box(drawn):
-    one = drawn("trees", 0)
-    points = cloud(one, "outliers")
-    assert (rows(one, points[:-41]) >= 0).all()
-    outliers = np.concatenate([cloud(one, "outliers", seed=seed)[-41:] for seed in range(20)])
-    low, size = one.points.min(axis=0), np.ptp(one.points, axis=0)
-    where = (outliers - low) / size
-    assert where.min() > -0.1
-    assert where.max() < 1.1
-    np.testing.assert_allclose(where.mean(axis=0), 0.5, atol=0.05)
-    np.testing.assert_allclose(where.std(axis=0), 1.2 / np.sqrt(12), rtol=0.05)
-    assert len(cloud(one, "outliers", 40)) == 40  # without any
 
 
 @pytest.mark.parametrize(("variant", "size"), [("noise05", 0.005), ("noise1", 0.01), ("noise2", 0.02)])
@@ -179,7 +140,7 @@ def test_noise_is_gaussian_and_as_large_as_said(variant, size, drawn):
     assert distances(one, points).std() == pytest.approx(size, rel=0.1)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", ["tubes", "figures"])
 def test_two_cameras_leave_out_what_is_hidden(family, drawn):
     one = drawn(family, 1)
     points, axis = cloud(one, "scan2"), (one.nodes, one.edges, one.radii)
@@ -193,17 +154,6 @@ def test_two_cameras_leave_out_what_is_hidden(family, drawn):
     assert np.mean(cosine[plain] > 0) > 0.85  # the rest is near the rim of what hides something
     backs = some[~np.any(seen, axis=0)]
     assert np.median(cKDTree(points).query(backs)[0]) > 4 * one.spacing
-
-
-def test_cameras_stand_around_the_shape():
-    for seed in range(10):
-        for count, apart in ((2, 140), (3, 120)):
-            eyes = camera_places(generator("eyes", seed), count)
-            np.testing.assert_allclose(np.linalg.norm(eyes, axis=1), 2.2)
-            around = np.degrees(np.unwrap(np.arctan2(eyes[:, 1], eyes[:, 0])))
-            np.testing.assert_allclose(np.abs((np.diff(around) + 180) % 360 - 180), apart)
-            assert (np.sin(np.radians(15)) <= eyes[:, 2] / 2.2).all()
-            assert (eyes[:, 2] / 2.2 <= np.sin(np.radians(35))).all()
 
 
 def test_a_camera_sees_the_front_of_a_ball(ball):
@@ -229,13 +179,6 @@ def test_rays_make_a_grid_and_hit_the_surface_and_know_the_background(ball):
     assert pitch[1] / pitch[0] == pytest.approx(4, rel=1e-3)
 
 
-def test_rays_beside_the_rim_know_what_is_behind(ball):
-    rays = cast(ball, np.array([0, -2.7, 0]), 1000, (1, 1), generator("rays"))
-    rim = rays.cosines < 0.2
-    assert np.isfinite(rays.behind[rim]).mean() > 0.9
-    assert np.isfinite(rays.behind[rays.cosines > 0.6]).mean() < 0.15  # where a cell of the grid stayed empty
-
-
 def test_depth_noise_is_along_the_ray_and_grows_at_grazing_angles(ball):
     eye = np.array([0, -2.7, 0])
     points = np.concatenate([depth_image(ball, eye, 1000, generator("depth", seed)) for seed in range(12)])
@@ -253,19 +196,6 @@ def test_depth_noise_is_along_the_ray_and_grows_at_grazing_angles(ball):
     assert 40 <= flying.sum() <= 60  # half a percent are, some of them less far
     assert np.median(cosine[flying]) < 0.5 < np.median(cosine)  # beside the rim
     assert error[flying].max() < 0.2
-
-
-def test_two_depth_cameras_share_the_points(drawn):
-    one = drawn("figures", 1)
-    points = cloud(one, "depth2", 2001, seed=3)
-    eyes = camera_places(generator("eyes", one.name, "depth2", 3), 2)
-    off = distances(one, points)
-    assert np.median(np.abs(off)) < 0.002
-    assert np.mean(off > 0.02) < 0.01
-    for eye, view in zip(eyes, (points[:1000], points[1000:]), strict=True):
-        ray = (view - eye) / np.linalg.norm(view - eye, axis=1, keepdims=True)
-        angle = cKDTree(ray).query(ray, 2)[0][:, 1]
-        assert np.std(angle) < 0.15 * np.mean(angle)  # a grid, where points of a surface are at random
 
 
 def test_views_that_do_not_fit_are_moved_and_turned_as_a_whole(drawn):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from glsk_bench.intervals import mean_with_interval, told
+from glsk_bench.table import mean_with_interval, told
 from scipy import stats
 
 
@@ -27,10 +27,6 @@ def test_more_clouds_of_a_shape_are_no_more_evidence():
     assert mean_with_interval(shapes * 4, [*values] * 4) == pytest.approx(once, rel=1e-12)
     apart = mean_with_interval([*map(str, range(120))], [*values] * 4)
     assert apart[2] - apart[1] == pytest.approx((once[2] - once[1]) / 2, rel=0.15)
-
-
-def test_shapes_weigh_as_much_as_they_have_clouds():
-    assert mean_with_interval(["a", "a", "b"], [1, 1, 0]) == (2 / 3, 0, 1)
 
 
 def test_in_words():

@@ -5,9 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from glsk_bench.scoring import MOST_ANSWER_JUNCTIONS, MOST_ANSWER_PLACES, Scores, score
+from glsk_bench.scoring import MOST_ANSWER_JUNCTIONS, MOST_ANSWER_PLACES, score
 
-from glsk_o3d.analysis import Truth
 from glsk_o3d.errors import InvalidParameterError
 
 BEST = dict(
@@ -86,13 +85,6 @@ def test_a_leg_that_is_missing(star):
     assert numbers(found, "junctions_f1", "length") == pytest.approx([1, 0.75])
 
 
-def test_a_spur_is_a_leaf_and_a_junction_too_much(rod):
-    found = score(rod, [[0, 0, 0], [0.5, 0, 0], [1, 0, 0], [0.5, 0.4, 0]], [[0, 1], [1, 2], [1, 3]])
-    assert numbers(found, "topology", "perfect", "leaves", "junctions", "junctions_f1") == [True, False, 1, 1, 0]
-    assert found.tips_f1 == pytest.approx(2 * 2 / (3 + 2))
-    assert found.length == pytest.approx(1.4)
-
-
 def test_a_break_a_loop_and_a_piece_beside(rod, square):
     broken = score(rod, [[0, 0, 0], [0.4, 0, 0], [0.6, 0, 0], [1, 0, 0]], [[0, 1], [2, 3]])
     assert numbers(broken, "components", "loops", "topology", "perfect") == [1, 0, False, False]
@@ -150,18 +142,6 @@ def test_units_and_turns_do_not_matter(star):
     assert known(found) == pytest.approx(known(score(star, vertices, edges)), rel=1e-9)
 
 
-def test_a_mirror_gives_mirrored_scores(star):
-    vertices, edges = crooked(star)
-    mirror = [-1, 1, 1]
-    mirrored = SimpleNamespace(nodes=star.nodes * mirror, edges=star.edges, radii=star.radii)
-    assert score(mirrored, vertices * mirror, edges).as_dict() == score(star, vertices, edges).as_dict()
-
-
-def test_a_truth_is_a_truth_however_it_is_held(rod):
-    truth = Truth(rod.nodes, rod.edges, rod.radii)
-    assert score(truth, rod.nodes, rod.edges) == score(rod, rod.nodes.tolist(), rod.edges.tolist())
-
-
 # ------------------------------------------------------------------------------------------------------- no answers
 
 
@@ -173,9 +153,7 @@ def test_a_truth_is_a_truth_however_it_is_held(rod):
         ([[0, 0, 0], [1, 0, 0]], [[0, 2]], "not there"),
         ([[0, 0, 0], [1, 0, 0]], [[0.0, 1.0]], "whole numbers"),
         ([[0, 0], [1, 0]], [[0, 1]], "of no use"),
-        (["here"], [[0, 0]], "of no use"),
         ([[0, 0, 0], [1e9, 0, 0]], [[0, 1]], "units"),
-        ([[0, 0, 0], [1e308, 1e308, 0]], [[0, 1]], "units"),
         (np.zeros((MOST_ANSWER_PLACES + 1, 3)), [], "too much for an answer"),
         (np.zeros((2, 3)), np.tile([0, 1], (MOST_ANSWER_PLACES, 1)), "too much for an answer"),
     ],
@@ -192,12 +170,6 @@ def test_a_mesh_is_no_skeleton(rod):
     places = np.column_stack([np.cos(ring), np.sin(ring), ring]) * 0.001
     with pytest.raises(InvalidParameterError, match="is it a mesh"):
         score(rod, places, edges)
-
-
-def test_the_scores_of_a_failure():
-    told = Scores.of_failure("hung").as_dict()
-    known = dict(perfect=False, topology=False, tips_f1=0, junctions_f1=0, failure="hung")
-    assert {name: value for name, value in told.items() if value is not None} == known
 
 
 # -------------------------------------------------------------------------------------------------- the yardstick

@@ -5,11 +5,10 @@ import json
 
 import numpy as np
 import pytest
-from glsk_bench import make, version, versions
-from glsk_bench.versions import fingerprint, fingerprints, sameness
+from glsk_bench import make, versions
+from glsk_bench.versions import fingerprint, fingerprints, sameness, version
 
 from glsk_o3d import read_cloud
-from glsk_o3d.errors import InvalidParameterError
 
 
 @pytest.fixture
@@ -26,18 +25,13 @@ def test_the_first_version_never_changes():
     assert " ".join(first.whole) == "clean outliers noise05 noise1 noise2"
 
 
-def test_an_unknown_version():
-    with pytest.raises(InvalidParameterError, match="did you mean 'v1'"):
-        version("v")
-
-
 def test_what_a_fingerprint_is_never_changes(points):
     assert fingerprint(np.zeros((2, 3))) == "9d908ecf 0 0"  # SHA-256 of 24 zeros
     assert fingerprint(np.arange(12.0).reshape(4, 3)).split()[1:] == ["82249263", "837992698"]
     assert fingerprint(points) == fingerprint(points.astype(float)) == fingerprint(np.asfortranarray(points))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_roundings_are_told_from_other_clouds(points, seed):
     known, rng = fingerprint(points), np.random.default_rng(seed)
     assert sameness(points, known) == "bits"
@@ -46,6 +40,10 @@ def test_roundings_are_told_from_other_clouds(points, seed):
     one = points.copy()
     one[7, 1] = np.nextafter(one[7, 1], np.float32(1))
     assert sameness(one, known) == "rounding"
+    moved, swapped, pair = points.copy(), points.copy(), rng.choice(4096, 2, replace=False)
+    moved[rng.integers(4096)] = rng.uniform(-0.5, 0.5, 3)
+    swapped[pair] = swapped[pair[::-1]]
+    assert sameness(moved, known) == sameness(swapped, known) == sameness(points[::-1], known) == "other"
 
 
 def test_the_worst_that_roundings_can_do(points):
@@ -57,31 +55,6 @@ def test_the_worst_that_roundings_can_do(points):
     assert sameness(worst, fingerprint(few)) == "rounding"
 
 
-@pytest.mark.parametrize("seed", range(50))
-def test_one_point_elsewhere_is_another_cloud(points, seed):
-    known, rng = fingerprint(points), np.random.default_rng(seed)
-    moved, swapped = points.copy(), points.copy()
-    moved[rng.integers(4096)] = rng.uniform(-0.5, 0.5, 3)
-    assert sameness(moved, known) == "other"
-    pair = rng.choice(4096, 2, replace=False)
-    swapped[pair] = swapped[pair[::-1]]
-    assert sameness(swapped, known) == "other"
-
-
-def test_other_clouds_are_others(points):
-    known = fingerprint(points)
-    for other in (points[::-1], -points, points[:-1], points + np.float32(1e-3), points[:, ::-1]):
-        assert sameness(other, known) == "other"
-
-
-def test_fingerprints_are_read_as_they_were_written(tmp_path, monkeypatch):
-    monkeypatch.setattr(versions, "_file", lambda name: tmp_path / f"{name}.json")
-    assert fingerprints("v1") == {}
-    found = {"tubes_100": {"clean": "a 1 2"}, "trees_7": {"clean": "b 3 4", "lidar": "c 5 6"}}
-    versions.write_fingerprints("v1", found, ["trees_7_lidar"])
-    assert fingerprints("v1") == {"trees_7_clean": "b 3 4", "trees_7_lidar": "c 5 6", "tubes_100_clean": "a 1 2"}
-
-
 def test_what_is_scored_is_fixed_for_the_clouds_that_are_known(tmp_path, monkeypatch):
     monkeypatch.setattr(versions, "_file", lambda name: tmp_path / f"{name}.json")
     versions.write_fingerprints("v1", {"trees_7": {"clean": "b 3 4", "lidar": "c 5 6"}}, ["trees_7_lidar"])
@@ -89,6 +62,7 @@ def test_what_is_scored_is_fixed_for_the_clouds_that_are_known(tmp_path, monkeyp
     assert [versions.is_scored(asked, "trees_7_clean", share) for share in (0.9699, 0.97)] == [True, True]
     assert [versions.is_scored(asked, "trees_7_lidar", share) for share in (0.9699, 0.97)] == [False, False]
     assert [versions.is_scored(asked, "trees_8_clean", share) for share in (0.9699, 0.97)] == [False, True]
+    assert fingerprints("v1") == {"trees_7_clean": "b 3 4", "trees_7_lidar": "c 5 6"}
 
 
 def test_the_package_knows_all_clouds_of_a_version_or_none():

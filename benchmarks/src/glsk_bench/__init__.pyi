@@ -1,20 +1,15 @@
-from .answers import Results, read_results, score_answers
-from .folders import BenchmarkFolder, CloudFile, read_folder
+from .folders import BenchmarkFolder, read_folder
 from .making import make
 from .own import add_shape
-from .running import RunResult, run
-from .scoring import Scores, score
+from .running import run
+from .scoring import Results, Scores, read_results, score, score_answers
 from .table import Leaderboard, leaderboard
-from .versions import Version, version
 
 __all__ = [
     "BenchmarkFolder",
-    "CloudFile",
     "Leaderboard",
     "Results",
-    "RunResult",
     "Scores",
-    "Version",
     "add_shape",
     "leaderboard",
     "make",
@@ -23,5 +18,4 @@ __all__ = [
     "run",
     "score",
     "score_answers",
-    "version",
 ]

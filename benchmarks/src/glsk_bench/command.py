@@ -12,7 +12,7 @@ from glsk_o3d.cli.options import Json, Quiet, Verbose
 from glsk_o3d.cli.reporting import WrongUsage, reporting
 
 if TYPE_CHECKING:
-    from .commands import Outcome
+    from .running import Outcome
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -191,13 +191,12 @@ def table(
         from glsk_o3d.cli.outputs import check_outputs
 
         from . import leaderboard, read_results
-        from .table import save_leaderboard
 
         files = output or []
         check_outputs([(path, (".md", ".json"), "table is Markdown or JSON") for path in files], *scores)
         board = leaderboard(map(read_results, scores))
         for path in files:
-            save_leaderboard(board, path)
+            board.save(path)
         if as_json:
             print_json({**board.as_dict(), "files": [str(path) for path in files]})
         elif files and not quiet:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -38,21 +37,7 @@ _EXPLAINED_OF_OWN = {
 
 @dataclass(frozen=True)
 class CloudFile:
-    """A cloud of a benchmark.
-
-    Attributes
-    ----------
-    shape, variant : str
-    family : str
-    path : Path
-    scored : bool
-        Whether answers to it count.
-
-    Examples
-    --------
-    >>> CloudFile("tubes_100", "clean", "tubes", Path("bench/clouds/tubes_100_clean.ply"), scored=True).name
-    'tubes_100_clean'
-    """
+    """A cloud of a benchmark."""
 
     shape: str
     variant: str
@@ -94,19 +79,17 @@ class BenchmarkFolder:
     @property
     def clouds(self) -> list[CloudFile]:
         """All clouds, by shape and then in the order of the variants: of one's own clouds, as they were added."""
-        return list(self._clouds())
+        found = []
+        for shape, told in sorted(self.shapes.items()):
+            names = [*told["clouds"]]
+            for variant in names if self.version == OWN else sorted(names, key=VERSIONS[self.version].variants.index):
+                cloud = told["clouds"][variant]
+                place = self.path / cloud["file"]
+                found.append(CloudFile(shape, variant, told["family"], place, bool(cloud["scored"])))
+        return found
 
     def digits(self, cloud: CloudFile) -> str | None:
-        """What tells a cloud of somebody's own from another of its name; None in a version, whose names say all.
-
-        Parameters
-        ----------
-        cloud : CloudFile
-
-        Returns
-        -------
-        str or None
-        """
+        """What tells a cloud of somebody's own from another of its name; None in a version, whose names say all."""
         shape = self.shapes[cloud.shape]
         if self.version != OWN:
             return None
@@ -115,16 +98,7 @@ class BenchmarkFolder:
     @property
     def scored(self) -> list[CloudFile]:
         """The clouds of which answers count."""
-        return [cloud for cloud in self._clouds() if cloud.scored]
-
-    def _clouds(self) -> Iterator[CloudFile]:
-        own = self.version == OWN
-        for shape, told in sorted(self.shapes.items()):
-            names = [*told["clouds"]]
-            for variant in names if own else sorted(names, key=VERSIONS[self.version].variants.index):
-                cloud = told["clouds"][variant]
-                place = self.path / cloud["file"]
-                yield CloudFile(shape, variant, told["family"], place, bool(cloud["scored"]))
+        return [cloud for cloud in self.clouds if cloud.scored]
 
     @property
     def whole(self) -> bool:

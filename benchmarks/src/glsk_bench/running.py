@@ -1,27 +1,32 @@
-"""Running a program over the clouds of a benchmark: our pipelines, or any command."""
+"""Running a program over the clouds of a benchmark: our pipelines, or any command, with limits."""
 
 from __future__ import annotations
 
 import json
 import os
 import platform
+import shlex
 import shutil
+import signal
+import subprocess
 import sys
 import tempfile
+import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from glsk_o3d.errors import FileFormatError, InvalidParameterError, brief
+from glsk_o3d.errors import LONGEST_QUOTED, FileFormatError, InvalidParameterError, brief
 from glsk_o3d.interop.atomic import write_json
 from glsk_o3d.io.skeletons import READABLE, read_skeleton
 from glsk_o3d.recipes.catalogue import named_pipeline
 
-from .answers import TIMES_NAME, answer_files, read_times
-from .commands import CAN_LIMIT_MEMORY, Outcome, Runner, filled, words_of
 from .folders import BenchmarkFolder, CloudFile, read_folder
+from .scoring import TIMES_NAME, answer_files, read_times
 
 TIME_LIMIT = 600.0  # fitted: seconds; the slowest of the programs that we know take a tenth of it
 _PIPELINE_WORDS = (
@@ -33,22 +38,7 @@ Told = dict[str, Any]
 
 @dataclass(frozen=True)
 class RunResult:
-    """What came of a run.
-
-    Attributes
-    ----------
-    done, failed : int
-        Clouds with and without an answer, those of earlier runs too.
-    skipped : int
-        Of these, clouds that an earlier run had done.
-    failures : dict of str to str
-        Why there is no answer, by the name of the cloud.
-
-    Examples
-    --------
-    >>> RunResult(1, 0, 0).failures
-    {}
-    """
+    """What came of a run."""
 
     done: int
     failed: int
@@ -234,3 +224,141 @@ def _fault(skeleton: Path) -> str | None:
     except (FileFormatError, OSError, MemoryError) as error:
         return f"it wrote no skeleton: {brief(error).removeprefix(f'{skeleton}: ')}"
     return None if len(found.vertices) else "it wrote an empty skeleton"
+
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
+
+CAN_LIMIT_MEMORY = hasattr(resource, "prlimit")
+_PLACES = ("{cloud}", "{skeleton}")
+
+
+class Outcome(NamedTuple):
+    """What came of a command."""
+
+    seconds: float
+    failure: str | None
+
+
+def words_of(command: str | Sequence[str]) -> list[str]:
+    """The words of a command with the places for files, checked."""
+    try:
+        words = shlex.split(command, posix=os.name == "posix") if isinstance(command, str) else [*command]
+    except ValueError as error:
+        raise InvalidParameterError(f"the command {command!r} is malformed: {error}") from None
+    for place in _PLACES:
+        if not any(place in word for word in words):
+            raise InvalidParameterError(
+                f"the command must say where names of files go: it has no {place}, as in 'mytool {' '.join(_PLACES)}'"
+            )
+    if shutil.which(words[0]) is None:
+        raise InvalidParameterError(f"the command cannot be run: there is no program {words[0]!r}")
+    return words
+
+
+def filled(words: Sequence[str], cloud: Path, skeleton: Path) -> list[str]:
+    """The words with the names of files in their places."""
+    names = [str(cloud), str(skeleton)]
+    found = []
+    for word in words:
+        for place, name in zip(_PLACES, names, strict=True):
+            word = word.replace(place, name)
+        found.append(word)
+    return found
+
+
+class Runner:
+    """Runs commands, several at a time if it is called from threads, and can end them all."""
+
+    def __init__(self, time_limit: float, memory_limit: float | None = None):
+        self._time_limit, self._memory_limit = time_limit, memory_limit
+        self._running: set[subprocess.Popen] = set()
+        self._lock, self._stopped = threading.Lock(), False
+
+    def run(self, words: Sequence[str], said: Path) -> Outcome:
+        """Run a command to its end. Never raises for what the command does.
+
+        Parameters
+        ----------
+        words : sequence of str
+        said : Path
+            A file for what it prints.
+
+        Returns
+        -------
+        Outcome
+        """
+        late = threading.Event()
+        with said.open("wb") as stream:
+            start = time.perf_counter()
+            try:
+                process = self._start(words, stream)
+            except OSError as error:
+                return Outcome(0.0, f"cannot be started: {error.strerror or error}")
+            watch = threading.Timer(self._time_limit, self._end_late, (process, late))
+            watch.daemon = True
+            watch.start()
+            code = process.wait()
+            seconds = time.perf_counter() - start
+            watch.cancel()
+        with self._lock:
+            self._running.discard(process)
+        if late.is_set():
+            return Outcome(seconds, f"not done after {self._time_limit:g} s")
+        return Outcome(seconds, None if code == 0 else f"{_ended(code)}{_last_line(said)}")
+
+    def _start(self, words: Sequence[str], stream: Any) -> subprocess.Popen:
+        with self._lock:
+            if self._stopped:
+                raise InterruptedError("stopped")
+            streams: dict[str, Any] = dict(stdin=subprocess.DEVNULL, stdout=stream, stderr=subprocess.STDOUT)
+            process = subprocess.Popen(words, **streams, start_new_session=os.name == "posix")
+            self._running.add(process)
+        if self._memory_limit is not None and CAN_LIMIT_MEMORY:
+            bytes_ = round(self._memory_limit * 1e9)
+            with suppress(OSError):  # it has ended already
+                resource.prlimit(process.pid, resource.RLIMIT_AS, (bytes_, bytes_))
+        return process
+
+    def _end_late(self, process: subprocess.Popen, late: threading.Event) -> None:
+        if process.poll() is None:
+            late.set()
+            _kill(process)
+
+    def stop(self) -> None:
+        """Kill what runs, and start nothing any more."""
+        with self._lock:
+            self._stopped = True
+            running = [*self._running]
+        for process in running:
+            if process.poll() is None:
+                _kill(process)
+
+
+def _kill(process: subprocess.Popen) -> None:
+    """Kill a process with all that it started, as far as these have not left its group."""
+    if os.name == "posix":
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    elif sys.platform == "win32":
+        subprocess.run(["taskkill", "/F", "/T", "/PID", str(process.pid)], capture_output=True, check=False)
+
+
+def _ended(code: int) -> str:
+    if code > 0:
+        return f"exit code {code}"
+    try:
+        return f"killed by {signal.Signals(-code).name}"
+    except ValueError:
+        return f"killed by signal {-code}"
+
+
+def _last_line(said: Path) -> str:
+    """The last line of what a command printed, after a colon."""
+    with said.open("rb") as stream:
+        stream.seek(0, os.SEEK_END)
+        stream.seek(max(stream.tell() - 4 * LONGEST_QUOTED, 0))
+        lines = stream.read().decode("utf-8", errors="replace").strip().splitlines()
+    return f": {lines[-1].strip()[:LONGEST_QUOTED]}" if lines else ""

@@ -18,9 +18,7 @@ CAMERA_DISTANCE = 2.2  # from the middle of the shape
 TWO_APART, THREE_APART = 140, 120  # two cameras, and three, in degrees around the shape
 LOWEST_CAMERA, HIGHEST_CAMERA = 15, 35  # in degrees above the horizon
 SEEN_COSINE, RAY_COSINE = 0.1, 0.15  # of the angle between ray and normal, at least: for a view, and for a ray
-VIEW_CELL = (
-    1.6  # side of a cell in which the nearest surface hides what is behind, in the spacing of the surface's points
-)
+VIEW_CELL = 1.6  # side of a cell whose nearest surface hides what is behind, in the spacing of the surface's points
 SLANT_CELLS = 2.2  # a slanted surface recedes as much as over so many cells without hiding itself
 RAY_REACH = 1.3  # how far from a ray a point stands for what it hits, in the spacing, on surface that faces it
 MOST_GRIDS = 12  # tried, each finer than the one before, until enough rays hit
@@ -28,10 +26,7 @@ FINER, FINEST = 0.98, 0.7  # a grid is as much finer as rays were too few, and t
 TANGENT_REACH = 3  # how far along its ray a point goes to meet the tangent plane, at most, in the spacing
 NO_SURFACE = 9.0  # range of a ray that hits nothing
 EDGE_STEP = 0.04  # what is farther behind is background
-DEPTH_NOISE, LIDAR_NOISE = (
-    0.0015,
-    0.002,
-)  # standard deviation along the ray; of depth where the surface faces the camera
+DEPTH_NOISE, LIDAR_NOISE = 0.0015, 0.002  # standard deviation along the ray; of depth where surface faces the camera
 FLYING_SHARE, FLYING_REACH = 0.005, 0.2  # points between foreground and background, and how far behind they are at most
 LIDAR_CELL = (0.5, 2.0)  # sides of a cell of its grid, in those of a square as large: dense along, sparse across
 
@@ -39,14 +34,10 @@ LIDAR_CELL = (0.5, 2.0)  # sides of a cell of its grid, in those of a square as 
 class Rays(NamedTuple):
     """Rays from one place that hit the shape."""
 
-    directions: np.ndarray
-    """(m, 3) float array, of length 1."""
-    ranges: np.ndarray
-    """(m,) float array."""
-    cosines: np.ndarray
-    """Of the angle between ray and normal, (m,) float array."""
-    behind: np.ndarray
-    """The range beside the ray where that is much longer, (m,) float array, else NaN."""
+    directions: np.ndarray  # (m, 3), of length 1
+    ranges: np.ndarray  # (m,)
+    cosines: np.ndarray  # of the angle between ray and normal
+    behind: np.ndarray  # the range beside the ray where that is much longer, else NaN
 
 
 def camera_places(rng: np.random.Generator, count: int) -> np.ndarray:
@@ -68,21 +59,7 @@ def _projected(points, eye):
 
 
 def seen_cosines(shape: Shape, eye: np.ndarray, least: float = SEEN_COSINE) -> np.ndarray:
-    """How squarely a camera looks at each point of a surface.
-
-    Parameters
-    ----------
-    shape : Shape
-    eye : (3,) float array
-        Where it is; it looks at the origin.
-    least : float
-        Cosine at which surface is grazing.
-
-    Returns
-    -------
-    (N,) float array
-        Cosine of the angle between ray and normal; 0 where the point is hidden, turned away, or grazing.
-    """
+    """How squarely a camera looks at each point of a surface."""
     image, distance, _ = _projected(shape.points, eye)
     cosine = dot(eye - shape.points, shape.normals) / distance
     cell = _view_cell(shape)
@@ -102,27 +79,7 @@ def _view_cell(shape):
 
 
 def cast(shape: Shape, eye: np.ndarray, n: int, sides: tuple[float, float], rng: np.random.Generator) -> Rays:
-    """Cast the rays of a grid at what a camera sees.
-
-    Parameters
-    ----------
-    shape : Shape
-    eye : (3,) float array
-    n : int
-        How many rays hit at least; the grid is about as fine as that takes.
-    sides : tuple of two floats
-        Of the grid's cells, in those of a square as large.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    Rays
-
-    Raises
-    ------
-    InvalidParameterError
-        The points of the surface are too few for so many rays.
-    """
+    """Cast the rays of a grid at what a camera sees."""
     seen = np.flatnonzero(seen_cosines(shape, eye, RAY_COSINE) > 0)
     points, normals = shape.points[seen], shape.normals[seen]
     image, distance, axes = _projected(points, eye)

@@ -1,16 +1,27 @@
-"""How near a skeleton comes to the true axis of a shape: the scores of the benchmark."""
+"""Scores of skeletons against the true axes of shapes, and of folders of them."""
 
 from __future__ import annotations
 
+import gzip
+import json
+import os
+import zlib
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from glsk_o3d.analysis.comparison import PLACE_SPACING, Truth, compare
-from glsk_o3d.analysis.curves import check_graph, simple_edges
-from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.analysis.comparison import PLACE_SPACING, compare
+from glsk_o3d.analysis.graph import check_graph, simple_edges
+from glsk_o3d.analysis.truth import Truth
+from glsk_o3d.errors import FileFormatError, InvalidParameterError, MissingPackageError, brief
+from glsk_o3d.interop.atomic import write_json
+from glsk_o3d.io.skeletons import READABLE, read_skeleton
 from glsk_o3d.skeleton import Skeleton
+
+from .folders import BenchmarkFolder, CloudFile, read_folder
 
 # Where an answer is refused, so that no program can fill the memory of who scores it.
 MOST_ANSWER_PLACES = 2_000_000  # fitted: along an answer; axes of the benchmark have a thousand to ten thousand
@@ -149,3 +160,211 @@ def _check_size(axis: Truth, vertices: np.ndarray, edges: np.ndarray) -> None:
         raise InvalidParameterError(
             f"the skeleton has {junctions} junctions, more than {MOST_ANSWER_JUNCTIONS}: is it a mesh?"
         )
+
+
+MEASURES = ("perfect", "topology", "tips_f1", "junctions_f1", "error", "inside", "completeness", "length", "ends")
+"""What is averaged: shares and F1 over all clouds, what comes after them over the answers that could be scored."""
+TIMES_NAME = "times.json"
+MOST_RESULTS = 1 << 28  # derived: bytes, far more than any version has, so that a few bytes cannot fill the memory
+_FACTS = ("benchmark", "name", "whole", "clouds")
+_PARTS = ("seconds", "failure", "digits")
+_BROKEN = (EOFError, zlib.error, gzip.BadGzipFile)  # what is not packed as it should be
+
+
+@dataclass(frozen=True)
+class Results:
+    """The scores of a program's answers to all clouds of a benchmark.
+
+    Attributes
+    ----------
+    benchmark : str
+        The version; of somebody's own clouds "own" and digits that differ where clouds or axes do.
+    name : str
+        Of the program, as the table shows it.
+    whole : bool
+        Whether the benchmark has all shapes and variants of the version, and no others.
+    rows : list of dict
+        For each cloud that is scored its shape, family, variant, `Scores`, and the seconds if they were measured.
+
+    Examples
+    --------
+    >>> Results("v1", "mine", True, []).failures
+    0
+    """
+
+    benchmark: str
+    name: str
+    whole: bool
+    rows: list[dict[str, Any]]
+
+    @property
+    def failures(self) -> int:
+        """Clouds without an answer that could be scored."""
+        return sum(row["failure"] is not None for row in self.rows)
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write them as JSON, which `read_results` reads.
+
+        Parameters
+        ----------
+        path : path-like
+        """
+        facts = (self.benchmark, self.name, self.whole, self.rows)
+        write_json(path, dict(zip(_FACTS, facts, strict=True)))
+
+
+def score_answers(
+    folder: BenchmarkFolder | str | os.PathLike,
+    answers: str | os.PathLike,
+    *,
+    name: str | None = None,
+    on_cloud: Callable[[str, int, int], object] | None = None,
+) -> Results:
+    """Score the answers in a folder.
+
+    An answer to the cloud SHAPE_VARIANT.ply is a skeleton in a file SHAPE_VARIANT with any ending that `read_skeleton`
+    reads. A cloud without an answer, or with one that is empty, unreadable or no skeleton, counts as a failure: see
+    `Scores`.
+
+    Parameters
+    ----------
+    folder : BenchmarkFolder or path-like
+    answers : path-like
+    name : str, optional
+        Of the program; by default that of the folder of answers.
+    on_cloud : callable, optional
+        Called with the name of each cloud that is scored, how many are, and of how many.
+
+    Returns
+    -------
+    Results
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such folder.
+    FileFormatError
+        The benchmark is damaged, a cloud has two answers, or the folder of answers has none at all.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Skeleton
+    >>> from glsk_bench import make
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as place:
+    ...     made = make(f"{place}/bench", families=["tubes"], seeds=[100], variants=["clean", "holes"], jobs=1)
+    ...     axis = made.truth("tubes_100")
+    ...     found = Skeleton(axis.nodes, axis.edges, axis.radii, (), (), ())
+    ...     Path(place, "mine").mkdir()
+    ...     found.save(f"{place}/mine/tubes_100_clean.obj")
+    ...     results = score_answers(made, f"{place}/mine")
+    >>> [(row["variant"], row["perfect"], row["failure"]) for row in results.rows]
+    [('clean', True, None), ('holes', False, 'no answer')]
+    """
+    made = folder if isinstance(folder, BenchmarkFolder) else read_folder(folder)
+    place = Path(answers)
+    if not place.is_dir():
+        raise FileNotFoundError(f"{place}: no such folder of answers")
+    files, times, clouds = answer_files(place), read_times(place), made.scored
+    if not times and not any(cloud.name in files for cloud in clouds):
+        example = f"{clouds[0].name}.ply" if clouds else "SHAPE_VARIANT.ply"
+        raise FileFormatError(
+            f"{place}: has no answer to any cloud: they are called as the clouds are, such as {example}"
+        )
+    rows = []
+    for done, cloud in enumerate(clouds, 1):
+        told = times.get(cloud.name, {})
+        scores = _score(made, cloud, files.get(cloud.name, []), told)
+        facts = {"shape": cloud.shape, "family": cloud.family, "variant": cloud.variant}
+        rows.append({**facts, **scores.as_dict(), "seconds": told.get("seconds")})
+        if on_cloud is not None:
+            on_cloud(cloud.name, done, len(clouds))
+    return Results(made.name, name or place.resolve().name, made.whole, rows)
+
+
+def answer_files(place: Path) -> dict[str, list[Path]]:
+    """The files of a folder with the endings of skeletons, by their names before the ending."""
+    found: dict[str, list[Path]] = {}
+    for path in sorted(place.iterdir()):
+        endings = [ending for ending in READABLE if path.name.lower().endswith(ending)]
+        if endings:
+            found.setdefault(path.name[: -len(max(endings, key=len))], []).append(path)
+    return found
+
+
+def _score(made: BenchmarkFolder, cloud: CloudFile, files: list[Path], told: dict[str, Any]) -> Scores:
+    """The scores of the answer to a cloud: that of a failure if there is none."""
+    failure = told.get("failure")
+    if told.get("digits") not in (None, made.digits(cloud)):
+        return Scores.of_failure("no answer: what is there answers another cloud of this name")
+    if len(files) > 1:
+        raise FileFormatError(f"{files[0]}: {files[1].name} answers the same cloud: keep one of them")
+    if not files:
+        return Scores.of_failure(f"no answer: {failure}" if failure else "no answer")
+    truth = made.truth(cloud.shape)
+    try:
+        answer = read_skeleton(files[0])
+        return score(truth, answer.vertices, answer.edges)
+    except MissingPackageError:
+        raise
+    except (FileFormatError, InvalidParameterError, OSError, MemoryError) as error:
+        return Scores.of_failure(f"unreadable: {brief(error).removeprefix(f'{files[0]}: ')}")
+
+
+def read_times(place: Path) -> dict[str, dict[str, Any]]:
+    """What ``times.json`` says of each cloud, if it is there: seconds, why there is no answer, and `digits`."""
+    path = place / TIMES_NAME
+    if not path.is_file():
+        return {}
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))["clouds"]
+        return {str(name): {part: each.get(part) for part in _PARTS if part in each} for name, each in told.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        message = f"is damaged ({type(error).__name__}: {error}): remove it, and seconds are not known"
+        raise FileFormatError(f"{path}: {message}") from None
+
+
+def read_results(path: str | os.PathLike) -> Results:
+    """What `Results.save` has written.
+
+    Parameters
+    ----------
+    path : path-like
+        Also packed by gzip, if its name ends in ``.gz``.
+
+    Returns
+    -------
+    Results
+
+    Raises
+    ------
+    FileNotFoundError
+    FileFormatError
+        The file holds no scores.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     Results("v1", "mine", True, []).save(f"{folder}/scores.json")
+    ...     read_results(f"{folder}/scores.json").name
+    'mine'
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: no such file")
+    try:
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as stream:
+            data = stream.read(MOST_RESULTS + 1)
+        if len(data) > MOST_RESULTS:
+            raise ValueError("it is too large")
+        told = json.loads(data)
+        benchmark, name, whole, rows = (told[fact] for fact in _FACTS)
+        known = {"shape", "variant", "seconds", *Scores.__dataclass_fields__}
+        if not all(isinstance(fact, str) for fact in (benchmark, name)) or any(known - row.keys() for row in rows):
+            raise ValueError("a part is missing")
+        if not all(isinstance(row[measure], int | float | None) for row in rows for measure in (*MEASURES, "seconds")):
+            raise ValueError("a measure is no number")
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, *_BROKEN) as error:
+        raise FileFormatError(f"{path}: not the scores of a benchmark ({type(error).__name__}: {error})") from None
+    return Results(benchmark, name, bool(whole), rows)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -14,14 +15,50 @@ import numpy as np
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.interop.atomic import write_atomically, write_json
 
-from .answers import MEASURES, Results
-from .intervals import mean_with_interval, told
+from .scoring import MEASURES, Results
 from .versions import OWN
 
 _COLUMNS = MEASURES[:7]  # in Markdown; JSON has them all
 _HEADS = {"tips_f1": "tips F1", "junctions_f1": "junctions F1"}
 _DIGITS = {"error": 3}
+_CAPTION = (
+    "Means, and in brackets 95 % intervals from drawing the shapes anew. A failure is neither perfect nor right in its "
+    "topology, and its F1 are 0; what comes after these are means over the answers that could be scored. Seconds are "
+    "medians."
+)
+RESAMPLES = 4000  # fitted: enough for two digits of an interval's ends
+LEVEL = 95  # published: by habit, % of the resampled means that lie in the interval
+
 Cell = dict[str, Any]
+
+
+def mean_with_interval(shapes: Sequence[str], values: Sequence[float]) -> tuple[float, float, float]:
+    """The mean of values, and the ends of its percentile bootstrap interval (Efron 1979).
+
+    Shapes are drawn with replacement, each with all its values, since several clouds of one shape are no independent
+    evidence. Means are over the values. The draws are the same every time.
+    """
+    if len(values) == 0:
+        return np.nan, np.nan, np.nan
+    names, of = np.unique(shapes, return_inverse=True)
+    total, count = np.bincount(of, np.asarray(values, float)), np.bincount(of)
+    times = _drawn(len(names))
+    low, high = np.percentile((times @ total) / (times @ count), [50 - LEVEL / 2, 50 + LEVEL / 2])
+    return float(total.sum() / count.sum()), float(low), float(high)
+
+
+@lru_cache(maxsize=16)
+def _drawn(n: int) -> np.ndarray:
+    """(RESAMPLES, n) array: how often each of n shapes is drawn, which takes longer than all that follows."""
+    return np.random.default_rng(0).multinomial(n, np.full(n, 1 / n), RESAMPLES)
+
+
+def told(mean: float, low: float, high: float, digits: int = 2, sign: str = "") -> str:
+    """A mean and its interval as tables show them; a dash for NaN. With the sign "+" positive ones have it."""
+    if np.isnan(mean):
+        return "-"
+    words = [f"{round(value, digits) + 0.0:{sign}.{digits}f}" for value in (mean, low, high)]  # no -0.00
+    return f"{words[0]} [{words[1]}, {words[2]}]"
 
 
 @dataclass(frozen=True)
@@ -58,23 +95,17 @@ class Leaderboard:
         """
         return {"benchmark": self.benchmark, "whole": self.whole, "entries": self.entries}
 
-    def to_json(self, path: str | os.PathLike) -> None:
-        """Write all numbers.
+    def save(self, path: str | os.PathLike) -> None:
+        """Write all numbers where the ending is ``.json``, else the tables in Markdown.
 
         Parameters
         ----------
         path : path-like
         """
-        write_json(path, self.as_dict())
-
-    def to_markdown(self, path: str | os.PathLike) -> None:
-        """Write the tables.
-
-        Parameters
-        ----------
-        path : path-like
-        """
-        write_atomically(path, lambda temporary: temporary.write_text(self.markdown(), encoding="utf-8"))
+        if Path(path).suffix.lower() == ".json":
+            write_json(path, self.as_dict())
+        else:
+            write_atomically(path, lambda temporary: temporary.write_text(self.markdown(), encoding="utf-8"))
 
     def markdown(self) -> str:
         """The tables in Markdown: all programs over all clouds, and each program by variant.
@@ -91,13 +122,6 @@ class Leaderboard:
             parts.append(_table(title, "program", ((each["name"], each["all"]) for each in self.entries)))
         parts += [_table(each["name"], "variant", each["variants"].items()) for each in self.entries]
         return "\n\n".join(parts) + "\n"
-
-
-_CAPTION = (
-    "Means, and in brackets 95 % intervals from drawing the shapes anew. A failure is neither perfect nor right in its "
-    "topology, and its F1 are 0; what comes after these are means over the answers that could be scored. Seconds are "
-    "medians."
-)
 
 
 def leaderboard(results: Iterable[Results]) -> Leaderboard:
@@ -193,14 +217,3 @@ def _line(words: Iterable[str]) -> str:
 def _plain(name: str) -> str:
     """A name that breaks no table."""
     return " ".join(name.split()).replace("|", "\\|")
-
-
-def save_leaderboard(board: Leaderboard, path: str | os.PathLike) -> None:
-    """Write a leaderboard: Markdown or JSON, by the ending.
-
-    Parameters
-    ----------
-    board : Leaderboard
-    path : path-like
-    """
-    {".md": board.to_markdown, ".json": board.to_json}[Path(path).suffix.lower()](path)

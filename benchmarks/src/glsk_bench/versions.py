@@ -22,40 +22,16 @@ HASH_FACTORS = (0x85EBCA6B, 0xC2B2AE35)  # published: of MurmurHash3's finalizer
 
 @dataclass(frozen=True)
 class Version:
-    """What a version of the benchmark is made of.
-
-    Attributes
-    ----------
-    name : str
-    families : tuple of str
-        Of shapes.
-    seeds : tuple of int
-        Of the shapes of each family.
-    variants : tuple of str
-        Of the clouds of each shape.
-    points : int
-        Of each cloud.
-    draw : int
-        The seed of the clouds.
-    whole : tuple of str
-        The variants that show the whole surface: their coverage is 1.
-    least_coverage : float
-        Clouds with less are not scored: nobody can be asked for what they do not show.
-
-    Examples
-    --------
-    >>> version("v1").points
-    4096
-    """
+    """What a version of the benchmark is made of: all its clouds, and which of them are scored."""
 
     name: str
     families: tuple[str, ...]
-    seeds: tuple[int, ...]
+    seeds: tuple[int, ...]  # of the shapes of each family
     variants: tuple[str, ...]
-    points: int
-    draw: int
-    whole: tuple[str, ...]
-    least_coverage: float
+    points: int  # of each cloud
+    draw: int  # the seed of the clouds
+    whole: tuple[str, ...]  # the variants that show the whole surface: their coverage is 1
+    least_coverage: float  # clouds with less are not scored: nobody can be asked for what they do not show
 
 
 VERSIONS = {
@@ -82,32 +58,10 @@ OWN = "own"
 
 
 def version(name: str) -> Version:
-    """The version of that name.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    Version
-
-    Raises
-    ------
-    InvalidParameterError
-        There is none.
-
-    Examples
-    --------
-    >>> version("v1").seeds[0]
-    100
-    """
+    """The version of that name."""
     if name not in VERSIONS:
         raise InvalidParameterError(did_you_mean(name, VERSIONS, "version of the benchmark"))
     return VERSIONS[name]
-
-
-# --------------------------------------------------------------------------------------------------------- fingerprints
 
 
 def fingerprint(points: np.ndarray) -> str:
@@ -117,20 +71,6 @@ def fingerprint(points: np.ndarray) -> str:
     points, say how far a cloud is from the one that is meant: all roundings together move them by less than
     `SUM_TOLERANCE`, one point in another place by more. Weights follow from the place in the file: points in another
     order are another cloud.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-        Taken as float32, as they are written.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> fingerprint(np.eye(3))
-    '64eec129 24958951 66427786'
     """
     rows = np.ascontiguousarray(points, "<f4")
     digits = hashlib.sha256(rows.tobytes()).hexdigest()[:8]
@@ -138,9 +78,7 @@ def fingerprint(points: np.ndarray) -> str:
 
 
 def _sums(rows: np.ndarray) -> np.ndarray:
-    """Two sums of all coordinates with weights between -1 and 1 that follow from their places, over the number of
-    points.
-    """
+    """Two sums of all coordinates, each times a weight that follows from its place, over the number of points."""
     mixed = np.arange(1, 2 * rows.size + 1, dtype=np.uint64)
     for shift, factor in zip((16, 13), HASH_FACTORS, strict=True):  # whole numbers: the same weights on all processors
         mixed = (mixed ^ (mixed >> np.uint64(shift))) * np.uint64(factor) % np.uint64(2**32)
@@ -149,25 +87,7 @@ def _sums(rows: np.ndarray) -> np.ndarray:
 
 
 def sameness(points: np.ndarray, known: str) -> str:
-    """Whether a cloud is the one of a fingerprint.
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-    known : str
-        What `fingerprint` gave.
-
-    Returns
-    -------
-    {"bits", "rounding", "other"}
-        The same to the last bit, the same but for roundings, or another cloud.
-
-    Examples
-    --------
-    >>> known = fingerprint(np.eye(3))
-    >>> sameness(np.eye(3), known), sameness(np.eye(3) * (1 + 1e-7), known), sameness(np.eye(3)[::-1], known)
-    ('bits', 'rounding', 'other')
-    """
+    """Whether a cloud is the one of a fingerprint: to the last ``bits``, but for ``rounding``, or an ``other``."""
     found, known_words = fingerprint(points).split(), known.split()
     if found == known_words:
         return "bits"
@@ -176,67 +96,20 @@ def sameness(points: np.ndarray, known: str) -> str:
 
 
 def fingerprints(name: str) -> dict[str, str]:
-    """The fingerprints of all clouds of a version, by their names; empty where the package has none.
-
-    Parameters
-    ----------
-    name : str
-        Of the version.
-
-    Returns
-    -------
-    dict of str to str
-
-    Examples
-    --------
-    >>> fingerprints("none")
-    {}
-    """
+    """The fingerprints of all clouds of a version, by their names; empty where the package has none."""
     shapes = _known(name)["clouds"]
     return {f"{shape}_{variant}": words for shape, clouds in shapes.items() for variant, words in clouds.items()}
 
 
 def is_scored(asked: Version, cloud: str, coverage: float) -> bool:
-    """Whether answers to a cloud count: as is fixed for the version, so that roundings of its coverage do not decide.
-
-    Parameters
-    ----------
-    asked : Version
-    cloud : str
-        Its name.
-    coverage : float
-        Decides where the package does not know the cloud.
-
-    Returns
-    -------
-    bool
-
-    Examples
-    --------
-    >>> is_scored(version("v1"), "tubes_7_holes", 0.98)
-    True
-    """
+    """Whether answers to a cloud count: fixed with the version, so that roundings of the coverage do not decide."""
     if cloud in fingerprints(asked.name):
         return cloud not in _known(asked.name)["unscored"]
     return coverage >= asked.least_coverage
 
 
 def write_fingerprints(name: str, found: dict[str, dict[str, str]], unscored: Iterable[str]) -> Path:
-    """Write the fingerprints of a version into the package. For whoever makes a version, once.
-
-    Parameters
-    ----------
-    name : str
-    found : dict of str to dict of str to str
-        By shape, by variant.
-    unscored : iterable of str
-        Names of clouds of which answers do not count.
-
-    Returns
-    -------
-    Path
-        The file.
-    """
+    """Write the fingerprints of a version into the package. For whoever makes a version, once."""
     clouds = ",\n".join(f"  {json.dumps(shape)}: {json.dumps(words)}" for shape, words in sorted(found.items()))
     text = f'{{\n "unscored": {json.dumps(sorted(unscored))},\n "clouds": {{\n{clouds}\n }}\n}}\n'
     write_atomically(_file(name), lambda temporary: temporary.write_text(text, encoding="utf-8"))

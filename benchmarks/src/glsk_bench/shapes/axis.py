@@ -9,17 +9,15 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from glsk_o3d.numerics.vectors import norm
+
 from .curves import wander
 
 # Fitted, as all of this page: joints and bends as round as those of things that people scan.
-BAR_THICKER, LIMB_THICKER = (
-    1.3,
-    1.2,
-)  # what a part starts in is thicker than that, in the part's radius: it keeps its own
-BAR_STARTS, LIMB_STARTS = (
-    0.02,
-    0.03,
-)  # where, as a share of the bar, and of the limb's first step, it has its own radius
+# A part keeps its own radius if what it starts in is thicker than so many of its radii. It has that radius from there
+# on, as a share of the bar, and of the limb's first step.
+BAR_THICKER, LIMB_THICKER = 1.3, 1.2
+BAR_STARTS, LIMB_STARTS = 0.02, 0.03
 BOW_STEP = 1.5  # between the nodes of a bar that is bowed, in radii
 LIMB_STEP = 1.3  # between the nodes of a limb, in the mean of its radii at both ends
 LEAST_STEPS = 4  # of a curved part
@@ -135,3 +133,35 @@ def joined(parts: Sequence[Axis]) -> Axis:
         whole.sizes += part.sizes
         whole.links += [(i + first, j + first) for i, j in part.links]
     return whole
+
+
+FINE_STEP = 0.5  # fitted: pieces of an axis, in the radius: their balls differ from the cone by a few percent of it
+
+
+def subdivided(
+    nodes: np.ndarray, edges: np.ndarray, radii: np.ndarray, longest: float | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes, edges and radii once every edge is cut in equal pieces, by default of half its smaller radius at most.
+
+    The new nodes come after those there were, edge by edge, and the pieces of each edge one after another.
+    """
+    a, b = edges.T
+    span, swell = nodes[b] - nodes[a], radii[b] - radii[a]
+    most = FINE_STEP * np.minimum(radii[a], radii[b]) if longest is None else longest
+    pieces = np.maximum(np.ceil(norm(span) / most).astype(int), 1)
+    new = pieces - 1
+    edge = np.repeat(np.arange(len(edges)), new)
+    t = (_counted(new) + 1) / pieces[edge]
+    inner = nodes[a[edge]] + t[:, None] * span[edge]
+    all_radii = np.concatenate([radii, radii[a[edge]] + t * swell[edge]])
+    # piece k of an edge, of those in a row, begins at new node k - 1 of this edge: but for the first, at the old one
+    piece_edge, k = np.repeat(np.arange(len(edges)), pieces), _counted(pieces)
+    after = len(nodes) + (np.cumsum(new) - new)[piece_edge] + k
+    start = np.where(k == 0, a[piece_edge], after - 1)
+    end = np.where(k == pieces[piece_edge] - 1, b[piece_edge], after)
+    return np.vstack([nodes, inner]), np.column_stack([start, end]), all_radii
+
+
+def _counted(sizes):
+    """0, 1, 2, ... for each of groups that lie one behind the other."""
+    return np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)

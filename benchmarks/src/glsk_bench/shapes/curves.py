@@ -1,8 +1,27 @@
-"""Curves that shapes are drawn along."""
+"""Random numbers, and the curves that shapes are drawn along."""
 
 from __future__ import annotations
 
+import zlib
+
 import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+def generator(*key: str | int) -> np.random.Generator:
+    """Random numbers that follow from some words and whole numbers."""
+    return np.random.default_rng([zlib.crc32(part.encode()) if isinstance(part, str) else int(part) for part in key])
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """A positive number whose logarithm is uniform: as many between 1 and 2 as between 2 and 4."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def any_rotation(rng: np.random.Generator) -> Rotation:
+    """A rotation of which none is likelier than another."""
+    return Rotation.from_quat(rng.normal(size=4))
+
 
 UP = np.array([0.0, 0.0, 1.0])
 """Which way is up while a shape is drawn, and for the scanners around it."""
@@ -24,23 +43,7 @@ def across(ahead: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def wander(
     rng: np.random.Generator, start: np.ndarray, ahead: np.ndarray, length: float, steps: int, bend: float
 ) -> np.ndarray:
-    """A smooth random curve.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    start : (3,) float array
-    ahead : (3,) float array
-        Its direction at the start, of any length.
-    length : float
-    steps : int
-    bend : float
-        About how far it turns in all, in radians.
-
-    Returns
-    -------
-    (steps + 1, 3) float array
-    """
+    """A smooth random curve."""
     t = (np.arange(steps) + 0.5) / steps
     waves = []
     for f in HARMONICS:
@@ -77,23 +80,7 @@ def polygon(corners: int, height: float = 0.0, radius: float = 1.0) -> np.ndarra
 
 
 def oval(rng: np.random.Generator, count: int, radius: float, narrowest: float = 0.6, wave: float = 0.15) -> np.ndarray:
-    """Places along a closed curve: an ellipse that leaves its plane a little.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    count : int
-    radius : float
-        Half of its longer axis.
-    narrowest : float
-        What its shorter axis is at least, in the longer one.
-    wave : float
-        How far it leaves its plane at most, in `radius`.
-
-    Returns
-    -------
-    (count, 3) float array
-    """
+    """Places along a closed curve: an ellipse that leaves its plane a little."""
     places = polygon(count, radius=radius) * [1, rng.uniform(narrowest, 1), 1]
     angle = np.arange(count) * 2 * np.pi / count
     places[:, 2] += radius * wave * rng.uniform(-1, 1) * np.cos(2 * angle + rng.uniform(0, 6))

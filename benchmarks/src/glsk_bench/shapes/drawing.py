@@ -12,8 +12,8 @@ from glsk_o3d.errors import InvalidParameterError, did_you_mean
 from glsk_o3d.numerics.groups import component_labels
 from glsk_o3d.numerics.vectors import norm
 
-from ..randomness import generator
 from .axis import UnfitDraw
+from .curves import generator
 from .fairness import fault
 from .figures import figures
 from .frames import frames

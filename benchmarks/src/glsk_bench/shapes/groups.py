@@ -7,10 +7,8 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from ..randomness import any_rotation
-from .axis import Axis, UnfitDraw, joined
-from .curves import UP, across, direction, oval, swelling, wander
-from .paths import FINE_STEP, subdivided
+from .axis import Axis, UnfitDraw, joined, subdivided
+from .curves import UP, across, any_rotation, direction, oval, swelling, wander
 
 GAP_RANGE = (0.7, 2.0)  # fitted: between two parts, in the thinner one's least radius
 GAP_SLACK = 0.05  # fitted: more is permitted to the nearest two
@@ -112,7 +110,7 @@ def _part(rng):
 
 def _finely(axis):
     """Places all along an axis, and the radii there."""
-    places, _, radii = subdivided(axis.nodes, axis.edges, axis.radii, FINE_STEP)
+    places, _, radii = subdivided(axis.nodes, axis.edges, axis.radii)
     return places, radii
 
 

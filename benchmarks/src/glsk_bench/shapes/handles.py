@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..randomness import any_rotation
 from .axis import Axis
-from .curves import UP, across, oval, swelling, wander
+from .curves import UP, across, any_rotation, oval, swelling, wander
 
-KNOT_NODES, SPOKE_NODES, BODY_STEPS, HANDLE_NODES = (
-    90,
-    8,
-    14,
-    16,
-)  # fitted: round enough; of the rim there are as many a spoke
+# fitted: round enough; of the rim there are as many a spoke
+KNOT_NODES, SPOKE_NODES, BODY_STEPS, HANDLE_NODES = 90, 8, 14, 16
 HANDLE_STARTS = 0.03  # fitted: where a handle has its own radius, as a share of its first step
 
 

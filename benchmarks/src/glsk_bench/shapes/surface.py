@@ -19,12 +19,9 @@ STEEP = 1e-6  # derived: a cone whose radii differ by less, in the first one, is
 class Surface(NamedTuple):
     """Points of a surface."""
 
-    points: np.ndarray
-    """(n, 3) float64 array, uniform by area."""
-    normals: np.ndarray
-    """(n, 3) float64 array, outward, of length 1."""
-    area: float
-    """Of the surface, as the share of points that are not inside tells it."""
+    points: np.ndarray  # (n, 3), uniform by area
+    normals: np.ndarray  # (n, 3), outward, of length 1
+    area: float  # of the surface, as the share of points that are not inside tells it
 
 
 class Pieces(NamedTuple):
@@ -33,35 +30,17 @@ class Pieces(NamedTuple):
     start: np.ndarray
     span: np.ndarray
     length: np.ndarray
-    radius: np.ndarray
-    """Of the cones at their start."""
+    radius: np.ndarray  # of the cones at their start
     end_radius: np.ndarray
-    sine: np.ndarray
-    """Of the angle by which a cone's normals lean towards its end."""
+    sine: np.ndarray  # of the angle by which a cone's normals lean towards its end
     cosine: np.ndarray
-    centres: np.ndarray
-    """Of the balls."""
+    centres: np.ndarray  # of the balls
     ball_radii: np.ndarray
-    areas: np.ndarray
-    """Of the cones, then of the balls."""
+    areas: np.ndarray  # of the cones, then of the balls
 
 
 def surface(nodes: np.ndarray, edges: np.ndarray, radii: np.ndarray, n: int, rng: np.random.Generator) -> Surface:
-    """Draw points on the boundary of a union of round cones.
-
-    Parameters
-    ----------
-    nodes : (M, 3) float array
-    edges : (E, 2) int array
-        The cones; every node has one.
-    radii : (M,) float array
-    n : int
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    Surface
-    """
+    """Draw points on the boundary of a union of round cones."""
     pieces = _pieces(nodes, edges, radii)
     chance = pieces.areas / pieces.areas.sum()
     points, normals, have, tried = [], [], 0, 0

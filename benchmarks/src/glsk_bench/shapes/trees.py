@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from ..randomness import log_uniform
 from .axis import Axis, UnfitDraw
-from .curves import UP, across, direction, wander
+from .curves import UP, across, direction, log_uniform, wander
 
 # Fitted: trees that grow freely and whose limbs can be told apart.
 LIMBS_TRIED = 40  # before there is no room for a limb
@@ -23,18 +22,12 @@ LEAST_SIDES, MOST_SIDES = 2, 3  # limbs at a fork
 class Habit(NamedTuple):
     """How a tree grows."""
 
-    leaves: int
-    """Tips of the whole tree."""
-    length: float
-    """Of the trunk, about."""
-    tip: float
-    """Radius at the start of a last limb."""
-    power: float
-    """The radius of a limb to this power is the sum of those it forks into; 2 is da Vinci's rule."""
-    bend: float
-    """How far a limb turns at most, about, in radians."""
-    spread: tuple[float, float]
-    """How far limbs lean aside at a fork, least and most, in degrees."""
+    leaves: int  # tips of the whole tree
+    length: float  # of the trunk, about
+    tip: float  # radius at the start of a last limb
+    power: float  # the radius of a limb to this power is the sum of those it forks into; 2 is da Vinci's rule
+    bend: float  # how far a limb turns at most, about, in radians
+    spread: tuple[float, float]  # how far limbs lean aside at a fork, least and most, in degrees
 
 
 def trees(rng: np.random.Generator) -> Axis:

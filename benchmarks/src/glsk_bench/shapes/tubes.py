@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..randomness import any_rotation, log_uniform
 from .axis import Axis
-from .curves import UP, swelling, wander
+from .curves import UP, any_rotation, log_uniform, swelling, wander
 
 
 def tubes(rng: np.random.Generator) -> Axis:

@@ -1,1 +1,0 @@
-"""The parts of accuracy.py: what its commands measure, their tables and their pictures."""

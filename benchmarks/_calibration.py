@@ -1,0 +1,199 @@
+"""Probabilities of the refiner's decisions: fitted to answered questions, and whether what is said is so as often."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from _clouds import Case
+from _tables import BLUE, GREY, Table, Tables, keep, number, pick, sheet
+from glsk_bench.table import mean_with_interval, told
+from scipy.optimize import minimize
+from scipy.special import expit
+from scipy.stats import rankdata
+
+from glsk_o3d.analysis import compare
+from glsk_o3d.pipelines import default
+from glsk_o3d.refinement import scores
+
+WEIGHTS = {"loop": "HANDLE_WEIGHTS", "air": "AIR_WEIGHTS", "gap": "BRIDGE_WEIGHTS", "limb": "LIMB_WEIGHTS"}
+"""What a question's weights are called in `glsk_o3d.refinement.scores`."""
+PENALTY = 1.0  # of half a weight's square, as if it were drawn from a normal distribution; the constant has none
+
+PARTS = 5  # of the range of probabilities, of the same width
+SURE = 1e-9  # a probability is taken to be as far from 0 and 1, or one mistake would make the loss infinite
+QUESTIONS = {
+    "loop": "a loop is a handle",
+    "air": "a branch crosses air",
+    "gap": "the object goes on across a gap",
+    "limb": "a branch is a limb",
+}
+SEEN, UNSEEN = "all families", "the other families"  # to which weights are fitted
+MEASURES = ("topology", "perfect")
+Weights = dict[str, dict[str, float]]
+
+
+class Answered(NamedTuple):
+    """Questions of one kind: their facts, whether it is so, and of which shapes and families they are."""
+
+    names: list[str]
+    facts: np.ndarray
+    is_so: np.ndarray
+    shapes: np.ndarray
+    families: np.ndarray
+
+    def of(self, some: np.ndarray) -> Answered:
+        """Some of them."""
+        return Answered(self.names, *(each[some] for each in self[1:]))
+
+
+def by_question(rows: list[dict]) -> dict[str, Answered]:
+    """The questions of all clouds, by what they are about."""
+    found: dict[str, list[tuple]] = {about: [] for about in WEIGHTS}
+    for row in rows:
+        for it in row.get("questions", ()):
+            found[it["about"]].append((it["facts"], it["is_so"], row["shape"], row["family"]))
+    told = {}
+    for about, each in found.items():
+        if each:
+            facts, is_so, shapes, families = zip(*each, strict=True)
+            names = list(facts[0])
+            table = np.array([[fact[name] for name in names] for fact in facts])
+            told[about] = Answered(names, table, np.array(is_so), np.array(shapes), np.array(families))
+    return told
+
+
+def fitted(answered: Answered) -> dict[str, float]:
+    """The weights with which the questions are answered best: least log loss, with a light L2 penalty."""
+    table = np.column_stack([np.ones(len(answered.facts)), answered.facts])
+    penalty = PENALTY * np.append(0, np.ones(len(answered.names)))
+
+    def loss(weights):
+        total = table @ weights
+        value = np.logaddexp(0, np.where(answered.is_so, -total, total)).sum() + penalty @ weights**2 / 2
+        return value, table.T @ (expit(total) - answered.is_so) + penalty * weights
+
+    found = minimize(loss, np.zeros(table.shape[1]), jac=True, method="BFGS").x
+    return dict(zip(["constant", *answered.names], found.tolist(), strict=True))
+
+
+def said(weights: Mapping[str, float], answered: Answered) -> np.ndarray:
+    """Probabilities, (n,) float array."""
+    return np.array([scores.probability(weights, dict(zip(answered.names, it, strict=True))) for it in answered.facts])
+
+
+def log_loss(chance: np.ndarray, is_so: np.ndarray) -> float:
+    """Mean of minus the logarithm of the probability of what is so, in nats."""
+    chance = np.clip(chance, SURE, 1 - SURE)
+    return float(-np.log(np.where(is_so, chance, 1 - chance)).mean())
+
+
+def area_under_curve(chance: np.ndarray, is_so: np.ndarray) -> float:
+    """The share of pairs, of one that is so and one that is not, in which that has the larger probability; ties half.
+
+    NaN without such pairs.
+    """
+    n, m = np.count_nonzero(is_so), np.count_nonzero(~is_so)
+    return (rankdata(chance)[is_so].sum() - n * (n + 1) / 2) / (n * m) if n and m else np.nan
+
+
+def parts(chance: np.ndarray, answered: Answered) -> list[tuple[int, float, tuple[float, float, float]]]:
+    """Of every part of the range that is not empty: the count, the mean probability, and how often it is so."""
+    part, found = np.minimum((chance * PARTS).astype(int), PARTS - 1), []
+    for k in np.unique(part):
+        here = part == k
+        often = mean_with_interval(answered.shapes[here].tolist(), answered.is_so[here].tolist())
+        found.append((int(here.sum()), float(chance[here].mean()), often))
+    return found
+
+
+def tables(told_of: Mapping[str, tuple[np.ndarray, Answered]]) -> Tables:
+    """A line for each kind of question; what is said and how often it is so, by parts of the range; and by family."""
+    kinds, ranges, families = [], [], []
+    for about, (chance, answered) in told_of.items():
+        question, is_so = QUESTIONS[about], answered.is_so
+        asked, so, probability, *losses = _judged(chance, is_so)
+        kinds.append([question, asked, so, probability, number(((chance >= 0.5) == is_so).mean()), *losses])
+        for place, (count, mean, often) in enumerate(parts(chance, answered)):
+            ranges.append([question * (place == 0), str(count), number(mean, 2), told(*often)])
+        for place, family in enumerate(dict.fromkeys(answered.families.tolist())):
+            here = answered.families == family
+            families.append([question * (place == 0), family, *_judged(chance[here], is_so[here])])
+    first, last = ["asked", "so", "said"], ["log loss", "of the share", "AUC"]
+    return [
+        ("by question", ["the question", *first, "right at .5", *last], kinds),
+        ("said, and so how often", ["the question", "asked", "said", "so"], ranges),
+        ("by family", ["the question", "family", *first, *last], families),
+    ]
+
+
+def _judged(chance, is_so):
+    """How many there are, how often it is so, what is said on average, and how good that is."""
+    shares = [number(is_so.mean()), number(chance.mean())]
+    losses = [number(log_loss(chance, is_so)), number(log_loss(np.full(len(is_so), is_so.mean()), is_so))]
+    return [str(len(is_so)), *shares, *losses, number(area_under_curve(chance, is_so))]
+
+
+def without_family(answered: Answered, learnt: Answered) -> np.ndarray:
+    """What weights say of each family that were fitted without it, to other questions, (n,) float array."""
+    chances = np.empty(len(answered.is_so))
+    for family in np.unique(answered.families):
+        here = answered.families == family
+        chances[here] = said(fitted(learnt.of(learnt.families != family)), answered.of(here))
+    return chances
+
+
+def draw_reliability(told_of: Mapping[str, tuple[np.ndarray, Answered]], folder: Path) -> None:
+    """How often it is so over the probability that was said, a panel for each kind of question, with counts."""
+    figure, panels = sheet(5.4, rows=2, columns=2, sharex=True, sharey=True)
+    for axes, (about, question) in zip(panels.ravel(), QUESTIONS.items(), strict=True):
+        axes.plot([0, 1], [0, 1], color=GREY, linewidth=0.8, zorder=0)
+        axes.set_title(question, fontsize=9)
+        axes.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), aspect="equal")
+        for count, mean, (often, low, high) in parts(*told_of[about]) if about in told_of else ():
+            axes.vlines(mean, low, high, color=BLUE, linewidth=1.5)
+            axes.plot(mean, often, "o", color=BLUE, markersize=5)
+            right = mean < 0.8  # of the dot, or there is no room
+            style = dict(textcoords="offset points", fontsize=7, color=GREY, va="center")
+            axes.annotate(str(count), (mean, often), (6 if right else -6, 0), ha="left" if right else "right", **style)
+    figure.supxlabel("probability that was said", fontsize=9)
+    figure.supylabel("how often it was so", fontsize=9)
+    keep(figure, folder, "probabilities")
+
+
+def weights_of(answered: Mapping[str, Answered], without: str | None = None) -> Weights:
+    """By the names of `scores`: fitted to all questions, or to those of all families but one."""
+    some = {about: it if without is None else it.of(it.families != without) for about, it in answered.items()}
+    return {WEIGHTS[about]: fitted(it) for about, it in some.items()}
+
+
+def measure(case: Case, weights: Weights) -> dict[str, float]:
+    """A skeleton of `default` with these weights, against its axis."""
+    points, truth = case.load()
+    kept = {name: dict(getattr(scores, name)) for name in weights}
+    try:
+        for name, them in weights.items():
+            getattr(scores, name).update(them)
+        return compare(default()(points), truth).as_dict()
+    finally:
+        for name, them in kept.items():
+            getattr(scores, name).update(them)
+
+
+def table(rows: list[dict]) -> Table:
+    """By family: shares with weights fitted to all families, with those fitted to the others, and the difference."""
+    lines = []
+    for family in [*dict.fromkeys(row["family"] for row in rows), "all"]:
+        here = rows if family == "all" else pick(rows, family=family)
+        rows_of = (pick(here, weights=name) for name in (SEEN, UNSEEN))
+        seen, unseen = ({(row["shape"], row["variant"]): row for row in each} for each in rows_of)
+        cells = []
+        for name in MEASURES:
+            sides = [[float(side[cloud].get(name, False)) for cloud in seen] for side in (seen, unseen)]
+            change = mean_with_interval([shape for shape, _ in seen], [b - a for a, b in zip(*sides, strict=True)])
+            cells += [*(number(sum(side) / len(seen), 2) for side in sides), told(*change, 2, sign="+")]
+        lines.append([family, str(len(seen)), *cells])
+    header = [f"{name}{word}" for name in MEASURES for word in (", all", ", others", ": change")]
+    return "weights fitted to all families, and to the others", ["family", "clouds", *header], lines

@@ -1,1 +1,0 @@
-"""What calibrate.py is made of."""

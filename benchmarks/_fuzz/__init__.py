@@ -1,1 +1,0 @@
-"""What `fuzz.py` is made of."""

@@ -1,1 +1,0 @@
-"""What other tools make of the public benchmark: kept scores, tables, a picture."""

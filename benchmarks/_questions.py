@@ -1,0 +1,135 @@
+"""What the refiner asks about a cloud with a known axis, and what the axis answers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from _clouds import Case
+from glsk_bench.shapes.axis import subdivided
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import dijkstra, maximum_bipartite_matching
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+
+from glsk_o3d import Pipeline
+from glsk_o3d.analysis import Truth
+from glsk_o3d.analysis.matching import TIP_REACH
+from glsk_o3d.numerics.cycles import minimum_cycle_basis
+from glsk_o3d.refinement.air import branch_facts, cut_air
+from glsk_o3d.refinement.bridging import gap_facts
+from glsk_o3d.refinement.evidence import Evidence, in_order
+from glsk_o3d.refinement.loops import close_loops, loop_facts
+from glsk_o3d.refinement.spurs import limb_facts, prune_spurs
+from glsk_o3d.skeleton import Skeleton
+
+DIGITS = 4  # of a fact
+STEP = 0.3  # between places on the true axis, in median radii
+CANDIDATES = 32  # nearest places, of which the one counts whose ball is nearest: thin parts grow out of thick ones
+NEAR = 4  # edges on either side of the weakest place of a branch in which it may cross air
+AIR_WAY, AIR_RADII = 2.0, 3.0  # across air is what is so many times farther along the axis, and so many radii more
+SAME_WAY, SAME_RADII = 1.5, 2.0  # and with a gap in one part the axis goes on no farther round than that
+
+
+def questions(case: Case, pipeline: Pipeline) -> dict:
+    """Every question about a cloud: what it is `about`, the `facts`, and whether it `is_so`."""
+    points, truth = case.load()
+    found = [
+        dict(about=about, facts={name: round(value, DIGITS) for name, value in facts.items()}, is_so=is_so)
+        for about, facts, is_so in asked(points, truth, pipeline)
+    ]
+    return dict(questions=found)
+
+
+def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tuple[str, dict[str, float], bool]]:
+    """The questions in the order in which a pipeline's refiner asks them, each of the skeleton that it has then."""
+    *stages, refiner = pipeline.stages
+    skeleton, surface = refiner._fit(in_order(Pipeline(*stages)(points))[0])
+    if not len(skeleton.edges):
+        return
+    evidence = Evidence.of(skeleton, surface)
+    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+    if cycles:
+        placed = Placed(truth, skeleton.vertices)
+        for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
+            if (is_so := placed.is_handle(cycle)) is not None:  # also without an inside: of false ones there are few
+                yield "loop", loop.facts, is_so
+    skeleton, _ = refiner._asked(close_loops, skeleton, evidence, refiner.handle)
+    yield from _limbs(skeleton, evidence, truth)
+    skeleton, _ = refiner._asked(prune_spurs, skeleton, evidence, refiner.limb)
+    placed = Placed(truth, skeleton.vertices)
+    for branch, k, facts in branch_facts(skeleton, evidence, skeleton.report.noise):
+        yield "air", facts, placed.crosses_air(branch, k)
+    skeleton, _ = cut_air(skeleton, evidence, skeleton.report.noise, refiner.air)
+    skeleton, _ = refiner._asked(prune_spurs, skeleton, evidence, refiner.limb)
+    placed = Placed(truth, skeleton.vertices)
+    for (leaf, other), facts in gap_facts(skeleton, evidence):
+        yield "gap", facts, bool(placed.joined(leaf, other))
+
+
+def _limbs(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
+    """A branch is a limb if a true tip is lost without it: of two prongs in one end either may go, and is none."""
+    leaves = np.flatnonzero(skeleton.degree == 1)
+    tips = np.flatnonzero(np.bincount(truth.edges.ravel(), minlength=len(truth.nodes)) == 1)
+    near = cdist(skeleton.vertices[leaves], truth.nodes[tips]) <= TIP_REACH * truth.radii[tips]
+    served = _served(near)
+    for leaf, facts in limb_facts(skeleton, evidence):
+        yield "limb", facts, _served(near[leaves != leaf]) < served
+
+
+def _served(near: np.ndarray) -> int:
+    """Most true tips that can have a leaf of their own near them."""
+    return int((maximum_bipartite_matching(csr_array(near.astype(np.int8)), perm_type="column") >= 0).sum())
+
+
+class Placed:
+    """Vertices, (m, 3) float array, at their places on a true axis, and the ways between these along it."""
+
+    def __init__(self, truth: Truth, vertices: np.ndarray) -> None:
+        points, links, radii = subdivided(truth.nodes, truth.edges, truth.radii, STEP * np.median(truth.radii))
+        lengths = np.maximum(np.linalg.norm(points[links[:, 1]] - points[links[:, 0]], axis=1), np.finfo(float).tiny)
+        near, which = cKDTree(points).query(vertices, k=range(1, 1 + min(CANDIDATES, len(points))))
+        self.place = which[np.arange(len(vertices)), np.argmin(near - radii[which], axis=1)]
+        graph = coo_array((lengths, links.T), shape=(len(points), len(points))).tocsr()
+        starts, self._row = np.unique(self.place, return_inverse=True)
+        self._way, self._before = dijkstra(graph, directed=False, indices=starts, return_predecessors=True)
+        self._points, self._radii = points, radii
+
+    def apart(self, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+        """Whether there is air between vertices i and j: along the axis it is much farther, bool array."""
+        return self._along(i, j) > AIR_WAY * self._across(i, j) + AIR_RADII * self._thickness(i, j)
+
+    def joined(self, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+        """Whether the object goes on from vertices i to j, bool array."""
+        return self._along(i, j) < SAME_WAY * self._across(i, j) + SAME_RADII * self._thickness(i, j)
+
+    def crosses_air(self, branch: np.ndarray, k: int) -> bool:
+        """Whether there is air between neighbours on a branch, near its edge k."""
+        there = branch[max(k - NEAR, 0) : k + NEAR + 2]
+        return bool(self.apart(there[:-1], there[1:]).any())
+
+    def is_handle(self, cycle: np.ndarray) -> bool | None:
+        """Whether the walk along the true axis that follows a loop goes round a loop of it, and not only to and fro.
+
+        None where the loop crosses air: it is no handle, but to zip it up would join what is apart.
+        """
+        if self.apart(cycle, np.roll(cycle, -1)).any():
+            return None
+        flow: dict[tuple[int, int], int] = {}
+        for a, b in zip(cycle.tolist(), np.roll(cycle, -1).tolist(), strict=True):
+            start, here = int(self.place[a]), int(self.place[b])
+            while here != start:
+                before = int(self._before[self._row[a], here])
+                link, way = ((before, here), 1) if before < here else ((here, before), -1)
+                flow[link] = flow.get(link, 0) + way
+                here = before
+        return any(flow.values())
+
+    def _along(self, i, j):
+        return self._way[self._row[i], self.place[j]]
+
+    def _across(self, i, j):
+        return np.linalg.norm(self._points[self.place[i]] - self._points[self.place[j]], axis=-1)
+
+    def _thickness(self, i, j):
+        return np.maximum(self._radii[self.place[i]], self._radii[self.place[j]])
