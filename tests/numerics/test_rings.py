@@ -4,8 +4,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from glsk_o3d.numerics import rings as module
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, plane_axes
@@ -37,17 +35,6 @@ def case(request):
 POINTS = np.random.default_rng(9).normal(size=(40, 3))
 
 
-def test_triangles_by_hand():
-    rings = rings_of([[1, 2, 3], [], [4, 5, 6], [7], [8, 9], [1, 2, 3, 4]], [True, False, False, False, False, True])
-    expected = [
-        [0, 1, 2], [0, 2, 3], [0, 3, 1],
-        [2, 4, 5], [2, 5, 6],
-        [4, 8, 9],
-        [5, 1, 2], [5, 2, 3], [5, 3, 4], [5, 4, 1],
-    ]  # fmt: skip
-    assert sorted(rings.triangles.tolist()) == sorted(expected)
-
-
 def test_sizes_centres_and_rows(case):
     lists, closed, rings = case
     assert lists_of(rings) == lists
@@ -76,20 +63,10 @@ def test_lengths(case):
     np.testing.assert_allclose(distance, [min(row) for row in slow], rtol=1e-14)
 
 
-def test_nearest_takes_the_first_of_equals():
-    points = np.array([[0.0, 0, 0], [0, 1, 0], [1, 0, 0], [0, 0, 1]])
-    rings = rings_of([[3, 1, 2], [0], [0], [0]], [False] * 4)
-    assert rings.nearest(points)[0].tolist() == [3, 0, 0, 0]
-
-
 def test_mean_over(case):
     lists, _, rings = case
     values = np.random.default_rng(1).normal(size=(40, 4))
     np.testing.assert_allclose(rings.mean_over(values), [values[row].mean(axis=0) for row in lists], atol=1e-13)
-
-
-def test_mean_over_an_empty_ring_is_zero():
-    assert rings_of([[1], [], [0, 1]], [False] * 3).mean_over(np.ones((3, 2))).tolist() == [[1, 1], [0, 0], [1, 1]]
 
 
 def test_take_replace_pad_and_concatenate(case):
@@ -117,21 +94,6 @@ def test_take_replace_pad_and_concatenate(case):
     assert both.closed.tolist() == closed + taken.closed.tolist()
 
 
-def test_nothing():
-    none = Rings.concatenate([])
-    assert len(none) == 0
-    assert none.triangles.shape == (0, 3)
-    assert rings_of([[1], [0]], [False, False]).take(np.empty(0, int)).padded(np.empty(0, int)).shape == (0, 0)
-
-
-def merged(row, closed):
-    """Runs of the same neighbour as one, around the corner too if the ring is closed."""
-    runs = [j for at, j in enumerate(row) if at == 0 or j != row[at - 1]]
-    while closed and len(runs) > 1 and runs[0] == runs[-1]:
-        runs.pop()
-    return runs
-
-
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize(
     ("row", "index", "expected"),
@@ -153,36 +115,6 @@ def test_rename_merges_neighbours_that_fall_together(row, index, expected, close
     assert lists_of(rings_of([row, [5]], [closed, False]).rename(names)) == [expected, [5]]
 
 
-RING = st.lists(st.integers(0, 5), max_size=8, unique=True)
-
-
-@settings(max_examples=400)
-@given(
-    st.lists(st.tuples(RING, st.booleans()), min_size=1, max_size=5), st.lists(st.sampled_from(range(6)), max_size=3)
-)
-def test_rename_after_merges_of_pairs(rows, keepers):
-    """As in a pass of the reducer: every name is taken over by one other at most."""
-    lists, closed = [row for row, _ in rows], [flag for _, flag in rows]
-    names, used = np.arange(6), set()
-    for keeper in keepers:
-        swallowed = (keeper + 1) % 6
-        if not {keeper, swallowed} & used:
-            used |= {keeper, swallowed}
-            names[swallowed] = keeper
-    renamed = rings_of(lists, closed).rename(names)
-    expected = [merged(names[row].tolist() if row else [], flag) for row, flag in zip(lists, closed, strict=True)]
-    assert lists_of(renamed) == expected
-    assert renamed.closed.tolist() == closed
-
-
-def test_rename_merges_around_the_corner_where_the_end_is_a_run_too():
-    # two passes: 2 is merged into 0, which leaves 0 twice in the ring, then 3 is merged into 0
-    rings = rings_of([[0, 1, 2, 3]], [True]).rename(np.array([0, 1, 0, 3]))
-    assert lists_of(rings) == [[0, 1, 0, 3]]
-    renamed = rings.rename(np.array([0, 1, 2, 0]))
-    assert lists_of(renamed) == [[0, 1]]
-
-
 # ---- stars in space
 
 
@@ -200,11 +132,3 @@ def test_star_rings_of_a_tilted_plane_are_those_of_the_flat_one(monkeypatch):
         assert set(a) == set(b)
     np.testing.assert_array_equal(rings.closed, tilted.closed)
     assert 200 < rings.closed.sum() < 300
-
-
-def test_star_rings_take_padding_and_any_centres():
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, -1, 0], [9, 9, 0]])
-    axes = np.tile(np.eye(3)[:, :2], (2, 1, 1))
-    rings = star_rings(points, np.array([0, 4]), np.array([[1, 2, 3, -1], [1, -1, -1, -1]]), axes)
-    assert [sorted(row) for row in lists_of(rings)] == [[1, 2, 3], [1]]
-    assert rings.closed.tolist() == [True, False]
