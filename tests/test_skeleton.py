@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import Skeleton
-from glsk_o3d.numerics.radii import plane_distance_radii
 
 
 def skeleton_of(m, edges):
@@ -127,14 +126,6 @@ def test_random_graphs_against_networkx(m, edges):
     assert skeleton.length == pytest.approx(total)
 
 
-def test_lengths_by_hand():
-    skeleton = dataclasses.replace(
-        skeleton_of(4, path([0, 1, 2])), vertices=[[0, 0, 0], [3, 4, 0], [3, 4, 12], [9, 9, 9]]
-    )
-    assert skeleton.edge_lengths.tolist() == [5, 12]
-    assert skeleton.length == 17
-
-
 def test_arrays_are_of_the_promised_kind():
     skeleton = Skeleton([[0, 0, 0], [1, 0, 0]], [], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
     assert skeleton.vertices.dtype == skeleton.radii.dtype == skeleton.points.dtype == np.float64
@@ -171,23 +162,3 @@ def test_half_axes_are_the_radii_until_they_are_measured():
         Skeleton([[0, 0, 0]], [], [3], (), (), (), half_width=None, half_thickness=None),
     ):
         assert one.half_width.tolist() == one.half_thickness.tolist() == [3]
-
-
-def test_nothing():
-    skeleton = Skeleton([], [], [], [], [], [])
-    assert (skeleton.n_components, skeleton.n_loops, skeleton.length, skeleton.branches) == (0, 0, 0, ())
-
-
-def test_radius_of_a_tube_and_of_a_ball():
-    rng = np.random.default_rng(0)
-    angle, along = rng.uniform(0, 2 * np.pi, 400), rng.uniform(-1, 1, 400)
-    normals = np.stack([0 * angle, np.cos(angle), np.sin(angle)], 1)
-    tube = 0.3 * normals + along[:, None] * [1, 0, 0]
-    ball = rng.normal(size=(300, 3))
-    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
-    vertices = np.array([[-0.5, 0, 0], [0.5, 0, 0], [7, 7, 7], [0, 0, 0]])
-    vertex = np.concatenate([(along > 0).astype(int), np.full(300, 2), [-1]])
-    points = np.concatenate([tube, 2.5 * ball + 7, [[np.nan] * 3]])
-    signs = rng.choice([-1, 1], (701, 1))  # normals are known up to their sign only
-    radii = plane_distance_radii(vertices, vertex, points, signs * np.concatenate([normals, ball, [[np.nan] * 3]]))
-    np.testing.assert_allclose(radii, [0.3, 0.3, 2.5, 0], rtol=1e-12)

@@ -51,7 +51,7 @@ def sheet_mesh(side=20):
     return np.column_stack([flat, 0.1 * np.sin(7 * flat[:, 0])]), faces
 
 
-MESHES = {"sphere": sphere_mesh, "torus": torus_mesh, "sheet": sheet_mesh}
+MESHES = {"sphere": sphere_mesh, "sheet": sheet_mesh}
 
 
 def relative(difference, reference):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d.errors import InvalidCloudError
-from glsk_o3d.preparation.sampling import Extent, sample_cloud, sample_grid
+from glsk_o3d.preparation.sampling import sample_cloud, sample_grid
 from glsk_o3d.preparation.streaming import sample_blocks
 from glsk_o3d.samples import torus, y_junction
 
@@ -38,26 +38,6 @@ def test_the_sample_of_blocks_is_that_of_the_whole(points, rows):
     np.testing.assert_array_equal(counts, sample.counts)
 
 
-def test_single_points_as_blocks():
-    points = torus(1500).points
-    found, counts = sample_blocks(in_blocks(points, 1), lambda n: 300)
-    np.testing.assert_array_equal(found, points[sample_grid(points, 300).kept])
-    assert counts.sum() == 1500
-
-
-def test_a_small_cloud_is_its_own_sample():
-    points = torus(500).points
-    found, counts = sample_blocks(in_blocks(points, 70), lambda n: n // 2)
-    np.testing.assert_array_equal(found, points)
-    assert (counts == 1).all()
-
-
-def test_the_size_is_asked_for_once_all_points_are_counted():
-    asked = []
-    sample_blocks(in_blocks(torus(900).points, 100), lambda n: asked.append(n) or n)
-    assert asked == [900]
-
-
 def test_points_that_all_coincide_or_nearly_so_are_few():
     places = torus(50).points
     found, counts = sample_blocks(in_blocks(np.repeat(places, 100, axis=0), 333), lambda n: 200)
@@ -72,16 +52,6 @@ def test_a_sample_of_a_sample_counts_all_points():
     assert len(second.kept) < 1500
     assert second.counts.sum() == 20000
     np.testing.assert_array_equal(sample_cloud(points[first.kept], 4000, first.counts).counts, first.counts)
-
-
-def test_how_far_a_cloud_reaches_is_the_same_in_blocks():
-    points = y_junction(250000).points
-    whole, parts = Extent(), Extent()
-    whole.add(points)
-    for block in in_blocks(points, 12345)():
-        parts.add(block)
-    for one, other in zip(whole.grid(), parts.grid(), strict=True):
-        np.testing.assert_array_equal(one, other)
 
 
 def test_memory_does_not_grow_with_the_cloud():

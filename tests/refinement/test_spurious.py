@@ -40,7 +40,7 @@ def drop(skeleton, root=None):
     [(0, 1.5, False), (0, 2.4, False), (0, 3.2, True), (0, 20, True), (1, 1.2, False), (1, 1.4, True)],
 )
 def test_a_twig_must_leave_the_scatter_of_its_limb(confidence, length, stays):
-    """Of 2000 points one is expected beyond 2.76 times the root mean square distance; of a surface its radius counts."""
+    """Of 2000 points one is expected beyond 2.76 times the root mean square; beside a surface its radius counts."""
     left = drop(limb((20, length * SCATTER), confidence=confidence))
     assert len(left.leaves) == (3 if stays else 2)
     assert len(left.vertices) == (43 if stays else 41)
