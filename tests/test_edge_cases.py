@@ -27,7 +27,6 @@ SOUND = {
     "corners of a cube": CORNERS,
     "every point twice": np.repeat(TORUS, 2, axis=0),
     "one point 1000 times": np.concatenate([TORUS, np.repeat(TORUS[:1], 1000, axis=0)]),
-
     "nearly doubled": np.concatenate([TORUS, TORUS + 1e-9 * RNG.normal(size=TORUS.shape)]),
     "doubled but for rounding": np.concatenate([TORUS, TORUS * (1 + 1e-15)]),
     "collinear": np.outer(np.linspace(0, 1, 100), [1, 2, 3]),
@@ -35,7 +34,6 @@ SOUND = {
     "two crossing lines": np.concatenate([np.outer(np.arange(-20, 21), axis) for axis in np.eye(3)[:2]]),
     "circle": np.stack([np.cos(a := np.arange(60) / 60 * 2 * np.pi), np.sin(a), 0 * a], axis=1),
     "square grid": GRID,
-
     "coplanar": Y * [1, 0, 1],
     "full cubic grid": np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3),
     "full ball": RNG.normal(size=(300, 3)),
@@ -54,11 +52,9 @@ SOUND = {
     "whole numbers": (Y * 1000).astype(int),
     "bytes": (Y * 100 + 100).astype(np.uint8),
     "list": Y.tolist(),
-
     "read-only": READ_ONLY,
     "Fortran order": np.asfortranarray(Y),
     "not contiguous": np.repeat(Y, 2, axis=0)[::2, ::-1],
-
     "minus zero": np.concatenate([Y, [[0.0, 0, 0], [-0.0, 0, -0.0]]]),
     "sphere": samples.sphere(n=300).points,
     "sheet": samples.sheet(n=300).points,

@@ -127,38 +127,27 @@ def test_random_graphs_against_networkx(m, edges):
 
 
 def test_arrays_are_of_the_promised_kind():
-    skeleton = Skeleton([[0, 0, 0], [1, 0, 0]], [], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
+    skeleton = Skeleton([[0, 0, 0], [3, 4, 0]], [(0, 1)], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
     assert skeleton.vertices.dtype == skeleton.radii.dtype == skeleton.points.dtype == np.float64
     assert skeleton.edges.dtype == skeleton.vertex_of_point.dtype == np.int64
-    assert skeleton.edges.shape == (0, 2)
-    assert skeleton.degree.tolist() == [0, 0]
+    assert (skeleton.length, skeleton.edge_lengths.tolist()) == (5, [5])
     with pytest.raises(dataclasses.FrozenInstanceError):
         skeleton.edges = None
+    nothing = Skeleton([], [], [], [], [], [])
+    assert nothing.edges.shape == (0, 2)
+    assert (nothing.n_components, nothing.n_loops, nothing.length, nothing.branches) == (0, 0, 0, ())
 
 
-def test_confidence_is_unknown_until_it_is_measured():
+def test_confidence_and_half_axes_are_those_that_were_measured():
+    """Else no number, and the radius; moved vertices are the same ones, other vertices are not."""
     plain = Skeleton([[0, 0, 0], [1, 0, 0]], [(0, 1)], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
-    assert plain.confidence.shape == (2,)
-    assert np.isnan(plain.confidence).all()
-    assert np.isnan(plain.to_networkx().nodes[1]["confidence"])
-    measured = dataclasses.replace(plain, confidence=[1, 0.5])
-    assert measured.confidence.dtype == np.float64
-    assert measured.confidence.tolist() == [1, 0.5]
-    # moved vertices are the same ones; other vertices are not
-    assert dataclasses.replace(measured, vertices=measured.vertices + 1).confidence.tolist() == [1, 0.5]
-    one = dataclasses.replace(measured, vertices=[[0, 0, 0]], edges=[], radii=[1])
-    assert np.isnan(one.confidence).tolist() == [True]
-
-
-def test_half_axes_are_the_radii_until_they_are_measured():
-    plain = Skeleton([[0, 0, 0], [1, 0, 0]], [(0, 1)], [1, 2], (), (), ())
+    assert np.isnan(plain.confidence).tolist() == [True, True]
     assert plain.half_width.tolist() == plain.half_thickness.tolist() == [1, 2]
-    measured = dataclasses.replace(plain, half_width=[2, 4], half_thickness=[1, 1])
-    assert measured.half_width.dtype == np.float64
+    measured = dataclasses.replace(plain, confidence=[1, 0.5], half_width=[2, 4], half_thickness=[1, 1])
     moved = dataclasses.replace(measured, vertices=measured.vertices + 1)
+    assert moved.confidence.tolist() == [1, 0.5]
     assert (moved.half_width.tolist(), moved.half_thickness.tolist()) == ([2, 4], [1, 1])
-    for one in (
-        dataclasses.replace(measured, vertices=[[0, 0, 0]], edges=[], radii=[3]),  # other vertices are not the same
-        Skeleton([[0, 0, 0]], [], [3], (), (), (), half_width=None, half_thickness=None),
-    ):
-        assert one.half_width.tolist() == one.half_thickness.tolist() == [3]
+    assert moved.confidence.dtype == moved.half_width.dtype == np.float64
+    one = dataclasses.replace(measured, vertices=[[0, 0, 0]], edges=[], radii=[3])
+    assert np.isnan(one.confidence).tolist() == [True]
+    assert one.half_width.tolist() == one.half_thickness.tolist() == [3]

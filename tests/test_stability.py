@@ -14,7 +14,8 @@ def test_points_that_move_by_next_to_nothing_have_the_same_topology(name):
     points = getattr(samples, name)(2000).points
     size = 1e-7 * np.linalg.norm(np.ptp(points, axis=0))
     still, moved = (
-        glsk.skeletonize(points + size * seed * np.random.default_rng(seed).normal(size=points.shape)) for seed in (0, 1)
+        glsk.skeletonize(points + size * seed * np.random.default_rng(seed).normal(size=points.shape))
+        for seed in (0, 1)
     )
     assert (moved.n_components, moved.n_loops) == (still.n_components, still.n_loops)
     assert len(moved.leaves) == len(still.leaves)

@@ -82,27 +82,27 @@ def test_points_of_a_noisy_line_come_nearer_to_it_but_do_not_clump():
     assert after < 1.2 * before
 
 
-@pytest.mark.parametrize("noise", [0, 0.01])
-def test_clean_cylinder_does_not_move(noise):
-    points = cylinder(noise)
+def test_clean_cylinder_does_not_move():
+    points = cylinder(0.01)
     assert subspace_mean_shift(points, noise_of(points), 4) is points
 
 
-def test_one_pass_by_its_definition():
-    """The mean of the neighbours in a Gaussian as wide as they are, but for the way along their main direction."""
+@pytest.mark.parametrize("share", [1, 0.25])
+def test_one_pass_by_its_definition(share):
+    """A share of the way to the mean of the neighbours in a Gaussian, but for that along their main direction."""
     points = thread(n=60)
-    moved = subspace_mean_shift(points, np.ones(60), 1)
+    moved = subspace_mean_shift(points, np.full(60, share), 1)
     for x, after in zip(points, moved, strict=True):
         distance = np.linalg.norm(points - x, axis=1)
         near = points[np.argsort(distance)[:RIDGE_NEIGHBOURS]]
         squared = np.sort(distance)[:RIDGE_NEIGHBOURS] ** 2
         weight = np.exp(-squared / (2 * squared.mean()))
-        mean = np.average(near, axis=0, weights=weight)
+        way = np.average(near, axis=0, weights=weight) - x
         along = np.linalg.eigh(np.cov(near, rowvar=False, aweights=weight))[1][:, 2]
-        np.testing.assert_allclose(after, mean - along * (along @ (mean - x)), atol=1e-10)
+        np.testing.assert_allclose(after, x + share * (way - along * (along @ way)), atol=1e-10)
 
 
-@pytest.mark.parametrize(("turn", "scale", "shift"), [(TURN, 1, 0), (-np.eye(3), 1, [5, 6, 7]), (TURN, 1e-9, 0)])
+@pytest.mark.parametrize(("turn", "scale", "shift"), [(TURN, 1, [5, 6, 7]), (TURN, 1e-9, 0)])
 def test_goes_with_the_cloud(turn, scale, shift):
     points = cylinder(0.2)
     noise = noise_of(points)
@@ -110,20 +110,3 @@ def test_goes_with_the_cloud(turn, scale, shift):
     np.testing.assert_allclose(noise_of(there), noise, atol=1e-9)
     moved = (subspace_mean_shift(there, noise, 3) - shift) / scale
     np.testing.assert_allclose(moved, subspace_mean_shift(points, noise, 3) @ turn, atol=1e-8)
-
-
-def test_a_point_that_stands_for_several():
-    """The mean shift goes where the weight is."""
-    rng = np.random.default_rng(0)
-    points = rng.normal(size=(31, 3)) * [3, 1, 1]
-    times = rng.integers(1, 4, 31)
-    ones = np.ones(31)
-    weighted = subspace_mean_shift(points, ones, 1, times.astype(float))
-    assert np.abs(weighted - subspace_mean_shift(points, ones, 1)).max() > 0.01
-    np.testing.assert_allclose(
-        subspace_mean_shift(points, ones, 3, 5 * ones), subspace_mean_shift(points, ones, 3), atol=1e-12
-    )
-    heavy = np.where(np.arange(31) == 4, 1e9, 1.0)
-    towards = subspace_mean_shift(points, ones, 1, heavy)
-    before, after = (np.linalg.norm(cloud - points[4], axis=1)[np.arange(31) != 4] for cloud in (points, towards))
-    assert (after < before).all()

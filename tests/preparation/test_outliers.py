@@ -14,9 +14,9 @@ K, N = 16, 12000
 SURFACE = samples.torus(N, ring_radius=0.4, radius=0.1).points
 
 
-def left(points, weight=None, factor=2.5, least=8):
+def left(points, weight=None):
     weight = np.ones(len(points)) if weight is None else weight
-    return inliers(points, weight, *nearest_neighbours(points, K), factor, least)[0]
+    return inliers(points, weight, *nearest_neighbours(points, K), 2.5, 8)[0]
 
 
 def floating(n, seed=0, reach=0.6):
@@ -25,14 +25,14 @@ def floating(n, seed=0, reach=0.6):
     return points[cKDTree(SURFACE).query(points)[0] > 0.05][:n]
 
 
-@pytest.mark.parametrize("n", [1, 10, 200, 600])
+@pytest.mark.parametrize("n", [1, 200])
 def test_points_that_float_around_a_surface(n):
     """A few stand out alone; many have each other for neighbours."""
     points = np.concatenate([SURFACE, floating(n)])
     np.testing.assert_array_equal(left(points), np.arange(N))
 
 
-@pytest.mark.parametrize("n", [5, 15, 30, 300])
+@pytest.mark.parametrize("n", [5, 300])
 def test_islands_far_away(n):
     """Whether their neighbourhoods reach back to the surface, or hold nothing but themselves."""
     island = [3, 0, 0] + np.random.default_rng(1).uniform(-0.3, 0.3, (n, 3))
@@ -46,21 +46,11 @@ def test_sparse_surfaces_stay(n, shift):
     assert len(left(np.concatenate([SURFACE, part]))) == N + n
 
 
-@pytest.mark.parametrize("scale", [0.2, 1, 4])
+@pytest.mark.parametrize("scale", [0.2, 4])
 def test_another_noisy_object_stays(scale):
     """However much coarser it is: a tenth of the points are no outliers."""
     other = scale * samples.torus(3000, noise=0.02, seed=1).points + [4, 0, 0]
     assert len(left(np.concatenate([SURFACE, other]))) > N + 2900
-
-
-def test_what_floats_around_a_part_with_a_tenth_of_the_points():
-    """The other part is so coarse that nothing is far from its neighbours by the measure of most points."""
-    part, other = samples.torus(2000).points, 20 * samples.torus(20000, seed=1).points + [80, 0, 0]
-    points = np.concatenate([part, other, floating(300)])
-    found = np.ones(len(points), bool)
-    found[left(points)] = False
-    assert not found[:22000].any()
-    assert found[22000:].mean() > 0.85
 
 
 def test_where_each_point_stands_for_many():
@@ -83,9 +73,3 @@ def test_it_does_not_matter_how_the_cloud_lies():
     np.testing.assert_array_equal(left(turned), kept)
     order = rng.permutation(len(points))
     np.testing.assert_array_equal(np.sort(order[left(points[order])]), kept)
-
-
-@pytest.mark.parametrize("least", [N + 190, N + 250])
-def test_so_many_stay_at_least(least):
-    points = np.concatenate([SURFACE, floating(200)])
-    assert len(left(points, least=least)) == len(points)
