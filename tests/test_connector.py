@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from glsk_o3d import Connector, Contractor, LPRReducer, RingBuilder, Skeleton, pipelines, samples
-from glsk_o3d.connector import UNSUPPORTED_NOISE, contraction_distance, drop_unsupported
+from glsk_o3d.connector import UNSUPPORTED_NOISE, drop_unsupported
 
 VARIANTS = {name: make().stages[2] for name, make in pipelines.PIPELINES.items()}
 ONE_RADIUS = VARIANTS["cao2010"]
@@ -75,27 +75,6 @@ def test_balls_of_one_radius_cover_and_keep_apart():
             assert cdist(own, own).max() <= 2 * radius
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[0] > 3 * sizes[-1]
-
-
-def test_components_stay_apart():
-    one = samples.torus(n=400).points
-    skeleton = Connector()(contracted(np.concatenate([one, one + [5, 0, 0]])))
-    side = skeleton.vertices[:, 0] > 2.5
-    assert side.any()
-    assert not side.all()
-    assert (side[skeleton.edges[:, 0]] == side[skeleton.edges[:, 1]]).all()
-    np.testing.assert_array_equal(side[skeleton.vertex_of_point], np.repeat([False, True], 400))
-
-
-# ---- local thickness
-
-
-def test_contraction_distance_of_a_tube_is_its_radius():
-    state = Contractor()(RingBuilder()(samples.tube(n=2000, radius=0.1).points))
-    middle = np.abs(state.contracted[:, 0]) < 0.4
-    off = np.abs(contraction_distance(state)[middle] * state.frame.scale - 0.1) / 0.1
-    assert np.median(off) < 0.04
-    assert np.quantile(off, 0.98) < 0.1
 
 
 # ---- vertices that few points support

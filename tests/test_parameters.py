@@ -120,4 +120,6 @@ def test_frozen_hashable_and_documented(cls):
             setattr(one, field.name, 1)
         assert f"\n{field.name} : " in cls.__doc__
         assert field.metadata["doc"] in cls.__doc__
+        assert field.metadata["doc"].endswith(".")
+        assert (field.metadata["unit"] or "-") != "-" or not field.metadata["type"].startswith("length")
         assert repr(field.default) in cls.__doc__

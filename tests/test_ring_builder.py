@@ -13,12 +13,10 @@ from glsk_o3d import (
     InvalidCloudError,
     InvalidParameterError,
     LPRReducer,
-    Pipeline,
     Refiner,
     RingBuilder,
     samples,
 )
-from glsk_o3d.analysis import compare
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.pipelines import default
 from glsk_o3d.ring_builder import default_k, default_size, published_k
@@ -40,6 +38,11 @@ def named_rings(state):
     return rings
 
 
+def in_order(state):
+    """The working cloud in the user's order and units."""
+    return state.frame.out_of(state.cloud)[state.representative_of_point]
+
+
 NUMBERS = {
     published_k: [(8, 8), (708, 8), (709, 9), (1024, 12), (1987, 24), (2458, 29), (2459, 30), (10**6, 30)],
     default_k: [(8, 8), (614, 8), (615, 9), (2048, 13), (3723, 15), (3724, 16), (4096, 16), (10**8, 16)],
@@ -53,18 +56,18 @@ def test_numbers_by_the_number_of_points(rule):
 
 
 @pytest.mark.parametrize(("word", "number"), [("auto", default_k), ("published", published_k)])
-@pytest.mark.parametrize("n", [20, 900, 2000])
+@pytest.mark.parametrize("n", [20, 900])
 def test_words_for_numbers_of_neighbours(word, number, n):
     points = samples.torus(n=n).points
     assert named_rings(RingBuilder(k=word, around=0)(points)) == named_rings(RingBuilder(k=number(n), around=0)(points))
 
 
-@pytest.mark.parametrize("k", ["published", "auto", 5, 20])
+@pytest.mark.parametrize("k", ["auto", 5, 20])
 @pytest.mark.parametrize("points", [TORUS, SHEET], ids=["torus", "sheet"])
 def test_rings_are_delaunay_stars_in_the_principal_plane(points, k):
     state = RingBuilder(k=k)(points)
     cloud = state.cloud
-    _, neighbours = nearest_neighbours(cloud, {"published": 8, "auto": 8}.get(k, k))
+    _, neighbours = nearest_neighbours(cloud, 8 if k == "auto" else k)
     for i, patch in enumerate(neighbours):
         assert patch[0] == i
         plane = np.linalg.svd(cloud[patch] - cloud[patch].mean(axis=0))[2][:2]
@@ -99,34 +102,16 @@ def test_state_says_what_it_is():
     assert list(state.report.seconds) == ["RingBuilder"]
 
 
-def test_normals_of_a_torus():
-    sample = samples.torus(n=3000)
-    state = RingBuilder(thin_to="all")(sample.points)
-    p = sample.points[state.point_of_survivor]
-    centre = p * [1, 1, 0]
-    centre *= 0.4 / np.linalg.norm(centre, axis=1, keepdims=True)
-    exact = (p - centre) / 0.1
-    angle = np.rad2deg(np.arccos(np.minimum(np.abs(np.einsum("ij,ij->i", state.normals, exact)), 1)))
-    assert np.median(angle) < 3
-    np.testing.assert_allclose(np.linalg.norm(state.normals, axis=1), 1, atol=1e-14)
-
-
 def test_order_place_size_and_rotation_do_not_matter():
     """Coordinates are rounded so that offset and factor are exact: then all rings are the same."""
-    points = np.round(TORUS * 2**20) / 2**20
+    points, rng = np.round(TORUS * 2**20) / 2**20, np.random.default_rng(0)
     rings = named_rings(RingBuilder()(points))
-    for moved in (points + 2**20, points * 2.0**-9, points * 2.0**40, points * [1, -1, 1], points[:, [2, 0, 1]]):
+    turn, order = np.linalg.qr(rng.normal(size=(3, 3)))[0], rng.permutation(len(points))
+    for moved in (points + 2**20, points * 2.0**40, points * [1, -1, 1], points[:, [2, 0, 1]], points @ turn):
         assert named_rings(RingBuilder()(moved)) == rings
-    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    assert named_rings(RingBuilder()(points @ turn)) == rings
-    order = np.random.default_rng(1).permutation(len(points))
-    renamed = {
-        order[i]: ([order[j] for j in row], closed)
-        for i, (row, closed) in named_rings(RingBuilder()(points[order])).items()
-    }
-    assert {i: (set(row), closed) for i, (row, closed) in renamed.items()} == {
-        i: (set(row), closed) for i, (row, closed) in rings.items()
-    }
+    for i, (row, closed) in named_rings(RingBuilder()(points[order])).items():
+        expected, is_closed = rings[order[i]]
+        assert ({*order[row].tolist()}, closed) == ({*expected}, is_closed)
 
 
 def test_duplicates_are_one_point():
@@ -197,11 +182,6 @@ def test_what_is_left_is_the_cloud_without_them(outliers):
 # ---- noise
 
 
-def in_order(state):
-    """The working cloud in the user's order and units."""
-    return state.frame.out_of(state.cloud)[state.representative_of_point]
-
-
 @pytest.mark.parametrize(("noise", "alone"), [(0.04, False), (0.06, True)])
 def test_denoising_moves_noisy_points_to_their_ridge_before_the_rings(noise, alone):
     """Points that stand alone there are outliers too."""
@@ -261,27 +241,11 @@ def test_clouds_are_not_averaged_where_points_shall_stay(settings):
     assert len(state.cloud) == state.report.n_distinct
 
 
-@pytest.mark.parametrize("frame", ["box", "spread"])
-def test_frame_is_that_of_the_distinct_points(frame):
-    """However often some of them came."""
-    filter = RingBuilder(frame=frame)
-    often = np.concatenate([TORUS, np.repeat(TORUS[:3], 500, axis=0)])
-    once, state = filter(TORUS).frame, filter(often).frame
-    assert state.scale == pytest.approx(once.scale, rel=1e-12)
-    assert state.diagonal == pytest.approx(once.diagonal, rel=1e-12)
-
-
 # ------------------------------------------------------------------------------------------ Open3D's search parameters
 
 
-@pytest.fixture(scope="module")
-def search():
-    import open3d
-
-    return open3d.geometry
-
-
-def test_open3d_search_parameters_are_plain_numbers_inside(search):
+def test_open3d_search_parameters_are_plain_numbers_inside():
+    search = pytest.importorskip("open3d").geometry
     cases = [
         (RingBuilder(k=search.KDTreeSearchParamKNN(12)), RingBuilder(k=12)),
         (RingBuilder(k=search.KDTreeSearchParamHybrid(0.5, 20)), RingBuilder(k=20, radius=0.5)),
@@ -292,11 +256,6 @@ def test_open3d_search_parameters_are_plain_numbers_inside(search):
         assert given == plain
         assert hash(given) == hash(plain)
         assert eval(repr(given)) == plain
-    same = RingBuilder(k=search.KDTreeSearchParamKNN(12))(TORUS)
-    np.testing.assert_array_equal(same.rings.indices, RingBuilder(k=12)(TORUS).rings.indices)
-
-
-def test_open3d_search_parameters_that_do_not_fit(search):
     for k, name in (
         (search.KDTreeSearchParamKNN(2), "k = 2"),
         (search.KDTreeSearchParamHybrid(-0.5, 20), "radius = -0.5"),
@@ -324,10 +283,7 @@ def test_radius_limits_the_rings():
     percent = RingBuilder(k=16, radius="5%")(TORUS)
     absolute = RingBuilder(k=16, radius=0.05 * near.frame.diagonal * scale)(TORUS)
     np.testing.assert_array_equal(percent.rings.indices, absolute.rings.indices)
-
-
-def test_a_radius_in_the_wrong_units_is_refused():
-    with pytest.raises(InvalidParameterError, match="radius"):
+    with pytest.raises(InvalidParameterError, match="radius"):  # in the wrong units
         RingBuilder(radius=1e-6)(TORUS)
 
 
@@ -408,33 +364,14 @@ def test_a_large_cloud_is_sampled_and_every_point_has_its_place():
     assert 800 < state.report.n_sampled < 3 * 1600
     assert state.report.n_contracted <= 800
     assert state.sampled.sum() == state.report.n_distinct
-    assert state.representative_of_point[17] == -1
-    assert state.outlier[4000]
+    assert (state.representative_of_point[17], state.outlier[4000]) == (-1, True)
     assert not state.sampled[[17, 4000]].any()
-    np.testing.assert_allclose(
-        state.frame.out_of(state.cloud[state.representative_of_point[state.sampled]]), points[state.sampled], atol=1e-12
-    )
-    others = np.flatnonzero(np.isfinite(points).all(axis=1) & ~state.outlier)
-    away = np.linalg.norm(
-        state.frame.out_of(state.cloud[state.representative_of_point[others]]) - points[others], axis=1
-    )
-    assert away.max() < 0.1
+    away = np.linalg.norm(in_order(state) - points, axis=1)
+    assert away[state.sampled].max() < 1e-12
+    assert np.delete(away, [17, *np.flatnonzero(state.outlier)]).max() < 0.1
     skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
     assert skeleton.n_loops == 1
     assert (skeleton.vertex_of_point >= 0).sum() == 7999
     assert len(skeleton.supporting_points) == state.sampled.sum()
     # who says where the surface is has a normal, nobody else
     np.testing.assert_array_equal(np.isfinite(skeleton.normals[:, 0]), state.sampled)
-
-
-def test_a_sampled_cloud_has_the_skeleton_of_the_whole():
-    sample = samples.y_junction(60000)
-    whole = default()(sample.points)
-    sampled = Pipeline(RingBuilder(thin_to=4096), *default().stages[1:])(sample.points)
-    assert sampled.report.n_sampled < 12000 < whole.report.n_sampled
-    assert len(sampled.leaves) == len(whole.leaves) == 3
-    for skeleton in (whole, sampled):
-        found = compare(skeleton, sample)
-        assert found.topology
-        assert found.error < 0.1
-        assert found.inside == 1

@@ -120,51 +120,7 @@ def test_against_triangulations(kind):
         assert not is_closed or row[0] == np.argmin((offsets**2).sum(axis=1))
 
 
-def test_masked_neighbours_do_not_exist():
-    cloud = neighbourhoods("plain", k=20)
-    valid = np.random.default_rng(2).random(cloud.shape[:2]) < 0.5
-    ring, closed = delaunay_star(np.where(valid[..., None], cloud, 1e-9), valid)
-    for offsets, use, row, is_closed in zip(cloud, valid, ring.tolist(), closed.tolist(), strict=True):
-        kept = np.flatnonzero(use)
-        expected, expected_closed = star(offsets[kept])
-        assert [j for j in row if j >= 0] == kept[expected].tolist()
-        assert is_closed == expected_closed
-
-
 # ---- degenerate neighbourhoods, by hand
-
-GRID = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
-
-
-@pytest.mark.parametrize(
-    ("offsets", "ring", "closed"),
-    [
-        pytest.param(np.empty((0, 2)), [], False, id="no neighbour"),
-        pytest.param([(0, 0)], [], False, id="only one that coincides"),
-        pytest.param([(0, 0), (2, 1), (0, 0)], [(2, 1)], False, id="one neighbour"),
-        pytest.param([(1, 0), (0, 1)], [(1, 0), (0, 1)], False, id="two neighbours"),
-        pytest.param([(2, 0), (1, 0), (3, 0)], [(1, 0)], False, id="collinear, all on one side"),
-        pytest.param([(1, 0), (-2, 0)], [(-2, 0), (1, 0)], False, id="collinear, on both sides"),
-        pytest.param([(3, 3), (-2, -2), (1, 1), (-4, -4)], [(-2, -2), (1, 1)], False, id="collinear, tilted"),
-        pytest.param([(1, 0), (0, 1), (-1, 0)], [(1, 0), (0, 1), (-1, 0)], False, id="centre on an edge of the hull"),
-        pytest.param([(0, 1), (0, 1), (1, -1), (-1, -1), (1, -1)], [(0, 1), (-1, -1), (1, -1)], True, id="duplicates"),
-        pytest.param(GRID, [(1, 0), (0, 1), (-1, 0), (0, -1)], True, id="square grid"),
-        pytest.param([p for p in GRID if p[1] >= 0], [(1, 0), (0, 1), (-1, 0)], False, id="edge of a square grid"),
-        pytest.param([p for p in GRID if min(p) >= 0], [(1, 0), (0, 1)], False, id="corner of a square grid"),
-        pytest.param([(2, 0), (2, 2), (0, 2)], [(2, 0), (0, 2)], False, id="all on a circle through the centre"),
-    ],
-)
-def test_degenerate(offsets, ring, closed):
-    offsets = np.reshape(np.asarray(offsets, float), (-1, 2))
-    found, is_closed = star(offsets)
-    found = [tuple(offsets[j]) for j in found]
-    assert is_closed == closed
-    if closed:
-        assert turned(found) == turned([tuple(map(float, p)) for p in ring])
-    else:  # a line has no first side
-        assert found == ring or (
-            len(ring) == 2 and found == ring[::-1] and np.cross(*(np.r_[p, 0] for p in ring))[2] == 0
-        )
 
 
 # ---- degenerate neighbourhoods, by the thousand: small integers are often collinear, cocircular, doubled

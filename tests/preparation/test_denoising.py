@@ -71,17 +71,6 @@ def test_points_of_a_noisy_cylinder_come_nearer_to_it():
     assert np.mean(radius) == pytest.approx(1, abs=0.05)
 
 
-def test_points_of_a_noisy_line_come_nearer_to_it_but_do_not_clump():
-    points = thread()
-    moved = subspace_mean_shift(points, np.ones(400), 4)
-    inner = np.abs(points[:, 0]) < 4
-    assert np.hypot(*moved[inner, 1:].T).mean() < np.hypot(*points[inner, 1:].T).mean() / 2
-    assert np.abs(moved - points)[inner, 0].mean() < 0.05
-    # as evenly along the line as before
-    before, after = (np.diff(np.sort(part[inner, 0])).std() for part in (points, moved))
-    assert after < 1.2 * before
-
-
 def test_clean_cylinder_does_not_move():
     points = cylinder(0.01)
     assert subspace_mean_shift(points, noise_of(points), 4) is points
