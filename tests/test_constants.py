@@ -69,21 +69,3 @@ def test_every_number_says_where_it_comes_from(path):
         if is_number(statement.value) and not ORIGIN.search(said(text.splitlines(), statement))
     ]
     assert silent == []
-
-
-@pytest.mark.parametrize(
-    ("source", "found"),
-    [
-        ("A = 1  # fitted", True),
-        ("# derived: why\nA = 1", True),
-        ("# All fitted.\nB = 2\nA = 1", True),
-        ("# All fitted.\n\nA = 1", False),
-        ("B = 2  # fitted\nA = 1", False),
-        ("# All fitted.\nB = 2\n# of something\nA = 1", True),
-        ("B = 2\n# measured\nC = 3\nA = 1", False),
-        ("A = 1  # unfitted", False),
-    ],
-)
-def test_which_comments_count(source, found):
-    (statement,) = (statement for name, statement in constants(ast.parse(source)) if name == "A")
-    assert bool(ORIGIN.search(said(source.splitlines(), statement))) is found

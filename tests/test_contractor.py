@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import Contractor, ExplainedScore, LPRReducer, RingBuilder, RingSizeRatio, pipelines, samples
+from glsk_o3d import Contractor, LPRReducer, RingBuilder, pipelines, samples
 from glsk_o3d import contractor as module
-from glsk_o3d.contractor import LINE_VARIANCE, explained_score, explained_variance
+from glsk_o3d.contractor import LINE_VARIANCE, explained_score
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
-from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
-from glsk_o3d.numerics.rings import Rings
 from glsk_o3d.numerics.solver import SolveError
 
 BUILDER = pipelines.cao2010().stages[0]
@@ -31,10 +29,9 @@ def never(_):
 # ---- one solve
 
 
-@pytest.mark.parametrize("share", [0.2, 1.0])
-def test_first_solve_is_the_least_squares_solution(built, share):
-    state = Contractor(max_iterations=1, initial_contraction=share)(built)
-    weight = share / built.mean_ring_edge
+def test_first_solve_is_the_least_squares_solution(built):
+    state = Contractor(max_iterations=1, initial_contraction=0.3)(built)
+    weight = 0.3 / built.mean_ring_edge
     laplacian = check_solve(built, state, weight, np.ones(len(built)), atol=1e-10)
     np.testing.assert_array_equal(state.previous, built.positions)
     np.testing.assert_allclose(state.laplacian_coordinates, laplacian @ built.positions, atol=1e-10)
@@ -51,6 +48,9 @@ def test_second_solve_weighs_by_the_rings_of_the_first(built):
     attraction = np.minimum(one.ring_size0 / one.ring_size, 1e4)
     check_solve(one, two, 3 * one.contraction_weight, attraction, atol=1e-8)
     assert two.ring_ratio_drop == pytest.approx(one.ring_ratio - two.ring_ratio)
+    capped = Contractor(stop=never, max_iterations=6, amplification=2.5, max_contraction=40.0)(built)
+    weights = [record.contraction_weight for record in capped.report.iterations]
+    np.testing.assert_allclose(weights, np.minimum(0.2 / built.mean_ring_edge * 2.5 ** np.arange(6), 40), rtol=1e-12)
 
 
 def check_solve(before, after, weight, attraction, atol):
@@ -62,58 +62,22 @@ def check_solve(before, after, weight, attraction, atol):
     return laplacian
 
 
-def test_mass_means_so_many_points_in_one_place(built):
-    """A doubled functional has the same minimum: all masses alike change nothing but the pull between the two terms."""
-    single = Contractor(max_iterations=1)(built)
-    masses = replace(built, mass=np.full(len(built), 4.0), mean_ring_edge=built.mean_ring_edge / 4)
-    np.testing.assert_allclose(Contractor(max_iterations=1)(masses).positions, single.positions, atol=1e-9)
-
-
-def test_weights_grow_up_to_their_cap(built):
-    filter = Contractor(stop=never, max_iterations=6, amplification=2.5, max_contraction=40.0)
-    weights = [record.contraction_weight for record in filter(built).report.iterations]
-    expected = np.minimum(0.2 / built.mean_ring_edge * 2.5 ** np.arange(6), 40)
-    np.testing.assert_allclose(weights, expected[: len(weights)], rtol=1e-12)
-    assert weights[-1] == 40
-
-
 def test_going_on_is_the_same_as_not_having_stopped(built):
     for reducer in (None, LPRReducer()):
         through = Contractor(reducer=reducer, stop=never, max_iterations=4)(built)
-        half = Contractor(reducer=reducer, stop=never, max_iterations=2)(built)
-        rest = Contractor(reducer=reducer, stop=never, max_iterations=2)(half)
-        np.testing.assert_array_equal(rest.positions, through.positions)
-        np.testing.assert_array_equal(rest.survivors, through.survivors)
-        drop = [replace(r, seconds=0) for r in rest.report.iterations]
-        assert drop == [replace(r, seconds=0) for r in through.report.iterations]
-        assert [record.iteration for record in drop] == [1, 2, 3, 4]
+        half = Contractor(reducer=reducer, stop=never, max_iterations=2)
+        same(half(half(built)), through)
+        assert [record.iteration for record in through.report.iterations] == [1, 2, 3, 4]
 
 
-def test_solution_does_not_depend_on_place_size_or_rotation():
-    points = np.round(samples.y_junction(n=500).points * 2**20) / 2**20
-    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-
-    def contracted(cloud, share=0.2, frame="spread"):
-        state = (RingBuilder(frame=frame) | Contractor(max_iterations=2, initial_contraction=share))(cloud)
-        return state.contracted[state.survivor_of_point]
-
-    expected = contracted(points)
-    # offset and factor are exact, but the frame's own rounding is not: digits of the result, not of the solve
-    np.testing.assert_allclose(contracted(points + 2**20) - 2**20, expected, atol=1e-9)
-    np.testing.assert_allclose(contracted(points * 1e-3) * 1e3, expected, atol=1e-11)
-    np.testing.assert_allclose(contracted(points * 1e3) / 1e3, expected, atol=1e-11)
-    order = np.random.default_rng(1).permutation(len(points))
-    np.testing.assert_allclose(contracted(points[order]), expected[order], atol=1e-11)
-    for exact in (np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]]), np.diag([1, -1, -1])):
-        np.testing.assert_allclose(contracted(points @ exact), expected @ exact, atol=1e-11)
-    np.testing.assert_allclose(contracted(points @ turn), expected @ turn, atol=1e-9)
-    # any other turn changes the bounding box, and with it the frame that w_L was stated in as published
-    expected = contracted(points, frame="box")
-    sides = [np.ptp(cloud, axis=0).max() for cloud in (points, points @ turn)]
-    assert abs(sides[1] / sides[0] - 1) > 0.01
-    same_weight = 0.2 * sides[0] / sides[1]
-    np.testing.assert_allclose(contracted(points @ turn, same_weight, "box"), expected @ turn, atol=1e-9)
-    assert 1e-4 < np.abs(contracted(points @ turn, frame="box") - expected @ turn).max() < 1e-2
+def test_solve_is_that_of_the_documented_system(built):
+    """(w_L^2 L^T M^-1 L + M W_H^2) P' = M W_H^2 P."""
+    mass = np.random.default_rng(0).integers(1, 9, len(built)).astype(float)
+    state = Contractor(max_iterations=1)(replace(built, mass=mass, ring_size=built.ring_size0 / 2))
+    laplacian = cotangent_laplacian(built.positions, built.rings).toarray()
+    attraction = np.diag(mass * 4.0)
+    lhs = state.contraction_weight**2 * laplacian.T @ np.diag(1 / mass) @ laplacian + attraction
+    np.testing.assert_allclose(state.positions, np.linalg.solve(lhs, attraction @ built.positions), atol=1e-7)
 
 
 # ---- closed forms
@@ -126,32 +90,7 @@ def distance_to_axis(points, sample):
     return cKDTree((a + share * (b - a)).reshape(-1, 3)).query(points)[0] / sample.radii.mean()
 
 
-@pytest.mark.parametrize(
-    ("shape", "filter", "mean"),
-    [
-        ("tube", CAO, 0.15),
-        ("tube", WEN, 0.15),
-        ("tube", DEFAULT, 0.15),
-        # a bent tube is pulled inwards: more so where merges spread the rings
-        ("torus", CAO, 0.25),
-        ("torus", DEFAULT, 0.4),
-        ("helix", CAO, 0.2),
-        ("helix", DEFAULT, 0.5),
-        ("y_junction", CAO, 0.2),
-        ("y_junction", DEFAULT, 0.25),
-    ],
-)
-def test_points_come_to_lie_on_the_axis(shape, filter, mean):
-    sample = samples.SAMPLES[shape](n=2048)
-    state = filter(RingBuilder()(sample.points))
-    distance = distance_to_axis(state.contracted, sample)
-    assert distance.mean() < mean
-    assert distance_to_axis(sample.points, sample).mean() > 0.9
-    # all along it: the ends draw back, but by little
-    far = cKDTree(state.contracted).query(sample.nodes)[0].max()
-    assert far < 2.5 * sample.radii.max()
-
-
+@pytest.mark.slow
 def test_conserving_mass_keeps_a_torus_open():
     """Without it the torus falls into its centre: the reason for the multiplicities."""
     sample = samples.torus(n=2048, seed=1)
@@ -218,43 +157,11 @@ def test_stop_rule_is_asked_after_every_solve_and_its_reason_kept(built):
     assert reducer.call_count == 2
 
 
-def test_running_out_of_iterations_is_no_convergence(built):
-    report = Contractor(stop=never, max_iterations=2)(built).report
-    assert report.stop_reason == "reached max_iterations = 2"
-    assert not report.converged
-
-
-def test_reducing_ends_after_a_pass_without_a_merge(built):
-    idle = Mock(side_effect=lambda state: state)
-    Contractor(reducer=idle, reduce_above=0, stop=never, max_iterations=4)(built)
-    assert idle.call_count == 1
-
-
-def test_no_reducer_keeps_every_point(built):
-    state = Contractor(stop=never, max_iterations=3)(built)
-    np.testing.assert_array_equal(state.survivors, np.arange(len(built)))
-    assert all(record.n_merged == 0 for record in state.report.iterations)
-
-
-@pytest.mark.parametrize("answer", [None, True, 0])
-def test_progress_is_told_once_per_solve(built, answer):
-    told = []
-
-    def listen(record):
-        told.append(record)
-        return answer
-
-    filter = Contractor(reducer=LPRReducer(), reduce_above=0, stop=ExplainedScore())
-    report = filter(built, on_iteration=listen).report
-    assert tuple(told) == report.iterations
-    assert [record.iteration for record in told] == list(range(1, len(told) + 1))
-    assert report.converged
-
-
-@pytest.mark.parametrize("after", [1, 2])
-def test_progress_can_stop_the_run(built, after):
-    state = Contractor(stop=never)(built, on_iteration=lambda record: record.iteration < after)
-    assert len(state.report.iterations) == after
+def test_progress_is_told_once_per_solve_and_can_stop_the_run(built):
+    told, after = [], 2
+    state = Contractor(stop=never)(built, on_iteration=lambda record: told.append(record) or len(told) < after)
+    assert tuple(told) == state.report.iterations
+    assert len(told) == after
     assert state.report.stop_reason == "stopped by the caller"
     assert not state.report.converged
     np.testing.assert_array_equal(state.positions, Contractor(stop=never, max_iterations=after)(built).positions)
@@ -274,25 +181,19 @@ GRID = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3)
 GRID += 0.1 * np.random.default_rng(0).normal(size=(216, 3))
 
 
-def test_solve_that_throws_points_out_is_dropped():
+def test_solve_that_throws_points_out_is_dropped_or_holds_them():
     """A full cube of points has no surface: as published, the second solve runs away."""
     built = BUILDER(GRID)
+    held = replace(CAO, retries=3)(built)
+    assert len(held.report.iterations) > 1
+    assert held.report.iterations[1].n_held > 0
+    assert (np.abs(held.positions) <= 1.2 * held.frame.half_extent).all()
     state = CAO(built)
     assert len(state.report.iterations) == 1
     assert state.report.stop_reason.startswith("solve 2 refused, last sound state kept: it would throw ")
     assert " of 216 points far out of the cloud" in state.report.stop_reason
     assert not state.report.converged
     same(state, replace(CAO, max_iterations=1)(built))
-    assert (np.abs(state.positions) <= 1.2 * state.frame.half_extent).all()
-
-
-def test_horse_ends_with_a_sound_state(shared_dir):
-    with np.load(shared_dir / "golden" / "horse_1987.npz") as file:
-        built = BUILDER(file["points"])
-    state = WEN(built)
-    done = len(state.report.iterations)
-    assert f"solve {done + 1} refused, last sound state kept" in state.report.stop_reason
-    same(state, replace(WEN, max_iterations=done)(built))
     assert (np.abs(state.positions) <= 1.2 * state.frame.half_extent).all()
 
 
@@ -314,48 +215,14 @@ def test_unsolvable_system_keeps_the_last_sound_state(built, monkeypatch, fails_
     assert not state.report.converged
 
 
-def test_points_thrown_far_out_never_get_through(built, monkeypatch):
-    solve, calls = module.solve_contraction, []
-
-    def throw(*system):
-        positions, error = solve(*system)
-        calls.append(1)
-        if len(calls) > 2:
-            positions = positions.copy()
-            positions[len(calls) % len(positions)] = 50
-        return positions, error
-
-    expected = Contractor(stop=never, max_iterations=2)(built)
-    monkeypatch.setattr(module, "solve_contraction", throw)
-    state = Contractor(stop=never)(built)
-    same(state, expected)
-    assert "solve 3 refused" in state.report.stop_reason
-    assert "far out of the cloud" in state.report.stop_reason
-
-
-@pytest.mark.parametrize("shape", ["sauropod", "two_rings", "sheet", "sphere"])
-@pytest.mark.parametrize("filter", [CAO, WEN, DEFAULT], ids=["cao2010", "wen2024", "default"])
-def test_no_point_is_far_out_of_the_cloud(shape, filter):
-    state = filter(RingBuilder()(samples.SAMPLES[shape](n=700, noise=0.01).points))
-    assert not state.frame.beyond(state.positions).any()
-    assert state.report.converged == (" < " in state.report.stop_reason and "refused" not in state.report.stop_reason)
-
-
-def test_ring_size_rule_in_a_run(built):
-    records = Contractor(stop=RingSizeRatio(0.1), max_iterations=20)(built).report.iterations
-    drops = -np.diff([1.0, *(record.ring_ratio for record in records)])
-    assert (drops[:-1] >= 0.1).all()
-    assert drops[-1] < 0.1
-
-
 # ---- weights, floors, and points held
 
 
 class Capture:
     """Stands in for the solve: keeps what it is given and throws points out unless they are held."""
 
-    def __init__(self, monkeypatch, thrown=(), cap=1e4):
-        self.calls, self.solve, self.thrown, self.cap = [], module.solve_contraction, list(thrown), cap
+    def __init__(self, monkeypatch, thrown=()):
+        self.calls, self.solve, self.thrown = [], module.solve_contraction, list(thrown)
         monkeypatch.setattr(module, "solve_contraction", self)
 
     def __call__(self, laplacian, row_weight, weight, points):
@@ -363,14 +230,14 @@ class Capture:
         positions, error = self.solve(laplacian, row_weight, weight, points)
         positions = positions.copy()
         for point in self.thrown:
-            if weight[point] < self.cap:
+            if weight[point] < 1e4:
                 positions[point, 1] = -40
                 break  # one at a time
         return positions, error
 
 
-@pytest.mark.parametrize("thrown", [[7], [7, 3], [7, 3, 250]])
-def test_thrown_points_are_held(built, monkeypatch, thrown):
+def test_thrown_points_are_held(built, monkeypatch):
+    thrown = [7, 3, 250]
     capture = Capture(monkeypatch, thrown)
     state = Contractor(max_iterations=1)(built)
     assert [record.n_held for record in state.report.iterations] == [len(thrown)]
@@ -383,14 +250,7 @@ def test_thrown_points_are_held(built, monkeypatch, thrown):
     np.testing.assert_allclose(state.positions[thrown], built.positions[thrown], atol=1e-4)
 
 
-def test_holding_is_for_one_solve(built, monkeypatch):
-    capture = Capture(monkeypatch, [7])
-    report = Contractor(max_iterations=2, stop=never)(built).report
-    assert [record.n_held for record in report.iterations] == [1, 1]
-    assert [bool(weight[7] == 1e4) for _, weight in capture.calls] == [False, True, False, True]
-
-
-@pytest.mark.parametrize(("thrown", "retries"), [([7], 0), ([7, 3, 250], 2), ([7, 3, 250, 9], 3)])
+@pytest.mark.parametrize(("thrown", "retries"), [([7], 0), ([7, 3, 250], 2)])
 def test_too_many_retries_refuse(built, monkeypatch, thrown, retries):
     capture = Capture(monkeypatch, thrown)
     state = Contractor(retries=retries)(built)
@@ -402,27 +262,7 @@ def test_too_many_retries_refuse(built, monkeypatch, thrown, retries):
     same(state, built)
 
 
-def test_points_that_run_even_if_held_refuse(built, monkeypatch):
-    capture = Capture(monkeypatch, [7], cap=np.inf)
-    assert "solve 1 refused" in Contractor()(built).report.stop_reason
-    assert len(capture.calls) == 4
-
-
-def test_no_point_thrown_no_point_held(built):
-    assert {record.n_held for record in Contractor()(built).report.iterations} == {0}
-
-
-def test_held_points_rescue_the_cube():
-    """What a real solve throws out is held, and the run goes on."""
-    built = BUILDER(GRID)
-    assert len(replace(CAO, retries=0)(built).report.iterations) == 1
-    state = replace(CAO, retries=3)(built)
-    assert len(state.report.iterations) > 1
-    assert state.report.iterations[1].n_held > 0
-    assert (np.abs(state.positions) <= 1.2 * state.frame.half_extent).all()
-
-
-@pytest.mark.parametrize("floor", [0, 0.5, 1, 3])
+@pytest.mark.parametrize("floor", [0, 3])
 def test_attraction_has_a_floor_and_a_cap(built, monkeypatch, floor):
     size = built.ring_size0.copy()
     size[:4] *= [4, 0.25, 1e-9, 0]
@@ -432,7 +272,7 @@ def test_attraction_has_a_floor_and_a_cap(built, monkeypatch, floor):
     np.testing.assert_allclose(weight[:5], np.maximum([0.25, 4, 500, 500, 1], floor))
 
 
-@pytest.mark.parametrize("above", [0, 150, 250, 400, 1000])
+@pytest.mark.parametrize("above", [0, 250, 400])
 def test_reducer_rests_when_few_are_left(built, above):
     filter = Contractor(reducer=LPRReducer(), reduce_above=above, stop=never, max_iterations=5)
     for record in filter(built).report.iterations:
@@ -442,67 +282,8 @@ def test_reducer_rests_when_few_are_left(built, above):
 # ---- what is a line already
 
 
-def rings_of(neighbours):
-    return Rings.from_padded(np.asarray(neighbours), np.ones(len(neighbours), bool))
-
-
-@pytest.mark.parametrize(
-    ("rim", "expected"),
-    [
-        (np.outer(np.arange(-6, 7), [1, 2, 3]), 1),
-        (np.stack([np.cos(a := np.arange(12) * np.pi / 6), np.sin(a), 0 * a], 1), 1 / 2),
-        (np.stack([3 * np.cos(a), np.sin(a), 0 * a], 1), 9 / 10),
-        (np.concatenate([np.eye(3), -np.eye(3)]), 1 / 3),
-        (np.zeros((9, 3)), 0),
-    ],
-    ids=["line", "circle", "ellipse", "ball", "point"],
-)
-@pytest.mark.parametrize("scale", [1e-6, 1, 1e6])
-def test_explained_variance_of_one_neighbourhood(rim, expected, scale):
-    """A hub in the middle of its ring, whose points know only the hub: its spread is a multiple of theirs."""
-    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    hub = np.zeros((1, 3))
-    neighbours = np.full((len(rim) + 1, len(rim)), -1)
-    neighbours[0], neighbours[1:, 0] = np.arange(1, len(rim) + 1), 0
-    # the closed form is good to the root of rounding where two spreads are equal
-    found = explained_variance(scale * np.concatenate([hub, rim]) @ turn, rings_of(neighbours))
-    np.testing.assert_allclose(found[0], expected, rtol=3e-8)
-
-
-def test_roundings_are_no_line():
-    points = np.array([3.0, 1, 2]) + 1e-9 * np.random.default_rng(0).normal(size=(300, 3))
-    share = explained_variance(points, rings_of(nearest_neighbours(points, 9)[1][:, 1:]))
-    assert (share < LINE_VARIANCE).all()
-
-
-def test_explained_variance_is_that_of_the_place():
-    """A long line and a disc in one cloud."""
-    line = np.outer(np.arange(200.0), [0, 0, 1])
-    disc = np.stack(np.meshgrid(np.arange(15.0), np.arange(15.0), [-50.0]), -1).reshape(-1, 3)
-    points = np.concatenate([line, disc])
-    found = explained_variance(points, rings_of(nearest_neighbours(points, 9)[1][:, 1:]))
-    np.testing.assert_allclose(found[:200], 1, atol=1e-9)
-    inside = ((disc[:, :2] > 3) & (disc[:, :2] < 11)).all(axis=1)
-    assert ((found[200:][inside] > 0.49) & (found[200:][inside] < 0.6)).all()
-    assert (found[200:] < 0.9).all()  # nor is its rim a line
-
-
-def test_no_line_hold_is_as_before(built, monkeypatch):
-    """No neighbourhood is asked, and W_H is the ratio of the ring sizes alone."""
-    plain = Contractor(stop=never, max_iterations=4, line_hold=1)
-    monkeypatch.setattr(module, "explained_variance", Mock(side_effect=AssertionError))
-    capture = Capture(monkeypatch)
-    state = built
-    for done in range(4):
-        before, state = state, replace(plain, max_iterations=1)(state)
-        expected = np.clip(before.ring_size0 / before.ring_size, 1, 1e4)
-        np.testing.assert_array_equal(capture.calls[done][1], expected)
-    np.testing.assert_array_equal(plain(built).positions, state.positions)
-
-
-@pytest.mark.parametrize(("floor", "cap"), [(0, 1e4), (1, 1e4), (3, 50)])
-@pytest.mark.parametrize("hold", [1.5, 30])
-def test_lines_are_held_from_the_second_solve_on(built, monkeypatch, hold, floor, cap):
+def test_lines_are_held_from_the_second_solve_on(built, monkeypatch):
+    hold, floor, cap = 30, 3, 50
     filter = Contractor(stop=never, max_iterations=1, line_hold=hold, min_attraction=floor, max_attraction=cap)
     share = np.linspace(LINE_VARIANCE - 0.3, 1, len(built))
     monkeypatch.setattr(module, "explained_variance", lambda points, rings: share[: len(points)])
@@ -528,27 +309,3 @@ def test_held_lines_keep_their_bends():
 
     assert ring(1) < 0.6 * 0.4  # the radius of the axis
     assert ring(30) > 0.95 * 0.4
-
-
-def test_mass_enters_both_terms_by_its_root(built, monkeypatch):
-    mass = np.random.default_rng(0).integers(1, 9, len(built)).astype(float)
-    size = built.ring_size0 / 2
-    capture = Capture(monkeypatch, [7], cap=1e4)
-    mass[7] = 4
-    state = Contractor(max_iterations=1)(replace(built, mass=mass, ring_size=size))
-    (rows, weight), (_, held) = capture.calls
-    np.testing.assert_allclose(rows, state.contraction_weight / np.sqrt(mass))
-    np.testing.assert_allclose(weight, 2 * np.sqrt(mass))
-    assert held[7] == 2e4
-    np.testing.assert_array_equal(np.delete(held, 7), np.delete(weight, 7))
-
-
-def test_solve_is_that_of_the_documented_system(built):
-    """(w_L^2 L^T M^-1 L + M W_H^2) P' = M W_H^2 P."""
-    mass = np.random.default_rng(0).integers(1, 9, len(built)).astype(float)
-    state = Contractor(max_iterations=1)(replace(built, mass=mass, ring_size=built.ring_size0 / 2))
-    laplacian = cotangent_laplacian(built.positions, built.rings).toarray()
-    attraction = np.diag(mass * 4.0)
-    lhs = state.contraction_weight**2 * laplacian.T @ np.diag(1 / mass) @ laplacian + attraction
-    np.testing.assert_allclose(lhs @ state.positions, attraction @ built.positions, atol=1e-5)
-    np.testing.assert_allclose(state.positions, np.linalg.solve(lhs, attraction @ built.positions), atol=1e-7)

@@ -16,40 +16,33 @@ Y = samples.y_junction(n=300).points
 TORUS = samples.torus(n=300).points
 FEW = RNG.normal(size=(12, 3))
 GRID = np.stack(np.meshgrid(np.arange(16.0), np.arange(12.0), [0.0]), -1).reshape(-1, 3)
-TURN = np.linalg.qr(RNG.normal(size=(3, 3)))[0]
+
 CORNERS = np.stack(np.meshgrid([-1.0, 1], [-1.0, 1], [-1.0, 1]), -1).reshape(-1, 3)
 READ_ONLY = Y.copy()
 READ_ONLY.setflags(write=False)
 
 # Clouds that have a skeleton, be it worth little.
 SOUND = {
-    **{f"{n} points": FEW[:n] for n in (8, 9, 10, 12)},
+    **{f"{n} points": FEW[:n] for n in (8, 12)},
     "corners of a cube": CORNERS,
-    "8 distinct among 160": np.repeat(FEW[:8], 20, axis=0),
     "every point twice": np.repeat(TORUS, 2, axis=0),
     "one point 1000 times": np.concatenate([TORUS, np.repeat(TORUS[:1], 1000, axis=0)]),
-    "30 points 100 times": np.repeat(TORUS[:30], 100, axis=0),
     "nearly doubled": np.concatenate([TORUS, TORUS + 1e-9 * RNG.normal(size=TORUS.shape)]),
     "doubled but for rounding": np.concatenate([TORUS, TORUS * (1 + 1e-15)]),
     "collinear": np.outer(np.linspace(0, 1, 100), [1, 2, 3]),
-    "collinear along x": np.outer(RNG.random(100), [1, 0, 0]),
     "8 collinear": np.outer(np.arange(8), [0, 1, 0]),
     "two crossing lines": np.concatenate([np.outer(np.arange(-20, 21), axis) for axis in np.eye(3)[:2]]),
     "circle": np.stack([np.cos(a := np.arange(60) / 60 * 2 * np.pi), np.sin(a), 0 * a], axis=1),
     "square grid": GRID,
-    "square grid, tilted": GRID @ TURN,
     "coplanar": Y * [1, 0, 1],
     "full cubic grid": np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3),
     "full ball": RNG.normal(size=(300, 3)),
     "two components": np.concatenate([Y, Y + [3, 0, 0]]),
-    "two distant specks": np.concatenate([Y * 1e-6, Y * 1e-6 + [1, 0, 0]]),
-    "two more distant specks": np.concatenate([Y * 1e-12, Y * 1e-12 + [1, 0, 0]]),
+    "two distant specks": np.concatenate([Y * 1e-12, Y * 1e-12 + [1, 0, 0]]),
     "an outlier": np.concatenate([Y, [[100.0, 100, 100]]]),
     "a far outlier": np.concatenate([Y, [[1e9, 0, 0]]]),
     "far from the origin": Y + 1e6,
     "farther": Y + [1e9, -1e9, 0],
-    "1e-12 as large": Y * 1e-12,
-    "1e12 times as large": Y * 1e12,
     "1e-100 as large": Y * 1e-100,
     "1e100 times as large": Y * 1e100,
     "points a subnormal apart": np.concatenate([CORNERS, samples.sphere(n=80).points, Y[:30] * 1e-155]),
@@ -59,11 +52,9 @@ SOUND = {
     "whole numbers": (Y * 1000).astype(int),
     "bytes": (Y * 100 + 100).astype(np.uint8),
     "list": Y.tolist(),
-    "tuple of tuples": tuple(map(tuple, Y.tolist())),
     "read-only": READ_ONLY,
     "Fortran order": np.asfortranarray(Y),
     "not contiguous": np.repeat(Y, 2, axis=0)[::2, ::-1],
-    "backwards": Y[::-1],
     "minus zero": np.concatenate([Y, [[0.0, 0, 0], [-0.0, 0, -0.0]]]),
     "sphere": samples.sphere(n=300).points,
     "sheet": samples.sheet(n=300).points,
@@ -79,7 +70,7 @@ MASKED = np.ma.masked_greater(Y, 0)
 REFUSED = {
     "nothing": (np.empty((0, 3)), "empty"),
     "empty list": ([], "empty"),
-    **{f"{n} points": (FEW[:n], rf"{n} .*at least 8") for n in range(1, 8)},
+    **{f"{n} points": (FEW[:n], rf"{n} .*at least 8") for n in (1, 7)},
     "all equal": (np.full((50, 3), 1e6 + 0.1), "coincide"),
     "zeros": (np.zeros((9, 3)), "coincide"),
     "7 distinct ones": (np.repeat(FEW[:7], 20, axis=0), "7 distinct"),
@@ -134,28 +125,27 @@ def test_sound_clouds(case, name, assert_sound):
     assert (skeleton.vertices <= high + slack).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("case", REFUSED)
-def test_refused_clouds(case, name):
+def test_refused_clouds(case):
     cloud, message = REFUSED[case]
     with pytest.raises(InvalidCloudError, match=message):
-        run(cloud, name)
+        run(cloud, "default")
 
 
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("scale", [1e-300, 1e-130, 1e130, 1e306])
-def test_extreme_sizes_are_refused(name, scale):
+def test_extreme_sizes_are_refused(scale):
     with pytest.raises(InvalidCloudError, match="rescale"):
-        run(Y * scale, name)
+        run(Y * scale, "default")
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("scale", [2.0**-300, 2.0**300])
-def test_odd_sizes_are_like_any(name, scale):
-    plain, odd = run(Y, name), run(Y * scale, name)
-    np.testing.assert_allclose(odd.radii / scale, plain.radii, rtol=1e-6)
-    assert odd.length / scale == pytest.approx(plain.length, rel=1e-6)
-    assert odd.report.warnings == plain.report.warnings
+def test_odd_sizes_are_like_any(name):
+    plain = run(Y, name)
+    for scale in (2.0**-300, 2.0**300):
+        odd = run(Y * scale, name)
+        np.testing.assert_allclose(odd.radii / scale, plain.radii, rtol=1e-6)
+        assert odd.length / scale == pytest.approx(plain.length, rel=1e-6)
+        assert odd.report.warnings == plain.report.warnings
 
 
 STEPWISE = ("8 points", "every point twice", "collinear", "coplanar", "two distant specks", "float32")
@@ -183,7 +173,6 @@ def test_every_filter_on_its_own(case, assert_sound):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SkeletonWarning)
         assert_sound(glsk.Refiner()(glsk.Connector()(again)), n)
-    np.testing.assert_array_equal(built.positions, glsk.RingBuilder()(cloud).positions)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -204,12 +193,9 @@ def test_invalid_points_can_be_dropped(name, assert_sound):
         run(few, dropping)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["wen2024", "cao2010", "default"])
 def test_two_components_are_skeletonised_each(name):
     skeleton = run(SOUND["two components"], name)
-    if name == "tree":
-        assert skeleton.n_components == 1
-        return
     assert skeleton.n_components >= 2
     side = skeleton.vertices[:, 0] > 1.5
     np.testing.assert_array_equal(side[skeleton.vertex_of_point], np.repeat([False, True], 300))
@@ -217,27 +203,22 @@ def test_two_components_are_skeletonised_each(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("case", ["sphere", "sheet", "flat sheet"])
-def test_warns_where_no_curve_skeleton_is_meaningful(case, name):
-    assert run(SOUND[case], name).report.warnings
+def test_warns_where_no_curve_skeleton_is_meaningful(name):
+    for case, kind in (("sphere", "-like"), ("sheet", "sheet-like"), ("flat sheet", "sheet-like")):
+        assert any(kind in message for message in run(SOUND[case], name).report.warnings)
 
 
-def bulk(kind, seed, n=2048):
-    rng = np.random.default_rng(seed)
-    out = rng.normal(size=(n, 3))
-    out /= np.linalg.norm(out, axis=1, keepdims=True)
-    if kind == "noisy sphere":
-        return out + 0.07 * rng.normal(size=(n, 3))
-    if kind == "solid ball":
-        return out * rng.random((n, 1)) ** (1 / 3)
-    return out / np.abs(out).max(axis=1, keepdims=True)
-
-
-@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("kind", ["noisy sphere", "solid ball", "surface of a cube"])
-def test_warns_of_what_is_as_thick_as_long(kind, seed):
-    warnings = run(bulk(kind, seed), "default").report.warnings
-    assert [text.partition(":")[0] for text in warnings] == ["sphere-like"]
+def test_warns_of_what_is_as_thick_as_long(kind):
+    rng = np.random.default_rng(0)
+    out = rng.normal(size=(1024, 3))
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    cloud = {
+        "noisy sphere": out + 0.07 * rng.normal(size=(1024, 3)),
+        "solid ball": out * rng.random((1024, 1)) ** (1 / 3),
+        "surface of a cube": out / np.abs(out).max(axis=1, keepdims=True),
+    }[kind]
+    assert [text.partition(":")[0] for text in run(cloud, "default").report.warnings] == ["sphere-like"]
 
 
 @pytest.mark.parametrize("name", ["wen2024", "cao2010"])

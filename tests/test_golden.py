@@ -68,12 +68,9 @@ def canonical(row, closed):
     return min(ways), closed
 
 
-def test_normalised(golden):
+def test_normalised_and_nearest_neighbours(golden):
     np.testing.assert_allclose(golden.built.cloud[golden.row], golden.recorded.normalised, atol=1e-15, rtol=0)
     np.testing.assert_array_equal(np.sort(golden.row), np.arange(len(golden.row)))
-
-
-def test_nearest_neighbours(golden):
     k = published_k(len(golden.row))
     assert golden.recorded.knn.shape[1] == k
     _, neighbours = nearest_neighbours(golden.built.cloud, k)
@@ -94,14 +91,10 @@ def recorded_rings(recorded):
     return Rings(indptr, np.concatenate([row for row, _ in lists]), np.array([closed for _, closed in lists]))
 
 
-def recorded_laplacian(recorded):
-    n = len(recorded.points)
-    return csr_matrix((recorded.laplacian_val, (recorded.laplacian_row, recorded.laplacian_col)), shape=(n, n))
-
-
 def test_laplacian(golden):
-    expected = recorded_laplacian(golden.recorded)
-    on_theirs = cotangent_laplacian(golden.recorded.normalised, recorded_rings(golden.recorded))
+    z = golden.recorded
+    expected = csr_matrix((z.laplacian_val, (z.laplacian_row, z.laplacian_col)), shape=2 * z.points.shape[:1])
+    on_theirs = cotangent_laplacian(z.normalised, recorded_rings(z))
     ours = cotangent_laplacian(golden.built.positions, golden.built.rings)[golden.row][:, golden.row]
     for matrix in (on_theirs, ours):
         # entry by entry, where the two cotangents of an edge do not cancel

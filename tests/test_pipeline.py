@@ -2,6 +2,7 @@
 
 import dataclasses
 import operator
+from copy import deepcopy
 from functools import reduce
 
 import numpy as np
@@ -14,8 +15,6 @@ from glsk_o3d import (
     Connector,
     Contraction,
     Contractor,
-    ExplainedScore,
-    InvalidCloudError,
     InvalidParameterError,
     LPRReducer,
     Pipeline,
@@ -29,22 +28,22 @@ from glsk_o3d import (
     skeletonize,
 )
 from glsk_o3d.analysis import compare
-from glsk_o3d.parameters import Parameters, parameter
 
 FILTERS = (RingBuilder, Contractor, LPRReducer, Connector, Refiner)
 NAMES = tuple(pipelines.PIPELINES)
 PUBLIC = {name: getattr(glsk, name) for name in glsk.__all__}
 POINTS = samples.y_junction(n=500).points
 
-# A cloud stopped after one solve is rightly called sheet-like.
-untrusted = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 
-
-def assert_same(a, b):
-    for field in dataclasses.fields(Skeleton):
+def assert_same_arrays(a, b):
+    for field in dataclasses.fields(a):
         x, y = getattr(a, field.name), getattr(b, field.name)
         if isinstance(x, np.ndarray):
             np.testing.assert_array_equal(x, y, err_msg=field.name)
+
+
+def assert_same(a, b):
+    assert_same_arrays(a, b)
     for name in ("stages", "converged", "stop_reason", "warnings", "n_distinct"):
         assert getattr(a.report, name) == getattr(b.report, name)
 
@@ -71,30 +70,13 @@ def test_what_belongs_elsewhere_is_refused(cls, given, flow):
 
 @pytest.mark.parametrize("cls", FILTERS)
 def test_calls_leave_their_input_alone_and_are_repeatable(cls, flow):
-    given = flow[cls.consumes]
-
-    def snapshot():
-        if isinstance(given, np.ndarray):
-            return given.tobytes()
-        values = {**vars(given), **vars(getattr(given, "rings", given))}
-        values = {name: value for name, value in values.items() if not name.startswith("_")}  # what was looked up
-        return {k: v.tobytes() if isinstance(v, np.ndarray) else repr(v) for k, v in values.items()}
-
-    before = snapshot()
+    given, before = flow[cls.consumes], deepcopy(flow[cls.consumes])
     first, second = cls()(given), cls()(given)
-    assert snapshot() == before
-    for field in dataclasses.fields(first):
-        a, b = getattr(first, field.name), getattr(second, field.name)
-        if isinstance(a, np.ndarray):
-            np.testing.assert_array_equal(a, b)
-
-
-@pytest.mark.parametrize("cls", FILTERS)
-def test_report_names_the_stage(cls, flow):
-    before = () if cls.consumes is Cloud else flow[cls.consumes].report.stages
-    result = cls()(flow[cls.consumes])
-    assert result.report.stages == (*before, repr(cls()))
-    assert result.report.seconds[cls.__name__] > 0
+    for one, other in ((given, before), (first, second)):
+        if isinstance(one, np.ndarray):
+            np.testing.assert_array_equal(one, other)
+        else:
+            assert_same_arrays(one, other)
 
 
 # ---- composition
@@ -108,9 +90,15 @@ def test_a_pipeline_is_its_filters_called_in_turn(name):
         by_hand = stage(by_hand)
     assert_same(pipeline(POINTS), by_hand)
     assert_same(skeletonize(POINTS.copy(), name), by_hand)  # the same to the last bit
-    assert_same(skeletonize(POINTS, pipeline), by_hand)
+    told = []
+    skeleton = skeletonize(POINTS, pipeline, on_iteration=told.append)
+    assert_same(skeleton, by_hand)
+    assert tuple(told) == skeleton.report.iterations
     if name == "default":
         assert_same(skeletonize(POINTS), by_hand)
+    report = by_hand.report
+    assert eval(" | ".join(report.stages), PUBLIC) == pipeline  # as its documentation says
+    assert set(report.seconds) >= {type(stage).__name__ for stage in pipeline.stages}
 
 
 def test_bars_associate():
@@ -124,34 +112,6 @@ def test_bars_associate():
     assert pipeline != "pipeline"
 
 
-@pytest.mark.filterwarnings("ignore:uncertain topology:glsk_o3d.SkeletonWarning")
-def test_part_of_a_pipeline_gives_what_its_last_filter_gives():
-    state = (RingBuilder() | Contractor(max_iterations=1))(POINTS)
-    assert isinstance(state, Contraction)
-    assert isinstance((Connector() | Refiner())(state), Skeleton)
-
-
-def test_several_contractors_and_a_lonely_reducer():
-    pipeline = RingBuilder() | Contractor(max_iterations=1) | LPRReducer() | Contractor(max_iterations=2) | Connector()
-    skeleton = pipeline(POINTS)
-    assert [record.iteration for record in skeleton.report.iterations] == [1, 2, 3]
-    assert skeleton.report.iterations[1].n_points < 500
-    assert skeleton.report.stages == tuple(map(repr, pipeline.stages))
-
-
-@pytest.mark.parametrize(
-    "pipeline",
-    [
-        *(make() for make in pipelines.PIPELINES.values()),
-        RingBuilder(k=9) | Contractor(reducer=LPRReducer(phi=2e5), stop=RingSizeRatio(1 / 3)) | Connector(radius="7%"),
-        Connector() | Refiner(recentre=0),
-    ],
-    ids=lambda pipeline: f"{len(pipeline.stages)} stages",
-)
-def test_repr_rebuilds_the_pipeline(pipeline):
-    assert eval(repr(pipeline), PUBLIC) == pipeline
-
-
 @pytest.mark.parametrize(
     "stages",
     [
@@ -159,8 +119,6 @@ def test_repr_rebuilds_the_pipeline(pipeline):
         (RingBuilder(), Refiner()),
         (Contractor(), RingBuilder()),
         (Connector(), Connector()),
-        (RingBuilder(), RingBuilder()),
-        (Refiner(), Contractor()),
     ],
     ids=lambda stages: "-".join(type(stage).__name__ for stage in stages),
 )
@@ -171,17 +129,22 @@ def test_stages_that_do_not_fit_are_refused_when_joined(stages):
         reduce(operator.or_, stages)
 
 
-@pytest.mark.parametrize("thing", [3, "Connector", Connector, None, lambda cloud: cloud, RingSizeRatio()])
-def test_only_filters_can_be_joined(thing):
+@pytest.mark.parametrize("thing", [3, "Connector", Connector, None, RingSizeRatio()])
+def test_only_filters_can_be_joined_and_only_pipelines_run(thing):
     with pytest.raises(InvalidParameterError):
         RingBuilder() | thing
     with pytest.raises(InvalidParameterError):
         Pipeline(RingBuilder(), thing)
-
-
-def test_empty_pipeline():
+    with pytest.raises((InvalidParameterError, StageError)):
+        skeletonize(POINTS, thing)
     with pytest.raises(InvalidParameterError):
         Pipeline()
+
+
+@pytest.mark.parametrize("incomplete", [RingBuilder(), RingBuilder() | Contractor(), Connector() | Refiner()], ids=repr)
+def test_incomplete_pipelines_are_refused(incomplete):
+    with pytest.raises(InvalidParameterError):
+        skeletonize(POINTS, incomplete)
 
 
 def test_parameters_of_all_stages_are_checked_before_any_work():
@@ -222,21 +185,9 @@ def test_what_is_put_in_may_be_varied_too(order):
     assert contractor.stop == RingSizeRatio(0.5)
     assert contractor.reducer == LPRReducer(phi=7.0)
     assert pipelines.default().with_options(reducer=None).stages[1].reducer is None
-
-
-def test_centres():
-    pipeline = pipelines.default()
-    for name, owner in {
-        "k": RingBuilder,
-        "RingBuilder.radius": RingBuilder,
-        "Connector.radius": Connector,
-        "phi": LPRReducer,
-        "threshold": ExplainedScore,
-        "reducer": Contractor,
-        "spacing": Refiner,
-    }.items():
-        assert pipeline.class_of_option(name)[0] is owner
-    assert Pipeline(Connector()).class_of_option("radius")[0] is Connector  # nobody else there has one
+    for gone in ([("phi", 3), ("reducer", None)], [("threshold", 0.5), ("stop", max)]):  # options of nothing
+        with pytest.raises(InvalidParameterError, match=gone[0][0]):
+            pipelines.default().with_options(dict(gone[::order]))
 
 
 @pytest.mark.parametrize(
@@ -264,37 +215,6 @@ def test_options_that_are_none_or_wrong_or_given_twice(options, named, words):
         skeletonize(np.zeros((0, 3)), options, **named)
 
 
-def test_a_rule_of_any_kind_is_put_in_before_its_parameters():
-    """Whatever the order: a threshold of the rule that leaves is one of nothing."""
-    for options in ({"threshold": 0.5, "stop": RingSizeRatio()}, {"stop": RingSizeRatio(), "threshold": 0.5}):
-        assert pipelines.default().with_options(options).stages[1].stop == RingSizeRatio(0.5)
-    for options in ({"threshold": 0.5, "stop": max}, {"stop": max, "threshold": 0.5}):
-        with pytest.raises(InvalidParameterError, match="threshold"):
-            pipelines.default().with_options(options)
-
-
-@dataclasses.dataclass(frozen=True)
-class Patience(Parameters):
-    """A rule with a parameter that may be None."""
-
-    kind = "rule"
-    least: int | None = parameter(None, "Fewest solves.", type="int?")
-
-    def __call__(self, iterations):
-        return None
-
-
-def test_a_rule_is_put_in_before_a_parameter_of_it_that_becomes_none():
-    for options in ({"Patience.least": None, "stop": Patience(3)}, {"stop": Patience(3), "Patience.least": None}):
-        assert pipelines.default().with_options(options).stages[1].stop == Patience(None)
-
-
-def test_a_reducer_that_is_taken_out_has_no_parameters():
-    for options in ({"phi": 3, "reducer": None}, {"reducer": None, "phi": 3}):
-        with pytest.raises(InvalidParameterError, match="'phi'"):
-            pipelines.default().with_options(options)
-
-
 def test_skeletonize_takes_options():
     by_hand = (RingBuilder(k=24) | Contractor(reducer=LPRReducer()) | Connector() | Refiner())(POINTS)
     assert_same(skeletonize(POINTS, k=24), by_hand)
@@ -304,15 +224,6 @@ def test_skeletonize_takes_options():
     assert_same(skeletonize(POINTS, {"spacing": 1}, k=24), skeletonize(POINTS, spacing=1, k=24))
     varied = skeletonize(POINTS, "cao2010", **{"Connector.radius": "4%"})
     assert glsk.from_recipe(varied.report.recipe).stages[2].radius == "4%"
-
-
-def test_skeletonize_drops_invalid_points_when_asked():
-    spoilt = np.r_[POINTS, [[np.nan, 0, 0]]]
-    with pytest.raises(InvalidCloudError, match="drop_invalid"):
-        skeletonize(spoilt)
-    skeleton = skeletonize(spoilt, drop_invalid=True)
-    assert (skeleton.report.n_dropped, skeleton.vertex_of_point[-1]) == (1, -1)
-    np.testing.assert_array_equal(skeleton.vertices, skeletonize(POINTS).vertices)
 
 
 # ---- skeletonize
@@ -325,59 +236,6 @@ def test_unknown_names_tell_the_nearest_or_list_the_known_ones():
         skeletonize(POINTS, "best")
 
 
-@pytest.mark.parametrize(
-    "incomplete",
-    [RingBuilder(), RingBuilder() | Contractor(), Connector() | Refiner(), Contractor() | Connector()],
-    ids=lambda made: "-".join(type(stage).__name__ for stage in getattr(made, "stages", [made])),
-)
-def test_incomplete_pipelines_are_refused(incomplete):
-    with pytest.raises(InvalidParameterError):
-        skeletonize(POINTS, incomplete)
-
-
-@pytest.mark.parametrize("thing", [None, 3, ["default"], pipelines.default], ids=["None", "number", "list", "maker"])
-def test_what_is_no_pipeline_is_refused(thing):
-    with pytest.raises((InvalidParameterError, StageError)):
-        skeletonize(POINTS, thing)
-
-
-@untrusted
-@pytest.mark.parametrize("name", NAMES)
-def test_progress(name):
-    told = []
-    skeleton = skeletonize(POINTS, name, on_iteration=told.append)
-    assert tuple(told) == skeleton.report.iterations
-    assert [record.iteration for record in told] == list(range(1, len(told) + 1))
-    cut = skeletonize(POINTS, name, on_iteration=lambda record: False)
-    assert len(cut.report.iterations) == 1
-    assert cut.report.stop_reason == "stopped by the caller"
-    assert len(cut.vertices) > 0
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_report_tells_what_ran(name):
-    pipeline = pipelines.PIPELINES[name]()
-    report = skeletonize(POINTS, name).report
-    assert (report.n_input, report.n_dropped, report.n_distinct) == (500, 0, 500)
-    assert eval(" | ".join(report.stages), PUBLIC) == pipeline  # as its documentation says
-    assert set(report.seconds) >= {type(stage).__name__ for stage in pipeline.stages}
-    assert all(seconds > 0 for seconds in report.seconds.values())
-    assert len(report.iterations) >= 1
-
-
-def test_the_named_pipelines_differ_as_they_say():
-    cao, wen, default = (make().stages for make in (pipelines.cao2010, pipelines.wen2024, pipelines.default))
-    assert cao[1].reducer is None
-    assert isinstance(cao[1].stop, RingSizeRatio)
-    assert not wen[1].reducer.conserve_mass
-    assert wen[1].reducer.order == "index"
-    assert wen[1].reduce_above == 0
-    assert default[1].reducer.conserve_mass
-    for named in (cao, wen):
-        assert (named[1].min_attraction, named[1].retries, named[1].line_hold, named[3].recentre) == (0, 0, 1, 0)
-    assert default[3].recentre > 0
-
-
 # ---- closed forms, end to end
 
 
@@ -385,9 +243,8 @@ def test_the_named_pipelines_differ_as_they_say():
     ("shape", "components", "loops", "leaves"),
     [("tube", 1, 0, 2), ("torus", 1, 1, 0), ("helix", 1, 0, 2), ("y_junction", 1, 0, 3), ("two_rings", 2, 2, 0)],
 )
-@pytest.mark.parametrize("seed", [0, 1])
-def test_default_on_shapes_with_a_known_axis(shape, components, loops, leaves, seed):
-    sample = samples.SAMPLES[shape](n=2048, seed=seed)
+def test_default_on_shapes_with_a_known_axis(shape, components, loops, leaves):
+    sample = samples.SAMPLES[shape](n=2048)
     skeleton = skeletonize(sample.points)
     assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (components, loops, leaves)
     found = compare(skeleton, sample)
@@ -396,92 +253,37 @@ def test_default_on_shapes_with_a_known_axis(shape, components, loops, leaves, s
     assert np.median(skeleton.radii) == pytest.approx(sample.radii.mean(), rel=0.1)
 
 
-@pytest.mark.parametrize(("shape", "loops"), [("tube", 0), ("torus", 1), ("helix", 0), ("two_rings", 2)])
-def test_cao2010_on_shapes_with_a_known_axis(shape, loops):
-    sample = samples.SAMPLES[shape](n=2048)
-    skeleton = skeletonize(sample.points, "cao2010")
-    assert skeleton.n_loops == loops
-    found = compare(skeleton, sample)
-    assert found.error < 0.25
-    assert found.inside == found.completeness == 1
-
-
-@pytest.mark.filterwarnings("ignore:uncertain topology:glsk_o3d.SkeletonWarning")  # a cut may be a close call
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("gap", [1, 2])
-def test_thin_parts_side_by_side_stay_apart(gap, seed):
-    rng, radius = np.random.default_rng(seed), 0.03
-    along, angle = rng.random((2, 4096)), rng.random((2, 4096)) * 2 * np.pi
-    middle = np.array([[0], [2 + gap]]) * radius
-    tubes = np.stack([along, middle + radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
-    skeleton = skeletonize(tubes.reshape(-1, 3))
-    assert (skeleton.n_components, skeleton.n_loops) == (2, 0)
-    owner = skeleton.vertex_of_point.reshape(2, -1)
-    assert not set(owner[0]) & set(owner[1])
-
-
-@pytest.mark.filterwarnings(
-    "ignore:uncertain topology:glsk_o3d.SkeletonWarning"
-)  # a stretch of 3 radii is a close call
-def test_parts_in_line_are_bridged_where_their_ends_are_open():
-    rod = samples.tube(2048).points
-    parts = np.concatenate([rod, rod + [1.5, 0, 0]])  # round ends 0.3 apart, 3 radii
-    assert skeletonize(parts).n_components == 2
-    asked = skeletonize(parts, {"Refiner.bridge": 0.01})
-    assert (asked.n_components, asked.report.n_bridges) == (1, 1)
-    unseen = np.abs(rod[:, 0]) > 0.15  # of one tube a stretch of 3 radii
-    joined = skeletonize(rod[unseen])
-    assert (joined.n_components, joined.n_loops, joined.report.n_bridges) == (1, 0, 1)
-    assert skeletonize(rod[unseen], bridge=0).n_components == 2
-
-
 # ---- equivariance, end to end
 
-TURNS = {"a quarter about the diagonal": np.eye(3)[[1, 2, 0]], "half about x": np.diag([1.0, -1, -1])}
 MOVES = {
-    "shift": (lambda x: x + 2**20, lambda x: x - 2**20),
     "shift by 1e6": (lambda x: x + 1e6, lambda x: x - 1e6),
     "1000 times smaller": (lambda x: x * 1e-3, lambda x: x * 1e3),
     "1000 times larger": (lambda x: x * 1e3, lambda x: x * 1e-3),
-    **{name: (lambda x, turn=turn: x @ turn, lambda x, turn=turn: x @ turn.T) for name, turn in TURNS.items()},
+    "a quarter about the diagonal": (lambda x: x[:, [2, 0, 1]], lambda x: x[:, [1, 2, 0]]),
 }
 
 
-@pytest.fixture(scope="module", params=["torus", "y_junction"])
-def shape(request):
-    """Coordinates rounded, so that the shift by a power of two is exact; 1e6 costs them 1e-10."""
-    return np.round(samples.SAMPLES[request.param](n=1024).points * 2**20) / 2**20
-
-
-@pytest.mark.parametrize("move", MOVES)
 @pytest.mark.parametrize("name", ["cao2010", "default"])
-def test_moves_and_scales_along_with_the_cloud(shape, name, move):
+def test_moves_and_scales_along_with_the_cloud(name):
     """Measured: vertices agree to 1e-7 tube radii, from roundings of 1e-16 that ill-conditioned late solves blow up."""
-    there, back = MOVES[move]
-    still, moved = skeletonize(shape, name), skeletonize(there(shape), name)
-    np.testing.assert_array_equal(moved.edges, still.edges)
-    np.testing.assert_array_equal(moved.vertex_of_point, still.vertex_of_point)
-    np.testing.assert_allclose(back(moved.vertices), still.vertices, atol=1e-6 * 0.1)
-    np.testing.assert_allclose(moved.radii / np.ptp(there(shape)), still.radii / np.ptp(shape), rtol=1e-5)
+    shape = np.round(samples.y_junction(n=700).points * 2**20) / 2**20  # so that the shift costs them 1e-10
+    still = skeletonize(shape, name)
+    for there, back in MOVES.values():
+        moved = skeletonize(there(shape), name)
+        np.testing.assert_array_equal(moved.edges, still.edges)
+        np.testing.assert_array_equal(moved.vertex_of_point, still.vertex_of_point)
+        np.testing.assert_allclose(back(moved.vertices), still.vertices, atol=1e-6 * 0.1)
+        np.testing.assert_allclose(moved.radii / np.ptp(there(shape)), still.radii / np.ptp(shape), rtol=1e-5)
 
 
-@pytest.mark.parametrize("name", ["cao2010", "default"])
-def test_order_of_the_points_does_not_matter(shape, name):
-    order = np.random.default_rng(0).permutation(len(shape))
-    still, shuffled = skeletonize(shape, name), skeletonize(shape[order], name)
-    np.testing.assert_array_equal(shuffled.edges, still.edges)
-    np.testing.assert_array_equal(shuffled.vertex_of_point, still.vertex_of_point[order])
-    np.testing.assert_allclose(shuffled.vertices, still.vertices, atol=1e-12)
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("name", ["tube", "torus", "helix", "y_junction", "two_rings"])
-def test_any_rotation_of_the_points_in_any_order(name, seed):
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["tube", "torus", "y_junction", "two_rings"])
+def test_any_rotation_of_the_points_in_any_order(name):
     """The same skeleton turned back, but for rounding.
 
     The published pipelines do not promise it: a turn changes the bounding box, and with it the weights.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     points = samples.SAMPLES[name](n=1024).points
     turn, order = np.linalg.qr(rng.normal(size=(3, 3)))[0], rng.permutation(1024)
     still, turned = skeletonize(points), skeletonize(points[order] @ turn)

@@ -6,8 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from glsk_o3d import Contractor, IterationRecord, Judgement, Report, RingBuilder, SkeletonWarning, samples
-from glsk_o3d.pipeline import with_stage
+from glsk_o3d import Contractor, Judgement, Report, RingBuilder, SkeletonWarning, samples
 
 
 @pytest.fixture(scope="module")
@@ -39,30 +38,6 @@ def test_an_entry_of_another_type_is_refused_or_means_the_same(report, name):
         assert json.dumps(getattr(again, name)) in (json.dumps(value), "{}", "[]")
 
 
-@pytest.mark.parametrize("record", [IterationRecord, Judgement])
-def test_an_entry_of_another_type_in_a_record_is_refused(report, record):
-    judged = Judgement("loop", (0.0, 0.5, 2.0), 0.55, changed=False)
-    (kind, made) = ("judgements", judged) if record is Judgement else ("iterations", report.iterations[0])
-    for name, value in ((field.name, value) for field in dataclasses.fields(record) for value in WRONG):
-        data = {kind: [{**dataclasses.asdict(made), name: value}]}
-        if type(value) is type(getattr(made, name)) and value in (-0.5, True):
-            Report.from_dict(data)
-            continue
-        with pytest.raises((ValueError, TypeError)):
-            Report.from_dict(data)
-
-
-def test_dict_holds_plain_python_values_only(report):
-    def plain(value):
-        if isinstance(value, dict):
-            return all(isinstance(key, str) and plain(item) for key, item in value.items())
-        if isinstance(value, (list, tuple)):
-            return all(map(plain, value))
-        return type(value) in (int, float, bool, str)
-
-    assert plain(report.to_dict())
-
-
 def test_places_on_a_map_keep_their_digits():
     told = Judgement("loop", (450123.456789, 5600321.987654, -0.0123456), 0.5, changed=False).question
     assert told == "the loop at (450123.46, 5600321.99, -0.01235) is a handle"
@@ -83,16 +58,6 @@ def test_is_frozen(report):
             part.converged = True
 
 
-def test_stages_add_up():
-    empty = Report()
-    once = with_stage(empty, RingBuilder(k=9), 0.5)
-    twice = with_stage(with_stage(once, Contractor(), 0.25), RingBuilder(), 0.125)
-    assert twice.stages == (repr(RingBuilder(k=9)), repr(Contractor()), repr(RingBuilder()))
-    assert twice.seconds == {"RingBuilder": 0.625, "Contractor": 0.25}
-    assert empty == Report()
-    assert once.stages == (repr(RingBuilder(k=9)),)
-
-
 def test_warnings_are_issued_and_kept():
     with pytest.warns(SkeletonWarning, match="first"):
         report = Report().with_warning("first")
@@ -107,13 +72,6 @@ JUDGEMENTS = (
     Judgement("gap", (1 / 3, 0.0, 1e9), 0.45, changed=False),
     Judgement("limb", (0.0, 0.0, 0.0), 0.01, changed=True),
 )
-
-
-def test_judgements_survive_json():
-    report = Report(judgements=JUDGEMENTS, n_cuts=1, noise=0.125)
-    again = Report.from_dict(json.loads(json.dumps(report.to_dict())))
-    assert again == report
-    assert isinstance(again.judgements[0].place, tuple)
 
 
 def test_close_calls_lie_between_a_quarter_and_three_quarters_the_closest_first():

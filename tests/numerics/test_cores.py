@@ -23,8 +23,3 @@ def test_cores_are_those_that_may_be_used():
 def test_threads_are_as_many_as_openmp_may_use(said, expected, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", said)
     assert threads() == (expected or cores())
-
-
-def test_threads_are_the_cores(monkeypatch):
-    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    assert threads() == cores()

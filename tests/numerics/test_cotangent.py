@@ -3,7 +3,6 @@
 import igl
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull
 
 from glsk_o3d.numerics.cotangent import WEIGHT_CAP, cotangent_laplacian
 from glsk_o3d.numerics.rings import Rings
@@ -32,27 +31,6 @@ def mesh_rings(n, faces):
     return rings_of(lists, closed)
 
 
-def sphere_mesh(n=400, seed=0):
-    points = np.random.default_rng(seed).normal(size=(n, 3))
-    points /= np.linalg.norm(points, axis=1, keepdims=True)
-    hull = ConvexHull(points)
-    faces = hull.simplices.copy()
-    a, b, c = points[faces].transpose(1, 0, 2)
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
-    faces[inward] = faces[inward][:, [0, 2, 1]]
-    return points * [1, 0.7, 1.6], faces
-
-
-def torus_mesh(m=24, n=11):
-    u, v = np.meshgrid(np.arange(m), np.arange(n), indexing="ij")
-    a, b = 2 * np.pi * u / m, 2 * np.pi * v / n
-    points = np.stack([(2 + np.cos(b)) * np.cos(a), (2 + np.cos(b)) * np.sin(a), np.sin(b)], -1).reshape(-1, 3)
-    at = lambda i, j: ((i % m) * n + j % n).ravel()  # noqa: E731
-    p, q, r, s = at(u, v), at(u + 1, v), at(u + 1, v + 1), at(u, v + 1)
-    faces = np.concatenate([np.stack([p, q, r], 1), np.stack([p, r, s], 1)])
-    return points + 0.05 * np.random.default_rng(1).normal(size=points.shape), faces
-
-
 def sheet_mesh(side=20):
     grid = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1).reshape(-1, 2)
     flat = (grid + np.random.default_rng(2).uniform(-0.2, 0.2, grid.shape)) / side
@@ -61,26 +39,21 @@ def sheet_mesh(side=20):
     return np.column_stack([flat, 0.1 * np.sin(7 * flat[:, 0])]), faces
 
 
-MESHES = {"sphere": sphere_mesh, "torus": torus_mesh, "sheet": sheet_mesh}
-
-
 def relative(difference, reference):
     return abs(difference).max() / abs(reference).max()
 
 
-@pytest.mark.parametrize("mesh", MESHES)
-def test_is_twice_the_matrix_of_libigl(mesh):
-    points, faces = MESHES[mesh]()
-    ours = cotangent_laplacian(points, mesh_rings(len(points), faces))
+def test_is_twice_the_matrix_of_libigl():
+    """Wherever, how large and however turned the mesh is."""
+    points, faces = sheet_mesh()
+    rings = mesh_rings(len(points), faces)
+    ours = cotangent_laplacian(points, rings)
     assert abs(ours.diagonal()).max() < WEIGHT_CAP
     assert relative(ours - 2 * igl.cotmatrix(points, faces), ours) < 1e-12
-
-
-@pytest.mark.parametrize("mesh", MESHES)
-def test_rows_sum_to_zero(mesh):
-    points, faces = MESHES[mesh]()
-    laplacian = cotangent_laplacian(points, mesh_rings(len(points), faces))
-    assert np.abs(laplacian @ np.ones(len(points))).max() < 1e-12 * abs(laplacian).max()
+    assert np.abs(ours @ np.ones(len(points))).max() < 1e-12 * abs(ours).max()
+    turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+    for moved, tolerance in ((points @ turn.T, 1e-12), (points * 1e-3, 1e-12), (points + 100, 1e-9)):
+        assert relative(cotangent_laplacian(moved, rings) - ours, ours) < tolerance
 
 
 def test_triangle_by_hand():
@@ -92,9 +65,8 @@ def test_triangle_by_hand():
     np.testing.assert_allclose(cotangent_laplacian(points, rings).toarray(), expected, atol=1e-14)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_linear_precision_on_plane_umbrellas(seed):
-    rng = np.random.default_rng(seed)
+def test_linear_precision_on_plane_umbrellas():
+    rng = np.random.default_rng(0)
     flat, faces = sheet_mesh()
     points = flat * [1, 1, 0] @ np.linalg.qr(rng.normal(size=(3, 3)))[0] + rng.normal(size=3)
     rings = mesh_rings(len(points), faces)
@@ -106,36 +78,13 @@ def test_linear_precision_on_plane_umbrellas(seed):
     assert coordinates[~rings.closed].max() > 1e-3 * scale  # not so at the border
 
 
-def test_delta_of_a_cylinder_points_to_its_axis():
-    m, n = 16, 9
-    u, v = np.meshgrid(np.arange(m), np.arange(n), indexing="ij")
-    angle = 2 * np.pi * (u + v / 2) / m
-    points = np.stack([np.cos(angle), np.sin(angle), 0.3 * v], -1).reshape(-1, 3)
-    at = lambda i, j: ((i % m) * n + j).ravel()  # noqa: E731
-    p, q = (u[:, :-1], v[:, :-1]), (u[:, 1:], v[:, 1:])
-    faces = np.concatenate([
-        np.stack([at(*p), at(p[0] + 1, p[1]), at(*q)], 1),
-        np.stack([at(p[0] + 1, p[1]), at(q[0] + 1, q[1]), at(*q)], 1),
-    ])  # fmt: skip
-    rings = mesh_rings(len(points), faces)
-    delta = cotangent_laplacian(points, rings) @ points
-    inside = rings.closed
-    outward = points[inside] * [1, 1, 0]
-    np.testing.assert_allclose(np.cross(delta[inside], outward), 0, atol=1e-12)
-    assert (np.einsum("ij,ij->i", delta[inside], outward) < -0.1).all()
-
-
 def test_rows_are_capped_by_scaling():
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1e-7, 0], [0, 1, 0]])
-    rings = rings_of([[1, 2], [3, 0], [], []], [False] * 4)
-    free = cotangent_laplacian(points, rings, cap=1e300).toarray()
-    assert abs(free[0, 0]) < 1  # a needle seen from its tip: large weights of both signs cancel
     rings = rings_of([[], [2, 0], [], [0, 1]], [False] * 4)
     free, capped = (cotangent_laplacian(points, rings, cap=cap).toarray() for cap in (1e300, WEIGHT_CAP))
     assert free[1, 1] < -1e6
     np.testing.assert_allclose(capped[1], free[1] / abs(free[1, 1]) * 1e4, rtol=1e-12)
     np.testing.assert_array_equal(capped[3], free[3])
-    np.testing.assert_allclose(cotangent_laplacian(points, rings, cap=0.5).toarray()[3], free[3] / abs(free[3, 3]) / 2)
 
 
 @pytest.mark.parametrize("height", [1, 1e-3, 1e-6, 1e-9, 1e-12])
@@ -155,28 +104,3 @@ def test_triangles_without_area_add_nothing():
     # next to one with area, only that one counts
     mixed, alone = rings_of([[2, 1, 4], *[[]] * 5], [False] * 6), rings_of([[1, 4], *[[]] * 5], [False] * 6)
     assert abs(cotangent_laplacian(points, mixed) - cotangent_laplacian(points, alone)).max() == 0
-
-
-@pytest.mark.parametrize("mesh", MESHES)
-def test_does_not_depend_on_where_how_large_or_how_turned(mesh):
-    points, faces = MESHES[mesh]()
-    rings = mesh_rings(len(points), faces)
-    laplacian = cotangent_laplacian(points, rings)
-    turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
-    for moved, tolerance in (
-        (points @ turn.T, 1e-12),
-        (points * 1e-3, 1e-12),
-        (points * 1e6, 1e-12),
-        (points * [1, 1, -1], 1e-12),
-        (points + 100, 1e-9),
-    ):
-        assert relative(cotangent_laplacian(moved, rings) - laplacian, laplacian) < tolerance
-
-
-def test_renumbering_renumbers_the_matrix():
-    points, faces = torus_mesh()
-    order = np.random.default_rng(6).permutation(len(points))
-    new_name = np.argsort(order)
-    laplacian = cotangent_laplacian(points, mesh_rings(len(points), faces))
-    again = cotangent_laplacian(points[order], mesh_rings(len(points), new_name[faces]))
-    assert relative(again - laplacian[order][:, order], laplacian) < 1e-12

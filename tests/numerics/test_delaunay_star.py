@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
@@ -38,11 +38,8 @@ def exact_star(offsets, valid):
 
     Strict corners of the convex hull of the images 1 / x, and the origin wherever it is not strictly inside.
     """
-    images = {}
-    for (x, y), use in zip(offsets, valid, strict=True):
-        if use and (x or y):
-            squared = x * x + y * y
-            images[Fraction(x, squared), Fraction(y, squared)] = (x, y)
+    used = {point for point, use in zip(offsets, valid, strict=True) if use and any(point)}
+    images = {(Fraction(x, x * x + y * y), Fraction(y, x * x + y * y)): (x, y) for x, y in used}
     origin = (Fraction(0), Fraction(0))
     points = sorted([*images, origin])
 
@@ -81,8 +78,8 @@ def turned(sequence):
 # ---- thousands of neighbourhoods in general position
 
 
-def neighbourhoods(kind, n=700, k=14, seed=0):
-    rng = np.random.default_rng([seed, len(kind)])
+def neighbourhoods(kind, n=300, k=14):
+    rng = np.random.default_rng(len(kind))
     cloud = rng.normal(size=(n, k, 2))
     if kind == "stretched":
         cloud *= [1, 1e-3]
@@ -110,119 +107,29 @@ KINDS = ("plain", "stretched", "border", "corner", "graded", "arc", "thin ring",
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_against_triangulations(kind):
+    """Counter-clockwise; a closed ring starts with the nearest neighbour."""
     cloud = neighbourhoods(kind)
     rings, closed = delaunay_star(cloud)
-    n_closed = 0
+    assert closed.any() == (kind not in ("border", "corner"))
     for offsets, row, is_closed in zip(cloud, rings.tolist(), closed.tolist(), strict=True):
         ring = [j for j in row if j >= 0]
-        expected, inside = triangulated_star(offsets)
-        assert links(ring, is_closed) == expected
-        assert is_closed == inside
-        n_closed += inside
-    expected_closed = {"border": (0, 0), "corner": (0, 0)}.get(kind, (1, len(cloud)))
-    assert expected_closed[0] <= n_closed <= expected_closed[1]
-
-
-@pytest.mark.parametrize("k", [3, 4, 5, 8, 30, 60])
-def test_against_triangulations_of_any_size(k):
-    cloud = neighbourhoods("plain", n=200, k=k, seed=k)
-    rings, closed = delaunay_star(cloud)
-    for offsets, row, is_closed in zip(cloud, rings.tolist(), closed.tolist(), strict=True):
-        assert (links([j for j in row if j >= 0], is_closed), is_closed) == triangulated_star(offsets)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_turns_counter_clockwise_and_starts_where_it_says(kind):
-    cloud = neighbourhoods(kind)
-    rings, closed = delaunay_star(cloud)
-    for offsets, row, is_closed in zip(cloud, rings.tolist(), closed.tolist(), strict=True):
-        ring = offsets[[j for j in row if j >= 0]]
-        following = np.roll(ring, -1, axis=0)
-        cross = ring[:, 0] * following[:, 1] - ring[:, 1] * following[:, 0]
+        assert (links(ring, is_closed), is_closed) == triangulated_star(offsets)
+        following = np.roll(offsets[ring], -1, axis=0)
+        cross = offsets[ring, 0] * following[:, 1] - offsets[ring, 1] * following[:, 0]
         assert (cross[: None if is_closed else -1] > 0).all()
-        if is_closed:
-            assert row[0] == np.argmin((offsets**2).sum(axis=1))
-        elif len(ring) > 1:
-            # the gap of a fan is at least a half turn wide, or the centre would not be on the hull
-            assert cross[-1] <= 0 or len(ring) == 2
-
-
-@pytest.mark.parametrize("kind", ["plain", "border", "arc", "graded"])
-def test_does_not_depend_on_rotation_scale_or_order(kind):
-    cloud = neighbourhoods(kind)
-    ring, closed = delaunay_star(cloud)
-    angle = 0.7
-    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    for moved in (cloud @ rotation.T, cloud * 1e-9, cloud * 1e9, (cloud @ rotation) * 3.7):
-        again, closed_again = delaunay_star(moved)
-        np.testing.assert_array_equal(again, ring)
-        np.testing.assert_array_equal(closed_again, closed)
-    order = np.random.default_rng(1).permutation(cloud.shape[1])
-    again, closed_again = delaunay_star(cloud[:, order])
-    np.testing.assert_array_equal(np.where(again >= 0, order[again], -1), ring)
-    np.testing.assert_array_equal(closed_again, closed)
-
-
-def test_masked_neighbours_do_not_exist():
-    cloud = neighbourhoods("plain", k=20)
-    valid = np.random.default_rng(2).random(cloud.shape[:2]) < 0.5
-    ring, closed = delaunay_star(np.where(valid[..., None], cloud, 1e-9), valid)
-    for offsets, use, row, is_closed in zip(cloud, valid, ring.tolist(), closed.tolist(), strict=True):
-        kept = np.flatnonzero(use)
-        expected, expected_closed = star(offsets[kept])
-        assert [j for j in row if j >= 0] == kept[expected].tolist()
-        assert is_closed == expected_closed
+        assert not is_closed or row[0] == np.argmin((offsets**2).sum(axis=1))
 
 
 # ---- degenerate neighbourhoods, by hand
-
-GRID = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
-
-
-@pytest.mark.parametrize(
-    ("offsets", "ring", "closed"),
-    [
-        pytest.param(np.empty((0, 2)), [], False, id="no neighbour"),
-        pytest.param([(0, 0)], [], False, id="only one that coincides"),
-        pytest.param([(0, 0), (2, 1), (0, 0)], [(2, 1)], False, id="one neighbour"),
-        pytest.param([(1, 0), (0, 1)], [(1, 0), (0, 1)], False, id="two neighbours"),
-        pytest.param([(2, 0), (1, 0), (3, 0)], [(1, 0)], False, id="collinear, all on one side"),
-        pytest.param([(1, 0), (-2, 0)], [(-2, 0), (1, 0)], False, id="collinear, on both sides"),
-        pytest.param([(3, 3), (-2, -2), (1, 1), (-4, -4)], [(-2, -2), (1, 1)], False, id="collinear, tilted"),
-        pytest.param([(1, 0), (0, 1), (-1, 0)], [(1, 0), (0, 1), (-1, 0)], False, id="centre on an edge of the hull"),
-        pytest.param([(0, 1), (0, 1), (1, -1), (-1, -1), (1, -1)], [(0, 1), (-1, -1), (1, -1)], True, id="duplicates"),
-        pytest.param(GRID, [(1, 0), (0, 1), (-1, 0), (0, -1)], True, id="square grid"),
-        pytest.param([p for p in GRID if p[1] >= 0], [(1, 0), (0, 1), (-1, 0)], False, id="edge of a square grid"),
-        pytest.param([p for p in GRID if min(p) >= 0], [(1, 0), (0, 1)], False, id="corner of a square grid"),
-        pytest.param([(2, 0), (2, 2), (0, 2)], [(2, 0), (0, 2)], False, id="all on a circle through the centre"),
-    ],
-)
-def test_degenerate(offsets, ring, closed):
-    offsets = np.reshape(np.asarray(offsets, float), (-1, 2))
-    found, is_closed = star(offsets)
-    found = [tuple(offsets[j]) for j in found]
-    assert is_closed == closed
-    if closed:
-        assert turned(found) == turned([tuple(map(float, p)) for p in ring])
-    else:  # a line has no first side
-        assert found == ring or (
-            len(ring) == 2 and found == ring[::-1] and np.cross(*(np.r_[p, 0] for p in ring))[2] == 0
-        )
-
-
-def test_no_neighbourhoods():
-    ring, closed = delaunay_star(np.empty((0, 5, 2)))
-    assert len(ring) == len(closed) == 0
 
 
 # ---- degenerate neighbourhoods, by the thousand: small integers are often collinear, cocircular, doubled
 
 WHOLE = st.integers(-4, 4)
-NEIGHBOURHOOD = st.lists(st.tuples(WHOLE, WHOLE, st.booleans() | st.just(True)), min_size=1, max_size=14)
 
 
-@settings(max_examples=1500)
-@given(NEIGHBOURHOOD)
+@settings(max_examples=800)
+@given(st.lists(st.tuples(WHOLE, WHOLE, st.booleans() | st.just(True)), min_size=1, max_size=14))
 def test_against_exact_arithmetic(rows):
     offsets, valid = [row[:2] for row in rows], [row[2] for row in rows]
     expected, closed = exact_star(offsets, valid)
@@ -238,29 +145,14 @@ def test_against_exact_arithmetic(rows):
         assert found == expected or (straight and found == expected[::-1])
 
 
-@pytest.mark.parametrize("jitter", [10**4, 10**6])
-def test_grids_that_are_hardly_disturbed(jitter):
-    """Squares with corners off by 1e-8 or 1e-6 of their side: four neighbours are nearly, but not, on one circle."""
-    side = np.arange(-2, 3) * 10**12
+def test_grids_that_are_hardly_disturbed():
+    """Squares with corners off by 1e-8 of their side: four neighbours are nearly, but not, on one circle."""
+    rng, side = np.random.default_rng(0), np.arange(-2, 3) * 10**12
     grid = np.stack(np.meshgrid(side, side), -1).reshape(-1, 2)
     grid = grid[np.abs(grid).sum(axis=1) > 0]
-    rng = np.random.default_rng(jitter)
-    for _ in range(100):
-        offsets = [tuple(row) for row in (grid + rng.integers(-jitter, jitter + 1, grid.shape)).tolist()]
+    for _ in range(50):
+        offsets = [tuple(row) for row in (grid + rng.integers(-(10**4), 10**4, grid.shape)).tolist()]
         expected, closed = exact_star(offsets, [True] * len(offsets))
         ring, is_closed = star(offsets)
         assert is_closed == closed
         assert turned([offsets[j] for j in ring]) == turned(expected)
-
-
-@settings(max_examples=300)
-@given(st.lists(st.tuples(*2 * [st.floats(-1.6, 1.6, allow_subnormal=False)]), min_size=1, max_size=12))
-def test_any_numbers_give_a_proper_ring(offsets):
-    offsets = np.array(offsets)
-    # squares of smaller ones are no longer normal numbers; in the working frame such points coincide
-    assume((np.abs(offsets[offsets != 0]) > 1e-150).all())
-    ring, closed = star(offsets)
-    assert len(set(ring)) == len(ring)
-    assert (len(ring) > 0) == (offsets != 0).any()
-    assert not closed or len(ring) > 2
-    assert all(offsets[j].any() for j in ring)

@@ -26,14 +26,6 @@ def test_sum_against_a_loop(shape):
         np.testing.assert_allclose(total[g], values[group == g].sum(axis=0), atol=1e-13)
 
 
-def test_sum_of_nothing():
-    assert group_sum(np.empty((0, 3)), np.empty(0, int), 2).tolist() == [[0, 0, 0], [0, 0, 0]]
-
-
-def test_median_of_nothing():
-    assert group_median(np.empty(0), np.empty(0, int), 2).tolist() == [0, 0]
-
-
 def test_members_of_groups_in_the_order_asked_for():
     members = Members(np.array([2, 0, -1, 2, 0, 2]), 4)
     np.testing.assert_array_equal(members.of(np.array([2, 1, 0])), [0, 3, 5, 1, 4])

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull
 
-from glsk_o3d.numerics.mesh_rings import clean_faces, common_share, corners, mesh_rings, umbrellas
+from glsk_o3d.numerics.mesh_rings import clean_faces, common_share, umbrellas
 from glsk_o3d.numerics.rings import Rings
 
 OCTAHEDRON = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
@@ -28,19 +27,6 @@ def test_triangles_without_area_and_repeated_ones_go():
     assert clean_faces(points, np.empty((0, 3))).shape == (0, 3)
 
 
-def test_corners():
-    assert sorted(corners(np.array([[7, 2, 5]])).tolist()) == [[2, 5, 7], [5, 2, 7], [7, 2, 5]]
-
-
-def test_all_vertices_of_a_closed_surface_have_umbrellas():
-    points = np.random.default_rng(0).normal(size=(300, 3))
-    faces = ConvexHull(points).simplices  # of arbitrary orientation
-    on_hull = np.unique(faces)
-    whole = umbrellas(300, faces)
-    assert whole[on_hull].all()
-    assert whole.sum() == len(on_hull) < 300  # points inside have no triangle
-
-
 def test_what_is_no_umbrella():
     assert umbrellas(6, OCTAHEDRON).all()
     opened = umbrellas(7, OCTAHEDRON[1:])  # the corners of the hole, and a vertex without a triangle
@@ -49,15 +35,6 @@ def test_what_is_no_umbrella():
     assert np.flatnonzero(~umbrellas(7, fin)).tolist() == [0, 4, 6]
     twins = np.vstack([OCTAHEDRON, np.where(OCTAHEDRON == 4, 4, OCTAHEDRON + 6)])  # two of them that touch in vertex 4
     assert np.flatnonzero(~umbrellas(12, twins)).tolist() == [4, 10]
-
-
-def test_neighbours():
-    rings = mesh_rings(6, OCTAHEDRON)
-    assert [rings[i].tolist() for i in range(6)] == [
-        sorted(set(range(6)) - {i, j}) for i, j in enumerate([1, 0, 3, 2, 5, 4])
-    ]
-    assert rings.closed.all()
-    assert not mesh_rings(6, OCTAHEDRON[1:]).closed[[0, 2, 4]].any()
 
 
 @pytest.mark.parametrize("first", [(2, 4, 3, 5), (3, 5, 2, 4), (5, 3, 4, 2)])

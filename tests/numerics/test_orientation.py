@@ -30,23 +30,3 @@ def test_normals_of_closed_surfaces_point_outward(shape, seed):
     np.testing.assert_allclose(np.abs(np.einsum("ij,ij->i", turned, outward)), 1)
     right = np.einsum("ij,ij->i", turned, outward) > 0
     assert right.all()
-
-
-def test_a_long_chain_and_a_lone_point():
-    n = 1000
-    points = np.column_stack([np.arange(n + 1), np.zeros(n + 1), np.zeros(n + 1)])
-    angle = np.arange(n + 1) * 0.02  # a ribbon that turns over three times
-    normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
-    signs = np.random.default_rng(2).choice([-1, 1], (n + 1, 1))
-    turned = orient_normals(points, normals * signs, np.column_stack([np.arange(n - 1), np.arange(1, n)]))
-    steps = np.einsum("ij,ij->i", turned[: n - 1], turned[1:n])
-    assert (steps > 0.99).all()
-    assert np.abs(turned[n] @ normals[n]) == pytest.approx(1)
-
-
-def test_the_input_is_not_changed():
-    sample = sphere(200)
-    normals = outward_of(sample)
-    before = normals.copy()
-    orient_normals(sample.points, normals, edges_of(sample.points))
-    np.testing.assert_array_equal(normals, before)

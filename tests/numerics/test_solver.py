@@ -6,7 +6,7 @@ from scipy.sparse import csr_matrix
 
 from glsk_o3d import samples
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
-from glsk_o3d.numerics.solver import SOLVE_ACCEPTABLE, SolveError, solve_contraction
+from glsk_o3d.numerics.solver import SolveError, solve_contraction
 from glsk_o3d.ring_builder import RingBuilder
 
 
@@ -53,30 +53,6 @@ def test_against_dense_least_squares(shape, contraction):
     assert error < 1e-7
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_late_ill_conditioned_systems(shape):
-    """As after some solves: contracted points, weights of many decades."""
-    laplacian, points, size = small_system(shape)
-    weight, attraction = 5.0, np.ones(len(points))
-    rings = RingBuilder()(samples.SAMPLES[shape](n=150).points).rings
-    worst, compared = 0.0, 0
-    for _ in range(5):
-        rows = np.full(len(points), weight)
-        try:
-            x, error = solve_contraction(laplacian, rows, attraction, points)
-        except SolveError:
-            break
-        expected = least_squares(laplacian, rows, attraction, points)
-        off = np.abs(x - expected).max() / np.ptp(points, axis=0).max()
-        assert off < max(1e-7, 10 * error)
-        worst, compared = max(worst, condition(laplacian, rows, attraction)), compared + 1
-        points, weight = expected, min(3 * weight, 2048)
-        attraction = np.minimum(size / rings.nearest(points)[1], 1e4)
-        laplacian = cotangent_laplacian(points, rings)
-    assert compared >= 3
-    assert worst > 1e9
-
-
 def test_refinement_mends_what_the_factorisation_misses():
     """Normal equations of condition 1e14: the plain solution is off by far more than the refined one."""
     n = 60
@@ -94,32 +70,11 @@ def test_refinement_mends_what_the_factorisation_misses():
     assert np.abs(x - expected).max() / size < 1e-7
 
 
-@pytest.mark.parametrize("spread", [1e-3, 1e-2])
-def test_different_weights_in_every_row(spread):
+def test_different_weights_in_every_row():
     laplacian, points, _ = small_system("torus")
-    rng = np.random.default_rng(2)
-    rows, attraction = rng.uniform(spread, 1, (2, len(points))) * [[50], [1]]
+    rows, attraction = np.random.default_rng(2).uniform(1e-3, 1, (2, len(points))) * [[50], [1]]
     x, _ = solve_contraction(laplacian, rows, attraction, points)
     np.testing.assert_allclose(x, least_squares(laplacian, rows, attraction, points), atol=1e-9)
-
-
-def test_without_contraction_nothing_moves():
-    laplacian, points, _ = small_system("torus")
-    x, error = solve_contraction(laplacian, np.zeros(len(points)), np.full(len(points), 3.0), points)
-    np.testing.assert_allclose(x, points, atol=1e-15)
-    assert error < 1e-14
-
-
-def test_error_estimates_the_error():
-    laplacian, points, _ = small_system("sheet")
-    rows, attraction = np.full(len(points), 2048.0), np.full(len(points), 1e-3)
-    try:
-        x, error = solve_contraction(laplacian, rows, attraction, points)
-    except SolveError:
-        pytest.fail("this system can still be solved")
-    off = np.abs(x - least_squares(laplacian, rows, attraction, points)).max() / np.ptp(points, axis=0).max()
-    assert off <= max(10 * error, 1e-9)
-    assert error < SOLVE_ACCEPTABLE
 
 
 @pytest.mark.parametrize(
@@ -137,33 +92,3 @@ def test_refuses_what_has_no_trustworthy_solution(spoil):
     system = spoil(laplacian, np.full(len(points), 5.0), np.ones(len(points)), points)
     with pytest.raises(SolveError):
         solve_contraction(*system)
-
-
-@pytest.mark.parametrize("contraction", [1e5, 1e7])
-@pytest.mark.parametrize("shape", SHAPES)
-def test_numerically_singular_systems_are_refused_or_solved(shape, contraction):
-    laplacian, points, _ = small_system(shape)
-    rows, attraction = np.full(len(points), contraction), np.full(len(points), 1e-5)
-    try:
-        x, _ = solve_contraction(laplacian, rows, attraction, points)
-    except SolveError:
-        return
-    # the sum of the equations: L has no say in it
-    np.testing.assert_allclose(x.mean(axis=0), points.mean(axis=0), atol=SOLVE_ACCEPTABLE)
-
-
-def test_leaves_its_input_alone():
-    laplacian, points, _ = small_system("torus")
-    system = (laplacian, np.full(len(points), 5.0), np.ones(len(points)), points)
-    before = [laplacian.data.copy(), *(array.copy() for array in system[1:])]
-    for array in (laplacian.data, laplacian.indices, *system[1:]):
-        array.setflags(write=False)
-    solve_contraction(*system)
-    for array, was in zip([laplacian.data, *system[1:]], before, strict=True):
-        np.testing.assert_array_equal(array, was)
-
-
-def test_points_that_nothing_holds_are_refused():
-    laplacian, points, _ = small_system("torus")
-    with pytest.raises(SolveError):  # their squares are 0
-        solve_contraction(laplacian, np.ones(len(points)), np.full(len(points), 1e-200), points)

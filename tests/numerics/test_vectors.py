@@ -1,17 +1,14 @@
 """Rows of vectors."""
 
 import numpy as np
-import pytest
 
 from glsk_o3d.numerics.vectors import dot, norm
 
 RNG = np.random.default_rng(0)
 
 
-@pytest.mark.parametrize("n", [0, 1, 7, 1000])
-@pytest.mark.parametrize("order", ["C", "F"])
-def test_against_numpy(n, order):
-    a, b = (np.asarray(RNG.normal(size=(n, 3)), order=order) for _ in range(2))
+def test_against_numpy():
+    a, b = RNG.normal(size=(2, 100, 3))
     np.testing.assert_allclose(dot(a, b), (a * b).sum(axis=1), rtol=1e-14, atol=1e-15)
     np.testing.assert_allclose(norm(a), np.linalg.norm(a, axis=1), rtol=1e-14)
 

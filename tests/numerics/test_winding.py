@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.winding import orient_from_axis, point_areas, winding_number
-from glsk_o3d.samples import torus
 
 X = np.eye(3)[0]
 
@@ -28,14 +27,6 @@ def open_tube(n, half=False, seed=0):
     return 0.1 * normals + rng.uniform(-0.5, 0.5, (n, 1)) * X, normals
 
 
-def ring(n, seed=0):
-    """A torus of radii .4 and .1: points and normals."""
-    points = torus(n, seed=seed).points
-    flat = points * [1, 1, 0]
-    away = points - 0.4 * flat / np.linalg.norm(flat, axis=1, keepdims=True)
-    return points, away / np.linalg.norm(away, axis=1, keepdims=True)
-
-
 def areas_of(points):
     return point_areas(points, nearest_neighbours(points, min(16, len(points)))[1])
 
@@ -47,9 +38,9 @@ def field(points, normals, queries):
 # --------------------------------------------------------------------------------------------------------------- field
 
 
-@pytest.mark.parametrize("dtype", [float, np.float32])
-def test_a_ball(dtype):
-    points, normals = (each.astype(dtype) for each in ball(4000))
+def test_a_ball():
+    points, normals = ball(4000)
+    assert areas_of(points).sum() == pytest.approx(4 * np.pi, rel=0.04)
     found = field(points, normals, np.outer([0, 0.5, 0.9, 1.1, 1.5, 4], X))
     np.testing.assert_allclose(found, [1, 1, 1, 0, 0, 0], atol=0.04)
     on_it = field(points, normals, ball(500, seed=1)[0])
@@ -64,30 +55,6 @@ def test_a_tube_and_half_of_one(half):
     ends = [-0.5, 0.5] - np.array([[0], [0.25], [2]])
     exact = np.diff(ends / np.hypot(ends, 0.1), axis=1)[:, 0] / 2
     np.testing.assert_allclose(found, exact / (2 if half else 1), atol=0.04)
-
-
-def test_a_torus_is_hollow_in_its_hole_only():
-    points, normals = ring(4000)
-    angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
-    axis = 0.4 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    np.testing.assert_allclose(field(points, normals, axis), 1, atol=0.04)
-    np.testing.assert_allclose(field(points, normals, axis * np.tile([[0], [0.5], [1.5], [2]], (10, 1))), 0, atol=0.04)
-
-
-def test_two_shells():
-    (outer, away), (inner, inward) = ball(4000), ball(1000, 0.5, seed=1)
-    places = np.outer([0, 0.75, 1.25], X)
-    # one inside another of the same side counts twice; a hollow does not count
-    for sign, exact in ((1, [2, 1, 0]), (-1, [0, 1, 0])):
-        found = field(np.concatenate([outer, inner]), np.concatenate([away, sign * inward]), places)
-        np.testing.assert_allclose(found, exact, atol=0.04)
-
-
-def test_an_uneven_ball():
-    points, normals = ball(8000)
-    kept = np.random.default_rng(1).random(8000) < np.where(points[:, 0] > 0, 1, 0.1)
-    found = field(points[kept], normals[kept], np.outer([-0.7, 0, 0.9, 1.3, -1.5], X))
-    np.testing.assert_allclose(found, [1, 1, 1, 0, 0], atol=0.06)
 
 
 def test_agrees_with_the_mesh_of_libigl():
@@ -107,16 +74,6 @@ def test_agrees_with_the_mesh_of_libigl():
     np.testing.assert_allclose(found, exact, atol=0.02)
 
 
-def test_dipoles_away_from_the_query_are_those_of_the_paper():
-    points, normals = ball(300)
-    areas = areas_of(points)
-    queries = 0.5 * ball(200, seed=1)[0]
-    away = points - queries[:, None]
-    exact = np.einsum("qpi,pi,p->q", away / np.linalg.norm(away, axis=2, keepdims=True) ** 3, normals, areas)
-    assert (np.linalg.norm(away, axis=2) > np.sqrt(areas)).all()
-    np.testing.assert_allclose(winding_number(points, normals, areas, queries), exact / (4 * np.pi), atol=1e-5)
-
-
 def test_near_a_point_it_is_the_mean_over_a_ball():
     point, area = np.zeros((1, 3)), np.array([0.04])
     # seen from the dipole the mean is one over directions: what it sends out along each is constant, times the chord
@@ -132,7 +89,7 @@ def test_near_a_point_it_is_the_mean_over_a_ball():
 
 
 def test_does_not_depend_on_pose_units_or_order():
-    points, normals = ring(1500)
+    points, normals = open_tube(1500)
     rng = np.random.default_rng(0)
     queries = rng.uniform(-0.5, 0.5, (100, 3))
     before = field(points, normals, queries)
@@ -143,15 +100,6 @@ def test_does_not_depend_on_pose_units_or_order():
         np.testing.assert_allclose(field(points * unit, normals, queries * unit), before, atol=1e-4)
     order = rng.permutation(len(points))
     np.testing.assert_allclose(field(points[order], normals[order], queries), before, atol=1e-4)
-    jitter = 1e-7 * rng.normal(size=points.shape)
-    np.testing.assert_allclose(field(points + jitter, normals, queries), before, atol=1e-4)
-
-
-def test_nothing_asked_and_nothing_there():
-    points, normals = ball(100)
-    assert field(points, normals, np.empty((0, 3))).shape == (0,)
-    nothing = np.empty((0, 3))
-    assert winding_number(nothing, nothing, np.empty(0), np.zeros((2, 3))).tolist() == [0, 0]
 
 
 @pytest.mark.parametrize("n", [1, 2, 8])
@@ -164,67 +112,14 @@ def test_few_or_coincident_points(n):
     assert np.isfinite(field(points, normals, points)).all()
 
 
-def test_doubled_points_count_once():
-    points, normals = ball(2000)
-    twice = np.repeat(points, 2, axis=0)
-    np.testing.assert_allclose(field(twice, np.repeat(normals, 2, axis=0), [[0, 0, 0], X * 2]), [1, 0], atol=0.15)
-
-
 # ------------------------------------------------------------------------------------------------------ areas and signs
-
-
-@pytest.mark.parametrize(("shape", "exact"), [(ball, 4 * np.pi), (ring, 0.16 * np.pi**2)])
-def test_areas_sum_up_to_that_of_the_surface(shape, exact):
-    assert areas_of(shape(8000)[0]).sum() == pytest.approx(exact, rel=0.04)
-
-
-def test_areas_follow_the_density():
-    points, _ = ball(9000)
-    kept = np.random.default_rng(1).random(9000) < np.where(points[:, 0] > 0, 1, 0.1)
-    areas = areas_of(points[kept])
-    for side in (points[kept][:, 0] > 0, points[kept][:, 0] < 0):
-        assert areas[side].sum() == pytest.approx(2 * np.pi, rel=0.15)
-
-
-def test_areas_of_some_of_the_points():
-    points, _ = ball(200)
-    _, neighbours = nearest_neighbours(points, 16)
-    np.testing.assert_array_equal(point_areas(points, neighbours[50:60]), point_areas(points, neighbours)[50:60])
-
-
-def test_normals_without_votes_stay():
-    _, normals = ball(20)
-    _, neighbours = nearest_neighbours(normals, 8)
-    np.testing.assert_array_equal(orient_from_axis(normals, normals, normals, neighbours), normals)
-
-
-def test_normals_turn_away_from_an_axis():
-    points, normals = open_tube(200)
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], (200, 1))
-    _, neighbours = nearest_neighbours(points, 9)
-    np.testing.assert_array_equal(orient_from_axis(points, normals * signs, points[:, :1] * X, neighbours), normals)
 
 
 def test_points_that_belong_to_no_axis_follow_their_neighbours():
     """A tenth of a ball's points have an axis along the surface, or a little outside."""
-    points, normals = ball(500)
-    _, neighbours = nearest_neighbours(points, 9)
-    rng = np.random.default_rng(0)
+    (points, normals), rng = ball(500), np.random.default_rng(0)
     axis = np.zeros((500, 3))
     axis[:50] = points[:50] + 0.3 * np.cross(normals[:50], rng.normal(size=(50, 3))) + 0.1 * normals[:50]
-    order = rng.permutation(500)
-    points, normals, axis = points[order], normals[order], axis[order]
-    _, neighbours = nearest_neighbours(points, 9)
     signs = rng.choice([-1.0, 1.0], (500, 1))
-    found = orient_from_axis(points, normals * signs, axis, neighbours)
+    found = orient_from_axis(points, normals * signs, axis, nearest_neighbours(points, 9)[1])
     np.testing.assert_array_equal(found, normals)
-
-
-def test_input_is_not_changed():
-    points, normals = ball(200)
-    areas, queries = areas_of(points), points * 0.5
-    given = [points, normals, areas, queries]
-    for each in given:
-        each.flags.writeable = False
-    winding_number(*given)
-    orient_from_axis(points, normals, queries, nearest_neighbours(points, 8)[1])

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
-from glsk_o3d.preparation import denoising as module
 from glsk_o3d.preparation.denoising import RIDGE_NEIGHBOURS, subspace_mean_shift
 from glsk_o3d.preparation.surface import CLEAN_SPHERICITY, NOISE_SPHERICITY, noise_share
 
@@ -52,37 +51,12 @@ def test_noise_share_by_its_definition(seed, n, k):
     np.testing.assert_allclose(noise_share(spread, neighbours), expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("size", [1e-9, 1, 1e9])
-@pytest.mark.parametrize("density", [1, 100])
-def test_planes_and_lines_are_no_noise(size, density):
-    rng = np.random.default_rng(0)
-    plane = np.column_stack([rng.uniform(size=(300, 2)) * [density, 1], np.zeros(300)]) @ TURN
-    line = np.outer(np.linspace(0, 1, 300), [1, density, 3])
-    for points in (plane, line):
-        assert (noise_of(size * points) == 0).all()
-
-
 def test_a_ball_is_noise_and_a_surface_is_none():
     assert np.median(noise_of(np.random.default_rng(0).normal(size=(1000, 3)))) > 0.8
     assert noise_of(cylinder(0)).max() == 0
     # and in between it grows with the noise
     grown = [noise_of(cylinder(noise)).mean() for noise in (0.05, 0.1, 0.2, 0.4)]
     assert (np.diff(grown) > 0).all()
-
-
-@pytest.mark.parametrize(
-    ("least", "share"),
-    [(0, 0), (CLEAN_SPHERICITY, 0), ((CLEAN_SPHERICITY + NOISE_SPHERICITY) / 2, 0.5), (NOISE_SPHERICITY, 1), (1, 1)],
-)
-@pytest.mark.parametrize("size", [1e-150, 1, 1e150])
-def test_noise_share_between_its_limits(least, share, size):
-    spread, neighbours = size * np.tile([least, 1, 1], (5, 1)), np.arange(5)[:, None]
-    np.testing.assert_allclose(noise_share(spread, neighbours), share, atol=1e-12)
-
-
-def test_noise_share_of_the_same_spread_in_all_directions_is_one():
-    points = np.concatenate([np.eye(3), -np.eye(3)])
-    np.testing.assert_array_equal(noise_of(points, 6), 1)
 
 
 # ---- subspace-constrained mean shift
@@ -97,68 +71,27 @@ def test_points_of_a_noisy_cylinder_come_nearer_to_it():
     assert np.mean(radius) == pytest.approx(1, abs=0.05)
 
 
-def test_points_of_a_noisy_line_come_nearer_to_it_but_do_not_clump():
-    points = thread()
-    moved = subspace_mean_shift(points, np.ones(400), 4)
-    inner = np.abs(points[:, 0]) < 4
-    assert np.hypot(*moved[inner, 1:].T).mean() < np.hypot(*points[inner, 1:].T).mean() / 2
-    assert np.abs(moved - points)[inner, 0].mean() < 0.05
-    # as evenly along the line as before
-    before, after = (np.diff(np.sort(part[inner, 0])).std() for part in (points, moved))
-    assert after < 1.2 * before
-
-
-@pytest.mark.parametrize("noise", [0, 0.01])
-def test_clean_cylinder_does_not_move(noise):
-    points = cylinder(noise)
+def test_clean_cylinder_does_not_move():
+    points = cylinder(0.01)
     assert subspace_mean_shift(points, noise_of(points), 4) is points
 
 
-def test_no_passes_move_nothing():
-    points = thread()
-    assert subspace_mean_shift(points, np.ones(400), 0) is points
-
-
-def test_clean_points_stay_among_noisy_ones():
-    points = thread()
-    noise = np.arange(400) % 2.0
-    moved = subspace_mean_shift(points, noise, 3)
-    np.testing.assert_array_equal(moved[::2], points[::2])
-    assert (moved[1::2] != points[1::2]).any(axis=1).all()
-    assert not np.shares_memory(moved, points)
-
-
-@pytest.mark.parametrize("share", [0, 0.25, 0.5])
-def test_noise_says_how_much_of_the_way(share):
-    points = thread()
-    step, whole = (subspace_mean_shift(points, np.full(400, value), 1) - points for value in (share, 1.0))
-    np.testing.assert_allclose(step, share * whole, atol=1e-12)
-
-
-def test_one_pass_by_its_definition():
-    """The mean of the neighbours in a Gaussian as wide as they are, but for the way along their main direction."""
+@pytest.mark.parametrize("share", [1, 0.25])
+def test_one_pass_by_its_definition(share):
+    """A share of the way to the mean of the neighbours in a Gaussian, but for that along their main direction."""
     points = thread(n=60)
-    moved = subspace_mean_shift(points, np.ones(60), 1)
+    moved = subspace_mean_shift(points, np.full(60, share), 1)
     for x, after in zip(points, moved, strict=True):
         distance = np.linalg.norm(points - x, axis=1)
         near = points[np.argsort(distance)[:RIDGE_NEIGHBOURS]]
         squared = np.sort(distance)[:RIDGE_NEIGHBOURS] ** 2
         weight = np.exp(-squared / (2 * squared.mean()))
-        mean = np.average(near, axis=0, weights=weight)
+        way = np.average(near, axis=0, weights=weight) - x
         along = np.linalg.eigh(np.cov(near, rowvar=False, aweights=weight))[1][:, 2]
-        np.testing.assert_allclose(after, mean - along * (along @ (mean - x)), atol=1e-10)
+        np.testing.assert_allclose(after, x + share * (way - along * (along @ way)), atol=1e-10)
 
 
-def test_passes_look_at_the_cloud_as_it_came():
-    """Neighbours do not move: each point goes its way, whatever the others do."""
-    points = thread()
-    all_of_them = subspace_mean_shift(points, np.ones(400), 5)
-    for some in (np.arange(400) < 7, np.arange(400) % 3 == 0):
-        moved = subspace_mean_shift(points, some.astype(float), 5)
-        np.testing.assert_allclose(moved, np.where(some[:, None], all_of_them, points), atol=1e-12)
-
-
-@pytest.mark.parametrize(("turn", "scale", "shift"), [(TURN, 1, 0), (-np.eye(3), 1, [5, 6, 7]), (TURN, 1e-9, 0)])
+@pytest.mark.parametrize(("turn", "scale", "shift"), [(TURN, 1, [5, 6, 7]), (TURN, 1e-9, 0)])
 def test_goes_with_the_cloud(turn, scale, shift):
     points = cylinder(0.2)
     noise = noise_of(points)
@@ -166,51 +99,3 @@ def test_goes_with_the_cloud(turn, scale, shift):
     np.testing.assert_allclose(noise_of(there), noise, atol=1e-9)
     moved = (subspace_mean_shift(there, noise, 3) - shift) / scale
     np.testing.assert_allclose(moved, subspace_mean_shift(points, noise, 3) @ turn, atol=1e-8)
-
-
-def test_order_does_not_matter():
-    points = cylinder(0.2)
-    noise, order = noise_of(points), np.random.default_rng(3).permutation(1200)
-    np.testing.assert_allclose(
-        subspace_mean_shift(points[order], noise[order], 3), subspace_mean_shift(points, noise, 3)[order], atol=1e-10
-    )
-
-
-def test_chunks_do_not_show(monkeypatch):
-    points = cylinder(0.2)
-    noise = noise_of(points)
-    whole = subspace_mean_shift(points, noise, 2)
-    monkeypatch.setattr(module, "RIDGE_CHUNK", 64)
-    np.testing.assert_array_equal(subspace_mean_shift(points, noise, 2), whole)
-
-
-@pytest.mark.parametrize("n", [8, RIDGE_NEIGHBOURS - 1, RIDGE_NEIGHBOURS, RIDGE_NEIGHBOURS + 1])
-def test_few_points_are_each_others_neighbours(n):
-    points = np.random.default_rng(n).normal(size=(n, 3))
-    moved = subspace_mean_shift(points, np.ones(n), 4)
-    assert np.isfinite(moved).all()
-    diameter = np.linalg.norm(points[:, None] - points, axis=2).max()
-    assert 0 < np.linalg.norm(moved - points, axis=1).max() < diameter
-
-
-def test_the_line_itself_stays():
-    """On the ridge there is nowhere to go, at the ends neither."""
-    line = np.outer(np.linspace(-1, 1, 50), [1, 2, 2])
-    np.testing.assert_allclose(subspace_mean_shift(line, np.ones(50), 4), line, atol=1e-12)
-
-
-def test_a_point_that_stands_for_several():
-    """The mean shift goes where the weight is."""
-    rng = np.random.default_rng(0)
-    points = rng.normal(size=(31, 3)) * [3, 1, 1]
-    times = rng.integers(1, 4, 31)
-    ones = np.ones(31)
-    weighted = subspace_mean_shift(points, ones, 1, times.astype(float))
-    assert np.abs(weighted - subspace_mean_shift(points, ones, 1)).max() > 0.01
-    np.testing.assert_allclose(
-        subspace_mean_shift(points, ones, 3, 5 * ones), subspace_mean_shift(points, ones, 3), atol=1e-12
-    )
-    heavy = np.where(np.arange(31) == 4, 1e9, 1.0)
-    towards = subspace_mean_shift(points, ones, 1, heavy)
-    before, after = (np.linalg.norm(cloud - points[4], axis=1)[np.arange(31) != 4] for cloud in (points, towards))
-    assert (after < before).all()

@@ -10,8 +10,8 @@ from glsk_o3d.preparation.frame import FRAME_SIDE, Frame, check_extent
 CLOUD = np.random.default_rng(0).normal(size=(500, 3)) * [1, 3, 0.2]
 
 
-@pytest.mark.parametrize("scale", [1e-300, 1e-12, 1.0, 1e12, 1e300])
-@pytest.mark.parametrize("offset", [0, -7, 1e6])
+@pytest.mark.parametrize("scale", [1e-300, 1.0, 1e300])
+@pytest.mark.parametrize("offset", [0, 1e6])
 def test_frame_is_centred_and_1_6_wide(scale, offset):
     points = (CLOUD + offset) * scale
     frame = Frame.of(points)
@@ -31,33 +31,7 @@ def test_frame_of_a_large_offset_costs_no_digits():
     np.testing.assert_allclose(far.out_of(near.into(exact)), exact + 1e6, atol=3e-10, rtol=0)
 
 
-def test_frame_keeps_angles_and_ratios():
-    frame = Frame.of(CLOUD)
-    a, b = frame.into(CLOUD[:250]), frame.into(CLOUD[250:])
-    np.testing.assert_allclose(
-        np.linalg.norm(a - b, axis=1) * frame.scale, np.linalg.norm(CLOUD[:250] - CLOUD[250:], axis=1)
-    )
-
-
-def test_frame_of_a_flat_cloud():
-    frame = Frame.of(CLOUD * [1, 1, 0] + [0, 0, 5])
-    assert frame.half_extent[2] == 0
-    assert frame.centre[2] == 5
-
-
-def test_frame_does_not_overflow_half_way():
-    points = np.array([[1.5e308, 0, 0], [1.6e308, 1e306, 0]])
-    frame = Frame.of(points)
-    np.testing.assert_allclose(np.abs(frame.into(points)[:, 0]), FRAME_SIDE / 2)
-
-
 # ---- the box with the spread of the points
-
-
-def lattice(sides, n):
-    """Middles of n^3 equal cells of a box."""
-    share = (np.arange(n) + 0.5) / n - 0.5
-    return np.stack(np.meshgrid(share, share, share), axis=-1).reshape(-1, 3) * sides
 
 
 def size(frame):
@@ -65,22 +39,21 @@ def size(frame):
     return np.array([FRAME_SIDE, frame.diagonal]) * frame.scale
 
 
-@pytest.mark.parametrize("n", [2, 5, 16])
-@pytest.mark.parametrize("sides", [(1, 1, 1), (1, 3, 2), (7, 0.5, 0), (0, 0, 2)])
-def test_spread_of_an_evenly_filled_box_is_that_box(n, sides):
-    """n points to a side have 1 - 1 / n^2 of its variance."""
-    points = lattice(sides, n)
+@pytest.mark.parametrize("sides", [(1, 3, 2), (7, 0.5, 0), (0, 0, 2)])
+def test_spread_of_an_evenly_filled_box_is_that_box(sides):
+    """Middles of n^3 equal cells of it: n points to a side have 1 - 1 / n^2 of its variance."""
+    n = 5
+    share = (np.arange(n) + 0.5) / n - 0.5
+    points = np.stack(np.meshgrid(share, share, share), axis=-1).reshape(-1, 3) * sides
     expected = np.array([max(sides), np.linalg.norm(sides)])
     np.testing.assert_allclose(size(Frame.of(points, "spread")), expected * np.sqrt(1 - 1 / n**2), rtol=1e-12)
     # the bounding box of the middles lacks half a cell on every side
     np.testing.assert_allclose(size(Frame.of(points)), expected * (1 - 1 / n), rtol=1e-12)
 
 
-@pytest.mark.parametrize("scale", [1e-12, 1, 1e12])
-@pytest.mark.parametrize("shift", [0, -7, 1e4])
-@pytest.mark.parametrize("seed", range(3))
-def test_spread_goes_with_the_cloud(seed, shift, scale):
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize("scale", [1e-12, 1e12])
+def test_spread_goes_with_the_cloud(scale):
+    rng, shift = np.random.default_rng(0), 1e4
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     moved = (rng.permutation(CLOUD) @ turn + shift) * scale
     frame, expected = Frame.of(moved, "spread"), Frame.of(CLOUD, "spread")
@@ -90,54 +63,19 @@ def test_spread_goes_with_the_cloud(seed, shift, scale):
     assert np.abs(size(Frame.of(moved)) / size(Frame.of(CLOUD)) / scale - 1).max() > 0.01
 
 
-@pytest.mark.parametrize("offset", [0, 1e6])
-def test_spread_leaves_the_centre_of_the_bounding_box(offset):
-    points = CLOUD + offset
-    frame, box = Frame.of(points, "spread"), Frame.of(points, "box")
-    np.testing.assert_array_equal(frame.centre, box.centre)
-    np.testing.assert_allclose(frame.half_extent * frame.scale, box.half_extent * box.scale, rtol=1e-14)
-    inside = frame.into(points)
-    np.testing.assert_allclose(inside.max(axis=0), frame.half_extent, rtol=1e-8)
-    np.testing.assert_allclose(frame.out_of(inside), points, rtol=0, atol=4e-15 * max(1, offset))
-
-
 # ---- Morton order
 
 
-def code(cell, bits=21):
-    """Bits of x, y, z interleaved, x lowest."""
-    return sum(((int(c) >> bit) & 1) << (3 * bit + axis) for bit in range(bits) for axis, c in enumerate(cell))
+def test_against_interleaved_python_integers():
+    """Bits of x, y, z, x lowest."""
 
+    def code(cell):
+        return sum(((int(c) >> bit) & 1) << (3 * bit + axis) for bit in range(21) for axis, c in enumerate(cell))
 
-def test_corners_of_a_cube_come_with_x_fastest():
-    corners = np.array([[x, y, z] for z in (0.0, 1) for y in (0.0, 1) for x in (0.0, 1)])
-    shuffled = np.random.default_rng(1).permutation(8)
-    np.testing.assert_array_equal(corners[shuffled][morton_order(corners[shuffled])], corners)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_against_interleaved_python_integers(seed):
-    cells = np.random.default_rng(seed).integers(0, 2**21, (300, 3))
+    cells = np.random.default_rng(0).integers(0, 2**21, (300, 3))
     cells[:2] = [0, 0, 0], [2**21 - 1] * 3  # these span the box, so that cells are what they are
     expected = sorted(range(300), key=lambda i: code(cells[i]))
     assert morton_order(cells.astype(float)).tolist() == expected
-
-
-@pytest.mark.parametrize("flatten", [(1, 1, 1), (1, 1, 0), (0, 1, 0)])
-def test_is_a_permutation_that_does_not_depend_on_place_or_size(flatten):
-    points = np.round(CLOUD * 2**20) / 2**20 * flatten
-    order = morton_order(points)
-    np.testing.assert_array_equal(np.sort(order), np.arange(len(points)))
-    np.testing.assert_array_equal(morton_order(points * 2.0**-30), order)
-    np.testing.assert_array_equal(morton_order(points + 1024), order)
-
-
-def test_is_stable():
-    np.testing.assert_array_equal(morton_order(np.ones((50, 3))), np.arange(50))
-    thrice = np.tile(CLOUD, (3, 1))
-    order = morton_order(thrice)
-    np.testing.assert_array_equal(order.reshape(-1, 3) % 500, np.repeat(morton_order(CLOUD), 3).reshape(-1, 3))
-    assert (np.diff(order.reshape(-1, 3)) == 500).all()
 
 
 def test_points_in_one_cell_are_sorted_by_their_coordinates():
@@ -157,11 +95,3 @@ def test_what_is_lost_in_rounding_is_refused(offset, fine):
         return check_extent(points)
     with pytest.raises(InvalidCloudError, match=r"lost in rounding; subtract an offset before"):
         check_extent(points)
-
-
-def test_neighbours_in_the_order_are_neighbours_in_space():
-    points = np.random.default_rng(2).uniform(size=(4096, 3))
-    step = np.linalg.norm(np.diff(points[morton_order(points)], axis=0), axis=1)
-    # 16 points to a side: steps of about one spacing, where random ones are 0.66 long
-    assert np.median(step) < 1.5 / 16
-    assert step.mean() < 2.5 / 16

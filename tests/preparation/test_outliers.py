@@ -14,9 +14,9 @@ K, N = 16, 12000
 SURFACE = samples.torus(N, ring_radius=0.4, radius=0.1).points
 
 
-def left(points, weight=None, factor=2.5, least=8):
+def left(points, weight=None):
     weight = np.ones(len(points)) if weight is None else weight
-    return inliers(points, weight, *nearest_neighbours(points, K), factor, least)[0]
+    return inliers(points, weight, *nearest_neighbours(points, K), 2.5, 8)[0]
 
 
 def floating(n, seed=0, reach=0.6):
@@ -25,14 +25,14 @@ def floating(n, seed=0, reach=0.6):
     return points[cKDTree(SURFACE).query(points)[0] > 0.05][:n]
 
 
-@pytest.mark.parametrize("n", [1, 10, 200, 600])
+@pytest.mark.parametrize("n", [1, 200])
 def test_points_that_float_around_a_surface(n):
     """A few stand out alone; many have each other for neighbours."""
     points = np.concatenate([SURFACE, floating(n)])
     np.testing.assert_array_equal(left(points), np.arange(N))
 
 
-@pytest.mark.parametrize("n", [5, 15, 30, 300])
+@pytest.mark.parametrize("n", [5, 300])
 def test_islands_far_away(n):
     """Whether their neighbourhoods reach back to the surface, or hold nothing but themselves."""
     island = [3, 0, 0] + np.random.default_rng(1).uniform(-0.3, 0.3, (n, 3))
@@ -46,60 +46,11 @@ def test_sparse_surfaces_stay(n, shift):
     assert len(left(np.concatenate([SURFACE, part]))) == N + n
 
 
-def limb(n, radius, noise):
-    rng = np.random.default_rng(1)
-    angle, along = rng.uniform(0, 2 * np.pi, n), rng.uniform(0, 0.6, n)
-    points = np.column_stack([along, radius * np.cos(angle), radius * np.sin(angle)])
-    return points + noise * rng.normal(size=(n, 3)) + [0.5, 0, 0]
-
-
-@pytest.mark.parametrize(("n", "radius", "noise"), [(200, 0.02, 0.005), (100, 0.01, 0.003), (400, 0.02, 0.005)])
-def test_sparse_limbs_of_a_dense_part_stay(n, radius, noise):
-    """All around a thin limb its neighbourhoods are as thick as long; a wider one knows better."""
-    points = np.concatenate([SURFACE, limb(n, radius, noise)])
-    found = np.ones(len(points), bool)
-    found[left(points)] = False
-    assert not found[:N].any()
-    assert found.sum() < 0.1 * n
-
-
-@pytest.mark.parametrize("scale", [0.2, 1, 4])
+@pytest.mark.parametrize("scale", [0.2, 4])
 def test_another_noisy_object_stays(scale):
     """However much coarser it is: a tenth of the points are no outliers."""
     other = scale * samples.torus(3000, noise=0.02, seed=1).points + [4, 0, 0]
     assert len(left(np.concatenate([SURFACE, other]))) > N + 2900
-
-
-def test_more_neighbours_than_points_are_left():
-    points = np.concatenate([samples.torus(200).points, floating(6, reach=3)])
-    for k in (100, 203, 206):
-        kept = inliers(points, np.ones(206), *nearest_neighbours(points, k), 2.5, 8)[0]
-        np.testing.assert_array_equal(kept, np.arange(200))
-
-
-def test_what_floats_around_a_part_with_a_tenth_of_the_points():
-    """The other part is so coarse that nothing is far from its neighbours by the measure of most points."""
-    part, other = samples.torus(2000).points, 20 * samples.torus(20000, seed=1).points + [80, 0, 0]
-    points = np.concatenate([part, other, floating(300)])
-    found = np.ones(len(points), bool)
-    found[left(points)] = False
-    assert not found[:22000].any()
-    assert found[22000:].mean() > 0.85
-
-
-def test_a_few_points_close_together_make_no_outliers_of_those_around():
-    """A clump of a fortieth of the points in a noisy cloud, whose neighbourhoods fill space."""
-    clump = [0.4, 0, 0.1] + 0.01 * np.random.default_rng(0).normal(size=(300, 3))
-    points = np.concatenate([samples.torus(N, noise=0.02).points, clump])
-    assert len(points) - len(left(points)) < 20
-
-
-@pytest.mark.parametrize("noise", [0, 0.003])
-def test_uneven_clouds_stay(noise):
-    """Ten times as dense at one end as at the other."""
-    points = samples.tube(30000, noise=noise).points
-    keep = np.random.default_rng(0).random(len(points)) < 10 ** (points[:, 0] / np.ptp(points[:, 0]) - 0.5)
-    assert len(left(points[keep])) > 0.999 * keep.sum()
 
 
 def test_where_each_point_stands_for_many():
@@ -122,15 +73,3 @@ def test_it_does_not_matter_how_the_cloud_lies():
     np.testing.assert_array_equal(left(turned), kept)
     order = rng.permutation(len(points))
     np.testing.assert_array_equal(np.sort(order[left(points[order])]), kept)
-
-
-@pytest.mark.parametrize("least", [N + 190, N + 250])
-def test_so_many_stay_at_least(least):
-    points = np.concatenate([SURFACE, floating(200)])
-    assert len(left(points, least=least)) == len(points)
-
-
-def test_nothing_is_left_to_find():
-    points = np.concatenate([SURFACE, floating(400)])
-    kept = left(points)
-    np.testing.assert_array_equal(left(points[kept]), np.arange(len(kept)))

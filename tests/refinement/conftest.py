@@ -1,5 +1,6 @@
 """Skeletons made by hand."""
 
+import warnings
 from dataclasses import replace
 from itertools import pairwise
 
@@ -7,67 +8,32 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import Skeleton
+from glsk_o3d import Refiner, Skeleton, SkeletonWarning
+
+NOTHING = dict(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0, surface=0)
 
 
 @pytest.fixture(scope="session")
-def ringed():
-    """A skeleton each of whose vertices owns `per` points at exactly the distance `radius`, normals outward."""
+def refine():
+    """The Refiner with none of its steps but those that are asked for, and without what it warns of."""
 
-    def make(vertices, edges, radius=0.1, per=12, seed=0):
-        vertices = np.asarray(vertices, float)
-        m = len(vertices)
-        radius, owner = np.broadcast_to(radius, m), np.repeat(np.arange(m), per)
-        normals = np.random.default_rng(seed).normal(size=(len(owner), 3))
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        edges = sorted({(min(a, b), max(a, b)) for a, b in edges})
-        points = vertices[owner] + radius[owner, None] * normals
-        return Skeleton(vertices, edges, radius, owner, points, normals)
+    def run(skeleton, **steps):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SkeletonWarning)
+            return Refiner(**(NOTHING | steps))(skeleton)
 
-    return make
-
-
-@pytest.fixture(scope="session")
-def around():
-    """A skeleton whose points belong to their nearest vertex."""
-
-    def make(vertices, edges, points, normals, radius=0.1):
-        owner = cKDTree(vertices).query(points)[1]
-        return Skeleton(vertices, edges, np.full(len(vertices), radius), owner, points, normals)
-
-    return make
+    return run
 
 
 @pytest.fixture(scope="session")
 def placed():
-    """A skeleton turned, in another unit of length, and elsewhere."""
+    """A skeleton turned, in another unit of length, and elsewhere; and the turn."""
 
-    def make(skeleton, turn=1, scale=1.0, shift=0.0):
-        turn = np.linalg.qr(np.random.default_rng(turn).normal(size=(3, 3)))[0] if np.ndim(turn) == 0 else turn
+    def make(skeleton, scale=1.0, shift=0.0):
+        turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
         vertices, points = (scale * places @ turn + shift for places in (skeleton.vertices, skeleton.points))
         radii = scale * skeleton.radii
         return replace(skeleton, vertices=vertices, points=points, normals=skeleton.normals @ turn, radii=radii), turn
-
-    return make
-
-
-@pytest.fixture(scope="session")
-def renumbered():
-    """A skeleton whose vertex v is called name[v], with its points in another order."""
-
-    def make(skeleton, name, order=None):
-        old = np.argsort(name)
-        order = np.arange(len(skeleton.points)) if order is None else order
-        return replace(
-            skeleton,
-            vertices=skeleton.vertices[old],
-            radii=skeleton.radii[old],
-            confidence=skeleton.confidence[old],
-            edges=np.unique(np.sort(name[skeleton.edges], axis=1), axis=0),
-            points=skeleton.points[order],
-            normals=skeleton.normals[order],
-            vertex_of_point=name[skeleton.vertex_of_point[order]],
-        )
 
     return make
 
@@ -89,13 +55,18 @@ def random_skeleton():
     return make
 
 
-def pipe(path, radius=0.1, spacing=0.03, side=None, seed=0):
-    """Points of an open tube around a polyline, anywhere on it, and their outward normals; of one side, if it is given.
+def line(start, stop, step):
+    """Vertices of a straight line, evenly."""
+    n = max(round(np.linalg.norm(stop - start) / step), 1)
+    return start + np.linspace(0, 1, n + 1)[:, None] * (stop - start)
+
+
+def pipe(path, radius, spacing, side, seed):
+    """Points anywhere on an open tube around a polyline, and their outward normals; of one side, if it is given.
 
     `spacing` is the root of the area of a point.
     """
-    path, rng = np.asarray(path, float), np.random.default_rng(seed)
-    steps = np.diff(path, axis=0)
+    rng, steps = np.random.default_rng(seed), np.diff(path, axis=0)
     length = np.linalg.norm(steps, axis=1)
     n = round(2 * np.pi * radius * length.sum() / spacing**2)
     place = rng.uniform(0, length.sum(), n)
@@ -118,16 +89,6 @@ def off_axis(points, path):
     return np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1)
 
 
-def _array(path):
-    return np.asarray(path, float)
-
-
-def line(start, stop, step=0.05):
-    """Vertices of a straight line, evenly."""
-    n = max(round(np.linalg.norm(stop - start) / step), 1)
-    return start + np.linspace(0, 1, n + 1)[:, None] * (stop - start)
-
-
 @pytest.fixture(scope="session")
 def piped():
     """A skeleton in the axes of tubes: the vertices of the lines, those at one place once, and tubes around some lines.
@@ -135,29 +96,28 @@ def piped():
     Normals have either sign. Of a tube what is inside of another is left out.
     """
 
-    def make(lines, tubes=None, radius=0.1, confidence=0.95, step=0.05, **options):
-        lines = [
-            np.concatenate([it[:1], *(line(a, b, step)[1:] for a, b in pairwise(it))]) for it in map(_array, lines)
+    def make(lines, tubes=None, radius=0.1, step=0.05, spacing=0.03, side=None):
+        paths = [
+            np.concatenate([corners[:1], *(line(a, b, step)[1:] for a, b in pairwise(corners))])
+            for corners in (np.asarray(corners, float) for corners in lines)
         ]
         tubes = range(len(lines)) if tubes is None else tubes
-        vertices, which = np.unique(np.concatenate(lines).round(9), axis=0, return_inverse=True)
+        vertices, which = np.unique(np.concatenate(paths).round(9), axis=0, return_inverse=True)
         edges, first = set(), 0
-        for it in lines:
-            names = which.ravel()[first : first + len(it)].tolist()
+        for path in paths:
+            names = which.ravel()[first : first + len(path)].tolist()
             edges |= {(min(a, b), max(a, b)) for a, b in pairwise(names)}
-            first += len(it)
+            first += len(path)
         points, normals = [], []
         for k in tubes:
-            p, n = pipe(lines[k], radius, seed=k, **options)
-            free = np.all([off_axis(p, lines[other]) > 0.99 * radius for other in tubes if other != k], axis=0)
-            points.append(p[free] if len(tubes) > 1 else p)
-            normals.append(n[free] if len(tubes) > 1 else n)
+            surface, outward = pipe(paths[k], radius, spacing, side, seed=k)
+            others = [off_axis(surface, paths[other]) > 0.99 * radius for other in tubes if other != k]
+            free = np.all([np.full(len(surface), True), *others], axis=0)
+            points.append(surface[free])
+            normals.append(outward[free])
         points, normals = np.concatenate(points), np.concatenate(normals)
         normals *= np.random.default_rng(0).choice([-1.0, 1.0], (len(points), 1))
         owner = cKDTree(vertices).query(points)[1]
-        m = len(vertices)
-        return Skeleton(
-            vertices, sorted(edges), np.full(m, radius), owner, points, normals, confidence=np.full(m, confidence)
-        )
+        return Skeleton(vertices, sorted(edges), np.full(len(vertices), radius), owner, points, normals)
 
     return make

@@ -1,13 +1,10 @@
 """Parts without a surface are traced, those with one stay; with a root everything is one tree."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, Tracer, pipelines, samples
-from glsk_o3d.refinement.thin_parts import SpacedPoints, one_direction, without_surface
+from glsk_o3d import InvalidParameterError, Refiner, pipelines, samples
 
 RNG = np.random.default_rng(3)
 ROOT, FORK = np.zeros(3), np.array([0, 0, 1.0])
@@ -54,13 +51,10 @@ def test_twigs_that_are_lines_of_points(grown):
     assert (grown.n_components, grown.n_loops, len(grown.leaves), len(grown.junctions)) == (1, 0, 3, 1)
     assert distance(grown.vertices, TWIGS).max() < 0.02
     assert grown.report.n_traced == 500
+    assert (grown.confidence == 0).all()
+    assert 0.5 < np.median(grown.radii) / (np.sqrt(2) * 0.005) < 1.2  # their spread
     tips = np.array([ROOT, *(stop for _, stop in TWIGS[1:])])
     assert np.linalg.norm(tips[:, None] - grown.vertices[grown.leaves], axis=2).min(axis=1).max() < 0.03
-
-
-def test_their_radius_is_their_spread_and_their_confidence_says_so(grown):
-    assert (grown.confidence == 0).all()
-    assert 0.5 < np.median(grown.radii) / (np.sqrt(2) * 0.005) < 1.2
 
 
 def test_a_tree_grows_from_vertex_0_along_its_edges(grown):
@@ -73,49 +67,32 @@ def test_a_tree_grows_from_vertex_0_along_its_edges(grown):
     np.testing.assert_allclose(table.start_point[table.level == 0][0], ROOT, atol=0.03)
 
 
-@pytest.mark.filterwarnings("error")
-def test_nothing_is_wrong_with_that(sparse):
-    skeleton = glsk.skeletonize(sparse)
-    assert skeleton.report.warnings == ()
-    assert np.isnan(skeleton.normals).all()
-
-
-@pytest.mark.parametrize(
-    ("root", "place"),
-    [
-        ("z", ROOT),
-        ("-x", TWIGS[1][1]),
-        ("2,0,2", TWIGS[1][1]),
-        ((2, 0, 2), TWIGS[1][1]),
-        (np.float32([2, 0, 2]), TWIGS[1][1]),
-    ],
-)
+@pytest.mark.parametrize(("root", "place"), [("z", ROOT), ("-x", TWIGS[1][1]), (np.float32([2, 0, 2]), TWIGS[1][1])])
 def test_roots(sparse, root, place):
     skeleton = pipelines.tree(root)(sparse)
     np.testing.assert_allclose(skeleton.vertices[0], place, atol=0.05)
     assert (skeleton.n_components, skeleton.n_loops) == (1, 0)
 
 
-def test_the_thickest_end():
-    skeleton = pipelines.tree("thickest")(samples.y_junction(2000).points)
-    first = skeleton.leaves[np.argmax(skeleton.radii[skeleton.leaves])]
-    assert first == 0
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_the_thickest_end_of_a_sparse_tree_is_that_of_the_trunk(seed):
-    skeleton = pipelines.tree("thickest")(samples.tree(4096, forks=6, seed=seed).points)
+def test_the_thickest_end_of_a_sparse_tree_is_that_of_the_trunk():
+    skeleton = pipelines.tree("thickest")(samples.tree(2048, forks=5).points)
     assert np.linalg.norm(skeleton.vertices[0]) < 0.15
+
+
+def test_a_point_is_kept_as_text_that_a_recipe_can_hold():
+    assert Refiner(root=(0.1, 2, np.float32(3))) == Refiner(root="0.1,2.0,3.0")
 
 
 @pytest.mark.parametrize("root", ["up", "1,2", "1,2,nan", 3, (1, 2), ("a", "b", "c"), [[1], [2, 3], 4]])
 def test_no_root(root):
     with pytest.raises(InvalidParameterError, match="a point such as"):
-        Tracer(root=root).check()
+        Refiner(root=root).check()
 
 
-def test_a_point_is_kept_as_text_that_a_recipe_can_hold():
-    assert Tracer(root=(0.1, 2, np.float32(3))) == Tracer(root="0.1,2.0,3.0")
+def test_what_floats_far_away_is_no_part(sparse):
+    skeleton = pipelines.tree()(np.concatenate([sparse, [[4, 4, 4], [-4, 4, 0]]]))
+    assert len(skeleton.leaves) == 3
+    assert (skeleton.vertex_of_point >= 0).all()
 
 
 def test_gaps_are_joined_and_told(sparse):
@@ -139,7 +116,7 @@ def test_a_ring_of_points_stays_a_loop():
 
 def test_a_trunk_with_a_surface_stays_what_it_was():
     cloud = np.concatenate([tube(1500), scattered([(ROOT, FORK), *TWIGS[1:]], 700)])
-    before = pipelines.default().with_options({"Tracer.surface": 0})(cloud)
+    before = pipelines.default().with_options({"Refiner.surface": 0})(cloud)
     skeleton = pipelines.tree()(cloud)
     assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 0, 3)
     trunk, twigs = skeleton.vertices[:, 2] < -0.3, skeleton.vertices[:, 2] > 0.2
@@ -151,51 +128,27 @@ def test_a_trunk_with_a_surface_stays_what_it_was():
     assert kept == {tuple(place) for place in skeleton.vertices[trunk].tolist()}
 
 
-def test_what_floats_far_away_is_no_part(sparse):
-    stray = np.concatenate([sparse, [[4, 4, 4], [-4, 4, 0]]])
-    skeleton = pipelines.tree()(stray)
-    assert len(skeleton.leaves) == 3
-    assert (skeleton.vertex_of_point >= 0).all()
-    assert skeleton.radii.max() < 0.02
-
-
 @pytest.mark.parametrize(
     "cloud",
     [
         samples.torus(2000).points,
         samples.y_junction(600).points,
         np.column_stack([RNG.random((2000, 2)), np.zeros(2000)]),
-        np.column_stack([RNG.random((500, 2)) * [1, 0.2], 0.01 * RNG.normal(size=500)]),
         RNG.random((2000, 3)),
     ],
-    ids=["torus", "y", "sheet", "noisy strip", "filled"],
+    ids=["torus", "y", "sheet", "filled"],
 )
 def test_surfaces_sheets_and_clouds_are_not_traced(cloud):
     assert pipelines.default()(cloud).report.n_traced == 0
 
 
+@pytest.mark.slow
 def test_a_large_cloud_has_the_surface_that_its_points_show():
     """Of a sample of a few ten thousand the twigs would look thinner than their points are apart."""
-    drawn = samples.tree(60_000, forks=6, seed=4, noise=0.0005)
+    drawn = samples.tree(30_000, forks=5, seed=4, noise=0.0005)
     found = pipelines.default()(drawn.points)
     assert found.report.n_traced == 0
-    assert len(found.leaves) == 2**6 + 1
-
-
-def test_nothing_is_traced_without_a_say(sparse):
-    fitted = pipelines.default().with_options({"Tracer.surface": 0})(sparse)
-    assert not without_surface(SpacedPoints(fitted), 0.0).any()
-    unknown = replace(fitted, confidence=np.full(len(fitted.vertices), np.nan))
-    assert not without_surface(SpacedPoints(unknown), 0.65).any()
-    assert without_surface(SpacedPoints(fitted), 0.65).all()
-
-
-def test_normals_of_a_tube_and_of_a_plane():
-    cloud = SpacedPoints(glsk.skeletonize(tube(2000)))
-    assert abs(np.median(one_direction(cloud.normals, cloud.links)) - 0.9) < 0.1  # of a small piece of it
-    flat = np.tile([0, 0, 1.0], (len(cloud.points), 1))
-    np.testing.assert_allclose(one_direction(flat, cloud.links), 1)
-    np.testing.assert_allclose(one_direction(np.full_like(flat, np.nan), cloud.links), 0)
+    assert len(found.leaves) == 2**5 + 1
 
 
 def test_without_points_a_graph_becomes_a_tree():
@@ -203,8 +156,7 @@ def test_without_points_a_graph_becomes_a_tree():
         [[0, 0, 0], [1, 0, 0], [1, 0, 1.1], [0, 0, 1], [0, 0, 3]], [(0, 1), (1, 2), (2, 3), (0, 3)], np.ones(5),
         np.empty(0, int), np.empty((0, 3)), np.empty((0, 3)),
     )  # fmt: skip
-    tree = Tracer(root="z")(square)
+    tree = Refiner(root="z", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(square)
     assert (tree.n_components, tree.n_loops, len(tree.vertices)) == (1, 0, 5)
-    assert tree.report.joined == (((0.0, 0.0, 3.0), (0.0, 0.0, 1.0)),) or tree.report.joined == (
-        ((0.0, 0.0, 1.0), (0.0, 0.0, 3.0)),
-    )
+    (gap,) = tree.report.joined
+    assert set(gap) == {(0.0, 0.0, 1.0), (0.0, 0.0, 3.0)}

@@ -1,0 +1,235 @@
+"""Loops, limbs, branches that cross air, and gaps: what the surface says of them, in closed cases."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glsk_o3d import Report, skeletonize
+from glsk_o3d.samples.capsules import union_sample
+
+X, Y, Z = np.eye(3)
+TUBE = [[(-1, 0, 0), (1, 0, 0)]]
+TORUS = [[(np.cos(t), np.sin(t), 0) for t in np.arange(25) * np.pi / 12]]
+FORK = [[(0, 0, 0), (0, 0, -1)], [(0, 0, 0), (0.7, 0, 0.7)], [(0, 0, 0), (-0.7, 0, 0.7)]]
+LADDER = [[(-0.8, y, 0), (0, y, 0), (0.8, y, 0)] for y in (0, 0.5)] + [[(x, 0, 0), (x, 0.5, 0)] for x in (-0.8, 0, 0.8)]
+ACROSS = [[(-1, y, 0), (0, y, 0), (1, y, 0)] for y in (0, 0.5)] + [[(0, 0, 0), (0, 0.5, 0)]]
+"""Two parallel tubes, and an edge from one to the other."""
+SIDES = pytest.mark.parametrize("side", [None, Z + 0.3 * Y], ids=["whole", "one side"])
+
+
+def counts(skeleton):
+    return skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)
+
+
+def assert_unchanged(skeleton, raw):
+    np.testing.assert_allclose(skeleton.vertices, raw.vertices, atol=1e-12)
+    np.testing.assert_array_equal(skeleton.edges, raw.edges)
+    np.testing.assert_array_equal(skeleton.vertex_of_point, raw.vertex_of_point)
+
+
+# ---- loops
+
+
+@SIDES
+@pytest.mark.parametrize(("lines", "loops"), [(LADDER, 2), (TORUS, 1)], ids=["ladder", "torus"])
+def test_handles_stay(piped, refine, lines, loops, side):
+    raw = piped(lines, side=side)
+    skeleton = refine(raw, handle=0.5)
+    assert_unchanged(skeleton, raw)
+    assert [(it.about, it.changed) for it in skeleton.report.judgements] == loops * [("loop", False)]
+    assert min(it.probability for it in skeleton.report.judgements) > 0.9
+
+
+def strands(piped, gap, length, **options):
+    """A tube with two strands in it that meet at both ends."""
+    a, b = length / 2, length / 2 - 0.05
+    middle = [[(-a, 0, 0), (-b, y, 0), (b, y, 0), (a, 0, 0)] for y in (-gap / 2, gap / 2)]
+    around, raw = piped(TUBE, **options), piped([*middle, [(-1, 0, 0), (-a, 0, 0)], [(a, 0, 0), (1, 0, 0)]])
+    owner = np.argmin(np.linalg.norm(around.points[:, None] - raw.vertices, axis=2), axis=1)
+    return replace(raw, points=around.points, normals=around.normals, vertex_of_point=owner)
+
+
+@SIDES
+@pytest.mark.parametrize("gap", [0.06, 0.12, 0.16])
+def test_two_strands_in_one_tube_become_a_path(piped, refine, gap, side):
+    raw = strands(piped, gap, 1.5, side=side)
+    skeleton = refine(raw, handle=0.5)
+    assert (raw.n_loops, counts(skeleton), len(skeleton.junctions)) == (1, (1, 0, 2), 0)
+    assert np.abs(skeleton.vertices[:, 1]).max() < 0.4 * gap
+    assert skeleton.report.n_loops_closed == (gap > 0.15)  # narrower ones are collapsed before anybody asks
+    assert refine(raw).n_loops == 1
+
+
+def test_a_wide_loop_is_cut_where_nothing_hangs_together(piped, refine):
+    """A ring of which an eighth is in air, joined by hand; whatever is asked of a handle, it is none."""
+    raw = piped([[(np.cos(t), np.sin(t), 0) for t in np.arange(4, 29) * np.pi / 16]])
+    ends = np.sort(np.argsort(raw.vertices @ X)[-2:])
+    closed = replace(raw, edges=np.unique([*raw.edges.tolist(), ends.tolist()], axis=0))
+    skeleton = refine(closed, handle=1.0)
+    assert (closed.n_loops, counts(skeleton)) == (1, (1, 0, 2))
+    assert skeleton.report.n_loops_closed == 1
+    np.testing.assert_allclose(skeleton.vertices[skeleton.leaves], raw.vertices[raw.leaves], atol=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:uncertain topology")  # one of a hundred questions may be a close call
+def test_an_object_of_many_parts_keeps_them():
+    """What is enough for a figure leaves a ladder's rungs a few points each, and no inside."""
+    rungs = 28
+    height = 0.3 * np.arange(rungs)
+    nodes = np.concatenate([np.column_stack([np.full(rungs, x), np.zeros(rungs), height]) for x in (0, 0.4)])
+    up = np.column_stack([np.arange(rungs - 1), np.arange(1, rungs)])
+    edges = np.concatenate([up, up + rungs, np.column_stack([np.arange(rungs), rungs + np.arange(rungs)])])
+    ladder = union_sample("ladder", nodes, edges, np.full(2 * rungs, 0.025), 50000, 0, 0)
+    assert counts(skeletonize(ladder.points)) == (1, rungs - 1, 0)
+
+
+# ---- limbs
+
+
+def twig(piped, reach, tubes=None):
+    """A tube and an edge path from its middle, `reach` radii long."""
+    return piped([[(-1, 0, 0), (0, 0, 0), (1, 0, 0)], [(0, 0, 0), (0, 0.1 * reach, 0)]], tubes=tubes)
+
+
+def test_a_branch_is_a_limb_as_far_as_its_points_reach(piped, refine):
+    """However long its curve is."""
+    assert counts(refine(twig(piped, 5, tubes=[0]), limb=0.25)) == (1, 0, 2)
+    found = []
+    for reach in (0.8, 1.5, 2, 3, 5):
+        skeleton = refine(twig(piped, reach), limb=1e-9)
+        assert len(skeleton.leaves) == 3
+        (tip,) = (it for it in skeleton.report.judgements if it.place[1] > 0)
+        assert (tip.about, tip.changed) == ("limb", False)
+        found.append(tip.probability)
+    assert (np.diff(found) > 0).all()
+    assert found[1] < 0.25 < found[2] < 0.5 < found[3]
+    assert refine(twig(piped, 0.8)).report.judgements == ()  # 0 does not ask
+
+
+def test_a_spur_goes_whole_and_nothing_else(piped, refine):
+    raw, stays = twig(piped, 0.8), twig(piped, 3)
+    skeleton = refine(raw, limb=0.25)
+    left = raw.vertices[:, 1] == 0
+    np.testing.assert_allclose(skeleton.vertices, raw.vertices[left], atol=1e-12)
+    (place,) = np.flatnonzero((skeleton.vertices == 0).all(axis=1))
+    owner = raw.vertex_of_point
+    np.testing.assert_array_equal(skeleton.vertex_of_point[~left[owner]], place)  # the fork takes its points
+    places = skeleton.vertices[skeleton.vertex_of_point[left[owner]]]
+    np.testing.assert_allclose(places, raw.vertices[owner[left[owner]]], atol=1e-12)
+    (gone,) = skeleton.report.judgements
+    for least, leaves in ((gone.probability - 1e-9, 3), (gone.probability + 1e-9, 2)):
+        assert len(refine(raw, limb=least).leaves) == leaves
+    assert_unchanged(refine(stays, limb=0.25), stays)
+
+
+def test_what_ends_nowhere_is_no_spur(piped, refine):
+    """A tiny ring on a stem, two ways between two junctions, and a path shorter than it is thick."""
+    tiny = [(0, 0, 0.02), (0.01, 0, 0.03), (0, 0, 0.04), (-0.01, 0, 0.03), (0, 0, 0.02)]
+    ring = [[(-1, 0, 0), (0, 0, 0), (1, 0, 0)], [(0, 0, 0), (0, 0, 0.02)], tiny]
+    for raw in (piped(ring, tubes=[0]), strands(piped, 0.04, 0.2), piped([[(0, 0, 0), (0.05, 0, 0)]])):
+        assert_unchanged(refine(raw, limb=0.25), raw)
+
+
+def test_of_a_fork_of_short_limbs_the_better_two_stay(piped, refine):
+    """They are one path; and a fork that is kept has two prongs that are limbs."""
+    raw = piped([[(0, 0, 0), (0.1, 0, 0)], [(0, 0, 0), (-0.05, 0.12, 0)], [(0, 0, 0), (-0.05, -0.14, 0)]])
+    assert counts(refine(raw, limb=1.0)) == (1, 0, 2)
+    alike = piped([[(0, 0, 0), (0, 0, -1)], [(0, 0, 0), (0.15, 0, 0.15)], [(0, 0, 0), (-0.15, 0, 0.15)]])
+    low, high = sorted(it.probability for it in refine(alike, limb=1e-9).report.judgements)[:2]
+    assert low < 0.9 * high
+
+
+# ---- branches that cross air
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.5])
+def test_an_edge_between_two_tubes_is_cut(piped, refine, noise):
+    raw = replace(piped(ACROSS, tubes=[0, 1]), report=Report(noise=noise))
+    skeleton = refine(raw, air=0.5, limb=0.5)
+    assert (raw.n_components, counts(skeleton), skeleton.report.n_cuts) == (1, (2, 0, 4), 1)
+    (false,) = (it for it in skeleton.report.judgements if it.about == "air" and it.changed)
+    np.testing.assert_allclose(false.place, [0, 0.25, 0], atol=0.16)
+    # what stays lies in the tubes, and has all points
+    assert np.minimum(np.abs(skeleton.vertices[:, 1]), np.abs(skeleton.vertices[:, 1] - 0.5)).max() < 0.16
+    assert skeleton.vertex_of_point.min() >= 0
+    assert_unchanged(refine(raw, air=1.0), raw)
+
+
+@SIDES
+@pytest.mark.parametrize("lines", [ACROSS, FORK, TUBE, TORUS], ids=["strut", "fork", "tube", "ring"])
+def test_limbs_and_struts_are_kept(piped, refine, lines, side):
+    raw = piped(lines, side=None if lines is ACROSS else side)
+    skeleton = refine(raw, air=0.5)
+    assert_unchanged(skeleton, raw)
+    assert len(skeleton.report.judgements) == len(raw.branches)
+    assert max(it.probability for it in skeleton.report.judgements) < 0.25
+
+
+# ---- gaps
+
+ARC = [[(np.cos(t), np.sin(t), 0) for t in np.linspace(0.15, 2 * np.pi - 0.15, 30)]]
+PARTS = [[(-1, 0, 0), (-0.15, 0, 0)], [(0.15, 0, 0), (1, 0, 0)]]
+"""A tube of which a stretch of three radii was not seen."""
+
+
+def capped(skeleton, *caps, radius=0.1, spacing=0.03):
+    """Half balls of points more, each at a place, bulging along a direction."""
+    points, normals = [skeleton.points], [skeleton.normals]
+    for k, (place, way) in enumerate(caps):
+        out = np.random.default_rng(k).normal(size=(round(4 * np.pi * radius**2 / spacing**2), 3))
+        out /= np.linalg.norm(out, axis=1, keepdims=True)
+        out = out[out @ way > 0]
+        points.append(place + radius * out)
+        normals.append(out)
+    points, normals = np.concatenate(points), np.concatenate(normals)
+    owner = np.argmin(np.linalg.norm(points[:, None] - skeleton.vertices, axis=2), axis=1)
+    return replace(skeleton, points=points, normals=normals, vertex_of_point=owner)
+
+
+@SIDES
+@pytest.mark.parametrize(
+    ("lines", "after", "place"), [(ARC, (1, 1, 0), X), (PARTS, (1, 0, 2), 0 * X)], ids=["ring", "limb"]
+)
+def test_where_the_object_goes_on_a_gap_is_bridged(piped, refine, lines, after, place, side):
+    raw = piped(lines, side=side)
+    skeleton = refine(raw, bridge=0.5)
+    assert (counts(skeleton), skeleton.report.n_bridges) == (after, 1)
+    ((about, changed),) = [(it.about, it.changed) for it in skeleton.report.judgements]
+    assert (about, changed) == ("gap", True)
+    np.testing.assert_allclose(skeleton.report.judgements[0].place, place, atol=0.05)
+    assert len(skeleton.edges) == len(raw.edges) + 1
+    np.testing.assert_allclose(skeleton.vertices, raw.vertices, atol=1e-12)
+    assert refine(raw).n_components == raw.n_components
+
+
+def test_where_it_ends_it_is_not(piped, refine):
+    """Two capsules end to end, and a tip that points at the side of a tube."""
+    tip = piped([[(0.3, 0, 0), (1, 0, 0)], [(0, -1, 0), (0, 0, 0), (0, 1, 0)]])
+    for raw in (capped(piped(PARTS), (-0.15 * X, X), (0.15 * X, -X)), capped(tip, (0.3 * X, -X))):
+        skeleton = refine(raw, bridge=0.5)
+        assert_unchanged(skeleton, raw)
+        assert max((it.probability for it in skeleton.report.judgements), default=0) < 0.5
+
+
+def test_which_gaps_are_asked(piped, refine):
+    """Of what an end points at, is not near along the skeleton, and is not too far."""
+
+    def asked(*lines):
+        return len(refine(piped(lines), bridge=1.0).report.judgements)
+
+    assert asked([(-1, 0, 0), (-0.2, 0, 0)], [(0.2, 0, 0), (1, 0, 0)]) == 1
+    assert asked([(-1, 0, 0), (-0.6, 0, 0)], [(0.6, 0, 0), (1, 0, 0)]) == 0
+    assert asked([(-1, 0, 0), (0, 0, 0)], [(-1, 0.3, 0), (0, 0.3, 0)]) == 0  # side by side
+    assert asked([(-1, 0, 0), (0.1, 0, 0), (0.1, 0.25, 0), (0, 0.25, 0), (0, 0.15, 0)]) == 0  # a hook
+
+
+def test_every_end_is_joined_once(piped, refine):
+    """Three ends meet: the two in line are surer."""
+    skeleton = refine(piped([*PARTS, [(0, 0.3, 0), (0, 1, 0)]]), bridge=0.01)
+    assert skeleton.degree.max() <= 3
+    joined = [
+        sorted(skeleton.vertices[edge, 0].tolist()) for edge in skeleton.edges if skeleton.edge_lengths.max() > 0.2
+    ]
+    assert [-0.15, 0.15] in joined
