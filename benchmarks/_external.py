@@ -21,7 +21,7 @@ from glsk_bench.versions import version
 from scipy.spatial import cKDTree
 
 from glsk_o3d import read_cloud, read_skeleton
-from glsk_o3d.analysis.graph import check_graph, simple_edges
+from glsk_o3d.analysis.curves import check_graph, simple_edges
 from glsk_o3d.errors import FileFormatError, InvalidParameterError, MissingPackageError, brief
 from glsk_o3d.io.formats.graphs import graph_skeleton, words_by_line
 from glsk_o3d.io.skeletons import holds_skeleton

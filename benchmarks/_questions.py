@@ -14,7 +14,7 @@ from scipy.spatial.distance import cdist
 
 from glsk_o3d import Pipeline
 from glsk_o3d.analysis import Truth
-from glsk_o3d.analysis.matching import TIP_REACH
+from glsk_o3d.analysis.comparison import TIP_REACH
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
 from glsk_o3d.refinement.air import branch_facts, cut_air
 from glsk_o3d.refinement.bridging import gap_facts

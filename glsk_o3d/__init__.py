@@ -20,7 +20,7 @@ def _show_in_notebooks():
 
 
 def _picture(skeleton):
-    from .viewing.notebook import to_html
+    from .viewing.html import to_html
 
     return to_html(skeleton)
 

@@ -23,15 +23,17 @@ from .errors import (
     StageError,
 )
 from .interop.clouds import Cloud
-from .io.annotation import annotate_contraction
+from .io.annotation import annotate, annotate_contraction
 from .io.cylinders import save_cylinders
 from .io.formats.gltf import save_rig
+from .io.geometry import to_line_set, to_tensor_line_set, to_tubes
 from .io.meshes import save_mesh
 from .io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
 from .io.skeletons import read_skeleton, read_truth, save_skeleton
 from .io.streaming import annotate_file, read_sample
 from .judgements import Judgement, Supported
 from .lpr_reducer import LPRReducer
+from .meshlab.layers import to_pymeshlab
 from .meshlab.meshset import MeshSet
 from .pipeline import Filter, Pipeline
 from .recipes import from_recipe, load_recipe, rerun, save_recipe, to_recipe
@@ -42,6 +44,7 @@ from .ring_builder import RingBuilder
 from .skeleton import Skeleton
 from .state import Contraction
 from .stopping import ExplainedScore, RingSizeRatio
+from .tracer import Tracer
 from .viewing.page import ContractionRecorder, save_report
 from .viewing.plot import plot_skeleton
 from .viewing.preview import save_assessment, save_preview
@@ -79,7 +82,9 @@ __all__ = [
     "SkeletonWarning",
     "StageError",
     "Supported",
+    "Tracer",
     "analysis",
+    "annotate",
     "annotate_contraction",
     "annotate_file",
     "batch",
@@ -106,5 +111,9 @@ __all__ = [
     "save_tensor_cloud",
     "skeletonize",
     "support",
+    "to_line_set",
+    "to_pymeshlab",
     "to_recipe",
+    "to_tensor_line_set",
+    "to_tubes",
 ]

@@ -6,27 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .numerics.components import component_labels
+from .interop.packages import import_open3d, require
+from .numerics.groups import component_labels
 from .numerics.radii import supporting_points
 from .numerics.vectors import norm
 from .report import Report
 
 if TYPE_CHECKING:
-    from os import PathLike
-
     import networkx
     import open3d
-    import pymeshlab
-
-    from .analysis.branches import BranchTable
-    from .analysis.loops import Loop
-    from .io.colors import ColorChoice
-
-Root = int | str | Sequence[float] | np.ndarray | None
 
 OF_VERTICES = ("radii", "confidence", "half_width", "half_thickness", "support")
 """What is known of every vertex but its place."""
@@ -109,12 +101,6 @@ class Skeleton:
             f"{self.n_loops} loops, {len(self.leaves)} leaves, {len(self.junctions)} junctions)"
         )
 
-    def _repr_html_(self) -> str:
-        """A picture and the numbers, for Jupyter."""
-        from .viewing.html import to_html
-
-        return to_html(self)
-
     @cached_property
     def degree(self) -> np.ndarray:
         """Edges at every vertex, (M,) int array."""
@@ -185,98 +171,37 @@ class Skeleton:
                 paths.append(np.array(path))
         return tuple(paths)
 
-    @cached_property
-    def loops(self) -> tuple[Loop, ...]:
-        """Loops of a minimum cycle basis, with openings and probabilities. See `glsk_o3d.analysis.Loop`."""
-        from .analysis.loops import loops
-
-        return loops(self)
-
-    def segment(self, cloud: Any = None) -> np.ndarray:
-        """Label every point with its branch, (N,) int64 array. See `glsk_o3d.analysis.segment`."""
-        from .analysis.segmentation import segment
-
-        return segment(self, cloud)
-
-    def branch_table(self, root: Root = None) -> BranchTable:
-        """One row of measures per branch. See `glsk_o3d.analysis.branch_table`."""
-        from .analysis.branches import branch_table
-
-        return branch_table(self, root)
-
-    def annotate(self, cloud: Any = None, *, color: ColorChoice | None = None) -> Any:
-        """A copy of a cloud that says where each point belongs. See `glsk_o3d.io.annotation.annotate`."""
-        from .io.annotation import annotate
-
-        return annotate(self, cloud, color=color)
-
-    def to_networkx(self, root: Root = None) -> networkx.Graph:
-        """Graph that carries everything that is known about the skeleton.
-
-        Parameters
-        ----------
-        root : str, int or (x, y, z), optional
-            See `branch_table`.
+    def to_networkx(self) -> networkx.Graph:
+        """The graph, with what is known of every vertex.
 
         Returns
         -------
         networkx.Graph
-            Nodes have ``position`` (3-tuple), ``radius``, ``confidence``, ``half_width``, ``half_thickness``,
-            ``support``, ``curvature`` and ``torsion``; edges ``length`` and ``branch``. ``graph.graph["branches"]`` is
-            the branch table, a list of dicts, with a row for every value of ``branch``.
+            Nodes have ``position`` (3-tuple), ``radius``, ``confidence``, ``half_width``, ``half_thickness`` and
+            ``support``; edges ``length``.
+
+        Raises
+        ------
+        MissingPackageError
         """
-        import networkx
-
-        from .analysis.curvature import curvature_torsion
-        from .analysis.segmentation import branch_of_edge
-
-        names = ("position", "radius", *OF_VERTICES[1:], "curvature", "torsion")
-        values = [*(getattr(self, name) for name in OF_VERTICES), *curvature_torsion(self)]
-        columns = [map(tuple, self.vertices.tolist()), *(each.tolist() for each in values)]
-        graph = networkx.Graph(branches=list(self.branch_table(root)) if len(self.vertices) else [])
+        graph = require("networkx").Graph()
+        columns = [map(tuple, self.vertices.tolist()), *(getattr(self, name).tolist() for name in OF_VERTICES)]
         for i, facts in enumerate(zip(*columns, strict=True)):
-            graph.add_node(i, **dict(zip(names, facts, strict=True)))
-        facts = zip(self.edges.tolist(), self.edge_lengths.tolist(), branch_of_edge(self).tolist(), strict=True)
-        for (a, b), length, branch in facts:
-            graph.add_edge(a, b, length=length, branch=branch)
+            graph.add_node(i, **dict(zip(("position", "radius", *OF_VERTICES[1:]), facts, strict=True)))
+        for (a, b), length in zip(self.edges.tolist(), self.edge_lengths.tolist(), strict=True):
+            graph.add_edge(a, b, length=length)
         return graph
 
-    def to_line_set(self, color: ColorChoice = (0.85, 0.1, 0.1)) -> open3d.geometry.LineSet:
-        """The skeleton as an ``open3d.geometry.LineSet``.
+    def to_line_set(self, color: Sequence[float] = (0.85, 0.1, 0.1)) -> open3d.geometry.LineSet:
+        """The skeleton as an ``open3d.geometry.LineSet`` of one colour. See `glsk_o3d.to_line_set` for others.
 
         Parameters
         ----------
-        color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
-            What the colours of the edges show, or the one colour of all.
+        color : three floats in [0, 1]
         """
-        from .io.line_sets import to_line_set
-
-        return to_line_set(self, color)
-
-    def to_tensor_line_set(self, color: ColorChoice | None = None) -> open3d.t.geometry.LineSet:
-        """The skeleton as an ``open3d.t.geometry.LineSet``. See ``glsk_o3d.io.line_sets.to_tensor_line_set``."""
-        from .io.line_sets import to_tensor_line_set
-
-        return to_tensor_line_set(self, color)
-
-    def to_tubes(
-        self, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16
-    ) -> open3d.geometry.TriangleMesh:
-        """The skeleton as tubes as thick as the object. See `glsk_o3d.io.tubes.to_tubes`."""
-        from .io.tubes import to_tubes
-
-        return to_tubes(self, color, radius=radius, sides=sides)
-
-    def to_pymeshlab(self) -> pymeshlab.Mesh:
-        """The skeleton as a ``pymeshlab.Mesh`` of vertices and edges (extra ``meshlab``)."""
-        from .meshlab.layers import Layer
-
-        return Layer.of(self).to_pymeshlab()
-
-    def save(
-        self, path: str | PathLike[str], *, cut_loops: bool = False, root: Root = None, format: str | None = None
-    ) -> None:
-        """Write the skeleton to a file; the ending chooses the format. See `glsk_o3d.save_skeleton`."""
-        from .io.skeletons import save_skeleton
-
-        save_skeleton(self, path, cut_loops=cut_loops, root=root, format=format)
+        o3d = import_open3d()
+        lines = o3d.geometry.LineSet()
+        lines.points = o3d.utility.Vector3dVector(np.ascontiguousarray(self.vertices))
+        lines.lines = o3d.utility.Vector2iVector(np.ascontiguousarray(self.edges, np.int32))
+        lines.paint_uniform_color(np.asarray(color, float))
+        return lines

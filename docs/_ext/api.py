@@ -33,6 +33,7 @@ NAMES = {
     },
     "filters": {
         "The five filters": ("RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner"),
+        "Thin parts and trees": ("Tracer",),
         "When to stop": ("ExplainedScore", "RingSizeRatio"),
     },
     "pipelines": {
@@ -45,6 +46,7 @@ NAMES = {
         "The same result again": ("rerun",),
     },
     "io": {
+        "As Open3D's and pymeshlab's": ("to_line_set", "to_tensor_line_set", "to_tubes", "to_pymeshlab", "annotate"),
         "Clouds": ("read_cloud", "read_tensor_cloud", "read_sample", "save_tensor_cloud", "annotate_file"),
         "Skeletons": ("read_skeleton", "save_skeleton", "read_truth"),
         "For other programs": ("save_cylinders", "save_rig", "save_mesh"),
@@ -54,7 +56,7 @@ NAMES = {
         "What happened on the way": ("ContractionRecorder",),
     },
     "analysis": {
-        "Branches": ("branch_table", "BranchTable", "segment", "curvature_torsion", "Loop"),
+        "Branches": ("branch_table", "BranchTable", "segment", "curvature_torsion", "find_loops", "Loop"),
         "Trees": ("tree_measures", "TreeMeasures", "cylinders", "Cylinders"),
         "Grasps": ("grasp_candidates", "GraspCandidates", "Gripper"),
         "How good is it?": ("assess", "Assessment", "thickness"),
@@ -94,9 +96,6 @@ NAMES = {
 PACKAGES = tuple(dict.fromkeys(module for _, module in TASKS.values()))
 """What users import from."""
 MODULES = {
-    "glsk_o3d.io.annotation": "Attributes on clouds",
-    "glsk_o3d.io.clouds.selection": "Some of the points",
-    "glsk_o3d.io.tubes": "Tubes",
     "glsk_o3d.io.colors": "Colours",
     "glsk_o3d.parameters": "Making filters",
     "glsk_o3d.interop.clouds": "What counts as a cloud",

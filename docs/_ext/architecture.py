@@ -19,7 +19,7 @@ ROWS = (
     {"files": ("io",), "driver": ("driver", "resampling")},
     {"analysis": ("analysis", "editing"), "recipes and plugins": ("recipes",)},
     {"named pipelines": ("pipelines",)},
-    {"filters": ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "stopping")},
+    {"filters": ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "tracer", "stopping")},
     {"refinement": ("refinement",), "pipeline": ("pipeline",)},
     {"what filters share": ("parameters", "state", "skeleton", "report", "judgements")},
     {"preparation": ("preparation",)},
@@ -33,21 +33,6 @@ ASIDE = {
     **{"MeshLab": 3.3, "preparation": -1.2, "other packages, and files": 1.2, "samples": 3.7},
 }
 """Where in the drawing the boxes are that are not in its middle."""
-
-COMFORTS = {
-    "skeleton.Skeleton._repr_html_": ("viewing.html",),
-    "skeleton.Skeleton.annotate": ("io.annotation",),
-    "skeleton.Skeleton.branch_table": ("analysis.branches",),
-    "skeleton.Skeleton.loops": ("analysis.loops",),
-    "skeleton.Skeleton.save": ("io.skeletons",),
-    "skeleton.Skeleton.segment": ("analysis.segmentation",),
-    "skeleton.Skeleton.to_line_set": ("io.line_sets",),
-    "skeleton.Skeleton.to_networkx": ("analysis.curvature", "analysis.segmentation"),
-    "skeleton.Skeleton.to_pymeshlab": ("meshlab.layers",),
-    "skeleton.Skeleton.to_tensor_line_set": ("io.line_sets",),
-    "skeleton.Skeleton.to_tubes": ("io.tubes",),
-}
-"""The only imports that go up: by method, what it fetches when it is called. Comforts for users, used by no filter."""
 
 
 class Import(NamedTuple):
@@ -67,7 +52,7 @@ def box_of(module):
 
 
 def imports(package=PACKAGE):
-    """All imports inside the package, the late ones in functions too, but not those for type checkers alone.
+    """All imports inside the package, the late ones in functions and those for type checkers too.
 
     Returns
     -------
@@ -86,8 +71,6 @@ def imports(package=PACKAGE):
 
     def walk(node, module, place):
         for child in ast.iter_child_nodes(node):
-            if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
-                continue
             for target, alias in targets(child, modules[module], package, modules):
                 found.add(Import(module, place, stubs.get(target, {}).get(alias.name, target)))
             named = isinstance(child, ast.ClassDef | ast.FunctionDef)
@@ -115,11 +98,6 @@ def targets(node, path, package, modules):
             yield whole if whole in modules else ".".join(base), alias
 
 
-def comforts():
-    """The imports that may go up, as a set of (place, target)."""
-    return {(place, target) for place, targets in COMFORTS.items() for target in targets}
-
-
 def upward():
     """The imports that go up, or sideways out of their box, as a set of (place, target)."""
     row = {box: n for n, boxes in enumerate(ROWS) for box in boxes}
@@ -128,16 +106,14 @@ def upward():
 
 
 def circles():
-    """The circles of modules that import each other, the comforts left out, as a list of sets."""
-    graph = nx.DiGraph((each.module, each.target) for each in imports() if (each.place, each.target) not in comforts())
+    """The circles of modules that import each other, as a list of sets."""
+    graph = nx.DiGraph((each.module, each.target) for each in imports())
     return [found for found in nx.strongly_connected_components(graph) if len(found) > 1]
 
 
 def arrows():
-    """Which box imports which other one, the comforts left out, as a set of (str, str)."""
-    pairs = {
-        (box_of(each.module), box_of(each.target)) for each in imports() if (each.place, each.target) not in comforts()
-    }
+    """Which box imports which other one, as a set of (str, str)."""
+    pairs = {(box_of(each.module), box_of(each.target)) for each in imports()}
     return {(a, b) for a, b in pairs if a and b and a != b}
 
 

@@ -6,7 +6,7 @@ from .comparison import Comparison, Truth, compare
 from .curvature import curvature_torsion
 from .grasps import grasp_candidates
 from .gripper import GraspCandidates, Gripper
-from .loops import Loop
+from .loops import Loop, find_loops
 from .segmentation import segment, thickness
 from .trees import Cylinders, TreeMeasures, cylinders, tree_measures
 
@@ -25,6 +25,7 @@ __all__ = [
     "compare",
     "curvature_torsion",
     "cylinders",
+    "find_loops",
     "grasp_candidates",
     "segment",
     "thickness",

@@ -11,8 +11,7 @@ from scipy.spatial.distance import cdist
 
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
-from ..numerics.components import component_labels
-from ..numerics.groups import group_median, group_sum
+from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.neighbourhoods import nearest_neighbours, plane_axes
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import dot, norm

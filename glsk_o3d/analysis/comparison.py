@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from ..errors import InvalidParameterError
-from ..numerics.components import component_labels
+from ..numerics.groups import component_labels
 from ..skeleton import Skeleton
 from .curves import check_graph, places_along, simple_edges
 from .summary import structure

@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
-from ..numerics.nearest_edges import incident_edges, nearest_on_edges
 from ..numerics.neighbourhoods import nearest_neighbours
+from ..numerics.polylines import incident_edges, nearest_on_edges
 from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from .curves import along, pieces
 
@@ -35,7 +35,7 @@ def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
     Returns
     -------
     (N,) int64 array
-        Rows of `Skeleton.branch_table`. -1 only for points with coordinates that are not finite.
+        Rows of `glsk_o3d.analysis.branch_table`. -1 only for points with coordinates that are not finite.
 
     Raises
     ------

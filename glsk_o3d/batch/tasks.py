@@ -22,7 +22,7 @@ from .. import __version__
 from ..analysis.summary import summary
 from ..errors import GlskError, InvalidCloudError
 from ..io.scans import read_cloud
-from ..io.skeletons import read_skeleton
+from ..io.skeletons import read_skeleton, save_skeleton
 from ..io.streaming import sample_for
 from ..recipes import from_recipe
 from ..report import Report
@@ -126,7 +126,7 @@ def _skeletonize(task: Task, row: Row, messages: list[str]) -> None:
         if output.endswith(".png"):
             save_preview(skeleton, path, title=os.path.basename(task.source))
         else:
-            skeleton.save(path, cut_loops=task.cut_loops)
+            save_skeleton(skeleton, path, cut_loops=task.cut_loops)
         row["outputs"].append(output)
 
 

@@ -100,7 +100,7 @@ def rig(
     along.
     """
     from .. import FileFormatError, read_cloud, read_skeleton, save_rig
-    from ..io.meshes import read_mesh
+    from ..io.scans import read_mesh
 
     if output is None or len(output) > 1:
         raise WrongUsage("nothing to write: give one output with -o")

@@ -74,8 +74,7 @@ def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
     import numpy as np
     from scipy.spatial import KDTree
 
-    from ..io.clouds.blocks import promised_points, read_blocks
-    from ..io.scans import read_scan
+    from ..io.scans import promised_points, read_blocks, read_scan
     from ..io.streaming import LARGE_CLOUD
 
     load_open3d()

@@ -12,7 +12,7 @@ import typer
 
 from .. import __version__
 from ..errors import MissingPackageError
-from ..interop.entry_points import entry_points
+from ..interop.packages import entry_points
 from .batch import batch
 from .console import echo, say
 from .crosscheck import crosscheck

@@ -37,14 +37,14 @@ def branches(
     same axis and order; the level counts branches from the root.
     """
     from .. import FileFormatError, read_skeleton
-    from ..analysis.branches import cell
+    from ..analysis import branch_table
 
     files = output or []
     check_outputs([(path, ".csv", "table is CSV") for path in files], skeleton)
     curve = read_skeleton(skeleton)
     if len(curve.vertices) == 0:
         raise FileFormatError(f"{skeleton}: the skeleton is empty: it has no branches to measure")
-    table = curve.branch_table(root)
+    table = branch_table(curve, root)
     for path in files:
         table.to_csv(path)
 
@@ -52,10 +52,9 @@ def branches(
         if files:
             echo(f"{len(table)} branches, {table.order.max() + 1} orders, length {table.length.sum():.4g}")
             return
-        columns = table.printed_columns
-        left = [i for i, form in enumerate(columns.values()) if form == "s"]
-        rows = [[cell(row, name) for name in columns] for row in table]
-        print_table(rows, [name.replace("_", " ") for name in columns], left=left)
+        columns = table.printed()
+        names = [name.replace("_", " ") for name in columns]
+        print_table(list(zip(*columns.values(), strict=True)), names, left=[names.index("kind")])
 
     facts = {"skeleton": str(skeleton), "branches": list(table)}
     tell(facts, words, [f"{path}, in the units of {skeleton.name}" for path in files])

@@ -293,6 +293,4 @@ def _shown(facts: Mapping[str, Any], report: Report) -> dict[str, Any]:
 
 def _close_call(call: Judgement) -> str:
     """A close call, and what to do where the answer is wrong."""
-    from ..refinement.diagnostics import otherwise
-
-    return f"{call}; if that is wrong: --set {otherwise(call)}"
+    return f"{call}; if that is wrong: --set {call.otherwise}"

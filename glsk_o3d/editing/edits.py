@@ -17,7 +17,7 @@ from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, norm
 from ..refinement.merging import merge_into, some_vertices
 from ..refinement.rooted import RootPlace, numbered_from, root_among
-from ..skeleton import Root, Skeleton
+from ..skeleton import Skeleton
 
 SHRINK, SWELL = 0.5, -0.53  # published: factors of a pass there and back, which leave long waves as they are
 
@@ -126,7 +126,12 @@ def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
 
 
 def prune(
-    skeleton: Skeleton, *, length: float = 0.0, radius: float = 0.0, order: int | None = None, root: Root = None
+    skeleton: Skeleton,
+    *,
+    length: float = 0.0,
+    radius: float = 0.0,
+    order: int | None = None,
+    root: RootPlace | None = None,
 ) -> Skeleton:
     """Drop branches that leave a junction and end, and are short, thin, or of a high order.
 
@@ -175,7 +180,7 @@ def prune(
     return skeleton
 
 
-def _without_orders(skeleton: Skeleton, order: int, root: Root) -> Skeleton:
+def _without_orders(skeleton: Skeleton, order: int, root: RootPlace | None) -> Skeleton:
     if skeleton.n_loops:
         raise InvalidParameterError(
             f"the skeleton has {skeleton.n_loops} loops: branches have an order in a tree; see cut_loops()"

@@ -1,33 +1,56 @@
-"""Scans from files: clouds, and meshes of which the vertices are taken; and clouds with attributes to files."""
+"""Scans from files, clouds and meshes of which the vertices are taken, whole or in blocks; and clouds to files."""
 
 from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError, MissingPackageError, brief
 from ..interop.atomic import write_atomically
 from ..interop.packages import following_open3d, import_open3d
-from .clouds import pcd
-from .clouds.blocks import read_whole
-from .clouds.scanned import Scan
-from .clouds.selection import select
-from .formats import ply
-from .paths import unknown_ending
+from . import meshes
+from .formats import pcd, ply, scanners, text_tables
+from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unknown_ending
+from .scan import ALL_ROWS, NoPoints, Scan, parsed
+from .skeletons import holds_skeleton
 
 WRITTEN_CLOUD_ENDINGS = (".ply", ".pcd", ".npz")
 """Files that hold all attributes of a tensor cloud."""
+BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take more memory
 _log = logging.getLogger(__name__)
+
+Reader = Callable[[Path, int, bool], tuple[int | None, Iterator[Scan]]]
+"""Gives the number of points by the header, None if the file is read whole, and blocks of so many, of positions alone
+if they are to be bare. What shows that a file breaks off is looked at before the first block.
+"""
+
+
+def _whole(read: Callable[[Path], Scan]) -> Reader:
+    return lambda path, rows, bare: (None, map(read, [path]))  # not read before it is asked for
+
+
+_SCAN_READERS: dict[str, Reader] = {
+    **dict.fromkeys(MESH_ENDINGS, _whole(meshes.read_vertices)),
+    **dict.fromkeys(TEXT_ENDINGS, _whole(text_tables.read)),
+    **dict.fromkeys((".las", ".laz"), scanners.blocks),
+    ".e57": _whole(scanners.read_e57),
+    ".ply": ply.blocks,
+    ".pcd": pcd.blocks,
+}
 
 
 def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     """Read a point cloud, or the vertices of a mesh.
 
     Open3D returns an empty cloud for a file that it cannot read and uninitialised points for one that breaks off; here
-    both are errors. All coordinates keep their full digits.
+    both are errors. All coordinates keep their full digits. Of a mesh with large triangles, whose vertices say little
+    about the surface, a warning in the log says so.
 
     Parameters
     ----------
@@ -35,7 +58,8 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
         PLY, PCD, CSV, TXT, ASC, XYZ, XYZN, XYZRGB, PTS; LAS and LAZ (extra ``las``), E57 (extra ``e57``); or a mesh
         with triangles as OFF, OBJ, STL, glTF or GLB. In text, lines that hold no point are skipped and logged.
     where : str, optional
-        Only points for which this holds, such as ``"classification == 5"``; see `glsk_o3d.io.clouds.selection.select`.
+        Only points for which this holds: comparisons of attributes, ``x``, ``y`` and ``z`` with numbers or each other,
+        joined by ``and``, ``or`` and ``not``, such as ``"classification == 5 and not 0 < z < 2"``.
 
     Returns
     -------
@@ -54,11 +78,6 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
         It holds for no point.
     MissingPackageError
 
-    Notes
-    -----
-    Where the triangles of a mesh are large, its vertices say little about the surface: then there is a warning in the
-    log.
-
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
@@ -76,24 +95,14 @@ def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> A
 
     Parameters
     ----------
-    path : path-like
-    where : str, optional
-        As for `read_cloud`.
+    path, where
+        As for `read_cloud`, which has the errors, too.
 
     Returns
     -------
     open3d.t.geometry.PointCloud
         Positions are float64. Attributes have the names of the file, such as ``intensity`` and ``classification``;
         what cannot stand in an expression is an underscore. `Skeleton.annotate` keeps them.
-
-    Raises
-    ------
-    FileNotFoundError
-    FileFormatError
-    InvalidParameterError
-    InvalidCloudError
-    MissingPackageError
-        As from `read_cloud`.
 
     Examples
     --------
@@ -105,6 +114,127 @@ def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> A
     array([1, 2, 2], dtype=int32)
     """
     return read_scan(path, where).to_tensor()
+
+
+def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
+    """Read all that `read_tensor_cloud` does, and the triangles between the points of a mesh if all are taken."""
+    scan = next(read_blocks(path, rows=ALL_ROWS, where=where))
+    if _coarse(scan.positions, scan.triangles):
+        with following_open3d():
+            _log.warning(
+                "%s: the %d vertices of this mesh are far apart, and only vertices count as points: sample its surface "
+                "first, for example with Open3D's sample_points_uniformly",
+                *(os.fspath(path), len(scan)),
+            )
+    return scan
+
+
+def _coarse(vertices: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether triangles with a side of more than a tenth of the diagonal make up half of the surface."""
+    if len(triangles) == 0 or triangles.min() < 0 or triangles.max() >= len(vertices):
+        return False
+    with np.errstate(all="ignore"):  # vertices may be anything
+        sides = vertices[triangles] - vertices[np.roll(triangles, 1, axis=1)]
+        area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+        large = np.linalg.norm(sides, axis=2).max(axis=1) > np.linalg.norm(np.ptp(vertices, axis=0)) / 10
+        return bool(area[large].sum() > area.sum() / 2)
+
+
+def read_mesh(path: str | os.PathLike) -> Any:
+    """Read an Open3D triangle mesh from PLY, OFF, OBJ, STL, glTF or GLB; errors as from `read_cloud`, and
+    FileFormatError for a file without triangles.
+    """
+    endings = (".ply", *MESH_ENDINGS)
+    if not str(path).lower().endswith(endings):
+        raise FileFormatError(f"{path}: unknown ending of a mesh; known are {', '.join(endings)}")
+    scan, o3d = next(read_blocks(path, rows=ALL_ROWS)), import_open3d()
+    if not len(scan.triangles):
+        raise FileFormatError(f"{path}: no triangles could be read: it is a cloud, or damaged")
+    vectors = o3d.utility.Vector3dVector
+    mesh = o3d.geometry.TriangleMesh(
+        vectors(scan.positions), o3d.utility.Vector3iVector(scan.triangles.astype(np.int32))
+    )
+    for name, values in (("vertex_normals", scan.normals), ("vertex_colors", scan.colors)):
+        if values is not None:
+            setattr(mesh, name, vectors(values))
+    return mesh
+
+
+# -------------------------------------------------------------------------------------------------------------- blocks
+
+
+def read_blocks(
+    path: str | os.PathLike, *, rows: int = BLOCK_ROWS, where: str | None = None, bare: bool = False
+) -> Iterator[Scan]:
+    """Read a scan a few points at a time, in the order of the file, or positions alone if they are to be `bare`.
+
+    Joined the blocks are the scan, to the last bit; in a block, attributes are unset that are so there. LAS, LAZ, PCD
+    (text and binary) and binary PLY without faces are read in blocks; everything else is one block. With `where` blocks
+    have fewer points, and there is none without. Errors are those of `read_cloud`, before the first block where the
+    size of the file shows that it breaks off.
+    """
+    if isinstance(rows, bool) or not isinstance(rows, int) or rows < 1:
+        raise InvalidParameterError(f"rows = {rows!r}: must be an int of at least 1")
+    if where is not None:
+        parsed(where)
+    path = _scan_file(path)
+    return _chosen(path, _opened(path, rows, bare and where is None)[1], where)
+
+
+def promised_points(path: str | os.PathLike) -> int | None:
+    """How many points a file holds by its header; None for one that is not read in blocks. Errors as `read_blocks`."""
+    return _opened(_scan_file(path), BLOCK_ROWS, True)[0]
+
+
+def _scan_file(path: str | os.PathLike) -> Path:
+    path = existing_file(path)
+    if path.suffix.lower() not in SCAN_ENDINGS:
+        raise unknown_ending(path, SCAN_ENDINGS)
+    if holds_skeleton(path):
+        raise FileFormatError(f"{path}: is a skeleton, not a scan")
+    return path
+
+
+def _opened(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan]]:
+    with _refused_where_damaged(path):
+        return _SCAN_READERS[path.suffix.lower()](path, rows, bare)
+
+
+@contextmanager
+def _refused_where_damaged(path: Path) -> Iterator[None]:
+    """FileFormatError for what goes wrong with the contents of a file."""
+    try:
+        yield
+    except (MissingPackageError, PermissionError):
+        raise
+    except NoPoints as error:
+        raise FileFormatError(f"{path}: no points could be read: {error}") from None
+    except Exception as error:  # whatever a parser raises on a hostile file, std::bad_alloc
+        raise FileFormatError(f"{path}: not a valid {path.suffix.lower()} file: {brief(error)}") from error
+
+
+def _chosen(path: Path, blocks: Iterator[Scan], where: str | None) -> Iterator[Scan]:
+    """Of each block the points for which a condition holds, if there are any; errors as those of files."""
+    read = chosen = 0
+    while True:
+        with _refused_where_damaged(path):
+            block = next(blocks, None)
+        if block is None:
+            break
+        read += len(block)
+        if where is not None:
+            block = block[block.chosen(where)]
+        chosen += len(block)
+        if len(block):
+            yield block
+    if not read:
+        ending = path.suffix.lower()
+        raise FileFormatError(f"{path}: no points could be read: it is empty, damaged, or not a {ending} file")
+    if not chosen:
+        raise InvalidCloudError(f"there is no point with {where}")
+
+
+# ------------------------------------------------------------------------------------------------------------- writing
 
 
 def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
@@ -134,7 +264,9 @@ def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
     ...     bool((read_tensor_cloud(f"{folder}/marked.ply").point.radius == marked.point.radius).all())
     True
     """
-    ending = tensor_cloud_ending(path)
+    ending = Path(path).suffix.lower()
+    if ending not in WRITTEN_CLOUD_ENDINGS:
+        raise unknown_ending(f"{os.fspath(path)}: a cloud with labels", WRITTEN_CLOUD_ENDINGS)
     o3d = import_open3d()
 
     def write(temporary: Path) -> None:
@@ -148,42 +280,10 @@ def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
         with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
             done = o3d.t.io.write_point_cloud(str(temporary), written)
         try:  # whether it is whole, which Open3D does not say
-            (ply if ending == ".ply" else pcd).promised(temporary)
+            _SCAN_READERS[ending](temporary, BLOCK_ROWS, True)
         except ValueError:
             done = False
         if not done:
             raise OSError("Open3D could not write all of it: is the disk full?")
 
     write_atomically(path, write)
-
-
-def tensor_cloud_ending(path: str | os.PathLike) -> str:
-    """The ending of a cloud to be written, in lower case; FileFormatError if it is unknown."""
-    ending = Path(path).suffix.lower()
-    if ending not in WRITTEN_CLOUD_ENDINGS:
-        raise unknown_ending(f"{os.fspath(path)}: a cloud with labels", WRITTEN_CLOUD_ENDINGS)
-    return ending
-
-
-def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
-    """Read all that `read_tensor_cloud` does, and the triangles between the points of a mesh if all are taken."""
-    scan = read_whole(path)
-    if _coarse(scan.positions, scan.triangles):
-        with following_open3d():
-            _log.warning(
-                "%s: the %d vertices of this mesh are far apart, and only vertices count as points: sample its surface "
-                "first, for example with Open3D's sample_points_uniformly",
-                *(os.fspath(path), len(scan)),
-            )
-    return scan if where is None else select(scan, where)
-
-
-def _coarse(vertices: np.ndarray, triangles: np.ndarray) -> bool:
-    """Whether triangles with a side of more than a tenth of the diagonal make up half of the surface."""
-    if len(triangles) == 0 or triangles.min() < 0 or triangles.max() >= len(vertices):
-        return False
-    with np.errstate(all="ignore"):  # vertices may be anything
-        sides = vertices[triangles] - vertices[np.roll(triangles, 1, axis=1)]
-        area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-        large = np.linalg.norm(sides, axis=2).max(axis=1) > np.linalg.norm(np.ptp(vertices, axis=0)) / 10
-        return bool(area[large].sum() > area.sum() / 2)

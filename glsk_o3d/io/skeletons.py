@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..analysis.comparison import Truth
-from ..errors import FileFormatError, InvalidParameterError, MissingPackageError, brief
+from ..errors import FileFormatError, brief
 from ..interop.atomic import write_atomically
 from ..refinement.rooted import RootPlace
 from ..skeleton import Skeleton
-from .formats import fields, gltf, graphml, obj, plants, ply, polylines, swc, urdf
+from .formats import fields, gltf, lines, plants, ply, urdf
 from .formats.graphs import NoEdges, as_forest
 from .paths import SCAN_ENDINGS, existing_file, unknown_ending
 
@@ -32,15 +32,15 @@ class Format(NamedTuple):
 
 FORMATS: dict[str, Format] = {
     ".ply": Format(ply.write, ply.read),
-    ".obj": Format(obj.write, obj.read),
+    ".obj": Format(lines.write_obj, lines.read_obj),
     ".json": Format(fields.write_json, fields.read_json),
     ".npz": Format(fields.write_npz, fields.read_npz),
-    ".swc": Format(swc.write, swc.read, trees=True),
-    ".graphml": Format(graphml.write, graphml.read),
-    ".cgal": Format(polylines.write_cgal, polylines.read_cgal),
-    ".polylines.txt": Format(polylines.write_cgal, polylines.read_cgal),
-    ".vtp": Format(polylines.write_vtp),
-    ".dxf": Format(polylines.write_dxf),
+    ".swc": Format(plants.write_swc, plants.read_swc, trees=True),
+    ".graphml": Format(lines.write_graphml, lines.read_graphml),
+    ".cgal": Format(lines.write_cgal, lines.read_cgal),
+    ".polylines.txt": Format(lines.write_cgal, lines.read_cgal),
+    ".vtp": Format(lines.write_vtp),
+    ".dxf": Format(lines.write_dxf),
     ".glb": Format(gltf.write, trees=True),
     ".mtg": Format(plants.write_mtg, trees=True),
     ".plant.csv": Format(plants.write_csv, trees=True),
@@ -49,6 +49,8 @@ FORMATS: dict[str, Format] = {
 """The formats of skeletons by the ending of the file."""
 READABLE = tuple(ending for ending, format in FORMATS.items() if format.read is not None)
 """Endings of files that `read_skeleton` reads."""
+_HOLDS_LINES = {".ply": ply.holds_lines, ".obj": lines.holds_lines}  # formats that scans have, too
+_OWN = tuple(ending for ending in FORMATS if ending.count(".") == 2)  # which end in those of scans
 
 
 def save_skeleton(
@@ -79,8 +81,7 @@ def save_skeleton(
     ===================== =============================================== =======================================
 
     Those after CGAL's are only written, not read. Numbers keep their full precision, but in glTF, which has float32.
-    The file appears complete or not at all; on an error an existing file stays as it was. Open3D's ``read_line_set``
-    gives an empty line set for a PLY file without edges.
+    The file appears complete or not at all; on an error an existing file stays as it was.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ def save_skeleton(
     root : str, int or (x, y, z), optional
         For the same formats: where the tree grows from, as for `glsk_o3d.editing.reroot`; the vertices are numbered
         from there. By default vertex 0, if the numbers go outwards from it, as those of `pipelines.tree` do, or else
-        the root of `Skeleton.branch_table`.
+        the root of `glsk_o3d.analysis.branch_table`.
     format : str, optional
         The ending of another format than that of `path`, with or without its dot.
 
@@ -102,10 +103,8 @@ def save_skeleton(
         The ending is unknown, or the skeleton has loops, or lacks what the format needs.
     InvalidParameterError
         There is no such root.
-    FileNotFoundError
-        The folder does not exist.
     OSError
-        The file cannot be written.
+        The folder does not exist, or the file cannot be written.
 
     Examples
     --------
@@ -131,7 +130,7 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     ----------
     path : path-like
     format : str, optional
-        The ending of another format than that of `path`, with or without its dot.
+        As for `save_skeleton`.
 
     Returns
     -------
@@ -153,7 +152,7 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     >>> from glsk_o3d.samples import torus
     >>> skeleton = skeletonize(torus(1000).points)
     >>> with TemporaryDirectory() as folder:
-    ...     skeleton.save(f"{folder}/ring.json")
+    ...     save_skeleton(skeleton, f"{folder}/ring.json")
     ...     again = read_skeleton(f"{folder}/ring.json")
     >>> bool((again.vertices == skeleton.vertices).all())
     True
@@ -168,8 +167,6 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     data = path.read_bytes()
     try:
         return read(data)
-    except MissingPackageError:
-        raise
     except NoEdges:
         raise _is_cloud(path) from None
     except Exception as error:  # whatever a parser raises on a hostile file
@@ -183,20 +180,16 @@ def _is_cloud(path: Path) -> FileFormatError:
 def holds_skeleton(path: str | os.PathLike) -> bool:
     """Whether a file holds a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending.
 
-    False also for what does not exist or is unknown: reading it as a cloud says so.
+    False also for what does not exist: reading it as a cloud says so.
     """
     path = Path(path)
-    name = path.name.lower()
-    if not path.is_file() or (name.endswith(SCAN_ENDINGS) and not name.endswith((*_HOLDS_LINES, *_OWN))):
+    name, ending = path.name.lower(), path.suffix.lower()
+    if not path.is_file():
         return False
-    if not name.endswith(tuple(_HOLDS_LINES)):
-        return True
-    with path.open("rb") as stream:
-        return _HOLDS_LINES[path.suffix.lower()](stream)
-
-
-_HOLDS_LINES = {".ply": ply.holds_lines, ".obj": obj.holds_lines}  # formats that scans have, too
-_OWN = tuple(ending for ending in FORMATS if ending.count(".") == 2)
+    if ending in _HOLDS_LINES:
+        with path.open("rb") as stream:
+            return _HOLDS_LINES[ending](stream)
+    return ending not in SCAN_ENDINGS or name.endswith(_OWN)
 
 
 def skeleton_ending(path: Path, format: str | None = None) -> str:
@@ -205,10 +198,10 @@ def skeleton_ending(path: Path, format: str | None = None) -> str:
     FileFormatError if there is none; the message lists them.
     """
     name = path.name.lower() if format is None else "." + format.lower().lstrip(".")
-    found = [ending for ending in FORMATS if (name.endswith(ending) if format is None else name == ending)]
-    if not found:
-        raise unknown_ending(path if format is None else f"format {format!r}", FORMATS)
-    return found[0]
+    for ending in FORMATS:
+        if name.endswith(ending) if format is None else name == ending:
+            return ending
+    raise unknown_ending(path if format is None else f"format {format!r}", FORMATS)
 
 
 def read_truth(path: str | os.PathLike) -> Truth:
@@ -250,7 +243,5 @@ def read_truth(path: str | os.PathLike) -> Truth:
         return Truth(skeleton.vertices, skeleton.edges, skeleton.radii)
     except FileFormatError:
         raise
-    except InvalidParameterError as error:
-        raise FileFormatError(f"{path}: {error}") from None
     except (ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise FileFormatError(f"{path}: not a valid .npz truth: {error}") from None
+        raise FileFormatError(f"{path}: not a valid truth: {error}") from None

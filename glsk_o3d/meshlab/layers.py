@@ -249,3 +249,32 @@ def check_ending(path: Path, what: str) -> None:
         skeleton_ending(path)
     else:
         raise FileFormatError(f"{path}: unknown ending for {what}; known are {', '.join(dict.fromkeys(known))}")
+
+
+def to_pymeshlab(skeleton: Skeleton) -> Any:
+    """A skeleton as a ``pymeshlab.Mesh`` of vertices and edges, with the radii as vertex scalars.
+
+    MeshLab's own PLY writer drops edges, its OBJ writer keeps them; `glsk_o3d.save_skeleton` writes both.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    pymeshlab.Mesh
+
+    Raises
+    ------
+    MissingPackageError
+        Without the extra ``meshlab``.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(1000).points)
+    >>> to_pymeshlab(ring).edge_number() == len(ring.edges)
+    True
+    """
+    return Layer.of(skeleton).to_pymeshlab()

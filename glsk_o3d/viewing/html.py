@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..analysis.branches import branch_table
 from ..analysis.summary import point_count, structure, summary
 from ..errors import MissingPackageError
 from ..interop.packages import require
@@ -155,10 +156,10 @@ def support(report: Report) -> str:
 
 
 def branches(skeleton: Skeleton) -> str:
-    """The longest branches, in the colours that they have in the view; numbered as in `Skeleton.branch_table`."""
+    """The longest branches, in the colours that they have in the view; numbered as in the table of branches."""
     if len(skeleton.edges) == 0:
         return ""
-    table = skeleton.branch_table()
+    table = branch_table(skeleton)
     longest = np.argsort(-table.length[: len(skeleton.branches)], kind="stable").tolist()
     colors, columns = branch_colors(skeleton, len(skeleton.branches)), table.printed()
     rows = [[columns[name][row] for name in _BRANCH_COLUMNS] for row in longest[:MOST_LISTED_ROWS]]

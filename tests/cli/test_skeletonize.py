@@ -238,8 +238,9 @@ def test_labels_do_not_change_the_skeleton(invoke, tmp_path):
 
 
 def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, monkeypatch):
-    from glsk_o3d.io import streaming
     from glsk_o3d.io.clouds import blocks
+
+    from glsk_o3d.io import streaming
 
     scan, n = tmp_path / "scan.ply", 9000
     save_cloud(scan, samples.torus(n).points)

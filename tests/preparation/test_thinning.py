@@ -7,7 +7,7 @@ from glsk_o3d import samples
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
 from glsk_o3d.preparation.denoising import MOST_IN_ONE, average_noisy
 from glsk_o3d.preparation.sampling import sample_grid
-from glsk_o3d.preparation.thinning import ENOUGH, spacing_enough, thin, thin_nearer
+from glsk_o3d.preparation.surface import ENOUGH, spacing_enough, thin, thin_nearer
 
 
 def thinned(points, n, k=16):

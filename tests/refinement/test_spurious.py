@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Skeleton, pipelines, samples
-from glsk_o3d.refinement.spurious import drop_spurious
+from glsk_o3d.refinement.tracing import drop_spurious
 
 SCATTER = 0.1  # root mean square distance
 MEDIAN = np.sqrt(np.log(2))  # over that

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d.errors import InvalidParameterError, did_you_mean
-from glsk_o3d.numerics.components import component_labels
+from glsk_o3d.numerics.groups import component_labels
 from glsk_o3d.numerics.vectors import norm
 from glsk_o3d.samples.capsules import check
 

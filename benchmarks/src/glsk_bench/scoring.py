@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from glsk_o3d.analysis.comparison import PLACE_SPACING, compare
-from glsk_o3d.analysis.graph import check_graph, simple_edges
-from glsk_o3d.analysis.truth import Truth
+from glsk_o3d.analysis.comparison import PLACE_SPACING, Truth, compare
+from glsk_o3d.analysis.curves import check_graph, simple_edges
 from glsk_o3d.errors import FileFormatError, InvalidParameterError, MissingPackageError, brief
 from glsk_o3d.interop.atomic import write_json
 from glsk_o3d.io.skeletons import READABLE, read_skeleton
