@@ -159,8 +159,8 @@ def cross_check(
     ('agrees', (1, 1))
     """
     pipeline = named_pipeline(pipeline) if isinstance(pipeline, str) else pipeline
-    kinds = [type(stage) for stage in pipeline.stages] if isinstance(pipeline, Pipeline) else []
-    if kinds[:1] != [RingBuilder] or Contractor not in kinds:
+    first = pipeline.stages[0] if isinstance(pipeline, Pipeline) else None
+    if not isinstance(first, RingBuilder) or not any(isinstance(stage, Contractor) for stage in pipeline.stages):
         raise InvalidParameterError(f"pipeline = {pipeline!r}: must start with a RingBuilder and have a Contractor")
     if isinstance(mesh, str) and mesh not in ("auto", *SURFACES):
         raise InvalidParameterError(f"mesh = {mesh!r}: must be 'auto', {', '.join(map(repr, SURFACES))}, or a mesh")
@@ -171,7 +171,7 @@ def cross_check(
     pipeline.check_complete()
     given = cloud_points(cloud)
     points = _thinned(given, max_points)
-    state = replace(pipeline.stages[0], thin_to="all")(points)
+    state = replace(first, thin_to="all")(points)
     skeleton = Pipeline(*pipeline.stages[1:])(state)
     surface, vertices, faces = surface_of(state, mesh)
     numbers, rows = agreement.compare_rows(state, vertices, faces)
