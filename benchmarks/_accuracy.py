@@ -27,17 +27,13 @@ IDEAS = {
     "point reduction": "Contractor.reducer=none",
     "mass of merged points": "LPRReducer.conserve_mass=false",
     "cheapest merges first": "LPRReducer.order=index",
-    "mended rings": "LPRReducer.mend_rings=false",
-    "reduction that stops": "Contractor.reduce_above=0",
     "stop by score": "Contractor.stop=RingSizeRatio",
     "stop at 3 %": "ExplainedScore.threshold=0.02",
     "last solve kept": "Contractor.keep_last=false",
     "floor of attraction": "Contractor.min_attraction=0",
     "hold on lines": "Contractor.line_hold=1",
-    "runaways held": "Contractor.retries=0",
     "sampling by thickness": "Connector.radius=2% Connector.thickness=0",
     "all ring links": "Connector.links=nearest",
-    "unsupported vertices dropped": "Connector.min_support=0",
     "shortest edge first": "Refiner.collapse=degree",
     "false loops closed": "Refiner.handle=0",
     "air cut": "Refiner.air=0",
@@ -45,7 +41,7 @@ IDEAS = {
     "spurs cut": "Refiner.limb=0",
     "edges subdivided": "Refiner.spacing=0",
     "fit to the axis": "Refiner.recentre=0",
-    "thin parts traced": "Refiner.surface=0",
+    "thin parts traced": "Tracer.surface=0",
 }
 """What `default` adds to the publications, and the settings that switch it off. All of them together (but for the
 reduction and the stop rule, which are published) are `wen2024`."""

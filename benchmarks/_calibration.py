@@ -15,11 +15,9 @@ from scipy.special import expit
 from scipy.stats import rankdata
 
 from glsk_o3d.analysis import compare
+from glsk_o3d.judgements import QUESTIONS as ASKED
 from glsk_o3d.pipelines import default
-from glsk_o3d.refinement import scores
 
-WEIGHTS = {"loop": "HANDLE_WEIGHTS", "air": "AIR_WEIGHTS", "gap": "BRIDGE_WEIGHTS", "limb": "LIMB_WEIGHTS"}
-"""What a question's weights are called in `glsk_o3d.refinement.scores`."""
 PENALTY = 1.0  # of half a weight's square, as if it were drawn from a normal distribution; the constant has none
 
 PARTS = 5  # of the range of probabilities, of the same width
@@ -51,7 +49,7 @@ class Answered(NamedTuple):
 
 def by_question(rows: list[dict]) -> dict[str, Answered]:
     """The questions of all clouds, by what they are about."""
-    found: dict[str, list[tuple]] = {about: [] for about in WEIGHTS}
+    found: dict[str, list[tuple]] = {about: [] for about in QUESTIONS}
     for row in rows:
         for it in row.get("questions", ()):
             found[it["about"]].append((it["facts"], it["is_so"], row["shape"], row["family"]))
@@ -81,7 +79,8 @@ def fitted(answered: Answered) -> dict[str, float]:
 
 def said(weights: Mapping[str, float], answered: Answered) -> np.ndarray:
     """Probabilities, (n,) float array."""
-    return np.array([scores.probability(weights, dict(zip(answered.names, it, strict=True))) for it in answered.facts])
+    question = ASKED["loop"]._replace(weights=weights)
+    return np.array([question.probability(dict(zip(answered.names, it, strict=True))) for it in answered.facts])
 
 
 def log_loss(chance: np.ndarray, is_so: np.ndarray) -> float:
@@ -164,22 +163,20 @@ def draw_reliability(told_of: Mapping[str, tuple[np.ndarray, Answered]], folder:
 
 
 def weights_of(answered: Mapping[str, Answered], without: str | None = None) -> Weights:
-    """By the names of `scores`: fitted to all questions, or to those of all families but one."""
+    """By question: fitted to all questions, or to those of all families but one."""
     some = {about: it if without is None else it.of(it.families != without) for about, it in answered.items()}
-    return {WEIGHTS[about]: fitted(it) for about, it in some.items()}
+    return {about: fitted(it) for about, it in some.items()}
 
 
 def measure(case: Case, weights: Weights) -> dict[str, float]:
     """A skeleton of `default` with these weights, against its axis."""
     points, truth = case.load()
-    kept = {name: dict(getattr(scores, name)) for name in weights}
+    kept = {about: ASKED[about] for about in weights}
     try:
-        for name, them in weights.items():
-            getattr(scores, name).update(them)
+        ASKED.update({about: ASKED[about]._replace(weights=them) for about, them in weights.items()})
         return compare(default()(points), truth).as_dict()
     finally:
-        for name, them in kept.items():
-            getattr(scores, name).update(them)
+        ASKED.update(kept)
 
 
 def table(rows: list[dict]) -> Table:

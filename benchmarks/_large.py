@@ -18,7 +18,7 @@ from _tables import Tables, number, short
 from glsk_o3d import Skeleton, read_cloud, read_skeleton, skeletonize
 from glsk_o3d.analysis.curves import distances
 from glsk_o3d.interop.packages import import_open3d, require
-from glsk_o3d.io.formats import ply_rows
+from glsk_o3d.io.formats import ply
 from glsk_o3d.pipelines import default
 from glsk_o3d.samples import sauropod
 
@@ -139,7 +139,7 @@ def write_huge(path: Path, n: int, seed: int = 0) -> None:
     blocks = noisy_blocks(n, seed)
     if path.suffix == ".ply":
         with path.open("wb") as stream:
-            stream.write(ply_rows.header(np.dtype([(axis, "<f4") for axis in "xyz"]), n))
+            stream.write(ply.header_of(np.dtype([(axis, "<f4") for axis in "xyz"]), n))
             for block in blocks:
                 stream.write(block.astype("<f4").tobytes())
         return

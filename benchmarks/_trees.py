@@ -34,7 +34,7 @@ CURVE_MEASURES = ("f1", "precision", "recall", "accuracy", "completeness", "tips
 BREAST_HEIGHT = 1.3  # of the stem's diameter, in metres
 TREE_MEASURES = ("volume", "stem_diameter", "height", "radius")
 NOISE = 0.001  # share of the diagonal, 7 mm
-PIPELINES = {"default, untraced": ("default", {"Refiner.surface": 0}), "default": ("default", {}), "tree": ("tree", {})}
+PIPELINES = {"default, untraced": ("default", {"Tracer.surface": 0}), "default": ("default", {}), "tree": ("tree", {})}
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ TOOLS: dict[str, Peer] = {
     "tree": Peer("`tree`", (), "points", partial(ours, "tree")),
     "default": PEERS["default"],
     "untraced": Peer(
-        "`default`, `Refiner.surface=0`", (), "points", partial(ours, "default", options={"Refiner.surface": 0})
+        "`default`, `Tracer.surface=0`", (), "points", partial(ours, "default", options={"Tracer.surface": 0})
     ),
     "cao2010": PEERS["cao2010"],
     "levels": Peer("geodesic level sets", (), "points", level_sets),

@@ -14,7 +14,6 @@ import typer
 from _calibration import (
     SEEN,
     UNSEEN,
-    WEIGHTS,
     by_question,
     draw_reliability,
     fitted,
@@ -30,8 +29,8 @@ from _questions import questions
 from _runs import Jobs, Markdown, Output, Own, Shapes, Variants, application, run
 from _tables import fill, page_with, present, publish, read, save
 
+from glsk_o3d.judgements import QUESTIONS
 from glsk_o3d.pipelines import default
-from glsk_o3d.refinement import scores
 
 EVERY = "*_4096"
 Sources = Annotated[
@@ -64,12 +63,12 @@ def fit(
     jobs: Jobs = 2,
     output: Output = None,
 ) -> None:
-    """The weights with which the questions are answered best, as glsk_o3d/refinement/scores.py has them."""
+    """The weights with which the questions are answered best, as glsk_o3d/judgements.py has them."""
     rows = rows_of(sources, own, variant, shapes, jobs)
     save(output, rows)
     for about, answered in by_question(rows).items():
         lines = [f'    "{name}": {weight:.2f},' for name, weight in fitted(answered).items()]
-        typer.echo("\n".join([f"{WEIGHTS[about]} = {{", *lines, "}"]))
+        typer.echo("\n".join([f"{about} = {{", *lines, "}"]))
 
 
 @app.command()
@@ -106,7 +105,7 @@ def check(
         others = by_question(read(learnt)["rows"]) if learnt else found
         told = {about: (without_family(it, others[about]), it) for about, it in found.items()}
     else:
-        told = {about: (said(getattr(scores, WEIGHTS[about]), it), it) for about, it in found.items()}
+        told = {about: (said(QUESTIONS[about].weights, it), it) for about, it in found.items()}
     shown = tables(told)
     present(shown, markdown)
     if page is not None:

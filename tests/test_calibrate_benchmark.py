@@ -8,8 +8,8 @@ import pytest
 from scipy.special import expit
 
 from glsk_o3d.analysis import Truth
+from glsk_o3d.judgements import QUESTIONS
 from glsk_o3d.pipelines import default
-from glsk_o3d.refinement import scores
 from glsk_o3d.samples import y_junction
 
 
@@ -86,9 +86,7 @@ class TestLabels:
         told = [(about, bool(is_so)) for about, _, is_so in found]
         assert told.count(("limb", True)) == 3
         assert not {("limb", False), ("air", True)} & {*told}
-        asked = [
-            (about, scores.probability(getattr(scores, judging.WEIGHTS[about]), facts)) for about, facts, _ in found
-        ]
+        asked = [(about, QUESTIONS[about].probability(facts)) for about, facts, _ in found]
         less, more, _ = sorted(row for row in asked if row[0] == "limb")  # the report's is that both prongs are limbs
         asked[asked.index(less)] = "limb", less[1] * more[1]
         assert sorted(asked) == sorted((it.about, it.probability) for it in pipeline(cloud.points).report.judgements)
@@ -129,11 +127,11 @@ class TestArithmetic:
 
     def test_weights_are_used_and_put_back(self, judging):
         case = sys.modules["_clouds"].Case("torus", "clean_512")
-        before = {name: dict(getattr(scores, name)) for name in judging.WEIGHTS.values()}
-        whole = judging.measure(case, {"HANDLE_WEIGHTS": before["HANDLE_WEIGHTS"]})
-        never = judging.measure(case, {"HANDLE_WEIGHTS": before["HANDLE_WEIGHTS"] | {"constant": -99.0}})
+        before = dict(QUESTIONS)
+        whole = judging.measure(case, {"loop": before["loop"].weights})
+        never = judging.measure(case, {"loop": {**before["loop"].weights, "constant": -99.0}})
         assert (whole["loops"], never["loops"]) == (0, -1)
-        assert before == {name: getattr(scores, name) for name in before}
+        assert before == QUESTIONS
 
     def test_the_table_of_transfer(self, judging):
         rows = [
@@ -158,7 +156,7 @@ class TestCommands:
         printed = call("fit", *few, "-o", saved)
         weights = {}
         exec(printed, weights)
-        assert [*weights["LIMB_WEIGHTS"]] == [*scores.LIMB_WEIGHTS]
+        assert [*weights["limb"]] == [*QUESTIONS["limb"].weights]
         rows = json.loads(saved.read_text())["rows"]
         assert len(rows) == 4
         assert any(it["about"] == "loop" and it["is_so"] for row in rows for it in row["questions"])
