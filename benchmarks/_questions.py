@@ -58,9 +58,9 @@ def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tupl
     yield from _limbs(skeleton, evidence, truth)
     skeleton, _ = refiner._asked(prune_spurs, skeleton, evidence, refiner.limb)
     placed = Placed(truth, skeleton.vertices)
-    for branch, k, facts in branch_facts(skeleton, evidence, skeleton.report.noise):
+    for branch, k, facts in branch_facts(skeleton, evidence):
         yield "air", facts, placed.crosses_air(branch, k)
-    skeleton, _ = cut_air(skeleton, evidence, skeleton.report.noise, refiner.air)
+    skeleton, _ = cut_air(skeleton, evidence, refiner.air)
     skeleton, _ = refiner._asked(prune_spurs, skeleton, evidence, refiner.limb)
     placed = Placed(truth, skeleton.vertices)
     for (leaf, other), facts in gap_facts(skeleton, evidence):
