@@ -16,11 +16,11 @@ from glsk_o3d import Pipeline
 from glsk_o3d.analysis import Truth
 from glsk_o3d.analysis.comparison import TIP_REACH
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
-from glsk_o3d.refinement.air import branch_facts, cut_air
+from glsk_o3d.refinement.air import branch_facts
 from glsk_o3d.refinement.bridging import gap_facts
-from glsk_o3d.refinement.evidence import Evidence, in_order
-from glsk_o3d.refinement.loops import close_loops, loop_facts
-from glsk_o3d.refinement.spurs import limb_facts, prune_spurs
+from glsk_o3d.refinement.evidence import Evidence, ordered
+from glsk_o3d.refinement.loops import loop_facts
+from glsk_o3d.refinement.spurs import limb_facts
 from glsk_o3d.skeleton import Skeleton
 
 DIGITS = 4  # of a fact
@@ -43,8 +43,8 @@ def questions(case: Case, pipeline: Pipeline) -> dict:
 
 def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tuple[str, dict[str, float], bool]]:
     """The questions in the order in which a pipeline's refiner asks them, each of the skeleton that it has then."""
-    *stages, refiner = pipeline.stages
-    skeleton, surface = refiner._fit(in_order(Pipeline(*stages)(points))[0])
+    *stages, refiner, _ = pipeline.stages
+    skeleton, surface = refiner._fit(ordered(Pipeline(*stages)(points))[0])
     if not len(skeleton.edges):
         return
     evidence = Evidence.of(skeleton, surface)
@@ -54,14 +54,13 @@ def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tupl
         for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
             if (is_so := placed.is_handle(cycle)) is not None:  # also without an inside: of false ones there are few
                 yield "loop", loop.facts, is_so
-    skeleton, _ = refiner._asked(close_loops, skeleton, evidence, refiner.handle)
+    skeleton, _ = refiner._asked("loop", skeleton, evidence)
     yield from _limbs(skeleton, evidence, truth)
-    skeleton, _ = refiner._asked(prune_spurs, skeleton, evidence, refiner.limb)
+    skeleton, _ = refiner._asked("limb", skeleton, evidence)
     placed = Placed(truth, skeleton.vertices)
     for branch, k, facts in branch_facts(skeleton, evidence):
         yield "air", facts, placed.crosses_air(branch, k)
-    skeleton, _ = cut_air(skeleton, evidence, refiner.air)
-    skeleton, _ = refiner._asked(prune_spurs, skeleton, evidence, refiner.limb)
+    skeleton, _ = refiner._asked("air", skeleton, evidence)
     placed = Placed(truth, skeleton.vertices)
     for (leaf, other), facts in gap_facts(skeleton, evidence):
         yield "gap", facts, bool(placed.joined(leaf, other))

@@ -21,7 +21,8 @@ from .refinement.spurs import prune_spurs
 from .skeleton import Skeleton
 
 ANSWERS = {"loop": close_loops, "limb": prune_spurs, "air": cut_air, "gap": bridge_gaps}
-ROUNDS = 3  # derived: of the questions; what a cut or a bridge has changed is asked about again, and once more
+ORDER_OF_QUESTIONS = ("loop", "limb", "air", "limb", "gap", "loop", "limb")
+"""Whether there are false loops and spurs is asked last, since cuts and bridges may make them."""
 
 
 @documented
@@ -109,19 +110,15 @@ class Refiner(Filter[Skeleton]):
         return self._centred(skeleton, surface), surface
 
     def _decide(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
-        """Answer one question after the other, until none changes the graph any more."""
+        """Answer one question after the other; not again where the graph is the same as before."""
         evidence = Evidence.of(skeleton, surface)
         decisions: dict[str, list[Judgement]] = {about: [] for about in ANSWERS}
         settled: dict[str, Skeleton] = {}  # what each question was last asked about
-        for _ in range(ROUNDS):
-            for about, answer in ANSWERS.items():
-                limit = getattr(self, QUESTIONS[about].option)
-                if limit and settled.get(about) is not skeleton:
-                    skeleton, found = answer(skeleton, evidence, limit)
-                    if _changed(found):
-                        skeleton = self._centred(skeleton, evidence)
-                    decisions[about] = _changed(decisions[about]) + found
-                    settled[about] = skeleton
+        for about in ORDER_OF_QUESTIONS:
+            if settled.get(about) is not skeleton:
+                skeleton, found = self._asked(about, skeleton, evidence)
+                decisions[about] = _changed(decisions[about]) + found
+                settled[about] = skeleton
         report = replace(
             skeleton.report,
             judgements=tuple(each for found in decisions.values() for each in found),
@@ -130,6 +127,14 @@ class Refiner(Filter[Skeleton]):
             n_bridges=len(_changed(decisions["gap"])),
         )
         return replace(skeleton, report=report)
+
+    def _asked(self, about: str, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
+        """A skeleton after a question was answered for its parts, with the curve fitted anew if it was changed."""
+        limit = getattr(self, QUESTIONS[about].option)
+        if not limit:
+            return skeleton, []
+        skeleton, found = ANSWERS[about](skeleton, evidence, limit)
+        return (self._centred(skeleton, evidence) if _changed(found) else skeleton), found
 
     def _centred(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
         if self.spacing:
