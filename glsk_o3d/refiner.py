@@ -133,8 +133,8 @@ class Refiner(Filter[Skeleton]):
         limit = getattr(self, QUESTIONS[about].option)
         if not limit:
             return skeleton, []
-        skeleton, found = ANSWERS[about](skeleton, evidence, limit)
-        return (self._centred(skeleton, evidence) if _changed(found) else skeleton), found
+        answered, found = ANSWERS[about](skeleton, evidence, limit)
+        return (self._centred(answered, evidence) if _changed(found) else skeleton), found
 
     def _centred(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
         if self.spacing:
