@@ -47,12 +47,11 @@ def test_a_wayland_socket_counts_only_while_somebody_listens(monkeypatch, tmp_pa
 
 
 @needs_x11
-def test_a_window_that_cannot_be_opened(run, monkeypatch):
-    o3d = pytest.importorskip("open3d")
+def test_a_window_that_cannot_be_opened(tree, monkeypatch):
     monkeypatch.setattr("glsk_o3d.viewing.window.has_display", lambda: True)
-    monkeypatch.setattr(o3d.visualization.VisualizerWithKeyCallback, "create_window", lambda *_: False)
+    monkeypatch.setattr("open3d.visualization.VisualizerWithKeyCallback.create_window", lambda *_: False)
     with pytest.raises(DisplayError, match="Open3D cannot open"):
-        show(run[0])
+        show(tree)
 
 
 def test_what_it_shows(run, forest, bare):
