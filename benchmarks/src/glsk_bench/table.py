@@ -193,7 +193,10 @@ def _table(title: str, first: str, cells: Iterable[tuple[str, Cell]]) -> str:
     heads = [first, "clouds", "failures", *(_HEADS.get(measure, measure) for measure in _COLUMNS), "s"]
     lines = [heads, ["---", *["--:"] * (len(heads) - 1)]]
     for name, cell in cells:
-        means = [told(*(cell[it] or (np.nan, np.nan, np.nan)), _DIGITS.get(it, 2)) for it in _COLUMNS]
+        means = []
+        for measure in _COLUMNS:
+            mean, low, high = cell[measure] or (np.nan, np.nan, np.nan)
+            means.append(told(mean, low, high, _DIGITS.get(measure, 2)))
         seconds = "-" if cell["seconds"] is None else f"{cell['seconds']:.2f}"
         lines.append([_plain(name), str(cell["clouds"]), str(cell["failures"]), *means, seconds])
     return "\n".join([f"**{_plain(title)}**", "", *(f"| {' | '.join(words)} |" for words in lines)])
