@@ -28,8 +28,6 @@ from glsk_o3d.recipes.catalogue import named_pipeline
 Graph = tuple[np.ndarray, np.ndarray]  # vertices (M, 3) and edges (E, 2)
 Mesh = tuple[np.ndarray, np.ndarray]  # vertices (V, 3) and triangles (F, 3)
 
-# --------------------------------------------------------------------------------------------- what they work on
-
 
 def without_outliers(points: np.ndarray) -> o3d.geometry.PointCloud:
     """The cloud without outliers; all that follow start here, for none of them drops any.
@@ -76,9 +74,6 @@ def poisson(points: np.ndarray) -> Mesh:
     mesh.remove_triangles_by_mask(np.asarray(sizes)[np.asarray(cluster)] < 100)
     mesh.remove_unreferenced_vertices()
     return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
-
-
-# ------------------------------------------------------------------------------------------------------- the tools
 
 
 def ours(name: str, points: np.ndarray, options: Mapping[str, object] | None = None) -> Graph:
@@ -212,19 +207,16 @@ class Peer:
 
     def versions(self) -> dict[str, str | None]:
         """Of its packages; None for one that is not installed."""
-        return {name: _version(name) for name in self.packages}
+        found: dict[str, str | None] = dict.fromkeys(self.packages)
+        for name in self.packages:
+            with suppress(PackageNotFoundError):
+                found[name] = version(name)
+        return found
 
 
 def skeleton_of(vertices: np.ndarray, edges: np.ndarray) -> Skeleton:
     """A graph as a skeleton without points and radii."""
     return Skeleton(vertices, simple_edges(edges), np.full(len(vertices), np.nan), (), (), ())
-
-
-def _version(package):
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 CGAL, WRAP = ("compas-cgal",), ("cgal", "compas-cgal")
@@ -242,9 +234,6 @@ PEERS = {
     "thinning": Peer("scikit-image, voxels", ("scikit-image", "skan", *WRAP), "wrap", thinning),
     "thinning-poisson": Peer("scikit-image, voxels", ("scikit-image", "skan"), "Poisson", thinning),
 }
-
-
-# ------------------------------------------------------------------------------------------------------- running them
 
 
 def installed(known: Mapping[str, Peer], names: str) -> dict[str, Peer]:

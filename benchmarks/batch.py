@@ -103,8 +103,8 @@ def ledger(out: Path) -> list[dict]:
 
 def kill_one(scans: Path, out: Path, folder: Path, after: int, *words: str) -> dict:
     """Kill one of two Dask workers once some scans or tiles are done; gives what became of all."""
-    begun = time.perf_counter()
     with dask_cluster(2, folder) as (file, workers):
+        begun = time.perf_counter()
         line = command(scans, out, *words, "--scheduler", file)
         run = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         path = out / "ledger.jsonl"
@@ -112,12 +112,13 @@ def kill_one(scans: Path, out: Path, folder: Path, after: int, *words: str) -> d
             time.sleep(0.02)
         workers[0].send_signal(signal.SIGKILL)
         run.wait()
+        seconds = time.perf_counter() - begun
     rows = ledger(out)
     per_worker = Counter(int(row["worker"].split()[-1]) for row in rows)
     done = [row for row in rows if row["status"] == "done"]
     return {
         "exit code": run.returncode,
-        "seconds": time.perf_counter() - begun,
+        "seconds": seconds,
         "lines": len(rows),
         "inputs named twice": len(rows) - len({row["input"] for row in rows}),
         "done": len(done),

@@ -18,7 +18,7 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")  # before NumPy: sums in the same order on any machine
 
@@ -45,47 +45,40 @@ Size = Annotated[int, typer.Option(min=8, help="Points of the truth clouds and s
 Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
 
 
-def clouds(shared: Path, size: int) -> Iterator[tuple[str, str, Any]]:
-    """Group, name and source of every cloud: a path, a path with the name of an array in it, or a sample's name."""
+def clouds(shared: Path, size: int) -> Iterator[tuple[str, str, Path | str, str | int]]:
+    """Group, name and source of every cloud: a path, with the name of an array in it if it has several, or a sample."""
     for path in sorted(shared.glob("data/*.ply")):
-        yield "data", path.stem, path
+        yield "data", path.stem, path, ""
     for path in sorted(shared.glob("truth/*.npz")):
         with np.load(path) as archive:
             for variant in sorted(name for name in archive if name.endswith(f"_{size}")):
-                yield f"truth {variant}", f"{path.stem} {variant}", (path, variant)
+                yield f"truth {variant}", f"{path.stem} {variant}", path, variant
     for name in SAMPLES:
-        yield "samples", f"{name} {size}", (name, size)
+        yield "samples", f"{name} {size}", name, size
 
 
-def load(source: Any) -> np.ndarray:
-    """The points that `clouds` names."""
-    if isinstance(source, Path):
-        return np.asarray(glsk.read_cloud(source).points)
-    place, which = source
-    if isinstance(place, Path):
-        with np.load(place) as archive:
-            return archive[which].astype(float)
-    return getattr(samples, place)(which).points
-
-
-def digest(cloud: np.ndarray, pipeline: str) -> str:
-    """What stands for a skeleton: the first 16 digits of a SHA-256 of its arrays, or the error's name."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            skeleton = glsk.skeletonize(cloud, pipeline)
-        except glsk.GlskError as error:
-            return type(error).__name__
-    told = hashlib.sha256()
-    for name in ARRAYS:
-        told.update(np.ascontiguousarray(getattr(skeleton, name)).tobytes())
-    return told.hexdigest()[:16]
-
-
-def _digests(case: tuple[str, str, Any]) -> tuple[str, str, dict[str, str]]:
-    group, name, source = case
-    cloud = load(source)
-    return group, name, {pipeline: digest(cloud, pipeline) for pipeline in PIPELINES}
+def digest(case: tuple[str, str, Path | str, str | int]) -> tuple[str, str, dict[str, str]]:
+    """Group and name of a cloud, and for each pipeline the first digits of a SHA-256 of arrays, or the error's name."""
+    group, name, source, which = case
+    if isinstance(source, str):
+        points = getattr(samples, source)(which).points
+    elif which:
+        with np.load(source) as archive:
+            points = archive[which].astype(float)
+    else:
+        points = np.asarray(glsk.read_cloud(source).points)
+    found = {}
+    for pipeline in PIPELINES:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                skeleton = glsk.skeletonize(points, pipeline)
+            except glsk.GlskError as error:
+                found[pipeline] = type(error).__name__
+                continue
+        parts = (np.ascontiguousarray(getattr(skeleton, array)).tobytes() for array in ARRAYS)
+        found[pipeline] = hashlib.sha256(b"".join(parts)).hexdigest()[:16]
+    return group, name, found
 
 
 def digests(shared: Path, size: int, jobs: int) -> Digests:
@@ -93,7 +86,7 @@ def digests(shared: Path, size: int, jobs: int) -> Digests:
     every = list(clouds(shared, size))
     found: Digests = {}
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        for group, name, told in track(pool.map(_digests, every), "clouds", len(every), console=Console(stderr=True)):
+        for group, name, told in track(pool.map(digest, every), "clouds", len(every), console=Console(stderr=True)):
             found.setdefault(group, {})[name] = told
     return found
 

@@ -73,6 +73,13 @@ def test_the_skeleton_of_limbs_has_no_twigs_and_few_vertices(tmp_path, monkeypat
     np.testing.assert_array_equal(found.radii, expected.radii)
 
 
+def test_the_skeleton_of_limbs_is_the_script_of_its_page(root, tmp_path):
+    (text,) = re.findall(r"```xml\n(.*?)```", (root / "docs" / "editing.md").read_text(), re.DOTALL)
+    (tmp_path / "page.mlx").write_text(text)
+    shown, shipped = (read_steps(path) for path in (tmp_path / "page.mlx", scripts()["skeleton_of_limbs"]))
+    assert [(one.name, one.values) for one in shown] == [(one.name, one.values) for one in shipped]
+
+
 @pytest.mark.parametrize("name", scripts())
 def test_every_script_has_a_comment_and_is_documented(root, name):
     assert len(comment(scripts()[name])) > 40

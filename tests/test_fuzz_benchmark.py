@@ -10,7 +10,7 @@ import pytest
 from glsk_o3d import Skeleton, skeletonize
 from glsk_o3d.samples import torus
 
-ARRAYS, FILES = 30, 400
+ARRAYS, FILES = 15, 200
 
 
 @pytest.fixture(scope="module")

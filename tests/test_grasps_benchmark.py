@@ -70,7 +70,8 @@ def test_what_is_only_on_the_way_in(tool):
     np.testing.assert_array_equal(found, np.tile([False, True], (len(grasps), 1)))
 
 
-def test_the_command(call, tmp_path):
+def test_the_command(tool, call, tmp_path, monkeypatch):
+    monkeypatch.setattr(tool, "STEPS", (5, 5, 9))
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- pierced -->\n<!-- end -->\nafter\n")
     out = call("--shapes", "torus", "--points", 1000, "--jobs", 0, "-o", tmp_path / "t.json", "--page", page)

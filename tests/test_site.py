@@ -156,6 +156,15 @@ def test_the_menu_shows_where_one_is(page, title, visit):
     assert tab.locator(".sidebar-tree summary:visible").count() > 4
 
 
+def test_pictures_on_white_do_not_dazzle_in_the_dark(visit):
+    changed = "(picture) => getComputedStyle(picture).filter"
+    for page, pictures in (("docs/index.html", "article img"), ("docs/method.html", "article img")):
+        assert visit(page).locator(pictures).first.evaluate(changed) == "none"
+        shown = visit(page, scheme="dark").locator(pictures).evaluate_all(f"(all) => all.map({changed})")
+        assert shown
+        assert "none" not in shown
+
+
 @pytest.mark.parametrize("width", [390, 1400])
 def test_the_first_page_leads_on(width, visit):
     tab = visit("docs/index.html", width)

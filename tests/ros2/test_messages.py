@@ -116,6 +116,17 @@ def test_markers_show_edges_vertices_and_junctions(skeleton, make_message, heade
         assert marker.scale.x == marker.scale.y == marker.scale.z > 0
 
 
+def test_every_branch_has_a_colour_of_its_own(tree, make_message, header):
+    edges, vertices = markers_of(tree, header, make_message).markers[1:3]
+    color_of = {}
+    for i, edge in enumerate(tree.edges):
+        (row,) = [row for row, path in enumerate(tree.branches) if set(edge) <= set(path)]
+        color_of.setdefault(row, set()).update((c.r, c.g, c.b) for c in edges.colors[2 * i : 2 * i + 2])
+    assert [len(colors) for colors in color_of.values()] == [1, 1, 1]
+    assert len(set.union(*color_of.values())) == 3
+    assert {(c.r, c.g, c.b) for c in vertices.colors} == set.union(*color_of.values())
+
+
 # --------------------------------------------------------------------------------------------------------------- poses
 
 
@@ -138,6 +149,12 @@ def test_x_is_along_the_curve(make):
     np.testing.assert_allclose(frames_of(upright)[:, :3, :3], np.tile([[0, 0, -1], [0, 1, 0], [1, 0, 0]], (4, 1, 1)))
     bent = make(np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.0]]), [[0, 1], [1, 2]])
     np.testing.assert_allclose(frames_of(bent)[:, :3, 0], [[1, 0, 0], [half, half, 0], [0, 1, 0]])
+
+
+def test_a_junction_follows_its_longest_branch_and_a_dot_is_not_turned(make, dot):
+    fork = make(np.array([[0, 0, 0], [1, 0, 0], [0, 5, 0], [0, 0, -2.0]]), [[0, 1], [0, 2], [0, 3]])
+    np.testing.assert_allclose(frames_of(fork)[0, :3, 0], [0, 1, 0])
+    np.testing.assert_array_equal(frames_of(dot)[0, :3, :3], np.eye(3))
 
 
 def test_in_a_tree_x_leads_away_from_the_root():

@@ -83,6 +83,16 @@ def test_with_an_opening_poses_are_grasps(ros, cloud, expected, rows):
     np.testing.assert_allclose(turns[:, :, 2], grasps.approach, atol=1e-12)
 
 
+def test_without_a_grasp_the_markers_go_out_with_a_warning(ros, cloud):
+    node = ros.node(opening=0.1)
+    node.on_cloud(cloud)
+    (_, markers), (_, poses) = node.published
+    assert len(markers.markers) >= 3
+    assert poses.poses == []
+    (warning,) = node.logged
+    assert "too wide" in warning
+
+
 def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, make_message, monkeypatch):
     node = ros.node()
     node.on_cloud(make_message(CLOUD, header=header))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import replace
 from functools import partial
@@ -86,18 +86,12 @@ def make(
             if missing:
                 todo[f"{family}_{seed}"] = partial(_make_shape, made.path, version, family, seed, missing)
     made = replace(made, complete=False) if todo else made
-    done = 0
-
-    def keep(name: str, told: Told) -> None:
-        nonlocal done
+    for done, (name, told) in enumerate(_done(todo, cores() if jobs is None else jobs), 1):
         before = made.shapes.get(name, {"clouds": {}})
         made.shapes[name] = told | {"clouds": before["clouds"] | told["clouds"]}
         made.save()
-        done += 1
         if on_shape is not None:
             on_shape(name, done, len(todo))
-
-    _work(todo, cores() if jobs is None else jobs, keep)
     made = replace(made, complete=True)
     made.save()
     return made
@@ -124,13 +118,12 @@ def _missing(made: BenchmarkFolder, name: str, variants: Sequence[str]) -> list[
     return [variant for variant in variants if variant not in there]
 
 
-def _work(todo: Mapping[str, Callable[[], Told]], jobs: int, keep: Callable[[str, Told], None]) -> None:
-    """Do the jobs, several at a time, and keep what comes of each."""
+def _done(todo: Mapping[str, Callable[[], Told]], jobs: int) -> Iterator[tuple[str, Told]]:
+    """What comes of each job, with its name; several are done at a time."""
     if jobs < 1:
         raise InvalidParameterError(f"jobs must be 1 or more, not {jobs}")
     if jobs == 1:
-        for name, job in todo.items():
-            keep(name, job())
+        yield from ((name, job()) for name, job in todo.items())
         return
     workers, waiting = LocalWorkers(min(jobs, max(len(todo), 1)), load=False), list(todo.items())
     running: dict[Future, str] = {}
@@ -143,7 +136,7 @@ def _work(todo: Mapping[str, Callable[[], Told]], jobs: int, keep: Callable[[str
                 name, error = running.pop(future), future.exception()
                 if error is not None:
                     raise BatchError(f"{name}: the process died: out of memory?") if died(error) else error
-                keep(name, future.result())
+                yield name, future.result()
     finally:
         workers.close(at_once=False)  # what is in work takes seconds, and then leaves no temporary file
 

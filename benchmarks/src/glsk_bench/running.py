@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
 import shlex
 import shutil
 import signal
@@ -14,7 +15,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,6 +29,13 @@ from glsk_o3d.recipes.catalogue import named_pipeline
 from .folders import BenchmarkFolder, CloudFile, read_folder
 from .scoring import TIMES_NAME, answer_files, read_times
 
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
+
+CAN_LIMIT_MEMORY = hasattr(resource, "prlimit")
+_PLACES = ("{cloud}", "{skeleton}")
 TIME_LIMIT = 600.0  # fitted: seconds; the slowest of the programs that we know take a tenth of it
 _PIPELINE_WORDS = (
     *(sys.executable, "-m", "glsk_o3d", "skeletonize", "{cloud}", "-o", "{skeleton}"),
@@ -40,10 +48,10 @@ Told = dict[str, Any]
 class RunResult:
     """What came of a run."""
 
-    done: int
-    failed: int
-    skipped: int
-    failures: dict[str, str] = field(default_factory=dict)
+    done: int  # clouds with an answer, those of earlier runs too
+    failed: int  # and without
+    skipped: int  # of these, clouds that an earlier run had done
+    failures: dict[str, str] = field(default_factory=dict)  # why there is no answer, by the name of the cloud
 
 
 def run(
@@ -112,28 +120,34 @@ def run(
     """
     made = folder if isinstance(folder, BenchmarkFolder) else read_folder(folder)
     words, program = _program(pipeline, command, ending)
-    _check_limits(time_limit, memory_limit, jobs)
+    if not 0 < time_limit < float("inf") or jobs < 1:
+        raise InvalidParameterError(f"the time limit must be above 0 and jobs 1 or more, not {time_limit:g} and {jobs}")
+    if memory_limit is not None and not memory_limit > 0:
+        raise InvalidParameterError(f"the memory limit must be above 0, not {memory_limit:g}")
+    if memory_limit is not None and not CAN_LIMIT_MEMORY:
+        raise InvalidParameterError("this system cannot limit the memory of a process: leave the limit out")
     program |= {"time_limit": time_limit, "memory_limit": memory_limit}
     place = Path(answers)
     place.mkdir(parents=True, exist_ok=True)
     times = _times(place, made, program)
     done = {name for name, told in times.items() if not (retry and told.get("failure") is not None)}
     todo = [cloud for cloud in made.scored if cloud.name not in done]
-    record = {"benchmark": made.version, "program": program, "machine": _machine(jobs), "clouds": times}
-    count = 0
-
-    def keep(cloud: CloudFile, outcome: Outcome) -> None:
-        nonlocal count
-        told = {"seconds": round(outcome.seconds, 4), "failure": outcome.failure, "digits": made.digits(cloud)}
-        times[cloud.name] = {part: value for part, value in told.items() if part != "digits" or value}
-        write_json(place / TIMES_NAME, record)
-        count += 1
-        if on_cloud is not None:
-            on_cloud(cloud.name, outcome, count, len(todo))
-
-    runner = Runner(time_limit, memory_limit)
+    machine = {"system": platform.platform(), "cores": os.cpu_count(), "jobs": jobs}
+    record = {"benchmark": made.version, "program": program, "machine": machine, "clouds": times}
+    runner, pool = Runner(time_limit, memory_limit), ThreadPoolExecutor(jobs)
     with tempfile.TemporaryDirectory(prefix=".run_", dir=place, ignore_cleanup_errors=True) as work:
-        _each(todo, jobs, lambda cloud: _answer(runner, words, cloud, Path(work), place, ending), keep, runner)
+        try:
+            begun = {pool.submit(_answer, runner, words, it, Path(work), place, ending): it for it in todo}
+            for count, future in enumerate(as_completed(begun), 1):
+                cloud, outcome = begun[future], future.result()
+                told = {"seconds": round(outcome.seconds, 4), "failure": outcome.failure, "digits": made.digits(cloud)}
+                times[cloud.name] = {part: value for part, value in told.items() if part != "digits" or value}
+                write_json(place / TIMES_NAME, record)
+                if on_cloud is not None:
+                    on_cloud(cloud.name, outcome, count, len(todo))
+        finally:  # ends all of them when something goes wrong
+            runner.stop()
+            pool.shutdown(wait=True, cancel_futures=True)
     known = {cloud.name: times[cloud.name].get("failure") for cloud in made.scored}
     failures = {name: failure for name, failure in known.items() if failure is not None}
     return RunResult(len(known) - len(failures), len(failures), len(known) - len(todo), failures)
@@ -151,15 +165,6 @@ def _program(pipeline: str | None, command: str | Sequence[str] | None, ending: 
     return [*_PIPELINE_WORDS, pipeline or "default"], {"pipeline": pipeline or "default", "ending": ending}
 
 
-def _check_limits(time_limit: float, memory_limit: float | None, jobs: int) -> None:
-    if not 0 < time_limit < float("inf") or jobs < 1:
-        raise InvalidParameterError(f"the time limit must be above 0 and jobs 1 or more, not {time_limit:g} and {jobs}")
-    if memory_limit is not None and not memory_limit > 0:
-        raise InvalidParameterError(f"the memory limit must be above 0, not {memory_limit:g}")
-    if memory_limit is not None and not CAN_LIMIT_MEMORY:
-        raise InvalidParameterError("this system cannot limit the memory of a process: leave the limit out")
-
-
 def _times(place: Path, made: BenchmarkFolder, program: Told) -> dict[str, Told]:
     """What earlier runs of the same program tell of each cloud."""
     files, times, path = answer_files(place), read_times(place), place / TIMES_NAME
@@ -174,37 +179,13 @@ def _times(place: Path, made: BenchmarkFolder, program: Told) -> dict[str, Told]
     return {name: times[name] for name in there if times[name].get("digits") == digits.get(name)}
 
 
-def _machine(jobs: int) -> Told:
-    return {"system": platform.platform(), "cores": os.cpu_count(), "jobs": jobs}
-
-
-def _each(
-    todo: Sequence[CloudFile],
-    jobs: int,
-    job: Callable[[CloudFile], Outcome],
-    keep: Callable[[CloudFile, Outcome], None],
-    runner: Runner,
-) -> None:
-    """Do a job for each cloud, several at a time, and keep the outcomes; end all of them when something goes wrong."""
-    pool, waiting = ThreadPoolExecutor(jobs), [*todo]
-    running: dict[Future[Outcome], CloudFile] = {}
-    try:
-        while waiting or running:
-            while waiting and len(running) < jobs:
-                cloud = waiting.pop(0)
-                running[pool.submit(job, cloud)] = cloud
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                keep(running.pop(future), future.result())
-    finally:
-        runner.stop()
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
 def _answer(runner: Runner, words: list[str], cloud: CloudFile, work: Path, place: Path, ending: str) -> Outcome:
     """Run the program on a cloud, and take its answer if it is one."""
     skeleton = work.resolve() / f"{cloud.name}{ending}"
     said = work / f"{cloud.name}.log"
-    outcome = runner.run(filled(words, cloud.path.resolve(), skeleton), said)
+    names = dict(zip(_PLACES, (str(cloud.path.resolve()), str(skeleton)), strict=True))
+    filled = [re.sub("{cloud}|{skeleton}", lambda found: names[found[0]], word) for word in words]
+    outcome = runner.run(filled, said)
     said.unlink(missing_ok=True)
     failure = outcome.failure or _fault(skeleton)
     if failure is None:
@@ -224,15 +205,6 @@ def _fault(skeleton: Path) -> str | None:
     except (FileFormatError, OSError, MemoryError) as error:
         return f"it wrote no skeleton: {brief(error).removeprefix(f'{skeleton}: ')}"
     return None if len(found.vertices) else "it wrote an empty skeleton"
-
-
-try:
-    import resource
-except ImportError:  # Windows
-    resource = None  # type: ignore[assignment]
-
-CAN_LIMIT_MEMORY = hasattr(resource, "prlimit")
-_PLACES = ("{cloud}", "{skeleton}")
 
 
 class Outcome(NamedTuple):
@@ -258,17 +230,6 @@ def words_of(command: str | Sequence[str]) -> list[str]:
     return words
 
 
-def filled(words: Sequence[str], cloud: Path, skeleton: Path) -> list[str]:
-    """The words with the names of files in their places."""
-    names = [str(cloud), str(skeleton)]
-    found = []
-    for word in words:
-        for place, name in zip(_PLACES, names, strict=True):
-            word = word.replace(place, name)
-        found.append(word)
-    return found
-
-
 class Runner:
     """Runs commands, several at a time if it is called from threads, and can end them all."""
 
@@ -278,18 +239,7 @@ class Runner:
         self._lock, self._stopped = threading.Lock(), False
 
     def run(self, words: Sequence[str], said: Path) -> Outcome:
-        """Run a command to its end. Never raises for what the command does.
-
-        Parameters
-        ----------
-        words : sequence of str
-        said : Path
-            A file for what it prints.
-
-        Returns
-        -------
-        Outcome
-        """
+        """Run a command to its end; what it prints goes into a file. Never raises for what the command does."""
         late = threading.Event()
         with said.open("wb") as stream:
             start = time.perf_counter()
@@ -307,7 +257,7 @@ class Runner:
             self._running.discard(process)
         if late.is_set():
             return Outcome(seconds, f"not done after {self._time_limit:g} s")
-        return Outcome(seconds, None if code == 0 else f"{_ended(code)}{_last_line(said)}")
+        return Outcome(seconds, None if code == 0 else _cause(code, said))
 
     def _start(self, words: Sequence[str], stream: Any) -> subprocess.Popen:
         with self._lock:
@@ -346,19 +296,12 @@ def _kill(process: subprocess.Popen) -> None:
         subprocess.run(["taskkill", "/F", "/T", "/PID", str(process.pid)], capture_output=True, check=False)
 
 
-def _ended(code: int) -> str:
-    if code > 0:
-        return f"exit code {code}"
-    try:
-        return f"killed by {signal.Signals(-code).name}"
-    except ValueError:
-        return f"killed by signal {-code}"
-
-
-def _last_line(said: Path) -> str:
-    """The last line of what a command printed, after a colon."""
+def _cause(code: int, said: Path) -> str:
+    """How a command ended, and the last line of what it printed."""
+    names = {each.value: each.name for each in signal.Signals}
+    cause = f"exit code {code}" if code > 0 else f"killed by {names.get(-code, f'signal {-code}')}"
     with said.open("rb") as stream:
         stream.seek(0, os.SEEK_END)
         stream.seek(max(stream.tell() - 4 * LONGEST_QUOTED, 0))
         lines = stream.read().decode("utf-8", errors="replace").strip().splitlines()
-    return f": {lines[-1].strip()[:LONGEST_QUOTED]}" if lines else ""
+    return f"{cause}: {lines[-1].strip()[:LONGEST_QUOTED]}" if lines else cause

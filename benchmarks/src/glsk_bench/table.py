@@ -155,8 +155,9 @@ def leaderboard(results: Iterable[Results]) -> Leaderboard:
     if not found or not found[0].rows:
         raise InvalidParameterError("there are no scores to make a table of")
     first = found[0]
-    for each in found[1:]:
-        if each.benchmark != first.benchmark or _clouds(each) != _clouds(first):
+    clouds = [{(row["shape"], row["variant"]) for row in each.rows} for each in found]
+    for each, those in zip(found, clouds, strict=True):
+        if each.benchmark != first.benchmark or those != clouds[0]:
             raise InvalidParameterError(
                 f"{each.name!r} and {first.name!r} were scored on different clouds: make one benchmark for both"
             )
@@ -164,21 +165,15 @@ def leaderboard(results: Iterable[Results]) -> Leaderboard:
     for name in names:
         if names.count(name) > 1:
             raise InvalidParameterError(f"two programs are called {name!r}: score one with another name")
-    entries = [_entry(each) for each in found]
+    entries: list[dict[str, Any]] = []
+    for each in found:
+        groups: dict[str, list] = {}  # in the order in which they come
+        for row in each.rows:
+            groups.setdefault(row["variant"], []).append(row)
+        by_variant = {variant: _cell(rows) for variant, rows in groups.items()}
+        entries.append({"name": each.name, "all": _cell(each.rows), "variants": by_variant})
     entries.sort(key=lambda entry: [-entry["all"][measure][0] for measure in ("perfect", "topology")])
     return Leaderboard(first.benchmark, first.whole, entries)
-
-
-def _clouds(results: Results) -> set[tuple[str, str]]:
-    return {(row["shape"], row["variant"]) for row in results.rows}
-
-
-def _entry(results: Results) -> dict[str, Any]:
-    """The means of a program: over all clouds, and by variant in the order in which they come."""
-    variants = dict.fromkeys(row["variant"] for row in results.rows)
-    parts = {variant: [row for row in results.rows if row["variant"] == variant] for variant in variants}
-    by_variant = {variant: _cell(rows) for variant, rows in parts.items()}
-    return {"name": results.name, "all": _cell(results.rows), "variants": by_variant}
 
 
 def _cell(rows: Sequence[dict[str, Any]]) -> Cell:
@@ -193,27 +188,19 @@ def _cell(rows: Sequence[dict[str, Any]]) -> Cell:
     return cell
 
 
-def _table(title: str, first: str, lines: Iterable[tuple[str, Cell]]) -> str:
+def _table(title: str, first: str, cells: Iterable[tuple[str, Cell]]) -> str:
+    """A table in Markdown; no name breaks it."""
     heads = [first, "clouds", "failures", *(_HEADS.get(measure, measure) for measure in _COLUMNS), "s"]
-    shown = [_line(heads), _line(["---", *["--:"] * (len(heads) - 1)])]
-    return "\n".join([f"**{_plain(title)}**", "", *shown, *(_line(_words(name, cell)) for name, cell in lines)])
-
-
-def _words(name: str, cell: Cell) -> list[str]:
-    means = (told(*_ends(cell[measure]), digits=_DIGITS.get(measure, 2)) for measure in _COLUMNS)
-    seconds = "-" if cell["seconds"] is None else f"{cell['seconds']:.2f}"
-    return [_plain(name), str(cell["clouds"]), str(cell["failures"]), *means, seconds]
-
-
-def _ends(found: list[float] | None) -> tuple[float, float, float]:
-    mean, low, high = found or (np.nan, np.nan, np.nan)
-    return mean, low, high
-
-
-def _line(words: Iterable[str]) -> str:
-    return f"| {' | '.join(words)} |"
+    lines = [heads, ["---", *["--:"] * (len(heads) - 1)]]
+    for name, cell in cells:
+        means = []
+        for measure in _COLUMNS:
+            mean, low, high = cell[measure] or (np.nan, np.nan, np.nan)
+            means.append(told(mean, low, high, _DIGITS.get(measure, 2)))
+        seconds = "-" if cell["seconds"] is None else f"{cell['seconds']:.2f}"
+        lines.append([_plain(name), str(cell["clouds"]), str(cell["failures"]), *means, seconds])
+    return "\n".join([f"**{_plain(title)}**", "", *(f"| {' | '.join(words)} |" for words in lines)])
 
 
 def _plain(name: str) -> str:
-    """A name that breaks no table."""
     return " ".join(name.split()).replace("|", "\\|")
