@@ -67,7 +67,7 @@ NAMES = {
         "Fewer vertices, smoother curves": ("simplify", "smooth"),
         "Another root": ("reroot",),
     },
-    "batch": {"Running": ("run_batch", "BatchResult"), "Looking before": ("plan_batch", "Plan", "Task")},
+    "batch": {"Running": ("run_batch", "BatchResult"), "Looking before": ("plan_batch", "Plan")},
     "crosscheck": {"The check": ("cross_check", "CrossCheck"), "Its picture": ("save_crosscheck_picture",)},
     "samples": {
         "By name, and what they hold": ("sample_object", "Sample"),

@@ -148,19 +148,19 @@ class Seams(NamedTuple):
 
     def messages(self, grid: Grid) -> list[str]:
         """What is to be beware of, in sentences."""
-        told = []
+        messages = []
         if self.unmatched:
-            told.append(
+            messages.append(
                 f"{self.unmatched} of {self.joined + self.unmatched} cuts at seams have nothing to meet on the other "
                 "side, and end there: give larger tiles, or more overlap"
             )
         if self.thick:
             need = grid.overlap * self.thickest / grid.thickest
-            told.append(
+            messages.append(
                 f"{self.thick} ends at seams are of parts thicker than the overlap of {grid.overlap:g} allows, radius "
                 f"up to {self.thickest:.3g}: give {need:.3g} or more"
             )
-        return told
+        return messages
 
 
 class Samples(NamedTuple):

@@ -43,12 +43,25 @@ class Plan:
         The pipeline.
     parameters : str
         The hash by which it is known.
-    tasks : tuple of Task
-        One per input, in the order of their names; after those of its tiles that of what is joined from them.
+    tasks : tuple
+        One per input, in the order of their names; after those of its tiles that of what is joined from them. Each has
+        a ``name``, that of its results without ending; the ``source``, as the ledger calls it; ``outputs``, files to
+        write, from `out_dir`; and ``why``: ``"done"`` if it is to be skipped, else ``"new"``, ``"failed before"``,
+        ``"interrupted before"``, ``"other parameters"``, ``"outputs are gone"``, ``"input changed"``, ``"asked for"``
+        or, of what is joined from tiles, ``"tiles to do"``.
     ledger : Ledger
         As it is in the folder.
     left_out : dict of str to str
         Files in the folders and patterns that are not taken, with the reason.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     Path(folder, "scan.ply").touch()
+    ...     plan = plan_batch(folder, f"{folder}/skeletons")
+    >>> plan.todo[0].why, plan.skipped
+    ('new', 0)
     """
 
     out_dir: Path

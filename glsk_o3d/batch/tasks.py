@@ -39,27 +39,13 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Task:
-    """A cloud of a batch, or a scene whose tiles are joined.
+    """A cloud of a batch, or a scene whose tiles are joined: all that a worker must know, and why it is to be done."""
 
-    Attributes
-    ----------
-    name : str
-        Of the results, without ending.
-    source : str
-        What the ledger calls the cloud: its path, and which of its points are meant if not all.
-    outputs : tuple of str
-        The files to write, from the output folder.
-    why : str
-        ``"done"`` if it is to be skipped, else why not: ``"new"``, ``"failed before"``, ``"interrupted before"``,
-        ``"other parameters"``, ``"outputs are gone"``, ``"input changed"``, ``"asked for"`` or, of what is joined from
-        tiles, ``"tiles to do"``.
-    """
-
-    name: str
-    source: str
+    name: str  # of the results, without ending
+    source: str  # what the ledger calls the cloud: its path, and which of its points are meant if not all
     path: str  # of the cloud
-    outputs: tuple[str, ...] = ()  # the ending chooses what is written, and .png is a preview
-    why: str = "new"
+    outputs: tuple[str, ...] = ()  # from out_dir; the ending chooses what is written, and .png is a preview
+    why: str = "new"  # as `Plan` lists them
     out_dir: str = ""
     recipe: dict[str, Any] = field(default_factory=dict)
     cut_loops: bool = False

@@ -129,7 +129,7 @@ def _begin(load: bool) -> None:
     for category in (SkeletonWarning, PluginWarning):  # the report has the one, the first process tells the other
         warnings.simplefilter("ignore", category)
     if load:
-        with suppress(Exception):  # every job will say what is wrong
+        with suppress(Exception):  # every task will say what is wrong
             import_open3d()
             importlib.import_module("glsk_o3d.recipes")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import asdict
+from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -41,7 +41,7 @@ def info(
         facts = _cloud_facts(file, where)
 
     def words() -> None:
-        print_rows(facts if "edges" in facts else _cloud_in_words(facts), title=str(file))
+        print_rows(_skeleton_in_words(facts, skeleton) if "edges" in facts else _cloud_in_words(facts), title=str(file))
         print_iterations(iterations)
 
     steps = {"iterations": list(map(asdict, iterations))} if iterations else {}
@@ -171,7 +171,7 @@ def _skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
         "stages": list(dict.fromkeys(report.stages)),
         "converged": report.converged,
         "stop_reason": report.stop_reason,
-        "repeatable": _is_repeatable(report.recipe),
+        "repeatable": _pipeline_of(skeleton) is not None,
         "uncertain": list(map(str, report.uncertain)),
         "unsupported": list(map(str, report.unsupported)),
         "warnings": list(report.warnings),
@@ -179,12 +179,30 @@ def _skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
     }
 
 
-def _is_repeatable(recipe: Any) -> bool:
-    """Whether a recipe can be run here: some cannot be written, and some need a plugin."""
+def _pipeline_of(skeleton: Skeleton) -> Any:
+    """The pipeline that made a skeleton; None where it cannot be run here: some need a plugin, some are no recipe."""
     from ..errors import RecipeError
     from ..recipes import from_recipe
 
     try:
-        return bool(recipe and from_recipe(recipe))
+        return from_recipe(skeleton.report.recipe) if skeleton.report.recipe else None
     except RecipeError:
-        return False
+        return None
+
+
+def _skeleton_in_words(facts: dict[str, Any], skeleton: Skeleton) -> dict[str, Any]:
+    """The facts, where the filters of the run can be made here with those options alone that are no default."""
+    shown = {**facts, "radii": " to ".join(f"{radius:.6g}" for radius in facts["radii"] or [])}
+    if facts.get("repeatable"):
+        short = {repr(stage): _call(stage) for stage in _pipeline_of(skeleton).stages}
+        shown["stages"] = [short.get(stage, stage) for stage in facts["stages"]]
+    return shown
+
+
+def _call(made: Any) -> str:
+    """A filter or stopping rule as its name, and its options that are not the default."""
+    if not is_dataclass(made):
+        return repr(made)
+    options = {field: getattr(made, field.name) for field in fields(made) if field.init}
+    chosen = [f"{field.name}={_call(value)}" for field, value in options.items() if value != field.default]
+    return type(made).__name__ + f"({', '.join(chosen)})" * bool(chosen)

@@ -32,10 +32,6 @@ EPILOG = (
     "Results go to stdout; errors (one line each), warnings and progress to stderr."
 )
 COMMAND_GROUP = "glsk_o3d.commands"
-ELSEWHERE = {
-    "benchmark": ("./benchmarks", "Score any program on shapes with known axes (in a distribution of its own)."),
-}
-"""Commands that are not in this distribution: the folder of the repository that has them, and what they do."""
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -49,7 +45,7 @@ WITHOUT_JSON = (edit, convert, rig, view, demo)
 
 
 def add_plugged(app: typer.Typer) -> None:
-    """Add the commands of other distributions; those of `ELSEWHERE` that are not there say how to get them."""
+    """Add the commands of other distributions; the benchmark says how to get it where it is not there."""
     problems: list[str] = []
     found = {entry.name: entry for _, entry in entry_points(COMMAND_GROUP, problems)}
     for name, entry in sorted(found.items()):
@@ -62,18 +58,16 @@ def add_plugged(app: typer.Typer) -> None:
             problems.append(f"the command {name!r} ({entry.value}) is left out: {error}")
     for problem in problems:
         say("warning", problem)
-    for name in ELSEWHERE.keys() - found.keys():
-        _add_absent(app, name, *ELSEWHERE[name])
+    if "benchmark" not in found:
+        settings = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
+        app.command("benchmark", context_settings=settings)(_absent_benchmark)
 
 
-def _add_absent(app: typer.Typer, name: str, folder: str, text: str) -> None:
-    def absent() -> None:
-        with reporting():
-            cure = f"pip install {folder} in a clone of glsk-o3d"
-            raise MissingPackageError(f"glsk {name} needs another distribution: {cure}")
-
-    settings = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
-    app.command(name, help=text, context_settings=settings)(absent)
+def _absent_benchmark() -> None:
+    """Score any program on shapes with known axes (in a distribution of its own)."""
+    with reporting():
+        cure = "pip install ./benchmarks in a clone of glsk-o3d"
+        raise MissingPackageError(f"glsk benchmark needs another distribution: {cure}")
 
 
 def _version(wanted: bool) -> None:

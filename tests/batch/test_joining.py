@@ -261,14 +261,6 @@ def test_a_capsule_through_three_tiles_is_one_chain():
     assert off.max() < 0.1 * 0.05
 
 
-@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # where a tile ends, a limb may go on
-def test_a_torus_over_four_tiles_is_one_loop():
-    sample = samples.torus(8000, radius=0.05, noise=0.002)
-    joined, seams = tiled(sample, [-0.65, -0.65, -0.1], 0.66, 0.16)
-    assert (structure(joined), seams.unmatched) == ((1, 1, 0), 0)
-    assert joined.length == pytest.approx(2 * np.pi * 0.4, rel=0.01)
-
-
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 def test_an_overlap_that_is_far_too_small_is_told():
     sample = samples.torus(4000, ring_radius=0.6, radius=0.05)

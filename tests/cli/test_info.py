@@ -64,8 +64,9 @@ def test_skeletons_of_every_format_and_the_report_of_the_run(told, skeleton, inv
     assert set(facts["stages"]) == set(report.stages)
     assert [each["n_points"] for each in facts["iterations"]] == [each.n_points for each in report.iterations]
     table = invoke("info", "s.npz").stdout
-    assert all(f"{stage}\n" in table for stage in report.stages)
-    assert re.search(r"^radii +[\d.]+ [\d.]+$", table, re.MULTILINE)
+    assert "Connector(radius='4%')\n" in table  # what is not the default of the filter
+    assert re.search(r"^radii +[\d.]+ to [\d.]+$", table, re.MULTILINE)
+    assert re.search(r"^stages +RingBuilder\n +Contractor", table, re.MULTILINE)
     assert all(f"{each.explained:.4f}" in table for each in report.iterations)
     call = Judgement("gap", (1.0, 2.0, 3.0), 0.45, changed=False)
     replace(skeleton["s.json"], report=replace(report, judgements=(call,))).save(tmp_path / "close.json")
