@@ -130,6 +130,7 @@ def check_command(words):
 PROJECT = tomlkit.parse((ROOT / "pyproject.toml").read_text())["project"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", pages("python", "sh", "bash"))
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # the clouds are small
 def test_every_block_runs(path, workplace, install):
@@ -286,6 +287,7 @@ def test_every_picture_is_there_has_words_and_is_shown():
     assert {f"{draw.__name__}.png" for draw in figures.FIGURES} <= targets
 
 
+@pytest.mark.slow
 def test_the_first_picture_is_as_right_as_the_readme_says():
     found = [figures.skeletonised(points) for _, _, points, _ in figures.damaged()]
     counts = [(skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) for skeleton in found]

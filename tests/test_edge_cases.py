@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 import glsk_o3d as glsk
 from glsk_o3d import InvalidCloudError, SkeletonWarning, pipelines, samples, skeletonize
 
-NAMES = tuple(pipelines.PIPELINES)
+NAMES = ("default", *(pytest.param(name, marks=pytest.mark.slow) for name in pipelines.PIPELINES if name != "default"))
 RNG = np.random.default_rng(0)
 Y = samples.y_junction(n=300).points
 TORUS = samples.torus(n=300).points

@@ -215,6 +215,7 @@ def test_options_that_are_none_or_wrong_or_given_twice(options, named, words):
         skeletonize(np.zeros((0, 3)), options, **named)
 
 
+@pytest.mark.slow
 def test_skeletonize_takes_options():
     by_hand = (RingBuilder(k=24) | Contractor(reducer=LPRReducer()) | Connector() | Refiner())(POINTS)
     assert_same(skeletonize(POINTS, k=24), by_hand)
@@ -263,6 +264,7 @@ MOVES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cao2010", "default"])
 def test_moves_and_scales_along_with_the_cloud(name):
     """Measured: vertices agree to 1e-7 tube radii, from roundings of 1e-16 that ill-conditioned late solves blow up."""

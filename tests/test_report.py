@@ -52,12 +52,6 @@ def test_sampled_only_where_a_cloud_was_large(counts, sampled):
     assert Report(n_input=n, n_dropped=dropped, n_sampled=kept).is_sampled is sampled
 
 
-def test_is_frozen(report):
-    for part in (report, report.iterations[0]):
-        with pytest.raises(dataclasses.FrozenInstanceError):
-            part.converged = True
-
-
 def test_warnings_are_issued_and_kept():
     with pytest.warns(SkeletonWarning, match="first"):
         report = Report().with_warning("first")

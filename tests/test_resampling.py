@@ -85,6 +85,7 @@ def test_a_loop_is_shown_by_a_loop_alone():
     assert shares(_supported(split, [ring, ring, split, split]), "loop", present=False) == [0.5]
 
 
+@pytest.mark.slow
 def test_a_clear_shape_is_certain(recwarn):
     calls, points = [], samples.y_junction(1200).points
     found = support(points, draws=3, on_draw=lambda *n: calls.append(n))
@@ -97,6 +98,7 @@ def test_a_clear_shape_is_certain(recwarn):
     assert np.isnan(plain.support).all()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:uncertain")
 def test_options_seeds_and_files(tmp_path):
     points = samples.torus(1000).points

@@ -50,6 +50,7 @@ def test_hand_made_graphs(which):
         assert f"{count} {name}" in repr(skeleton)
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(st.integers(1, 14), st.sets(st.tuples(st.integers(0, 13), st.integers(0, 13))))
 def test_random_graphs_against_networkx(m, edges):

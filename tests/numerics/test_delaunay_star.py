@@ -128,6 +128,7 @@ def test_against_triangulations(kind):
 WHOLE = st.integers(-4, 4)
 
 
+@pytest.mark.slow
 @settings(max_examples=800)
 @given(st.lists(st.tuples(WHOLE, WHOLE, st.booleans() | st.just(True)), min_size=1, max_size=14))
 def test_against_exact_arithmetic(rows):

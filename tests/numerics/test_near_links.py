@@ -10,12 +10,6 @@ RNG = np.random.default_rng(0)
 LINE = np.column_stack([np.arange(40.0), np.zeros((40, 2))])
 
 
-def test_links_end_at_twice_the_spacing():
-    links = near_links(LINE)  # the third nearest point is two steps away, or three
-    assert links[20, 24] == 4
-    assert links[20, 25] == 0
-
-
 @pytest.mark.parametrize("n", [0, 1, 2, 3])
 def test_few_points(n):
     assert near_links(LINE[:n]).shape == (n, n)

@@ -55,6 +55,7 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.slow
 def test_threads_may_be_interrupted():
     environment = os.environ | {"OMP_NUM_THREADS": "4"}
     asking = subprocess.Popen([sys.executable, "-c", ASK_ON_AND_ON], env=environment, stdout=subprocess.PIPE, text=True)

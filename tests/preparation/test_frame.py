@@ -78,16 +78,6 @@ def test_against_interleaved_python_integers():
     assert morton_order(cells.astype(float)).tolist() == expected
 
 
-def test_points_in_one_cell_are_sorted_by_their_coordinates():
-    near = np.random.default_rng(4).random((40, 3)) * 1e-9
-    points = np.concatenate([near, np.ones((1, 3))])  # one cell is 5e-7 wide
-    order = morton_order(points)
-    assert order[-1] == 40
-    assert (np.diff(points[order[:40], 2]) > 0).all()
-    shuffled = np.random.default_rng(5).permutation(41)
-    np.testing.assert_array_equal(shuffled[morton_order(points[shuffled])], order)
-
-
 @pytest.mark.parametrize(("offset", "fine"), [(1e12, True), (1e13, True), (2e14, False), (1e15, False)])
 def test_what_is_lost_in_rounding_is_refused(offset, fine):
     points = CLOUD + [0, offset, 0]

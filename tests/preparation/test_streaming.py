@@ -36,13 +36,6 @@ def test_the_sample_of_blocks_is_that_of_the_whole(points, rows):
     np.testing.assert_array_equal(counts, sample.counts)
 
 
-def test_points_that_all_coincide_or_nearly_so_are_few():
-    places = torus(50).points
-    found, counts = sample_blocks(in_blocks(np.repeat(places, 100, axis=0), 333), lambda n: 200)
-    np.testing.assert_array_equal(np.unique(found, axis=0), np.unique(places, axis=0))
-    assert (counts == 100).all()
-
-
 def test_a_sample_of_a_sample_counts_all_points():
     points = torus(20000).points
     first = sample_grid(points, 4000)

@@ -42,6 +42,7 @@ def test_what_nobody_saw_is_the_radius(flat_bar):
     np.testing.assert_allclose(half_axes(pointless)[8], [0.4, 0.2])
 
 
+@pytest.mark.slow
 def test_skeletons_come_with_their_sections(flat_bar):
     ring = skeletonize(samples.torus(2000).points)
     np.testing.assert_allclose([ring.half_width, ring.half_thickness], [ring.radii] * 2, rtol=0.03)

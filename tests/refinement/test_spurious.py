@@ -61,6 +61,7 @@ def test_what_has_a_surface_stays_and_so_does_the_root():
     assert drop(short, root=41) is short  # inside the twig
 
 
+@pytest.mark.slow
 def test_noise_as_wide_as_twigs_makes_few_false_tips():
     """Beside the root and 16 true ones fewer than half of those that there are without the rule."""
     left = pipelines.tree()(samples.tree(4096, forks=4, noise=0.002).points)

@@ -32,6 +32,7 @@ def test_tiny_radii_make_no_endless_subdivision(refine):
     assert len(refine(bar(5000, radii=(0, 0)), spacing=0.5).edges) <= 1000
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(1, 9), st.floats(0.2, 0.4), st.floats(0.3, 5))
 def test_topology_and_length_stay(random_skeleton, refine, seed, m, reach, spacing):

@@ -74,6 +74,7 @@ def test_roots(sparse, root, place):
     assert (skeleton.n_components, skeleton.n_loops) == (1, 0)
 
 
+@pytest.mark.slow
 def test_the_thickest_end_of_a_sparse_tree_is_that_of_the_trunk():
     skeleton = pipelines.tree("thickest")(samples.tree(2048, forks=5).points)
     assert np.linalg.norm(skeleton.vertices[0]) < 0.15

@@ -37,6 +37,7 @@ def slow(skeleton, by_degree):
     return members, position, links
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(st.integers(0, 10**6), st.integers(3, 25), st.floats(0.3, 1.2), st.booleans(), st.booleans())
 def test_always_the_cheapest_edge(random_skeleton, refine, seed, m, reach, every, by_degree):
