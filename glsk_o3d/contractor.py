@@ -43,8 +43,9 @@ class Contractor(Filter[Contraction]):
     conserves mass.
 
     A late, ill-conditioned solve can throw points out of the cloud: beyond 1.2 times the bounding box or, in a frame
-    that turns with the cloud, the ball around it. Such a solve, and one without a trustworthy solution, is dropped, the
-    last sound state is kept, and the report says so.
+    that turns with the cloud, the ball around it. Such a solve is repeated with the runaway points held; where that
+    does not help, or there is no trustworthy solution, it is dropped, the last sound state is kept, and the report
+    says so.
 
     References
     ----------
@@ -79,6 +80,9 @@ class Contractor(Filter[Contraction]):
         30.0, "Factor on W_H where the cloud is a line already: more contraction would only shorten it.", low=1
     )
     keep_last: bool = parameter(True, "Keep the solve after which the rule says stop.")
+    retries: int = parameter(
+        3, "Times a solve that throws points out of the box is repeated with these points held.", low=0
+    )
     max_attraction: float = parameter(1e4, "Cap of W_H.", low=0, open_low=True)
 
     def _run(self, state: Contraction, watch: Watch | None) -> Contraction:
@@ -107,10 +111,10 @@ class Contractor(Filter[Contraction]):
             start = time.perf_counter()
             before = state
             try:
-                state, error = self._solve(state, laplacian)
+                state, facts = self._solve(state, laplacian)
             except SolveError as problem:
                 return _finished(state, f"solve {len(state.report.iterations) + 1} {REFUSED}: {problem}")
-            state = _record(state, solve_error=error, seconds=time.perf_counter() - start)
+            state = _record(state, **facts, seconds=time.perf_counter() - start)
             reason = self.stop(state.report.iterations)
             if reason is None and reducer is not None:
                 n = len(state)
@@ -126,7 +130,7 @@ class Contractor(Filter[Contraction]):
                 return _finished(kept, reason, converged=True)
         return _finished(state, f"reached max_iterations = {self.max_iterations}")
 
-    def _solve(self, state: Contraction, laplacian_of: Laplacian) -> tuple[Contraction, float]:
+    def _solve(self, state: Contraction, laplacian_of: Laplacian) -> tuple[Contraction, dict[str, Any]]:
         """One contraction step: equations 2, 4 and 5; 3 is `solve_contraction`."""
         # Wen (4)
         contraction = state.contraction_weight * self.amplification or self.initial_contraction / state.mean_ring_edge
@@ -141,10 +145,7 @@ class Contractor(Filter[Contraction]):
         attraction = np.clip(attraction, self.min_attraction, self.max_attraction)
         laplacian = laplacian_of(state)
         mass = np.sqrt(state.mass)
-        positions, error = solve_contraction(laplacian, contraction / mass, attraction * mass, state.positions)
-        outside = np.count_nonzero(state.frame.beyond(positions))
-        if outside:
-            raise SolveError(f"it would throw {outside} of {len(state)} points far out of the cloud")
+        positions, facts = self._solve_in_box(state, laplacian, contraction / mass, attraction, mass)
         _, ring_size = state.rings.nearest(positions)
         contracted = replace(
             state,
@@ -157,7 +158,26 @@ class Contractor(Filter[Contraction]):
         # In the first pass the published code takes a(1) itself for the drop, not 1 - a(1); so does this one.
         done = state.report.iterations
         drop = done[-1].ring_ratio - contracted.ring_ratio if done else contracted.ring_ratio  # Wen (10)
-        return replace(contracted, ring_ratio_drop=drop), error
+        return replace(contracted, ring_ratio_drop=drop), facts
+
+    def _solve_in_box(
+        self,
+        state: Contraction,
+        laplacian: csr_matrix,
+        row_weight: np.ndarray,
+        attraction: np.ndarray,
+        mass: np.ndarray,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Solve; as long as that throws points out of the box, hold these and solve again."""
+        held = np.zeros(len(state), bool)
+        for _ in range(self.retries + 1):
+            weight = np.where(held, self.max_attraction, attraction) * mass
+            positions, error = solve_contraction(laplacian, row_weight, weight, state.positions)
+            outside = state.frame.beyond(positions)
+            if not outside.any():
+                return positions, dict(n_held=int(held.sum()), solve_error=error)
+            held |= outside
+        raise SolveError(f"it would throw {outside.sum()} of {len(state)} points far out of the cloud")
 
 
 def explained_variance(points: np.ndarray, rings: Rings) -> np.ndarray:

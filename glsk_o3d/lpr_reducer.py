@@ -63,6 +63,9 @@ class LPRReducer(Filter[Contraction]):
 
     phi: float = parameter(1e5, "Merge where F is below phi times the squared ring size.", low=0, open_low=True)
     conserve_mass: bool = parameter(True, "Survivors take over the mass of the points they swallow.")
+    mend_rings: bool = parameter(
+        True, "Rebuild rings that no longer surround their point; otherwise such points later run away."
+    )
     order: Literal["cheapest", "index"] = parameter(
         "cheapest",
         "Which pairs are merged first: those with the least F / s^2, or those of the lowest point index.",
@@ -95,6 +98,8 @@ class LPRReducer(Filter[Contraction]):
         keep = representative == np.arange(n)
         index = np.cumsum(keep) - 1
         rings = state.rings.replace(representatives, combined).take(np.flatnonzero(keep)).rename(index[representative])
+        if self.mend_rings:
+            rings = mend_rings(rings, state.cloud[state.survivors[keep]], state.normals[state.survivors[keep]])
         left = {name: getattr(state, name)[keep] for name in OF_SURVIVORS}
         if self.conserve_mass:
             left["mass"] = np.bincount(representative, state.mass, n)[keep]
@@ -158,6 +163,18 @@ def match_feasible(state: Contraction, representatives: np.ndarray, swallowed: n
         ring_of[representatives[new]] = len(rings) + np.arange(len(new))
         rings = Rings.concatenate([rings, combined])
         feasible[new] = combined.sizes + combined.closed > 3
+
+
+def mend_rings(rings: Rings, points: np.ndarray, normals: np.ndarray) -> Rings:
+    """Rings with those of fewer than three neighbours rebuilt: Delaunay stars among the rings of these neighbours."""
+    broken = np.flatnonzero(rings.sizes < 3)
+    if len(broken) == 0:
+        return rings
+    around = rings.padded(broken)
+    beyond = [np.where(side[:, None] >= 0, rings.padded(np.maximum(side, 0)), -1) for side in around.T]
+    union = np.concatenate([around, *beyond], axis=1)
+    union[union == broken[:, None]] = -1
+    return rings.replace(broken, star_rings(points, broken, union, plane_axes(normals[broken])))
 
 
 def match(n: int, representatives: np.ndarray, swallowed: np.ndarray) -> np.ndarray:

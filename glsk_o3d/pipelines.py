@@ -39,7 +39,7 @@ def wen2024() -> Pipeline[Skeleton]:
     >>> wen2024().stages[1].reducer.conserve_mass
     False
     """
-    reducer = LPRReducer(conserve_mass=False, order="index")
+    reducer = LPRReducer(conserve_mass=False, order="index", mend_rings=False)
     return _published(reducer=reducer, stop=ExplainedScore(threshold=0.02))
 
 
@@ -47,7 +47,7 @@ def _published(**contraction: Any) -> Pipeline[Skeleton]:
     """What both published pipelines have in common: none of what this package adds."""
     return (
         RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
-        | Contractor(min_attraction=0, line_hold=1, keep_last=False, **contraction)
+        | Contractor(min_attraction=0, line_hold=1, keep_last=False, retries=0, **contraction)
         | Connector(radius="2%", thickness=0, links="nearest")
         | Refiner(collapse="degree", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)
     )

@@ -30,8 +30,9 @@ class IterationRecord:
     ----------
     iteration : int
         Counted from 1.
-    n_points, n_merged : int
-        Points that were solved for, and those that the reduction after the solve merged away.
+    n_points, n_merged, n_held : int
+        Points that were solved for, those that the reduction after the solve merged away, and those held in place
+        because the solve would have thrown them out of the bounding box.
     explained, explained_change : float
         PCA score e of the contracted points, 1 for a straight line (Wen et al. 2024, equation 14), and De, its change
         per share of points kept (equation 16).
@@ -56,6 +57,7 @@ class IterationRecord:
     iteration: int
     n_points: int
     n_merged: int
+    n_held: int
     explained: float
     explained_change: float
     ring_ratio: float

@@ -52,7 +52,7 @@ def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
     --------
     >>> from glsk_o3d import LPRReducer
     >>> to_recipe(Pipeline(LPRReducer()))["pipeline"]
-    [{'filter': 'LPRReducer', 'phi': 100000.0, 'conserve_mass': True, 'order': 'cheapest'}]
+    [{'filter': 'LPRReducer', 'phi': 100000.0, 'conserve_mass': True, 'mend_rings': True, 'order': 'cheapest'}]
     """
     pipeline.check()
     recipe = recipe_of(*(stage.table() for stage in pipeline.stages))
