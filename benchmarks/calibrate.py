@@ -1,4 +1,4 @@
-"""Probabilities of the refiner's judgements: their weights fitted, and whether what they say is so as often.
+"""Probabilities of the refiner's decisions: their weights fitted, and whether what they say is so as often.
 
 python benchmarks/calibrate.py check --builtin --variant clean_1024,noise2_1024
 
@@ -29,7 +29,7 @@ from _questions import questions
 from _runs import Jobs, Markdown, Output, Own, Shapes, Variants, application, run
 from _tables import fill, page_with, present, publish, read, save
 
-from glsk_o3d.judgements import QUESTIONS
+from glsk_o3d.decisions import QUESTIONS
 from glsk_o3d.pipelines import default
 
 EVERY = "*_4096"
@@ -63,7 +63,7 @@ def fit(
     jobs: Jobs = 2,
     output: Output = None,
 ) -> None:
-    """The weights with which the questions are answered best, as glsk_o3d/judgements.py has them."""
+    """The weights with which the questions are answered best, as glsk_o3d/decisions.py has them."""
     rows = rows_of(sources, own, variant, shapes, jobs)
     save(output, rows)
     for about, answered in by_question(rows).items():

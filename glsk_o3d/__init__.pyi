@@ -7,6 +7,7 @@ from . import pipelines as pipelines
 from . import samples as samples
 from .connector import Connector
 from .contractor import Contractor
+from .decisions import Decision, Supported
 from .driver import remove_redundant_points, skeletonize
 from .errors import (
     BatchError,
@@ -31,7 +32,6 @@ from .io.meshes import save_mesh
 from .io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
 from .io.skeletons import read_skeleton, read_truth, save_skeleton
 from .io.streaming import annotate_file, read_sample
-from .judgements import Judgement, Supported
 from .lpr_reducer import LPRReducer
 from .meshlab.layers import to_pymeshlab
 from .meshlab.meshset import MeshSet
@@ -58,6 +58,7 @@ __all__ = [
     "Contraction",
     "ContractionRecorder",
     "Contractor",
+    "Decision",
     "DisplayError",
     "ExplainedScore",
     "FileFormatError",
@@ -66,7 +67,6 @@ __all__ = [
     "InvalidCloudError",
     "InvalidParameterError",
     "IterationRecord",
-    "Judgement",
     "LPRReducer",
     "MeshSet",
     "MissingPackageError",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
-from .judgements import QUESTIONS, Judgement
+from .decisions import QUESTIONS, Decision
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .refinement.air import cut_air
@@ -112,7 +112,7 @@ class Refiner(Filter[Skeleton]):
     def _decide(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
         """Answer one question after the other; not again where the graph is the same as before."""
         evidence = Evidence.of(skeleton, surface)
-        decisions: dict[str, list[Judgement]] = {about: [] for about in ANSWERS}
+        decisions: dict[str, list[Decision]] = {about: [] for about in ANSWERS}
         settled: dict[str, Skeleton] = {}  # what each question was last asked about
         for about in ORDER_OF_QUESTIONS:
             if settled.get(about) is not skeleton:
@@ -121,14 +121,14 @@ class Refiner(Filter[Skeleton]):
                 settled[about] = skeleton
         report = replace(
             skeleton.report,
-            judgements=tuple(each for found in decisions.values() for each in found),
+            decisions=tuple(each for found in decisions.values() for each in found),
             n_loops_closed=len(_changed(decisions["loop"])),
             n_cuts=len(_changed(decisions["air"])),
             n_bridges=len(_changed(decisions["gap"])),
         )
         return replace(skeleton, report=report)
 
-    def _asked(self, about: str, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Judgement]]:
+    def _asked(self, about: str, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Decision]]:
         """A skeleton after a question was answered for its parts, with the curve fitted anew if it was changed."""
         limit = getattr(self, QUESTIONS[about].option)
         if not limit:
@@ -142,5 +142,5 @@ class Refiner(Filter[Skeleton]):
         return fit_axis(skeleton, self.recentre, surface)
 
 
-def _changed(judgements: list[Judgement]) -> list[Judgement]:
-    return [each for each in judgements if each.changed]
+def _changed(decisions: list[Decision]) -> list[Decision]:
+    return [each for each in decisions if each.changed]

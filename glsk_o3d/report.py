@@ -13,9 +13,9 @@ from importlib.metadata import PackageNotFoundError, version
 from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from .decisions import QUESTIONS, Decision, Place, Supported
 from .errors import SkeletonWarning
 from .interop.packages import QUIET, open3d_is
-from .judgements import QUESTIONS, Judgement, Place, Supported
 
 NOT_CONTRACTED = "not contracted"
 STOPPED_BY_CALLER = "stopped by the caller"
@@ -135,7 +135,7 @@ class Report:
         Ends of the gaps that were joined there, or to make one tree, in the cloud's units.
     root : (x, y, z) or ()
         Where a tree grows from; empty if none was asked for.
-    judgements : tuple of Judgement
+    decisions : tuple of Decision
         What was asked about the topology, with probabilities, and what was done.
     n_draws, n_agreeing : int
         Samples of the cloud whose skeletons were compared with this one, see `glsk_o3d.support`, and those of them with
@@ -180,7 +180,7 @@ class Report:
     n_traced: int = 0
     joined: tuple[tuple[Place, Place], ...] = ()
     root: Place | tuple[()] = ()
-    judgements: tuple[Judgement, ...] = ()
+    decisions: tuple[Decision, ...] = ()
     n_draws: int = 0
     n_agreeing: int = 0
     support: tuple[Supported, ...] = ()
@@ -204,9 +204,9 @@ class Report:
         return 0 < self.n_sampled < self.n_input - self.n_dropped
 
     @property
-    def uncertain(self) -> tuple[Judgement, ...]:
+    def uncertain(self) -> tuple[Decision, ...]:
         """What was judged with a probability between a quarter and three quarters, the least certain first."""
-        uncertain = (each for each in self.judgements if each.is_uncertain)
+        uncertain = (each for each in self.decisions if each.is_uncertain)
         return tuple(sorted(uncertain, key=lambda each: abs(each.probability - 0.5)))
 
     @property
@@ -222,9 +222,11 @@ class Report:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Report:
         """Inverse of `to_dict`; entries of a later version that this one does not know are passed over."""
+        if "judgements" in data:  # what decisions were called in files of before
+            data = {"decisions": data["judgements"], **data}
         report = _read(data, cls)
-        if not all(judgement.about in QUESTIONS for judgement in report.judgements):
-            raise ValueError("a judgement in its report is about nothing that is known")
+        if not all(decision.about in QUESTIONS for decision in report.decisions):
+            raise ValueError("a decision in its report is about nothing that is known")
         if not isinstance(report.recipe.get("pipeline", []), list):
             raise ValueError("its recipe is none")
         return report

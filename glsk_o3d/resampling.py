@@ -14,9 +14,9 @@ from scipy.spatial.distance import cdist
 
 from .analysis.comparison import matched
 from .analysis.curves import along, pieces
+from .decisions import Supported
 from .driver import chosen_pipeline
 from .errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
-from .judgements import Supported
 from .numerics.cycles import minimum_cycle_basis
 from .numerics.groups import component_labels
 from .numerics.polylines import arc_lengths, place_at

@@ -8,7 +8,7 @@ import pytest
 from scipy.special import expit
 
 from glsk_o3d.analysis import Truth
-from glsk_o3d.judgements import QUESTIONS
+from glsk_o3d.decisions import QUESTIONS
 from glsk_o3d.pipelines import default
 from glsk_o3d.samples import y_junction
 
@@ -89,7 +89,7 @@ class TestLabels:
         asked = [(about, QUESTIONS[about].probability(facts)) for about, facts, _ in found]
         less, more, _ = sorted(row for row in asked if row[0] == "limb")  # the report's is that both prongs are limbs
         asked[asked.index(less)] = "limb", less[1] * more[1]
-        assert sorted(asked) == sorted((it.about, it.probability) for it in pipeline(cloud.points).report.judgements)
+        assert sorted(asked) == sorted((it.about, it.probability) for it in pipeline(cloud.points).report.decisions)
 
 
 def answered(judging, n=6000):

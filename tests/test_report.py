@@ -1,4 +1,4 @@
-"""Report, IterationRecord and Judgement."""
+"""Report, IterationRecord and Decision."""
 
 import dataclasses
 import json
@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from glsk_o3d import Contractor, Judgement, Report, RingBuilder, SkeletonWarning, samples
+from glsk_o3d import Contractor, Decision, Report, RingBuilder, SkeletonWarning, samples
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def test_an_entry_of_another_type_is_refused_or_means_the_same(report, name):
 
 
 def test_places_on_a_map_keep_their_digits():
-    told = Judgement("loop", (450123.456789, 5600321.987654, -0.0123456), 0.5, changed=False).question
+    told = Decision("loop", (450123.456789, 5600321.987654, -0.0123456), 0.5, changed=False).question
     assert told == "the loop at (450123.46, 5600321.99, -0.01235) is a handle"
 
 
@@ -61,21 +61,21 @@ def test_warnings_are_issued_and_kept():
 
 
 JUDGEMENTS = (
-    Judgement("loop", (0.0, 0.5, -2.0), 0.99, changed=False),
-    Judgement("air", (1.0, 2.0, 3.0), 0.7, changed=True),
-    Judgement("gap", (1 / 3, 0.0, 1e9), 0.45, changed=False),
-    Judgement("limb", (0.0, 0.0, 0.0), 0.01, changed=True),
+    Decision("loop", (0.0, 0.5, -2.0), 0.99, changed=False),
+    Decision("air", (1.0, 2.0, 3.0), 0.7, changed=True),
+    Decision("gap", (1 / 3, 0.0, 1e9), 0.45, changed=False),
+    Decision("limb", (0.0, 0.0, 0.0), 0.01, changed=True),
 )
 
 
 def test_close_calls_lie_between_a_quarter_and_three_quarters_the_closest_first():
-    assert Report(judgements=JUDGEMENTS).uncertain == (JUDGEMENTS[2], JUDGEMENTS[1])
+    assert Report(decisions=JUDGEMENTS).uncertain == (JUDGEMENTS[2], JUDGEMENTS[1])
     assert Report().uncertain == ()
     for probability, close in ((0.249, False), (0.25, True), (0.75, True), (0.751, False)):
-        assert Judgement("gap", (0.0, 0.0, 0.0), probability, changed=False).is_uncertain == close
+        assert Decision("gap", (0.0, 0.0, 0.0), probability, changed=False).is_uncertain == close
 
 
-def test_judgements_in_words():
+def test_decisions_in_words():
     assert list(map(str, JUDGEMENTS)) == [
         "the loop at (0, 0.5, -2) is a handle: 0.99, loop kept",
         "the branch at (1, 2, 3) crosses air: 0.70, branch cut",

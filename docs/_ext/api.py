@@ -28,7 +28,7 @@ NAMES = {
     "skeletons": {
         "One call": ("skeletonize", "Skeleton"),
         "How far it hangs on chance": ("support", "Supported"),
-        "What it says about itself": ("Report", "IterationRecord", "Judgement"),
+        "What it says about itself": ("Report", "IterationRecord", "Decision"),
         "Fewer points, without a skeleton": ("remove_redundant_points",),
     },
     "filters": {

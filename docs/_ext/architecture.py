@@ -21,7 +21,7 @@ ROWS = (
     {"named pipelines": ("pipelines",)},
     {"filters": ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "tracer", "stopping")},
     {"refinement": ("refinement",), "pipeline": ("pipeline",)},
-    {"what filters share": ("parameters", "state", "skeleton", "report", "judgements")},
+    {"what filters share": ("parameters", "state", "skeleton", "report", "decisions")},
     {"preparation": ("preparation",)},
     {"numerics": ("numerics",), "other packages, and files": ("interop",), "samples": ("samples",)},
     {"errors": ("errors",)},

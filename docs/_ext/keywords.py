@@ -6,7 +6,7 @@ KEYWORDS = {
     "docs/start": "start, tutorial, quick start, getting started, install, installation",
     "docs/method": "method, algorithm, how it works, laplacian, contraction, equations",
     "docs/parameters": "parameters, settings, options, tuning, noise, noisy, sparse, radius, slow",
-    "docs/report": "report, warning, warnings, confidence, stop reason, judgements",
+    "docs/report": "report, warning, warnings, confidence, stop reason, decisions",
     "docs/limits": "limits, limitations, failure, failures, wrong, fails, sphere, sheet, large clouds, memory",
     "docs/coming_from": "matlab, cloudcontr, migration, coming from, pc-skeletor, skeletor, cgal",
     "docs/open3d": "open3d, annotate, attributes, colours, colors, tubes, tensor, downsample, point reduction",

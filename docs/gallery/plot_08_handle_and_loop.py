@@ -31,7 +31,7 @@ for name, each in (
 # %%
 # What was asked, and how it was answered, is in the report; here the loops.
 
-for it in skeleton.report.judgements:
+for it in skeleton.report.decisions:
     if it.about == "loop":
         print(it)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +13,10 @@ from ..errors import InvalidParameterError
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import norm
 from ..refinement.rooted import root_among
+from ..skeleton import Skeleton
 from .curvature import curvature_torsion
 from .rows import Rows
 from .segmentation import branch_of_point
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
 
 # fitted: radii from a junction between which a branch has its direction; nearer, parts blend
 HEADING_SPAN = (1.0, 3.0)

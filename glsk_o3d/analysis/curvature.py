@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidParameterError
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import norm
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
+from ..skeleton import Skeleton
 
 # All fitted, on circles, helices and skeletons of sampled clouds.
 POLYNOMIAL_DEGREE = 4  # of the local polynomials: with an odd one less the second derivative of a bend is too small

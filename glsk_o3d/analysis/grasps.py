@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +13,10 @@ from ..errors import InvalidParameterError, SkeletonWarning
 from ..interop.clouds import cloud_points
 from ..numerics.polylines import arc_lengths
 from ..report import outside
+from ..skeleton import Skeleton
 from .curves import check_number
 from .grasp_checks import Ways, free_ways, obstacle_list
 from .gripper import GraspCandidates, Gripper, listed
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
 
 
 def grasp_candidates(

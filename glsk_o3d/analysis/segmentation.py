@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -12,10 +12,8 @@ from ..interop.clouds import cloud_points
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.polylines import incident_edges, nearest_on_edges
 from ..refinement.thin_parts import SCALE_NEIGHBOUR
+from ..skeleton import Skeleton
 from .curves import along, pieces
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
 
 PIECES_PER_CURVE = 4000  # fitted: that a curve is cut into, to find the one nearest to a point
 

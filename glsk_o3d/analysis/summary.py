@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..report import NOT_CONTRACTED
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
+from ..skeleton import Skeleton
 
 ENDING_FACTS = ("iterations", "converged", "stop_reason")
 """What `ending` tells in one line."""

@@ -37,8 +37,8 @@ def edit(
     root, the stem is 0.
     """
     from .. import editing
+    from ..decisions import coordinates
     from ..io.skeletons import read_skeleton
-    from ..judgements import coordinates
 
     check_outputs(skeleton_files(output), skeleton, needed="an output with -o")
     edited, done = read_skeleton(skeleton), []

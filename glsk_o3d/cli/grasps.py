@@ -94,7 +94,7 @@ def _cone(text: str) -> tuple[tuple[float, ...], float]:
 
 
 def _print(best: GraspCandidates, found: int) -> None:
-    from ..judgements import coordinates
+    from ..decisions import coordinates
 
     echo(f"{found} grasps at {best.places} places")
     for reason, times in best.left_out.items():

@@ -105,7 +105,7 @@ def _print(measures: TreeMeasures) -> None:
 def _why_not(name: str, measures: TreeMeasures) -> str:
     """Why a measure is not known."""
     from ..analysis.trees import BREAST_HEIGHT
-    from ..judgements import coordinates
+    from ..decisions import coordinates
 
     if name == "crown_base":
         return "no branch leaves the stem"

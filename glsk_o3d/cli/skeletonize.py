@@ -18,7 +18,7 @@ from .outputs import check_outputs, skeleton_files, skeleton_writers, tell, writ
 from .reporting import WrongUsage, load_open3d
 
 if TYPE_CHECKING:
-    from ..judgements import Judgement
+    from ..decisions import Decision
     from ..pipeline import Pipeline
     from ..report import IterationRecord, Report
     from ..skeleton import Skeleton
@@ -291,6 +291,6 @@ def _shown(facts: Mapping[str, Any], report: Report) -> dict[str, Any]:
     return {**shown, "contraction": ending(facts), "seconds": f"{facts['seconds']:.2f}"}
 
 
-def _close_call(call: Judgement) -> str:
+def _close_call(call: Decision) -> str:
     """A close call, and what to do where the answer is wrong."""
     return f"{call}; if that is wrong: --set {call.otherwise}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,11 +10,9 @@ from ..analysis.branches import branch_table
 from ..analysis.segmentation import branch_of_point, label_of_nearest, thickness_of_points, vertex_of_cloud
 from ..interop.clouds import cloud_points, open3d_class
 from ..interop.packages import import_open3d
+from ..skeleton import Skeleton
+from ..state import Contraction
 from .colors import ColorChoice, shades, thickness_shades
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
-    from ..state import Contraction
 
 __all__ = ["annotate", "annotate_contraction"]
 

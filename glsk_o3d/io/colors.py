@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -12,9 +12,7 @@ from ..analysis.segmentation import thickness_of_points
 from ..errors import InvalidParameterError
 from ..interop.packages import require
 from ..numerics.groups import group_median
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
+from ..skeleton import Skeleton
 
 ColorChoice: TypeAlias = Literal["branch", "order", "radius", "confidence", "support", "thickness"] | Sequence[float]
 """What colours show, or one colour for all: red, green and blue from 0 to 1."""

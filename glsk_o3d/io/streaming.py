@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -17,18 +17,16 @@ from ..interop.clouds import SAMPLE_COUNT
 from ..interop.packages import import_open3d
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours
+from ..pipeline import Pipeline
 from ..preparation.frame import not_finite
 from ..preparation.sampling import sample_blocks
 from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from ..ring_builder import RingBuilder
+from ..skeleton import Skeleton
 from .annotation import labels
 from .formats import ply
 from .scan import COLOR_CHANNELS, NORMAL_NAMES, Scan
 from .scans import promised_points, read_blocks
-
-if TYPE_CHECKING:
-    from ..pipeline import Pipeline
-    from ..skeleton import Skeleton
 
 STREAMED_ENDING = ".ply"  # of files that labels are streamed to
 LARGE_CLOUD = 10_000_000  # measured: points that in memory take 2 GB, and in blocks half the time

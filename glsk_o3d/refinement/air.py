@@ -7,7 +7,7 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from ..judgements import QUESTIONS, Judgement
+from ..decisions import QUESTIONS, Decision
 from ..numerics.polylines import place_at
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
@@ -21,21 +21,21 @@ CROSSING_HOPS = 6  # fitted: edges around a branch whose vertices count to the s
 LEAST_SCATTER = 0.05  # fitted: of winding numbers along a skeleton
 
 
-def cut_air(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
-    """Cut every branch where it crosses air with a probability of `least` or more; one judgement for each branch.
+def cut_air(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
+    """Cut every branch where it crosses air with a probability of `least` or more; one decision for each branch.
 
     The skeleton was fitted to its axis.
     """
-    judgements, gone = [], []
+    decisions, gone = [], []
     for branch, place, facts in branch_facts(skeleton, evidence):
         weakest, chance = branch[place : place + 2], QUESTIONS["air"].probability(facts)
         middle = skeleton.vertices[weakest].mean(axis=0)
-        judgements.append(Judgement("air", tuple(middle.tolist()), chance, chance >= least))
+        decisions.append(Decision("air", tuple(middle.tolist()), chance, chance >= least))
         if chance >= least:
             gone.append(sorted(weakest.tolist()))
     if not gone:
-        return skeleton, judgements
-    return drop_lone_vertices(drop_edges(skeleton, gone)), judgements
+        return skeleton, decisions
+    return drop_lone_vertices(drop_edges(skeleton, gone)), decisions
 
 
 def branch_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[np.ndarray, int, dict[str, float]]]:

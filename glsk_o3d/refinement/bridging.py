@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ..judgements import QUESTIONS, Judgement
+from ..decisions import QUESTIONS, Decision
 from ..numerics.near_links import linked
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, dot, norm
@@ -33,25 +33,25 @@ class _End(NamedTuple):
     radius: float
 
 
-def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
+def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
     """Join ends with other ends, or with the side of something, where the object probably goes on; the surest first.
 
-    A gap is bridged by an edge from a probability of `least` on. There is one judgement for each end that points at
+    A gap is bridged by an edge from a probability of `least` on. There is one decision for each end that points at
     something, of its likeliest bridge.
     """
     found = [(QUESTIONS["gap"].probability(facts), pair) for pair, facts in gap_facts(skeleton, evidence)]
     used: set[int] = set()
-    judgements, bridges = [], []
+    decisions, bridges = [], []
     for chance, pair in sorted(found, key=lambda each: -each[0]):
         if used.isdisjoint(pair):
             place = skeleton.vertices[list(pair)].mean(axis=0)
-            judgements.append(Judgement("gap", tuple(place.tolist()), chance, chance >= least))
+            decisions.append(Decision("gap", tuple(place.tolist()), chance, chance >= least))
             used.update(pair)
             if chance >= least:
                 bridges.append(sorted(pair))
     if not bridges:
-        return skeleton, judgements
-    return replace(skeleton, edges=np.unique(np.concatenate([skeleton.edges, bridges]), axis=0)), judgements
+        return skeleton, decisions
+    return replace(skeleton, edges=np.unique(np.concatenate([skeleton.edges, bridges]), axis=0)), decisions
 
 
 def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..judgements import coordinates
+from ..decisions import coordinates
 from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
@@ -90,7 +90,7 @@ def _close_calls(skeleton: Skeleton) -> list[str]:
     close = [it for it in skeleton.report.uncertain if it.about != "limb"]
     if not close:
         return []
-    asked = sum(it.about != "limb" for it in skeleton.report.judgements)
+    asked = sum(it.about != "limb" for it in skeleton.report.decisions)
     return [
         f"uncertain topology: {len(close)} of {asked} questions about loops, air and gaps were close calls, above all "
         f"whether {close[0].question} (probability {close[0].probability:.2f}): look there; "

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..judgements import QUESTIONS, Judgement
+from ..decisions import QUESTIONS, Decision
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, opens_wider
 from ..numerics.groups import component_labels
 from ..numerics.polylines import arc_lengths
@@ -49,20 +49,20 @@ def _collapsed(skeleton: Skeleton, cycles: list[np.ndarray]) -> Skeleton:
     return collapse_triangles(merge_vertices(skeleton, component_labels(len(skeleton.vertices), pairs)))
 
 
-def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
+def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
     """Close the loops that are handles with a probability of less than `least`, until there are none.
 
     Narrow ones, two strands in one part, are collapsed; wide ones are cut where the fewest bonds cross. There is one
-    judgement for each loop of the minimum cycle bases, closed or left.
+    decision for each loop of the minimum cycle bases, closed or left.
     """
-    judgements: list[Judgement] = []
+    decisions: list[Decision] = []
     while True:
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
         kept, narrow, cut, used = [], [], [], set()
         for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
             false = loop.probability < least
             where = tuple(loop.centre.tolist())
-            (judgements if false else kept).append(Judgement("loop", where, loop.probability, false))
+            (decisions if false else kept).append(Decision("loop", where, loop.probability, false))
             if not false:
                 continue
             if loop.facts["opening"] < np.log(WIDE_LOOP):
@@ -71,7 +71,7 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
                 cut.append(sorted((cycle[loop.weakest], cycle[(loop.weakest + 1) % len(cycle)])))
                 used.update(cycle.tolist())
         if not narrow and not cut:
-            return skeleton, judgements + kept
+            return skeleton, decisions + kept
         if cut:
             skeleton = drop_edges(skeleton, cut)
         if narrow:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..judgements import QUESTIONS, Judgement
+from ..decisions import QUESTIONS, Decision
 from ..numerics.polylines import arc_lengths, relative_distance
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
@@ -23,7 +23,7 @@ SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
 FAR_OUT = 20.0  # fitted: half widths beyond which a protrusion says no more
 
 
-def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Judgement]]:
+def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
     """Cut branches whose points hardly stand out of the surface around the limbs that meet there.
 
     The points count, not the curve, since contraction shortens stubs as thick as they are long, and lets thin ones
@@ -32,10 +32,10 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     Another branch with an end may be a spur, too: it counts as no thicker than the junction.
 
     Of every junction the least probable limb goes first, until none is less probable than `least`; its points belong to
-    the junction and have no normals any more. There is one judgement for each branch that leaves a junction and has an
+    the junction and have no normals any more. There is one decision for each branch that leaves a junction and has an
     end, cut or left; at its end.
     """
-    judgements: list[Judgement] = []
+    decisions: list[Decision] = []
     given = skeleton
     while True:
         found = _with_forks(skeleton, list(_twigs(skeleton, evidence)))
@@ -44,12 +44,12 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
             before = worst.get(twig.junction)
             if twig.probability < (before.probability if before else least):
                 worst[twig.junction] = twig
-        judgements += [
-            Judgement("limb", tuple(skeleton.vertices[twig.tip].tolist()), twig.probability, bool(worst))
+        decisions += [
+            Decision("limb", tuple(skeleton.vertices[twig.tip].tolist()), twig.probability, bool(worst))
             for twig in worst.values() or found
         ]
         if not worst:
-            return replace(skeleton, normals=given.normals), judgements
+            return replace(skeleton, normals=given.normals), decisions
         group = np.arange(len(skeleton.vertices))
         for twig in worst.values():
             group[twig.body] = twig.junction

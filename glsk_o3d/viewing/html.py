@@ -9,22 +9,19 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..analysis.branches import branch_table
 from ..analysis.summary import point_count, structure, summary
+from ..decisions import coordinates
 from ..errors import MissingPackageError
 from ..interop.packages import require
 from ..io.colors import shades
-from ..judgements import coordinates
+from ..report import Report
+from ..skeleton import Skeleton
 from .figures import DPI
 from .preview import draw
-
-if TYPE_CHECKING:
-    from ..report import Report
-    from ..skeleton import Skeleton
 
 NOTEBOOK_SIZE = (1200, 500)
 NOTEBOOK_MARGIN = 16  # in pixels
@@ -130,12 +127,12 @@ def contraction(report: Report) -> str:
 
 def topology(report: Report) -> str:
     """What was closed, cut and bridged, and what was kept or left by a narrow margin: the least certain first."""
-    if not report.judgements:
+    if not report.decisions:
         return ""
-    counts = Counter(it.outcome for it in report.judgements)
+    counts = Counter(it.outcome for it in report.decisions)
     told = ", ".join(f"{outcome}: {n:,}" for outcome, n in sorted(counts.items()))
-    told = f"<h2>Topology</h2><p>{told}; {len(report.uncertain):,} of {len(report.judgements):,} close calls.</p>"
-    listed = [it for it in report.judgements if it.changed or it.is_uncertain]
+    told = f"<h2>Topology</h2><p>{told}; {len(report.uncertain):,} of {len(report.decisions):,} close calls.</p>"
+    listed = [it for it in report.decisions if it.changed or it.is_uncertain]
     listed.sort(key=lambda it: abs(it.probability - 0.5))
     rows = [(it.outcome, it.question, f"{it.probability:.2f}") for it in listed[:MOST_LISTED_ROWS]]
     marks = [' class="uncertain"' if it.is_uncertain else "" for it in listed[:MOST_LISTED_ROWS]]

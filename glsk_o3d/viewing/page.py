@@ -10,7 +10,7 @@ import re
 from datetime import datetime, timezone
 from html import escape
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,12 +19,10 @@ from ..analysis.summary import point_count
 from ..errors import InvalidParameterError
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
+from ..skeleton import Skeleton
 from ..state import Contraction
 from . import html as sections
 from .figures import MOST_DRAWN_POINTS, thinned
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
 
 FLAT_SIDE = 0.85  # a box whose least side is less than this share of the next is flat
 _STORED_RANGE = 1.25  # half diagonals that positions are stored as shares of: contracted points may leave the box a bit

@@ -6,7 +6,6 @@ import os
 import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,11 +13,9 @@ from ..analysis.summary import point_count, structure
 from ..errors import InvalidParameterError
 from ..interop.atomic import check_ending
 from ..numerics.vectors import norm
+from ..skeleton import Skeleton
 from . import figures
 from .figures import INK, PAPER
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
 
 _RED, _AMBER = "#d0121f", "#a05000"
 _LINE_HEIGHT, _LETTER_WIDTH, _MOST_LINES, _MOST_WARNINGS = 0.16, 0.066, 2, 2  # inches; lines of each warning, warnings

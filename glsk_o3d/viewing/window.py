@@ -7,7 +7,7 @@ import os
 import socket
 import sys
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from ..errors import DisplayError
 from ..interop.clouds import to_point_cloud
 from ..interop.packages import import_open3d
 from ..io.geometry import to_line_set, to_tubes
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
+from ..skeleton import Skeleton
 
 WINDOW_KEYS = {"C": "cloud", "S": "skeleton", "T": "radius tubes"}
 CLOUD_GREY = (0.62, 0.64, 0.66)  # of points without a colour

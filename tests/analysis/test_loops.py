@@ -20,7 +20,7 @@ def test_a_ring_is_one_loop_as_surely_a_handle_as_it_was_judged():
     (loop,) = skeleton.loops
     assert isinstance(loop, Loop)
     assert loop.opening == pytest.approx(0.4, rel=0.03)
-    (judged,) = (it for it in skeleton.report.judgements if it.about == "loop")
+    (judged,) = (it for it in skeleton.report.decisions if it.about == "loop")
     assert loop.probability == pytest.approx(judged.probability, abs=0.02)
     assert loop.probability > 0.9
     assert sorted(loop.vertices.tolist()) == list(range(len(skeleton.vertices)))

@@ -270,12 +270,12 @@ def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, monkeypatch):
 def test_a_close_call_comes_with_the_option_that_answers_otherwise(invoke, scans, monkeypatch):
     import glsk_o3d
 
-    call = glsk_o3d.Judgement("gap", (1.0, 2.0, 3.0), 0.42, changed=False)
+    call = glsk_o3d.Decision("gap", (1.0, 2.0, 3.0), 0.42, changed=False)
     real = glsk_o3d.Refiner._run
 
     def doubtful(self, data, watch):
         skeleton = real(self, data, watch)
-        return replace(skeleton, report=replace(skeleton.report, judgements=(call,)))
+        return replace(skeleton, report=replace(skeleton.report, decisions=(call,)))
 
     monkeypatch.setattr(glsk_o3d.Refiner, "_run", doubtful)
     told = "the object goes on across the gap at (1, 2, 3): 0.42, gap left; if that is wrong: --set Refiner.bridge=0.41"

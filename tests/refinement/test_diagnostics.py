@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import Judgement, Report, Skeleton
+from glsk_o3d import Decision, Report, Skeleton
 
 
 def sheet(n):
@@ -94,15 +94,15 @@ def test_one_reason_is_enough(refine):
 
 
 CALLS = (
-    Judgement("loop", (0.0, 1.0, 2.0), 0.55, changed=False),
-    Judgement("air", (3.0, 4.0, 5.0), 0.7, changed=True),
-    Judgement("gap", (6.0, 7.0, 8.0), 0.9, changed=True),
-    Judgement("limb", (6.0, 7.0, 8.0), 0.5, changed=False),
+    Decision("loop", (0.0, 1.0, 2.0), 0.55, changed=False),
+    Decision("air", (3.0, 4.0, 5.0), 0.7, changed=True),
+    Decision("gap", (6.0, 7.0, 8.0), 0.9, changed=True),
+    Decision("limb", (6.0, 7.0, 8.0), 0.5, changed=False),
 )
 
 
 def test_names_the_closest_call(refine):
-    judged, clear = (skeleton_of(torus(1600), report=Report(judgements=calls)) for calls in (CALLS, CALLS[2:]))
+    judged, clear = (skeleton_of(torus(1600), report=Report(decisions=calls)) for calls in (CALLS, CALLS[2:]))
     assert refine(clear).report.warnings == ()
     assert refine(judged).report.warnings == (
         "uncertain topology: 2 of 3 questions about loops, air and gaps were close calls, above all whether the loop "
@@ -117,7 +117,7 @@ def test_names_the_closest_call(refine):
 def test_the_option_that_answers_otherwise_is_beyond_the_probability(refine, about, option, cut_above, changed):
     for probability in (0.25, 0.414, 0.57, 0.7499):
         call = replace(CALLS[0], about=about, probability=probability, changed=changed)
-        (message,) = refine(skeleton_of(torus(800), report=Report(judgements=(call,)))).report.warnings
+        (message,) = refine(skeleton_of(torus(800), report=Report(decisions=(call,)))).report.warnings
         value = float(re.search(rf"set Refiner\.{option}=(.*)$", message)[1])
         assert (probability >= value) == (cut_above != changed)
         assert 0.004 < abs(probability - value) < 0.02

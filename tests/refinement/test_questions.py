@@ -37,8 +37,8 @@ def test_handles_stay(piped, refine, lines, loops, side):
     raw = piped(lines, side=side)
     skeleton = refine(raw, handle=0.5)
     assert_unchanged(skeleton, raw)
-    assert [(it.about, it.changed) for it in skeleton.report.judgements] == loops * [("loop", False)]
-    assert min(it.probability for it in skeleton.report.judgements) > 0.9
+    assert [(it.about, it.changed) for it in skeleton.report.decisions] == loops * [("loop", False)]
+    assert min(it.probability for it in skeleton.report.decisions) > 0.9
 
 
 def strands(piped, gap, length, **options):
@@ -100,12 +100,12 @@ def test_a_branch_is_a_limb_as_far_as_its_points_reach(piped, refine):
     for reach in (0.8, 1.5, 2, 3, 5):
         skeleton = refine(twig(piped, reach), limb=1e-9)
         assert len(skeleton.leaves) == 3
-        (tip,) = (it for it in skeleton.report.judgements if it.place[1] > 0)
+        (tip,) = (it for it in skeleton.report.decisions if it.place[1] > 0)
         assert (tip.about, tip.changed) == ("limb", False)
         found.append(tip.probability)
     assert (np.diff(found) > 0).all()
     assert found[1] < 0.25 < found[2] < 0.5 < found[3]
-    assert refine(twig(piped, 0.8)).report.judgements == ()  # 0 does not ask
+    assert refine(twig(piped, 0.8)).report.decisions == ()  # 0 does not ask
 
 
 def test_a_spur_goes_whole_and_nothing_else(piped, refine):
@@ -118,7 +118,7 @@ def test_a_spur_goes_whole_and_nothing_else(piped, refine):
     np.testing.assert_array_equal(skeleton.vertex_of_point[~left[owner]], place)  # the fork takes its points
     places = skeleton.vertices[skeleton.vertex_of_point[left[owner]]]
     np.testing.assert_allclose(places, raw.vertices[owner[left[owner]]], atol=1e-12)
-    (gone,) = skeleton.report.judgements
+    (gone,) = skeleton.report.decisions
     for least, leaves in ((gone.probability - 1e-9, 3), (gone.probability + 1e-9, 2)):
         assert len(refine(raw, limb=least).leaves) == leaves
     assert_unchanged(refine(stays, limb=0.25), stays)
@@ -137,7 +137,7 @@ def test_of_a_fork_of_short_limbs_the_better_two_stay(piped, refine):
     raw = piped([[(0, 0, 0), (0.1, 0, 0)], [(0, 0, 0), (-0.05, 0.12, 0)], [(0, 0, 0), (-0.05, -0.14, 0)]])
     assert counts(refine(raw, limb=1.0)) == (1, 0, 2)
     alike = piped([[(0, 0, 0), (0, 0, -1)], [(0, 0, 0), (0.15, 0, 0.15)], [(0, 0, 0), (-0.15, 0, 0.15)]])
-    low, high = sorted(it.probability for it in refine(alike, limb=1e-9).report.judgements)[:2]
+    low, high = sorted(it.probability for it in refine(alike, limb=1e-9).report.decisions)[:2]
     assert low < 0.9 * high
 
 
@@ -149,7 +149,7 @@ def test_an_edge_between_two_tubes_is_cut(piped, refine, noise):
     raw = replace(piped(ACROSS, tubes=[0, 1]), report=Report(noise=noise))
     skeleton = refine(raw, air=0.5, limb=0.5)
     assert (raw.n_components, counts(skeleton), skeleton.report.n_cuts) == (1, (2, 0, 4), 1)
-    (false,) = (it for it in skeleton.report.judgements if it.about == "air" and it.changed)
+    (false,) = (it for it in skeleton.report.decisions if it.about == "air" and it.changed)
     np.testing.assert_allclose(false.place, [0, 0.25, 0], atol=0.16)
     # what stays lies in the tubes, and has all points
     assert np.minimum(np.abs(skeleton.vertices[:, 1]), np.abs(skeleton.vertices[:, 1] - 0.5)).max() < 0.16
@@ -163,8 +163,8 @@ def test_limbs_and_struts_are_kept(piped, refine, lines, side):
     raw = piped(lines, side=None if lines is ACROSS else side)
     skeleton = refine(raw, air=0.5)
     assert_unchanged(skeleton, raw)
-    assert len(skeleton.report.judgements) == len(raw.branches)
-    assert max(it.probability for it in skeleton.report.judgements) < 0.25
+    assert len(skeleton.report.decisions) == len(raw.branches)
+    assert max(it.probability for it in skeleton.report.decisions) < 0.25
 
 
 # ---- gaps
@@ -196,9 +196,9 @@ def test_where_the_object_goes_on_a_gap_is_bridged(piped, refine, lines, after, 
     raw = piped(lines, side=side)
     skeleton = refine(raw, bridge=0.5)
     assert (counts(skeleton), skeleton.report.n_bridges) == (after, 1)
-    ((about, changed),) = [(it.about, it.changed) for it in skeleton.report.judgements]
+    ((about, changed),) = [(it.about, it.changed) for it in skeleton.report.decisions]
     assert (about, changed) == ("gap", True)
-    np.testing.assert_allclose(skeleton.report.judgements[0].place, place, atol=0.05)
+    np.testing.assert_allclose(skeleton.report.decisions[0].place, place, atol=0.05)
     assert len(skeleton.edges) == len(raw.edges) + 1
     np.testing.assert_allclose(skeleton.vertices, raw.vertices, atol=1e-12)
     assert refine(raw).n_components == raw.n_components
@@ -210,14 +210,14 @@ def test_where_it_ends_it_is_not(piped, refine):
     for raw in (capped(piped(PARTS), (-0.15 * X, X), (0.15 * X, -X)), capped(tip, (0.3 * X, -X))):
         skeleton = refine(raw, bridge=0.5)
         assert_unchanged(skeleton, raw)
-        assert max((it.probability for it in skeleton.report.judgements), default=0) < 0.5
+        assert max((it.probability for it in skeleton.report.decisions), default=0) < 0.5
 
 
 def test_which_gaps_are_asked(piped, refine):
     """Of what an end points at, is not near along the skeleton, and is not too far."""
 
     def asked(*lines):
-        return len(refine(piped(lines), bridge=1.0).report.judgements)
+        return len(refine(piped(lines), bridge=1.0).report.decisions)
 
     assert asked([(-1, 0, 0), (-0.2, 0, 0)], [(0.2, 0, 0), (1, 0, 0)]) == 1
     assert asked([(-1, 0, 0), (-0.6, 0, 0)], [(0.6, 0, 0), (1, 0, 0)]) == 0

@@ -11,7 +11,7 @@ import pytest
 
 import glsk_o3d as glsk
 from glsk_o3d import ContractionRecorder, Contractor, InvalidParameterError, RingBuilder, save_report
-from glsk_o3d.judgements import Judgement
+from glsk_o3d.decisions import Decision
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.samples import torus
 from glsk_o3d.viewing import html as sections
@@ -166,7 +166,7 @@ def test_warnings_once_each():
 
 def judged(*pairs):
     return Report(
-        judgements=tuple(Judgement("gap", (float(i), 0.0, 0.0), p, changed) for i, (p, changed) in enumerate(pairs))
+        decisions=tuple(Decision("gap", (float(i), 0.0, 0.0), p, changed) for i, (p, changed) in enumerate(pairs))
     )
 
 
@@ -189,4 +189,4 @@ def test_clear_answers_are_only_counted_and_long_lists_are_cut():
 def test_the_page_tells_how_the_topology_was_judged(tree, tmp_path):
     report = judged((0.55, False))
     save_report(dataclasses.replace(tree, report=report), tmp_path / "r.html")
-    assert report.judgements[0].question in (tmp_path / "r.html").read_text("utf-8")
+    assert report.decisions[0].question in (tmp_path / "r.html").read_text("utf-8")

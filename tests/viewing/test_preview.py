@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Skeleton
+from glsk_o3d.decisions import Supported
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
-from glsk_o3d.judgements import Supported
 from glsk_o3d.report import Report
 from glsk_o3d.samples import torus
 from glsk_o3d.viewing import preview

@@ -18,8 +18,8 @@ import re
 import numpy as np
 
 from ...analysis.branches import branch_table
+from ...decisions import coordinates
 from ...errors import FileFormatError
-from ...judgements import coordinates
 from ...numerics.polylines import arc_lengths
 from ...skeleton import Skeleton
 from .graphs import global_shift, graph_skeleton, line, parents, text, words_by_line

@@ -79,7 +79,7 @@ QUESTIONS = {
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Decision:
     """A question about the topology, and how it was answered.
 
     Attributes
@@ -98,9 +98,9 @@ class Judgement:
     --------
     >>> from glsk_o3d import skeletonize
     >>> from glsk_o3d.samples import torus
-    >>> [(it.about, it.changed) for it in skeletonize(torus(1000).points).report.judgements if it.about == "loop"]
+    >>> [(it.about, it.changed) for it in skeletonize(torus(1000).points).report.decisions if it.about == "loop"]
     [('loop', False)]
-    >>> str(Judgement("loop", (0.0, 0.5, 2.0), 0.55, changed=False))
+    >>> str(Decision("loop", (0.0, 0.5, 2.0), 0.55, changed=False))
     'the loop at (0, 0.5, 2) is a handle: 0.55, loop kept'
     """
 
