@@ -15,7 +15,7 @@ from _stages import told
 from _stopwatch import MB, fresh_python, peak, reset_peak, resident
 from _tables import Tables, number, short
 
-from glsk_o3d import Skeleton, read_cloud, read_skeleton, skeletonize
+from glsk_o3d import Skeleton, read_cloud, read_skeleton, save_skeleton, skeletonize
 from glsk_o3d.analysis.curves import distances
 from glsk_o3d.interop.packages import import_open3d, require
 from glsk_o3d.io.formats import ply
@@ -61,7 +61,7 @@ def once(path: Path, file: bool) -> dict:
     facts = costs | dict(peak=(peak() - before) / MB, sampled=skeleton.report.n_sampled) | told(skeleton)
     facts["diagonal"] = float(np.linalg.norm(np.ptp(points, axis=0)))
     curve = Skeleton(skeleton.vertices, skeleton.edges, skeleton.radii, (), (), ())
-    curve.save(path.with_suffix(".json"))
+    save_skeleton(curve, path.with_suffix(".json"))
     cloud = path.with_suffix(".ply")
     return facts | (spent(COMMAND, cloud, "skeletonize", cloud, "-o", path.with_suffix(".out.ply")) if file else {})
 

@@ -21,6 +21,7 @@ from glsk_bench import versions
 from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
+from glsk_o3d import save_skeleton
 from glsk_o3d.recipes.plugins import forget_plugins
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.ring_builder import RingBuilder
@@ -351,7 +352,7 @@ def perfect(small, tmp_path):
     place = tmp_path / "perfect"
     place.mkdir()
     for cloud in small.scored:
-        axis_of(small, cloud).save(place / f"{cloud.name}.obj")
+        save_skeleton(axis_of(small, cloud), place / f"{cloud.name}.obj")
     return place
 
 

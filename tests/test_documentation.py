@@ -18,7 +18,7 @@ import tomlkit
 from typer.testing import CliRunner
 
 import glsk_o3d as glsk
-from glsk_o3d import samples
+from glsk_o3d import samples, save_skeleton
 from glsk_o3d.cli.main import app
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.recipes.catalogue import BUILTIN
@@ -75,7 +75,7 @@ def prepared(tmp_path_factory):
     assert o3d.io.write_triangle_mesh(str(folder / "scan_mesh.ply"), mesh)
     skeleton = glsk.skeletonize(cloud)
     for name in ("skeleton.ply", "skeleton.json", "s.json", "horse.json"):
-        skeleton.save(folder / name)
+        save_skeleton(skeleton, folder / name)
     glsk.save_recipe(glsk.pipelines.default(), folder / "plant.toml")
     (folder / "mine.mlx").write_text((ROOT / "filters" / "glskeleton.mlx").read_text())
     return folder

@@ -9,6 +9,7 @@ import open3d as o3d
 import pytest
 
 from glsk_o3d import read_skeleton, samples
+from glsk_o3d.analysis import segment
 
 RNG = np.random.default_rng(0)
 SCENE = np.concatenate(
@@ -49,7 +50,7 @@ def test_open3d_pipeline(root, tmp_path, monkeypatch, capsys, api, dtype):
         assert positions[:, 2].min() > 0  # the ground is gone
         np.testing.assert_array_equal(positions, skeleton.points)
         np.testing.assert_array_equal(cloud.point.skeleton_vertex.numpy()[:, 0], skeleton.vertex_of_point)
-        np.testing.assert_array_equal(cloud.point.branch.numpy()[:, 0], skeleton.segment())
+        np.testing.assert_array_equal(cloud.point.branch.numpy()[:, 0], segment(skeleton))
         if api == "tensor":
             np.testing.assert_allclose(cloud.point.intensity.numpy()[:, 0], positions[:, 2], atol=0.012)
         with (folder / f"{i}_branches.csv").open(newline="") as stream:

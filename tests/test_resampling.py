@@ -15,9 +15,11 @@ from glsk_o3d import (
     Supported,
     read_skeleton,
     samples,
+    save_skeleton,
     skeletonize,
     support,
 )
+from glsk_o3d.analysis import branch_table
 from glsk_o3d.resampling import _supported, with_support
 
 R = 0.1
@@ -59,7 +61,7 @@ def test_a_limb_has_the_share_of_the_samples_that_show_it(shift):
     tip, foot = (np.argmin(np.linalg.norm(found.vertices - place, axis=1)) for place in ([1, 0, 1], [0, 0, 0]))
     assert (found.support[tip], found.support[foot]) == (0.75, 1)
     assert found.report.n_agreeing == 3
-    table = found.branch_table()
+    table = branch_table(found)
     assert sorted(table.support) == [0.75, 1, 1]
 
 
@@ -107,7 +109,7 @@ def test_options_seeds_and_files(tmp_path):
     assert support(points, 2, "cao2010").report.stages != found.report.stages
     assert Report.from_dict(json.loads(json.dumps(found.report.to_dict()))) == found.report
     for name in ("ring.json", "ring.npz"):
-        found.save(tmp_path / name)
+        save_skeleton(found, tmp_path / name)
         again = read_skeleton(tmp_path / name)
         np.testing.assert_array_equal(again.support, found.support)
         assert again.report.support == found.report.support

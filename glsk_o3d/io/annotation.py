@@ -89,7 +89,7 @@ def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
     ----------
     state : Contraction
     cloud : cloud, optional
-        As for `Skeleton.annotate`.
+        As for `glsk_o3d.annotate`.
 
     Returns
     -------

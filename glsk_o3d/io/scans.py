@@ -102,7 +102,7 @@ def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> A
     -------
     open3d.t.geometry.PointCloud
         Positions are float64. Attributes have the names of the file, such as ``intensity`` and ``classification``;
-        what cannot stand in an expression is an underscore. `Skeleton.annotate` keeps them.
+        what cannot stand in an expression is an underscore. `glsk_o3d.annotate` keeps them.
 
     Examples
     --------

@@ -149,7 +149,7 @@ def annotate_file(
 ) -> int:
     """Write a scan with labels to a file, block by block, in memory that does not grow with it.
 
-    `Skeleton.annotate` for files: the same attributes, coloured by branch. The scan's own colours are attributes
+    `glsk_o3d.annotate` for files: the same attributes, coloured by branch. The scan's own colours are attributes
     ``scan_red``, ``scan_green`` and ``scan_blue``. What a binary PLY file holds as float, double, uchar or int stays
     so, and radius, confidence and thickness are float where the coordinates are. All else becomes int, or double.
     ``thickness`` takes the spacing of the points that the skeleton was made from; NaN if it came without.

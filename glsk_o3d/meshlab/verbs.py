@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import editing
+from ..analysis.segmentation import segment
 from ..contractor import Contractor
 from ..errors import InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.clouds import Cloud
@@ -288,7 +289,7 @@ class SegmentVerb(PipelineVerb):
             skeleton, layer = layer.flow, layer.source or layer
         else:
             skeleton = self.plan(given)(layer.cloud(), on_iteration=on_iteration)
-        labels = skeleton.segment()
+        labels = segment(skeleton)
         colors = shades(skeleton, "branch", labels, skeleton.vertex_of_point)
         return dataclasses.replace(
             self.shown(skeleton.points, layer),

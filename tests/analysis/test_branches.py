@@ -8,8 +8,8 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, samples, skeletonize
-from glsk_o3d.analysis import thickness
+from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, annotate, samples, skeletonize
+from glsk_o3d.analysis import branch_table, segment, thickness
 from glsk_o3d.analysis.branches import PRINTED_COLUMNS
 from glsk_o3d.analysis.segmentation import branch_of_edge, vertex_of_cloud
 
@@ -48,7 +48,7 @@ TREE = grow()
 
 
 def test_a_tree_with_known_numbers():
-    table = TREE.branch_table()
+    table = branch_table(TREE)
     assert len(table) == 15
     assert np.bincount(table.level).tolist() == [1, 2, 4, 8]
     np.testing.assert_allclose(table.length, SHARE**table.level)
@@ -72,7 +72,7 @@ def test_a_tree_with_known_numbers():
 def test_parents_and_angles_follow_the_root():
     tip = TREE.leaves[-1]
     for root in (int(tip), np.int64(tip), TREE.vertices[tip] + 1e-3, tuple(TREE.vertices[tip])):
-        table = TREE.branch_table(root)
+        table = branch_table(TREE, root)
         assert table.level.max() == 5  # up the trunk's side, and down again to the farthest twigs
         (row,) = np.flatnonzero(table.level == 0)
         assert table.start[row] == tip
@@ -82,10 +82,10 @@ def test_parents_and_angles_follow_the_root():
 
 
 def test_a_root_inside_a_branch_and_at_a_junction():
-    inside = TREE.branch_table(3)  # a vertex of the trunk
-    assert inside.level.tolist() == TREE.branch_table().level.tolist()
+    inside = branch_table(TREE, 3)  # a vertex of the trunk
+    assert inside.level.tolist() == branch_table(TREE).level.tolist()
     assert inside.start[inside.level == 0].tolist() == [0]
-    fork = TREE.branch_table(8)
+    fork = branch_table(TREE, 8)
     assert np.flatnonzero(fork.level == 0).tolist() == np.flatnonzero(fork.start == 8).tolist()
     assert (fork.level == 0).sum() == 3
     assert np.isnan(fork.angle[fork.level == 0]).all()
@@ -93,11 +93,11 @@ def test_a_root_inside_a_branch_and_at_a_junction():
 
 def test_y_junction_exactly_and_from_its_cloud():
     sample = samples.y_junction(2000, angle=80)
-    table = axis_of(sample).branch_table()
+    table = branch_table(axis_of(sample))
     np.testing.assert_allclose(table.length, 0.5)
     np.testing.assert_allclose(table.angle[1:], 40)
     np.testing.assert_allclose(table.mean_radius, [0.09, 0.08, 0.08])
-    found = skeletonize(sample.points).branch_table(root=(0, 0, -1))
+    found = branch_table(skeletonize(sample.points), root=(0, 0, -1))
     assert sorted(found.level.tolist()) == [0, 1, 1]
     np.testing.assert_allclose(found.angle[found.level == 1], 40, atol=4)
     np.testing.assert_allclose(found.length, 0.5, atol=0.1)
@@ -106,7 +106,7 @@ def test_y_junction_exactly_and_from_its_cloud():
 
 
 def test_loops():
-    table = axis_of(samples.two_rings()).branch_table()
+    table = branch_table(axis_of(samples.two_rings()))
     assert table.kind.tolist() == ["loop", "loop"]
     assert table.component.tolist() == [0, 1]
     assert table.parent.tolist() == [-1, -1]
@@ -118,7 +118,7 @@ def test_loops():
     ring = [[0, 0, 0], [1, 1, 0], [2, 0, 0], [1, -1, 0]]
     edges = [[0, 1], [0, 3], [0, 4], [1, 2], [2, 3], [2, 5]]
     skeleton = Skeleton([*ring, [-5, 0, 0], [4, 0, 0], [9, 9, 9]], edges, np.full(7, np.nan), (), (), ())
-    table = skeleton.branch_table()
+    table = branch_table(skeleton)
     kinds = {name: np.flatnonzero(table.kind == name) for name in ("loop", "tip", "isolated", "inner")}
     assert [len(kinds[name]) for name in kinds] == [2, 2, 1, 0]
     assert table.start[table.level == 0].tolist() == [4, 6]  # without radii the longest branch, from its free end
@@ -138,7 +138,7 @@ def closed_branch_on_a_stick():
 
 @pytest.mark.parametrize("root", [13, 6])
 def test_a_closed_branch_has_no_direction(root):
-    table = closed_branch_on_a_stick().branch_table(root)
+    table = branch_table(closed_branch_on_a_stick(), root)
     (loop,), (stick,) = (np.flatnonzero(table.kind == kind) for kind in ("loop", "tip"))
     assert table.start[loop] == table.end[loop] == 0
     assert table.parent[[loop, stick]].tolist() == ([stick, -1] if root == 13 else [-1, loop])
@@ -150,8 +150,8 @@ def test_means_are_along_the_curve_and_the_thicker_end_is_the_start():
     for radii, start in (([1, 2, 4], 2), ([4, 2, 1], 0)):
         cone = Skeleton(np.outer([0, 1, 3], [1, 0, 0]), [(0, 1), (1, 2)], radii, (), (), ())
         mean = (1 * (radii[0] + radii[1]) + 2 * (radii[1] + radii[2])) / 2 / 3
-        assert {cone.branch_table(root).mean_radius[0] for root in (0, 2, None)} == {mean}
-        assert cone.branch_table().start.tolist() == [start]
+        assert {branch_table(cone, root).mean_radius[0] for root in (0, 2, None)} == {mean}
+        assert branch_table(cone).start.tolist() == [start]
 
 
 def test_the_parent_lies_on_the_shortest_way_from_the_root():
@@ -159,7 +159,7 @@ def test_the_parent_lies_on_the_shortest_way_from_the_root():
     vertices = [[-1, 0, 0], [0, 0, 0], [3, 0, 0], [1.5, np.sqrt(1.75), 0], [1.5, 3, 0], [4, 0, 0]]
     edges = [(0, 1), (1, 2), (1, 3), (2, 3), (2, 5), (3, 4)]
     skeleton = Skeleton(vertices, edges, np.full(6, 0.1), (), (), ())
-    table = skeleton.branch_table(root=0)
+    table = branch_table(skeleton, root=0)
     row = {frozenset(pair): i for i, pair in enumerate(zip(table.start.tolist(), table.end.tolist(), strict=True))}
     assert table.parent[row[frozenset((2, 5))]] == row[frozenset((1, 2))]
     assert table.parent[row[frozenset((2, 3))]] == row[frozenset((1, 3))]
@@ -168,7 +168,7 @@ def test_the_parent_lies_on_the_shortest_way_from_the_root():
 
 def test_the_straighter_branch_continues_the_axis():
     """At every fork of the tree the one at 30 degrees; the other one, at 50, begins an axis of the next order."""
-    table = TREE.branch_table()
+    table = branch_table(TREE)
     np.testing.assert_array_equal(np.bincount(table.order), [4, 6, 4, 1])
     straight = np.isclose(table.angle, ANGLES[0])
     child = np.flatnonzero(table.parent >= 0)
@@ -194,7 +194,7 @@ def feathered(angle, thin):
 @pytest.mark.parametrize(("angle", "thin"), [(0.9, 0.05), (1.5, 0.3), (2.5, 0.9)])
 def test_a_stem_has_one_order(angle, thin):
     """Also where leaves are thicker, if they leave it sideways."""
-    table = feathered(angle, thin).branch_table(root=0)
+    table = branch_table(feathered(angle, thin), root=0)
     assert table.level.max() == 5
     stem = np.abs(table.end_point[:, 2] - table.start_point[:, 2] - 1) < 1e-9
     assert stem.sum() == 6
@@ -203,7 +203,7 @@ def test_a_stem_has_one_order(angle, thin):
     assert table.axis[~stem].tolist() == np.flatnonzero(~stem).tolist()
     if thin < 0.1:  # without radii the direction alone decides
         bare = replace(feathered(angle, thin), radii=np.full(12, np.nan))
-        np.testing.assert_array_equal(bare.branch_table(0).order, table.order)
+        np.testing.assert_array_equal(branch_table(bare, 0).order, table.order)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0])
@@ -213,19 +213,19 @@ def test_where_one_radius_is_unknown_the_unit_does_not_matter(scale):
     nodes = np.array([[0, 0, 0], [0, 0, 1], [np.sin(a), 0, 1 + np.cos(a)], [np.sin(b), 0, 1 + np.cos(b)]])
     for radii, straight in (([0.1, np.nan, np.nan, 0.1], 2), ([0.1, 0.1, 0.1, 0.3], 3)):
         fork = Skeleton(nodes * scale, [(0, 1), (1, 2), (1, 3)], np.multiply(radii, scale), (), (), ())
-        table = fork.branch_table(0)
+        table = branch_table(fork, 0)
         assert table.end[table.order == 0].tolist() in ([1, straight], [straight, 1])
 
 
 def test_nothing_continues_what_turns_back_or_is_closed():
     hook = Skeleton([[0, 0, 0], [1, 0, 0], [0, 0.5, 0], [0, -0.5, 0]], [(0, 1), (1, 2), (1, 3)], [0.1] * 4, (), (), ())
-    assert hook.branch_table(0).order.tolist() == [0, 1, 1]
-    loop = closed_branch_on_a_stick().branch_table(13)
+    assert branch_table(hook, 0).order.tolist() == [0, 1, 1]
+    loop = branch_table(closed_branch_on_a_stick(), 13)
     assert sorted(loop.order.tolist()) == [0, 1]
 
 
 def test_a_torso_goes_on_at_both_ends():
-    table = axis_of(samples.sauropod(1000)).branch_table()
+    table = branch_table(axis_of(samples.sauropod(1000)))
     assert sorted(table.kind.tolist()) == ["inner"] * 2 + ["loop"] * 2 + ["tip"] * 6
     (body,) = np.flatnonzero(table.level == 0)
     assert table.mean_radius[body] == table.mean_radius.max()
@@ -238,7 +238,7 @@ def test_a_torso_goes_on_at_both_ends():
 
 
 def test_print():
-    table, supported = TREE.branch_table(), replace(TREE, support=np.full(len(TREE.vertices), 0.5)).branch_table()
+    table, supported = branch_table(TREE), branch_table(replace(TREE, support=np.full(len(TREE.vertices), 0.5)))
     lines = str(table).splitlines()
     assert lines[0].startswith("BranchTable(15 branches, 4 levels): lengths in")
     assert lines[1].split() == [name for name in PRINTED_COLUMNS if name != "support"]
@@ -246,12 +246,12 @@ def test_print():
     assert len(lines) == 17
     assert len({len(line) for line in lines[1:]}) == 1
     assert [line.split()[-1] for line in str(supported).splitlines()[1:3]] == ["support", "0.50"]
-    long = str(grow(5).branch_table()).splitlines()
+    long = str(branch_table(grow(5))).splitlines()
     assert [line.split()[0] for line in long[2:]] == [*map(str, range(15)), "...", "59", "60", "61", "62"]
 
 
 def test_csv_and_dicts(tmp_path):
-    table = closed_branch_on_a_stick().branch_table()
+    table = branch_table(closed_branch_on_a_stick())
     rows = list(table)
     assert [row["branch"] for row in rows] == list(range(len(table)))
     assert all(type(value) in (int, float, str) for row in rows for value in row.values())
@@ -270,14 +270,14 @@ def test_csv_and_dicts(tmp_path):
 @pytest.mark.parametrize("root", [-1, 121, 1.5, "trunk", (0, 0), (0, 0, np.nan)])
 def test_refuses_roots(root):
     with pytest.raises(InvalidParameterError, match="root"):
-        TREE.branch_table(root)
+        branch_table(TREE, root)
 
 
 def test_an_empty_skeleton():
     nothing = Skeleton((), (), (), (), (), ())
-    for ask in (nothing.branch_table, nothing.segment, nothing.annotate, lambda: thickness(nothing, np.zeros((3, 3)))):
+    for ask in (branch_table, segment, annotate, lambda skeleton: thickness(skeleton, np.zeros((3, 3)))):
         with pytest.raises(InvalidParameterError, match="empty"):
-            ask()
+            ask(nothing)
     assert len(nothing.to_networkx()) == 0
 
 
@@ -298,7 +298,7 @@ def distance_to(points, curve):
 
 
 def test_every_point_has_the_branch_of_its_vertex_or_the_nearest_one(y):
-    label = y.segment()
+    label = segment(y)
     assert label.shape == (2000,)
     assert label.dtype == np.int64
     apart = np.stack([distance_to(y.points, y.vertices[path]) for path in y.branches])
@@ -307,21 +307,21 @@ def test_every_point_has_the_branch_of_its_vertex_or_the_nearest_one(y):
     np.testing.assert_allclose(apart[label, np.arange(2000)][at_junction], apart.min(axis=0)[at_junction], atol=1e-9)
     rows = np.flatnonzero(~at_junction)
     assert all(y.vertex_of_point[row] in y.branches[label[row]] for row in rows)
-    np.testing.assert_array_equal(np.bincount(label, minlength=3), y.branch_table().points)
+    np.testing.assert_array_equal(np.bincount(label, minlength=3), branch_table(y).points)
 
 
 def test_other_clouds(y):
-    label = y.segment()
+    label = segment(y)
     order = RNG.permutation(2000)
-    np.testing.assert_array_equal(y.segment(y.points[order].astype(np.float32)), label[order])
-    np.testing.assert_array_equal(y.segment(o3d.t.geometry.PointCloud(o3d.core.Tensor(y.points))), label)
-    near = y.segment(np.concatenate([y.points[:5] + 1e-7, [[np.nan, 0, 0]]]))
+    np.testing.assert_array_equal(segment(y, y.points[order].astype(np.float32)), label[order])
+    np.testing.assert_array_equal(segment(y, o3d.t.geometry.PointCloud(o3d.core.Tensor(y.points))), label)
+    near = segment(y, np.concatenate([y.points[:5] + 1e-7, [[np.nan, 0, 0]]]))
     np.testing.assert_array_equal(near, [*label[:5], -1])
     bare = Skeleton(y.vertices, y.edges, y.radii, (), (), ())
     with pytest.raises(InvalidCloudError, match="without its cloud"):
-        bare.segment()
+        segment(bare)
     apart = np.stack([distance_to(y.points, y.vertices[path]) for path in y.branches])
-    chosen = apart[bare.segment(y.points), np.arange(2000)]
+    chosen = apart[segment(bare, y.points), np.arange(2000)]
     assert (chosen - apart.min(axis=0)).max() < 0.01 * y.radii.max()
 
 
@@ -329,13 +329,13 @@ def test_dropped_points_and_vertices_without_edges():
     vertices = [[0, 0, 0], [1, 0, 0], [5, 5, 5], [7, 7, 7]]
     points = [[0.2, 0, 0], [np.nan] * 3, [5, 5, 5], [7, 7, 7], [0.9, 1, 0]]
     skeleton = Skeleton(vertices, [(0, 1)], np.ones(4), [0, -1, 2, 3, 1], points, np.ones((5, 3)))
-    assert skeleton.segment().tolist() == [0, -1, 1, 2, 0]
-    assert skeleton.segment(points).tolist() == [0, -1, 1, 2, 0]
+    assert segment(skeleton).tolist() == [0, -1, 1, 2, 0]
+    assert segment(skeleton, points).tolist() == [0, -1, 1, 2, 0]
     bare = Skeleton(vertices, [(0, 1)], np.ones(4), (), (), ())
-    assert bare.segment(points).tolist() == [0, -1, 1, 2, 0]
+    assert segment(bare, points).tolist() == [0, -1, 1, 2, 0]
     assert vertex_of_cloud(bare, points)[1].tolist() == [0, -1, 2, 3, 1]  # the nearer end of the nearest edge
-    assert Skeleton(vertices, [], np.ones(4), (), (), ()).segment(points).tolist() == [0, -1, 2, 3, 1]
-    assert skeleton.branch_table().points.tolist() == [2, 1, 1]
+    assert segment(Skeleton(vertices, [], np.ones(4), (), (), ()), points).tolist() == [0, -1, 2, 3, 1]
+    assert branch_table(skeleton).points.tolist() == [2, 1, 1]
 
 
 def test_edges_in_any_order():

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from glsk_o3d import read_truth
+from glsk_o3d import read_truth, save_skeleton
 from glsk_o3d.analysis import Truth, compare
 from glsk_o3d.analysis.comparison import matching_f1
 from glsk_o3d.analysis.curves import distances
@@ -244,7 +244,7 @@ def test_truth_files(ring, tmp_path, axis_of):
     np.savez(tmp_path / "truth.npz", nodes=ring.nodes, edges=ring.edges, radii=ring.radii, more=1)
     axis = axis_of(ring)
     for name in ("s.npz", "s.json", "s.ply"):
-        axis.save(tmp_path / name)
+        save_skeleton(axis, tmp_path / name)
     for path in tmp_path.iterdir():
         assert compare(axis, read_truth(path)).error < 1e-12
 
@@ -252,7 +252,7 @@ def test_truth_files(ring, tmp_path, axis_of):
 def test_files_without_a_truth(ring, tmp_path, axis_of):
     np.savez(tmp_path / "other.npz", nodes=ring.nodes)
     np.savez(tmp_path / "bad.npz", nodes=ring.nodes, edges=ring.edges, radii=0 * ring.radii)
-    axis_of(ring).save(tmp_path / "noradii.obj")
+    save_skeleton(axis_of(ring), tmp_path / "noradii.obj")
     data = (tmp_path / "bad.npz").read_bytes()
     (tmp_path / "cut.npz").write_bytes(data[: len(data) // 2])
     (tmp_path / "flipped.npz").write_bytes(data[:200] + bytes([data[200] ^ 255]) + data[201:])

@@ -6,8 +6,8 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from glsk_o3d import Skeleton, read_skeleton, samples, skeletonize
-from glsk_o3d.analysis import Loop
+from glsk_o3d import Skeleton, read_skeleton, samples, save_skeleton, skeletonize
+from glsk_o3d.analysis import Loop, find_loops
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +17,7 @@ def rings():
 
 def test_a_ring_is_one_loop_as_surely_a_handle_as_it_was_judged():
     skeleton = skeletonize(samples.torus(1500).points)
-    (loop,) = skeleton.loops
+    (loop,) = find_loops(skeleton)
     assert isinstance(loop, Loop)
     assert loop.opening == pytest.approx(0.4, rel=0.03)
     (judged,) = (it for it in skeleton.report.decisions if it.about == "loop")
@@ -29,10 +29,10 @@ def test_a_ring_is_one_loop_as_surely_a_handle_as_it_was_judged():
 
 
 def test_as_many_as_there_are_and_computed_once(rings, loop):
-    assert len(rings.loops) == rings.n_loops == 2
-    assert rings.loops is rings.loops
-    assert len(loop.loops) == loop.n_loops == 2
-    for it in loop.loops:
+    assert len(find_loops(rings)) == rings.n_loops == 2
+    assert find_loops(rings) is find_loops(rings)
+    assert len(find_loops(loop)) == loop.n_loops == 2
+    for it in find_loops(loop):
         assert nx.is_path(loop.to_networkx(), [*it.vertices.tolist(), int(it.vertices[0])])
 
 
@@ -43,18 +43,20 @@ def test_nobody_knows_without_points_normals_or_confidence(rings):
         replace(rings, normals=np.full_like(rings.normals, np.nan)),
         replace(rings, confidence=[]),
     ):
-        assert len(unknown.loops) == 2
-        assert np.isnan([it.probability for it in unknown.loops]).all()
-        np.testing.assert_array_equal([it.opening for it in unknown.loops], [it.opening for it in rings.loops])
+        assert len(find_loops(unknown)) == 2
+        assert np.isnan([it.probability for it in find_loops(unknown)]).all()
+        np.testing.assert_array_equal(
+            [it.opening for it in find_loops(unknown)], [it.opening for it in find_loops(rings)]
+        )
 
 
 @pytest.mark.parametrize(("ending", "known"), [("json", True), ("npz", True), ("obj", False)])
 def test_from_files(rings, tmp_path, ending, known):
-    rings.save(tmp_path / f"s.{ending}")
-    again = read_skeleton(tmp_path / f"s.{ending}").loops
+    save_skeleton(rings, tmp_path / f"s.{ending}")
+    again = find_loops(read_skeleton(tmp_path / f"s.{ending}"))
     assert len(again) == 2
     assert [np.isfinite(it.probability) for it in again] == [known, known]
 
 
 def test_trees_dots_and_nothing_have_none(tree, dot):
-    assert tree.loops == dot.loops == Skeleton([], [], [], [], [], []).loops == ()
+    assert find_loops(tree) == find_loops(dot) == find_loops(Skeleton([], [], [], [], [], [])) == ()

@@ -5,8 +5,17 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from glsk_o3d import InvalidParameterError, Report, Skeleton, SkeletonWarning, pipelines, read_skeleton, samples
-from glsk_o3d.analysis import cylinders, tree_measures
+from glsk_o3d import (
+    InvalidParameterError,
+    Report,
+    Skeleton,
+    SkeletonWarning,
+    pipelines,
+    read_skeleton,
+    samples,
+    save_skeleton,
+)
+from glsk_o3d.analysis import branch_table, cylinders, tree_measures
 
 Z = np.array([0, 0, 1.0])
 THICK, THIN, HEIGHT = 0.1, 0.05, 2.0
@@ -132,7 +141,7 @@ def test_outliers_have_no_say():
 def test_a_file_without_a_report_keeps_its_root(tmp_path):
     grown = pipelines.tree("-z")(samples.tree(4000, forks=2, seed=1).points)
     for ending in ("json", "ply", "swc"):
-        grown.save(tmp_path / f"t.{ending}")
+        save_skeleton(grown, tmp_path / f"t.{ending}")
     first = [cylinders(read_skeleton(tmp_path / f"t.{ending}")).start_point[0] for ending in ("json", "ply", "swc")]
     np.testing.assert_allclose(first[1], first[0], atol=0.1)
     np.testing.assert_allclose(first[2], first[1])
@@ -154,6 +163,6 @@ def test_an_axis_goes_on_past_a_stub_as_thick_as_itself():
     """A spur inside the trunk, straight ahead and thicker than what goes on, ends nothing."""
     places = [[0, 0, 0], [0, 0, 3], [0, 0, 3.03], [0.3, 0, 6], [1, 1, 4]]
     tree = Skeleton(places, [[0, 1], [1, 2], [1, 3], [1, 4]], [0.1, 0.08, 0.08, 0.03, 0.03], (), (), ())
-    table = tree.branch_table(0)
+    table = branch_table(tree, 0)
     trunk = [i for i, path in enumerate(tree.branches) if set(path) & {0, 3}]
     assert table.order[trunk].tolist() == [0, 0]

@@ -6,7 +6,7 @@ import json
 import pytest
 from glsk_bench import read_results, score_answers, scoring
 
-from glsk_o3d import Skeleton
+from glsk_o3d import Skeleton, save_skeleton
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.skeletons import READABLE
 
@@ -40,7 +40,8 @@ def answer(small, tmp_path):
 @pytest.mark.parametrize("ending", READABLE)
 def test_every_format_that_is_read(answer, small, ending):
     axis = small.truth("tubes_100")
-    found = answer(Skeleton(axis.nodes, axis.edges, axis.radii, (), (), ()).save, ending)
+    skeleton = Skeleton(axis.nodes, axis.edges, axis.radii, (), (), ())
+    found = answer(lambda path: save_skeleton(skeleton, path), ending)
     assert (found["perfect"], found["failure"], found["seconds"]) == (True, None, None)
     assert found["error"] < 1e-6
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from glsk_bench import add_shape, leaderboard, make, read_folder, run, score_answers
 from glsk_bench.folders import INDEX_NAME
+from glsk_bench.radii import radii_from_points
 
-from glsk_o3d import Skeleton, read_cloud, samples
-from glsk_o3d.analysis.curves import radii_from_points
+from glsk_o3d import Skeleton, read_cloud, samples, save_skeleton
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 
 FORK = samples.y_junction(900)
@@ -194,7 +194,7 @@ class TestScores:
     def test_from_a_command_to_the_table(self, own, tmp_path):
         for cloud in own.clouds:
             truth = own.truth(cloud.shape)
-            Skeleton(truth.nodes, truth.edges, truth.radii, (), (), ()).save(tmp_path / f"{cloud.shape}.obj")
+            save_skeleton(Skeleton(truth.nodes, truth.edges, truth.radii, (), (), ()), tmp_path / f"{cloud.shape}.obj")
         words = [sys.executable, "-S", "-c", COPY, "{cloud}", "{skeleton}", str(tmp_path / "a.fork.obj")]
         assert run(own.path, tmp_path / "mine", command=words, ending=".obj").failures == {}
         results = score_answers(own.path, tmp_path / "mine")
@@ -211,7 +211,7 @@ class TestScores:
         other = add_shape(tmp_path / "b", "zig", {"scan": FORK.points}, *AXIS)
         add_shape(tmp_path / "c", "zig", {"scan": FORK.points[::2]}, *AXIS)
         (tmp_path / "mine").mkdir()
-        Skeleton(*AXIS, (), (), ()).save(tmp_path / "mine" / "zig_scan.obj")
+        save_skeleton(Skeleton(*AXIS, (), (), ()), tmp_path / "mine" / "zig_scan.obj")
         results = [score_answers(tmp_path / each, tmp_path / "mine", name=each) for each in "bc"]
         assert other.name == results[0].benchmark
         with pytest.raises(InvalidParameterError, match="different clouds"):

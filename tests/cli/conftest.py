@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from glsk_o3d import Skeleton
+from glsk_o3d import Skeleton, save_skeleton
 from glsk_o3d.cli.main import app
 from glsk_o3d.samples import sample_object, sphere, torus, y_junction
 
@@ -89,7 +89,7 @@ def refused(invoke, tmp_path):
 def y(tmp_path) -> str:
     """The name of a file in the folder of the test with the skeleton of a Y, without points."""
     sample = y_junction(100)
-    Skeleton(sample.nodes, sample.edges, sample.radii, (), (), ()).save(tmp_path / "y.ply")
+    save_skeleton(Skeleton(sample.nodes, sample.edges, sample.radii, (), (), ()), tmp_path / "y.ply")
     return "y.ply"
 
 
@@ -99,5 +99,5 @@ def ring_file(tmp_path) -> str:
     turn = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     circle = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
     edges = [*((i, i + 1) for i in range(11)), (0, 11)]
-    Skeleton(circle, edges, np.full(12, 0.1), (), (), ()).save(tmp_path / "o.ply")
+    save_skeleton(Skeleton(circle, edges, np.full(12, 0.1), (), (), ()), tmp_path / "o.ply")
     return "o.ply"

@@ -4,9 +4,9 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import Skeleton, read_skeleton, save_rig
+from glsk_o3d import Skeleton, read_skeleton, save_rig, save_skeleton
 from glsk_o3d.cli.options import SKELETON_ENDINGS, TREE_ENDINGS
-from glsk_o3d.io.meshes import read_mesh
+from glsk_o3d.io.scans import read_mesh
 from glsk_o3d.io.skeletons import FORMATS
 
 
@@ -17,7 +17,7 @@ def file(tmp_path):
     circle = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
     vertices = np.concatenate([circle, [[2, 0, 0], [3, 0, 0], [2, 0.2, 0], [9, 0, 0], [9, 1, 0]]])
     edges = [*((i, i + 1) for i in range(11)), (0, 11), (0, 12), (12, 13), (12, 14), (15, 16)]
-    Skeleton(vertices, edges, np.ones(17), (), (), ()).save(tmp_path / "raw.json")
+    save_skeleton(Skeleton(vertices, edges, np.ones(17), (), (), ()), tmp_path / "raw.json")
     return "raw.json"
 
 
@@ -48,7 +48,9 @@ def test_convert(invoke, file, tmp_path):
 def line(tmp_path):
     """Three edges along x, from the thin end to the thick one."""
     edges = [(0, 1), (1, 2), (2, 3)]
-    Skeleton([[x, 0, 0] for x in range(-1, 3)], edges, [0.1, 0.2, 0.3, 0.4], (), (), ()).save(tmp_path / "line.json")
+    save_skeleton(
+        Skeleton([[x, 0, 0] for x in range(-1, 3)], edges, [0.1, 0.2, 0.3, 0.4], (), (), ()), tmp_path / "line.json"
+    )
     return "line.json"
 
 
@@ -60,7 +62,7 @@ def test_a_root_in_all_words(invoke, line, tmp_path, word, x):
     result = invoke("convert", line, *names, "--root", word)
     assert (result.exit_code, result.stderr) == (0, ""), result.output
     for name in names:
-        read_skeleton(line).save(tmp_path / f"expected-{name}", root=[x, 0, 0])
+        save_skeleton(read_skeleton(line), tmp_path / f"expected-{name}", root=[x, 0, 0])
         assert (tmp_path / name).read_bytes() == (tmp_path / f"expected-{name}").read_bytes()
     assert read_skeleton(tmp_path / "t.swc").vertices[0].tolist() == [x, 0, 0]
     assert invoke("edit", line, "-o", "e.json", "--root", word).stdout.startswith(f"grows from ({x}, 0, 0)\n")

@@ -7,7 +7,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import Skeleton, read_skeleton, samples
+from glsk_o3d import Skeleton, read_skeleton, samples, save_skeleton
 from glsk_o3d.analysis import Gripper, grasp_candidates
 
 
@@ -16,7 +16,7 @@ def rod(tmp_path):
     """The axis of a tube, with its points."""
     sample = samples.tube(3000, length=1.0, radius=0.1)
     skeleton = Skeleton(sample.nodes, sample.edges, sample.radii, [0] * 3000, sample.points, (), confidence=[1, 1])
-    skeleton.save(tmp_path / "rod.npz")
+    save_skeleton(skeleton, tmp_path / "rod.npz")
     return "rod.npz"
 
 
@@ -49,7 +49,7 @@ def test_lines_files_and_json_agree(invoke, tmp_path, rod):
 
 def test_the_scene_and_the_points_come_from_files(invoke, tmp_path, rod, write_scan):
     skeleton = read_skeleton(tmp_path / rod)
-    skeleton.save(tmp_path / "axis.ply")
+    save_skeleton(skeleton, tmp_path / "axis.ply")
     write_scan(tmp_path / "rod.ply", skeleton.points)
     wall = np.stack(np.meshgrid(np.arange(-1, 1, 0.02), [0.3], np.arange(-1, 1, 0.02)), axis=-1).reshape(-1, 3)
     write_scan(tmp_path / "wall.ply", wall)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import typer
 
-from glsk_o3d import InvalidParameterError, RingBuilder, Skeleton
+from glsk_o3d import InvalidParameterError, RingBuilder, Skeleton, save_skeleton
 from glsk_o3d.cli.console import echo, print_json, print_rows, print_table, say, visible
 from glsk_o3d.cli.reporting import reporting
 from glsk_o3d.errors import FileFormatError
@@ -80,7 +80,9 @@ def test_nothing_of_a_file_or_its_name_reaches_the_terminal(invoke, tmp_path, mo
 def test_numbers_too_long_for_any_are_said_in_a_sentence(invoke, number, words):
     np.savetxt("s.xyz", torus(300).points)
     line = np.arange(4)
-    Skeleton(np.eye(3)[np.zeros(4, int)] * line[:, None], [[0, 1], [1, 2], [2, 3]], line, [], [], []).save("k.json")
+    save_skeleton(
+        Skeleton(np.eye(3)[np.zeros(4, int)] * line[:, None], [[0, 1], [1, 2], [2, 3]], line, [], [], []), "k.json"
+    )
     result = invoke(*(word.format(number) for word in words))
     assert result.exit_code == 2, result.output
     assert "rror: " in result.output

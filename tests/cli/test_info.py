@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import Decision, read_skeleton
+from glsk_o3d import Decision, read_skeleton, save_skeleton
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def test_skeletons_of_every_format_and_the_report_of_the_run(told, skeleton, inv
     assert re.search(r"^stages +RingBuilder\n +Contractor", table, re.MULTILINE)
     assert all(f"{each.explained:.4f}" in table for each in report.iterations)
     call = Decision("gap", (1.0, 2.0, 3.0), 0.45, changed=False)
-    replace(skeleton["s.json"], report=replace(report, decisions=(call,))).save(tmp_path / "close.json")
+    save_skeleton(replace(skeleton["s.json"], report=replace(report, decisions=(call,))), tmp_path / "close.json")
     assert told("close.json")["uncertain"] == [str(call)]
     data = json.loads((tmp_path / "s.json").read_text())
     data["report"]["recipe"]["pipeline"].insert(0, {"filter": "Slab"})  # which is not installed

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 import glsk_o3d
-from glsk_o3d import read_cloud, read_skeleton
+from glsk_o3d import read_cloud, read_skeleton, save_skeleton
 
 
 def test_as_a_process(glsk, scans, tmp_path):
@@ -50,7 +50,7 @@ def test_nothing_is_half_written_on_a_full_disk(glsk, scans, tmp_path, tree):
     assert (run.returncode, run.stderr.count("\n")) == (1, 1)
     assert all(f"{name}: cannot be written: File too large" in run.stderr for name in ("s.ply", "s.json", "s.png"))
     assert old.read_text() == "kept"
-    tree.save(old)
+    save_skeleton(tree, old)
     run = glsk("branches", old, "-o", "s.csv", "--quiet", preexec_fn=little_room)
     assert (run.returncode, run.stderr) == (1, "glsk: error: s.csv: cannot be written: File too large\n")
     assert [path.name for path in tmp_path.iterdir()] == ["s.ply"]

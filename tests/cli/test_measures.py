@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from glsk_o3d import Skeleton, pipelines, read_skeleton, samples
-from glsk_o3d.analysis import BranchTable, cylinders, tree_measures
+from glsk_o3d import Skeleton, pipelines, read_skeleton, samples, save_skeleton
+from glsk_o3d.analysis import BranchTable, branch_table, cylinders, tree_measures
 from glsk_o3d.analysis.branches import PRINTED_COLUMNS
 from glsk_o3d.io.cylinders import save_cylinders
 
@@ -22,7 +22,7 @@ def test_branches_table_file_and_json_agree(invoke, tmp_path, y):
     assert result.stdout.splitlines() == lines
     assert (tmp_path / "y.csv").read_bytes() == (tmp_path / "z.csv").read_bytes()
     lines = invoke("branches", y).stdout.splitlines()
-    rows = list(read_skeleton(tmp_path / y).branch_table())
+    rows = list(branch_table(read_skeleton(tmp_path / y)))
     with (tmp_path / "y.csv").open(newline="") as stream:
         assert [row["kind"] for row in csv.DictReader(stream)] == [row["kind"] for row in rows]
     names = ["branch", *(field.name for field in fields(BranchTable))]
@@ -85,11 +85,11 @@ def test_tree_lines_file_and_json_agree(invoke, tmp_path, y):
 def test_why_a_stem_has_no_diameter(invoke, tmp_path):
     points = [[0, 0, 0], [0, 0, 1], [3, 0, 1], [0, 0, 2.5]]
     bent = Skeleton(points, [[0, 1], [1, 2], [1, 3]], [0.2, 0.2, 0.2, 0.01], (), (), ())
-    bent.save(tmp_path / "t.json")
+    save_skeleton(bent, tmp_path / "t.json")
     said = invoke("tree", "t.json", "--root", "z", "--up", "x").stdout.splitlines()
     cause = "if x points up (--up), and 0, 0, 0 is the root (--root)"
     assert f"stem diameter: not known: the stem does not pass 1.3 m above the root, {cause}" in said
-    Skeleton(points[:2], [[0, 1]], [0.2, 0.2], (), (), ()).save(tmp_path / "s.json")
+    save_skeleton(Skeleton(points[:2], [[0, 1]], [0.2, 0.2], (), (), ()), tmp_path / "s.json")
     assert "crown base: not known: no branch leaves the stem" in invoke("tree", "s.json", "--root", "z").stdout
 
 
@@ -100,7 +100,7 @@ def test_units_and_what_is_up(invoke, tmp_path, y):
         assert facts["height"] == pytest.approx(factor * metres["height"])
         assert facts["unit"] == factor
     assert json.loads(invoke("tree", y, "--json", "--up", "-z").stdout)["height"] != metres["height"]
-    pipelines.tree("-y")(samples.y_junction(2000).points).save(tmp_path / "t.json")
+    save_skeleton(pipelines.tree("-y")(samples.y_junction(2000).points), tmp_path / "t.json")
     for words, up in (((), "-y"), (("--root", "x"), "x"), (("--up", "z"), "z")):  # as the tree was grown, or as asked
         assert json.loads(invoke("tree", "t.json", "--json", *words).stdout)["up"] == up
 
@@ -120,7 +120,9 @@ def test_files_of_other_programs_are_in_metres(invoke, tmp_path, y, name):
 
 def test_a_tree_taller_than_any_is_in_doubt(invoke, tmp_path, y):
     skeleton = read_skeleton(tmp_path / y)
-    replace(skeleton, vertices=1000 * skeleton.vertices, radii=1000 * skeleton.radii).save(tmp_path / "mm.ply")
+    save_skeleton(
+        replace(skeleton, vertices=1000 * skeleton.vertices, radii=1000 * skeleton.radii), tmp_path / "mm.ply"
+    )
     (line,) = invoke("tree", "mm.ply", "--up", "z", "--root", "z").stderr.splitlines()
     assert line.endswith("none is known above 116 m: is a unit of the cloud 1 m? pass unit=, such as 'mm'")
     assert invoke("tree", "mm.ply", "--unit", "mm", "--up", "z", "--root", "z").stderr == ""

@@ -4,7 +4,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import Skeleton, read_skeleton, samples
+from glsk_o3d import Skeleton, read_skeleton, samples, save_skeleton
 
 TABLE = """
     1 branches z.ply                                       | z.ply: no such file
@@ -81,13 +81,13 @@ TABLE = """
 def files(tmp_path, y, ring_file):
     """Skeletons, clouds and meshes, of which most lack something."""
     none = np.empty((0, 3))
-    read_skeleton(tmp_path / y).save(tmp_path / "bare.obj")
-    Skeleton(np.eye(3), [[0, 1]], np.ones(3), (), (), ()).save(tmp_path / "two.json")
-    Skeleton((), (), (), (), (), ()).save(tmp_path / "empty.json")
-    Skeleton([[0, 0, 0]], [], [1], (), (), ()).save(tmp_path / "dot.ply")
+    save_skeleton(read_skeleton(tmp_path / y), tmp_path / "bare.obj")
+    save_skeleton(Skeleton(np.eye(3), [[0, 1]], np.ones(3), (), (), ()), tmp_path / "two.json")
+    save_skeleton(Skeleton((), (), (), (), (), ()), tmp_path / "empty.json")
+    save_skeleton(Skeleton([[0, 0, 0]], [], [1], (), (), ()), tmp_path / "dot.ply")
     rod = samples.tube(500, length=1.0, radius=0.1)
     skeleton = Skeleton(rod.nodes, rod.edges, rod.radii, [0] * 500, rod.points, (), confidence=[1, 1])
-    skeleton.save(tmp_path / "rod.npz")
+    save_skeleton(skeleton, tmp_path / "rod.npz")
     np.savez(tmp_path / "none.npz", nodes=none, edges=np.empty((0, 2), int), radii=[])
     np.savetxt(tmp_path / "few.xyz", np.eye(3))
     cube = o3d.geometry.TriangleMesh.create_box().translate((50, 0, 0))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import glsk_o3d
-from glsk_o3d import load_recipe, pipelines, read_skeleton
+from glsk_o3d import load_recipe, pipelines, read_skeleton, save_skeleton
 from glsk_o3d.recipes import to_recipe
 
 
@@ -29,7 +29,7 @@ def test_without_outputs_it_says_whether_it_is_the_same(invoke, scans, tmp_path,
     told = dict(line.split(maxsplit=1) for line in result.stdout.splitlines())
     assert (told["identical"], told["vertices"]) == ("yes", str(len(made.vertices)))
     assert "identical    no\n" in invoke("rerun", "s.json", scans / "ring.ply").stdout
-    dataclasses.replace(made, radii=made.radii * 2).save(tmp_path / "s.json")
+    save_skeleton(dataclasses.replace(made, radii=made.radii * 2), tmp_path / "s.json")
     result = invoke("rerun", "s.json", "--json")
     assert json.loads(result.stdout)["identical"] is False
     assert "glsk: warning: the rerun differs from the result" in result.stderr
@@ -65,7 +65,7 @@ def test_another_scan_and_its_recipe_from_a_file(invoke, scans, tmp_path, made):
 
 
 def test_refused_before_anything_runs(refused, scans, tmp_path, made, no_run, monkeypatch):
-    made.save("s.ply")
+    save_skeleton(made, "s.ply")
     data = json.loads((tmp_path / "s.json").read_text())
     data["report"]["recipe"]["pipeline"][1]["reducer"] = {"unwritten": "a function"}
     (tmp_path / "gap.json").write_text(json.dumps(data))

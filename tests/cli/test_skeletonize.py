@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import read_skeleton, read_tensor_cloud, samples
+from glsk_o3d import annotate, read_skeleton, read_tensor_cloud, samples, to_tubes
 from glsk_o3d.cli.options import PipelineName
-from glsk_o3d.io.meshes import read_mesh
+from glsk_o3d.io.scans import read_mesh
 from glsk_o3d.pipelines import PIPELINES
 
 
@@ -196,7 +196,7 @@ def test_a_scan_with_labels_has_all_that_it_had(invoke, las, tmp_path):
     for name in ("positions", "classification", "intensity", "treeID"):
         np.testing.assert_array_equal(back[name].numpy(), scan.point[name].numpy(), err_msg=name)
     assert (back.scan_red.numpy() == 255).all()
-    expected = skeleton.annotate(color="branch").point
+    expected = annotate(skeleton, color="branch").point
     for name in ("skeleton_vertex", "branch", "order", "radius", "confidence", "thickness", "colors"):
         np.testing.assert_array_equal(back[name].numpy(), expected[name].numpy(), err_msg=name)
 
@@ -207,7 +207,7 @@ def test_tubes_are_those_of_the_skeleton(invoke, las, tmp_path):
     assert result.stderr.startswith("glsk: error: t.stl: .stl has too few digits for coordinates as large as 5.61e+06")
     assert invoke(*words, "--tubes", "t.ply").exit_code == 0
     tubes, skeleton = read_mesh(tmp_path / "t.ply"), read_skeleton(tmp_path / "s.npz")
-    np.testing.assert_array_equal(np.asarray(tubes.vertices), np.asarray(skeleton.to_tubes().vertices))
+    np.testing.assert_array_equal(np.asarray(tubes.vertices), np.asarray(to_tubes(skeleton).vertices))
     assert tubes.has_vertex_colors()
 
 
@@ -238,13 +238,11 @@ def test_labels_do_not_change_the_skeleton(invoke, tmp_path):
 
 
 def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, monkeypatch):
-    from glsk_o3d.io.clouds import blocks
-
-    from glsk_o3d.io import streaming
+    from glsk_o3d.io import scans, streaming
 
     scan, n = tmp_path / "scan.ply", 9000
     save_cloud(scan, samples.torus(n).points)
-    monkeypatch.setitem(blocks.read_blocks.__kwdefaults__, "rows", 2000)
+    monkeypatch.setitem(scans.read_blocks.__kwdefaults__, "rows", 2000)
     words = ("skeletonize", scan, "-o", "s.json", "--set", "thin_to=2000")
     assert invoke(*words).stderr == ""
     whole = read_skeleton("s.json")

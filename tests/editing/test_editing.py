@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import InvalidParameterError, Skeleton, pipelines, samples, skeletonize
+from glsk_o3d.analysis import branch_table
 from glsk_o3d.editing import cut_loops, largest_component, prune, reroot, simplify, smooth
 
 
@@ -62,7 +63,7 @@ def test_thin_branches_go(radius, leaves):
 
 
 def test_orders(grown):
-    stem, table = prune(grown, order=0), grown.branch_table()
+    stem, table = prune(grown, order=0), branch_table(grown)
     assert len(stem.leaves) == 2
     assert stem.length == pytest.approx(table.length[table.order == 0].sum())
     assert prune(grown, order=int(table.order.max())).length == pytest.approx(grown.length)

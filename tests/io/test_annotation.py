@@ -5,7 +5,8 @@ import open3d as o3d
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, annotate_contraction, samples
+from glsk_o3d import InvalidParameterError, annotate, annotate_contraction, samples
+from glsk_o3d.analysis import branch_table, segment
 from glsk_o3d.io.colors import thickness_shades
 
 POINTS = samples.y_junction(800).points
@@ -45,13 +46,13 @@ def assert_equal(found, expected):
 
 
 def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton, state):
-    before, vertex, branch = held(cloud), skeleton.vertex_of_point, skeleton.segment()
-    annotated = held(skeleton.annotate(cloud))
+    before, vertex, branch = held(cloud), skeleton.vertex_of_point, segment(skeleton)
+    annotated = held(annotate(skeleton, cloud))
     kind = cloud.point.positions.numpy().dtype
     gained = {
         "skeleton_vertex": vertex.astype(np.int32),
         "branch": branch.astype(np.int32),
-        "order": skeleton.branch_table().order[branch].astype(np.int32),
+        "order": branch_table(skeleton).order[branch].astype(np.int32),
         "radius": skeleton.radii[vertex].astype(kind),
         "confidence": skeleton.confidence[vertex].astype(kind),
     }
@@ -65,14 +66,14 @@ def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton, state)
 
 
 def test_through_selections_sampling_and_files(cloud, skeleton, state, tmp_path):
-    annotated = skeleton.annotate(cloud)
+    annotated = annotate(skeleton, cloud)
     everything = held(annotated)
     mask = everything["branch"][:, 0] == 1
     assert_equal(held(annotated.select_by_mask(o3d.core.Tensor(mask))), {n: v[mask] for n, v in everything.items()})
     thin = annotated.voxel_down_sample(0.08)
     assert held(thin).keys() == everything.keys()
-    again = skeleton.annotate(thin)  # labels are labels again, not means of labels
-    np.testing.assert_array_equal(again.point.branch.numpy()[:, 0], skeleton.segment(thin))
+    again = annotate(skeleton, thin)  # labels are labels again, not means of labels
+    np.testing.assert_array_equal(again.point.branch.numpy()[:, 0], segment(skeleton, thin))
     for ending in ("ply", "pcd", "npz"):
         path = str(tmp_path / f"cloud.{ending}")
         assert o3d.t.io.write_point_cloud(path, annotated)
@@ -88,27 +89,27 @@ def test_legacy_clouds_arrays_and_meshes_become_tensor_ones(skeleton):
     vectors = o3d.utility.Vector3dVector
     legacy = o3d.geometry.PointCloud(vectors(POINTS))
     legacy.colors, legacy.normals = vectors(COLORS / 255), vectors(POINTS)
-    annotated = skeleton.annotate(legacy)
+    annotated = annotate(skeleton, legacy)
     assert annotated.point.positions.dtype == annotated.point.radius.dtype == o3d.core.float64
     np.testing.assert_array_equal(annotated.point.positions.numpy(), POINTS)
     np.testing.assert_array_equal(annotated.point.normals.numpy(), POINTS)
     np.testing.assert_allclose(annotated.point.colors.numpy(), COLORS / 255)
-    np.testing.assert_array_equal(annotated.point.branch.numpy()[:, 0], skeleton.segment(POINTS))
+    np.testing.assert_array_equal(annotated.point.branch.numpy()[:, 0], segment(skeleton, POINTS))
     for array, dtype in ((POINTS, np.float64), (POINTS.astype(np.float32), np.float32), (POINTS.tolist(), np.float64)):
-        assert skeleton.annotate(array).point.positions.numpy().dtype == dtype
+        assert annotate(skeleton, array).point.positions.numpy().dtype == dtype
     mesh = o3d.geometry.TriangleMesh(vectors(POINTS), o3d.utility.Vector3iVector([[0, 1, 2]]))
     for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
-        marked = skeleton.annotate(given)
+        marked = annotate(skeleton, given)
         assert isinstance(marked, o3d.t.geometry.TriangleMesh)
         assert len(marked.triangle.indices) == 1
         np.testing.assert_array_equal(marked.vertex.skeleton_vertex.numpy()[:, 0], skeleton.vertex_of_point)
-    np.testing.assert_array_equal(skeleton.annotate().point.positions.numpy(), skeleton.points)
+    np.testing.assert_array_equal(annotate(skeleton).point.positions.numpy(), skeleton.points)
 
 
 def test_whole_numbers_and_points_that_are_not_finite():
     points = np.round(POINTS * 1000)
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(points.astype(np.int32)))
-    annotated = glsk.skeletonize(cloud).annotate(cloud)
+    annotated = annotate(glsk.skeletonize(cloud), cloud)
     assert (annotated.point.positions.dtype, annotated.point.radius.dtype) == (o3d.core.int32, o3d.core.float64)
     points[7] = np.nan
     state = (glsk.RingBuilder(drop_invalid=True) | glsk.Contractor())(points)
@@ -116,23 +117,23 @@ def test_whole_numbers_and_points_that_are_not_finite():
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(places).any(axis=1)), [7])
     moved = annotate_contraction(state, np.r_[points[:3] + 0.1, [[np.inf] * 3]]).point.contracted.numpy()
     np.testing.assert_array_equal(moved, np.r_[places[:3], [[np.nan] * 3]])
-    annotated = (glsk.Connector() | glsk.Refiner())(state).annotate(points, color="radius")
+    annotated = annotate((glsk.Connector() | glsk.Refiner())(state), points, color="radius")
     assert annotated.point.branch.numpy()[7] == annotated.point.skeleton_vertex.numpy()[7] == -1
     assert np.isnan(annotated.point.radius.numpy()[7])
     np.testing.assert_array_equal(annotated.point.colors.numpy()[7], [153] * 3)
 
 
 def test_colours(cloud, skeleton):
-    shown = skeleton.annotate(cloud, color="branch").point.colors.numpy()
+    shown = annotate(skeleton, cloud, color="branch").point.colors.numpy()
     assert shown.dtype == np.uint8
-    assert len(np.unique(np.column_stack([shown, skeleton.segment()]), axis=0)) == len(np.unique(shown, axis=0)) == 3
-    brightness = skeleton.annotate(cloud, color="radius").point.colors.numpy() @ [0.2, 0.7, 0.1]
+    assert len(np.unique(np.column_stack([shown, segment(skeleton)]), axis=0)) == len(np.unique(shown, axis=0)) == 3
+    brightness = annotate(skeleton, cloud, color="radius").point.colors.numpy() @ [0.2, 0.7, 0.1]
     radius = skeleton.radii[skeleton.vertex_of_point]
     assert brightness[radius.argmin()] < brightness[radius.argmax()]
-    marked = skeleton.annotate(cloud, color="thickness").point
+    marked = annotate(skeleton, cloud, color="thickness").point
     expected = np.round(255 * thickness_shades(marked.thickness.numpy()[:, 0].astype(float)))
     assert np.abs(marked.colors.numpy() - expected).max() <= 1
-    legacy = skeleton.annotate(cloud, color="branch").to_legacy()
+    legacy = annotate(skeleton, cloud, color="branch").to_legacy()
     np.testing.assert_allclose(np.asarray(legacy.colors), shown / 255, atol=1e-6)
     with pytest.raises(InvalidParameterError, match="color"):
-        skeleton.annotate(cloud, color="size")
+        annotate(skeleton, cloud, color="size")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import samples, skeletonize
+from glsk_o3d.analysis import branch_table
 from glsk_o3d.analysis.segmentation import thickness
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.io.colors import COLOR_NAMES, UNKNOWN_GREY, shades, thickness_shades
@@ -24,7 +25,7 @@ def test_branches_differ_orders_go_up_and_values_are_means_over_vertices(tree):
     pairs = np.array([[0, 0], [5, 5]])
     by_radius = [shades(tree, "radius", BRANCH[:2], vertices) for vertices in (pairs, VERTICES[:2])]
     np.testing.assert_array_equal(*by_radius)
-    order = tree.branch_table().order
+    order = branch_table(tree).order
     shown = shades(tree, "order", np.arange(len(order)), np.zeros(len(order), int))
     dark, light = (np.unique(shown[order == each], axis=0) for each in (0, 1))
     assert len(dark) == len(light) == 1

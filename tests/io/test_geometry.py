@@ -6,7 +6,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import InvalidParameterError, Skeleton, samples, skeletonize
+from glsk_o3d import InvalidParameterError, Skeleton, samples, skeletonize, to_line_set, to_tensor_line_set, to_tubes
 from glsk_o3d.io.colors import COLOR_NAMES
 from glsk_o3d.io.geometry import sweep
 from glsk_o3d.refinement.sections import measure_sections
@@ -25,7 +25,7 @@ def axis_of(sample):
 
 
 def test_line_sets_of_both_kinds_have_their_own_copy_of_the_graph(skeleton):
-    legacy, tensor = skeleton.to_line_set((0, 0.5, 1)), skeleton.to_tensor_line_set()
+    legacy, tensor = skeleton.to_line_set((0, 0.5, 1)), to_tensor_line_set(skeleton)
     np.testing.assert_array_equal(np.asarray(legacy.points), skeleton.vertices)
     np.testing.assert_array_equal(np.asarray(legacy.lines).reshape(-1, 2), skeleton.edges)
     np.testing.assert_array_equal(np.asarray(legacy.colors), np.tile([0, 0.5, 1], (len(skeleton.edges), 1)))
@@ -47,27 +47,27 @@ def test_line_sets_of_both_kinds_have_their_own_copy_of_the_graph(skeleton):
 @pytest.mark.parametrize("color", [*COLOR_NAMES, (0.1, 0.2, 0.3)])
 def test_in_colour_without_edges(count, color):
     lone = Skeleton(np.zeros((count, 3)), (), np.ones(count), (), (), (), confidence=np.ones(count))
-    legacy, tensor = lone.to_line_set(color), lone.to_tensor_line_set(color)
+    legacy, tensor = to_line_set(lone, color), to_tensor_line_set(lone, color)
     assert (len(legacy.points), len(legacy.lines), len(legacy.colors)) == (count, 0, 0)
     assert tuple(tensor.line.colors.shape) == (0, 3)
-    assert len(lone.to_tubes(color).vertex_colors) == len(lone.to_tubes(color).vertices)
+    assert len(to_tubes(lone, color).vertex_colors) == len(to_tubes(lone, color).vertices)
 
 
 def test_line_sets_in_colour():
     branched = skeletonize(samples.y_junction(800).points)
     for color, distinct in (("branch", 3), ((0.1, 0.2, 0.3), 1), ("radius", None), ("confidence", None)):
-        legacy = np.asarray(branched.to_line_set(color).colors)
-        np.testing.assert_array_equal(branched.to_tensor_line_set(color).line.colors.numpy(), legacy)
+        legacy = np.asarray(to_line_set(branched, color).colors)
+        np.testing.assert_array_equal(to_tensor_line_set(branched, color).line.colors.numpy(), legacy)
         count = len(np.unique(legacy, axis=0))
         assert count == distinct if distinct else count > 5
-    plain = branched.to_tensor_line_set()
+    plain = to_tensor_line_set(branched)
     assert "colors" not in plain.line
     for path, branch in zip(branched.branches, range(3), strict=True):
         rows = np.isin(branched.edges, path).all(axis=1)
         assert (plain.line.branch.numpy()[rows] == branch).all()
     bare = graph(branched.vertices, branched.edges, np.full(len(branched.radii), np.nan))
     for color in ("radius", "confidence", "thickness"):
-        assert (np.asarray(bare.to_line_set(color).colors) == 0.6).all()
+        assert (np.asarray(to_line_set(bare, color).colors) == 0.6).all()
 
 
 # --------------------------------------------------------------------------------------------------------------- tubes
@@ -81,7 +81,7 @@ def prism(sides):
 @pytest.mark.parametrize("direction", [[0, 0, 1], [0, 0, -1], [1, 0, 0], [1, -2, 3]])
 def test_a_capsule(direction):
     axis = np.array(direction) / np.linalg.norm(direction)
-    mesh = graph(np.outer([0, 0.4, 1], axis) + 5, [(0, 1), (1, 2)], [0.1] * 3).to_tubes(sides=64)
+    mesh = to_tubes(graph(np.outer([0, 0.4, 1], axis) + 5, [(0, 1), (1, 2)], [0.1] * 3), sides=64)
     assert mesh.is_watertight()
     caps, length = 4 / 3 * np.pi * 0.1**3, np.pi * 0.1**2
     assert mesh.get_volume() == pytest.approx(prism(64) * (length + caps), rel=1e-3)
@@ -94,10 +94,10 @@ def test_a_capsule(direction):
 
 
 def test_a_cone_and_a_ball():
-    cone = graph([[0, 0, 0], [2, 0, 0]], [(0, 1)], [0.3, 0.1]).to_tubes(sides=96)
+    cone = to_tubes(graph([[0, 0, 0], [2, 0, 0]], [(0, 1)], [0.3, 0.1]), sides=96)
     frustum, caps = np.pi * 2 / 3 * (0.09 + 0.03 + 0.01), 2 / 3 * np.pi * (0.3**3 + 0.1**3)
     assert cone.get_volume() == pytest.approx(prism(96) * (frustum + caps), rel=1e-3)
-    ball = graph([[1, 1, 1]], [], [0.5]).to_tubes(sides=96)
+    ball = to_tubes(graph([[1, 1, 1]], [], [0.5]), sides=96)
     assert ball.is_watertight()
     assert ball.get_volume() == pytest.approx(np.pi / 6, rel=3e-3)
 
@@ -105,7 +105,7 @@ def test_a_cone_and_a_ball():
 @pytest.mark.parametrize("sample", [samples.sauropod(64), samples.two_rings(64)], ids=str)
 def test_every_branch_is_one_closed_outward_surface(sample):
     skeleton = axis_of(sample)
-    mesh = skeleton.to_tubes(sides=9)
+    mesh = to_tubes(skeleton, sides=9)
     assert mesh.is_edge_manifold(allow_boundary_edges=False)
     assert mesh.is_orientable()
     assert mesh.euler_poincare_characteristic() == 2 * len(skeleton.branches)
@@ -119,7 +119,7 @@ def test_every_branch_is_one_closed_outward_surface(sample):
 def test_a_helix_of_wire_has_its_volume_and_does_not_twist():
     spring = axis_of(samples.helix(64))
     wire, caps = np.pi * 0.06**2 * spring.length, 4 / 3 * np.pi * 0.06**3
-    assert spring.to_tubes(sides=48).get_volume() == pytest.approx(wire + caps, rel=0.01)
+    assert to_tubes(spring, sides=48).get_volume() == pytest.approx(wire + caps, rel=0.01)
     points, _, row = sweep(spring.vertices, spring.radii, spring.branches, 8)
     ring = points[np.isin(row, np.arange(1, len(spring.vertices) - 1))].reshape(-1, 8, 3)
     across = (ring - ring.mean(axis=1, keepdims=True))[:, 0] / 0.06
@@ -132,19 +132,19 @@ def test_tubes_of_a_flat_bar_are_flat(flat_bar):
     bar = flat_bar(0.4, 0.2)
     sections = measure_sections(bar)
     bar = replace(bar, half_width=sections.half_width, half_thickness=sections.half_thickness)
-    mesh = bar.to_tubes(sides=32)
+    mesh = to_tubes(bar, sides=32)
     assert mesh.is_watertight()
     assert np.abs(np.asarray(mesh.vertices)).max(axis=0) == pytest.approx([0.4, 0.2, 2 + 0.3])
     round_bar = replace(bar, half_width=None, half_thickness=None)
     bare = replace(bar, vertex_of_point=(), points=(), normals=())  # nobody knows where the width is
     for other in (round_bar, bare):
-        points = np.asarray(other.to_tubes(sides=32).vertices)
+        points = np.asarray(to_tubes(other, sides=32).vertices)
         np.testing.assert_array_equal(points, sweep(bar.vertices, bar.radii, bar.branches, 32)[0])
 
 
 def test_sharp_turns_and_coincident_vertices():
     zigzag = [[0, 0, 0], [1, 0, 0], [0, 0, 0], [0, 0, 0], [1, 1, 1]]
-    mesh = graph(zigzag, [(0, 1), (1, 2), (2, 3), (3, 4)], [0.1] * 5).to_tubes()
+    mesh = to_tubes(graph(zigzag, [(0, 1), (1, 2), (2, 3), (3, 4)], [0.1] * 5))
     assert np.isfinite(np.asarray(mesh.vertices)).all()
     assert mesh.is_edge_manifold(allow_boundary_edges=False)
 
@@ -152,9 +152,9 @@ def test_sharp_turns_and_coincident_vertices():
 def test_radius_and_refusals():
     bare = replace(axis_of(samples.y_junction(64)), radii=np.full(4, np.nan))
     with pytest.raises(InvalidParameterError, match="4 of 4 vertices have no radius"):
-        bare.to_tubes()
-    thin = np.asarray(bare.to_tubes(radius=0.01).vertices)
+        to_tubes(bare)
+    thin = np.asarray(to_tubes(bare, radius=0.01).vertices)
     assert np.abs(thin[:, 1]).max() == pytest.approx(0.01, rel=0.1)
     for wrong in (dict(radius=0), dict(radius=np.nan), dict(sides=2), dict(sides=8.0), dict(color="red", radius=1)):
         with pytest.raises(InvalidParameterError, match=next(iter(wrong))):
-            bare.to_tubes(**wrong)
+            to_tubes(bare, **wrong)

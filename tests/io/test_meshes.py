@@ -6,7 +6,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import Skeleton, read_cloud, samples
+from glsk_o3d import Skeleton, read_cloud, samples, to_tubes
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.io.meshes import WRITTEN_MESH_ENDINGS, mesh_arrays, save_mesh
 from glsk_o3d.io.scans import read_mesh, read_scan
@@ -96,7 +96,7 @@ FAR = np.array([471234.56789012, 5612345.67890123, 123.456789])
 @pytest.fixture(scope="module")
 def tubes():
     ring = samples.torus(60)
-    return Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ()).to_tubes()
+    return to_tubes(Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ()))
 
 
 @pytest.mark.parametrize("ending", [*WRITTEN_MESH_ENDINGS, ".GLB"])

@@ -6,6 +6,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
+from glsk_o3d import save_skeleton
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.io.formats.text_tables import holds_points
 from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
@@ -74,7 +75,7 @@ def test_a_cloud_that_breaks_off_is_no_file(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", [f"s{ending}" for ending in READABLE] + ["c.md", "c.bin"])
 def test_what_is_no_scan(skeleton, tmp_path, name):
     says = r"is a skeleton" if name in ("s.ply", "s.obj", "s.polylines.txt") else r"unknown ending; .*\.ply.*\.pcd"
-    skeleton.save(tmp_path / name, cut_loops=True, format=None if name[0] == "s" else "ply")
+    save_skeleton(skeleton, tmp_path / name, cut_loops=True, format=None if name[0] == "s" else "ply")
     with pytest.raises(FileFormatError, match=rf"{name}: {says}"):
         read_cloud(tmp_path / name)
 

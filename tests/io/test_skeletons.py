@@ -71,16 +71,16 @@ def test_broken_off_files(tree, tmp_path, ending):
 @pytest.mark.parametrize("ending", FORMATS)
 def test_saving_twice_gives_the_same_bytes_and_what_is_only_written_is_not_read(tree, loop, tmp_path, ending):
     for name in "ab":
-        tree.save(tmp_path / f"{name}{ending}")
+        save_skeleton(tree, tmp_path / f"{name}{ending}")
     assert (tmp_path / f"a{ending}").read_bytes() == (tmp_path / f"b{ending}").read_bytes()
     if ending not in READABLE:
         with pytest.raises(FileFormatError, match=rf"a\{ending}: \{ending} is only written; read are .*\.ply"):
             read_skeleton(tmp_path / f"a{ending}")
     if FORMATS[ending].trees:
         with pytest.raises(FileFormatError, match=r"2 loop.*cut_loops=True"):
-            loop.save(tmp_path / f"c{ending}")
+            save_skeleton(loop, tmp_path / f"c{ending}")
         assert not (tmp_path / f"c{ending}").exists()
-        loop.save(tmp_path / f"c{ending}", cut_loops=True)
+        save_skeleton(loop, tmp_path / f"c{ending}", cut_loops=True)
 
 
 PLY = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
@@ -120,20 +120,20 @@ def test_damaged_files(tmp_path, ending):
 def test_endings(tree, tmp_path, assert_identical):
     for name in ("s.vtk", "s", "s.txt"):
         with pytest.raises(FileFormatError, match=r"\.ply.*\.obj.*\.json.*\.polylines\.txt"):
-            tree.save(tmp_path / name)
+            save_skeleton(tree, tmp_path / name)
     with pytest.raises(FileFormatError, match="format 'vtk'"):
-        tree.save(tmp_path / "s.ply", format="vtk")
+        save_skeleton(tree, tmp_path / "s.ply", format="vtk")
     assert not list(tmp_path.iterdir())
-    tree.save(tmp_path / "S.JSON")
+    save_skeleton(tree, tmp_path / "S.JSON")
     assert_identical(read_skeleton(tmp_path / "S.JSON"), tree)
     for format in ("npz", ".NPZ"):
-        tree.save(tmp_path / "s.bak", format=format)
+        save_skeleton(tree, tmp_path / "s.bak", format=format)
         assert_identical(read_skeleton(tmp_path / "s.bak", format=format), tree)
 
 
 def test_failure_keeps_the_old_file_and_leaves_nothing(tree, tmp_path, monkeypatch):
     with pytest.raises(FileNotFoundError, match=r"missing.*folder.*s\.ply"):
-        tree.save(tmp_path / "missing" / "s.ply")
+        save_skeleton(tree, tmp_path / "missing" / "s.ply")
     path = tmp_path / "s.ply"
     path.write_text("old")
 
@@ -148,7 +148,7 @@ def test_failure_keeps_the_old_file_and_leaves_nothing(tree, tmp_path, monkeypat
         with monkeypatch.context() as patch:
             patch.setattr(name, broken)
             with pytest.raises(OSError, match="disk full"):
-                tree.save(path)
+                save_skeleton(tree, path)
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
     assert path.read_text() == "old"
 
@@ -173,7 +173,7 @@ def test_a_scan_is_no_skeleton(cloud, tmp_path, ending, mesh):
 @pytest.mark.parametrize("ending", READABLE)
 def test_whether_a_file_holds_a_skeleton(skeleton, tmp_path, ending):
     assert not holds_skeleton(tmp_path / f"s{ending}")
-    skeleton.save(tmp_path / f"s{ending}", cut_loops=True)
+    save_skeleton(skeleton, tmp_path / f"s{ending}", cut_loops=True)
     assert holds_skeleton(tmp_path / f"s{ending}")
 
 

@@ -7,12 +7,14 @@ import open3d as o3d
 import pytest
 
 from glsk_o3d import (
+    annotate,
     annotate_file,
     pipelines,
     read_cloud,
     read_sample,
     read_skeleton,
     read_tensor_cloud,
+    save_skeleton,
     save_tensor_cloud,
     skeletonize,
 )
@@ -149,7 +151,7 @@ def test_labels_are_those_of_annotate(scans, skeleton, tmp_path, ending, where):
     path = scans / f"scan.{ending}"
     n = annotate_file(skeleton, path, tmp_path / "marked.ply", where=where)
     cloud = read_tensor_cloud(path, where=where)
-    found, expected = read_tensor_cloud(tmp_path / "marked.ply").point, skeleton.annotate(cloud, color="branch").point
+    found, expected = read_tensor_cloud(tmp_path / "marked.ply").point, annotate(skeleton, cloud, color="branch").point
     assert n == len(cloud.point.positions)
     for name in ("positions", "classification", *LABELS):
         assert found[name].dtype == expected[name].dtype, name
@@ -162,14 +164,14 @@ def test_labels_are_those_of_annotate(scans, skeleton, tmp_path, ending, where):
 
 def test_thickness_is_that_of_the_points_of_the_skeleton_and_not_known_without(ring, tmp_path):
     scan, marked = tmp_path / "scan.ply", tmp_path / "marked.ply"
-    save_tensor_cloud(ring.annotate(), scan)
+    save_tensor_cloud(annotate(ring), scan)
     annotate_file(ring, scan, marked)
     found = read_tensor_cloud(marked).point.thickness.numpy()
-    np.testing.assert_array_equal(found, ring.annotate().point.thickness.numpy())
-    ring.save(tmp_path / "ring.ply")
+    np.testing.assert_array_equal(found, annotate(ring).point.thickness.numpy())
+    save_skeleton(ring, tmp_path / "ring.ply")
     bare = read_skeleton(tmp_path / "ring.ply")
     annotate_file(bare, scan, marked)
-    found, expected = read_tensor_cloud(marked).point, bare.annotate(torus(1000).points).point
+    found, expected = read_tensor_cloud(marked).point, annotate(bare, torus(1000).points).point
     np.testing.assert_array_equal(found.skeleton_vertex.numpy(), expected.skeleton_vertex.numpy())
     assert np.isnan(found.thickness.numpy()).all()
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import editing
+from glsk_o3d import editing, save_skeleton
+from glsk_o3d.analysis import segment
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, ScriptError
 from glsk_o3d.meshlab.layers import Layer
 from glsk_o3d.meshlab.script import write_script
@@ -158,11 +159,11 @@ def test_a_segmentation_is_of_the_scan(layers, scan, whole):
     applied(layers, "pruned_skeleton", order=0)
     applied(layers, "segmented_cloud")
     np.testing.assert_array_equal(layers.layer().vertices, scan)
-    np.testing.assert_array_equal(layers.layer().scalars, editing.prune(whole, order=0).segment())
+    np.testing.assert_array_equal(layers.layer().scalars, segment(editing.prune(whole, order=0)))
 
 
 def test_a_skeleton_from_a_file_can_be_changed(tmp_path, whole):
-    whole.save(tmp_path / "s.ply")
+    save_skeleton(whole, tmp_path / "s.ply")
     layers = PlainLayers(Layer.read(tmp_path / "s.ply"))
     said = applied(layers, "rerooted_skeleton", root=7)
     assert not set(said) & {"iterations", "converged", "stop_reason"}  # of which the file says nothing

@@ -4,7 +4,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import samples
+from glsk_o3d import samples, save_skeleton
 from glsk_o3d.meshlab.layers import Layer
 from glsk_o3d.meshlab.verbs import verbs
 
@@ -39,7 +39,7 @@ def test_a_mesh_is_read_as_it_was_written(tmp_path, ending):
 
 @pytest.mark.parametrize("ending", ["ply", "obj", "json"])
 def test_a_skeleton_is_read_with_its_edges(tmp_path, tree, ending):
-    tree.save(tmp_path / f"s.{ending}")
+    save_skeleton(tree, tmp_path / f"s.{ending}")
     back = Layer.read(tmp_path / f"s.{ending}")
     np.testing.assert_array_equal(back.vertices, tree.vertices)
     np.testing.assert_array_equal(back.edges, tree.edges)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
+from glsk_o3d import to_pymeshlab
+from glsk_o3d.analysis import segment
 from glsk_o3d.errors import GlskError, InvalidCloudError, InvalidParameterError, MissingPackageError, ScriptError
 from glsk_o3d.io.skeletons import read_skeleton
 from glsk_o3d.meshlab import builtin
@@ -293,7 +295,7 @@ def test_a_segmentation_has_the_points_and_faces_of_its_skeleton():
     np.testing.assert_array_equal(mesh.face_matrix(), faces)
     np.testing.assert_array_equal(mesh.vertex_matrix(), points)
     labels = mesh.vertex_scalar_array().astype(int)
-    np.testing.assert_array_equal(labels, skeleton.segment())
+    np.testing.assert_array_equal(labels, segment(skeleton))
     assert said["branches"] == len(skeleton.branches) > 1
     colours = np.unique(np.column_stack([labels, mesh.vertex_color_matrix()]), axis=0)
     assert len(colours) == len(np.unique(labels))  # one for each
@@ -449,7 +451,7 @@ def test_which_parameters_are_layers():
 
 def test_a_skeleton_as_a_mesh_of_meshlab(skeleton, tmp_path, monkeypatch):
     meshes = pymeshlab.MeshSet()
-    meshes.add_mesh(skeleton.to_pymeshlab())
+    meshes.add_mesh(to_pymeshlab(skeleton))
     mesh = meshes.current_mesh()
     np.testing.assert_array_equal(mesh.vertex_matrix(), skeleton.vertices)
     np.testing.assert_array_equal(mesh.edge_matrix().reshape(-1, 2), skeleton.edges)
@@ -459,4 +461,4 @@ def test_a_skeleton_as_a_mesh_of_meshlab(skeleton, tmp_path, monkeypatch):
         np.testing.assert_array_equal(read_skeleton(tmp_path / "m.obj").edges, skeleton.edges)
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     with pytest.raises(MissingPackageError, match=r"pymeshlab.*pip install .glsk-o3d.meshlab"):
-        skeleton.to_pymeshlab()
+        to_pymeshlab(skeleton)

@@ -30,6 +30,7 @@ from glsk_o3d import (
     rerun,
     samples,
     save_recipe,
+    save_skeleton,
     skeletonize,
 )
 from glsk_o3d.io.formats.fields import ARRAYS
@@ -276,7 +277,7 @@ def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, place, name, key
         save_recipe(pipeline, tmp_path / "r.json")
     assert list(tmp_path.iterdir()) == []
     skeleton = pipeline(POINTS)
-    skeleton.save(tmp_path / "s.json")
+    save_skeleton(skeleton, tmp_path / "s.json")
     recipe = glsk.read_skeleton(tmp_path / "s.json").report.recipe
     assert recipe == skeleton.report.recipe
     table = recipe["pipeline"][1]
@@ -335,7 +336,7 @@ def test_results_repeat_to_the_last_bit(tmp_path, name, ending):
     skeleton = pipeline(points)
     assert from_recipe(skeleton.report.recipe) == pipeline
     assert skeleton.report.recipe == to_recipe(pipeline)
-    skeleton.save(tmp_path / f"s.{ending}")
+    save_skeleton(skeleton, tmp_path / f"s.{ending}")
     read = glsk.read_skeleton(tmp_path / f"s.{ending}")
     assert read.report.recipe == skeleton.report.recipe
     for again in (rerun(read), rerun(rerun(skeleton), points)):
@@ -378,7 +379,7 @@ def test_progress_of_a_rerun_and_a_result_that_others_made():
 
 
 def test_old_results_load_but_have_no_recipe(tmp_path):
-    skeletonize(POINTS).save(tmp_path / "s.json")
+    save_skeleton(skeletonize(POINTS), tmp_path / "s.json")
     data = json.loads((tmp_path / "s.json").read_text())
     del data["report"]["recipe"]
     (tmp_path / "old.json").write_text(json.dumps(data))
@@ -387,7 +388,7 @@ def test_old_results_load_but_have_no_recipe(tmp_path):
     assert old.report.recipe == {}
     with pytest.raises(RecipeError):
         rerun(old)
-    old.save(tmp_path / "s.ply")
+    save_skeleton(old, tmp_path / "s.ply")
     read = glsk.read_skeleton(tmp_path / "s.ply")
     for begun in (read, Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(read)):
         with pytest.raises(RecipeError):

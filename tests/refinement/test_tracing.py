@@ -5,6 +5,7 @@ import pytest
 
 import glsk_o3d as glsk
 from glsk_o3d import InvalidParameterError, Refiner, pipelines, samples
+from glsk_o3d.analysis import branch_table
 
 RNG = np.random.default_rng(3)
 ROOT, FORK = np.zeros(3), np.array([0, 0, 1.0])
@@ -62,7 +63,7 @@ def test_a_tree_grows_from_vertex_0_along_its_edges(grown):
     assert grown.report.root == tuple(grown.vertices[0])
     assert (grown.edges[:, 0] < grown.edges[:, 1]).all()
     np.testing.assert_array_equal(np.sort(grown.edges[:, 1]), np.arange(1, len(grown.vertices)))  # a parent each
-    table = grown.branch_table()
+    table = branch_table(grown)
     assert sorted(table.level.tolist()) == [0, 1, 1]
     np.testing.assert_allclose(table.start_point[table.level == 0][0], ROOT, atol=0.03)
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import ContractionRecorder, Contractor, InvalidParameterError, RingBuilder, save_report
+from glsk_o3d import ContractionRecorder, Contractor, InvalidParameterError, RingBuilder, save_report, to_line_set
+from glsk_o3d.analysis import segment
 from glsk_o3d.decisions import Decision
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.samples import torus
@@ -74,9 +75,9 @@ def test_positions_come_through(data):
     np.testing.assert_allclose(unpacked(held["radii"], "<f4") * held["unit"], skeleton.radii, rtol=1e-6)
     np.testing.assert_array_equal(unpacked(held["edges"], "<u4").reshape(-1, 2), skeleton.edges)
     np.testing.assert_array_equal(unpacked(held["vertex_of_point"], "<i4"), skeleton.vertex_of_point)
-    np.testing.assert_array_equal(unpacked(held["branch_of_point"], "<i4"), skeleton.segment())
+    np.testing.assert_array_equal(unpacked(held["branch_of_point"], "<i4"), segment(skeleton))
     colours = [[int(hexa[i : i + 2], 16) / 255 for i in (1, 3, 5)] for hexa in held["palette"]]
-    lines = np.asarray(skeleton.to_line_set("branch").colors)
+    lines = np.asarray(to_line_set(skeleton, "branch").colors)
     np.testing.assert_allclose(np.array(colours)[unpacked(held["branch_of_edge"], "<i4")], lines, atol=0.003)
     assert len(held["captions"]) == len(skeleton.report.iterations) + 1
 

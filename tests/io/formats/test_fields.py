@@ -92,7 +92,7 @@ def test_what_makes_no_sense(tree, tmp_path, changes, says):
 
 
 def test_npz_is_plain_and_what_is_no_part_of_it_is_not_read(tree, tmp_path):
-    tree.save(tmp_path / "s.npz")
+    save_skeleton(tree, tmp_path / "s.npz")
     with np.load(tmp_path / "s.npz", allow_pickle=False) as archive:
         assert archive["format"] == "glsk-o3d skeleton"
         np.testing.assert_array_equal(archive["vertices"], tree.vertices)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import Skeleton
+from glsk_o3d import Skeleton, to_tubes
 from glsk_o3d.analysis.segmentation import skin_weights
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.io.formats.gltf import save_rig
@@ -107,7 +107,7 @@ def test_weights_are_continuous_along_the_curve_and_sum_to_one(tree):
 def test_triangles_normals_and_colours_go_along(tree, rig):
     import open3d as o3d
 
-    mesh = tree.to_tubes((1.0, 0.5, 0.0))
+    mesh = to_tubes(tree, (1.0, 0.5, 0.0))
     for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
         file = rig(tree, given)
         part = file.meshes[0].primitives[0]

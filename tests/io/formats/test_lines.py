@@ -4,6 +4,7 @@ import networkx
 import numpy as np
 import pytest
 
+from glsk_o3d import save_skeleton
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.skeletons import read_skeleton
 
@@ -11,7 +12,7 @@ from glsk_o3d.io.skeletons import read_skeleton
 @pytest.mark.parametrize("ending", [".obj", ".ply"])
 def test_meshlab_opens_it(skeleton, tmp_path, ending):
     pymeshlab = pytest.importorskip("pymeshlab")
-    skeleton.save(tmp_path / f"s{ending}")
+    save_skeleton(skeleton, tmp_path / f"s{ending}")
     meshes = pymeshlab.MeshSet()
     meshes.load_new_mesh(str(tmp_path / f"s{ending}"))
     mesh = meshes.current_mesh()
@@ -38,7 +39,7 @@ def test_graphml_of_others_and_in_networkx(tree, tmp_path):
     back = read_skeleton(tmp_path / "s.graphml")
     np.testing.assert_array_equal(back.edges, [[0, 1]])
     np.testing.assert_array_equal(back.radii, [np.nan, 2])
-    tree.save(tmp_path / "s.graphml")
+    save_skeleton(tree, tmp_path / "s.graphml")
     graph = networkx.read_graphml(tmp_path / "s.graphml", node_type=int)
     assert [graph.nodes[i]["radius"] for i in range(6)] == tree.radii.tolist()
     assert [graph.edges[edge]["length"] for edge in tree.edges.tolist()] == tree.edge_lengths.tolist()
@@ -49,13 +50,13 @@ def test_graphml_of_others_and_in_networkx(tree, tmp_path):
 
 def test_polylines_have_a_line_per_branch(tree, forest, tmp_path):
     for skeleton, name, counts in ((tree, "s.cgal", [2, 3, 3]), (forest, "s.polylines.txt", [1, 2, 3])):
-        skeleton.save(tmp_path / name)
+        save_skeleton(skeleton, tmp_path / name)
         assert sorted(int(line.split()[0]) for line in (tmp_path / name).read_text().splitlines()) == counts
 
 
 def test_ezdxf_reads_a_polyline_per_branch(skeleton, tmp_path):
     ezdxf = pytest.importorskip("ezdxf")
-    skeleton.save(tmp_path / "s.dxf")
+    save_skeleton(skeleton, tmp_path / "s.dxf")
     drawing = ezdxf.readfile(tmp_path / "s.dxf")
     assert not drawing.audit().errors
     assert drawing.dxfversion == "AC1009"
@@ -76,7 +77,7 @@ def test_vtk_reads_vertices_branches_and_radii(skeleton, tmp_path):
     reader_module = pytest.importorskip("vtkmodules.vtkIOXML", reason="vtk is not installed")
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
-    skeleton.save(tmp_path / "s.vtp")
+    save_skeleton(skeleton, tmp_path / "s.vtp")
     reader = reader_module.vtkXMLPolyDataReader()
     reader.SetFileName(str(tmp_path / "s.vtp"))
     reader.Update()

@@ -10,7 +10,8 @@ from unittest.mock import MagicMock
 import numpy as np
 import pytest
 
-from glsk_o3d import FileFormatError, Skeleton, editing, pipelines, samples
+from glsk_o3d import FileFormatError, Skeleton, editing, pipelines, samples, save_skeleton
+from glsk_o3d.analysis import branch_table
 from glsk_o3d.io.formats import plants
 from glsk_o3d.io.formats.plants import plant_axes
 from glsk_o3d.io.skeletons import read_skeleton
@@ -74,20 +75,20 @@ def test_swc_as_others_write_it(tmp_path):
 
 
 def test_swc_cuts_the_longest_edges_and_keeps_those_of_no_length(loop, make, tmp_path):
-    loop.save(tmp_path / "s.swc", cut_loops=True)
+    save_skeleton(loop, tmp_path / "s.swc", cut_loops=True)
     tree = read_skeleton(tmp_path / "s.swc")
     assert (len(tree.edges), tree.n_loops, tree.n_components) == (len(loop.edges) - loop.n_loops, 0, 1)
     # Of two loops sharing the chord both the chord and one more edge go: the chord is the longest.
     lengths = np.sort(loop.edge_lengths)
     assert tree.length == pytest.approx(lengths[:5].sum())
     assert tree.edge_lengths.max() < lengths[-1]
-    make(np.zeros((3, 3)), [[0, 1], [1, 2]]).save(tmp_path / "s.swc")
+    save_skeleton(make(np.zeros((3, 3)), [[0, 1], [1, 2]]), tmp_path / "s.swc")
     assert len(read_skeleton(tmp_path / "s.swc").edges) == 2
 
 
 def test_coordinates_of_a_map_are_shifted_along_the_axes_that_need_it(tmp_path, caplog):
     far = graph([[5e5, 5.4e6, -0.05], [5e5 + 0.25, 5.4e6 + 0.125, 10.0]], [[0, 1]], 0.01)
-    far.save(tmp_path / "s.swc")
+    save_skeleton(far, tmp_path / "s.swc")
     assert "# global_shift: 500000.0 5400000.0 0.0" in (tmp_path / "s.swc").read_text()
     assert "global shift of (500000.00, 5400000.00, 0)" in caplog.text
     np.testing.assert_array_equal(read_skeleton(tmp_path / "s.swc").vertices, far.vertices)
@@ -97,7 +98,7 @@ def test_coordinates_of_a_map_are_shifted_along_the_axes_that_need_it(tmp_path, 
 
 
 def test_orders_are_those_of_the_branch_table(tree):
-    order, table = orders(*plant_axes(tree)), tree.branch_table(0)
+    order, table = orders(*plant_axes(tree)), branch_table(tree, 0)
     assert table.order.max() > 3
     for row, path in enumerate(tree.branches):
         assert (order[path[path != table.start[row]]] == table.order[row]).all()
@@ -180,7 +181,7 @@ def test_node_list_by_hand():
 @pytest.mark.parametrize("load", ["load_csv", "from_nodelist", "from_skeleton_gt_data", "from_mtg"])
 def test_trees_in_tomatowur(tree, skeleton_graph, load, tmp_path):
     path = tmp_path / ("t.mtg" if load == "from_mtg" else "t.plant.csv")
-    tree.save(path)
+    save_skeleton(tree, path)
     given = str(path) if load == "from_mtg" else path
     found = skeleton_graph(path) if load == "load_csv" else getattr(skeleton_graph, load)(given)
     ends = found.get_node_attribute("pos")[found.get_edges()]

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glsk_o3d import save_skeleton
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.formats.ply import read_tables
 from glsk_o3d.io.scans import read_scan
@@ -60,7 +61,7 @@ def test_ply_in_open3d_and_written_by_it(skeleton, tmp_path):
     if not len(skeleton.edges):
         pytest.skip("Open3D reads no line set without lines")
     path = str(tmp_path / "s.ply")
-    skeleton.save(path)
+    save_skeleton(skeleton, path)
     lines = o3d.io.read_line_set(path)
     np.testing.assert_array_equal(np.asarray(lines.points), skeleton.vertices)
     np.testing.assert_array_equal(np.asarray(lines.lines), skeleton.edges)
@@ -76,7 +77,7 @@ def test_ply_in_open3d_and_written_by_it(skeleton, tmp_path):
 
 def test_the_half_axes_come_back(tree, tmp_path):
     flat = replace(tree, half_width=2 * tree.radii, half_thickness=tree.radii / 2)
-    flat.save(tmp_path / "s.ply")
+    save_skeleton(flat, tmp_path / "s.ply")
     back = read_skeleton(tmp_path / "s.ply")
     for name in ("radii", "half_width", "half_thickness"):
         np.testing.assert_array_equal(getattr(back, name), getattr(flat, name))
