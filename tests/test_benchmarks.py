@@ -218,7 +218,7 @@ def test_all_ideas_off_are_the_publications(parts):
     published = ("point reduction", "stop by score")
     wen = chain.from_iterable(setting for name, setting in off.items() if name not in published)
     assert override(pipelines.default(), wen) == pipelines.wen2024()
-    absent = ("LPRReducer.", "ExplainedScore.", "Contractor.reduce_above")
+    absent = ("LPRReducer.", "ExplainedScore.")
     left = (setting for setting in chain.from_iterable(off.values()) if not setting.startswith(absent))
     assert override(pipelines.default(), [*left, "Contractor.max_iterations=20"]) == pipelines.cao2010()
 

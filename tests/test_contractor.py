@@ -121,7 +121,7 @@ def test_explained_score(points, score):
 
 
 def test_records_follow_their_definitions(built):
-    filter = Contractor(reducer=LPRReducer(), reduce_above=0, stop=never, max_iterations=4)
+    filter = Contractor(reducer=LPRReducer(), stop=never, max_iterations=4)
     state = filter(built)
     records = state.report.iterations
     assert [record.iteration for record in records] == [1, 2, 3, 4]
@@ -149,7 +149,7 @@ def test_stop_rule_is_asked_after_every_solve_and_its_reason_kept(built):
         return "three are enough" if len(iterations) == 3 else None
 
     reducer = Mock(side_effect=LPRReducer())
-    report = Contractor(stop=third, reducer=reducer, reduce_above=0)(built).report
+    report = Contractor(stop=third, reducer=reducer)(built).report
     assert asked == [1, 2, 3]
     assert report.stop_reason == "three are enough"
     assert report.converged
@@ -272,13 +272,6 @@ def test_attraction_has_a_floor_and_a_cap(built, monkeypatch, floor):
     np.testing.assert_allclose(weight[:5], np.maximum([0.25, 4, 500, 500, 1], floor))
 
 
-@pytest.mark.parametrize("above", [0, 250, 400])
-def test_reducer_rests_when_few_are_left(built, above):
-    filter = Contractor(reducer=LPRReducer(), reduce_above=above, stop=never, max_iterations=5)
-    for record in filter(built).report.iterations:
-        assert (record.n_merged > 0) == (record.n_points > above)
-
-
 # ---- what is a line already
 
 
@@ -301,7 +294,7 @@ def test_lines_are_held_from_the_second_solve_on(built, monkeypatch):
 def test_held_lines_keep_their_bends():
     """Contraction that goes on and on shrinks a ring, unless what has become a line is held."""
     built = RingBuilder()(samples.torus(n=1000).points)
-    filter = Contractor(reducer=LPRReducer(), reduce_above=0, stop=never, max_iterations=8)
+    filter = Contractor(reducer=LPRReducer(), stop=never, max_iterations=8)
 
     def ring(hold):
         x = replace(filter, line_hold=hold)(built).contracted

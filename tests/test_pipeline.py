@@ -23,6 +23,7 @@ from glsk_o3d import (
     RingSizeRatio,
     Skeleton,
     StageError,
+    Tracer,
     pipelines,
     samples,
     skeletonize,
@@ -159,13 +160,14 @@ def test_parameters_of_all_stages_are_checked_before_any_work():
 
 
 def test_options_by_full_and_by_short_name():
-    builder, contractor, connector, refiner = pipelines.default().stages
+    builder, contractor, connector, refiner, tracer = pipelines.default().stages
     varied = pipelines.default().with_options({"RingBuilder.k": 24, "phi": 2e5}, spacing=1)
     assert varied == (
         dataclasses.replace(builder, k=24)
         | dataclasses.replace(contractor, reducer=LPRReducer(phi=2e5))
         | connector
         | dataclasses.replace(refiner, spacing=1)
+        | tracer
     )
     assert pipelines.default().with_options() == pipelines.default().with_options({}) == pipelines.default()
 
@@ -217,7 +219,7 @@ def test_options_that_are_none_or_wrong_or_given_twice(options, named, words):
 
 @pytest.mark.slow
 def test_skeletonize_takes_options():
-    by_hand = (RingBuilder(k=24) | Contractor(reducer=LPRReducer()) | Connector() | Refiner())(POINTS)
+    by_hand = (RingBuilder(k=24) | Contractor(reducer=LPRReducer()) | Connector() | Refiner() | Tracer())(POINTS)
     assert_same(skeletonize(POINTS, k=24), by_hand)
     assert_same(skeletonize(POINTS, {"RingBuilder.k": 24}), by_hand)
     assert_same(skeletonize(POINTS, "default", k=24), by_hand)

@@ -81,8 +81,6 @@ def test_random_graphs_against_networkx(m, edges):
     assert {tuple(sorted(edge)) for edge in back.edges} == edges
     for i in range(m):
         facts = dict(back.nodes[i])
-        known = np.isfinite([facts.pop("curvature"), facts.pop("torsion")])
-        assert not known.any() or degree[i] in (1, 2)
         assert np.isnan(facts.pop("support"))
         assert facts == {
             "position": tuple(skeleton.vertices[i]),
@@ -91,14 +89,6 @@ def test_random_graphs_against_networkx(m, edges):
             "half_width": skeleton.half_width[i],
             "half_thickness": skeleton.half_thickness[i],
         }
-    rows = back.graph["branches"]
-    assert len(rows) == len(skeleton.branches) + degree.count(0)
-    for a, b, facts in back.edges(data=True):
-        branch = skeleton.branches[facts["branch"]].tolist()
-        assert (a, b) in {*path(branch), *path(branch[::-1])}
-        assert rows[facts["branch"]]["length"] == pytest.approx(
-            sum(back.edges[edge]["length"] for edge in path(branch))
-        )
     total = sum(length for _, _, length in back.edges(data="length"))
     assert skeleton.length == pytest.approx(total)
 

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import Refiner, Skeleton, SkeletonWarning
 
-NOTHING = dict(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0, surface=0)
+NOTHING = dict(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)
 
 
 @pytest.fixture(scope="session")
