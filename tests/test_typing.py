@@ -28,10 +28,11 @@ whole: Pipeline[Skeleton] = start | Connector(radius="2%", links="all") | Refine
 skeleton = whole(cloud, on_stage=lambda stage: print(stage.kind))
 skeleton = pipelines.default().with_options(k=24)(cloud)
 RingBuilder(k=o3d.geometry.KDTreeSearchParamKNN(24), radius=0.1, thin_to="all")
-skeleton.save("tree.swc", cut_loops=True)
-o3d.visualization.draw_geometries([cloud, skeleton.to_line_set("branch"), skeleton.to_tubes((0, 0, 1), sides=8)])
-print(skeleton.vertices.shape, skeleton.report.iterations[-1].explained, skeleton.to_networkx(root=(0, 0, 1)).nodes)
-print(skeleton.branch_table(root=0).length, skeleton.segment().shape, glsk.Report.from_dict({}).to_dict()["n_input"])
+glsk.save_skeleton(skeleton, "tree.swc", cut_loops=True)
+o3d.visualization.draw_geometries([cloud, skeleton.to_line_set(), glsk.to_tubes(skeleton, (0, 0, 1), sides=8)])
+print(skeleton.vertices.shape, skeleton.report.iterations[-1].explained, skeleton.to_networkx().nodes)
+table = glsk.analysis.branch_table(skeleton, root=0)
+print(table.length, glsk.analysis.segment(skeleton).shape, glsk.Report.from_dict({}).to_dict()["n_input"])
 glsk.save_recipe(whole, "plant.toml")
 again: Skeleton = glsk.load_recipe("plant.toml")(cloud)
 
@@ -42,8 +43,8 @@ LPRReducer(order="random")  # wrong
 Connector(links="al")  # wrong
 Refiner(recentre="3")  # wrong
 RingBuilder() | 12  # wrong
-skeleton.save("x.swc", cut_lops=True)  # wrong
-skeleton.to_line_set("brnch")  # wrong
+glsk.save_skeleton(skeleton, "x.swc", cut_lops=True)  # wrong
+glsk.to_line_set(skeleton, "brnch")  # wrong
 skeleton.to_line_set().colours  # wrong
 glsk.skeletonise(cloud)  # wrong
 glsk.skeletonize(cloud, 12)  # wrong

@@ -21,14 +21,14 @@ points = y_junction(600).points
 skeleton = glsk.skeletonize(points)
 from glsk_o3d.io.skeletons import FORMATS, READABLE
 for ending in FORMATS:
-    skeleton.save(f"s{ending}", cut_loops=True)
+    glsk.save_skeleton(skeleton, f"s{ending}", cut_loops=True)
     if ending in READABLE:
         glsk.read_skeleton(f"s{ending}")
 glsk.save_recipe(glsk.pipelines.default(), "r.toml")
 assert glsk.load_recipe("r.toml") == glsk.pipelines.default()
-skeleton.to_networkx(), skeleton.to_line_set(), skeleton.to_tensor_line_set()
-skeleton.annotate(points, color=(1, 0, 0))
-table = skeleton.branch_table()
+skeleton.to_networkx(), skeleton.to_line_set(), glsk.to_tensor_line_set(skeleton)
+glsk.annotate(skeleton, points, color=(1, 0, 0))
+table = glsk.analysis.branch_table(skeleton)
 table.to_csv("branches.csv"), str(table), glsk.analysis.grasp_candidates(skeleton, 1.0)
 """
 ASKS = """
@@ -41,7 +41,7 @@ asking = {
     "preview": lambda: glsk.save_preview(skeleton, "s.png"),
     "report": lambda: glsk.save_report(skeleton, "s.html"),
     "plot": lambda: glsk.plot_skeleton(skeleton),
-    "colours": lambda: skeleton.to_line_set(color="branch"),
+    "colours": lambda: glsk.to_line_set(skeleton, "branch"),
     "grasps": lambda: glsk.analysis.grasp_candidates(skeleton, 1.0).to_line_set(),
     "crosscheck": lambda: cross_check(points),
     "meshlab": lambda: glsk.MeshSet(),
@@ -51,7 +51,7 @@ asking = {
     "e57": lambda: glsk.read_cloud("scan.e57"),
     "batch": lambda: glsk.batch.run_batch("s.ply", "out", preview=True),
 }
-said = {"notebook": skeleton._repr_html_()}
+said = {"notebook": glsk._picture(skeleton)}
 for name, ask in asking.items():
     try:
         ask()

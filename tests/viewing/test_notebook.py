@@ -4,12 +4,15 @@ import base64
 import dataclasses
 import io
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
 
 from glsk_o3d.report import Report
+from glsk_o3d.viewing.html import to_html
 
 
 def image_of(html):
@@ -18,7 +21,7 @@ def image_of(html):
 
 
 def test_is_sound_and_self_contained(skeleton):
-    html = skeleton._repr_html_()
+    html = to_html(skeleton)
     open_tags = []
     for closing, tag in re.findall(r"<(/?)(\w+)", html):
         if closing:
@@ -36,13 +39,13 @@ def test_is_sound_and_self_contained(skeleton):
 def test_is_small_even_for_large_clouds(tree):
     points = np.random.default_rng(0).normal(size=(100_000, 3))
     many = dataclasses.replace(tree, points=points, normals=points, vertex_of_point=np.zeros(len(points)))
-    assert len(many._repr_html_()) < 200_000
+    assert len(to_html(many)) < 200_000
 
 
 def test_no_white_band_around_the_drawing_and_warnings_are_texts(make):
     long = make(np.array([[0, 0, 0], [9, 0, 0], [9, 0.5, 0.5]]), [[0, 1], [1, 2]])
     warned = Report(warnings=("<b>&",))
-    html = dataclasses.replace(long, points=(), normals=(), vertex_of_point=(), report=warned)._repr_html_()
+    html = to_html(dataclasses.replace(long, points=(), normals=(), vertex_of_point=(), report=warned))
     picture = image_of(html)
     inked = np.flatnonzero((picture[..., :3] < 0.9).any(axis=(1, 2)))
     assert inked[0] < 25
@@ -50,8 +53,20 @@ def test_no_white_band_around_the_drawing_and_warnings_are_texts(make):
     assert ">&lt;b&gt;&amp;</p>" in html
 
 
-def test_jupyter_finds_it(tree):
-    formatters = pytest.importorskip("IPython.core.formatters")
-    bundle, _ = formatters.DisplayFormatter().format(tree)
-    assert bundle["text/html"] == tree._repr_html_()
-    assert bundle["text/plain"] == repr(tree)
+JUPYTER = """
+from IPython.core.interactiveshell import InteractiveShell
+shell = InteractiveShell.instance()
+import glsk_o3d
+from glsk_o3d.samples import torus
+from glsk_o3d.viewing.html import to_html
+ring = glsk_o3d.skeletonize(torus(500).points)
+bundle, _ = shell.display_formatter.format(ring)
+assert bundle["text/html"] == to_html(ring)
+assert bundle["text/plain"] == repr(ring)
+"""
+
+
+def test_jupyter_finds_it():
+    pytest.importorskip("IPython")
+    done = subprocess.run([sys.executable, "-c", JUPYTER], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
