@@ -283,7 +283,7 @@ def slack_of(pipeline: Pipeline) -> float:
     An axis is no farther out than that of a strip of a tube. What nobody has centred is where the contraction left it:
     in a box that is larger by a fifth, as published, or in a ball around it.
     """
-    rings, refiner = pipeline.stages[0], pipeline.stages[-1]
+    rings, refiner = pipeline.stages[0], pipeline.stages[3]
     if rings.frame == "box":
         return CONTRACTED_SLACK
     return FITTED_SLACK if refiner.recentre else np.inf

@@ -45,7 +45,7 @@ STAGES = {
         "preparation.denoising:average_noisy,subspace_mean_shift"
     ),
     "planes": Stage("numerics.neighbourhoods:principal"),
-    "thinning": Stage("preparation.sampling:sample_grid preparation.thinning:thin,spacing_enough,thin_nearer"),
+    "thinning": Stage("preparation.sampling:sample_grid preparation.surface:thin,spacing_enough,thin_nearer"),
     "rings": Stage("numerics.rings:star_rings"),
     "rest of the rings": Stage("ring_builder:RingBuilder._run", open=True),
     "Laplacian": Stage("numerics.cotangent:cotangent_laplacian"),

@@ -53,7 +53,7 @@ def test_late_imports_count_and_so_do_those_for_type_checkers(tmp_path):
     (package / "b" / "d.py").write_text("from ..a import Shape\nfrom . import c\n")
     assert architecture.imports(package) == {
         ("a", "a.Shape.draw", "b.c"),
-        ("b.c", "b.c", "a"),
+        ("b.c", "b.c", "b"),
         ("b.d", "b.d", "a"),
         ("b.d", "b.d", "b.c"),
     }

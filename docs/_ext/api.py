@@ -96,12 +96,10 @@ NAMES = {
 PACKAGES = tuple(dict.fromkeys(module for _, module in TASKS.values()))
 """What users import from."""
 MODULES = {
-    "glsk_o3d.io.colors": "Colours",
     "glsk_o3d.parameters": "Making filters",
     "glsk_o3d.interop.clouds": "What counts as a cloud",
     "glsk_o3d.recipes.catalogue": "What there is by name",
     "glsk_o3d.recipes.plugins": "Plugins",
-    "glsk_o3d.meshlab.steps": "Filter scripts",
 }
 """What the package's own parts, and those who extend it, import from."""
 

@@ -17,12 +17,12 @@ cloud = sauropod(4096, noise=0.002).points
 # **Rings**: which neighbours surround each point. **Contraction**: the rings' Laplacian draws the points inwards,
 # while local point reduction (**LPR**) merges those that say little more than their neighbours. **Connection**:
 # clusters of contracted points become a graph. **Refinement**: the graph becomes a curve in the middle of the
-# surface.
+# surface. **Tracing** is for twigs that show no surface; here it finds nothing to do.
 
 rings = glsk.RingBuilder()(cloud)
 contracted = glsk.Contractor(reducer=glsk.LPRReducer())(rings)
 graph = glsk.Connector()(contracted)
-skeleton = glsk.Refiner()(graph)
+skeleton = glsk.Tracer()(glsk.Refiner()(graph))
 for state in (rings, contracted, graph, skeleton):
     print(state)
 
@@ -59,6 +59,7 @@ pipeline = (
     | glsk.Contractor(reducer=glsk.LPRReducer())
     | glsk.Connector()
     | glsk.Refiner()
+    | glsk.Tracer()
 )
 assert pipeline == glsk.pipelines.default()
 assert np.array_equal(pipeline(cloud).vertices, skeleton.vertices)

@@ -67,7 +67,7 @@ class BranchTable(Rows, row="branch"):
     --------
     >>> from glsk_o3d import skeletonize
     >>> from glsk_o3d.samples import y_junction
-    >>> table = skeletonize(y_junction(2000).points).branch_table()
+    >>> table = branch_table(skeletonize(y_junction(2000).points))
     >>> len(table), list(table)[0]["kind"], table.length.shape
     (3, 'tip', (3,))
     """

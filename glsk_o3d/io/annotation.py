@@ -56,6 +56,14 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     Notes
     -----
     ``voxel_down_sample`` takes the mean of every attribute: that of labels means nothing. Annotate its result again.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(1000).points)
+    >>> annotate(ring).point.branch.shape
+    SizeVector[1000, 1]
     """
     points, vertex = vertex_of_cloud(skeleton, cloud)
     found = labels(skeleton, points, vertex, thickness_of_points(skeleton, points, vertex), color)

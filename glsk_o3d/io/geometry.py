@@ -120,6 +120,13 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     InvalidParameterError
         A radius is unknown or not positive, `sides` is below 3, or the colour is unknown.
     MissingPackageError
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> to_tubes(skeletonize(torus(1000).points)).is_watertight()
+    True
     """
     if isinstance(sides, bool) or not isinstance(sides, (int, np.integer)) or sides < 3:
         raise InvalidParameterError(f"sides = {sides!r}: must be an int of at least 3")

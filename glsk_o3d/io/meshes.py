@@ -98,9 +98,9 @@ def save_mesh(mesh: Any, path: str | os.PathLike) -> None:
     --------
     >>> from tempfile import TemporaryDirectory
     >>> import open3d
-    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d import skeletonize, to_tubes
     >>> from glsk_o3d.samples import torus
-    >>> tubes = skeletonize(torus(1000).points).to_tubes()
+    >>> tubes = to_tubes(skeletonize(torus(1000).points))
     >>> with TemporaryDirectory() as folder:
     ...     save_mesh(tubes, f"{folder}/ring.obj")
     ...     len(open3d.io.read_triangle_mesh(f"{folder}/ring.obj").triangles) == len(tubes.triangles)

@@ -256,9 +256,9 @@ def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d import annotate, skeletonize
     >>> from glsk_o3d.samples import torus
-    >>> marked = skeletonize(torus(1000).points).annotate()
+    >>> marked = annotate(skeletonize(torus(1000).points))
     >>> with TemporaryDirectory() as folder:
     ...     save_tensor_cloud(marked, f"{folder}/marked.ply")
     ...     bool((read_tensor_cloud(f"{folder}/marked.ply").point.radius == marked.point.radius).all())

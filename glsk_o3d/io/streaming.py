@@ -66,11 +66,11 @@ def read_sample(
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d import save_tensor_cloud, skeletonize
+    >>> from glsk_o3d import annotate, save_tensor_cloud, skeletonize
     >>> from glsk_o3d.samples import torus
     >>> whole = skeletonize(torus(120000).points)
     >>> with TemporaryDirectory() as folder:
-    ...     save_tensor_cloud(whole.annotate(), f"{folder}/scan.ply")
+    ...     save_tensor_cloud(annotate(whole), f"{folder}/scan.ply")
     ...     sample = read_sample(f"{folder}/scan.ply")
     >>> len(sample.point.positions) < 60000, int(sample.point.sample_count.numpy().sum())
     (True, 120000)
@@ -182,11 +182,11 @@ def annotate_file(
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d import read_tensor_cloud, save_tensor_cloud, skeletonize
+    >>> from glsk_o3d import annotate, read_tensor_cloud, save_tensor_cloud, skeletonize
     >>> from glsk_o3d.samples import torus
     >>> ring = skeletonize(torus(1000).points)
     >>> with TemporaryDirectory() as folder:
-    ...     save_tensor_cloud(skeletonize(torus(3000).points).annotate(), f"{folder}/scan.ply")
+    ...     save_tensor_cloud(annotate(skeletonize(torus(3000).points)), f"{folder}/scan.ply")
     ...     annotate_file(ring, f"{folder}/scan.ply", f"{folder}/marked.ply")
     ...     int(read_tensor_cloud(f"{folder}/marked.ply").point.skeleton_vertex.max().item()) < len(ring.vertices)
     3000

@@ -28,9 +28,8 @@ def test_a_ring_is_one_loop_as_surely_a_handle_as_it_was_judged():
     np.testing.assert_array_equal(np.unique(closed, axis=0), skeleton.edges)
 
 
-def test_as_many_as_there_are_and_computed_once(rings, loop):
+def test_as_many_as_there_are(rings, loop):
     assert len(find_loops(rings)) == rings.n_loops == 2
-    assert find_loops(rings) is find_loops(rings)
     assert len(find_loops(loop)) == loop.n_loops == 2
     for it in find_loops(loop):
         assert nx.is_path(loop.to_networkx(), [*it.vertices.tolist(), int(it.vertices[0])])

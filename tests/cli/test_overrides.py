@@ -73,7 +73,9 @@ def test_round_trip_of_every_pipeline():
             if dataclasses.is_dataclass(value := getattr(part, f.name)) is False
         ]
         start = default() if find(pipeline, "Contractor").reducer else cao2010()
-        changed = override(start, settings)
+        changed = Pipeline(
+            *override(start, settings).stages[: len(pipeline.stages)]
+        )  # the published end before a Tracer
         assert changed == pipeline
         assert eval(repr(changed), vars(glsk_o3d) | {name: getattr(glsk_o3d, name) for name in catalogue()}) == pipeline
 

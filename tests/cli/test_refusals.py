@@ -50,7 +50,7 @@ TABLE = """
     2 grasps y.ply --opening 1 --min-confidence 0          | does not know the points of the object: give cloud=
     1 grasps rod.npz --opening 1 --scene none.ply          | none.ply: no such file
     1 evaluate y.ply no.ply                                | no.ply: no such file
-    1 evaluate y.ply SCANS/ring.ply --truth none.npz       | none.npz: the truth has no nodes
+    1 evaluate y.ply SCANS/ring.ply --truth none.npz       | none.npz: not a valid truth: the truth has no nodes
     1 evaluate dot.ply SCANS/ring.ply                      | dot.ply: the skeleton has no edge with a length
     1 evaluate y.ply few.xyz                               | few.xyz: no part of the skeleton has 6 points around it
     2 evaluate y.ply SCANS/ring.ply -o r.txt               | r.txt: the report is JSON and its name ends in .json

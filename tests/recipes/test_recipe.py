@@ -86,7 +86,7 @@ def test_every_parameter_of_every_filter_survives(made):
 
 def test_the_round_trip_is_over_everything():
     """So that a new filter is not forgotten above."""
-    assert {*BUILTIN} == {"RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner", *RULES}
+    assert {*BUILTIN} == {"RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner", "Tracer", *RULES}
 
 
 @pytest.mark.parametrize("ending", ["json", "toml", "JSON"])
@@ -142,9 +142,9 @@ def test_extends(tmp_path):
         radius = "4%"
     """
     (tmp_path / "r.toml").write_text(text)
-    builder, _, _, refiner = pipelines.default().stages
+    builder, _, _, refiner, tracer = pipelines.default().stages
     contractor = Contractor(reducer=LPRReducer(phi=3e5), stop=RingSizeRatio(0.5), max_iterations=7)
-    assert load_recipe(tmp_path / "r.toml") == builder | contractor | Connector(radius="4%") | refiner
+    assert load_recipe(tmp_path / "r.toml") == builder | contractor | Connector(radius="4%") | refiner | tracer
     for name, make in pipelines.PIPELINES.items():
         assert from_recipe({**HEAD, "extends": name}) == make()
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, Refiner, pipelines, samples
+from glsk_o3d import InvalidParameterError, Tracer, pipelines, samples
 from glsk_o3d.analysis import branch_table
 
 RNG = np.random.default_rng(3)
@@ -82,13 +82,13 @@ def test_the_thickest_end_of_a_sparse_tree_is_that_of_the_trunk():
 
 
 def test_a_point_is_kept_as_text_that_a_recipe_can_hold():
-    assert Refiner(root=(0.1, 2, np.float32(3))) == Refiner(root="0.1,2.0,3.0")
+    assert Tracer(root=(0.1, 2, np.float32(3))) == Tracer(root="0.1,2.0,3.0")
 
 
 @pytest.mark.parametrize("root", ["up", "1,2", "1,2,nan", 3, (1, 2), ("a", "b", "c"), [[1], [2, 3], 4]])
 def test_no_root(root):
     with pytest.raises(InvalidParameterError, match="a point such as"):
-        Refiner(root=root).check()
+        Tracer(root=root).check()
 
 
 def test_what_floats_far_away_is_no_part(sparse):
@@ -118,7 +118,7 @@ def test_a_ring_of_points_stays_a_loop():
 
 def test_a_trunk_with_a_surface_stays_what_it_was():
     cloud = np.concatenate([tube(1500), scattered([(ROOT, FORK), *TWIGS[1:]], 700)])
-    before = pipelines.default().with_options({"Refiner.surface": 0})(cloud)
+    before = pipelines.default().with_options({"Tracer.surface": 0})(cloud)
     skeleton = pipelines.tree()(cloud)
     assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 0, 3)
     trunk, twigs = skeleton.vertices[:, 2] < -0.3, skeleton.vertices[:, 2] > 0.2
@@ -158,7 +158,7 @@ def test_without_points_a_graph_becomes_a_tree():
         [[0, 0, 0], [1, 0, 0], [1, 0, 1.1], [0, 0, 1], [0, 0, 3]], [(0, 1), (1, 2), (2, 3), (0, 3)], np.ones(5),
         np.empty(0, int), np.empty((0, 3)), np.empty((0, 3)),
     )  # fmt: skip
-    tree = Refiner(root="z", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(square)
+    tree = Tracer(root="z")(square)
     assert (tree.n_components, tree.n_loops, len(tree.vertices)) == (1, 0, 5)
     (gap,) = tree.report.joined
     assert set(gap) == {(0.0, 0.0, 1.0), (0.0, 0.0, 3.0)}

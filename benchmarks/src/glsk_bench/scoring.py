@@ -247,7 +247,7 @@ def score_answers(
 
     Examples
     --------
-    >>> from glsk_o3d import Skeleton
+    >>> from glsk_o3d import Skeleton, save_skeleton
     >>> from glsk_bench import make
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as place:
@@ -255,7 +255,7 @@ def score_answers(
     ...     axis = made.truth("tubes_100")
     ...     found = Skeleton(axis.nodes, axis.edges, axis.radii, (), (), ())
     ...     Path(place, "mine").mkdir()
-    ...     found.save(f"{place}/mine/tubes_100_clean.obj")
+    ...     save_skeleton(found, f"{place}/mine/tubes_100_clean.obj")
     ...     results = score_answers(made, f"{place}/mine")
     >>> [(row["variant"], row["perfect"], row["failure"]) for row in results.rows]
     [('clean', True, None), ('holes', False, 'no answer')]
