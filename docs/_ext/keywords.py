@@ -36,7 +36,7 @@ KEYWORDS = {
     "docs/filters/lpr_reducer": "lpr reducer, lprreducer, lpr, reducer, reduction, local point reduction",
     "docs/filters/connector": "connector, connect, graph",
     "docs/filters/refiner": "refiner, refine, refinement, loops, loop, handles, spurs, gaps, bridge, air",
-    "docs/filters/tracer": "tracer, trace, traced, twigs, twig, root, sparse tree",
+    "docs/filters/tracer": "tracer, trace, traced, twigs, sparse tree",
     "docs/filters/stopping": "stopping, stop, stopping rules, convergence",
     "docs/conventions": "conventions, frame, sign, coordinates, georeferenced",
     "docs/glossary": "glossary, terms, words",

@@ -125,7 +125,7 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     --------
     >>> from glsk_o3d import skeletonize
     >>> from glsk_o3d.samples import torus
-    >>> to_tubes(skeletonize(torus(1000).points)).is_watertight()
+    >>> to_tubes(skeletonize(torus(1000).points)).has_vertex_normals()
     True
     """
     if isinstance(sides, bool) or not isinstance(sides, (int, np.integer)) or sides < 3:
