@@ -27,7 +27,7 @@ KEYWORDS = {
     "docs/benchmark": "benchmark, benchmarks, score, scores",
     "docs/evaluation": "evaluate, evaluation, measures, metrics, truth, assess",
     "docs/crosscheck": "crosscheck, cross-check, cross check, libigl, mesh, density",
-    "docs/numbers": "numbers, constants, thresholds, weights, defaults",
+    "docs/numbers": "numbers, constants, thresholds, defaults",
     "docs/differences": "differences, published code",
     "docs/paper": "paper, publication, abstract, novelty, ablation",
     "docs/filters/index": "filter, filters",
