@@ -24,7 +24,7 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
     ----------
     skeleton : Skeleton
     color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
-        What the colours of the edges show, or the one colour of all; see `glsk_o3d.io.colors.shades`.
+        What the colours of the edges show, or the one colour of all.
 
     Returns
     -------
