@@ -17,7 +17,7 @@ distributed = pytest.importorskip("distributed")
 
 @pytest.fixture
 def cluster(tmp_path, until, patience, monkeypatch):
-    """Start a scheduler and two workers; gives the scheduler's file, its process and those of the workers."""
+    """Start a scheduler and workers; gives the scheduler's file, its process and those of the workers."""
     begun = []
     for name in ("CONNECT", "TCP"):
         monkeypatch.setenv(f"DASK_DISTRIBUTED__COMM__TIMEOUTS__{name}", f"{patience} s")
@@ -29,15 +29,15 @@ def cluster(tmp_path, until, patience, monkeypatch):
             begun.append(subprocess.Popen(command, stdout=log, stderr=log, env={**os.environ, **environment}))
         return begun[-1]
 
-    def make(**environment):
+    def make(n=2, **environment):
         file = tmp_path / "scheduler.json"
         words = ("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
         scheduler = dask(*words, **environment)
         until(lambda: file.exists() and file.read_text().endswith("}"), scheduler)
         options = ("--scheduler-file", str(file), "--no-nanny", "--nthreads", "1", "--host", "127.0.0.1")
-        workers = [dask("worker", *options) for _ in range(2)]
+        workers = [dask("worker", *options) for _ in range(n)]
         with distributed.Client(scheduler_file=str(file), timeout=patience, set_as_default=False) as client:
-            until(lambda: len(client.nthreads()) == 2, scheduler, *workers)
+            until(lambda: len(client.nthreads()) == n, scheduler, *workers)
         return file, scheduler, workers
 
     yield make
@@ -85,7 +85,7 @@ def test_a_worker_is_killed_and_then_the_scheduler(cluster, waiting, until, sabo
 def test_a_scan_that_kills_its_workers(cluster, saboteur, write, rows, tmp_path):
     for i in range(3):
         write(tmp_path / "in" / f"{i}.ply", seed=i, order=1000 * (i == 2))
-    file, _, _ = cluster(DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0")
+    file, _, _ = cluster(3, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0")  # it kills two, one is left
     result = run_batch(tmp_path / "in", tmp_path / "out", pipeline=saboteur, scheduler=file)
     assert (result.done, result.failed) == (2, 1)
     assert rows()["2"]["error"] == WORKER_DIED
