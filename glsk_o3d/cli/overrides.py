@@ -12,6 +12,7 @@ from ..parameters import Parameters
 from ..pipeline import Pipeline
 from ..recipes import load_recipe
 from ..recipes.catalogue import catalogue, named_pipeline, serves
+from ..tracer import Tracer
 from .reporting import WrongUsage
 
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
@@ -27,6 +28,13 @@ def choose(
     chosen = override(base, [*settings, *["drop_invalid=true"] * drop_invalid])
     chosen.check_complete()
     return chosen
+
+
+def grown_from(root: str, pipeline: Pipeline) -> Pipeline:
+    """A pipeline that makes one tree; one that ends without a Tracer gets one, which traces nothing else."""
+    if not any(isinstance(stage, Tracer) for stage in pipeline.stages):
+        pipeline = pipeline | Tracer(surface=0)
+    return override(pipeline, [f"Tracer.root={root}"])
 
 
 def override(pipeline: Pipeline, settings: Iterable[str]) -> Pipeline:

@@ -73,10 +73,11 @@ def skeletonize(
     from ..io.meshes import WRITTEN_MESH_ENDINGS
     from ..io.scans import WRITTEN_CLOUD_ENDINGS
     from ..resampling import with_support
-    from .overrides import choose
+    from .overrides import choose, grown_from
 
-    rooted = [f"Tracer.root={root}"] if root is not None else []
-    chosen = choose(pipeline, recipe, [*(settings or []), *rooted], drop_invalid)
+    chosen = choose(pipeline, recipe, settings or [], drop_invalid)
+    if root is not None:
+        chosen = grown_from(root, chosen)
     results = [
         *skeleton_files(output, preview, report),
         (tubes, WRITTEN_MESH_ENDINGS, "tubes are a mesh"),

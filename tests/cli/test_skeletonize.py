@@ -290,3 +290,13 @@ def test_support_is_told_and_shown(invoke, scans, tmp_path):
     told = json.loads(invoke("skeletonize", scans / "ring.ply", "-o", "s.json", "--support", "2", "--json").stdout)
     assert (told["samples"], told["agreeing"], told["unsupported"]) == (2, 2, [])
     assert invoke("skeletonize", scans / "ring.ply", "-o", "u.json", "--support", "1").exit_code == 2
+
+
+@pytest.mark.parametrize("pipeline", ["default", "wen2024"])
+def test_a_root_makes_a_tree_of_any_pipeline(invoke, scans, pipeline):
+    scan = scans / "ring.ply"
+    assert invoke("skeletonize", scan, "-o", "t.json", "--pipeline", pipeline, "--root", "z", "-q").exit_code == 0
+    tree = read_skeleton("t.json")
+    assert (tree.n_components, tree.n_loops) == (1, 0)
+    assert tree.vertices[0, 2] <= tree.vertices[:, 2].min() + 1e-9
+    assert invoke("skeletonize", scan, "-o", "u.json", "--root", "up").exit_code == 2
