@@ -39,7 +39,7 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     distance, and have the spread of their points for a radius, and confidence 0; their points have no normals any more.
     Of a tree, vertex 0 is the root, and the first vertex of an edge is nearer to it.
 
-    See `without_surface` for `surface`, 0 for no traced parts, and `Refiner.root` for the root.
+    See `without_surface` for `surface`, 0 for no traced parts, and `Tracer.root` for the root.
     """
     cloud, m = SpacedPoints(skeleton), len(skeleton.vertices)
     thin = np.zeros(m, bool)
