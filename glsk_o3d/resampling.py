@@ -122,7 +122,7 @@ def with_support(
             try:
                 others.append(pipeline(points[rows]))
             except InvalidCloudError:  # too few points are left: they show nothing
-                others.append(replace(skeleton, vertices=skeleton.vertices[:0], edges=skeleton.edges[:0]))
+                others.append(Skeleton((), (), (), (), (), ()))  # type: ignore[arg-type]
     return _supported(skeleton, others)
 
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .errors import InvalidParameterError, brief
 from .interop.packages import import_open3d, require
 from .numerics.groups import component_labels
 from .numerics.radii import supporting_points
 from .numerics.vectors import norm
+from .parameters import shown
 from .report import Report
 
 if TYPE_CHECKING:
@@ -22,23 +24,45 @@ if TYPE_CHECKING:
 
 OF_VERTICES = ("radii", "confidence", "half_width", "half_thickness", "support")
 """What is known of every vertex but its place."""
+ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {
+    "vertices": ((3,), float),
+    "edges": ((2,), int),
+    "radii": ((), float),
+    "confidence": ((), float),
+    "vertex_of_point": ((), int),
+    "points": ((3,), float),
+    "normals": ((3,), float),
+    "half_width": ((), float),
+    "half_thickness": ((), float),
+    "support": ((), float),
+}
+"""The arrays of a skeleton: the shape of a row and the type of each. The one field more is ``report``."""
+NOT_MEASURED: dict[str, Any] = dict.fromkeys(OF_VERTICES[1:])
+"""For `replace`, where vertices are others than before."""
+LARGEST = 1e150  # derived: a float64 holds the squares of lengths up to it, and their sums
+UNIT = 1.001  # derived: a unit vector that was written in three digits is one
 
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
     """A curve skeleton: a graph embedded in space, in the units of the cloud it was made from.
 
+    It is sound, or it is not made. Arrays without rows stand for what is not known: they are filled in with NaN, or -1
+    for `vertex_of_point`. Edges in another order are sorted.
+
     Attributes
     ----------
     vertices : (M, 3) float64 array
+        Finite, and at most 1e150.
     edges : (E, 2) int64 array
         Pairs i < j, sorted, each once.
     radii : (M,) float64 array
         Local radius: the median distance from the vertex to the tangent planes of the points it owns, or, where
         noise has tilted these, from the fitted curve to the points; on the axis of a tube the tube's radius. Where
-        there is no surface, how far the points scatter around the curve.
+        there is no surface, how far the points scatter around the curve. NaN where it is not known.
     vertex_of_point : (N,) int64 array
-        For every input point the vertex it belongs to; -1 only for points that were dropped as not finite.
+        For every input point the vertex it belongs to; -1 for points that were dropped as not finite, or whose vertex
+        was left out.
     points : (N, 3) float64 array
         The input points, in the order they came in.
     normals : (N, 3) float64 array
@@ -56,6 +80,11 @@ class Skeleton:
     support : (M,) float64 array
         Share of samples of the cloud whose skeletons show the curve there, see `glsk_o3d.support`; NaN where nobody has
         measured it.
+
+    Raises
+    ------
+    InvalidParameterError
+        An array has another shape or type, or a number that cannot be true: the message names the first such row.
 
     Examples
     --------
@@ -83,17 +112,14 @@ class Skeleton:
     support: np.ndarray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        # steps that merge or add vertices pass on what was measured before them: it means nothing any more
-        unknown = np.full(len(self.vertices), np.nan)
-        otherwise = dict(confidence=unknown, half_width=self.radii, half_thickness=self.radii, support=unknown)
-        for name, value in otherwise.items():
-            if np.shape(getattr(self, name))[:1] != unknown.shape:
-                object.__setattr__(self, name, value)
-        shapes = dict(vertices=(-1, 3), edges=(-1, 2), points=(-1, 3), normals=(-1, 3))
-        for name in (*shapes, "vertex_of_point", *OF_VERTICES):
-            dtype = np.int64 if name in ("edges", "vertex_of_point") else float
-            array = np.asarray(getattr(self, name), dtype).reshape(shapes.get(name, -1))
-            object.__setattr__(self, name, array)
+        _complete(self)
+        with np.errstate(all="ignore"):  # numbers that are refused may overflow
+            _check_values(self)
+        first, second = self.edges.T
+        if (first > second).any() or (np.diff(first * len(self.vertices) + second) <= 0).any():
+            edges = np.sort(self.edges, axis=1)
+            object.__setattr__(self, "edges", edges[np.lexsort(edges.T[::-1])])
+            _refuse(self, "edges", ~np.diff(self.edges, axis=0).any(axis=1), "is there twice")
 
     def __repr__(self) -> str:
         return (
@@ -205,3 +231,66 @@ class Skeleton:
         lines.lines = o3d.utility.Vector2iVector(np.ascontiguousarray(self.edges, np.int32))
         lines.paint_uniform_color(np.asarray(color, float))
         return lines
+
+
+def _complete(skeleton: Skeleton) -> None:
+    """Make all fields arrays, and fill in those without rows; InvalidParameterError where that cannot be."""
+    arrays = {}
+    for name, (columns, kind) in ARRAYS.items():
+        given = getattr(skeleton, name)
+        try:
+            array = np.asarray(() if given is None else given)
+        except (TypeError, ValueError) as error:  # rows of unequal length, and what else
+            raise InvalidParameterError(f"{name}: is no array: {brief(error)}") from None
+        array = array if array.size else np.empty((0, *columns), kind)
+        if array.shape[1:] != columns or array.ndim == 0 or not np.can_cast(array.dtype, kind, "safe"):
+            meant = f"{'whole ' * (kind is int)}numbers, {columns[0] if columns else 1} a row"
+            raise InvalidParameterError(f"{name}: has shape {array.shape} and dtype {array.dtype}: must be {meant}")
+        arrays[name] = array.astype(kind, copy=False)
+    for name in (*OF_VERTICES, "vertex_of_point", "normals"):
+        owner = "vertices" if name in OF_VERTICES else "points"
+        given, wanted = arrays[name], len(arrays[owner])
+        if len(given) not in (0, wanted):
+            raise InvalidParameterError(f"{name}: has {len(given)} rows for {wanted} {owner}")
+        if len(given) < wanted:
+            unknown = np.full((wanted, *given.shape[1:]), np.nan if given.dtype == float else -1)
+            arrays[name] = arrays["radii"] if name.startswith("half") else unknown
+    for name, array in arrays.items():
+        object.__setattr__(skeleton, name, array)
+    if not isinstance(skeleton.report, Report):
+        raise InvalidParameterError(f"report = {shown(skeleton.report)}: must be a Report")
+
+
+def _check_values(skeleton: Skeleton) -> None:
+    """Raise InvalidParameterError for the first number that cannot be true."""
+    m, owner = len(skeleton.vertices), skeleton.vertex_of_point
+    finite, there = f"must be finite, and at most {LARGEST:g}", f"names a vertex that is not there: there are {m}"
+    _check_range(skeleton, "vertices", -LARGEST, LARGEST, finite)
+    _check_range(skeleton, "edges", 0, m - 1, there)
+    _refuse(skeleton, "edges", skeleton.edges[:, 0] == skeleton.edges[:, 1], "joins a vertex with itself")
+    _check_range(skeleton, "vertex_of_point", -1, m - 1, there)
+    _check_range(skeleton, "points", -LARGEST, LARGEST, finite, unless=lambda points: (owner < 0)[:, None])
+    _check_range(skeleton, "normals", -UNIT, UNIT, "must be unit vectors, or NaN", unless=np.isnan)
+    for name in OF_VERTICES:
+        most = 1.0 if name in ("confidence", "support") else LARGEST
+        _check_range(skeleton, name, 0, most, f"must lie between 0 and {most:g}, or be NaN", unless=np.isnan)
+    thicker = skeleton.half_thickness > skeleton.half_width
+    _refuse(skeleton, "half_thickness", thicker, "must be at most half_width")
+
+
+def _check_range(
+    skeleton: Skeleton, name: str, low: float, high: float, why: str, unless: Callable[[np.ndarray], Any] | None = None
+) -> None:
+    """Refuse the first row of an array with a number beyond limits, or that is none, `unless` it is excused."""
+    values = getattr(skeleton, name)
+    least, most = (np.fmin, np.fmax) if unless is np.isnan else (np.minimum, np.maximum)
+    if values.size and not (low <= least.reduce(values, None) and most.reduce(values, None) <= high):
+        wrong = ~((values >= low) & (values <= high))
+        _refuse(skeleton, name, wrong if unless is None else wrong & ~unless(values), why)
+
+
+def _refuse(skeleton: Skeleton, name: str, wrong: Any, why: str) -> None:
+    """Raise InvalidParameterError for the first row of an array that is wrong, or has something wrong."""
+    if wrong.any():
+        row = int(wrong.argmax()) // (wrong.size // len(wrong))
+        raise InvalidParameterError(f"{name}[{row}] = {shown(getattr(skeleton, name)[row].tolist())}: {why}")

@@ -200,6 +200,7 @@ def build(vertices, edges, n_points=7, seed=0):
     rng = np.random.default_rng(seed)
     m = len(vertices)
     points, normals = rng.normal(size=(2, n_points, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
     owners = rng.integers(0, m, n_points)
     points[0], points[1], normals[:2], owners[:2] = np.nan, [np.inf, -np.inf, -0.0], np.nan, -1
     floats = iter([0.1 + 0.2, math.nan, 1 / 3, math.inf, -0.0, 1e-300, np.float64(0.9), -math.inf] * 9)

@@ -10,12 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import Skeleton
+from glsk_o3d.skeleton import NOT_MEASURED
 
 
 def skeleton_of(m, edges):
     rng = np.random.default_rng(m)
     edges = sorted({(min(edge), max(edge)) for edge in edges})
-    cloud = [0] * 4, rng.normal(size=(4, 3)), np.ones((4, 3))
+    cloud = [0] * 4, rng.normal(size=(4, 3)), ()
     return Skeleton(rng.normal(size=(m, 3)), edges, rng.random(m), *cloud, confidence=rng.random(m))
 
 
@@ -106,7 +107,7 @@ def test_arrays_are_of_the_promised_kind():
 
 
 def test_confidence_and_half_axes_are_those_that_were_measured():
-    """Else no number, and the radius; moved vertices are the same ones, other vertices are not."""
+    """Else no number, and the radius."""
     plain = Skeleton([[0, 0, 0], [1, 0, 0]], [(0, 1)], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
     assert np.isnan(plain.confidence).tolist() == [True, True]
     assert plain.half_width.tolist() == plain.half_thickness.tolist() == [1, 2]
@@ -115,6 +116,6 @@ def test_confidence_and_half_axes_are_those_that_were_measured():
     assert moved.confidence.tolist() == [1, 0.5]
     assert (moved.half_width.tolist(), moved.half_thickness.tolist()) == ([2, 4], [1, 1])
     assert moved.confidence.dtype == moved.half_width.dtype == np.float64
-    one = dataclasses.replace(measured, vertices=[[0, 0, 0]], edges=[], radii=[3])
+    one = dataclasses.replace(measured, **NOT_MEASURED, vertices=[[0, 0, 0]], edges=[], radii=[3])
     assert np.isnan(one.confidence).tolist() == [True]
     assert one.half_width.tolist() == one.half_thickness.tolist() == [3]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,6 @@ from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import dot, norm
 from ..preparation.frame import check_extent
 from ..skeleton import Skeleton
-from .curves import check_graph, simple_edges
 from .loops import opening_cycles
 
 CLUSTER_NEIGHBOURS = 16  # fitted: of each point, in the graph whose components are the clusters of a cloud
@@ -124,7 +123,7 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     Raises
     ------
     InvalidParameterError
-        The skeleton is empty, not finite, or has no edge with a length.
+        The skeleton has no edge with a length.
     InvalidCloudError
         `points` is no cloud, or no part of the skeleton has six points around it.
 
@@ -138,11 +137,9 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     >>> found.boundedness, found.smoothness, found.topology
     (1.0, 1.0, 1.0)
     """
-    edges = check_graph(skeleton.vertices, skeleton.edges, "skeleton")
     cloud = cloud_points(points)
     cloud = np.unique(cloud[np.isfinite(cloud).all(axis=1)], axis=0)
-    middles = skeleton.vertices[edges].mean(axis=1)
-    skeleton = replace(skeleton, edges=simple_edges(edges))
+    middles = skeleton.vertices[skeleton.edges].mean(axis=1)
     if not skeleton.length > 0:
         raise InvalidParameterError("the skeleton has no edge with a length: there is no curve to assess")
     if len(cloud) > 1:

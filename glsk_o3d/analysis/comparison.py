@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -146,7 +146,7 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     Raises
     ------
     InvalidParameterError
-        The skeleton is empty or not finite, or the truth is no axis (see `Truth`).
+        The skeleton is empty, or the truth is no axis (see `Truth`).
 
     Examples
     --------
@@ -157,14 +157,13 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     True
     """
     truth = truth if isinstance(truth, Truth) else Truth(truth.nodes, truth.edges, truth.radii)
-    nothing = np.empty((0, 3))
-    axis = Skeleton(truth.nodes, truth.edges, truth.radii, nothing, nothing, nothing)
-    edges = check_graph(skeleton.vertices, skeleton.edges, "skeleton")
-    radii = skeleton.radii if len(skeleton.radii) == len(skeleton.vertices) else np.full(len(skeleton.vertices), np.nan)
-    curve = replace(skeleton, edges=edges, radii=radii)
+    none = np.empty(0)
+    axis = Skeleton(truth.nodes, simple_edges(truth.edges), truth.radii, none, none, none)
+    if len(skeleton.vertices) == 0:
+        raise InvalidParameterError("the skeleton is empty: there is nothing to compare")
     step = PLACE_SPACING * np.median(truth.radii)
     _, axis_places, axis_radius = places_along(axis, step)
-    edge, curve_places, curve_radius = places_along(curve, step)
+    edge, curve_places, curve_radius = places_along(skeleton, step)
     to_axis, nearest = cKDTree(axis_places).query(curve_places)
     to_curve, _ = cKDTree(curve_places).query(axis_places)
     radius = axis_radius[nearest]
@@ -172,23 +171,22 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     known = np.isfinite(curve_radius)
     radius_error = np.abs(curve_radius - radius)[known] / radius[known]
 
-    mine, true = (replace(each, edges=simple_edges(each.edges)) for each in (curve, axis))
-    mine_counts, true_counts = structure(mine), structure(true)
+    mine_counts, true_counts = structure(skeleton), structure(axis)
     difference = {
         name: mine_counts[name] - true_counts[name] for name in ("components", "loops", "leaves", "junctions")
     }
     topology = difference["components"] == 0 == difference["loops"]
-    tips, tip_radius = true.vertices[true.leaves], true.radii[true.leaves]
-    ends = mine.vertices[mine.leaves] if len(mine.leaves) else mine.vertices
+    tips, tip_radius = axis.vertices[axis.leaves], axis.radii[axis.leaves]
+    ends = skeleton.vertices[skeleton.leaves] if len(skeleton.leaves) else skeleton.vertices
     to_end = cKDTree(ends).query(tips)[0] / tip_radius
-    tips_f1 = matching_f1(mine.vertices[mine.leaves], tips, TIP_REACH * tip_radius)
-    forks, local = merged_junctions(true.vertices[true.junctions], axis_places, axis_radius)
-    found_forks, _ = merged_junctions(mine.vertices[mine.junctions], axis_places, axis_radius)
+    tips_f1 = matching_f1(skeleton.vertices[skeleton.leaves], tips, TIP_REACH * tip_radius)
+    forks, local = merged_junctions(axis.vertices[axis.junctions], axis_places, axis_radius)
+    found_forks, _ = merged_junctions(skeleton.vertices[skeleton.junctions], axis_places, axis_radius)
     return Comparison(
         error=float(np.mean(error)),
         inside=float(np.mean(to_axis < radius)),
         completeness=float(np.mean(to_curve < axis_radius)),
-        length=curve.length / axis.length if axis.length > 0 else None,
+        length=skeleton.length / axis.length if axis.length > 0 else None,
         ends=float(to_end.mean()) if len(tips) else None,
         radius_error=float(radius_error.mean()) if len(radius_error) else None,
         tips_f1=tips_f1,
@@ -196,7 +194,7 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
         **difference,
         topology=topology,
         perfect=topology and tips_f1 == 1,
-        edge_error=np.bincount(edge, error) / np.bincount(edge) if len(edges) else np.empty(0),
+        edge_error=np.bincount(edge, error) / np.bincount(edge) if len(skeleton.edges) else np.empty(0),
     )
 
 

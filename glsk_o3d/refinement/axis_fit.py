@@ -15,7 +15,7 @@ from ..numerics.polylines import incident_edges, nearest_on_edges
 from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
 from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, dot, norm, unit
-from ..skeleton import Skeleton
+from ..skeleton import NOT_MEASURED, Skeleton
 from .evidence import SurfaceGraph
 from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
 
@@ -311,4 +311,5 @@ def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
     radii = np.concatenate(
         [skeleton.radii, ((1 - t[:, 0]) * skeleton.radii[ends[edge, 0]] + t[:, 0] * skeleton.radii[ends[edge, 1]])]
     )
-    return replace(skeleton, vertices=vertices, edges=edges, radii=radii, vertex_of_point=vertex_of_point)
+    made = dict(vertices=vertices, edges=edges, radii=radii, vertex_of_point=vertex_of_point)
+    return replace(skeleton, **NOT_MEASURED | made)

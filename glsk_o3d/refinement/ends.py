@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from ..numerics.groups import Members
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import TINY, dot, norm, unit
-from ..skeleton import Skeleton
+from ..skeleton import NOT_MEASURED, Skeleton
 from .axis_fit import axis_box
 from .sections import Sections, VertexPoints, measure_sections
 
@@ -263,12 +263,12 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
         owner[lost] = chain[near]
     keep = np.concatenate([keep, np.ones(m - len(keep), bool)])
     number, links = np.cumsum(keep) - 1, np.concatenate(edges)
-    links = np.sort(number[links[keep[links].all(axis=1)]], axis=1)
-    return replace(
-        skeleton,
+    links = number[links[keep[links].all(axis=1)]]
+    made = dict(
         vertices=np.concatenate([skeleton.vertices, *planted])[keep],
-        edges=links[np.lexsort((links[:, 1], links[:, 0]))],
+        edges=links,
         radii=np.concatenate(radii)[keep],
         confidence=np.concatenate(confidence)[keep],
         vertex_of_point=np.where(owner >= 0, number[owner], -1),
     )
+    return replace(skeleton, **NOT_MEASURED | made)

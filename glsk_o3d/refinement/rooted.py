@@ -60,10 +60,10 @@ def numbered_from(skeleton: Skeleton, root: int) -> Skeleton:
     starts[0] = root  # of several vertices in one place
     order = np.concatenate([breadth_first_order(links, at, False, return_predecessors=False) for at in starts])
     index = np.argsort(order)
-    edges, vertex = np.sort(index[skeleton.edges], axis=1), skeleton.vertex_of_point
+    vertex = skeleton.vertex_of_point
     return replace(
         skeleton,
         **some_vertices(skeleton, order),
-        edges=edges[np.lexsort((edges[:, 1], edges[:, 0]))],
+        edges=index[skeleton.edges],
         vertex_of_point=np.where(vertex >= 0, index[vertex], -1),
     )

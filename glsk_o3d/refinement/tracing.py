@@ -15,7 +15,7 @@ from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.near_links import join_pieces, linked, slice_centres, steps
 from ..numerics.polylines import incident_edges, nearest_on_edges
 from ..numerics.vectors import dot, norm, unit
-from ..skeleton import Skeleton
+from ..skeleton import NOT_MEASURED, Skeleton
 from .merging import merge_into
 from .rooted import numbered_from, root_among
 from .thin_parts import SpacedPoints, without_surface
@@ -190,9 +190,8 @@ def _assembled(skeleton: Skeleton, mixed: _Mixed, paths: _Paths, tree: bool) -> 
     stays = mixed.vertices[nodes[~point] - mixed.n]
     radii[~point], confidence[~point] = skeleton.radii[stays], skeleton.confidence[stays]
     edges = np.unique(np.sort(edges, axis=1), axis=0)
-    traced = replace(
-        skeleton, vertices=vertices, edges=edges, radii=radii, confidence=confidence, vertex_of_point=vertex
-    )
+    made = dict(vertices=vertices, edges=edges, radii=radii, confidence=confidence, vertex_of_point=vertex)
+    traced = replace(skeleton, **NOT_MEASURED | made)
     if point.any() and len(edges):
         traced = replace(traced, radii=np.where(point, spread_around(traced), radii))
     return traced

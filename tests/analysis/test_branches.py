@@ -328,7 +328,7 @@ def test_other_clouds(y):
 def test_dropped_points_and_vertices_without_edges():
     vertices = [[0, 0, 0], [1, 0, 0], [5, 5, 5], [7, 7, 7]]
     points = [[0.2, 0, 0], [np.nan] * 3, [5, 5, 5], [7, 7, 7], [0.9, 1, 0]]
-    skeleton = Skeleton(vertices, [(0, 1)], np.ones(4), [0, -1, 2, 3, 1], points, np.ones((5, 3)))
+    skeleton = Skeleton(vertices, [(0, 1)], np.ones(4), [0, -1, 2, 3, 1], points, ())
     assert segment(skeleton).tolist() == [0, -1, 1, 2, 0]
     assert segment(skeleton, points).tolist() == [0, -1, 1, 2, 0]
     bare = Skeleton(vertices, [(0, 1)], np.ones(4), (), (), ())
@@ -347,7 +347,7 @@ def test_edges_in_any_order():
 def in_a_row(vertex, points=None):
     """Forty points, a unit apart, at an edge whose ends are two and one thick."""
     points = np.column_stack([np.arange(40.0), np.zeros((40, 2))]) if points is None else points
-    return Skeleton([[0, 0, 0], [9, 0, 0]], [(0, 1)], [2, 1], vertex, points, np.zeros_like(points))
+    return Skeleton([[0, 0, 0], [9, 0, 0]], [(0, 1)], [2, 1], vertex, points, ())
 
 
 def test_thickness_is_the_radius_over_the_distance_to_the_eighth_nearest_point():

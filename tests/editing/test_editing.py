@@ -24,7 +24,7 @@ def graph(vertices, edges, radii=None):
     """A skeleton with a point at every vertex."""
     vertices = np.asarray(vertices, float)
     m = len(vertices)
-    return Skeleton(vertices, edges, np.ones(m) if radii is None else radii, np.arange(m), vertices, vertices)
+    return Skeleton(vertices, edges, np.ones(m) if radii is None else radii, np.arange(m), vertices, ())
 
 
 def comb():
@@ -221,8 +221,8 @@ def test_refuses(edit, wrong):
 )
 def test_half_axes_stay_with_their_vertices(grown, edit):
     two = replace(grown, edges=np.delete(grown.edges, 5, axis=0))  # two components
-    two = replace(two, half_width=two.vertices[:, 0] + 9, half_thickness=two.vertices[:, 1])
+    two = replace(two, half_width=two.vertices[:, 0] + 9, half_thickness=two.vertices[:, 1] + 2)
     left = edit(two)
     assert 0 < len(left.vertices) <= len(two.vertices)
     np.testing.assert_array_equal(left.half_width, left.vertices[:, 0] + 9)
-    np.testing.assert_array_equal(left.half_thickness, left.vertices[:, 1])
+    np.testing.assert_array_equal(left.half_thickness, left.vertices[:, 1] + 2)

@@ -25,7 +25,7 @@ def limb(*twigs, confidence=0.0, n=2000):
     vertex = np.abs(points[:, :1] - np.linspace(0, 10, 41)).argmin(axis=1)
     sure = np.where(np.arange(len(vertices)) < 41, confidence, 0.0)
     radius = SCATTER if confidence else MEDIAN * SCATTER
-    return Skeleton(vertices, edges, np.full(len(vertices), radius), vertex, points, points, confidence=sure)
+    return Skeleton(vertices, edges, np.full(len(vertices), radius), vertex, points, (), confidence=sure)
 
 
 def drop(skeleton, root=None):

@@ -134,7 +134,7 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
     axis = truth if isinstance(truth, Truth) else Truth(truth.nodes, truth.edges, truth.radii)
     try:
         places = np.asarray(vertices, float).reshape(-1, 3)
-        links = check_graph(places, edges, "skeleton")
+        links = simple_edges(check_graph(places, edges, "skeleton"))
     except (TypeError, ValueError) as error:
         if isinstance(error, InvalidParameterError):
             raise
@@ -154,7 +154,7 @@ def _check_size(axis: Truth, vertices: np.ndarray, edges: np.ndarray) -> None:
             f"the skeleton is {length:.3g} long and has {len(edges)} edges, too much for an answer: is it in the units "
             "of the cloud?"
         )
-    junctions = int((np.bincount(simple_edges(edges).ravel(), minlength=1) > 2).sum())
+    junctions = int((np.bincount(edges.ravel(), minlength=1) > 2).sum())
     if junctions > MOST_ANSWER_JUNCTIONS:
         raise InvalidParameterError(
             f"the skeleton has {junctions} junctions, more than {MOST_ANSWER_JUNCTIONS}: is it a mesh?"

@@ -10,30 +10,17 @@ import io
 import json
 import math
 import zipfile
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from ...report import Report
-from ...skeleton import Skeleton
-from .graphs import checked
+from ...skeleton import ARRAYS, Skeleton
 
 FORMAT, FORMAT_VERSION = "glsk-o3d skeleton", 1
-ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {
-    "vertices": ((3,), float),
-    "edges": ((2,), int),
-    "radii": ((), float),
-    "confidence": ((), float),
-    "vertex_of_point": ((), int),
-    "points": ((3,), float),
-    "normals": ((3,), float),
-    "half_width": ((), float),
-    "half_thickness": ((), float),
-    "support": ((), float),
-}
-"""The arrays of a skeleton: the shape of a row and the type of each. The one field more is ``report``."""
 LATER = ("half_width", "half_thickness", "support")
-"""Those that older files lack: there they are the radii, and the support is not known."""
+"""Those that older files lack."""
 MOST_EXPANDED = 200  # fitted: times the size of a file that its arrays may have; those of skeletons have 1 to 20
 SMALL_ARCHIVE = 1 << 26  # derived: bytes that may always be held
 
@@ -82,23 +69,16 @@ def _decode(values: Any) -> Skeleton:
         raise ValueError(f"it is not marked as a {FORMAT!r}")
     if (version := values.get("format_version")) != FORMAT_VERSION:
         raise ValueError(f"it has format_version {version!r} and this release reads {FORMAT_VERSION}: update glsk-o3d")
-    radii = values.get("radii", ())
-    values = dict(zip(LATER, (radii, radii, np.full(len(radii), np.nan)), strict=True)) | values
+    values = dict.fromkeys(LATER, ()) | values
     missing = [name for name in (*ARRAYS, "report") if name not in values]
     if missing:
         raise ValueError(f"it lacks {', '.join(missing)}")
-    arrays = {}
-    for name, (columns, kind) in ARRAYS.items():
-        array = np.asarray(values[name], None if kind is int else kind)  # 1.5 must not become 1
-        if array.size == 0:
-            array = np.empty((0, *columns), kind)
-        if array.shape[1:] != columns or array.dtype.kind not in ("iu" if kind is int else "f"):
-            raise ValueError(f"{name} has shape {array.shape} and dtype {array.dtype}")
-        arrays[name] = array
-    for name in ("confidence", *LATER):  # those that a skeleton leaves out where they do not fit
-        if len(arrays[name]) != len(arrays["vertices"]):
-            raise ValueError(f"{name} has {len(arrays[name])} values for {len(arrays['vertices'])} vertices")
-    return checked(Skeleton(**arrays, report=Report.from_dict(_with_nan(values["report"]))))
+    arrays: dict[str, Any] = {name: values[name] for name in ARRAYS}
+    for name, (_, kind) in ARRAYS.items():
+        if kind is float and isinstance(values[name], list):
+            with suppress(TypeError, ValueError, OverflowError):  # a skeleton says best what is wrong
+                arrays[name] = np.asarray(values[name], float)  # null is NaN, and words infinity
+    return Skeleton(**arrays, report=Report.from_dict(_with_nan(values["report"])))
 
 
 def _plain(value: Any) -> Any:

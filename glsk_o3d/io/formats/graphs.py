@@ -11,7 +11,7 @@ from ...analysis.branches import branch_table
 from ...editing.edits import cut_loops, reroot
 from ...errors import FileFormatError
 from ...refinement.rooted import RootPlace, numbered_from
-from ...skeleton import OF_VERTICES, Skeleton
+from ...skeleton import Skeleton
 
 FLOAT32_SHARE = 0.01  # derived: an error of a hundredth of a radius is below what any fit of the axis knows
 
@@ -27,36 +27,13 @@ def graph_skeleton(
     vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | None = None, **known: ArrayLike
 ) -> Skeleton:
     """A skeleton without a cloud, of edges in any order: they are sorted, and repeated ones and those from a vertex to
-    itself are dropped. Radii are NaN by default; `known` are other fields of the vertices. Errors as from `checked`.
+    itself are dropped. `known` are other fields of the vertices.
     """
     vertices = np.asarray(vertices, float).reshape(-1, 3)
     edges = np.sort(np.asarray(edges, np.int64).reshape(-1, 2), axis=1)
     edges = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0)
-    radii = np.full(len(vertices), np.nan) if radii is None else np.asarray(radii)
     none = np.empty(0)
-    return checked(Skeleton(vertices, edges, radii, vertex_of_point=none, points=none, normals=none, **known))  # type: ignore[arg-type]
-
-
-def checked(skeleton: Skeleton) -> Skeleton:
-    """The same skeleton; ValueError where its arrays do not fit together or cannot be true."""
-    m, vertex_of_point = len(skeleton.vertices), skeleton.vertex_of_point
-    if skeleton.edges.size and (skeleton.edges.min() < 0 or skeleton.edges.max() >= m):
-        raise ValueError(f"an edge names a vertex that is not there: there are {m}")
-    if vertex_of_point.size and (vertex_of_point.min() < -1 or vertex_of_point.max() >= m):
-        raise ValueError(f"vertex_of_point names a vertex that is not there: there are {m}")
-    if len({len(array) for array in (vertex_of_point, skeleton.points, skeleton.normals)} - {0}) > 1:
-        raise ValueError("points, normals and vertex_of_point differ in length")
-    if not np.isfinite(skeleton.vertices).all():
-        raise ValueError("a vertex has coordinates that are not finite")
-    highest = {"confidence": 1.0, "half_thickness": skeleton.half_width, "support": 1.0}
-    for name in OF_VERTICES:
-        values = getattr(skeleton, name)
-        if len(values) != m:
-            raise ValueError(f"{name} has {len(values)} values for {m} vertices")
-        wrong = values[(values < 0) | (values > highest.get(name, np.inf))]
-        if len(wrong):
-            raise ValueError(f"{name} has the value {wrong[0]:g}")
-    return skeleton
+    return Skeleton(vertices, edges, radii, vertex_of_point=none, points=none, normals=none, **known)  # type: ignore[arg-type]
 
 
 # --------------------------------------------------------------------------------------------------------------- trees
