@@ -1,4 +1,4 @@
-"""Look for what breaks: degenerate clouds through all pipelines, damaged files through all readers.
+"""Look for what breaks: degenerate clouds through all pipelines, damaged files through all readers, unsound skeletons.
 
 Findings are crashes, hangs, memory, errors that are not of the package, warnings, vertices that are no numbers or lie
 outside of the box of the points, indices out of range, and skeletons that depend on the order of the points.
@@ -27,9 +27,11 @@ from _fuzz_arrays import array_case
 from _fuzz_files import file_case
 from _runs import application, cause_of_death
 from _tables import present
+from _unsound import unsound_case
 
 LIMIT_S = 60  # of one case; those that are sound take a second at most
 MOST_MEMORY = 2 << 30  # bytes that a case may take more than were taken before
+FILES = {"files": file_case, "skeletons": unsound_case}
 MOST_CASES = 10**7  # more than there is time for
 
 app = application(__doc__)
@@ -83,7 +85,7 @@ def one_case(what: str, seed: int, number: int, folder: Path) -> Outcome:
     """Run a case in this process; an error that is not one of the package's own is a finding."""
     rng = np.random.default_rng([seed, number])
     try:
-        found = array_case(rng) if what == "arrays" else file_case(rng, folder)
+        found = array_case(rng) if what == "arrays" else FILES[what](rng, folder)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # whatever it is; some is no Exception
@@ -130,6 +132,12 @@ def arrays(runs: Runs = 1000, seed: Seed = 0, case: Only = None) -> None:
 def files(runs: Runs = 1000, seed: Seed = 0, case: Only = None) -> None:
     """Damaged files through the readers."""
     _run("files", runs, seed, case)
+
+
+@app.command()
+def skeletons(runs: Runs = 1000, seed: Seed = 0, case: Only = None) -> None:
+    """Files of skeletons with one field unsound, and all that can be done with those that are read."""
+    _run("skeletons", runs, seed, case)
 
 
 @app.command()

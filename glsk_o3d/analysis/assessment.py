@@ -14,7 +14,7 @@ from ..interop.clouds import cloud_points
 from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.neighbourhoods import nearest_neighbours, plane_axes
 from ..numerics.polylines import arc_lengths, place_at
-from ..numerics.vectors import dot, norm
+from ..numerics.vectors import dot, norm, unit
 from ..preparation.frame import check_extent
 from ..skeleton import Skeleton
 from .loops import opening_cycles
@@ -200,8 +200,9 @@ def _turning(skeleton, radius):
     onward = ends[np.argsort(ends[:, 0], kind="stable"), 1].reshape(-1, 2)
     before, after = (skeleton.vertices[onward] - skeleton.vertices[inner, None]).swapaxes(0, 1)
     # between the one edge and the other turned back; the arctangent is exact also near 0, where the arccosine is not
-    angle = np.arctan2(norm(np.cross(before, after)), -dot(before, after))
     straight = (before == 0).all(axis=1) | (after == 0).all(axis=1)
+    before, after = unit(before), unit(after)
+    angle = np.arctan2(norm(np.cross(before, after)), -dot(before, after))
     return float((np.where(straight, 0, angle) * radius[inner]).sum())
 
 
@@ -236,7 +237,8 @@ def cross_sections(vertices, branches, points, shortest=0.0) -> Sections:
     kept = distance <= FAR_FROM_SECTION * group_median(distance, section, n)[section]
     section = section[kept]
     q = np.einsum("nij,ni->nj", plane_axes(tangents)[section], points[kept] - places[section])
-    count = np.bincount(section, minlength=n)
+    size = 2.0 ** np.frexp(np.abs(q).max(initial=0))[1]  # so that no power of a length overflows
+    q, count = q / size, np.bincount(section, minlength=n)
     total = np.maximum(count, 1)
     mean = group_sum(q, section, n) / total[:, None]
     u = q - mean[section]
@@ -245,7 +247,8 @@ def cross_sections(vertices, branches, points, shortest=0.0) -> Sections:
     # the pseudo-inverse leaves the centre where the mean is in directions in which the outline is flat
     centre = mean + np.einsum("sij,sj->si", np.linalg.pinv(spread, rcond=MIN_ARC_VARIANCE, hermitian=True), skew) / 2
     squared = group_sum(((q - centre[section]) ** 2).sum(axis=1), section, n) / total
-    return Sections(places, lengths, count, np.linalg.norm(centre, axis=1), np.sqrt(squared), _open(q, section, n))
+    offsets, radii = size * np.linalg.norm(centre, axis=1), size * np.sqrt(squared)
+    return Sections(places, lengths, count, offsets, radii, _open(q, section, n))
 
 
 def _cut(vertices, branches, n_points, shortest):

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InvalidParameterError
 from ..numerics.polylines import arc_lengths
-from ..numerics.vectors import norm
+from ..numerics.vectors import TINY, norm
 from ..skeleton import Skeleton
 
 # All fitted, on circles, helices and skeletons of sampled clouds.
@@ -86,12 +86,14 @@ def bend(curve, half=None, closed=False):
     else:
         centre = np.clip(along, half / 2, length - half / 2)
     least = min(MIN_WINDOW_VERTICES, len(along))
-    reach = np.maximum(half, 1.001 * cKDTree(along[:, None]).query(centre[:, None], [least])[0][:, 0])
+    reach = np.maximum(max(half, TINY), 1.001 * cKDTree(along[:, None]).query(centre[:, None], [least])[0][:, 0])
     first, last = np.searchsorted(along, centre - reach), np.searchsorted(along, centre + reach, side="right")
     row = first[:, None] + np.arange((last - first).max())
     inside = row < last[:, None]
     row = np.minimum(row, len(along) - 1)
-    u = (along[row] - centre[:, None]) / reach[:, None]
+    u = np.where(
+        inside, (along[row] - centre[:, None]) / reach[:, None], 0
+    )  # others may be so far that powers overflow
     weight = np.where(inside, np.maximum(1 - np.abs(u), 0) ** 1.5 + 1e-3, 0)[:, :, None]
     powers = u[:, :, None] ** np.arange(min(POLYNOMIAL_DEGREE, least - 1) + 1)
     local = curve[row] - curve[row].mean(axis=1, keepdims=True)

@@ -11,6 +11,8 @@ from ..errors import InvalidParameterError
 from ..numerics.vectors import norm
 from ..parameters import parameter, problem_with
 
+MOST_PLACES = 10**7  # derived: on a curve; the arrays of so many take a gigabyte
+
 
 def pieces(nodes, edges, step):
     """Edges cut into equal pieces no longer than `step`: the edge of each piece, and how far along it its middle is.
@@ -20,10 +22,20 @@ def pieces(nodes, edges, step):
     if len(edges) == 0:
         return np.arange(len(nodes)), np.zeros(len(nodes))
     length = norm(nodes[edges[:, 1]] - nodes[edges[:, 0]])
+    check_places(length, step)
     count = np.maximum(np.ceil(length / step).astype(int), 1)
     row = np.repeat(np.arange(len(edges)), count)
     before = np.repeat(np.cumsum(count) - count, count)
     return row, (np.arange(len(row)) - before + 0.5) / count[row]
+
+
+def check_places(length, step):
+    """Raise InvalidParameterError where curves are so long that places on them, `step` apart, would fill the memory."""
+    with np.errstate(all="ignore"):
+        places = np.sum(length / step)
+    if not places <= MOST_PLACES:
+        far = f"{np.sum(length):.3g} long, too long for places {np.min(step):.3g} apart on it"
+        raise InvalidParameterError(f"the skeleton is {far}: are all its coordinates and radii right?")
 
 
 def along(edges, row, part, values):

@@ -14,7 +14,7 @@ from ..interop.clouds import cloud_points
 from ..numerics.polylines import arc_lengths
 from ..report import outside
 from ..skeleton import Skeleton
-from .curves import check_number
+from .curves import check_number, check_places
 from .grasp_checks import Ways, free_ways, obstacle_list
 from .gripper import GraspCandidates, Gripper, listed
 
@@ -179,6 +179,7 @@ def _places_on(skeleton, path, spacing, margin):
     closed = path[0] == path[-1] and skeleton.degree[path[0]] == 2
     usual = np.nanmedian(radii) if np.isfinite(radii).any() else 0.0
     step = spacing or usual or length / 10
+    check_places(length, step)
     if closed:
         count = max(round(length / step), 1)
         at = length / count * np.arange(count)

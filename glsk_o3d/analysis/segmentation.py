@@ -120,7 +120,7 @@ def branch_of_vertex(skeleton):
 @np.errstate(all="ignore")
 def branch_of_point(skeleton, points, vertex):
     """`segment` for points, (N, 3) float array, whose vertices are known, (N,) int array: (N,) int64 array."""
-    label = np.where(vertex >= 0, branch_of_vertex(skeleton)[vertex], -1)
+    label = np.append(branch_of_vertex(skeleton), -1)[vertex]
     edge_branch = branch_of_edge(skeleton)
     unsure = np.flatnonzero((vertex >= 0) & (label < 0))
     unsure = unsure[np.argsort(vertex[unsure], kind="stable")]

@@ -125,11 +125,9 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     if not np.isfinite(skeleton.radii).all():
         raise InvalidParameterError("the skeleton has no radii: a file of a format without them was read")
     table, beyond = branch_table(skeleton, _root(skeleton, root)), _beyond_tips(skeleton)
-    if not skeleton.branches:
-        raise InvalidParameterError("the skeleton has no branches: there is nothing to put cylinders on")
     last = np.full(len(table), -1)
     rows: list[tuple] = []
-    for row in np.argsort(table.level, kind="stable").tolist():
+    for row in np.argsort(table.level[: len(skeleton.branches)], kind="stable").tolist():
         path = skeleton.branches[row]
         path = path if path[0] == table.start[row] else path[::-1]
         before = int(table.parent[row])
@@ -141,7 +139,7 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
         stop = along[-1] + max(beyond.get(int(path[-1]), 0.0) - skeleton.radii[path[-2]] / 3, 0.0)
         if stop <= start:
             continue
-        pieces = max(round((stop - start) / (PIECE_LENGTH * max(table.mean_radius[row], 1e-3 * stop))), 1)
+        pieces = max(round((stop - start) / (PIECE_LENGTH * max(table.mean_radius[row], 1e-3 * (stop - start)))), 1)
         ends = np.linspace(start, stop, pieces + 1)
         places = _place_beyond(skeleton.vertices[path], along, ends)
         inside = ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(RADIUS_SAMPLES) + 0.5) / RADIUS_SAMPLES
@@ -151,6 +149,8 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
             size = (radius[i], ends[i + 1] - ends[i])
             rows.append((places[i], places[i + 1], *size, last[row], row, table.order[row], confidence[i]))
             last[row] = len(rows) - 1
+    if not rows:
+        raise InvalidParameterError("the skeleton has no branches of any length: there is nothing to put cylinders on")
     return Cylinders(*(np.array(column) for column in zip(*rows, strict=True)))
 
 

@@ -7,12 +7,12 @@ import json
 import logging
 import os
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..errors import BatchError
+from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_atomically, write_csv
 
 try:
@@ -97,6 +97,18 @@ def _is_inside(path: Any) -> bool:
     if not isinstance(path, str) or "\0" in path or os.path.isabs(path) or os.path.splitdrive(path)[0]:
         return False
     return not {"", ".", ".."} & set(path.replace(os.sep, "/").split("/"))
+
+
+def refuse_ways_out(folder: Path, paths: Iterable[str]) -> None:
+    """Raise InvalidParameterError where a link leads one of some paths in an output folder out of it."""
+    inside = os.path.join(os.path.realpath(folder), "")
+    for path in paths:
+        real = os.path.realpath(folder / path)
+        if not real.startswith(inside):
+            raise InvalidParameterError(
+                f"{folder / path}: a link leads out of the output folder, to {real}: remove it, or give the results "
+                "another folder"
+            )
 
 
 def _line(row: Row) -> bytes:

@@ -21,7 +21,7 @@ from ..pipeline import Filter, Pipeline, parts
 from ..recipes import to_recipe
 from .grid import checked_sizes
 from .inputs import find_inputs, one_name
-from .ledger import DONE, STALE, Ledger, file_hash
+from .ledger import DONE, STALE, Ledger, file_hash, refuse_ways_out
 from .splitting import Cut, Splitter
 from .tasks import TILE_ENDING, Task
 
@@ -236,6 +236,8 @@ def planned(inputs: Any, out_dir: str | os.PathLike, wanted: Wanted, *, write: b
     sources = {text for task in tasks for text in (task.source, task.origin or task.path)}
     tasks = _with_reasons(list(_filled(tasks, out, wanted, ledger, sources)), ledger, wanted, hashed)
     _refuse_strangers(out, ledger, tasks)
+    refuse_ways_out(out, (ledger.path.name, ledger.table.name, RECIPE_FILE))
+    refuse_ways_out(out, (path for task in tasks for path in (*task.outputs, *task.stale)))
     _refuse_to_replace(tasks, ledger, sources)
     plan = Plan(out, wanted.recipe, wanted.parameters, tuple(tasks), ledger, left_out)
     if splitter is not None and write:  # parts of which some are to be done were removed when they had been done

@@ -19,7 +19,7 @@ from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
 from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
-from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STALE, Row, locked
+from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STALE, Row, locked, refuse_ways_out
 from .plan import RECIPE_FILE, TILES_FOLDER, UP_TO_DATE, Plan, Wanted, planned
 from .splitting import PARTS_FOLDER
 from .tasks import Task, clear, in_one_line, work
@@ -136,6 +136,7 @@ def run_batch(
     wanted, folder = Wanted(**options), Path(os.path.abspath(out_dir))
     new = [each for each in (folder, *folder.parents) if not each.exists()]
     folder.mkdir(parents=True, exist_ok=True)
+    refuse_ways_out(folder, [LOCK_FILE])
     with locked(folder):
         try:
             plan = planned(inputs, folder, wanted, write=True)

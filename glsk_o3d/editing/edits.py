@@ -52,7 +52,7 @@ def largest_component(skeleton: Skeleton) -> Skeleton:
         skeleton,
         **some_vertices(skeleton, stays),
         edges=index[skeleton.edges[stays[skeleton.edges[:, 0]]]],
-        vertex_of_point=np.where(vertex >= 0, index[vertex], -1),
+        vertex_of_point=np.append(index, -1)[vertex],
     )
 
 

@@ -109,6 +109,8 @@ def save_mesh(mesh: Any, path: str | os.PathLike) -> None:
     ending, mesh = Path(path).suffix.lower(), import_open3d().geometry.TriangleMesh(mesh)
     if ending not in WRITTEN_MESH_ENDINGS:
         raise unknown_ending(f"{os.fspath(path)}: tubes are a mesh", WRITTEN_MESH_ENDINGS)
+    if not mesh.has_vertices():
+        raise FileFormatError(f"{os.fspath(path)}: the mesh is empty: there is nothing to write")
     if not mesh.has_vertex_normals():
         mesh.compute_vertex_normals()
     if not mesh.has_triangle_normals():

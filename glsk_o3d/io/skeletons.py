@@ -16,7 +16,7 @@ from ..interop.atomic import write_atomically
 from ..refinement.rooted import RootPlace
 from ..skeleton import Skeleton
 from .formats import fields, gltf, lines, plants, ply, urdf
-from .formats.graphs import NoEdges, as_forest
+from .formats.graphs import NoEdges, as_forest, holding_all
 from .paths import SCAN_ENDINGS, existing_file, unknown_ending
 
 
@@ -119,7 +119,8 @@ def save_skeleton(
     """
     path = Path(path)
     chosen = FORMATS[skeleton_ending(path, format)]
-    data = chosen.write(as_forest(skeleton, cut_loops, root) if chosen.trees else skeleton)
+    with holding_all(path):
+        data = chosen.write(as_forest(skeleton, cut_loops, root) if chosen.trees else skeleton)
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
 
 

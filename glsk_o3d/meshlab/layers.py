@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, InvalidCloudError
+from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import write_atomically
 from ..interop.clouds import cloud_points
 from ..interop.packages import import_open3d, require
@@ -165,6 +165,8 @@ class Layer:
             v_color_matrix=(self.colors, float),
         )
         arrays = {key: np.ascontiguousarray(array, kind) for key, (array, kind) in given.items() if array is not None}
+        if not len(self.vertices):
+            raise InvalidParameterError(f"the {self.label} is empty: pymeshlab has no meshes without vertices")
         return pymeshlab.Mesh(**{key: array for key, array in arrays.items() if len(array)})
 
     def to_skeleton(self) -> Skeleton:

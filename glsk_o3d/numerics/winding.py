@@ -9,6 +9,7 @@ from .vectors import TINY, dot, norm
 VOTING_ROUNDS = 10  # measured: more rounds gain in noise what they lose where thin parts are near
 AREA_NEIGHBOURS = 8  # measured: fewer scatter more, more reach across thin parts
 LEAST_BALL = 1e-6  # derived: of the extent; what single precision can tell apart
+FARTHEST = 1e6  # derived: extents away, where a winding number is 0; single precision does not hold all that is beyond
 WINDING_CHUNK = 16  # speed: queries at a time: the work arrays of 4096 points then stay in the cache
 
 
@@ -60,7 +61,8 @@ def winding_number(points: np.ndarray, normals: np.ndarray, areas: np.ndarray, q
     if not len(points):
         return np.zeros(len(queries))
     centre, extent = points.mean(axis=0), np.ptp(points, axis=0).max() or 1.0
-    p, q, area = (points - centre) / extent, (queries - centre) / extent, areas / extent**2
+    p, area = (points - centre) / extent, areas / extent**2
+    q = np.clip((queries - centre) / extent, -FARTHEST, FARTHEST)
     dipoles = normals * area[:, None] / (4 * np.pi)
     # products of matrices: |p - q|^2 of every pair, and the sums of what does not depend on the query
     ours = np.column_stack([q, dot(q, q), np.ones(len(q))]).astype(np.float32)

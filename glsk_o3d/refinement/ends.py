@@ -269,6 +269,6 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
         edges=links,
         radii=np.concatenate(radii)[keep],
         confidence=np.concatenate(confidence)[keep],
-        vertex_of_point=np.where(owner >= 0, number[owner], -1),
+        vertex_of_point=np.append(number, -1)[owner],
     )
     return replace(skeleton, **NOT_MEASURED | made)

@@ -37,7 +37,7 @@ def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
         skeleton,
         **{name: (group_sum((weight * values.T).T, group, n).T / total).T for name, values in known.items()},
         edges=np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0),
-        vertex_of_point=np.where(vertex >= 0, group[vertex], -1),
+        vertex_of_point=np.append(group, -1)[vertex],
     )
 
 
@@ -68,7 +68,7 @@ def drop_lone_vertices(skeleton: Skeleton) -> Skeleton:
         skeleton,
         **some_vertices(skeleton, left),
         edges=representative[skeleton.edges],
-        vertex_of_point=np.where(vertex >= 0, representative[vertex], -1),
+        vertex_of_point=np.append(representative, -1)[vertex],
     )
 
 

@@ -65,5 +65,5 @@ def numbered_from(skeleton: Skeleton, root: int) -> Skeleton:
         skeleton,
         **some_vertices(skeleton, order),
         edges=index[skeleton.edges],
-        vertex_of_point=np.where(vertex >= 0, index[vertex], -1),
+        vertex_of_point=np.append(index, -1)[vertex],
     )

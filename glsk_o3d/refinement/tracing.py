@@ -183,7 +183,7 @@ def _assembled(skeleton: Skeleton, mixed: _Mixed, paths: _Paths, tree: bool) -> 
     index = np.full(len(skeleton.vertices), -1)
     index[mixed.vertices] = paths.index[mixed.n :]
     owner = skeleton.vertex_of_point
-    vertex = np.where(owner >= 0, index[owner], -1)
+    vertex = np.append(index, -1)[owner]
     free = np.flatnonzero((owner >= 0) & (vertex < 0))
     vertex[free] = cKDTree(vertices).query(skeleton.points[free])[1]
     radii, confidence = np.zeros((2, len(nodes)))

@@ -196,4 +196,5 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
 
 
 def _packed(array, dtype) -> str:
-    return base64.b64encode(np.ascontiguousarray(array, dtype).tobytes()).decode()
+    with np.errstate(over="ignore"):  # radii may be infinitely larger than the cloud
+        return base64.b64encode(np.ascontiguousarray(array, dtype).tobytes()).decode()

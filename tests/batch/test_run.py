@@ -301,3 +301,21 @@ class TestRefusals:
         assert plan.tasks[0].outputs == ("a.ply", "a.json", "a.png")
         assert (plan.skipped, len(plan.parameters)) == (0, 64)
         assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("link", ["sub", "sub/s.ply", "ledger.jsonl", "ledger.csv", "recipe.json", ".ledger.lock"])
+def test_no_link_leads_out_of_the_output_folder(write, tmp_path, link):
+    write(tmp_path / "in" / "sub" / "s.ply", seed=0)
+    victim, out = tmp_path / "victim", tmp_path / "out"
+    victim.mkdir()
+    (out / link).parent.mkdir(parents=True)
+    (victim / "kept").write_text("kept")
+    (out / "ledger.jsonl").touch()
+    (out / link).unlink(missing_ok=True)
+    (out / link).symlink_to(victim if link == "sub" else victim / "kept")
+    with pytest.raises(
+        InvalidParameterError, match=rf"{re.escape(link)}.*: a link leads out of the output folder, to "
+    ):
+        run_batch(tmp_path / "in", out, recursive=True, workers=1)
+    assert [path.name for path in victim.iterdir()] == ["kept"]
+    assert (victim / "kept").read_text() == "kept"

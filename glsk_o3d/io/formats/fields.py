@@ -49,9 +49,16 @@ def read_npz(data: bytes) -> Skeleton:
             raise ValueError(f"it would become more than {MOST_EXPANDED} times as large: no skeleton packs so")
     words = ("format", "format_version", "report")
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-        values = {name: archive[name] for name in (*words, *ARRAYS) if name in archive.files}
+        values = {name: _loaded(archive, name) for name in (*words, *ARRAYS) if name in archive.files}
     values |= {name: values[name].item() for name in words if name in values and values[name].ndim == 0}
     return _decode({**values, "report": json.loads(values["report"])})
+
+
+def _loaded(archive: Any, name: str) -> np.ndarray:
+    try:
+        return archive[name]
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from error
 
 
 def dumps(value: Any) -> str:

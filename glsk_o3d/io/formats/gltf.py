@@ -20,7 +20,7 @@ from ...numerics.vectors import norm, unit
 from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
 from ..geometry import to_tubes
-from .graphs import as_forest, global_shift
+from .graphs import as_forest, global_shift, holding_all
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
 COMPONENT_TYPES = {"f4": 5126, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
@@ -77,7 +77,8 @@ def save_rig(
     check_ending(path, "rig is binary glTF", ".glb")
     if up not in UPRIGHT:
         raise InvalidParameterError(f"up = {up!r}: must be one of {', '.join(UPRIGHT)}")
-    data = _content(as_forest(skeleton, cut_loops, root), _surface(skeleton) if mesh is None else mesh, up)
+    with holding_all(path):
+        data = _content(as_forest(skeleton, cut_loops, root), _surface(skeleton) if mesh is None else mesh, up)
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,6 +60,18 @@ def as_forest(skeleton: Skeleton, cut: bool, root: RootPlace | None) -> Skeleton
     return numbered_from(forest, int(table.start[np.argmin(table.level)]))
 
 
+@contextmanager
+def holding_all(path: object) -> Iterator[None]:
+    """FileFormatError where a number grows larger than the format of a file holds: glTF has float32."""
+    try:
+        with np.errstate(over="raise"):
+            yield
+    except FloatingPointError:
+        raise FileFormatError(
+            f"{path}: its format does not hold numbers as large as these: rescale the skeleton"
+        ) from None
+
+
 def parents(forest: Skeleton) -> np.ndarray:
     """The vertex before each of a forest that is numbered outwards, (M,) int array; -1 for roots."""
     parent = np.full(len(forest.vertices), -1)
@@ -70,13 +83,13 @@ def global_shift(skeleton: Skeleton) -> np.ndarray:
     """What to take off coordinates so that float32 holds them, (3,) float array of whole numbers; 0 along axes where
     float32 holds them as they are.
     """
-    finite = skeleton.vertices[np.isfinite(skeleton.vertices).all(axis=1)]
+    vertices = skeleton.vertices
     sizes = np.concatenate([skeleton.radii, skeleton.edge_lengths])
     sizes = sizes[sizes > 0]
-    if len(finite) == 0 or len(sizes) == 0:
+    if len(sizes) == 0:
         return np.zeros(3)
-    lost = np.abs(finite).max(axis=0) * np.finfo(np.float32).eps > FLOAT32_SHARE * np.median(sizes)
-    return np.where(lost, np.floor(finite.min(axis=0)), 0.0)
+    lost = np.abs(vertices).max(axis=0) * np.finfo(np.float32).eps > FLOAT32_SHARE * np.median(sizes)
+    return np.where(lost, np.floor(vertices.min(axis=0)), 0.0)
 
 
 # ---------------------------------------------------------------------------------------------------------------- text

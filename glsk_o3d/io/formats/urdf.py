@@ -29,8 +29,6 @@ def write(skeleton: Skeleton) -> bytes:
     of `URDF_DENSITY`, of a root that of its ball.
     """
     vertices, radii = skeleton.vertices, skeleton.radii
-    if not np.isfinite(vertices).all():
-        raise FileFormatError("URDF needs finite coordinates, and some vertices have none")
     unknown = np.count_nonzero(~np.isfinite(radii))
     if unknown:
         raise FileFormatError(
