@@ -7,7 +7,12 @@ LONGEST_QUOTED = 300  # fitted: characters of another library's words
 
 
 class GlskError(Exception):
-    """Base of all errors this package raises on purpose."""
+    """Base of all errors this package raises on purpose. Of a long message its middle is left out."""
+
+    def __str__(self) -> str:
+        words = super().__str__()
+        head, tail = 2 * LONGEST_QUOTED, LONGEST_QUOTED  # how it begins says where, and its end why
+        return words if len(words) <= head + tail else f"{words[:head]} ... {words[-tail:]}"
 
 
 class InvalidCloudError(GlskError, ValueError):

@@ -6,7 +6,6 @@ import dataclasses
 import inspect
 import math
 import re
-import sys
 from numbers import Integral, Real
 from typing import Any, ClassVar, TypeVar
 
@@ -17,6 +16,7 @@ __all__ = ["Parameters", "documented", "parameter", "resolve_length"]  # what pl
 _Class = TypeVar("_Class", bound=type)
 
 LARGEST_WHOLE = 2**63 - 1  # derived: of the numbers that NumPy counts with
+LARGEST, SMALLEST_LENGTH = 1e100, 1e-100  # derived: a float64 holds their cubes
 LONGEST_SHOWN = 200  # fitted: characters of a value that say what was meant
 
 TYPES = ("int", "float", "bool", "length", "point", "choice", "reducer", "stop")
@@ -164,7 +164,9 @@ def problem_with(value: Any, facts: Any) -> str | None:
         percent = _percent(value)
         if percent is None:
             return "must be a number in the cloud's units or a percentage of its diagonal such as '2%'"
-        return None if 0 < percent <= 100 else "a percentage of the diagonal lies above 0% and up to 100%"
+        return (
+            None if SMALLEST_LENGTH <= percent <= 100 else "a percentage of the diagonal lies above 0% and up to 100%"
+        )
     return _problem_with_number(value, kind == "int", facts)
 
 
@@ -173,11 +175,13 @@ def _problem_with_number(value: Any, whole: bool, facts: Any) -> str | None:
     if isinstance(value, bool) or not isinstance(value, Integral if whole else Real):
         words = "".join(f", or {choice!r}" for choice in facts["choices"])
         return f"must be {'an int' if whole else 'a number'}{words}"
-    most = LARGEST_WHOLE if whole else sys.float_info.max
-    if isinstance(value, Integral) and abs(int(value)) > most:  # Python has larger ones, arrays and files do not
-        return f"must be at most {most:g}"
-    if not isinstance(value, Integral) and not math.isfinite(value):
+    most = LARGEST_WHOLE if whole else LARGEST
+    if value != value or abs(value) == math.inf:
         return "must be finite"
+    if abs(value) > most:  # Python has larger ones, arrays and files do not
+        return f"must be at most {most:g}"
+    if facts["type"].startswith("length") and 0 < value < SMALLEST_LENGTH:
+        return f"must be at least {SMALLEST_LENGTH:g}"
     if low is not None and (value < low or (above and value == low)):
         return f"must be {'above' if above else 'at least'} {low}"
     return f"must be at most {high}" if high is not None and value > high else None

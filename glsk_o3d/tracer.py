@@ -60,7 +60,7 @@ class Tracer(Filter[Skeleton]):
     def __post_init__(self) -> None:
         # as plain text it can be compared, printed and written to files
         if not isinstance(self.root, str | None):
-            with suppress(TypeError, ValueError):  # what is no point is found when the filter is checked
+            with suppress(TypeError, ValueError, OverflowError):  # what is no point is found when the filter is checked
                 point = np.asarray(self.root, float)
                 if point.shape == (3,):
                     object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))

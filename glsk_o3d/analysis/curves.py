@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InvalidParameterError
 from ..numerics.vectors import norm
-from ..parameters import parameter, problem_with
+from ..parameters import parameter, problem_with, shown
 
 MOST_PLACES = 10**7  # derived: on a curve; the arrays of so many take a gigabyte
 
@@ -91,5 +91,5 @@ def check_number(name: str, value: Any, type: str = "float", **limits: Any) -> A
     """A number of a type and within limits of `parameters.parameter`; InvalidParameterError for anything else."""
     problem = problem_with(value, parameter(None, "", type=type, **limits).metadata)
     if problem:
-        raise InvalidParameterError(f"{name} = {value!r}: {problem}")
+        raise InvalidParameterError(f"{name} = {shown(value)}: {problem}")
     return float(value) if type == "float" else value

@@ -204,7 +204,8 @@ def _places_on(skeleton, path, spacing, margin):
     chord = sample(behind) - sample(before)
     size = np.linalg.norm(chord[:, :3], axis=1, keepdims=True)
     axis = np.divide(chord[:, :3], size, out=np.full((count, 3), np.nan), where=size > 0)
-    slope = chord[:, 3] / (behind - before)
+    apart = behind - before
+    slope = np.divide(chord[:, 3], apart, out=np.zeros(count), where=apart > 0)
     return np.column_stack([here[:, :3], axis, here[:, 3], slope, here[:, 4]])[size[:, 0] > 0]
 
 

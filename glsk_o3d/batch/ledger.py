@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BatchError, InvalidParameterError
-from ..interop.atomic import write_atomically, write_csv
+from ..interop.atomic import write_atomically, write_csv, writing
 
 try:
     import fcntl
@@ -71,7 +71,7 @@ class Ledger:
     def add(self, row: Row) -> None:
         """Add a row, to the file at once; it replaces the one of its name."""
         self._keep(row)
-        with self.path.open("ab") as stream:
+        with writing(self.path), self.path.open("ab") as stream:
             stream.write(_line(row))
 
     def close(self) -> None:

@@ -7,7 +7,8 @@ import json
 import os
 import shutil
 import uuid
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -45,16 +46,24 @@ def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -
         raise OSError(f"{path} is a folder or a device, not a file to write to")
     temporary = path.with_name(f".{uuid.uuid4().hex}{path.suffix}")
     try:
-        write(temporary)
-        if path.exists():
-            shutil.copymode(path, temporary)
-        os.replace(temporary, path)
+        with writing(given):
+            write(temporary)
+            if path.exists():
+                shutil.copymode(path, temporary)
+            os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def writing(path: str | os.PathLike) -> Iterator[None]:
+    """An OSError that says which file cannot be written, and why."""
+    try:
+        yield
     except OSError as error:
         if error.errno is None:
             raise
-        raise OSError(error.errno, f"cannot be written: {os.strerror(error.errno)}", os.fspath(given)) from error
-    finally:
-        temporary.unlink(missing_ok=True)
+        raise OSError(error.errno, f"cannot be written: {os.strerror(error.errno)}", os.fspath(path)) from error
 
 
 def check_ending(path: str | os.PathLike, what: str, *endings: str) -> None:

@@ -16,6 +16,8 @@ from ..interop.atomic import write_atomically
 from ..io.paths import existing_file
 
 MOST_BYTES = 1 << 20
+ENCODINGS = ("utf-8", "utf-16", "iso-8859-1", "us-ascii")
+"""Those that expat itself reads: it would leave others to any codec of Python."""
 _ELEMENTS = ("FilterScript", "filter", "Param")  # by depth
 
 BOOL = ("RichBool",)
@@ -116,6 +118,10 @@ def read_script(path: str | os.PathLike) -> list[Call]:
                 "<!DOCTYPE FilterScript>"
             )
 
+    def declaration(version, encoding, standalone):
+        if encoding is not None and encoding.lower() not in ENCODINGS:
+            raise wrong(f"the encoding is {brief(encoding)!r}: must be one of {', '.join(ENCODINGS)}")
+
     def start(element, attributes):
         nonlocal depth
         if element not in _ELEMENTS[depth : depth + 1]:
@@ -136,6 +142,7 @@ def read_script(path: str | os.PathLike) -> list[Call]:
         nonlocal depth
         depth -= 1
 
+    parser.XmlDeclHandler = declaration
     parser.StartDoctypeDeclHandler, parser.StartElementHandler, parser.EndElementHandler = doctype, start, end
     try:
         parser.Parse(data, True)

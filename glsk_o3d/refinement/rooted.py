@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from ..errors import InvalidParameterError
 from ..numerics.near_links import linked
 from ..numerics.vectors import AXES, along_axis, norm
-from ..parameters import resolve_point
+from ..parameters import resolve_point, shown
 from ..skeleton import Skeleton
 from .merging import some_vertices
 
@@ -27,7 +27,7 @@ def root_among(places: np.ndarray, skeleton: Skeleton, which: RootPlace, thick: 
     """
     if isinstance(which, int | np.integer) and not isinstance(which, bool):
         if not 0 <= which < len(places):
-            raise InvalidParameterError(f"root = {which}: there are vertices 0 to {len(places) - 1}")
+            raise InvalidParameterError(f"root = {shown(which)}: there are vertices 0 to {len(places) - 1}")
         return int(which)
     if isinstance(which, str) and which in AXES:
         return int(along_axis(places, which).argmin())
@@ -40,11 +40,11 @@ def root_among(places: np.ndarray, skeleton: Skeleton, which: RootPlace, thick: 
     else:
         try:
             place = np.asarray(resolve_point(which) if isinstance(which, str) else which, float)
-        except (InvalidParameterError, TypeError, ValueError):
+        except (InvalidParameterError, TypeError, ValueError, OverflowError):
             place = np.empty(0)
         if place.shape != (3,) or not np.isfinite(place).all():
             raise InvalidParameterError(
-                f"root = {which!r}: must be an axis, x to -z, 'thickest', a vertex, or a point (x, y, z)"
+                f"root = {shown(which)}: must be an axis, x to -z, 'thickest', a vertex, or a point (x, y, z)"
             )
     return int(norm(places - place).argmin())
 

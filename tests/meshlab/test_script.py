@@ -45,7 +45,16 @@ COLOUR = '<Param type="RichColor" name="color1" r="{}" g="1" b="{}" a="{}"/>'
         # no script
         (_of(THEIRS)[:60], 3, "not well-formed XML: unclosed token"),
         ("ply\nformat ascii 1.0\n", 1, "not well-formed XML: syntax error"),
-        ('<?xml version="1.0" encoding="klingon"?>\n<FilterScript/>', 1, "cannot be read: unknown encoding: klingon"),
+        (
+            '<?xml version="1.0" encoding="klingon"?>\n<FilterScript/>',
+            1,
+            "the encoding is 'klingon': must be one of utf-8, ",
+        ),
+        (
+            '<?xml version="1.0" encoding="unicode_escape"?>\n<FilterScript/>',
+            1,
+            "the encoding is 'unicode_escape': must",
+        ),
         ("<MeshLabProject/>", 1, "<MeshLabProject> cannot stand as the root of a filter script"),
         (_script(), 4, "the script has no filters"),
         (_script(" <filter/>"), 3, "a <filter> without a name"),
