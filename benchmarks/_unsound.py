@@ -6,7 +6,7 @@ import json
 import math
 import traceback
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -51,7 +51,7 @@ def unsound_case(rng: np.random.Generator, folder: Path) -> tuple[str, str, list
             return kind, "refused", _told_badly(error, path, field)
         finally:
             path.unlink()
-        return kind, "read", [*_use(skeleton, folder, rng)]
+        return kind, "read", [*used(skeleton, folder, (*USES, *(SLOW if rng.random() < RARE else ())))]
 
 
 def _told_badly(error: GlskError, *words: object) -> list[str]:
@@ -60,9 +60,9 @@ def _told_badly(error: GlskError, *words: object) -> list[str]:
     return long + [f"an error that does not name {word}: {str(error)[:200]}" for word in missing]
 
 
-def _use(skeleton: Skeleton, folder: Path, rng: np.random.Generator) -> Iterator[str]:
+def used(skeleton: Skeleton, folder: Path, uses: Iterable[Callable[[Skeleton, Path], object]]) -> Iterator[str]:
     """All that is public: what is wrong with its errors, and those that are none of the package's."""
-    for use in (*USES, *(SLOW if rng.random() < RARE else ())):
+    for use in uses:
         try:
             use(skeleton, folder)
         except GlskError as error:

@@ -31,7 +31,6 @@ from _unsound import unsound_case
 
 LIMIT_S = 60  # of one case; those that are sound take a second at most
 MOST_MEMORY = 2 << 30  # bytes that a case may take more than were taken before
-FILES = {"files": file_case, "skeletons": unsound_case}
 MOST_CASES = 10**7  # more than there is time for
 
 app = application(__doc__)
@@ -85,7 +84,8 @@ def one_case(what: str, seed: int, number: int, folder: Path) -> Outcome:
     """Run a case in this process; an error that is not one of the package's own is a finding."""
     rng = np.random.default_rng([seed, number])
     try:
-        found = array_case(rng) if what == "arrays" else FILES[what](rng, folder)
+        of_file = unsound_case if what == "skeletons" else file_case
+        found = array_case(rng) if what == "arrays" else of_file(rng, folder)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # whatever it is; some is no Exception

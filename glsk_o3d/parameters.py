@@ -175,16 +175,20 @@ def _problem_with_number(value: Any, whole: bool, facts: Any) -> str | None:
     if isinstance(value, bool) or not isinstance(value, Integral if whole else Real):
         words = "".join(f", or {choice!r}" for choice in facts["choices"])
         return f"must be {'an int' if whole else 'a number'}{words}"
+    try:
+        number = int(value) if isinstance(value, Integral) else float(value)
+    except OverflowError:  # of a fraction
+        number = math.inf
     most = LARGEST_WHOLE if whole else LARGEST
-    if value != value or abs(value) == math.inf:
+    if isinstance(number, float) and not math.isfinite(number):
         return "must be finite"
-    if abs(value) > most:  # Python has larger ones, arrays and files do not
+    if abs(number) > most:  # Python has larger ones, arrays and files do not
         return f"must be at most {most:g}"
-    if facts["type"].startswith("length") and 0 < value < SMALLEST_LENGTH:
+    if facts["type"].startswith("length") and 0 < number < SMALLEST_LENGTH:
         return f"must be at least {SMALLEST_LENGTH:g}"
-    if low is not None and (value < low or (above and value == low)):
+    if low is not None and (number < low or (above and number == low)):
         return f"must be {'above' if above else 'at least'} {low}"
-    return f"must be at most {high}" if high is not None and value > high else None
+    return f"must be at most {high}" if high is not None and number > high else None
 
 
 def _point(text: str) -> tuple[float, ...] | None:

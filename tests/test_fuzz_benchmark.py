@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from glsk_o3d import Skeleton, skeletonize
+from glsk_o3d import Report, Skeleton, skeletonize
 from glsk_o3d.samples import torus
+from glsk_o3d.skeleton import ARRAYS as ARRAYS_OF_SKELETONS
 
-ARRAYS, FILES = 15, 200
+ARRAYS, FILES, SKELETONS = 15, 200, 40
 
 
 @pytest.fixture(scope="module")
@@ -23,8 +24,9 @@ def tool(benchmark):
 def parts(tool):
     import _fuzz_arrays
     import _fuzz_files
+    import _unsound
 
-    return SimpleNamespace(arrays=_fuzz_arrays, files=_fuzz_files, workers=tool)
+    return SimpleNamespace(arrays=_fuzz_arrays, files=_fuzz_files, unsound=_unsound, workers=tool)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +34,7 @@ def ring():
     return skeletonize(torus(300).points)
 
 
-@pytest.mark.parametrize(("what", "cases"), [("arrays", ARRAYS), ("files", FILES)])
+@pytest.mark.parametrize(("what", "cases"), [("arrays", ARRAYS), ("files", FILES), ("skeletons", SKELETONS)])
 def test_nothing_is_found(call, what, cases):
     told = call(what, "--runs", cases, "--seed", 1)
     *_, number, findings = told.split()
@@ -56,6 +58,19 @@ def test_every_reader_reads_the_files_that_are_to_be_damaged(parts, tmp_path):
         path.write_bytes(data)
         parts.files.READERS[kind](path)
     assert {name.split()[0] for name in parts.files.seeds()} == set(parts.files.READERS)
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning", "ignore::DeprecationWarning")
+def test_degenerate_skeletons_and_extreme_ones_can_be_used(parts, tmp_path):
+    """Or are refused in a sentence."""
+    for name, fields in parts.unsound.seeds().items():
+        sound = Skeleton(**{**fields, "report": Report.from_dict(fields["report"])})
+        assert list(parts.unsound.used(sound, tmp_path, parts.unsound.USES)) == [], name
+    tree = parts.unsound.seeds()["tree"]
+    for field, factor in (("vertices", 1e149), ("vertices", 5e-324), ("radii", 1e149), ("radii", 5e-324)):
+        arrays = {**{name: tree[name] for name in ARRAYS_OF_SKELETONS}, field: factor * tree[field]}
+        sound = Skeleton(**{**arrays, "half_width": (), "half_thickness": ()})
+        assert list(parts.unsound.used(sound, tmp_path, parts.unsound.USES)) == [], (field, factor)
 
 
 def test_damage_can_be_repeated_and_is_some(parts):

@@ -2,6 +2,8 @@
 
 import dataclasses
 import math
+from fractions import Fraction
+from types import SimpleNamespace
 
 import pytest
 
@@ -15,6 +17,7 @@ from glsk_o3d import (
     Refiner,
     RingBuilder,
     RingSizeRatio,
+    Tracer,
     samples,
 )
 from glsk_o3d.parameters import resolve_length
@@ -123,3 +126,30 @@ def test_frozen_hashable_and_documented(cls):
         assert field.metadata["doc"].endswith(".")
         assert (field.metadata["unit"] or "-") != "-" or not field.metadata["type"].startswith("length")
         assert repr(field.default) in cls.__doc__
+
+
+@pytest.mark.parametrize(
+    ("made", "message"),
+    [
+        (RingBuilder(radius=1e308), r"^RingBuilder\.radius = 1e\+308: must be at most 1e\+100$"),
+        (Connector(radius=1e-320), r"^Connector\.radius = 1e-320: must be at least 1e-100$"),
+        (Connector(radius="5e-324%"), "a percentage of the diagonal lies above 0%"),
+        (Connector(thickness=Fraction(10**400)), r"^Connector\.thickness = .*: must be finite$"),
+        (Tracer(root=10**400), r"^Tracer\.root = a number of 401 digits: must be 'x', .* a point such as"),
+    ],
+)
+def test_numbers_beyond_what_can_be_computed_with_are_none(made, message):
+    with pytest.raises(InvalidParameterError, match=message):
+        made.check()
+
+
+def test_no_error_repeats_pages():
+    with pytest.raises(InvalidParameterError, match=r"^no filter is called 'x+ \.\.\. x+'$") as caught:
+        raise InvalidParameterError(f"no filter is called {'x' * 5000!r}")
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize("rule", [ExplainedScore(min_iterations=1), RingSizeRatio()])
+def test_rules_take_any_number(rule):
+    rule = dataclasses.replace(rule, threshold=Fraction(1, 3))
+    assert "< 0.333333" in rule((SimpleNamespace(explained_change=0.0, ring_ratio=1.0),))

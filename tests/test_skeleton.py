@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glsk_o3d import Skeleton
+from glsk_o3d import InvalidParameterError, Skeleton
 from glsk_o3d.skeleton import NOT_MEASURED
 
 
@@ -119,3 +119,57 @@ def test_confidence_and_half_axes_are_those_that_were_measured():
     one = dataclasses.replace(measured, **NOT_MEASURED, vertices=[[0, 0, 0]], edges=[], radii=[3])
     assert np.isnan(one.confidence).tolist() == [True]
     assert one.half_width.tolist() == one.half_thickness.tolist() == [3]
+
+
+LINE = dict(
+    vertices=[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]],
+    edges=[[0, 1], [1, 2]],
+    radii=[1.0, 1, 1],
+    vertex_of_point=[0, 2, -1],
+    points=[[0.0, 0, 1], [2, 0, 1], [np.nan] * 3],
+    normals=[[0, 0, 1.0]] * 3,
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("vertices", [[0.0, 0], [1, 0]], r"vertices: has shape \(2, 2\) and dtype float64: must be numbers, 3 a row"),
+        ("vertices", [[0, 0, 0], [1, 0]], "vertices: is no array: "),
+        ("vertices", [["0", "0", "0"]] * 3, "vertices: has shape .* and dtype <U1: must be numbers"),
+        ("vertices", [[0, 0, 0], [1, 0, np.nan], [2, 0, 0]], r"vertices\[1\] = \[1.0, 0.0, nan\]: must be finite"),
+        ("vertices", [[0, 0, 0], [1, 0, 0], [0, 0, 1e200]], r"vertices\[2\] = .*: must be finite, and at most 1e\+150"),
+        ("edges", [[0.5, 1]], r"edges: has shape \(1, 2\) and dtype float64: must be whole numbers, 2 a row"),
+        ("edges", np.array([[0, 2**63]], np.uint64), "edges: has shape .* and dtype uint64"),
+        ("edges", [[0, 1], [1, 3]], r"edges\[1\] = \[1, 3\]: names a vertex that is not there: there are 3"),
+        ("edges", [[0, 1], [-1, 2]], r"edges\[1\] = \[-1, 2\]: names a vertex"),
+        ("edges", [[0, 1], [2, 2]], r"edges\[1\] = \[2, 2\]: joins a vertex with itself"),
+        ("edges", [[0, 1], [1, 2], [1, 0]], r"edges\[0\] = \[0, 1\]: is there twice"),
+        ("radii", [1, 1], "radii: has 2 rows for 3 vertices"),
+        ("radii", [[1], [1], [1]], r"radii: has shape \(3, 1\)"),
+        ("radii", [1, -1, 1], r"radii\[1\] = -1.0: must lie between 0 and 1e\+150, or be NaN"),
+        ("radii", [1, np.inf, 1], r"radii\[1\] = inf"),
+        ("radii", [1, 10**400, 1], "radii: has shape .* and dtype object"),
+        ("vertex_of_point", [0, 2], "vertex_of_point: has 2 rows for 3 points"),
+        ("vertex_of_point", [0, -2, 3], r"vertex_of_point\[1\] = -2: names a vertex"),
+        ("vertex_of_point", [0, 1, 1], r"points\[2\] = .*: must be finite, .* as vertex_of_point gives it a vertex"),
+        ("normals", [[0, 0, np.inf]] * 3, r"normals\[0\] = .*: must be unit vectors, or NaN"),
+        ("confidence", [0, 1.5, 0], r"confidence\[1\] = 1.5: must lie between 0 and 1, or be NaN"),
+        ("half_thickness", [1, 1, 2], r"half_thickness\[2\] = 2.0: must be at most half_width"),
+        ("support", [-1, 0, 0], r"support\[0\] = -1.0"),
+        ("report", {}, "report = {}: must be a Report"),
+    ],
+)
+def test_a_skeleton_is_sound_or_it_is_not_made(name, value, message):
+    Skeleton(**LINE)
+    with pytest.raises(InvalidParameterError, match=message):
+        Skeleton(**{**LINE, name: value})
+
+
+def test_what_is_not_known_is_filled_in_and_edges_are_sorted():
+    found = Skeleton(LINE["vertices"], [[2, 1], [1, 0]], (), (), LINE["points"], ())
+    assert found.edges.tolist() == [[0, 1], [1, 2]]
+    assert np.isnan(found.radii).tolist() == np.isnan(found.half_width).tolist() == [True] * 3
+    assert found.vertex_of_point.tolist() == [-1] * 3
+    assert np.isnan(found.normals).all()
+    assert found.normals.shape == (3, 3)

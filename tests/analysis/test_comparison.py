@@ -261,3 +261,11 @@ def test_files_without_a_truth(ring, tmp_path, axis_of):
             read_truth(path)
     with pytest.raises(FileNotFoundError, match="no such file"):
         read_truth(tmp_path / "none.npz")
+
+
+def test_a_skeleton_in_other_units_is_told_before_the_memory_is_full(axis_of):
+    sample = torus(100)
+    far = axis_of(sample, shift=[0, 0, 0])
+    far = Skeleton(1e12 * far.vertices, far.edges, far.radii, (), (), ())
+    with pytest.raises(InvalidParameterError, match=r"^the skeleton is .* long, too long for places .* apart"):
+        compare(far, sample)

@@ -104,5 +104,5 @@ def test_numbers_of_python_are_told_without_pages_of_digits():
         RingBuilder(k=10**5000).check()
     for number, digits in {10**401 - 1: 401, -(10**401) + 1: 401, 10**401: 402, 2**63: 19, 10**19 - 1: 19}.items():
         assert shown(number) == f"a number of {digits} digits"
-    with pytest.raises(InvalidParameterError, match=r"around = a number of 401 digits: must be at most 1\.79769e\+308"):
+    with pytest.raises(InvalidParameterError, match=r"around = a number of 401 digits: must be at most 1e\+100"):
         RingBuilder(around=10**400).check()

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import glsk_o3d
 from glsk_o3d import Contractor, InvalidParameterError, LPRReducer, Pipeline, RingBuilder, RingSizeRatio
 from glsk_o3d.cli.overrides import override
+from glsk_o3d.parameters import SMALLEST_LENGTH
 from glsk_o3d.pipeline import parts
 from glsk_o3d.pipelines import PIPELINES, cao2010, default
 from glsk_o3d.recipes.catalogue import catalogue
@@ -36,7 +37,7 @@ def values(facts):
         )
     elif kind == "length":
         percent = st.floats(0.001, 100).map(lambda x: (f"{x:.6f}%", f"{x:.6f}%"))
-        plain = percent | st.floats(low, high, exclude_min=True).map(lambda x: (repr(x), x))
+        plain = percent | st.floats(max(low, SMALLEST_LENGTH), high).map(lambda x: (repr(x), x))
     elif kind == "point":
         plain = st.just(("0.5,0,-2e3", "0.5,0,-2e3"))
     elif kind == "bool":

@@ -226,3 +226,9 @@ def test_half_axes_stay_with_their_vertices(grown, edit):
     assert 0 < len(left.vertices) <= len(two.vertices)
     np.testing.assert_array_equal(left.half_width, left.vertices[:, 0] + 9)
     np.testing.assert_array_equal(left.half_thickness, left.vertices[:, 1] + 2)
+
+
+@pytest.mark.parametrize("edit", [largest_component, lambda it: simplify(it, n=3), smooth, lambda it: cut_loops(it)[0]])
+def test_a_cloud_without_vertices_stays_one(edit):
+    cloud = Skeleton((), (), (), (), np.eye(3), ())
+    assert edit(cloud).vertex_of_point.tolist() == [-1] * 3

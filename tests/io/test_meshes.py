@@ -163,3 +163,8 @@ def test_every_kind_of_mesh_gives_the_same_arrays_and_what_is_useless_none():
     for wrong, says in ((7, "int"), (bare, r"\(F, 3\)"), ((np.eye(3), [[0, 1, 3]]), "vertex"), (lost, "not finite")):
         with pytest.raises(InvalidParameterError, match=says):
             mesh_arrays(wrong)
+
+
+def test_a_mesh_of_nothing_is_not_written(tmp_path):
+    with pytest.raises(FileFormatError, match=r"m\.ply: the mesh is empty: there is nothing to write"):
+        save_mesh(to_tubes(Skeleton((), (), (), (), (), ())), tmp_path / "m.ply")

@@ -49,7 +49,7 @@ def read_npz(data: bytes) -> Skeleton:
             raise ValueError(f"it would become more than {MOST_EXPANDED} times as large: no skeleton packs so")
     words = ("format", "format_version", "report")
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-        values = {name: _loaded(archive, name) for name in (*words, *ARRAYS) if name in archive.files}
+        values: dict[str, Any] = {name: _loaded(archive, name) for name in (*words, *ARRAYS) if name in archive.files}
     values |= {name: values[name].item() for name in words if name in values and values[name].ndim == 0}
     return _decode({**values, "report": json.loads(values["report"])})
 
