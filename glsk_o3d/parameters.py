@@ -6,7 +6,7 @@ import dataclasses
 import inspect
 import math
 import re
-from numbers import Integral, Real
+from numbers import Integral, Rational, Real
 from typing import Any, ClassVar, TypeVar
 
 from .errors import InvalidParameterError
@@ -172,13 +172,11 @@ def problem_with(value: Any, facts: Any) -> str | None:
 
 def _problem_with_number(value: Any, whole: bool, facts: Any) -> str | None:
     low, high, above = facts["low"], facts["high"], facts["open_low"]
-    if isinstance(value, bool) or not isinstance(value, Integral if whole else Real):
+    fraction = isinstance(value, Rational) and not isinstance(value, Integral)  # arrays hold none
+    if isinstance(value, bool) or fraction or not isinstance(value, Integral if whole else Real):
         words = "".join(f", or {choice!r}" for choice in facts["choices"])
         return f"must be {'an int' if whole else 'a number'}{words}"
-    try:
-        number = int(value) if isinstance(value, Integral) else float(value)
-    except OverflowError:  # of a fraction
-        number = math.inf
+    number = int(value) if isinstance(value, Integral) else float(value)
     most = LARGEST_WHOLE if whole else LARGEST
     if isinstance(number, float) and not math.isfinite(number):
         return "must be finite"

@@ -39,7 +39,7 @@ class ExplainedScore(Parameters):
     def __call__(self, iterations: tuple[IterationRecord, ...]) -> str | None:
         change = iterations[-1].explained_change
         if len(iterations) >= self.min_iterations and change < self.threshold:  # Wen (16)
-            return f"explained score settled: De = {change:.4f} < {float(self.threshold):g}"
+            return f"explained score settled: De = {change:.4f} < {self.threshold:g}"
         return None
 
 
@@ -63,5 +63,5 @@ class RingSizeRatio(Parameters):
         before = iterations[-2].ring_ratio if len(iterations) > 1 else 1.0
         drop = before - iterations[-1].ring_ratio
         if drop < self.threshold:
-            return f"rings stopped shrinking: a(t) - a(t+1) = {drop:.4f} < {float(self.threshold):g}"
+            return f"rings stopped shrinking: a(t) - a(t+1) = {drop:.4f} < {self.threshold:g}"
         return None

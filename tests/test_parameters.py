@@ -3,7 +3,6 @@
 import dataclasses
 import math
 from fractions import Fraction
-from types import SimpleNamespace
 
 import pytest
 
@@ -134,7 +133,7 @@ def test_frozen_hashable_and_documented(cls):
         (RingBuilder(radius=1e308), r"^RingBuilder\.radius = 1e\+308: must be at most 1e\+100$"),
         (Connector(radius=1e-320), r"^Connector\.radius = 1e-320: must be at least 1e-100$"),
         (Connector(radius="5e-324%"), "a percentage of the diagonal lies above 0%"),
-        (Connector(thickness=Fraction(10**400)), r"^Connector\.thickness = .*: must be finite$"),
+        (Connector(thickness=Fraction(10**400)), r"^Connector\.thickness = .*: must be a number$"),
         (Tracer(root=10**400), r"^Tracer\.root = a number of 401 digits: must be 'x', .* a point such as"),
     ],
 )
@@ -147,9 +146,3 @@ def test_no_error_repeats_pages():
     with pytest.raises(InvalidParameterError, match=r"^no filter is called 'x+ \.\.\. x+'$") as caught:
         raise InvalidParameterError(f"no filter is called {'x' * 5000!r}")
     assert len(str(caught.value)) < 1000
-
-
-@pytest.mark.parametrize("rule", [ExplainedScore(min_iterations=1), RingSizeRatio()])
-def test_rules_take_any_number(rule):
-    rule = dataclasses.replace(rule, threshold=Fraction(1, 3))
-    assert "< 0.333333" in rule((SimpleNamespace(explained_change=0.0, ring_ratio=1.0),))

@@ -236,7 +236,7 @@ def _object(skeleton, cloud):
 def _check(skeleton, clearance, around, spacing, margin, min_confidence):
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: there is nothing to grasp")
-    if not (np.isfinite(skeleton.vertices).all() and np.isfinite(skeleton.radii).any()):
+    if not np.isfinite(skeleton.radii).any():
         raise InvalidParameterError("grasps need finite vertices and radii: save skeletons as .json, .npz or .ply")
     if min_confidence != 0 and np.isnan(skeleton.confidence).all():
         raise InvalidParameterError("this skeleton has no confidence, perhaps due to its file: give min_confidence=0")
