@@ -194,7 +194,7 @@ def _point(text: str) -> tuple[float, ...] | None:
         numbers = tuple(map(float, text.split(",")))
     except ValueError:
         return None
-    return numbers if len(numbers) == 3 and all(map(math.isfinite, numbers)) else None
+    return numbers if len(numbers) == 3 and all(abs(number) <= LARGEST for number in numbers) else None
 
 
 def resolve_point(text: str) -> tuple[float, ...]:
