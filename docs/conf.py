@@ -29,7 +29,7 @@ extensions = [
     "generated",  # these are in _ext
     "keywords",
     "mathml",
-    "steering",
+    "steering_table",
     "options",
     "sidebar",
     "tables",

@@ -18,6 +18,7 @@ from .recipes import RECIPE_ENDINGS, load_recipe
 from .recipes.catalogue import named_pipeline
 from .ring_builder import RingBuilder
 from .skeleton import Skeleton
+from .state import Contraction
 
 
 def skeletonize(
@@ -96,7 +97,11 @@ def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathL
 
 
 def remove_redundant_points(
-    cloud: Any, *, passes: int = 1, rings: RingBuilder | None = None, reducer: LPRReducer | None = None
+    cloud: Any,
+    *,
+    passes: int = 1,
+    rings: Filter[Contraction] | Pipeline[Contraction] | None = None,
+    reducer: LPRReducer | None = None,
 ) -> tuple[Any, Any]:
     """Remove points that say little more about the skeleton than their neighbours, by local point reduction.
 
@@ -109,9 +114,8 @@ def remove_redundant_points(
         Not modified.
     passes : int
         Solves, each with a merging pass after it. They cost as much as the contraction of a skeleton.
-    rings : RingBuilder, optional
-        How the neighbourhoods are made. By default points are neither set aside nor denoised: outliers are for
-        ``remove_statistical_outlier``.
+    rings : RingBuilder, or a pipeline that ends with one, optional
+        How the neighbourhoods are made. By default points are neither set aside nor denoised.
     reducer : LPRReducer, optional
 
     Returns
@@ -141,7 +145,7 @@ def remove_redundant_points(
     name, tensor = open3d_class(cloud)
     if name == "TriangleMesh":
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
-    rings = RingBuilder(thin_to="all", outlier_factor=0, denoise=0) if rings is None else rings
+    rings = RingBuilder() if rings is None else rings
     reducer = LPRReducer() if reducer is None else reducer
     contraction = Contractor(reducer=reducer, max_iterations=int(passes), stop=lambda iterations: None)
     kept = np.sort((rings | contraction)(cloud).point_of_survivor)

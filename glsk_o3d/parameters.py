@@ -43,7 +43,7 @@ def parameter(
         One sentence; it appears in the class's docstring and in ``glsk filters``.
     type : {"int", "float", "bool", "length", "point", "choice", "reducer", "stop"}, optional
         By default that of `default`, of a string "choice". A length is a float in the cloud's units or a string such
-        as ``"2%"`` of the diagonal of the box that `RingBuilder.frame` names, a point a string such as ``"0.5,0,2"``.
+        as ``"2%"`` of the diagonal of the box that `Sampler.frame` names, a point a string such as ``"0.5,0,2"``.
         A trailing ``?`` allows None.
     unit : str
     low, high : float, optional
@@ -211,7 +211,7 @@ def resolve_length(length: float | str, diagonal: float) -> float:
     ----------
     length : float or str
     diagonal : float
-        In the cloud's units: of the bounding box or of the box with the spread of the points, as `RingBuilder.frame`
+        In the cloud's units: of the bounding box or of the box with the spread of the points, as `Sampler.frame`
         says.
 
     Returns

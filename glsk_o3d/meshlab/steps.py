@@ -49,7 +49,7 @@ class Step:
             place = f"{self.place}: " if self.place else ""
             slots = self.verb.slots if self.verb is not None else ()
             cure = next((f"its parameter {name}" for name in slots if name.endswith("drop_invalid")), "")
-            said = str(error).replace("drop_invalid=True", cure or "the RingBuilder's drop_invalid")
+            said = str(error).replace("drop_invalid=True", cure or "the Sampler's drop_invalid")
             raise ScriptError(f"{place}filter {self.call.name!r}: {said}") from error
 
 

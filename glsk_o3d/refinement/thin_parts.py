@@ -41,7 +41,7 @@ class SpacedPoints(VertexPoints):
         """Which input points they are."""
         points, some = self.skeleton.points, np.flatnonzero(self.skeleton.vertex_of_point >= 0)
         if len(some):
-            some = some[sample_cloud(points[some], TRACED_POINTS).kept]
+            some = some[sample_cloud(points[some], TRACED_POINTS)[0]]
         wide = np.ptp(points[some], axis=0).max() if len(some) else 0.0
         cells = np.rint(points[some] / max(SAME_PLACE * wide, TINY))
         return some[np.sort(np.unique(cells, axis=0, return_index=True)[1])]
