@@ -12,7 +12,7 @@ import glsk_o3d as glsk
 from glsk_o3d.samples import sauropod
 
 cloud = sauropod(6000, noise=0.002).points
-graph = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(cloud)
+graph = (glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(cloud)
 
 # %%
 # The raw graph is full of small loops. Those of three edges are no loops but triangles, and the refinement closes
