@@ -244,7 +244,7 @@ class Pipeline(Generic[Produced]):
         --------
         >>> from glsk_o3d import pipelines
         >>> thin = pipelines.default().with_options({"Connector.radius": "2%"}, k=12, reducer=None)
-        >>> thin.stages[0].k, thin.stages[1].reducer, thin.stages[2].radius
+        >>> thin.stages[4].k, thin.stages[5].reducer, thin.stages[6].radius
         (12, None, '2%')
         """
         pipeline: Any = self

@@ -27,7 +27,7 @@ def cao2010() -> Pipeline[Skeleton]:
 
     Examples
     --------
-    >>> cao2010().stages[1].reducer is None
+    >>> cao2010().stages[2].reducer is None
     True
     """
     return _published(stop=RingSizeRatio(), max_iterations=20)
@@ -41,7 +41,7 @@ def wen2024() -> Pipeline[Skeleton]:
 
     Examples
     --------
-    >>> wen2024().stages[1].reducer.conserve_mass
+    >>> wen2024().stages[2].reducer.conserve_mass
     False
     """
     reducer = LPRReducer(conserve_mass=False, order="index", mend_rings=False)
@@ -92,7 +92,15 @@ def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
 
 
 def rings() -> Pipeline[Contraction]:
-    """From a cloud to the rings, through what a scan needs."""
+    """From a cloud to its rings, through all that a scan needs: what `default` begins with.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> state = (rings() | Contractor())(torus(1000).points)
+    >>> len(state.contracted)
+    1000
+    """
     return Sampler() | OutlierRemover() | Denoiser() | Thinner() | RingBuilder()
 
 

@@ -164,7 +164,7 @@ class Report:
     >>> report.n_input, report.converged, report.warnings
     (1000, True, ())
     >>> list(report.seconds)
-    ['RingBuilder', 'Contractor', 'Connector', 'Refiner', 'Tracer']
+    ['Sampler', 'OutlierRemover', 'Denoiser', 'Thinner', 'RingBuilder', 'Contractor', 'Connector', 'Refiner', 'Tracer']
     """
 
     n_input: int = 0

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 import glsk_o3d as glsk
 from glsk_o3d import Refiner, Report, Skeleton, SkeletonWarning, pipelines, samples
 
-PUBLISHED = pipelines.cao2010().stages[3]
+PUBLISHED = pipelines.cao2010().stages[-1]
 
 
 def refined(skeleton, filter):

@@ -111,7 +111,7 @@ def test_where_settings_go():
         ("", "write it as Filter.parameter=value"),
         ("connector.radius=2%", "connector is not in the pipeline, which has RingBuilder, Contractor, LPRReducer,"),
         ("Connector.radios=2%", "did you mean 'radius'?"),
-        ("RingBuilder.zzz=2", "no parameter of RingBuilder is called 'zzz': there are k, radius, around, thin_to, "),
+        ("RingBuilder.zzz=2", "no parameter of RingBuilder is called 'zzz': there are k and radius"),
         ("RingBuilder.consumes=cloud", "no parameter of RingBuilder is called 'consumes'"),
         ("Contractor.stop=RingSizeRati", "no stop is called 'RingSizeRati': did you mean 'RingSizeRatio'?"),
         ("Contractor.stop=LPRReducer", "no stop is called 'LPRReducer'"),
