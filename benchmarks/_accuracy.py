@@ -21,7 +21,7 @@ from glsk_o3d.interop.atomic import write_atomically
 IDEAS = {
     "neighbours by size": "RingBuilder.k=published",
     "frame that turns along": "Sampler.frame=box",
-    "thinning": "Thinner.thin_to=all",
+    "thinning": "Sampler.size=all Thinner.thin_to=all",
     "outliers set aside": "OutlierRemover.outlier_factor=0",
     "denoising": "Denoiser.denoise=0",
     "point reduction": "Contractor.reducer=none",

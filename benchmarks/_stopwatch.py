@@ -40,9 +40,7 @@ class Stage(NamedTuple):
 STAGES = {
     "order": Stage("numerics.morton:morton_order"),
     "kNN": Stage("numerics.neighbourhoods:nearest_neighbours,nearest_left"),
-    "outliers, noise": Stage(
-        "outlier_remover:inliers points:noise_share denoiser:average_noisy,subspace_mean_shift"
-    ),
+    "outliers, noise": Stage("outlier_remover:inliers points:noise_share denoiser:average_noisy,subspace_mean_shift"),
     "planes": Stage("numerics.neighbourhoods:principal"),
     "thinning": Stage("preparation.sampling:sample_grid thinner:thin,spacing_enough,thin_nearer"),
     "rings": Stage("numerics.rings:star_rings"),

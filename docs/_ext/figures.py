@@ -289,7 +289,8 @@ def stopping():
     points = animal()
     figure = Figure((2 * SIDE, 0.8 * SIDE), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
-    records = (glsk.pipelines.rings() | glsk.Contractor(max_iterations=8, stop=lambda _: None))(points).report.iterations
+    contraction = glsk.pipelines.rings() | glsk.Contractor(max_iterations=8, stop=lambda _: None)
+    records = contraction(points).report.iterations
     for axes, name, threshold, label in zip(
         figure.subplots(1, 2), ("explained_change", "drop"), (0.03, 0.01), ("De", "a(t−1) − a(t)"), strict=True
     ):
