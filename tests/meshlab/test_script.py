@@ -86,7 +86,7 @@ COLOUR = '<Param type="RichColor" name="color1" r="{}" g="1" b="{}" a="{}"/>'
         (
             _of(OURS, "RichString pipeline cao2010", "RichFloat lprreducer_phi 10"),
             3,
-            "lprreducer_phi: LPRReducer is not in the pipeline, which has Sampler, RingBuilder, Contractor, RingSizeRatio, ",
+            "lprreducer_phi: LPRReducer is not in the pipeline, which has Sampler, RingBuilder, Contractor, ",
         ),
     ],
 )
