@@ -139,7 +139,7 @@ class Decision:
         return f"{self.question}: {self.probability:.2f}, {self.outcome}"
 
 
-WELL_SUPPORTED = 0.8  # fitted: of the samples show what can be relied on, and do not show what is not there
+WELL_SUPPORTED = 0.8  # warning: of the samples show what can be relied on, and do not show what is not there
 
 
 @dataclass(frozen=True)
