@@ -22,7 +22,7 @@ from .numerics.groups import component_labels
 from .numerics.polylines import arc_lengths, place_at
 from .numerics.vectors import TINY, norm
 from .pipeline import Pipeline
-from .report import Report
+from .report import Report, warn
 from .skeleton import Skeleton
 
 SAMPLE_SHARE = 0.8  # fitted: of the points in each sample; halves doubt more that is right
@@ -159,6 +159,7 @@ def _supported(skeleton: Skeleton, others: list[Skeleton]) -> Skeleton:
     report = replace(skeleton.report, n_draws=len(curves), n_agreeing=same, support=tuple(supported))
     if same <= WORTH_A_WARNING * len(curves):
         report = report.with_warning(_doubt(report))
+        warn(report.warnings[-1:])
     return replace(skeleton, support=support, report=report)
 
 

@@ -22,11 +22,18 @@ MAJORITY = 0.5  # derived: of the points, from which on a cloud is called what t
 LOW_CONFIDENCE = 0.1  # below which a vertex is not to be trusted
 LOW_CONFIDENCE_SHARE = 0.25  # of the points around such vertices that is worth a warning
 
+REASONS = ("sheet-like", "sphere-like", "no edges", "uncertain topology", "weakly supported")
+"""What the messages of `diagnose` begin with."""
+
 
 def measured(skeleton: Skeleton) -> Skeleton:
-    """A finished skeleton with its sections, and with the reasons not to trust it as the warnings of its report."""
+    """A finished skeleton with its sections, and with the reasons not to trust it among the warnings of its report.
+
+    They take the place of those of before, and follow what other filters warned of.
+    """
     sections = measure_sections(skeleton)
-    report = replace(skeleton.report, warnings=tuple(diagnose(skeleton)))
+    others = [message for message in skeleton.report.warnings if message.partition(":")[0] not in REASONS]
+    report = replace(skeleton.report, warnings=(*others, *diagnose(skeleton)))
     return replace(skeleton, report=report, half_width=sections.half_width, half_thickness=sections.half_thickness)
 
 
