@@ -68,10 +68,8 @@ def in_words(error: BaseException) -> str:
 
 
 MOVED = {
-    "root": "it is Tracer's, a filter of its own behind the Refiner",
-    "surface": "it is Tracer's, a filter of its own behind the Refiner",
-    "reduce_above": "it is gone, leave it out",
-    "min_support": "it is gone, leave it out",
+    **dict.fromkeys(("root", "surface"), "it is Tracer's, a filter of its own behind the Refiner"),
+    **dict.fromkeys(("reduce_above", "min_support"), "it is gone, leave it out"),
 }
 """What became of parameters of before, which recipes and scripts may still have."""
 
