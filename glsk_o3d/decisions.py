@@ -127,7 +127,7 @@ class Decision:
 
     @property
     def otherwise(self) -> str:
-        """The option with which the Refiner would have answered otherwise, such as ``"Refiner.limb=0.56"``."""
+        """The option with which the Refiner would have answered a close call otherwise, as ``"Refiner.limb=0.56"``."""
         question = QUESTIONS[self.about]
         if self.changed == question.changes_from:
             hundredths = math.ceil(100 * self.probability + 0.5)
