@@ -15,8 +15,8 @@ from .sections import VertexPoints, measure_sections
 SHEET_SHARE = 0.9  # fitted: share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
 # warning: spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
 BALL_SPREAD = 0.5
-# warning: length of the evenly filled box with the spread of a part, over the median distance to the surface; balls have
-# 2 to 3
+# warning: length of the evenly filled box with a part's spread, over the median distance to the surface; a ball has 2
+# to 3
 STUB_LENGTH = 3.3
 MAJORITY = 0.5  # derived: of the points, from which on a cloud is called what they are
 LOW_CONFIDENCE = 0.1  # warning: below which a vertex is not to be trusted

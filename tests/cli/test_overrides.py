@@ -76,7 +76,8 @@ def test_round_trip_of_every_pipeline():
         kinds = {type(stage) for stage in pipeline.stages}
         start = Pipeline(*(stage for stage in start.stages if type(stage) in kinds))
         assert override(start, settings) == pipeline
-        assert eval(repr(changed), vars(glsk_o3d) | {name: getattr(glsk_o3d, name) for name in catalogue()}) == pipeline
+        names = vars(glsk_o3d) | {name: getattr(glsk_o3d, name) for name in catalogue()}
+        assert eval(repr(pipeline), names) == pipeline
 
 
 def test_where_settings_go():
