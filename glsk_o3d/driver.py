@@ -13,6 +13,7 @@ from .errors import InvalidCloudError, InvalidParameterError
 from .interop.clouds import open3d_class
 from .interop.packages import import_open3d
 from .lpr_reducer import LPRReducer
+from .parameters import check_number
 from .pipeline import Filter, OnIteration, OnState, Pipeline
 from .recipes import RECIPE_ENDINGS, load_recipe
 from .recipes.catalogue import named_pipeline
@@ -140,8 +141,7 @@ def remove_redundant_points(
     >>> bool((reduced == points[kept]).all()), 500 < len(kept) < 700
     (True, True)
     """
-    if isinstance(passes, bool) or not isinstance(passes, (int, np.integer)) or passes < 1:
-        raise InvalidParameterError(f"passes = {passes!r}: must be an int of at least 1")
+    check_number("passes", passes, "int", low=1)
     name, tensor = open3d_class(cloud)
     if name == "TriangleMesh":
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")

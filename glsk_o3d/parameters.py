@@ -168,6 +168,14 @@ def problem_with(value: Any, facts: Any) -> str | None:
     return _problem_with_number(value, kind == "int", facts)
 
 
+def check_number(name: str, value: Any, type: str = "float", **limits: Any) -> Any:
+    """A number of a type and within limits of `parameter`; InvalidParameterError for anything else."""
+    problem = problem_with(value, parameter(None, "", type=type, **limits).metadata)
+    if problem:
+        raise InvalidParameterError(f"{name} = {shown(value)}: {problem}")
+    return float(value) if type == "float" else value
+
+
 def _problem_with_number(value: Any, whole: bool, facts: Any) -> str | None:
     low, high, above = facts["low"], facts["high"], facts["open_low"]
     if isinstance(value, bool) or not isinstance(value, Integral if whole else Real):

@@ -275,9 +275,7 @@ class Pipeline(Generic[Produced]):
         meant = [(cls, field) for cls, field in known if field.name == option]
         if not meant:
             names = dict.fromkeys(field.name for _, field in known)
-            others = [cls.__name__ for cls in present.values() if hasattr(cls, option)]
-            hint = f"; {others[0]}.{option} is one" if dot and others else ""
-            raise InvalidParameterError(did_you_mean(option, names, f"parameter of {holder or 'the pipeline'}") + hint)
+            raise InvalidParameterError(did_you_mean(option, names, f"parameter of {holder or 'the pipeline'}"))
         if len(meant) > 1:
             choice = " or ".join(f"'{cls.__name__}.{option}'" for cls, _ in meant)
             raise InvalidParameterError(f"{name}: more than one part of the pipeline has it: write {choice}")

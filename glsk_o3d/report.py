@@ -194,8 +194,7 @@ class Report:
     versions: dict[str, str] = field(default_factory=_versions)
 
     def with_warning(self, message: str) -> Report:
-        """This report with a warning in it; also issued, see `warn`."""
-        warn([message])
+        """This report with a warning in it; pipelines, and filters called by themselves, issue it in the end."""
         return dataclasses.replace(self, warnings=(*self.warnings, message))
 
     @property

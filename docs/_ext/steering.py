@@ -11,8 +11,9 @@ FILES = (
     *("points", "sampler", "outlier_remover", "denoiser", "thinner", "ring_builder"),
     *("contractor", "lpr_reducer", "stopping", "connector", "refiner", "tracer", "decisions"),
 )
-ORIGINS = ("published", "derived", "measured", "fitted", "speed")
-"""Where numbers come from; those for speed, such as the sizes of blocks, change no result."""
+ORIGINS = ("published", "derived", "measured", "fitted", "speed", "warning")
+"""Where numbers come from. Those for speed, such as the sizes of blocks, change no result, and those of warnings only
+what is said about one."""
 ORIGIN = re.compile(rf"\b({'|'.join(ORIGINS)})\b", re.IGNORECASE)
 
 
@@ -112,6 +113,10 @@ def weights():
     return found
 
 
+EVEN = ("handle", "air", "bridge", "limb")
+"""Options that are probabilities."""
+
+
 def defaults():
     """The numbers that are defaults of options in `default`."""
     from glsk_o3d import pipelines
@@ -124,6 +129,8 @@ def defaults():
             value = getattr(part, field.name)
             if re.fullmatch(r"[\d.e+-]+%?", str(value)) and type(value) is not bool:
                 where = "published" if theirs.get((type(part), field.name)) == value else "fitted"
+                if field.name in EVEN and value == 0.5:
+                    where = "derived"  # where both answers are equally likely
                 found.append(Number(type(part).__name__, field.name, str(value), where, field.metadata["doc"]))
     return found
 

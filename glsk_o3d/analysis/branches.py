@@ -286,7 +286,9 @@ def _mean(values, weights):
 def _kinds(skeleton, paths):
     """The kind of every path, see `BranchTable`."""
     cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-    on_loops = {frozenset(edge) for cycle in cycles for edge in zip(cycle.tolist(), np.roll(cycle, -1).tolist())}
+    on_loops = {
+        frozenset(edge) for cycle in cycles for edge in zip(cycle.tolist(), np.roll(cycle, -1).tolist(), strict=True)
+    }
 
     def kind(path):
         if len(path) == 1:

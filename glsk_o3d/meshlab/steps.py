@@ -35,11 +35,6 @@ class Step:
         """None for MeshLab's own filters."""
         return verbs().get(self.name)
 
-    @property
-    def needs_pymeshlab(self) -> bool:
-        """Whether it is a filter of MeshLab's own."""
-        return self.verb is None
-
     @contextmanager
     def named_in_errors(self) -> Iterator[None]:
         """Say in every error of ours where in the script it happened."""

@@ -59,6 +59,7 @@ _FILTER_STEMS = {
     "LPRReducer": "generate_reduced_cloud",
     "Connector": "generate_skeleton_graph",
     "Refiner": "generate_refined_skeleton",
+    "Tracer": "generate_traced_skeleton",
 }
 _EDITS: dict[str, Callable[..., Any]] = {
     "generate_largest_skeleton_component": editing.largest_component,

@@ -273,6 +273,8 @@ class TestRefusals:
             ({"formats": ["stl"]}, "unknown ending"),
             ({"formats": []}, "nothing to write"),
             ({"workers": 0}, "workers = 0"),
+            ({"workers": 1.5}, "workers = 1.5: must be an int"),
+            ({"format": "ply"}, "no option of a batch is called 'format': did you mean 'formats'"),
             ({"workers": 2, "scheduler": "tcp://x:1"}, "neither workers nor"),
         ],
     )
