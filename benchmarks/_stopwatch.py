@@ -42,7 +42,7 @@ STAGES = {
     "kNN": Stage("numerics.neighbourhoods:nearest_neighbours,nearest_left"),
     "outliers, noise": Stage("outlier_remover:inliers points:noise_share denoiser:average_noisy,subspace_mean_shift"),
     "planes": Stage("numerics.neighbourhoods:principal"),
-    "thinning": Stage("preparation.sampling:sample_grid thinner:thin,spacing_enough,thin_nearer"),
+    "thinning": Stage("numerics.grid_sampling:sample_grid thinner:thin,spacing_enough,thin_nearer"),
     "rings": Stage("numerics.rings:star_rings"),
     "rest of the rings": Stage(
         "sampler:Sampler._run outlier_remover:OutlierRemover._run denoiser:Denoiser._run thinner:Thinner._run "

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .numerics.eigen import main_direction
+from .numerics.frame import MIN_POINTS
 from .numerics.groups import group_sum
 from .numerics.neighbourhoods import local_outlier_ratio, nearest_left, nearest_moved, nearest_neighbours
 from .numerics.pairing import Pairs, merge_pairs
@@ -16,7 +17,6 @@ from .numerics.vectors import PAIRS
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .points import Points, default_k
-from .preparation.frame import MIN_POINTS
 from .thinner import STEADY_SHARE
 
 RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick

@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from .numerics.frame import MIN_POINTS
 from .numerics.groups import component_labels
 from .numerics.neighbourhoods import local_outlier_ratio, nearest_neighbours, principal, row_medians
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .points import Points
-from .preparation.frame import MIN_POINTS
 
 # All fitted, on clouds with outliers of 1 to 10 %, sparse limbs and crowns.
 OUTLIER_ROUNDS = 6  # since what is left of a cluster stands out once the rest is gone

@@ -65,7 +65,7 @@ class Filter(Parameters, Generic[Produced]):
 
         Parameters
         ----------
-        data : cloud, Contraction or Skeleton
+        data : cloud, Points, Contraction or Skeleton
             See `consumes`. A cloud is anything `glsk_o3d.skeletonize` takes.
         on_iteration : callable, optional
             Called with each IterationRecord of a contraction; return False to stop there and keep what is done.
@@ -74,7 +74,7 @@ class Filter(Parameters, Generic[Produced]):
 
         Returns
         -------
-        cloud, Contraction or Skeleton
+        cloud, Points, Contraction or Skeleton
             See `produces`.
 
         Raises

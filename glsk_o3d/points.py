@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 
 from .errors import StageError
 from .interop.clouds import cloud_counts, cloud_points, to_point_cloud
+from .numerics.frame import Frame, finite_points, to_working_frame
+from .numerics.grid_sampling import sample_cloud
 from .numerics.neighbourhoods import principal, sphericity
-from .preparation.frame import Frame, finite_points, to_working_frame
-from .preparation.sampling import sample_cloud
 from .report import Report
 
 Some = TypeVar("Some", bound="Representatives")
@@ -52,6 +52,9 @@ class Representatives:
     representative: np.ndarray
     report: Report
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} of {len(self.points)} points left)"
+
     def __len__(self) -> int:
         return len(self.survivors)
 
@@ -83,7 +86,7 @@ class Representatives:
         return np.where(known, values[self.representative_of_point], -1)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Points(Representatives):
     """A cloud on its way to its rings.
 

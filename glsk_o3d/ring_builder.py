@@ -91,6 +91,8 @@ class RingBuilder(Filter[Contraction]):
     def _run(self, points: Points, watch: Watch | None) -> Contraction:
         cloud = points.cloud[points.survivors]
         neighbours, normals = self._neighbourhoods(points, cloud)
+        if np.array_equal(points.ring_normals, points.normals):  # no point was moved or merged
+            points = replace(points, normals=normals)
         if self.radius is not None:
             radius = resolve_length(self.radius, points.frame.diagonal * points.frame.scale) / points.frame.scale
             neighbours = self._within(radius, cloud, neighbours)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -82,7 +82,13 @@ class Thinner(Filter[Points]):
             before, here = len(points), points.cloud[points.survivors]
             apart = spacing_enough(here, points.neighbours, points.spread, self.around)
             points = _merged(points, thin_nearer(here, points.neighbours, apart))
-        most = default_size(points.report.n_input - points.report.n_dropped) if self.thin_to == "auto" else self.thin_to
+        report = points.report
+        if report.is_sampled and self.thin_to != "auto" and self.thin_to > report.n_sampled:
+            told = (
+                f"Thinner.thin_to = {self.thin_to}: the Sampler left {report.n_sampled} points: set Sampler.size, too"
+            )
+            points = replace(points, report=report.with_warning(told))
+        most = default_size(report.n_input - report.n_dropped) if self.thin_to == "auto" else self.thin_to
         if most < len(points):
             points = _merged(points, thin(points.cloud[points.survivors], points.neighbours, most))
         return points

@@ -6,9 +6,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import OutlierRemover, RingBuilder, Sampler, samples
+from glsk_o3d.numerics.grid_sampling import sample_grid
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.outlier_remover import inliers
-from glsk_o3d.preparation.sampling import sample_grid
 
 K, N = 16, 12000
 SURFACE = samples.torus(N, ring_radius=0.4, radius=0.1).points

@@ -18,8 +18,8 @@ from glsk_o3d import (
     samples,
 )
 from glsk_o3d.denoiser import MOST_IN_ONE, average_noisy
+from glsk_o3d.numerics.grid_sampling import sample_grid
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
-from glsk_o3d.preparation.sampling import sample_grid
 from glsk_o3d.thinner import ENOUGH, default_size, spacing_enough, thin, thin_nearer
 
 PREPARED = Sampler() | OutlierRemover() | Denoiser()

@@ -25,7 +25,6 @@ ROWS = (
     },
     {"refinement": ("refinement",), "pipeline": ("pipeline",)},
     {"what filters share": ("parameters", "points", "state", "skeleton", "report", "decisions")},
-    {"preparation": ("preparation",)},
     {"numerics": ("numerics",), "other packages, and files": ("interop",), "samples": ("samples",)},
     {"errors": ("errors",)},
 )
@@ -34,7 +33,7 @@ ROWS = (
 ASIDE = {
     **dict.fromkeys(("cross-check", "pictures and windows", "files", "analysis", "refinement", "numerics"), -3.3),
     **{"MeshLab": 3.3, "filters of points": -2.5, "filters": 2.5},
-    **{"preparation": -1.2, "other packages, and files": 1.2, "samples": 3.7},
+    **{"other packages, and files": 1.2, "samples": 3.7},
 }
 """Where in the drawing the boxes are that are not in its middle."""
 

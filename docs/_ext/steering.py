@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
-ROOMS = ("numerics", "preparation", "refinement")
+ROOMS = ("numerics", "refinement")
 FILES = (
     *("points", "sampler", "outlier_remover", "denoiser", "thinner", "ring_builder"),
     *("contractor", "lpr_reducer", "stopping", "connector", "refiner", "tracer", "decisions"),

@@ -13,9 +13,9 @@ from ..contractor import Contractor
 from ..errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
 from ..interop.atomic import check_ending
 from ..interop.clouds import cloud_points
+from ..numerics.frame import MIN_POINTS
 from ..numerics.morton import morton_order
 from ..pipeline import Pipeline
-from ..preparation.frame import MIN_POINTS
 from ..recipes.catalogue import named_pipeline
 from ..ring_builder import RingBuilder
 from ..skeleton import Skeleton

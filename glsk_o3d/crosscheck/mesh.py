@@ -18,11 +18,11 @@ from ..interop.packages import import_open3d, require
 from ..io.meshes import mesh_arrays
 from ..lpr_reducer import LPRReducer
 from ..numerics.cotangent import WEIGHT_CAP
+from ..numerics.frame import MIN_POINTS
 from ..numerics.mesh_rings import clean_faces, mesh_rings, umbrellas
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.orientation import orient_normals
 from ..pipeline import Pipeline, with_stage
-from ..preparation.frame import MIN_POINTS
 from ..refiner import Refiner
 from ..report import Report
 from ..state import at_rest

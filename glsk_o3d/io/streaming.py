@@ -15,11 +15,11 @@ from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.clouds import SAMPLE_COUNT
 from ..interop.packages import import_open3d
+from ..numerics.frame import not_finite
+from ..numerics.grid_sampling import sample_blocks
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..pipeline import Pipeline
-from ..preparation.frame import not_finite
-from ..preparation.sampling import sample_blocks
 from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from ..sampler import Sampler
 from ..skeleton import Skeleton

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ..numerics.eigen import largest_eigenvalue
+from ..numerics.grid_sampling import sample_cloud
 from ..numerics.groups import component_labels, group_sum
 from ..numerics.near_links import link_growth, near_links
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import COLUMNS, ROWS, TINY
-from ..preparation.sampling import sample_cloud
 from ..skeleton import Skeleton
 from .diagnostics import SHEET_SHARE
 from .sections import VertexPoints

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InvalidCloudError
-from ..numerics.morton import morton_order
-from ..numerics.neighbourhoods import nearest_neighbours
+from .morton import morton_order
+from .neighbourhoods import nearest_neighbours
 
 FRAME_SIDE = 1.6  # published: longest side of the box
 CLOUD_SLACK = 1.2  # published: how much larger than the cloud the contracted one may be

@@ -5,7 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from glsk_o3d.preparation.sampling import sample_blocks, sample_cloud, sample_grid
+from glsk_o3d.numerics.grid_sampling import sample_blocks, sample_cloud, sample_grid
 from glsk_o3d.samples import torus
 
 

@@ -7,9 +7,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from ..numerics.morton import MORTON_BITS, morton_codes, sort_within
-from ..numerics.vectors import dot
 from .frame import check_extent
+from .morton import MORTON_BITS, morton_codes, sort_within
+from .vectors import dot
 
 GRID_TAIL = 0.001  # fitted: share of the points that may be far off, at either end of each axis
 TAIL_POINTS = 100000  # fitted: points by which that is told
