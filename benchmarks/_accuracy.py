@@ -20,10 +20,10 @@ from glsk_o3d.interop.atomic import write_atomically
 
 IDEAS = {
     "neighbours by size": "RingBuilder.k=published",
-    "frame that turns along": "RingBuilder.frame=box",
-    "thinning": "RingBuilder.thin_to=all",
-    "outliers set aside": "RingBuilder.outlier_factor=0",
-    "denoising": "RingBuilder.denoise=0",
+    "frame that turns along": "Sampler.frame=box",
+    "thinning": "Sampler.size=all Thinner.thin_to=all",
+    "outliers set aside": "OutlierRemover.outlier_factor=0",
+    "denoising": "Denoiser.denoise=0",
     "point reduction": "Contractor.reducer=none",
     "mass of merged points": "LPRReducer.conserve_mass=false",
     "mended rings": "LPRReducer.mend_rings=false",

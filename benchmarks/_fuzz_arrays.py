@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import glsk_o3d as glsk
-from glsk_o3d import GlskError, Pipeline, Skeleton, SkeletonWarning, samples
+from glsk_o3d import GlskError, Pipeline, Refiner, Sampler, Skeleton, SkeletonWarning, samples
 
 PIPELINES = ("default", "tree", "cao2010", "wen2024")
 FITTED_SLACK = 0.0501  # of the diagonal: what a fit to the axis may do, see FIT_BEYOND
@@ -283,8 +283,8 @@ def slack_of(pipeline: Pipeline) -> float:
     An axis is no farther out than that of a strip of a tube. What nobody has centred is where the contraction left it:
     in a box that is larger by a fifth, as published, or in a ball around it.
     """
-    rings, refiner = pipeline.stages[0], pipeline.stages[3]
-    if rings.frame == "box":
+    (sampler,), (refiner,) = ([it for it in pipeline.stages if isinstance(it, kind)] for kind in (Sampler, Refiner))
+    if sampler.frame == "box":
         return CONTRACTED_SLACK
     return FITTED_SLACK if refiner.recentre else np.inf
 

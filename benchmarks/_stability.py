@@ -14,9 +14,9 @@ from _tables import INK, LOOKS, Tables, good, grouped, keep, number, pick, plain
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import Pipeline
+from glsk_o3d import Contractor, LPRReducer, Pipeline
 from glsk_o3d.cli.overrides import override
-from glsk_o3d.pipelines import default
+from glsk_o3d.pipelines import rings
 
 
 def feet(points, nodes, edges):
@@ -84,7 +84,7 @@ def draw_stop(rows: list[dict], folder: Path) -> None:
 def tracking(case: Case) -> dict:
     """How far reduced contractions are from the one without reduction after as many solves, in local radii."""
     points, axis = case.load()
-    contraction = Pipeline(*default().stages[:2])
+    contraction = rings() | Contractor(reducer=LPRReducer())
     solves = len(contraction(points).report.iterations)
     contraction = with_solves(contraction, solves)
     full = override(contraction, ["Contractor.reducer=none"])(points).contracted

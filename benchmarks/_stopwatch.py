@@ -40,14 +40,15 @@ class Stage(NamedTuple):
 STAGES = {
     "order": Stage("numerics.morton:morton_order"),
     "kNN": Stage("numerics.neighbourhoods:nearest_neighbours,nearest_left"),
-    "outliers, noise": Stage(
-        "preparation.outliers:inliers preparation.surface:noise_share "
-        "preparation.denoising:average_noisy,subspace_mean_shift"
-    ),
+    "outliers, noise": Stage("outlier_remover:inliers points:noise_share denoiser:average_noisy,subspace_mean_shift"),
     "planes": Stage("numerics.neighbourhoods:principal"),
-    "thinning": Stage("preparation.sampling:sample_grid preparation.surface:thin,spacing_enough,thin_nearer"),
+    "thinning": Stage("numerics.grid_sampling:sample_grid thinner:thin,spacing_enough,thin_nearer"),
     "rings": Stage("numerics.rings:star_rings"),
-    "rest of the rings": Stage("ring_builder:RingBuilder._run", open=True),
+    "rest of the rings": Stage(
+        "sampler:Sampler._run outlier_remover:OutlierRemover._run denoiser:Denoiser._run thinner:Thinner._run "
+        "ring_builder:RingBuilder._run",
+        open=True,
+    ),
     "Laplacian": Stage("numerics.cotangent:cotangent_laplacian"),
     "lines": Stage("contractor:explained_variance"),
     "normal matrix": Stage("numerics.solver:solve_contraction", open=True),

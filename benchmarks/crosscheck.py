@@ -80,7 +80,7 @@ def verdicts(
 def curved(shape: str, n: int) -> dict:
     """Errors of the mean curvature normals of rings and of a ball-pivoting mesh, both with mixed Voronoi areas."""
     points, radius = _curved_cloud(shape, n)
-    state = RingBuilder(thin_to="all")(points)
+    state = RingBuilder()(points)
     cloud = state.frame.out_of(state.cloud)
     _, faces = ball_pivoting(state)
     exact = -cloud * [0, 1, 1] / radius**2 if shape == "cylinder" else -2 * cloud / radius**2

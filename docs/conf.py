@@ -29,7 +29,7 @@ extensions = [
     "generated",  # these are in _ext
     "keywords",
     "mathml",
-    "steering",
+    "steering_table",
     "options",
     "sidebar",
     "tables",
@@ -42,6 +42,7 @@ nitpicky = True
 nitpick_ignore = [
     ("py:class", "pymeshlab.pmeshlab.MeshSet"),
     ("py:class", "glsk_o3d.analysis.rows.Rows"),  # of the tables
+    ("py:class", "glsk_o3d.points.Representatives"),  # of Points and Contraction
     ("py:obj", "glsk_o3d.pipeline.Produced"),  # a type variable
 ]
 default_role = "autolink"

@@ -8,6 +8,7 @@ from . import samples as samples
 from .connector import Connector
 from .contractor import Contractor
 from .decisions import Decision, Supported
+from .denoiser import Denoiser
 from .driver import remove_redundant_points, skeletonize
 from .errors import (
     BatchError,
@@ -35,15 +36,19 @@ from .io.streaming import annotate_file, read_sample
 from .lpr_reducer import LPRReducer
 from .meshlab.layers import to_pymeshlab
 from .meshlab.meshset import MeshSet
+from .outlier_remover import OutlierRemover
 from .pipeline import Filter, Pipeline
+from .points import Points
 from .recipes import from_recipe, load_recipe, rerun, save_recipe, to_recipe
 from .refiner import Refiner
 from .report import IterationRecord, Report
 from .resampling import support
 from .ring_builder import RingBuilder
+from .sampler import Sampler
 from .skeleton import Skeleton
 from .state import Contraction
 from .stopping import ExplainedScore, RingSizeRatio
+from .thinner import Thinner
 from .tracer import Tracer
 from .viewing.page import ContractionRecorder, save_report
 from .viewing.plot import plot_skeleton
@@ -59,6 +64,7 @@ __all__ = [
     "ContractionRecorder",
     "Contractor",
     "Decision",
+    "Denoiser",
     "DisplayError",
     "ExplainedScore",
     "FileFormatError",
@@ -70,18 +76,22 @@ __all__ = [
     "LPRReducer",
     "MeshSet",
     "MissingPackageError",
+    "OutlierRemover",
     "Pipeline",
     "PluginWarning",
+    "Points",
     "RecipeError",
     "Refiner",
     "Report",
     "RingBuilder",
     "RingSizeRatio",
+    "Sampler",
     "ScriptError",
     "Skeleton",
     "SkeletonWarning",
     "StageError",
     "Supported",
+    "Thinner",
     "Tracer",
     "analysis",
     "annotate",

@@ -127,7 +127,7 @@ class Decision:
 
     @property
     def otherwise(self) -> str:
-        """The option with which the Refiner would have answered otherwise, such as ``"Refiner.limb=0.56"``."""
+        """The option with which the Refiner would have answered a close call otherwise, as ``"Refiner.limb=0.56"``."""
         question = QUESTIONS[self.about]
         if self.changed == question.changes_from:
             hundredths = math.ceil(100 * self.probability + 0.5)
@@ -139,7 +139,7 @@ class Decision:
         return f"{self.question}: {self.probability:.2f}, {self.outcome}"
 
 
-WELL_SUPPORTED = 0.8  # fitted: of the samples show what can be relied on, and do not show what is not there
+WELL_SUPPORTED = 0.8  # warning: of the samples show what can be relied on, and do not show what is not there
 
 
 @dataclass(frozen=True)

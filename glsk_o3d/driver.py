@@ -13,11 +13,13 @@ from .errors import InvalidCloudError, InvalidParameterError
 from .interop.clouds import open3d_class
 from .interop.packages import import_open3d
 from .lpr_reducer import LPRReducer
+from .parameters import check_number
 from .pipeline import Filter, OnIteration, OnState, Pipeline
 from .recipes import RECIPE_ENDINGS, load_recipe
 from .recipes.catalogue import named_pipeline
 from .ring_builder import RingBuilder
 from .skeleton import Skeleton
+from .state import Contraction
 
 
 def skeletonize(
@@ -96,7 +98,11 @@ def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathL
 
 
 def remove_redundant_points(
-    cloud: Any, *, passes: int = 1, rings: RingBuilder | None = None, reducer: LPRReducer | None = None
+    cloud: Any,
+    *,
+    passes: int = 1,
+    rings: Filter[Contraction] | Pipeline[Contraction] | None = None,
+    reducer: LPRReducer | None = None,
 ) -> tuple[Any, Any]:
     """Remove points that say little more about the skeleton than their neighbours, by local point reduction.
 
@@ -109,9 +115,8 @@ def remove_redundant_points(
         Not modified.
     passes : int
         Solves, each with a merging pass after it. They cost as much as the contraction of a skeleton.
-    rings : RingBuilder, optional
-        How the neighbourhoods are made. By default points are neither set aside nor denoised: outliers are for
-        ``remove_statistical_outlier``.
+    rings : RingBuilder, or a pipeline that ends with one, optional
+        How the neighbourhoods are made. By default points are neither set aside nor denoised.
     reducer : LPRReducer, optional
 
     Returns
@@ -136,12 +141,11 @@ def remove_redundant_points(
     >>> bool((reduced == points[kept]).all()), 500 < len(kept) < 700
     (True, True)
     """
-    if isinstance(passes, bool) or not isinstance(passes, (int, np.integer)) or passes < 1:
-        raise InvalidParameterError(f"passes = {passes!r}: must be an int of at least 1")
+    check_number("passes", passes, "int", low=1)
     name, tensor = open3d_class(cloud)
     if name == "TriangleMesh":
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
-    rings = RingBuilder(thin_to="all", outlier_factor=0, denoise=0) if rings is None else rings
+    rings = RingBuilder() if rings is None else rings
     reducer = LPRReducer() if reducer is None else reducer
     contraction = Contractor(reducer=reducer, max_iterations=int(passes), stop=lambda iterations: None)
     kept = np.sort((rings | contraction)(cloud).point_of_survivor)

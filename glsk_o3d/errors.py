@@ -65,6 +65,24 @@ def brief(error: object) -> str:
     return words if len(words) <= LONGEST_QUOTED else f"{words[:LONGEST_QUOTED]}..."
 
 
+def in_words(error: BaseException) -> str:
+    """What an error says, in one line; of a file that cannot be had, its name and why."""
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+MOVED = {
+    **dict.fromkeys(("around", "thin_to"), "it is Thinner's, a filter of its own ahead of the RingBuilder"),
+    **dict.fromkeys(("frame", "drop_invalid"), "it is Sampler's, a filter of its own at the beginning"),
+    "outlier_factor": "it is OutlierRemover's, a filter of its own behind the Sampler",
+    "denoise": "it is Denoiser's, a filter of its own behind the OutlierRemover",
+    **dict.fromkeys(("root", "surface"), "it is Tracer's, a filter of its own behind the Refiner"),
+    **dict.fromkeys(("reduce_above", "min_support"), "it is gone, leave it out"),
+}
+"""What became of parameters of before, which recipes and scripts may still have."""
+
+
 def did_you_mean(word: str, known: Iterable[str], what: str) -> str:
     """The message for an unknown word: the known one that was meant, or all that there are.
 
@@ -75,4 +93,6 @@ def did_you_mean(word: str, known: Iterable[str], what: str) -> str:
     close = difflib.get_close_matches(word.lower(), names, n=1)
     listed = f"there are {', '.join(names.values()) or 'none'}" if len(names) <= 40 else "and none is like it"
     hint = f"did you mean {names[close[0]]!r}?" if close else listed
+    if what.startswith("parameter"):  # in scripts with the filter's name ahead of it
+        hint = next((cure for old, cure in MOVED.items() if f"_{word}".endswith(f"_{old}")), hint)
     return f"no {what} is called {word!r}: {hint}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ PSI_FACTOR = 1.2  # published: psi' over psi
 AMPLIFICATION_SQUARED = 9  # published: s_L squared, in the code and not in the paper
 CURVATURE_WEIGHT = 3  # published: of U in F
 IN_PLANE_SINE = 1e-3  # fitted: sine of the angle below which a direction counts as lying in the tangent plane
-OF_SURVIVORS = ("survivors", "positions", "previous", "laplacian_coordinates", "mass", "ring_size0", "ring_size")
+OF_SURVIVORS = ("positions", "previous", "laplacian_coordinates", "mass", "ring_size0", "ring_size")
 MIN_SHRINKAGE = 1e-4  # published: floor of s - psi' s(0) in the working frame, as in the published code
 
 
@@ -96,16 +96,16 @@ class LPRReducer(Filter[Contraction]):
         representative = np.arange(n)
         representative[swallowed] = representatives
         keep = representative == np.arange(n)
-        index = np.cumsum(keep) - 1
+        index, survivors = np.cumsum(keep) - 1, state.survivors[keep]
         rings = state.rings.replace(representatives, combined).take(np.flatnonzero(keep)).rename(index[representative])
         if self.mend_rings:
-            rings = mend_rings(rings, state.cloud[state.survivors[keep]], state.normals[state.survivors[keep]])
+            rings = mend_rings(rings, state.cloud[survivors], state.normals[survivors])
         left = {name: getattr(state, name)[keep] for name in OF_SURVIVORS}
         if self.conserve_mass:
             left["mass"] = np.bincount(representative, state.mass, n)[keep]
-            _, left["ring_size0"] = rings.nearest(state.cloud[left["survivors"]])
+            _, left["ring_size0"] = rings.nearest(state.cloud[survivors])
             _, left["ring_size"] = rings.nearest(left["positions"])
-        return replace(state, **left, representative=index[representative][state.representative], rings=rings)
+        return state.merged_into(representative, rings=rings, **left)
 
 
 def merge_energy(state: Contraction) -> np.ndarray:

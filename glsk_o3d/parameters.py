@@ -43,7 +43,7 @@ def parameter(
         One sentence; it appears in the class's docstring and in ``glsk filters``.
     type : {"int", "float", "bool", "length", "point", "choice", "reducer", "stop"}, optional
         By default that of `default`, of a string "choice". A length is a float in the cloud's units or a string such
-        as ``"2%"`` of the diagonal of the box that `RingBuilder.frame` names, a point a string such as ``"0.5,0,2"``.
+        as ``"2%"`` of the diagonal of the box that `Sampler.frame` names, a point a string such as ``"0.5,0,2"``.
         A trailing ``?`` allows None.
     unit : str
     low, high : float, optional
@@ -170,6 +170,14 @@ def problem_with(value: Any, facts: Any) -> str | None:
     return _problem_with_number(value, kind == "int", facts)
 
 
+def check_number(name: str, value: Any, type: str = "float", **limits: Any) -> Any:
+    """A number of a type and within limits of `parameter`; InvalidParameterError for anything else."""
+    problem = problem_with(value, parameter(None, "", type=type, **limits).metadata)
+    if problem:
+        raise InvalidParameterError(f"{name} = {shown(value)}: {problem}")
+    return float(value) if type == "float" else value
+
+
 def _problem_with_number(value: Any, whole: bool, facts: Any) -> str | None:
     low, high, above = facts["low"], facts["high"], facts["open_low"]
     fraction = isinstance(value, Rational) and not isinstance(value, Integral)  # arrays hold none
@@ -217,7 +225,7 @@ def resolve_length(length: float | str, diagonal: float) -> float:
     ----------
     length : float or str
     diagonal : float
-        In the cloud's units: of the bounding box or of the box with the spread of the points, as `RingBuilder.frame`
+        In the cloud's units: of the bounding box or of the box with the spread of the points, as `Sampler.frame`
         says.
 
     Returns

@@ -14,6 +14,7 @@ from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageEr
 from .interop.clouds import Cloud, cloud_points
 from .interop.packages import following_open3d
 from .parameters import UNWRITTEN, Parameters
+from .points import Points
 from .report import STOPPED_BY_CALLER, IterationRecord, Report, warn
 from .skeleton import Skeleton
 from .state import Contraction
@@ -24,9 +25,12 @@ Watch: TypeAlias = Callable[[Contraction], bool | None]
 Produced = TypeVar("Produced", covariant=True)
 Next = TypeVar("Next")
 
-FLOWS = (Cloud, Contraction, Skeleton)
+FLOWS = (Cloud, Points, Contraction, Skeleton)
 """What runs between filters."""
-ORDER = "the order is RingBuilder | Contractor | Connector | Refiner | Tracer"
+ORDER = (
+    "the order is Sampler | OutlierRemover | Denoiser | Thinner | RingBuilder | Contractor | Connector | Refiner | "
+    "Tracer"
+)
 RECIPE_VERSION = 1
 SOLVED = (
     "solve %(iteration)d: %(n_points)d points, %(n_merged)d merged, e %(explained).4f, De %(explained_change).4f, "
@@ -45,12 +49,12 @@ class Filter(Parameters, Generic[Produced]):
     --------
     >>> from glsk_o3d import Connector, RingBuilder
     >>> [flow.__name__ for flow in (RingBuilder.consumes, RingBuilder.produces, Connector.produces)]
-    ['Cloud', 'Contraction', 'Skeleton']
+    ['Points', 'Contraction', 'Skeleton']
     """
 
     kind: ClassVar[str] = "filter"
     consumes: ClassVar[type] = Cloud
-    """What the filter takes: `Cloud`, `Contraction` or `Skeleton`."""
+    """What the filter takes: `Cloud`, `Points`, which may be a cloud too, `Contraction` or `Skeleton`."""
     produces: ClassVar[type] = Contraction
     """What it gives. A cloud, which only a filter of clouds gives, carries no report: pipelines tell of its stage."""
 
@@ -61,7 +65,7 @@ class Filter(Parameters, Generic[Produced]):
 
         Parameters
         ----------
-        data : cloud, Contraction or Skeleton
+        data : cloud, Points, Contraction or Skeleton
             See `consumes`. A cloud is anything `glsk_o3d.skeletonize` takes.
         on_iteration : callable, optional
             Called with each IterationRecord of a contraction; return False to stop there and keep what is done.
@@ -70,7 +74,7 @@ class Filter(Parameters, Generic[Produced]):
 
         Returns
         -------
-        cloud, Contraction or Skeleton
+        cloud, Points, Contraction or Skeleton
             See `produces`.
 
         Raises
@@ -91,10 +95,12 @@ class Filter(Parameters, Generic[Produced]):
         What a filter warns of may be mended by the next.
         """
         name = type(self).__name__
-        if not _is_of(data, self.consumes):
+        if not (_is_of(data, self.consumes) or (_is_of(data, Cloud) and self.takes_clouds())):
             raise StageError(f"{name} takes a {_named(self.consumes)}, not a {type(data).__name__}: {ORDER}")
         start = time.perf_counter()
         with following_open3d():
+            if self.consumes is Points and not isinstance(data, Points):
+                data = Points.of(data)
             result = self._ran(data, _watch(on_iteration, on_state))
             seconds = time.perf_counter() - start
             _log.debug("%s took %.3f s: %r", name, seconds, result)
@@ -107,6 +113,11 @@ class Filter(Parameters, Generic[Produced]):
         except InvalidCloudError as error:
             raise InvalidCloudError(f"{name} gave no usable cloud: {error}") from error
         return result
+
+    @classmethod
+    def takes_clouds(cls) -> bool:
+        """Whether a cloud will do; of one that wants `Points` all are taken, as by ``Sampler(size="all")``."""
+        return cls.consumes in (Cloud, Points)
 
     def __or__(self, other: Filter[Next] | Pipeline[Next]) -> Pipeline[Next]:
         return Pipeline(self) | other
@@ -150,7 +161,7 @@ class Pipeline(Generic[Produced]):
             if not isinstance(stage, Filter):
                 raise InvalidParameterError(f"{stage!r} is not a filter and cannot be part of a pipeline")
         for before, after in pairwise(stages):
-            if before.produces != after.consumes:
+            if before.produces != after.consumes and not (before.produces is Cloud and after.takes_clouds()):
                 raise InvalidParameterError(
                     f"{type(after).__name__} takes a {_named(after.consumes)} but {type(before).__name__} gives a "
                     f"{_named(before.produces)}: {ORDER}"
@@ -187,11 +198,11 @@ class Pipeline(Generic[Produced]):
         for stage in self.stages:
             if on_stage is not None:
                 on_stage(stage)
-            start = time.perf_counter()
+            start, given = time.perf_counter(), cloud
             cloud = stage.run(cloud, on_iteration=on_iteration, on_state=on_state)
             if stage.produces is Cloud:
                 ahead = with_stage(ahead, stage, time.perf_counter() - start)
-            elif ahead.stages and stage.consumes is Cloud:
+            elif ahead.stages and not isinstance(given, FLOWS[1:]):
                 cloud = dataclasses.replace(cloud, report=after(cloud.report, ahead))
         warn_of(cloud, data)
         return cloud
@@ -203,7 +214,7 @@ class Pipeline(Generic[Produced]):
 
     def check_complete(self) -> None:
         """Raise InvalidParameterError unless the pipeline leads from a cloud to a skeleton."""
-        if self.stages[0].consumes is not Cloud or self.stages[-1].produces is not Skeleton:
+        if not self.stages[0].takes_clouds() or self.stages[-1].produces is not Skeleton:
             raise InvalidParameterError(f"{self!r} does not lead from a cloud to a skeleton")
 
     def with_options(self, options: Mapping[str, Any] | None = None, /, **named: Any) -> Pipeline[Produced]:
@@ -233,7 +244,7 @@ class Pipeline(Generic[Produced]):
         --------
         >>> from glsk_o3d import pipelines
         >>> thin = pipelines.default().with_options({"Connector.radius": "2%"}, k=12, reducer=None)
-        >>> thin.stages[0].k, thin.stages[1].reducer, thin.stages[2].radius
+        >>> thin.stages[4].k, thin.stages[5].reducer, thin.stages[6].radius
         (12, None, '2%')
         """
         pipeline: Any = self

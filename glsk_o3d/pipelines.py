@@ -7,13 +7,18 @@ from typing import Any
 
 from .connector import Connector
 from .contractor import Contractor
+from .denoiser import Denoiser
 from .lpr_reducer import LPRReducer
+from .outlier_remover import OutlierRemover
 from .parameters import Parameters
 from .pipeline import Pipeline
 from .refiner import Refiner
 from .ring_builder import RingBuilder
+from .sampler import Sampler
 from .skeleton import Skeleton
+from .state import Contraction
 from .stopping import ExplainedScore, RingSizeRatio
+from .thinner import Thinner
 from .tracer import Tracer
 
 
@@ -22,7 +27,7 @@ def cao2010() -> Pipeline[Skeleton]:
 
     Examples
     --------
-    >>> cao2010().stages[1].reducer is None
+    >>> cao2010().stages[2].reducer is None
     True
     """
     return _published(stop=RingSizeRatio(), max_iterations=20)
@@ -36,7 +41,7 @@ def wen2024() -> Pipeline[Skeleton]:
 
     Examples
     --------
-    >>> wen2024().stages[1].reducer.conserve_mass
+    >>> wen2024().stages[2].reducer.conserve_mass
     False
     """
     reducer = LPRReducer(conserve_mass=False, order="index", mend_rings=False)
@@ -46,7 +51,8 @@ def wen2024() -> Pipeline[Skeleton]:
 def _published(**contraction: Any) -> Pipeline[Skeleton]:
     """What both published pipelines have in common: none of what this package adds."""
     return (
-        RingBuilder(k="published", thin_to="all", outlier_factor=0, denoise=0, frame="box")
+        Sampler(size="all", frame="box")
+        | RingBuilder(k="published")
         | Contractor(min_attraction=0, line_hold=1, keep_last=False, retries=0, **contraction)
         | Connector(radius="2%", thickness=0, links="nearest")
         | Refiner(collapse="degree", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)
@@ -62,7 +68,7 @@ def default() -> Pipeline[Skeleton]:
     >>> default()(torus(1000).points).n_loops
     1
     """
-    return RingBuilder() | Contractor(reducer=LPRReducer()) | Connector() | Refiner() | Tracer()
+    return rings() | Contractor(reducer=LPRReducer()) | Connector() | Refiner() | Tracer()
 
 
 def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
@@ -82,7 +88,20 @@ def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
     >>> grown.n_components, grown.n_loops, len(grown.leaves)
     (1, 0, 3)
     """
-    return RingBuilder() | Contractor(reducer=LPRReducer()) | Connector() | Refiner(handle=1) | Tracer(root=root)
+    return rings() | Contractor(reducer=LPRReducer()) | Connector() | Refiner(handle=1) | Tracer(root=root)
+
+
+def rings() -> Pipeline[Contraction]:
+    """From a cloud to its rings, through all that a scan needs: what `default` begins with.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> state = (rings() | Contractor())(torus(1000).points)
+    >>> len(state.contracted)
+    1000
+    """
+    return Sampler() | OutlierRemover() | Denoiser() | Thinner() | RingBuilder()
 
 
 PIPELINES: dict[str, Callable[[], Pipeline[Skeleton]]] = {
@@ -91,6 +110,9 @@ PIPELINES: dict[str, Callable[[], Pipeline[Skeleton]]] = {
 
 BUILTIN: dict[str, type[Parameters]] = {
     cls.__name__: cls
-    for cls in (RingBuilder, Contractor, LPRReducer, Connector, Refiner, Tracer, ExplainedScore, RingSizeRatio)
+    for cls in (
+        *(Sampler, OutlierRemover, Denoiser, Thinner, RingBuilder),
+        *(Contractor, LPRReducer, Connector, Refiner, Tracer, ExplainedScore, RingSizeRatio),
+    )
 }
 """The filters and stopping rules of this package, in the order in which they run."""

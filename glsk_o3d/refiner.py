@@ -94,7 +94,7 @@ class Refiner(Filter[Skeleton]):
         asks = self.handle or self.limb or self.air or self.bridge
         if len(skeleton.edges) and len(skeleton.supporting_points) and (asks or self.recentre):
             skeleton = self._decide(skeleton, surface)
-        if self.recentre:
+        if self.recentre and len(skeleton.vertices):
             size = binary_size(skeleton)  # fourth powers of lengths must not overflow
             skeleton = scaled(regrow_ends(move_junctions(scaled(skeleton, 1 / size))), size)
         return measured(skeleton)

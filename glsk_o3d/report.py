@@ -164,7 +164,7 @@ class Report:
     >>> report.n_input, report.converged, report.warnings
     (1000, True, ())
     >>> list(report.seconds)
-    ['RingBuilder', 'Contractor', 'Connector', 'Refiner', 'Tracer']
+    ['Sampler', 'OutlierRemover', 'Denoiser', 'Thinner', 'RingBuilder', 'Contractor', 'Connector', 'Refiner', 'Tracer']
     """
 
     n_input: int = 0
@@ -194,8 +194,7 @@ class Report:
     versions: dict[str, str] = field(default_factory=_versions)
 
     def with_warning(self, message: str) -> Report:
-        """This report with a warning in it; also issued, see `warn`."""
-        warn([message])
+        """This report with a warning in it; pipelines, and filters called by themselves, issue it in the end."""
         return dataclasses.replace(self, warnings=(*self.warnings, message))
 
     @property

@@ -16,13 +16,14 @@ from .analysis.comparison import matched
 from .analysis.curves import along, pieces
 from .decisions import Supported
 from .driver import chosen_pipeline
-from .errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
+from .errors import InvalidCloudError, SkeletonWarning
 from .numerics.cycles import minimum_cycle_basis
 from .numerics.groups import component_labels
 from .numerics.polylines import arc_lengths, place_at
 from .numerics.vectors import TINY, norm
+from .parameters import check_number
 from .pipeline import Pipeline
-from .report import Report
+from .report import Report, warn
 from .skeleton import Skeleton
 
 SAMPLE_SHARE = 0.8  # fitted: of the points in each sample; halves doubt more that is right
@@ -93,6 +94,7 @@ def support(
     >>> [(it.about, it.share) for it in ring.report.support], float(ring.support.min())
     ([('branch', 1.0), ('loop', 1.0)], 1.0)
     """
+    check_number("draws", draws, "int", low=2)
     chosen = chosen_pipeline(pipeline, options)
     return with_support(chosen(cloud), chosen, draws, seed=seed, on_draw=on_draw)
 
@@ -109,8 +111,6 @@ def with_support(
 
     The other arguments are those of `support`.
     """
-    if isinstance(draws, bool) or not isinstance(draws, (int, np.integer)) or draws < 2:
-        raise InvalidParameterError(f"draws = {draws!r}: must be an int of at least 2")
     points = skeleton.points[skeleton.vertex_of_point >= 0]
     others, rng = [], np.random.default_rng(seed)
     for draw in range(draws):
@@ -159,6 +159,7 @@ def _supported(skeleton: Skeleton, others: list[Skeleton]) -> Skeleton:
     report = replace(skeleton.report, n_draws=len(curves), n_agreeing=same, support=tuple(supported))
     if same <= WORTH_A_WARNING * len(curves):
         report = report.with_warning(_doubt(report))
+        warn(report.warnings[-1:])
     return replace(skeleton, support=support, report=report)
 
 

@@ -224,12 +224,23 @@ class Skeleton:
         Parameters
         ----------
         color : three floats in [0, 1]
+
+        Raises
+        ------
+        InvalidParameterError, MissingPackageError
         """
+        try:
+            paint = np.asarray(color, float)
+        except (TypeError, ValueError):
+            paint = np.empty(0)
+        if paint.shape != (3,) or not ((paint >= 0) & (paint <= 1)).all():
+            words = "must be three numbers from 0 to 1; glsk_o3d.to_line_set takes words, too"
+            raise InvalidParameterError(f"color = {color!r}: {words}")
         o3d = import_open3d()
         lines = o3d.geometry.LineSet()
         lines.points = o3d.utility.Vector3dVector(np.ascontiguousarray(self.vertices))
         lines.lines = o3d.utility.Vector2iVector(np.ascontiguousarray(self.edges, np.int32))
-        lines.paint_uniform_color(np.asarray(color, float))
+        lines.paint_uniform_color(paint)
         return lines
 
 

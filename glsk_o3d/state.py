@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from .numerics.rings import Rings
-from .preparation.frame import Frame
-from .report import Report
+from .points import Representatives
 
 
 def at_rest(positions: np.ndarray, rings: Rings) -> dict[str, Any]:
@@ -29,32 +28,13 @@ def at_rest(positions: np.ndarray, rings: Rings) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Contraction:
+class Contraction(Representatives):
     """A cloud on its way to its skeleton.
 
-    Arrays over the N input points are in the user's order and units. Everything else lives in the working frame
-    (`frame`): m distinct points in Morton order, n of which survive.
+    Of what `Points` has, all but the neighbourhoods; the arrays over the survivors, and then:
 
     Attributes
     ----------
-    points : (N, 3) float64 array
-        The input.
-    representative_of_point : (N,) int array
-        Row of `cloud` that each input point is; -1 if it was dropped as not finite.
-    outlier, sampled : (N,) bool array
-        Input points that were set aside, whose distinct point is the nearest one, and those that say where the surface
-        is: no outliers, and of a large cloud a sample.
-    frame : Frame
-    cloud : (m, 3) float64 array
-        Distinct input points; noisy ones denoised, and where there are many, means of several.
-    noise : (m,) float64 array
-        How far the neighbourhood of each is noise, from 0 to 1.
-    normals : (m, 3) float64 array
-        Unit normals of the tangent planes before points were moved to ridges, up to their sign.
-    survivors : (n,) int array
-        Rows of `cloud` still there, ascending.
-    representative : (m,) int array
-        The survivor (0 .. n-1) that each distinct point was merged into; itself for a survivor.
     positions, previous : (n, 3) float64 array
         Contracted positions, and those before the last solve.
     laplacian_coordinates : (n, 3) float64 array
@@ -70,7 +50,6 @@ class Contraction:
         psi: a(t-1) - a(t), the drop of the ring ratio in the last solve; a(1) after the first, 0 before it.
     mean_ring_edge, contraction_weight : float
         Mean over the points of the mean ring edge of the uncontracted cloud, and w_L of the last solve, 0 before it.
-    report : Report
 
     Examples
     --------
@@ -81,16 +60,6 @@ class Contraction:
     (True, (500,))
     """
 
-    points: np.ndarray
-    representative_of_point: np.ndarray
-    outlier: np.ndarray
-    sampled: np.ndarray
-    frame: Frame
-    cloud: np.ndarray
-    noise: np.ndarray
-    normals: np.ndarray
-    survivors: np.ndarray
-    representative: np.ndarray
     positions: np.ndarray
     previous: np.ndarray
     laplacian_coordinates: np.ndarray
@@ -101,31 +70,14 @@ class Contraction:
     ring_ratio_drop: float
     mean_ring_edge: float
     contraction_weight: float
-    report: Report
 
     def __repr__(self) -> str:
         return f"Contraction({len(self)} of {len(self.points)} points left after {len(self.report.iterations)} solves)"
-
-    def __len__(self) -> int:
-        return len(self.survivors)
 
     @property
     def contracted(self) -> np.ndarray:
         """Contracted positions of the survivors in the user's units, (n, 3) float64 array."""
         return self.frame.out_of(self.positions)
-
-    @property
-    def survivor_of_point(self) -> np.ndarray:
-        """For every input point the survivor that speaks for it, (N,) int array; -1 for dropped points."""
-        return np.where(self.representative_of_point >= 0, self.representative[self.representative_of_point], -1)
-
-    @property
-    def point_of_survivor(self) -> np.ndarray:
-        """For every survivor the first input point that it is, (n,) int array."""
-        points = np.flatnonzero(self.sampled)[::-1]  # of several writes the last one stays
-        first = np.empty(len(self.cloud), int)
-        first[self.representative_of_point[points]] = points
-        return first[self.survivors]
 
     @property
     def ring_ratio(self) -> float:

@@ -13,6 +13,7 @@ from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .refinement.diagnostics import measured
 from .refinement.evidence import in_order
+from .refinement.thin_parts import may_lack_surface
 from .refinement.tracing import trace
 from .skeleton import Skeleton
 
@@ -24,6 +25,7 @@ class Tracer(Filter[Skeleton]):
 
     Where the cloud shows no surface, the curve is replaced by shortest paths through the points. With a `root` all is
     made one tree: gaps are joined, loops opened, vertex 0 is the root, and every edge leads from parent to child.
+    Without, and with a surface everywhere, it is as it was.
 
     Warns
     -----
@@ -66,4 +68,6 @@ class Tracer(Filter[Skeleton]):
                     object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))
 
     def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
+        if self.root is None and not (self.surface and may_lack_surface(given, self.surface)):
+            return given  # as most are: sorting many points would take longer than all else
         return in_order(lambda skeleton: measured(trace(skeleton, self.surface, self.root)), given)

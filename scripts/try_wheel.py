@@ -15,7 +15,7 @@ import venv
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-USERS = ("pictures", "crosscheck", "meshlab", "las", "e57", "cluster", "full")
+USERS = ("pictures", "crosscheck", "meshlab", "las", "e57", "graph", "cluster", "full")
 BENCH = "bench"  # the wheel beside it, with glsk-bench
 TABLE = "x,y,z,tree\n" + "".join(f"{x},{y},{z},{x % 2}\n" for x in range(40) for y in (0, 1, 2) for z in (0, 1, 2))
 COMMANDS = """\
@@ -33,6 +33,7 @@ branches s.json -o branches.csv
 tree t.json --unit m -o cylinders.csv
 grasps s.json --opening 0.3 -o grasps.json
 rig s.json -o rig.glb --cut-loops
+convert s.json s.graphml
 edit t.json -o e.json --prune-order 1
 convert t.json t.swc t.glb t.urdf
 evaluate s.json demo/cloud.ply

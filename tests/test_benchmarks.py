@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import Tracer, pipelines, read_cloud
+from glsk_o3d import Denoiser, OutlierRemover, Thinner, Tracer, pipelines, read_cloud
 from glsk_o3d.batch import run_batch
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.samples import torus
@@ -166,7 +166,7 @@ class TestArithmetic:
         assert lines[0] == ["default", "0.100 / 1", "0.300 / 1", "0.200 / 2", ""]
         names = [line[0] for line in lines[1:]]
         assert names == ["without denoising", "without air cut", "without spurs cut", "cao2010"]
-        assert lines[1] == ["without denoising", "0.500 / 1", "0.100 / 1", "0.300 / 2", "`RingBuilder.denoise=0`"]
+        assert lines[1] == ["without denoising", "0.500 / 1", "0.100 / 1", "0.300 / 2", "`Denoiser.denoise=0`"]
 
     def test_what_ideas_are_worth(self, parts):
         """Pairs of the same cloud; a failure has the wrong topology, and no error to compare."""
@@ -195,11 +195,11 @@ class TestArithmetic:
         rows = [row(), row(variant="noise1_512", error=0.3)]
         rows += [row(pipeline="denoising"), row(pipeline="denoising", variant="noise1_512", error=0.5, topology=False)]
         page = tmp_path / "page.md"
-        page.write_text("| a | 1 before<br>`RingBuilder.denoise=0`: ? |\n| b | `Refiner.limb=0`: old |\n")
+        page.write_text("| a | 1 before<br>`Denoiser.denoise=0`: ? |\n| b | `Refiner.limb=0`: old |\n")
         told = "0.200 / 2 → 0.300 / 1; noise1_512: 0.300 / 1 → 0.500 / 0"
         for _ in range(2):
             parts.accuracy.write_effects(page, rows)
-            expected = f"| a | 1 before<br>`RingBuilder.denoise=0`: {told} |\n| b | `Refiner.limb=0`: old |\n"
+            expected = f"| a | 1 before<br>`Denoiser.denoise=0`: {told} |\n| b | `Refiner.limb=0`: old |\n"
             assert page.read_text() == expected
 
     def test_feet_on_a_square(self, parts):
@@ -217,11 +217,17 @@ def test_all_ideas_off_are_the_publications(parts):
     off = {name: setting.split() for name, setting in parts.accuracy.IDEAS.items()}
     published = ("point reduction", "stop by score")
     wen = chain.from_iterable(setting for name, setting in off.items() if name not in published)
-    assert override(pipelines.default(), wen).stages == (*pipelines.wen2024().stages, Tracer(surface=0))
+    idle = (OutlierRemover(outlier_factor=0), Denoiser(denoise=0), Thinner(thin_to="all", around=20))
+
+    def with_idle(make):
+        sampler, *others = make().stages
+        return (sampler, *idle, *others, Tracer(surface=0))
+
+    assert override(pipelines.default(), wen).stages == with_idle(pipelines.wen2024)
     absent = ("LPRReducer.", "ExplainedScore.")
     left = (setting for setting in chain.from_iterable(off.values()) if not setting.startswith(absent))
     without = override(pipelines.default(), [*left, "Contractor.max_iterations=20"])
-    assert without.stages == (*pipelines.cao2010().stages, Tracer(surface=0))
+    assert without.stages == with_idle(pipelines.cao2010)
 
 
 @pytest.mark.parametrize("n", [0, 1, 6])

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
-from glsk_o3d import Connector, Contractor, LPRReducer, RingBuilder, Skeleton, pipelines, samples
+from glsk_o3d import Connector, Contractor, LPRReducer, RingBuilder, Sampler, Skeleton, pipelines, samples
 
-VARIANTS = {name: make().stages[2] for name, make in pipelines.PIPELINES.items()}
+VARIANTS = {
+    name: next(stage for stage in make().stages if isinstance(stage, Connector))
+    for name, make in pipelines.PIPELINES.items()
+}
 ONE_RADIUS = VARIANTS["cao2010"]
 
 
 def contracted(points, reducer=None):
-    return Contractor(reducer=reducer, max_iterations=3)(RingBuilder(drop_invalid=True)(points))
+    return Contractor(reducer=reducer, max_iterations=3)((Sampler(drop_invalid=True) | RingBuilder())(points))
 
 
 @pytest.fixture(scope="module", params=[None, LPRReducer()], ids=["all points", "reduced"])
@@ -51,7 +54,7 @@ def test_vertices_are_the_weighted_means_of_their_points_and_rings_join_them(sta
 @pytest.mark.parametrize(("frame", "share"), [("box", 2), ("spread", 5)])
 def test_percentages_and_units_agree(frame, share):
     sample = samples.y_junction(n=800).points * 250
-    state = Contractor(max_iterations=3)(RingBuilder(frame=frame)(sample))
+    state = Contractor(max_iterations=3)((Sampler(frame=frame) | RingBuilder())(sample))
     # of the box with the spread of the points: a^2 / 12 is the variance of one side, evenly filled
     diagonal = np.linalg.norm(np.ptp(sample, axis=0) if frame == "box" else np.sqrt(12) * sample.std(axis=0))
     a, b = (replace(ONE_RADIUS, radius=radius)(state) for radius in (f"{share}%", share / 100 * diagonal))

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE, BENCHMARK = ROOT / "glsk_o3d", ROOT / "benchmarks" / "src" / "glsk_bench"
 ROOMS = (
-    *(PACKAGE / name for name in ("numerics", "preparation", "refinement", "analysis", "crosscheck")),
+    *(PACKAGE / name for name in ("numerics", "refinement", "analysis", "crosscheck")),
     *(BENCHMARK, BENCHMARK / "shapes"),
 )
 sys.path.insert(0, str(ROOT / "docs" / "_ext"))

@@ -9,6 +9,7 @@ from glsk_o3d import (
     InvalidCloudError,
     InvalidParameterError,
     LPRReducer,
+    OutlierRemover,
     RingBuilder,
     remove_redundant_points,
     samples,
@@ -69,7 +70,7 @@ def test_duplicates_and_outliers():
     assert max(kept) < 1500  # the first of each
     far = np.concatenate([POINTS, [[3.0, 0, 0]]])
     assert 1500 in remove_redundant_points(far)[1]  # no business of this filter
-    assert 1500 not in remove_redundant_points(far, rings=RingBuilder())[1]
+    assert 1500 not in remove_redundant_points(far, rings=OutlierRemover() | RingBuilder())[1]
 
 
 def test_parameters():

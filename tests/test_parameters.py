@@ -16,6 +16,7 @@ from glsk_o3d import (
     Refiner,
     RingBuilder,
     RingSizeRatio,
+    Sampler,
     Tracer,
     samples,
 )
@@ -76,7 +77,7 @@ def test_a_parameter_of_any_type_takes_its_words_and_no_others(word):
         RingBuilder(k=word).check()
     RingBuilder(k="auto").check()
     assert "k : 'auto' or 'published' or int [points], default 'auto'" in RingBuilder.__doc__
-    assert "frame : 'spread' or 'box', default 'spread'" in RingBuilder.__doc__  # only words
+    assert "frame : 'spread' or 'box', default 'spread'" in Sampler.__doc__  # only words
 
 
 @pytest.mark.parametrize(("cls", "field"), fields(), ids=lambda x: getattr(x, "__name__", None) or x.name)
@@ -102,7 +103,9 @@ def test_parameters_of_a_part_are_checked_too():
         (RingBuilder() | Contractor(reducer=LPRReducer(phi=0)))(POINTS)
 
 
-@pytest.mark.parametrize("made", [cls() for cls in DESCRIBED] + [RingBuilder(k=17, drop_invalid=True)], ids=repr)
+@pytest.mark.parametrize(
+    "made", [cls() for cls in DESCRIBED] + [RingBuilder(k=17), Sampler(drop_invalid=True)], ids=repr
+)
 def test_repr_rebuilds_the_filter(made):
     assert eval(repr(made), PUBLIC) == made
 

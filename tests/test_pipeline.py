@@ -15,14 +15,19 @@ from glsk_o3d import (
     Connector,
     Contraction,
     Contractor,
+    Denoiser,
     InvalidParameterError,
     LPRReducer,
+    OutlierRemover,
     Pipeline,
+    Points,
     Refiner,
     RingBuilder,
     RingSizeRatio,
+    Sampler,
     Skeleton,
     StageError,
+    Thinner,
     Tracer,
     pipelines,
     samples,
@@ -30,7 +35,7 @@ from glsk_o3d import (
 )
 from glsk_o3d.analysis import compare
 
-FILTERS = (RingBuilder, Contractor, LPRReducer, Connector, Refiner)
+FILTERS = (Sampler, OutlierRemover, Denoiser, Thinner, RingBuilder, Contractor, LPRReducer, Connector, Refiner)
 NAMES = tuple(pipelines.PIPELINES)
 PUBLIC = {name: getattr(glsk, name) for name in glsk.__all__}
 POINTS = samples.y_junction(n=500).points
@@ -57,12 +62,17 @@ def flow():
     """What comes out of every stage, by its class."""
     points = samples.torus(n=200).points
     contracted = Contractor(max_iterations=1)(RingBuilder()(points))
-    return {Cloud: points, Contraction: contracted, Skeleton: Connector()(contracted)}
+    return {Cloud: points, Points: Sampler()(points), Contraction: contracted, Skeleton: Connector()(contracted)}
 
 
 @pytest.mark.parametrize(
     ("cls", "given"),
-    [(cls, kind) for cls in FILTERS for kind in (Cloud, Contraction, Skeleton) if cls.consumes is not kind],
+    [
+        (cls, kind)
+        for cls in FILTERS
+        for kind in (Cloud, Points, Contraction, Skeleton)
+        if not (cls.consumes is kind or (kind is Cloud and cls.takes_clouds()))
+    ],
 )
 def test_what_belongs_elsewhere_is_refused(cls, given, flow):
     with pytest.raises(StageError, match=cls.__name__):
@@ -160,10 +170,11 @@ def test_parameters_of_all_stages_are_checked_before_any_work():
 
 
 def test_options_by_full_and_by_short_name():
-    builder, contractor, connector, refiner, tracer = pipelines.default().stages
+    *prepare, builder, contractor, connector, refiner, tracer = pipelines.default().stages
     varied = pipelines.default().with_options({"RingBuilder.k": 24, "phi": 2e5}, spacing=1)
     assert varied == (
-        dataclasses.replace(builder, k=24)
+        Pipeline(*prepare)
+        | dataclasses.replace(builder, k=24)
         | dataclasses.replace(contractor, reducer=LPRReducer(phi=2e5))
         | connector
         | dataclasses.replace(refiner, spacing=1)
@@ -183,10 +194,10 @@ def test_options_reach_every_filter_of_the_name():
 @pytest.mark.parametrize("order", [1, -1])
 def test_what_is_put_in_may_be_varied_too(order):
     options = [("RingSizeRatio.threshold", 0.5), ("stop", RingSizeRatio()), ("phi", 7.0), ("reducer", LPRReducer())]
-    contractor = pipelines.cao2010().with_options(dict(options[::order])).stages[1]
+    contractor = pipelines.cao2010().with_options(dict(options[::order])).stages[2]
     assert contractor.stop == RingSizeRatio(0.5)
     assert contractor.reducer == LPRReducer(phi=7.0)
-    assert pipelines.default().with_options(reducer=None).stages[1].reducer is None
+    assert pipelines.default().with_options(reducer=None).stages[5].reducer is None
     for gone in ([("phi", 3), ("reducer", None)], [("threshold", 0.5), ("stop", max)]):  # options of nothing
         with pytest.raises(InvalidParameterError, match=gone[0][0]):
             pipelines.default().with_options(dict(gone[::order]))
@@ -197,8 +208,9 @@ def test_what_is_put_in_may_be_varied_too(order):
     [
         ({"spaceing": 3}, {}, "'spacing'"),  # did you mean
         ({"RingBuilder.spacing": 3}, {}, "no parameter of RingBuilder"),
-        ({"Ringbuilder.k": 3}, {}, "which has RingBuilder, "),
-        ({"RingSizeRatio.threshold": 3}, {}, "which has RingBuilder, "),
+        ({"RingBuilder.denoise": 3}, {}, "it is Denoiser's"),
+        ({"Ringbuilder.k": 3}, {}, "which has Sampler, "),
+        ({"RingSizeRatio.threshold": 3}, {}, "which has Sampler, "),
         ({"radius": 3}, {}, "'RingBuilder.radius' or 'Connector.radius'"),
         ({"": 3}, {}, "''"),
         ({1: 2}, {}, "1"),
@@ -219,14 +231,16 @@ def test_options_that_are_none_or_wrong_or_given_twice(options, named, words):
 
 @pytest.mark.slow
 def test_skeletonize_takes_options():
-    by_hand = (RingBuilder(k=24) | Contractor(reducer=LPRReducer()) | Connector() | Refiner() | Tracer())(POINTS)
+    prepare = Sampler() | OutlierRemover() | Denoiser() | Thinner()
+    rest = Contractor(reducer=LPRReducer()) | Connector() | Refiner() | Tracer()
+    by_hand = (prepare | RingBuilder(k=24) | rest)(POINTS)
     assert_same(skeletonize(POINTS, k=24), by_hand)
     assert_same(skeletonize(POINTS, {"RingBuilder.k": 24}), by_hand)
     assert_same(skeletonize(POINTS, "default", k=24), by_hand)
     assert_same(skeletonize(POINTS, pipelines.default(), **{"RingBuilder.k": 24}), by_hand)
     assert_same(skeletonize(POINTS, {"spacing": 1}, k=24), skeletonize(POINTS, spacing=1, k=24))
     varied = skeletonize(POINTS, "cao2010", **{"Connector.radius": "4%"})
-    assert glsk.from_recipe(varied.report.recipe).stages[2].radius == "4%"
+    assert glsk.from_recipe(varied.report.recipe).stages[3].radius == "4%"
 
 
 # ---- skeletonize

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import glsk_o3d as glsk
-from glsk_o3d import Refiner, Report, Skeleton, SkeletonWarning, pipelines, samples
+from glsk_o3d import Refiner, Report, Skeleton, SkeletonWarning, Tracer, pipelines, samples
 
-PUBLISHED = pipelines.cao2010().stages[3]
+PUBLISHED = pipelines.cao2010().stages[-1]
 
 
 def refined(skeleton, filter):
@@ -19,6 +19,12 @@ def refined(skeleton, filter):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SkeletonWarning)
         return filter(skeleton)
+
+
+def test_nothing_stays_nothing():
+    none = np.empty((0, 3))
+    nothing = Skeleton(none, np.empty((0, 2)), np.empty(0), np.empty(0), none, none)
+    assert len(Tracer(root="z")(Refiner()(nothing)).vertices) == 0
 
 
 @pytest.mark.parametrize("filter", [PUBLISHED, Refiner()], ids=["published", "recommended"])

@@ -2,11 +2,24 @@
 
 import dataclasses
 import json
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
-from glsk_o3d import Contractor, Decision, Report, RingBuilder, SkeletonWarning, samples
+from glsk_o3d import (
+    Contraction,
+    Contractor,
+    Decision,
+    Filter,
+    Pipeline,
+    Report,
+    RingBuilder,
+    SkeletonWarning,
+    pipelines,
+    samples,
+)
 
 
 @pytest.fixture(scope="module")
@@ -52,12 +65,34 @@ def test_sampled_only_where_a_cloud_was_large(counts, sampled):
     assert Report(n_input=n, n_dropped=dropped, n_sampled=kept).is_sampled is sampled
 
 
-def test_warnings_are_issued_and_kept():
-    with pytest.warns(SkeletonWarning, match="first"):
-        report = Report().with_warning("first")
-    with pytest.warns(SkeletonWarning, match="second"):
-        report = report.with_warning("second")
-    assert report.warnings == ("first", "second")
+@dataclass(frozen=True, kw_only=True)
+class Doubt(Filter[Contraction]):
+    """A filter of somebody else's that warns."""
+
+    consumes: ClassVar[type] = Contraction
+    produces: ClassVar[type] = Contraction
+
+    def _run(self, given, watch):
+        return replace(given, report=given.report.with_warning("doubtful: so it is"))
+
+
+def test_what_filters_warn_of_is_issued_once_and_kept():
+    """In a pipeline and by hand, whatever the Refiner and the Tracer say of the skeleton."""
+    rings, others = pipelines.rings(), pipelines.default().stages[5:]
+    points = samples.sheet(900).points
+    with pytest.warns(SkeletonWarning) as issued:
+        skeleton = (rings | Doubt() | Pipeline(*others))(points)
+    assert [message.partition(":")[0] for message in skeleton.report.warnings] == ["doubtful", "sheet-like"]
+    assert [str(each.message) for each in issued] == list(skeleton.report.warnings)
+
+    state = rings(points)
+    with pytest.warns(SkeletonWarning) as issued:
+        state = Doubt()(state)
+    assert [str(each.message) for each in issued] == ["doubtful: so it is"]
+    with pytest.warns(SkeletonWarning) as issued:
+        by_hand = Pipeline(*others)(state)
+    assert by_hand.report.warnings == skeleton.report.warnings
+    assert [str(each.message) for each in issued] == list(skeleton.report.warnings)[1:]
 
 
 JUDGEMENTS = (

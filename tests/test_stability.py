@@ -49,7 +49,7 @@ def test_ties_are_decided_by_place_not_by_number(name, pipeline):
 def test_a_sample_of_a_large_grid_is_one_of_its_places():
     points = np.round(40 * samples.torus(9000).points, 1)
     order = np.random.default_rng(0).permutation(len(points))
-    skeleton, shuffled = (glsk.skeletonize(each, thin_to=500) for each in (points, points[order]))
+    skeleton, shuffled = (glsk.skeletonize(each, size=1000, thin_to=500) for each in (points, points[order]))
     assert skeleton.report.n_sampled < len(points)
     np.testing.assert_array_equal(shuffled.vertices, skeleton.vertices)
     np.testing.assert_array_equal(shuffled.edges, skeleton.edges)

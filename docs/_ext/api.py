@@ -32,15 +32,20 @@ NAMES = {
         "Fewer points, without a skeleton": ("remove_redundant_points",),
     },
     "filters": {
+        "Preparing a cloud": ("Sampler", "OutlierRemover", "Denoiser", "Thinner"),
         "The five filters": ("RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner"),
         "Thin parts and trees": ("Tracer",),
         "When to stop": ("ExplainedScore", "RingSizeRatio"),
     },
     "pipelines": {
         "Joining filters": ("Pipeline", "Filter"),
-        "What runs through them": ("Cloud", "Contraction", "annotate_contraction"),
+        "What runs through them": ("Cloud", "Points", "Contraction", "annotate_contraction"),
     },
-    "named_pipelines": {"To work with": ("default", "tree"), "As they were published": ("wen2024", "cao2010")},
+    "named_pipelines": {
+        "To work with": ("default", "tree"),
+        "The first half": ("rings",),
+        "As they were published": ("wen2024", "cao2010"),
+    },
     "recipes": {
         "Writing and reading": ("save_recipe", "load_recipe", "to_recipe", "from_recipe"),
         "The same result again": ("rerun",),

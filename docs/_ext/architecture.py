@@ -19,10 +19,12 @@ ROWS = (
     {"files": ("io",), "driver": ("driver", "resampling")},
     {"analysis": ("analysis", "editing"), "recipes and plugins": ("recipes",)},
     {"named pipelines": ("pipelines",)},
-    {"filters": ("ring_builder", "contractor", "lpr_reducer", "connector", "refiner", "tracer", "stopping")},
+    {
+        "filters of points": ("sampler", "outlier_remover", "denoiser", "thinner", "ring_builder"),
+        "filters": ("contractor", "lpr_reducer", "connector", "refiner", "tracer", "stopping"),
+    },
     {"refinement": ("refinement",), "pipeline": ("pipeline",)},
-    {"what filters share": ("parameters", "state", "skeleton", "report", "decisions")},
-    {"preparation": ("preparation",)},
+    {"what filters share": ("parameters", "points", "state", "skeleton", "report", "decisions")},
     {"numerics": ("numerics",), "other packages, and files": ("interop",), "samples": ("samples",)},
     {"errors": ("errors",)},
 )
@@ -30,7 +32,8 @@ ROWS = (
 
 ASIDE = {
     **dict.fromkeys(("cross-check", "pictures and windows", "files", "analysis", "refinement", "numerics"), -3.3),
-    **{"MeshLab": 3.3, "preparation": -1.2, "other packages, and files": 1.2, "samples": 3.7},
+    **{"MeshLab": 3.3, "filters of points": -2.5, "filters": 2.5},
+    **{"other packages, and files": 1.2, "samples": 3.7},
 }
 """Where in the drawing the boxes are that are not in its middle."""
 
@@ -132,7 +135,7 @@ def draw():
     for box, modules in (item for row in ROWS for item in row.items()):
         x, y = place[box]
         names = "" if modules == (box,) else ", ".join(modules)
-        half = 1.2 if len(names) < 25 else 1.6 if len(names) < 45 else 2.6
+        half = 1.2 if len(names) < 25 else 1.6 if len(names) < 45 else 2.4
         style = dict(boxstyle="round,pad=0,rounding_size=0.08", facecolor="#f3f0ea", edgecolor="#333333", linewidth=0.8)
         axes.add_patch(FancyBboxPatch((x - half, y - 0.25), 2 * half, 0.5, **style))
         axes.text(x, y + 0.09 * bool(names), box, ha="center", va="center", fontsize=9, color="#222222")

@@ -222,15 +222,15 @@ def tree(seed, forks=3):
 # ------------------------------------------------------------------------------------------------- pages of the filters
 
 
-def ring_builder():
+def denoiser():
     rng = np.random.default_rng(1)
     points = samples.y_junction(3000, noise=0.02).points
     low, high = points.min(axis=0), points.max(axis=0)
     points = np.concatenate([points, rng.uniform(low - 0.05, high + 0.05, (40, 3))])
-    state = glsk.RingBuilder()(points)
-    figure, axes = panels(["a cloud with 2 % noise and 40 outliers", "what the rings are made of; red: set aside"])
+    state = (glsk.OutlierRemover() | glsk.Denoiser())(points)
+    figure, axes = panels(["a cloud with 2 % noise and 40 outliers", "denoised; red: set aside"])
     dots(axes[0], points, INK, 2.5)
-    dots(axes[1], state.frame.out_of(state.cloud), INK, 2.5)
+    dots(axes[1], state.coordinates, INK, 2.5)
     dots(axes[1], points[state.outlier], RED, 7)
     same_scale(axes)
     return figure
@@ -238,7 +238,7 @@ def ring_builder():
 
 def contractor():
     points = animal()
-    state = (glsk.RingBuilder() | glsk.Contractor())(points)
+    state = (glsk.pipelines.rings() | glsk.Contractor())(points)
     figure, axes = panels(["the scan", f"after {len(state.report.iterations)} solves"], 0.8)
     dots(axes[0], points)
     dots(axes[1], points)
@@ -249,7 +249,7 @@ def contractor():
 
 def lpr_reducer():
     points = animal()
-    rings = glsk.RingBuilder()(points)
+    rings = glsk.pipelines.rings()(points)
     whole, less = glsk.Contractor()(rings), glsk.Contractor(reducer=glsk.LPRReducer())(rings)
     figure, axes = panels([f"without: {len(whole)} points", f"with: {len(less)} points, larger for more mass"], 0.8)
     dots(axes[0], whole.contracted, RED, 2)
@@ -260,7 +260,7 @@ def lpr_reducer():
 
 def connector():
     points = animal()
-    state = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()))(points)
+    state = (glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()))(points)
     raw = glsk.Connector()(state)
     figure, axes = panels(["contracted points", f"{len(raw.vertices)} vertices, {len(raw.edges)} edges"], 0.8)
     dots(axes[0], state.contracted, INK, 3)
@@ -272,7 +272,7 @@ def connector():
 
 def refiner():
     points = animal()
-    raw = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(points)
+    raw = (glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(points)
     fine = glsk.Refiner()(raw)
     figure, axes = panels(
         [f"before: {raw.n_loops} loops, counting triangles", f"after: {fine.n_loops} loop, {len(fine.leaves)} ends"],
@@ -289,7 +289,8 @@ def stopping():
     points = animal()
     figure = Figure((2 * SIDE, 0.8 * SIDE), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
-    records = (glsk.RingBuilder() | glsk.Contractor(max_iterations=8, stop=lambda _: None))(points).report.iterations
+    contraction = glsk.pipelines.rings() | glsk.Contractor(max_iterations=8, stop=lambda _: None)
+    records = contraction(points).report.iterations
     for axes, name, threshold, label in zip(
         figure.subplots(1, 2), ("explained_change", "drop"), (0.03, 0.01), ("De", "a(t−1) − a(t)"), strict=True
     ):
@@ -306,7 +307,7 @@ def stopping():
 
 def hull():
     """A neighbourhood in its plane, the Delaunay star of its centre, and the hull of the inverted neighbours."""
-    state = glsk.RingBuilder(around=0)(samples.torus(2000, noise=0.004).points)
+    state = glsk.RingBuilder()(samples.torus(2000, noise=0.004).points)
     rings = state.rings
     cloud = state.cloud[state.survivors]
     even = [lengths.min() / lengths.max() for lengths in np.split(rings.edge_lengths(cloud), rings.indptr[1:-1])]
@@ -342,7 +343,7 @@ def hull():
 def contraction():
     points = animal()
     recorder = glsk.ContractionRecorder()
-    (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()))(points, on_state=recorder)
+    (glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()))(points, on_state=recorder)
     left = [len(points), *(len(np.unique(places, axis=0)) for places in recorder.positions[1:])]
     shown = range(len(recorder.positions))
     titles = [f"solve {t}: {left[t]} points" if t else f"the scan: {left[0]} points" for t in shown]
@@ -366,7 +367,7 @@ def reduction():
 
 def mass():
     points = samples.torus(4096).points
-    rings = glsk.RingBuilder(around=0)(points)
+    rings = glsk.RingBuilder()(points)
     variants = (None, glsk.LPRReducer(), glsk.LPRReducer(conserve_mass=False))
     states = [
         glsk.Contractor(reducer=reducer, stop=lambda records: None, max_iterations=4)(rings) for reducer in variants
@@ -387,7 +388,7 @@ def centring():
     """A cross-section of a bent tube seen from one side only, before and after the fit to the axis."""
     torus = samples.torus(6000)
     points = torus.points[torus.points[:, 2] > 0]
-    built = glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector()
+    built = glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector()
     raw = built(points)
     figure, axes = panels(["before the fit", "after it: where the normals meet"], 0.75)
     for each, passes in zip(axes, (0, 3), strict=True):
@@ -413,7 +414,7 @@ def centring():
 
 def loop_test():
     points = animal(6000)
-    raw = (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(points)
+    raw = (glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(points)
     skeleton = glsk.Refiner()(raw)
     figure, axes = panels(
         ["before: every loop of four edges and more", "after: the circle fits through the handle"], 0.8
@@ -471,7 +472,7 @@ def limits():
 
 FIGURES = (
     *(showcase, card_robots, card_trees, card_shapes),
-    *(ring_builder, contractor, lpr_reducer, connector, refiner, stopping),
+    *(denoiser, contractor, lpr_reducer, connector, refiner, stopping),
     *(hull, contraction, reduction, mass, centring, loop_test, limits),
 )
 

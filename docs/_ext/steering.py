@@ -5,14 +5,15 @@ import dataclasses
 import re
 from pathlib import Path
 
-from docutils import nodes
-from docutils.parsers.rst import Directive
-
 PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
-ROOMS = ("numerics", "preparation", "refinement")
-FILES = ("ring_builder", "contractor", "lpr_reducer", "stopping", "connector", "refiner", "tracer", "decisions")
-ORIGINS = ("published", "derived", "measured", "fitted", "speed")
-"""Where numbers come from; those for speed, such as the sizes of blocks, change no result."""
+ROOMS = ("numerics", "refinement")
+FILES = (
+    *("points", "sampler", "outlier_remover", "denoiser", "thinner", "ring_builder"),
+    *("contractor", "lpr_reducer", "stopping", "connector", "refiner", "tracer", "decisions"),
+)
+ORIGINS = ("published", "derived", "measured", "fitted", "speed", "warning")
+"""Where numbers come from. Those for speed, such as the sizes of blocks, change no result, and those of warnings only
+what is said about one."""
 ORIGIN = re.compile(rf"\b({'|'.join(ORIGINS)})\b", re.IGNORECASE)
 
 
@@ -112,6 +113,10 @@ def weights():
     return found
 
 
+EVEN = ("handle", "air", "bridge", "limb")
+"""Options that are probabilities."""
+
+
 def defaults():
     """The numbers that are defaults of options in `default`."""
     from glsk_o3d import pipelines
@@ -124,6 +129,8 @@ def defaults():
             value = getattr(part, field.name)
             if re.fullmatch(r"[\d.e+-]+%?", str(value)) and type(value) is not bool:
                 where = "published" if theirs.get((type(part), field.name)) == value else "fitted"
+                if field.name in EVEN and value == 0.5:
+                    where = "derived"  # where both answers are equally likely
                 found.append(Number(type(part).__name__, field.name, str(value), where, field.metadata["doc"]))
     return found
 
@@ -131,34 +138,6 @@ def defaults():
 def steering():
     """All that steer, as a list of Number."""
     return [number for number in [*defaults(), *weights(), *all_constants()] if number.steers]
-
-
-class Steering(Directive):
-    """``{steering}``: the table."""
-
-    def run(self):
-        rows = [(f"{each.place}", each.name, each.value, each.origin, each.what) for each in steering()]
-        table = nodes.table(classes=["numbers"])
-        group = nodes.tgroup(cols=5)
-        table += group
-        for width in (18, 20, 10, 10, 60):
-            group += nodes.colspec(colwidth=width)
-        head, body = nodes.thead(), nodes.tbody()
-        group += [head, body]
-        for part, lines in ((head, [("where", "number", "value", "origin", "what")]), (body, rows)):
-            for line in lines:
-                row = nodes.row()
-                part += row
-                for column, text in enumerate(line):
-                    code = part is body and column in (1, 2)
-                    shown = nodes.literal(text=text) if code else nodes.Text(text)
-                    row += nodes.entry("", nodes.paragraph("", "", shown))
-        return [nodes.paragraph(text=f"{len(rows)} numbers:"), table]
-
-
-def setup(app):
-    app.add_directive("steering", Steering)
-    return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """
-What the five filters do
-========================
+What the filters do
+===================
 
 The one call is a pipeline of filters. Here each runs by itself, so that you can look at what lies between.
 """
@@ -14,12 +14,14 @@ from glsk_o3d.samples import sauropod
 cloud = sauropod(4096, noise=0.002).points
 
 # %%
-# **Rings**: which neighbours surround each point. **Contraction**: the rings' Laplacian draws the points inwards,
+# **Preparation**: a scan of any size becomes points without outliers, noise and more of them than it takes. **Rings**:
+# which neighbours surround each point. **Contraction**: the rings' Laplacian draws the points inwards,
 # while local point reduction (**LPR**) merges those that say little more than their neighbours. **Connection**:
 # clusters of contracted points become a graph. **Refinement**: the graph becomes a curve in the middle of the
 # surface. **Tracing** is for twigs that show no surface; here it finds nothing to do.
 
-rings = glsk.RingBuilder()(cloud)
+prepared = (glsk.Sampler() | glsk.OutlierRemover() | glsk.Denoiser() | glsk.Thinner())(cloud)
+rings = glsk.RingBuilder()(prepared)
 contracted = glsk.Contractor(reducer=glsk.LPRReducer())(rings)
 graph = glsk.Connector()(contracted)
 skeleton = glsk.Tracer()(glsk.Refiner()(graph))
@@ -55,7 +57,11 @@ print(
 # Joined with ``|`` the filters are the recommended pipeline, and give the same to the last bit.
 
 pipeline = (
-    glsk.RingBuilder()
+    glsk.Sampler()
+    | glsk.OutlierRemover()
+    | glsk.Denoiser()
+    | glsk.Thinner()
+    | glsk.RingBuilder()
     | glsk.Contractor(reducer=glsk.LPRReducer())
     | glsk.Connector()
     | glsk.Refiner()

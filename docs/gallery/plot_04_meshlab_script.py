@@ -56,7 +56,7 @@ print(skeleton)
 
 # %%
 # The skeleton is one open curve with the coil's two turns. In the right picture no outlier is left; any that a filter
-# misses would be set aside by :class:`glsk_o3d.RingBuilder`.
+# misses would be set aside by :class:`glsk_o3d.OutlierRemover`.
 
 figure = plt.figure(figsize=(9, 4.5), layout="constrained")
 left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))

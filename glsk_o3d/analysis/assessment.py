@@ -11,11 +11,11 @@ from scipy.spatial.distance import cdist
 
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
+from ..numerics.frame import check_extent
 from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.neighbourhoods import nearest_neighbours, plane_axes
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import dot, norm, unit
-from ..preparation.frame import check_extent
 from ..skeleton import Skeleton
 from .loops import opening_cycles
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidParameterError
+from ..numerics.cycles import minimum_cycle_basis
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import norm
 from ..refinement.rooted import root_among
@@ -284,15 +285,15 @@ def _mean(values, weights):
 
 def _kinds(skeleton, paths):
     """The kind of every path, see `BranchTable`."""
-    import networkx
-
-    graph = networkx.Graph(skeleton.edges.tolist())
-    bridges = {frozenset(edge) for edge in networkx.bridges(graph)} if len(graph) else set()
+    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+    on_loops = {
+        frozenset(edge) for cycle in cycles for edge in zip(cycle.tolist(), np.roll(cycle, -1).tolist(), strict=True)
+    }
 
     def kind(path):
         if len(path) == 1:
             return "isolated"
-        if frozenset(path[:2].tolist()) not in bridges:
+        if frozenset(path[:2].tolist()) in on_loops:
             return "loop"
         return "tip" if (skeleton.degree[path[[0, -1]]] == 1).any() else "inner"
 

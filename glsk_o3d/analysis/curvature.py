@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..errors import InvalidParameterError
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, norm
+from ..parameters import check_number
 from ..skeleton import Skeleton
 
 # All fitted, on circles, helices and skeletons of sampled clouds.
@@ -54,8 +54,7 @@ def curvature_torsion(skeleton: Skeleton, window: float | None = None) -> tuple[
     >>> bool(abs(np.median(curvature) - 1 / 0.4) < 0.1)  # the axis is a circle of radius 0.4
     True
     """
-    if window is not None and not (np.isfinite(window) and window > 0):
-        raise InvalidParameterError(f"window = {window!r}: must be a length above 0, in the cloud's units")
+    check_number("window", window, "float?", low=0, open_low=True)
     curvature, torsion = np.full((2, len(skeleton.vertices)), np.nan)
     for path in skeleton.branches:
         half = window or WINDOW_RADII * float(np.median(skeleton.radii[path]))

@@ -1,15 +1,12 @@
-"""Curves as arrays of edges, and as places along these; and numbers that are given, checked."""
+"""Curves as arrays of edges, and as places along these."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidParameterError
 from ..numerics.vectors import norm
-from ..parameters import parameter, problem_with, shown
 
 MOST_PLACES = 10**7  # derived: on a curve; the arrays of so many take a gigabyte
 
@@ -85,11 +82,3 @@ def simple_edges(edges):
     """Edges, (E, 2) int array, as pairs i < j, sorted, each once, and none from a node to itself."""
     edges = np.unique(np.sort(edges, axis=1), axis=0)
     return edges[edges[:, 0] != edges[:, 1]]
-
-
-def check_number(name: str, value: Any, type: str = "float", **limits: Any) -> Any:
-    """A number of a type and within limits of `parameters.parameter`; InvalidParameterError for anything else."""
-    problem = problem_with(value, parameter(None, "", type=type, **limits).metadata)
-    if problem:
-        raise InvalidParameterError(f"{name} = {shown(value)}: {problem}")
-    return float(value) if type == "float" else value

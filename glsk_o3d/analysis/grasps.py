@@ -12,9 +12,10 @@ import numpy as np
 from ..errors import InvalidParameterError, SkeletonWarning
 from ..interop.clouds import cloud_points
 from ..numerics.polylines import arc_lengths
+from ..parameters import check_number
 from ..report import outside
 from ..skeleton import Skeleton
-from .curves import check_number, check_places
+from .curves import check_places
 from .grasp_checks import Ways, free_ways, obstacle_list
 from .gripper import GraspCandidates, Gripper, listed
 

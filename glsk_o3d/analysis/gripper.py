@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InvalidParameterError
 from ..interop.atomic import write_atomically, write_json
 from ..interop.packages import import_open3d, require
-from .curves import check_number
+from ..parameters import check_number
 from .rows import Rows
 
 # Published: shapes of the Franka Hand in its maker's description (franka_description, franka_hand.xacro), which opens

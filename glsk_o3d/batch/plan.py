@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..driver import as_pipeline
-from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
+from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.packages import require_for
 from ..io.scan import parsed
 from ..io.skeletons import skeleton_ending
@@ -168,16 +168,24 @@ def plan_batch(
 class Wanted:
     """The options of `plan_batch`, checked before a batch looks at any cloud, and what follows from them."""
 
-    pipeline: Pipeline | Filter | str | os.PathLike = "default"
-    formats: Sequence[str] = ("ply",)
-    preview: bool = False
-    cut_loops: bool = False
-    recursive: bool = False
-    where: str | None = None
-    by: str | None = None
-    tiles: float | None = None
-    overlap: float | None = None
-    force: bool = False
+    pipeline: Pipeline | Filter | str | os.PathLike
+    formats: Sequence[str]
+    preview: bool
+    cut_loops: bool
+    recursive: bool
+    where: str | None
+    by: str | None
+    tiles: float | None
+    overlap: float | None
+    force: bool
+
+    @classmethod
+    def of(cls, options: dict[str, Any]) -> Wanted:
+        """Some options by name, and the defaults of the others; InvalidParameterError for a name that is none."""
+        defaults = plan_batch.__kwdefaults__ or {}
+        for name in options.keys() - defaults.keys():
+            raise InvalidParameterError(did_you_mean(name, defaults, "option of a batch"))
+        return cls(**{**defaults, **options})
 
     def __post_init__(self) -> None:
         chosen = as_pipeline(self.pipeline)

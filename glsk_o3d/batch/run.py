@@ -19,6 +19,7 @@ from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
 from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
+from ..parameters import check_number
 from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STALE, Row, locked, refuse_ways_out
 from .plan import RECIPE_FILE, TILES_FOLDER, UP_TO_DATE, Plan, Wanted, planned
 from .splitting import PARTS_FOLDER
@@ -131,9 +132,8 @@ def run_batch(
     """
     if scheduler is not None and (executor is not None or workers is not None):
         raise InvalidParameterError("scheduler: the cluster has its own workers: give neither workers nor an executor")
-    if workers is not None and workers < 1:
-        raise InvalidParameterError(f"workers = {workers}: must be at least 1")
-    wanted, folder = Wanted(**options), Path(os.path.abspath(out_dir))
+    check_number("workers", workers, "int?", low=1)
+    wanted, folder = Wanted.of(options), Path(os.path.abspath(out_dir))
     new = [each for each in (folder, *folder.parents) if not each.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     refuse_ways_out(folder, [LOCK_FILE])

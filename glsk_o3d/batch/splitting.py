@@ -19,7 +19,7 @@ from ..interop.atomic import write_json
 from ..io.formats import ply
 from ..io.scan import COLOR_CHANNELS, Scan
 from ..io.scans import read_blocks
-from ..preparation.frame import not_finite
+from ..numerics.frame import not_finite
 from .grid import Grid, tile_name, tile_of
 
 PARTS_FOLDER = ".parts"

@@ -20,7 +20,7 @@ import numpy as np
 
 from .. import __version__
 from ..analysis.summary import summary
-from ..errors import GlskError, InvalidCloudError
+from ..errors import GlskError, InvalidCloudError, in_words
 from ..io.scans import read_cloud
 from ..io.skeletons import read_skeleton, save_skeleton
 from ..io.streaming import sample_for
@@ -150,10 +150,8 @@ def in_one_line(error: BaseException) -> str:
     """An error in one line; of a mistake in the code also the place."""
     if isinstance(error, MemoryError):
         return f"out of memory {error}".strip()
-    if isinstance(error, OSError) and error.strerror and error.filename is not None:
-        return f"{error.filename}: {error.strerror}"
     if isinstance(error, GlskError | OSError):
-        return " ".join(str(error).split()) or type(error).__name__
+        return in_words(error)
     place = traceback.extract_tb(error.__traceback__)
     where = f" ({os.path.basename(place[-1].filename)}, line {place[-1].lineno})" if place else ""
     return " ".join(f"{type(error).__name__}: {error}{where}".split())

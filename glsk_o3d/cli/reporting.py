@@ -14,7 +14,7 @@ from pathlib import Path
 
 import typer
 
-from ..errors import GlskError, InvalidCloudError, InvalidParameterError, PluginWarning, SkeletonWarning
+from ..errors import GlskError, InvalidCloudError, InvalidParameterError, PluginWarning, SkeletonWarning, in_words
 from ..interop.interrupts import counted_interrupts
 from ..interop.packages import import_open3d
 from .console import echo, flags, say
@@ -84,9 +84,7 @@ def _message(problem: BaseException) -> str:
         return "interrupted; no file is half-written"
     if isinstance(problem, MemoryError):
         return f"out of memory ({problem}): thin the cloud first, for example with voxel_down_sample"
-    if isinstance(problem, OSError) and problem.strerror and problem.filename is not None:
-        return f"{problem.filename}: {problem.strerror}"
-    return str(problem) or type(problem).__name__
+    return in_words(problem)
 
 
 @contextmanager

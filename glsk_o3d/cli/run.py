@@ -54,7 +54,7 @@ def run(
     with progress(not flags.quiet and not flags.verbose) as update:
         update(f"reading {scan.name}")
         load_open3d()
-        if any(step.needs_pymeshlab for step in steps):
+        if any(step.verb is None for step in steps):
             from ..meshlab.meshset import MeshSet
 
             layers: Any = MeshSet()

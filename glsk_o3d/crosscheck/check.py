@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,12 +13,13 @@ from ..contractor import Contractor
 from ..errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
 from ..interop.atomic import check_ending
 from ..interop.clouds import cloud_points
+from ..numerics.frame import MIN_POINTS
 from ..numerics.morton import morton_order
 from ..pipeline import Pipeline
-from ..preparation.frame import MIN_POINTS
 from ..recipes.catalogue import named_pipeline
 from ..ring_builder import RingBuilder
 from ..skeleton import Skeleton
+from ..thinner import Thinner
 from ..viewing import figures
 from . import agreement
 from .mesh import COVERED_SHARE, SURFACES, mesh_skeleton, surface_of
@@ -133,7 +134,7 @@ def cross_check(
         a pair of arrays (V, 3) and (F, 3). "auto" is ball pivoting, or Poisson where that closes less than 70 % of the
         rings.
     pipeline : Pipeline or str
-        RingBuilder | Contractor | ... | Refiner. The mesh's skeleton is made with the same parameters but without
+        ... | RingBuilder | Contractor | ... | Refiner. The mesh's skeleton is made with the same parameters but without
         reduction.
     max_points : int or None
         Larger clouds are thinned to so many points, evenly along their Morton curve. None for no limit.
@@ -159,9 +160,9 @@ def cross_check(
     ('agrees', (1, 1))
     """
     pipeline = named_pipeline(pipeline) if isinstance(pipeline, str) else pipeline
-    first = pipeline.stages[0] if isinstance(pipeline, Pipeline) else None
-    if not isinstance(first, RingBuilder) or not any(isinstance(stage, Contractor) for stage in pipeline.stages):
-        raise InvalidParameterError(f"pipeline = {pipeline!r}: must start with a RingBuilder and have a Contractor")
+    kinds = [type(stage) for stage in pipeline.stages] if isinstance(pipeline, Pipeline) else []
+    if RingBuilder not in kinds or Contractor not in kinds:
+        raise InvalidParameterError(f"pipeline = {pipeline!r}: must have a RingBuilder and a Contractor")
     if isinstance(mesh, str) and mesh not in ("auto", *SURFACES):
         raise InvalidParameterError(f"mesh = {mesh!r}: must be 'auto', {', '.join(map(repr, SURFACES))}, or a mesh")
     if max_points is not None and not (isinstance(max_points, int | np.integer) and max_points >= MIN_POINTS):
@@ -171,8 +172,9 @@ def cross_check(
     pipeline.check_complete()
     given = cloud_points(cloud)
     points = _thinned(given, max_points)
-    state = replace(first, thin_to="all")(points)
-    skeleton = Pipeline(*pipeline.stages[1:])(state)
+    rings = kinds.index(RingBuilder) + 1
+    state = Pipeline(*(stage for stage in pipeline.stages[:rings] if not isinstance(stage, Thinner)))(points)
+    skeleton = Pipeline(*pipeline.stages[rings:])(state)
     surface, vertices, faces = surface_of(state, mesh)
     numbers, rows = agreement.compare_rows(state, vertices, faces)
     if rows.compared == 0 and surface == "given":

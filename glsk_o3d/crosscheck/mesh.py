@@ -12,17 +12,17 @@ from scipy.sparse import diags_array
 from scipy.spatial import cKDTree
 
 from ..contractor import Contractor
-from ..errors import InvalidCloudError, SkeletonWarning
+from ..errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
 from ..interop.clouds import to_point_cloud
 from ..interop.packages import import_open3d, require
 from ..io.meshes import mesh_arrays
 from ..lpr_reducer import LPRReducer
 from ..numerics.cotangent import WEIGHT_CAP
+from ..numerics.frame import MIN_POINTS
 from ..numerics.mesh_rings import clean_faces, mesh_rings, umbrellas
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.orientation import orient_normals
 from ..pipeline import Pipeline, with_stage
-from ..preparation.frame import MIN_POINTS
 from ..refiner import Refiner
 from ..report import Report
 from ..state import at_rest
@@ -80,7 +80,10 @@ def without_bare(vertices, faces):
 def surface_of(state, mesh):
     """The name of a surface, its vertices in the frame (`state.cloud` itself if these are its points), its faces."""
     if not isinstance(mesh, str):
-        return "given", *_given(state, *mesh_arrays(mesh))
+        vertices, faces = _given(state, *mesh_arrays(mesh))
+        if not len(faces):
+            raise InvalidParameterError("no triangle of the mesh has an area")
+        return "given", vertices, faces
     names = tuple(SURFACES) if mesh == "auto" else (mesh,)
     found, closed = None, state.rings.closed
     for name in names:

@@ -10,11 +10,11 @@ import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from ..analysis.branches import branch_table
-from ..analysis.curves import check_number
 from ..errors import InvalidParameterError
 from ..numerics.near_links import linked
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, norm
+from ..parameters import check_number
 from ..refinement.merging import merge_into, some_vertices
 from ..refinement.rooted import RootPlace, numbered_from, root_among
 from ..skeleton import Skeleton

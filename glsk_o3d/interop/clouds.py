@@ -26,8 +26,8 @@ class Cloud:
 
     Examples
     --------
-    >>> from glsk_o3d import RingBuilder
-    >>> RingBuilder.consumes is Cloud
+    >>> from glsk_o3d import Sampler
+    >>> Sampler.consumes is Cloud
     True
     """
 

@@ -16,12 +16,13 @@ from ..errors import MissingPackageError
 EXTRA_OF = {
     **dict.fromkeys(("matplotlib", "PIL"), "pictures"),
     **dict.fromkeys(("laspy", "lazrs"), "las"),
-    **{"pye57": "e57", "igl": "crosscheck", "pymeshlab": "meshlab", "distributed": "cluster"},
+    **{"pye57": "e57", "igl": "crosscheck", "pymeshlab": "meshlab", "distributed": "cluster", "networkx": "graph"},
 }
 """The extra of this package that brings a module."""
 _NEEDED = {  # ending of a file -> modules that read or write it
     ".html": ("matplotlib",),
     ".png": ("matplotlib",),
+    ".graphml": ("networkx",),
     ".las": ("laspy",),
     ".laz": ("laspy", "lazrs"),
     ".e57": ("pye57",),

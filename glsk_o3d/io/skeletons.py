@@ -13,6 +13,7 @@ import numpy as np
 from ..analysis.comparison import Truth
 from ..errors import FileFormatError, brief
 from ..interop.atomic import write_atomically
+from ..interop.packages import require_for
 from ..refinement.rooted import RootPlace
 from ..skeleton import Skeleton
 from .formats import fields, gltf, lines, plants, ply, urdf
@@ -145,6 +146,8 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     FileNotFoundError
     FileFormatError
         A folder, a cloud, an unknown ending, or a file that is damaged or from a newer release.
+    MissingPackageError
+        Of GraphML, without the extra [graph].
 
     Examples
     --------
@@ -165,6 +168,7 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     read = FORMATS[ending].read
     if read is None:
         raise FileFormatError(f"{path}: {ending} is only written; read are {', '.join(READABLE)}")
+    require_for(ending)
     data = path.read_bytes()
     try:
         return read(data)

@@ -15,13 +15,13 @@ from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.clouds import SAMPLE_COUNT
 from ..interop.packages import import_open3d
+from ..numerics.frame import not_finite
+from ..numerics.grid_sampling import sample_blocks
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..pipeline import Pipeline
-from ..preparation.frame import not_finite
-from ..preparation.sampling import sample_blocks
 from ..refinement.thin_parts import SCALE_NEIGHBOUR
-from ..ring_builder import RingBuilder
+from ..sampler import Sampler
 from ..skeleton import Skeleton
 from .annotation import labels
 from .formats import ply
@@ -37,7 +37,7 @@ def read_sample(
 ) -> Any:
     """Read of a large scan the points that its skeleton is made from, in memory that does not grow with the file.
 
-    Of large clouds `RingBuilder` keeps the point nearest to the mean of each cell of a grid. Here it is found while
+    Of large clouds `Sampler` keeps the point nearest to the mean of each cell of a grid. Here it is found while
     reading, block by block: the skeleton of the sample is that of the whole.
 
     Parameters
@@ -45,7 +45,7 @@ def read_sample(
     path : path-like
         As for `read_cloud`. LAS, LAZ, PCD and binary PLY are read in blocks, all else is read whole.
     n : int, optional
-        About how many points; all, if they are not more than twice as many. By default what `RingBuilder` takes: twice
+        About how many points; all, if they are not more than twice as many. By default what `Sampler` takes: twice
         25000 or, from 152588 points on, 128 times the square root of their number, 1.28 of 100 million.
     where : str, optional
         As for `read_cloud`.
@@ -79,7 +79,7 @@ def read_sample(
     """
     if n is not None and (isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1):
         raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
-    size = RingBuilder().sample_size if n is None else lambda total: int(n)
+    size = Sampler().sample_size if n is None else lambda total: int(n)
     return _cloud(*_sampled(path, size, where, drop_invalid)[:2])
 
 
@@ -131,14 +131,14 @@ def sample_for(
     """
     if stream is False:
         return None
-    rings, n = pipeline.stages[0], promised_points(path)
-    if not isinstance(rings, RingBuilder) or rings.sample_size(LARGE_CLOUD) >= LARGE_CLOUD:
+    sampler, n = pipeline.stages[0], promised_points(path)
+    if not isinstance(sampler, Sampler) or sampler.sample_size(LARGE_CLOUD) >= LARGE_CLOUD:
         if stream:
             raise InvalidParameterError("this pipeline takes all points of a cloud: it cannot be given a sample")
         return None
     if stream is None and (n is None or n <= LARGE_CLOUD):
         return None
-    points, counts, dropped = _sampled(path, rings.sample_size, where, rings.drop_invalid)
+    points, counts, dropped = _sampled(path, sampler.sample_size, where, sampler.drop_invalid)
     if dropped:
         points, counts = np.append(points, np.full((1, 3), np.nan), axis=0), np.append(counts, dropped)
     return _cloud(points, counts)

@@ -20,6 +20,7 @@ from ..io.paths import existing_file
 from ..io.scan import COLOR_CHANNELS
 from ..io.scans import read_scan
 from ..io.skeletons import holds_skeleton, read_skeleton, save_skeleton, skeleton_ending
+from ..points import Points
 from ..skeleton import Skeleton
 from ..state import Contraction
 
@@ -43,7 +44,7 @@ class Layer:
     scalars: np.ndarray | None = None
     colors: np.ndarray | None = None
     label: str = "cloud"
-    flow: Contraction | Skeleton | None = None
+    flow: Points | Contraction | Skeleton | None = None
     source: Layer | None = None
     cut: list[list[float]] | None = None
 
@@ -55,6 +56,8 @@ class Layer:
             return cls(data.vertices, edges=data.edges, scalars=data.radii, flow=data, **common)
         if isinstance(data, Contraction):
             return cls(data.contracted, scalars=data.mass, flow=data, **common)
+        if isinstance(data, Points):
+            return cls(data.coordinates, scalars=data.noise[data.survivors], flow=data, **common)
         return cls(cloud_points(data), **common)
 
     @classmethod
@@ -114,7 +117,7 @@ class Layer:
         return math.hypot(*np.ptp(finite, axis=0)) if len(finite) else 0.0
 
     def holds(self, kind: type) -> bool:
-        """Whether there is a Contraction or a Skeleton to go on from, with its points: those of a file have none."""
+        """Whether there is something to go on from, with its points: those of a file have none."""
         return isinstance(self.flow, kind) and self.flow is not None and len(self.flow.points) > 0
 
     def shows(self, other: Layer) -> bool:

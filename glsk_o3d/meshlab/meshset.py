@@ -37,7 +37,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
 
     Lengths are ``pymeshlab.PercentageValue``, as MeshLab's own of the diagonal of the layer's bounding box, or
     ``pymeshlab.PureValue``, in the units of the cloud; a float and a string such as ``"2%"`` are understood too. What
-    is not given is as elsewhere in this package, of the box that ``RingBuilder.frame`` names: ``"1% of the frame"``.
+    is not given is as elsewhere in this package, of the box that ``Sampler.frame`` names: ``"1% of the frame"``.
 
     Where pymeshlab is not installed, importing the class raises MissingPackageError.
 

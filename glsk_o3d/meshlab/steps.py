@@ -35,11 +35,6 @@ class Step:
         """None for MeshLab's own filters."""
         return verbs().get(self.name)
 
-    @property
-    def needs_pymeshlab(self) -> bool:
-        """Whether it is a filter of MeshLab's own."""
-        return self.verb is None
-
     @contextmanager
     def named_in_errors(self) -> Iterator[None]:
         """Say in every error of ours where in the script it happened."""
@@ -49,7 +44,7 @@ class Step:
             place = f"{self.place}: " if self.place else ""
             slots = self.verb.slots if self.verb is not None else ()
             cure = next((f"its parameter {name}" for name in slots if name.endswith("drop_invalid")), "")
-            said = str(error).replace("drop_invalid=True", cure or "the RingBuilder's drop_invalid")
+            said = str(error).replace("drop_invalid=True", cure or "the Sampler's drop_invalid")
             raise ScriptError(f"{place}filter {self.call.name!r}: {said}") from error
 
 

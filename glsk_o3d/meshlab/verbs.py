@@ -16,7 +16,6 @@ from .. import editing
 from ..analysis.segmentation import segment
 from ..contractor import Contractor
 from ..errors import InvalidCloudError, InvalidParameterError, did_you_mean
-from ..interop.clouds import Cloud
 from ..io.colors import shades
 from ..io.formats.graphs import graph_skeleton
 from ..lpr_reducer import LPRReducer
@@ -25,15 +24,15 @@ from ..parameters import Parameters, parameter, problem_with, resolve_length
 from ..pipeline import Filter, Pipeline, parts
 from ..pipelines import default
 from ..recipes.catalogue import catalogue, known_pipelines, named_pipeline, serves
-from ..ring_builder import RingBuilder
 from ..skeleton import Skeleton
 from ..state import Contraction
+from ..thinner import Thinner
 from .layers import Layer
 from .script import BOOL, FLOAT, LENGTH, Param
 
 PARTS = ("reducer", "stop")
 OF_FRAME = " of the frame"
-"""What follows a percentage that is as everywhere else in this package, of the box that RingBuilder's `frame` names."""
+"""What follows a percentage that is as everywhere else in this package, of the box that the Sampler's `frame` names."""
 _SLOT_TYPES = {
     "bool": ("bool", BOOL),
     "int": ("int", ("RichInt",)),
@@ -51,11 +50,16 @@ def facts_of(doc: str, type: str, choices: tuple[str, ...] = (), low: float | No
 
 
 _FILTER_STEMS = {
+    "Sampler": "generate_sampled_cloud",
+    "OutlierRemover": "generate_cloud_without_outliers",
+    "Denoiser": "generate_denoised_cloud",
+    "Thinner": "generate_thinned_cloud",
     "RingBuilder": "generate_one_rings",
     "Contractor": "generate_contracted_cloud",
     "LPRReducer": "generate_reduced_cloud",
     "Connector": "generate_skeleton_graph",
     "Refiner": "generate_refined_skeleton",
+    "Tracer": "generate_traced_skeleton",
 }
 _EDITS: dict[str, Callable[..., Any]] = {
     "generate_largest_skeleton_component": editing.largest_component,
@@ -253,7 +257,7 @@ class PipelineVerb(Verb):
         return found
 
     def run(self, layer, given, on_iteration=None):
-        # a layer without extent is refused by the RingBuilder, in better words than a length of 0
+        # a layer without extent is refused by the Sampler, in better words than a length of 0
         pipeline = self.plan(self.in_units(given, layer.diagonal or 1.0))
         if self.filter is not None and layer.holds(self.filter.consumes):
             return self.shown(pipeline(layer.flow, on_iteration=on_iteration), layer.source or layer)
@@ -262,14 +266,13 @@ class PipelineVerb(Verb):
 
     def _before(self) -> tuple[Filter, ...]:
         """What turns a cloud into what the filter takes: the default pipeline's filters before it."""
-        stages = default().stages
-        kinds = [type(stage) for stage in stages]
+        stages, kinds = default().stages, [type(stage) for stage in default().stages]
         if self.filter in kinds:
             return stages[: kinds.index(self.filter)]
-        consumes = self.filter.consumes if self.filter else Cloud
-        if consumes is Contraction:
-            return (RingBuilder(thin_to="all"), Contractor(max_iterations=1))
-        return stages if consumes is Skeleton else ()
+        if self.filter is not None and self.filter.consumes is Contraction:
+            whole = [stage for stage in stages[: kinds.index(Contractor)] if not isinstance(stage, Thinner)]
+            return (*whole, Contractor(max_iterations=1))
+        return stages if self.filter is not None and self.filter.consumes is Skeleton else ()
 
     def shown(self, result, source):
         layer = super().shown(result, source)

@@ -152,7 +152,7 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder, "mine.json")
     ...     _ = path.write_text('{"glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {"k": 12}}}')
-    ...     load_recipe(path).stages[0].k
+    ...     load_recipe(path).stages[4].k
     12
     """
     ending = _ending(path)
@@ -200,7 +200,7 @@ def from_recipe(recipe: dict[str, Any]) -> Pipeline:
     --------
     >>> from_recipe({"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "Connector", "radius": "2%"}]})
     Connector(radius='2%', thickness=0.6, links='all')
-    >>> from_recipe({"glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {"k": 20}}}).stages[0].k
+    >>> from_recipe({"glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {"k": 20}}}).stages[4].k
     20
     """
     _check_head(recipe)

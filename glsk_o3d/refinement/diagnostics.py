@@ -12,21 +12,28 @@ from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
 from .sections import VertexPoints, measure_sections
 
-# All fitted; what tubes and balls have is derived.
-SHEET_SHARE = 0.9  # of one direction among the normals around a vertex; a tube has 0.5, half a tube too
-# spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
+SHEET_SHARE = 0.9  # fitted: share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
+# warning: spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
 BALL_SPREAD = 0.5
-# length of the evenly filled box with a part's spread, over the median distance to the surface; balls have 2 to 3
+# warning: length of the evenly filled box with a part's spread, over the median distance to the surface; a ball has 2
+# to 3
 STUB_LENGTH = 3.3
 MAJORITY = 0.5  # derived: of the points, from which on a cloud is called what they are
-LOW_CONFIDENCE = 0.1  # below which a vertex is not to be trusted
-LOW_CONFIDENCE_SHARE = 0.25  # of the points around such vertices that is worth a warning
+LOW_CONFIDENCE = 0.1  # warning: below which a vertex is not to be trusted
+LOW_CONFIDENCE_SHARE = 0.25  # warning: of the points around such vertices that is worth a warning
+
+REASONS = ("sheet-like", "sphere-like", "no edges", "uncertain topology", "weakly supported")
+"""What the messages of `diagnose` begin with."""
 
 
 def measured(skeleton: Skeleton) -> Skeleton:
-    """A finished skeleton with its sections, and with the reasons not to trust it as the warnings of its report."""
+    """A finished skeleton with its sections, and with the reasons not to trust it among the warnings of its report.
+
+    They take the place of those of before, and follow what other filters warned of.
+    """
     sections = measure_sections(skeleton)
-    report = replace(skeleton.report, warnings=tuple(diagnose(skeleton)))
+    others = [message for message in skeleton.report.warnings if message.partition(":")[0] not in REASONS]
+    report = replace(skeleton.report, warnings=(*others, *diagnose(skeleton)))
     return replace(skeleton, report=report, half_width=sections.half_width, half_thickness=sections.half_thickness)
 
 

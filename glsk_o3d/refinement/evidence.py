@@ -124,27 +124,21 @@ class Evidence(SurfaceGraph):
         return np.column_stack(np.divmod(keys, m)), np.bincount(which, weight, len(keys))
 
 
-def ordered(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
-    """A skeleton with its points along a Morton curve, and where every point is now, (N,) int array."""
+def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skeleton:
+    """What a step makes of a skeleton whose points are along a Morton curve, whatever order they came in.
+
+    That would show in the last digit of sums, and where one thing is as good as another, as on grids, it decides. In
+    the result the points are as they came.
+    """
     finite = np.isfinite(skeleton.points).all(axis=1)
     some = np.flatnonzero(finite)
     if len(some):
         some = some[morton_order(skeleton.points[some])]
     order = np.concatenate([some, np.flatnonzero(~finite)])
-    back = np.empty(len(order), int)
+    back = np.empty_like(order)
     back[order] = np.arange(len(order))
     vertex, normals = skeleton.vertex_of_point[order], skeleton.normals.take(order, axis=0)
-    return replace(skeleton, points=skeleton.points[order], normals=normals, vertex_of_point=vertex), back
-
-
-def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skeleton:
-    """What a step makes of a skeleton whose points are in an order that does not depend on the one they came in.
-
-    That would show in the last digit of sums, and where one thing is as good as another, as on grids, it decides. In
-    the result the points are as they came.
-    """
-    given, back = ordered(skeleton)
-    made = step(given)
+    made = step(replace(skeleton, points=skeleton.points[order], normals=normals, vertex_of_point=vertex))
     vertex, normals = made.vertex_of_point[back], made.normals.take(back, axis=0)
     return replace(made, points=skeleton.points, normals=normals, vertex_of_point=vertex)
 

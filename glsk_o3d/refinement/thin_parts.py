@@ -8,11 +8,11 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ..numerics.eigen import largest_eigenvalue
+from ..numerics.grid_sampling import sample_cloud
 from ..numerics.groups import component_labels, group_sum
 from ..numerics.near_links import link_growth, near_links
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import COLUMNS, ROWS, TINY
-from ..preparation.sampling import sample_cloud
 from ..skeleton import Skeleton
 from .diagnostics import SHEET_SHARE
 from .sections import VertexPoints
@@ -41,7 +41,7 @@ class SpacedPoints(VertexPoints):
         """Which input points they are."""
         points, some = self.skeleton.points, np.flatnonzero(self.skeleton.vertex_of_point >= 0)
         if len(some):
-            some = some[sample_cloud(points[some], TRACED_POINTS).kept]
+            some = some[sample_cloud(points[some], TRACED_POINTS)[0]]
         wide = np.ptp(points[some], axis=0).max() if len(some) else 0.0
         cells = np.rint(points[some] / max(SAME_PLACE * wide, TINY))
         return some[np.sort(np.unique(cells, axis=0, return_index=True)[1])]
@@ -71,11 +71,8 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     points of a region, it is so. Where the confidence is unknown there is a surface.
     """
     skeleton, m = cloud.skeleton, len(cloud.skeleton.vertices)
-    owner = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0]
-    count = np.bincount(owner, minlength=m) / max(len(owner) / TRACED_POINTS, 1)
     thin = skeleton.confidence < UNSURE_CONFIDENCE
-    enough = (1 - least) * min(REGION_POINTS, count.sum())  # for one region
-    if count[thin].sum() <= enough or len(cloud.rows) < LEAST_POINTS:
+    if not may_lack_surface(skeleton, least) or len(cloud.rows) < LEAST_POINTS:
         return np.zeros(m, bool)
     vertex, count = cloud.vertex, cloud.count
     _, near = nearest_neighbours(skeleton.vertices, min(REGION_VERTICES, m))
@@ -85,6 +82,13 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     growth, flat = (group_sum(facts, vertex, m) / np.maximum(count, 1)[:, None]).T
     thin &= growth < np.where(flat < SHEET_SHARE, SURFACE_GROWTH, SHEET_GROWTH)
     return (_share_around(near, count, thin) > 1 - least) & ~_surely_with_surface(skeleton)
+
+
+def may_lack_surface(skeleton: Skeleton, least: float) -> bool:
+    """Whether vertices that are not sure where the axis is have so many points that one region may lack a surface."""
+    owner, m = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0], len(skeleton.vertices)
+    count = np.bincount(owner, minlength=m) / max(len(owner) / TRACED_POINTS, 1)
+    return bool(count[skeleton.confidence < UNSURE_CONFIDENCE].sum() > (1 - least) * min(REGION_POINTS, count.sum()))
 
 
 def one_direction(normals: np.ndarray, links: csr_matrix) -> np.ndarray:

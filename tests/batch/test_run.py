@@ -251,7 +251,7 @@ def test_a_large_cloud_is_read_in_blocks(run, rows, tmp_path, monkeypatch, where
 
     from glsk_o3d.io import streaming
 
-    points, pipeline = torus(9000).points, pipelines.default().with_options(thin_to=2000)
+    points, pipeline = torus(9000).points, pipelines.default().with_options(size=4000, thin_to=2000)
     path = tmp_path / "scan.ply"
     glsk_o3d.save_tensor_cloud(o3d.t.geometry.PointCloud(o3d.core.Tensor(points)), path)
     monkeypatch.setattr(streaming, "LARGE_CLOUD", 8999)
@@ -273,6 +273,8 @@ class TestRefusals:
             ({"formats": ["stl"]}, "unknown ending"),
             ({"formats": []}, "nothing to write"),
             ({"workers": 0}, "workers = 0"),
+            ({"workers": 1.5}, "workers = 1.5: must be an int"),
+            ({"format": "ply"}, "no option of a batch is called 'format': did you mean 'formats'"),
             ({"workers": 2, "scheduler": "tcp://x:1"}, "neither workers nor"),
         ],
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import typer
 
-from glsk_o3d import InvalidParameterError, RingBuilder, Skeleton, save_skeleton
+from glsk_o3d import InvalidParameterError, RingBuilder, Skeleton, Thinner, save_skeleton
 from glsk_o3d.cli.console import echo, print_json, print_rows, print_table, say, visible
 from glsk_o3d.cli.reporting import reporting
 from glsk_o3d.errors import FileFormatError
@@ -105,4 +105,4 @@ def test_numbers_of_python_are_told_without_pages_of_digits():
     for number, digits in {10**401 - 1: 401, -(10**401) + 1: 401, 10**401: 402, 2**63: 19, 10**19 - 1: 19}.items():
         assert shown(number) == f"a number of {digits} digits"
     with pytest.raises(InvalidParameterError, match=r"around = a number of 401 digits: must be at most 1e\+100"):
-        RingBuilder(around=10**400).check()
+        Thinner(around=10**400).check()

@@ -74,11 +74,11 @@ def test_round_trip_of_every_pipeline():
             if dataclasses.is_dataclass(value := getattr(part, f.name)) is False
         ]
         start = default() if find(pipeline, "Contractor").reducer else cao2010()
-        changed = Pipeline(
-            *override(start, settings).stages[: len(pipeline.stages)]
-        )  # the published end before a Tracer
-        assert changed == pipeline
-        assert eval(repr(changed), vars(glsk_o3d) | {name: getattr(glsk_o3d, name) for name in catalogue()}) == pipeline
+        kinds = {type(stage) for stage in pipeline.stages}
+        start = Pipeline(*(stage for stage in start.stages if type(stage) in kinds))
+        assert override(start, settings) == pipeline
+        names = vars(glsk_o3d) | {name: getattr(glsk_o3d, name) for name in catalogue()}
+        assert eval(repr(pipeline), names) == pipeline
 
 
 def test_where_settings_go():
@@ -110,9 +110,9 @@ def test_where_settings_go():
         (".radius=2%", "write it as Filter.parameter=value"),
         ("Connector.radius=", "write it as Filter.parameter=value"),
         ("", "write it as Filter.parameter=value"),
-        ("connector.radius=2%", "connector is not in the pipeline, which has RingBuilder, Contractor, LPRReducer,"),
+        ("connector.radius=2%", "connector is not in the pipeline, which has Sampler, OutlierRemover, "),
         ("Connector.radios=2%", "did you mean 'radius'?"),
-        ("RingBuilder.zzz=2", "no parameter of RingBuilder is called 'zzz': there are k, radius, around, thin_to, "),
+        ("RingBuilder.zzz=2", "no parameter of RingBuilder is called 'zzz': there are k, radius"),
         ("RingBuilder.consumes=cloud", "no parameter of RingBuilder is called 'consumes'"),
         ("Contractor.stop=RingSizeRati", "no stop is called 'RingSizeRati': did you mean 'RingSizeRatio'?"),
         ("Contractor.stop=LPRReducer", "no stop is called 'LPRReducer'"),

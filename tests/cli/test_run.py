@@ -195,8 +195,8 @@ def test_one_file_that_cannot_be_written_does_not_cost_the_others(invoke, scans,
 @pytest.mark.parametrize(
     ("name", "parameter"),
     [
-        ("Generate Curve Skeleton (GLSkeleton)", "ringbuilder_drop_invalid"),
-        ("Generate One Rings (GLSkeleton)", "drop_invalid"),
+        ("Generate Curve Skeleton (GLSkeleton)", "sampler_drop_invalid"),
+        ("Generate Sampled Cloud (GLSkeleton)", "drop_invalid"),
     ],
 )
 def test_points_that_are_not_finite(invoke, refused, scans, script, name, parameter):

@@ -8,7 +8,18 @@ import open3d as o3d
 import pytest
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import Connector, Contractor, LPRReducer, Refiner, RingBuilder, read_cloud, samples, skeletonize
+from glsk_o3d import (
+    Connector,
+    Contractor,
+    LPRReducer,
+    OutlierRemover,
+    Refiner,
+    RingBuilder,
+    Sampler,
+    read_cloud,
+    samples,
+    skeletonize,
+)
 from glsk_o3d.crosscheck import cross_check
 from glsk_o3d.crosscheck.agreement import compare_rows, compare_skeletons, mesh_fit
 from glsk_o3d.crosscheck.mesh import spacing
@@ -110,7 +121,7 @@ def test_open_ends_that_the_cloud_has_too_are_not_held_against_a_mesh():
 def test_flat_rows_have_one_direction(grid):
     x, y = (each.ravel() + 0.0 for each in np.mgrid[:12, :12])
     points = np.column_stack([x, y, 0.4 * x])
-    state = RingBuilder(denoise=0)(points)
+    state = RingBuilder()(points)
     faces = np.lexsort(state.points[state.point_of_survivor].T[1::-1])[grid(12, 12, 0, 0)]
     (angle, length, _), found = compare_rows(state, state.cloud, faces)
     compared = np.isfinite(angle)
@@ -237,6 +248,7 @@ def test_poisson_and_a_single_method(ring):
         ("alpha", "mesh = 'alpha': must be 'auto', 'ball_pivoting', 'poisson', or a mesh"),
         ((np.eye(3), [[0.0, 1, 2]]), "names a vertex that is not there"),
         (o3d.geometry.TriangleMesh(), "needs"),
+        ((np.zeros((3, 3)), [[0, 1, 2]]), "no triangle of the mesh has an area"),
     ],
 )
 def test_useless_meshes(ring, mesh, message):
@@ -270,7 +282,8 @@ def test_points_that_are_not_finite_and_outliers(ring, check):
     spoilt = np.vstack([ring.points, [[np.nan, 0, 0], [0.45, 0.4, 0.4]]])
     with pytest.raises(InvalidCloudError, match="1 of 1502 points"):
         cross_check(spoilt)
-    pipeline = RingBuilder(drop_invalid=True) | Contractor(reducer=LPRReducer()) | Connector() | Refiner()
+    prepare = Sampler(drop_invalid=True) | OutlierRemover() | RingBuilder()
+    pipeline = prepare | Contractor(reducer=LPRReducer()) | Connector() | Refiner()
     found = cross_check(spoilt, pipeline=pipeline)
     assert np.isnan(found.angle[1500:]).all()
     np.testing.assert_allclose(found.angle[:1500], check.angle, atol=1e-3)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, cKDTree
 
-from glsk_o3d import Contractor, RingBuilder, pipelines
+from glsk_o3d import Contractor, RingBuilder, Sampler, pipelines
 from glsk_o3d.crosscheck.mesh import (
     INVENTED_DISTANCE,
     ball_pivoting,
@@ -42,9 +42,9 @@ def convex_rings(points, faces):
     return Rings(np.cumsum([0, *map(len, rows)]), np.concatenate(rows), np.ones(len(rows), bool))
 
 
-def meshed(points, by=ball_pivoting, **parameters):
+def meshed(points, by=ball_pivoting):
     """The state, the vertices of a mesh of its cloud in the frame, and the faces."""
-    state = RingBuilder(thin_to="all", **parameters)(points)
+    state = RingBuilder()(points)
     return state, *by(state)
 
 
@@ -90,7 +90,7 @@ def test_the_same_twice():
 
 def test_our_rows_are_twice_libigls_where_the_rings_are_the_same(even_ball):
     points, faces = even_ball(700)
-    state = RingBuilder(frame="box")(points)
+    state = (Sampler(frame="box") | RingBuilder())(points)
     row = state.representative_of_point
     faces, cloud = row[faces], state.frame.out_of(state.cloud)
     same = common_share(state.rings, faces) == 1
@@ -112,7 +112,7 @@ def test_the_sign(even_ball):
 
 def test_it_is_the_gradient_of_the_area():
     # x . L x = -4 area of any mesh, torn or not manifold
-    _, points, faces = meshed(torus(1500, noise=0.02).points, denoise=0)
+    _, points, faces = meshed(torus(1500, noise=0.02).points)
     area = igl.doublearea(points, faces).sum() / 2
     found = (points * (mesh_laplacian(points, faces, cap=1e300) @ points)).sum()
     assert found == pytest.approx(-4 * area, rel=1e-9)
@@ -157,7 +157,7 @@ def test_a_sphere_that_is_sampled_evenly_has_two_over_its_radius(even_ball):
     errors = []
     for n in (500, 2000):
         points, faces = even_ball(n)
-        state = RingBuilder(thin_to="all")(points)
+        state = RingBuilder()(points)
         assert state.rings.closed.all()
         every, cloud = np.ones(n, bool), state.frame.out_of(state.cloud)
         ours = curvature_normals(cotangent_laplacian(cloud, state.rings), ring_areas(cloud, state.rings), cloud)
@@ -176,7 +176,7 @@ def test_a_cylinder_that_is_sampled_evenly_has_one_over_its_radius():
     turn = 2 * np.pi * (u + v / 2) / m
     height = radius * 2 * np.pi / m * np.sqrt(3) / 2
     points = np.stack([radius * np.cos(turn), radius * np.sin(turn), height * v], -1).reshape(-1, 3)
-    state = RingBuilder(thin_to="all", denoise=0, outlier_factor=0)(points)
+    state = RingBuilder()(points)
     cloud = state.frame.out_of(state.cloud)
     found = curvature_normals(cotangent_laplacian(cloud, state.rings), ring_areas(cloud, state.rings), cloud)
     exact = -cloud * [1, 1, 0] / radius**2
@@ -193,7 +193,7 @@ def test_it_is_the_contractor_where_rings_and_one_rings_are_the_same():
     rng = np.random.default_rng(3)
     points = rng.normal(size=(400, 3))
     points *= [[1, 0.6, 2.5]] / np.linalg.norm(points, axis=1, keepdims=True)
-    state = RingBuilder(thin_to="all", denoise=0, outlier_factor=0)(points)
+    state = RingBuilder()(points)
     faces = ConvexHull(state.cloud).simplices.astype(np.int64)
     begun, faces = mesh_state(state, state.cloud, faces)
     centred = state.cloud - state.cloud.mean(axis=0)

@@ -20,13 +20,13 @@ from glsk_o3d.samples import y_junction
 points = y_junction(600).points
 skeleton = glsk.skeletonize(points)
 from glsk_o3d.io.skeletons import FORMATS, READABLE
-for ending in FORMATS:
+for ending in FORMATS.keys() - {".graphml"}:
     glsk.save_skeleton(skeleton, f"s{ending}", cut_loops=True)
     if ending in READABLE:
         glsk.read_skeleton(f"s{ending}")
 glsk.save_recipe(glsk.pipelines.default(), "r.toml")
 assert glsk.load_recipe("r.toml") == glsk.pipelines.default()
-skeleton.to_networkx(), skeleton.to_line_set(), glsk.to_tensor_line_set(skeleton)
+skeleton.to_line_set(), glsk.to_tensor_line_set(skeleton)
 glsk.annotate(skeleton, points, color=(1, 0, 0))
 table = glsk.analysis.branch_table(skeleton)
 table.to_csv("branches.csv"), str(table), glsk.analysis.grasp_candidates(skeleton, 1.0)
@@ -37,9 +37,13 @@ from pathlib import Path
 from glsk_o3d.crosscheck import cross_check
 for ending in ("las", "laz", "e57"):
     Path(f"scan.{ending}").write_bytes(b"any")
+Path("s.graphml").write_bytes(b"<graphml/>")
 asking = {
     "preview": lambda: glsk.save_preview(skeleton, "s.png"),
     "report": lambda: glsk.save_report(skeleton, "s.html"),
+    "graph": skeleton.to_networkx,
+    "graphml": lambda: glsk.save_skeleton(skeleton, "s.graphml"),
+    "read graphml": lambda: glsk.read_skeleton("s.graphml"),
     "plot": lambda: glsk.plot_skeleton(skeleton),
     "colours": lambda: glsk.to_line_set(skeleton, "branch"),
     "grasps": lambda: glsk.analysis.grasp_candidates(skeleton, 1.0).to_line_set(),
@@ -61,6 +65,7 @@ print(json.dumps(said))
 """
 NAMED = {
     **dict.fromkeys(("preview", "report", "plot", "colours", "grasps", "notebook", "batch"), "pictures"),
+    **dict.fromkeys(("graph", "graphml", "read graphml"), "graph"),
     **{"las": "las", "laz": "las", "e57": "e57"},
     **{name: name for name in ("crosscheck", "meshlab", "cluster")},
 }

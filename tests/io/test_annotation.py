@@ -112,7 +112,7 @@ def test_whole_numbers_and_points_that_are_not_finite():
     annotated = annotate(glsk.skeletonize(cloud), cloud)
     assert (annotated.point.positions.dtype, annotated.point.radius.dtype) == (o3d.core.int32, o3d.core.float64)
     points[7] = np.nan
-    state = (glsk.RingBuilder(drop_invalid=True) | glsk.Contractor())(points)
+    state = (glsk.Sampler(drop_invalid=True) | glsk.RingBuilder() | glsk.Contractor())(points)
     places = annotate_contraction(state).point.contracted.numpy()
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(places).any(axis=1)), [7])
     moved = annotate_contraction(state, np.r_[points[:3] + 0.1, [[np.inf] * 3]]).point.contracted.numpy()

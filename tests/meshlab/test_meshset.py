@@ -22,7 +22,7 @@ pymeshlab = pytest.importorskip("pymeshlab")
 POINTS = np.concatenate([sample_object(1000).points, sample_object(100).points, [[9.0, 9, 9], [9, -9, 9]]])
 LARGER = 1.7 * POINTS[:1000] @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
 WHOLE = "generate_curve_skeleton_glsk"
-CONTRACT = glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer())
+CONTRACT = glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer())
 
 
 def holding(*clouds):
@@ -69,7 +69,7 @@ def test_a_mixed_session_and_its_script_do_what_its_filters_do_by_hand(meshes, t
     scan = pymeshlab.MeshSet()
     scan.add_mesh(pymeshlab.Mesh(POINTS))
     scan.meshing_remove_duplicate_vertices()
-    once = glsk.RingBuilder() | glsk.Contractor(max_iterations=1) | glsk.LPRReducer(phi=1000)
+    once = glsk.pipelines.rings() | glsk.Contractor(max_iterations=1) | glsk.LPRReducer(phi=1000)
     reduced = once(scan.current_mesh().vertex_matrix())
     rest = pymeshlab.MeshSet()
     rest.add_mesh(pymeshlab.Mesh(reduced.points[reduced.point_of_survivor]))
@@ -237,7 +237,7 @@ def test_what_is_listed_can_be_given_and_scripts_keep_percentages(tmp_path):
 
 def test_points_that_are_dropped_have_no_part_in_the_box():
     spoilt = Layer.of(np.concatenate([LARGER, [[np.nan, 1e6, 0], [0, np.inf, 0]]]))
-    params = {"connector_radius": "5%", "ringbuilder_drop_invalid": True}
+    params = {"connector_radius": "5%", "sampler_drop_invalid": True}
     found, clean = (verbs()[WHOLE].run(layer, params) for layer in (spoilt, Layer.of(LARGER)))
     same(found.flow, clean.flow)
 
@@ -272,13 +272,13 @@ def test_filters_go_on_where_the_last_one_ended_unless_the_layer_was_changed(mes
     once, twice = (glsk.Contractor(reducer=glsk.LPRReducer(), max_iterations=n) for n in (1, 2))
     meshes.generate_contracted_cloud_glsk(max_iterations=2)
     meshes.generate_contracted_cloud_glsk(max_iterations=1)
-    expected = (glsk.RingBuilder() | twice | once)(POINTS)
+    expected = (glsk.pipelines.rings() | twice | once)(POINTS)
     np.testing.assert_array_equal(meshes.current_mesh().vertex_matrix(), expected.contracted)
     meshes.set_current_mesh(1)
     meshes.compute_matrix_from_scaling_or_normalization(axisx=2.0, uniformflag=True)
     changed = meshes.current_mesh().vertex_matrix()
     meshes.generate_contracted_cloud_glsk(max_iterations=1)
-    expected = (glsk.RingBuilder() | once)(changed)
+    expected = (glsk.pipelines.rings() | once)(changed)
     np.testing.assert_array_equal(meshes.current_mesh().vertex_matrix(), expected.contracted)
 
 

@@ -72,6 +72,8 @@ COLOUR = '<Param type="RichColor" name="color1" r="{}" g="1" b="{}" a="{}"/>'
         (_script("", '<filter name="Generate Curve Skeletons"/>'), 4, "no filter .* 'Generate Curve Skeleton .GLSkel"),
         (_of(THEIRS, "RichInt KNearst 32"), 4, "no parameter is called 'KNearst': did you mean 'knearest'"),
         (_of(OURS, "RichAbsPerc conector_radius 2%"), 4, "no parameter is called .* did you mean 'connector_radius'"),
+        (_of(OURS, "RichString refiner_root z"), 4, "no parameter .* 'refiner_root': it is Tracer's"),
+        (_of(OURS, "RichInt contractor_reduce_above 5"), 4, "no parameter .*_reduce_above': it is gone, leave it out"),
         (_of(THEIRS, NEIGHBOURS, NEIGHBOURS), 5, "parameter 'KNearest' is given twice"),
         (_of(THEIRS, NEIGHBOURS, NEIGHBOURS.replace("KN", "kn")), 5, "parameter 'knearest' is given twice"),
         # wrong
@@ -95,7 +97,7 @@ COLOUR = '<Param type="RichColor" name="color1" r="{}" g="1" b="{}" a="{}"/>'
         (
             _of(OURS, "RichString pipeline cao2010", "RichFloat lprreducer_phi 10"),
             3,
-            "lprreducer_phi: LPRReducer is not in the pipeline, which has RingBuilder, Contractor, RingSizeRatio, Conn",
+            "lprreducer_phi: LPRReducer is not in the pipeline, which has Sampler, RingBuilder, Contractor, ",
         ),
     ],
 )
@@ -196,7 +198,7 @@ def test_our_values_survive_a_script(tmp_path):
     verb = verbs()["generate_curve_skeleton_glsk"]
     values = {
         "ringbuilder_k": 20,
-        "ringbuilder_drop_invalid": True,
+        "sampler_drop_invalid": True,
         "contractor_reducer": None,
         "contractor_stop": "RingSizeRatio",
         "ringsizeratio_threshold": 1 / 3,
@@ -208,9 +210,10 @@ def test_our_values_survive_a_script(tmp_path):
     (back,) = read_steps(tmp_path / "s.mlx")
     pipeline = verb.plan(back.values)
     assert pipeline == verb.plan(values)
-    assert pipeline.stages[1].stop == glsk_o3d.RingSizeRatio(threshold=1 / 3)
-    assert pipeline.stages[1].reducer is None
-    assert pipeline.stages[2] == glsk_o3d.Connector(radius="2.5%", links="nearest")
+    contractor, connector = pipeline.stages[5:7]
+    assert contractor.stop == glsk_o3d.RingSizeRatio(threshold=1 / 3)
+    assert contractor.reducer is None
+    assert connector == glsk_o3d.Connector(radius="2.5%", links="nearest")
 
 
 def test_the_whole_pipeline_has_the_parameters_of_all_its_parts():

@@ -159,7 +159,7 @@ def test_filters_of_clouds_stand_in_front_and_in_a_row(example):
     assert voxels(POINTS).shape[1] == 3  # a pipeline of nothing else gives a cloud too
     skeleton = skeletonize(POINTS, voxels | glsk.pipelines.default())
     assert skeleton.report.stages[:2] == ("Voxel(size='1%')", "Voxel(size='3%')")
-    assert [stage["filter"] for stage in skeleton.report.recipe["pipeline"]][:3] == ["Voxel", "Voxel", "RingBuilder"]
+    assert [stage["filter"] for stage in skeleton.report.recipe["pipeline"]][:3] == ["Voxel", "Voxel", "Sampler"]
     with pytest.raises(InvalidParameterError, match=r"Voxel.*RingBuilder"):
         glsk.RingBuilder() | glsk_example.Voxel()
     with pytest.raises(StageError, match="Voxel"):

@@ -1,5 +1,7 @@
 """Parts without a surface are traced, those with one stay; with a root everything is one tree."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,15 @@ def distance(points, lines):
         t = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
         found.append(np.linalg.norm(points - a - t[:, None] * (b - a), axis=1))
     return np.min(found, axis=0)
+
+
+def test_what_has_a_surface_stays_as_it_is(grown):
+    thick = pipelines.default()(tube(2000))
+    for given, tracer in ((thick, Tracer()), (grown, Tracer(surface=0))):
+        known = dataclasses.replace(given, half_width=2 * given.half_width)  # by somebody else
+        again = tracer(known)
+        for name in ("vertices", "edges", "radii", "half_width", "vertex_of_point", "normals"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(known, name))
 
 
 def test_twigs_that_are_lines_of_points(grown):

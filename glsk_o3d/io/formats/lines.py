@@ -20,6 +20,7 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
+from ...interop.packages import require
 from ...skeleton import Skeleton
 from .graphs import NoEdges, graph_skeleton, line, text, words_by_line
 
@@ -66,8 +67,7 @@ def read_obj(data: bytes) -> Skeleton:
 
 def write_graphml(skeleton: Skeleton) -> bytes:
     """The content of a GraphML file."""
-    import networkx
-
+    networkx = require("networkx")
     graph = networkx.Graph()
     table = np.column_stack([skeleton.vertices, skeleton.radii]).tolist()
     graph.add_nodes_from((i, dict(zip(_KEYS, row, strict=True))) for i, row in enumerate(table))
@@ -80,8 +80,7 @@ def write_graphml(skeleton: Skeleton) -> bytes:
 
 def read_graphml(data: bytes) -> Skeleton:
     """The skeleton in the content of a GraphML file."""
-    import networkx
-
+    networkx = require("networkx")
     graph = networkx.read_graphml(io.BytesIO(data))
     lost = [node for node, facts in graph.nodes(data=True) if not {"x", "y", "z"} <= facts.keys()]
     if lost:

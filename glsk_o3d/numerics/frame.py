@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidCloudError
-from ..numerics.morton import morton_order
-from ..numerics.neighbourhoods import nearest_neighbours
+from .morton import morton_order
+from .neighbourhoods import nearest_neighbours
 
 FRAME_SIDE = 1.6  # published: longest side of the box
 CLOUD_SLACK = 1.2  # published: how much larger than the cloud the contracted one may be
@@ -75,17 +74,6 @@ class Frame:
         return points * self.scale + self.centre
 
 
-class DistinctPoints(NamedTuple):
-    """A cloud in its working frame, in Morton order and without duplicates."""
-
-    frame: Frame
-    points: np.ndarray  # (m, 3)
-    representative: np.ndarray  # (n,) of every given point its row
-    weight: np.ndarray  # (m,) points that each stands for
-    distance: np.ndarray  # (m, k) to its neighbours
-    neighbours: np.ndarray  # (m, k)
-
-
 def finite_points(points: np.ndarray, drop: bool) -> np.ndarray:
     """Which points have finite coordinates, (N,) bool; InvalidCloudError for the others, if they may not `drop`."""
     finite = np.isfinite(points).all(axis=1)
@@ -105,11 +93,15 @@ def not_finite(n: int, total: int, first: int) -> InvalidCloudError:
     )
 
 
-def to_working_frame(points: np.ndarray, counts: np.ndarray, by: str, k: Callable[[int], int]) -> DistinctPoints:
+def to_working_frame(
+    points: np.ndarray, counts: np.ndarray, by: str, k: Callable[[int], int], neighbours: np.ndarray | None = None
+) -> tuple[Frame, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Bring points (n, 3), each of which stands for `counts` (n,), into their working frame, see `Frame.of`.
 
-    `k` says how many neighbours to look up for so many points. InvalidCloudError if fewer than 8 points are distinct,
-    or if they are so far apart or so near that squares overflow.
+    `k` says how many neighbours to look up for so many points; `neighbours` (n, k), if they are known, are those of
+    points that are all distinct. Returned are the frame; the m distinct points in Morton order (m, 3); for each given
+    point its row among them; how many points each row stands for; and the neighbours of each row. InvalidCloudError if
+    fewer than 8 points are distinct, or if they are so far apart or so near that squares overflow.
     """
     if len(points) < MIN_POINTS:
         raise InvalidCloudError(f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones")
@@ -119,28 +111,28 @@ def to_working_frame(points: np.ndarray, counts: np.ndarray, by: str, k: Callabl
     order = morton_order(points)
     points, counts = points[order], counts[order]
     frame = Frame.of(points, by)
-    cloud, representative = frame.into(points), np.empty(len(points), int)
-    representative[order] = np.arange(len(points))
+    cloud, row = frame.into(points), np.empty(len(points), int)
+    row[order] = np.arange(len(points))
+    if neighbours is not None:
+        return frame, cloud, row, counts, row[neighbours[order, : k(len(cloud))]]
     distance, neighbours = nearest_neighbours(cloud, k(len(cloud)))
-    weight = counts
-    if distance[:, 1].min() < SAME_POINT:
-        cells = np.round(cloud / SAME_POINT).astype(np.int64)
-        first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)[1:]
-        if len(first) < MIN_POINTS:
-            raise InvalidCloudError(
-                f"{len(points)} points but only {len(first)} distinct ones: a skeleton needs at least {MIN_POINTS}"
-            )
-        # Anew: the frame is that of the distinct points, however often they came.
-        distinct = points[first]
-        order = morton_order(distinct)
-        frame = Frame.of(distinct[order], by)
-        position = np.empty(len(first), int)
-        position[order] = np.arange(len(first))
-        cloud, merged = frame.into(distinct[order]), position[inverse.reshape(-1)]
-        representative, weight = merged[representative], np.zeros(len(first))
-        np.maximum.at(weight, merged, counts)
-        distance, neighbours = nearest_neighbours(cloud, k(len(cloud)))
-    return DistinctPoints(frame, cloud, representative, weight, distance, neighbours)
+    if distance[:, 1].min() >= SAME_POINT:
+        return frame, cloud, row, counts, neighbours
+    cells = np.round(cloud / SAME_POINT).astype(np.int64)
+    first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)[1:]
+    if len(first) < MIN_POINTS:
+        raise InvalidCloudError(
+            f"{len(points)} points but only {len(first)} distinct ones: a skeleton needs at least {MIN_POINTS}"
+        )
+    # Anew: the frame is that of the distinct points, however often they came.
+    distinct = points[first]
+    order = morton_order(distinct)
+    frame = Frame.of(distinct[order], by)
+    position, weight = np.empty(len(first), int), np.zeros(len(first))
+    position[order] = np.arange(len(first))
+    cloud, merged = frame.into(distinct[order]), position[inverse.reshape(-1)]
+    np.maximum.at(weight, merged, counts)
+    return frame, cloud, merged[row], weight, nearest_neighbours(cloud, k(len(cloud)))[1]
 
 
 def check_extent(points: np.ndarray, n: int | None = None) -> None:

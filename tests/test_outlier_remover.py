@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import samples
+from glsk_o3d import OutlierRemover, RingBuilder, Sampler, samples
+from glsk_o3d.numerics.grid_sampling import sample_grid
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
-from glsk_o3d.preparation.outliers import inliers
-from glsk_o3d.preparation.sampling import sample_grid
+from glsk_o3d.outlier_remover import inliers
 
 K, N = 16, 12000
 SURFACE = samples.torus(N, ring_radius=0.4, radius=0.1).points
@@ -73,3 +73,42 @@ def test_it_does_not_matter_how_the_cloud_lies():
     np.testing.assert_array_equal(left(turned), kept)
     order = rng.permutation(len(points))
     np.testing.assert_array_equal(np.sort(order[left(points[order])]), kept)
+
+
+# ---- the filter
+
+
+TORUS = samples.torus(n=600).points
+ALL, STRICT = Sampler(), Sampler() | OutlierRemover()
+
+
+def group(n, wide, seed=4):
+    """Points beside the torus."""
+    return [1.5, 0, 1] + wide * np.random.default_rng(seed).normal(size=(n, 3))
+
+
+@pytest.mark.parametrize("seed", [2, 9])
+def test_a_group_of_outliers_that_hide_each_other_is_found_in_rounds(seed):
+    """At first most of ten have others among their neighbours that are as far off."""
+    points = np.concatenate([TORUS, group(10, 0.4, seed)])
+    state = (STRICT | RingBuilder())(points)
+    np.testing.assert_array_equal(state.outlier, np.arange(610) >= 600)
+    assert (state.report.n_outliers, state.report.n_distinct) == (10, 600)
+    assert not STRICT(points[~state.outlier]).outlier.any()  # nothing more is found
+    assert not (ALL | OutlierRemover(outlier_factor=0))(points).outlier.any()
+
+
+@pytest.mark.parametrize("outliers", [np.outer([1, 2, 4, 8, 16], [1, 0.3, 1]), group(6, 0.01), group(10, 0.4)])
+def test_what_is_left_is_the_cloud_without_them(outliers):
+    order = np.random.default_rng(0).permutation(600 + len(outliers))
+    mixed = np.concatenate([TORUS, outliers])[order]
+    state, clean = STRICT(mixed), STRICT(TORUS)
+    np.testing.assert_array_equal(state.outlier, order >= 600)
+    np.testing.assert_allclose(state.cloud, clean.cloud, atol=1e-15)  # sums in another order
+    np.testing.assert_array_equal(state.neighbours, clean.neighbours)
+    assert state.frame.diagonal == pytest.approx(clean.frame.diagonal, rel=1e-15)
+    kept = order < 600
+    np.testing.assert_array_equal(state.representative_of_point[kept], clean.representative_of_point[order[kept]])
+    # outliers go with the nearest point that is none
+    nearest = cKDTree(TORUS).query(mixed[~kept])[1]
+    np.testing.assert_array_equal(state.representative_of_point[~kept], clean.representative_of_point[nearest])

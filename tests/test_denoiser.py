@@ -5,9 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glsk_o3d import Denoiser, OutlierRemover, RingBuilder, Sampler, samples
+from glsk_o3d.denoiser import RIDGE_NEIGHBOURS, subspace_mean_shift, to_ridges
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
-from glsk_o3d.preparation.denoising import RIDGE_NEIGHBOURS, subspace_mean_shift
-from glsk_o3d.preparation.surface import CLEAN_SPHERICITY, NOISE_SPHERICITY, noise_share
+from glsk_o3d.points import CLEAN_SPHERICITY, NOISE_SPHERICITY, noise_share
+
+PREPARED = Sampler() | OutlierRemover() | Denoiser()
 
 TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
 
@@ -99,3 +102,62 @@ def test_goes_with_the_cloud(turn, scale, shift):
     np.testing.assert_allclose(noise_of(there), noise, atol=1e-9)
     moved = (subspace_mean_shift(there, noise, 3) - shift) / scale
     np.testing.assert_allclose(moved, subspace_mean_shift(points, noise, 3) @ turn, atol=1e-8)
+
+
+# ---- the filter
+
+
+def in_order(points):
+    """The working cloud in the user's order and units."""
+    return points.frame.out_of(points.cloud)[points.representative_of_point]
+
+
+@pytest.mark.parametrize("noise", [0.04, 0.06])
+def test_denoising_moves_noisy_points_to_their_ridge_(noise):
+    """Points that stand alone there are outliers too."""
+    points = samples.tube(n=2000, radius=0.1, noise=noise, seed=2).points
+    plain, state = Sampler()(points), (Sampler() | Denoiser())(points)
+    np.testing.assert_allclose(in_order(plain), points, atol=1e-15)
+    middle = (np.abs(points[:, 0]) < 0.4) & ~state.outlier
+    before, after = (np.hypot(*in_order(each)[middle, 1:].T).std() for each in (plain, state))
+    assert after < 0.8 * before
+    np.testing.assert_array_equal(state.points, points)
+    left = plain.representative_of_point[state.point_of_survivor]
+    np.testing.assert_array_equal(state.normals, plain.normals[left])  # a ridge has none, and is not noisy any more
+    np.testing.assert_array_equal(state.noise, plain.noise[left])
+    strict, known = PREPARED(points), (Sampler() | OutlierRemover())(points).outlier
+    assert strict.outlier[known].all()
+    assert strict.outlier.sum() == 2000 - len(strict)
+    assert strict.outlier.sum() > known.sum()
+    assert sorted(strict.point_of_survivor.tolist()) == np.flatnonzero(~strict.outlier).tolist()
+
+
+@pytest.mark.parametrize("points", [samples.torus(600).points, samples.sheet(500, bend=0).points])
+def test_clean_clouds_are_not_denoised(points):
+    plain, denoised = Sampler()(points), (Sampler() | Denoiser(denoise=9))(points)
+    np.testing.assert_array_equal(denoised.cloud, plain.cloud)
+    np.testing.assert_array_equal(denoised.neighbours, plain.neighbours)
+
+
+# ---- averaging where noise is wider than neighbourhoods
+
+
+@pytest.mark.slow
+def test_dense_noisy_clouds_are_averaged():
+    """Neighbourhoods as wide as those of 4096 to 8192 points, and less noise in them the more points there are."""
+    noise = 0.01
+    sample = samples.torus(20000, noise=noise)
+    state = (PREPARED | RingBuilder())(sample.points)
+    assert 4096 <= len(state.cloud) < 8192 + 400
+    assert state.report.n_distinct == state.report.n_input - state.report.n_outliers == state.sampled.sum()
+    assert state.mass.mean() == pytest.approx(1, rel=1e-12)
+    alone = to_ridges(OutlierRemover()(sample.points), 4)
+
+    def off(cloud):
+        x, y, z = cloud.T
+        return np.hypot(np.hypot(x, y) - 0.4, z).std()
+
+    assert off(in_order(state)) < 0.8 * off(in_order(alone))
+    # every point has its place near it
+    away = np.linalg.norm(in_order(state) - sample.points, axis=1)
+    assert np.quantile(away, 0.99) < 6 * noise * np.linalg.norm(np.ptp(sample.points, axis=0))

@@ -3,11 +3,26 @@
 import numpy as np
 import pytest
 
-from glsk_o3d import samples
+from glsk_o3d import (
+    Connector,
+    Contractor,
+    Denoiser,
+    LPRReducer,
+    OutlierRemover,
+    Refiner,
+    RingBuilder,
+    Sampler,
+    StageError,
+    Thinner,
+    pipelines,
+    samples,
+)
+from glsk_o3d.denoiser import MOST_IN_ONE, average_noisy
+from glsk_o3d.numerics.grid_sampling import sample_grid
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
-from glsk_o3d.preparation.denoising import MOST_IN_ONE, average_noisy
-from glsk_o3d.preparation.sampling import sample_grid
-from glsk_o3d.preparation.surface import ENOUGH, spacing_enough, thin, thin_nearer
+from glsk_o3d.thinner import ENOUGH, default_size, spacing_enough, thin, thin_nearer
+
+PREPARED = Sampler() | OutlierRemover() | Denoiser()
 
 
 def thinned(points, n, k=16):
@@ -120,3 +135,84 @@ def test_means_of_noisy_points(surface):
     clean = noise == 0
     assert (size[into[clean]] == 1).all()
     np.testing.assert_allclose(mean[into[clean]], surface[clean], rtol=1e-15)
+
+
+# ---- the filter
+
+
+@pytest.mark.parametrize(
+    ("n", "size"), [(8, 8), (25000, 25000), (25001, 25000), (152588, 25000), (160000, 25600), (10**6, 64000)]
+)
+def test_points_to_contract_by_the_number_of_points(n, size):
+    assert default_size(n) == size
+
+
+@pytest.mark.parametrize("late", [OutlierRemover(), Denoiser()])
+def test_what_looks_at_every_point_comes_before(late):
+    with pytest.raises(StageError, match="comes before Thinner"):
+        (Thinner() | late)(samples.torus(5000).points)
+
+
+def test_thinned_clouds_keep_all_points_and_their_mass():
+    points, n = samples.torus(2000).points, 500
+    state, whole = (Thinner(around=0, thin_to=n) | RingBuilder())(points), RingBuilder()(points)
+    assert len(state) == n == state.report.n_contracted < len(whole) == 2000
+    assert state.report.n_sampled == state.report.n_distinct == 2000
+    assert len(Thinner(thin_to="all")(points)) == 2000
+    assert state.sampled.all()
+    np.testing.assert_array_equal(state.cloud, whole.cloud)
+    np.testing.assert_array_equal(state.normals, whole.normals)
+    np.testing.assert_array_equal(state.positions, state.cloud[state.survivors])
+    np.testing.assert_array_equal(state.representative[state.survivors], np.arange(n))
+    np.testing.assert_allclose(state.mass, np.bincount(state.representative) * n / 2000, rtol=1e-14)
+    skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
+    assert len(skeleton.vertex_of_point) == 2000
+    assert skeleton.n_loops == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [4000, 16000])
+def test_a_tube_is_contracted_with_as_many_points_around_it_as_are_enough(n):
+    """Whatever their number: the points contracted have the spacing of a tube with `around` points around it."""
+    sample = samples.torus(n, radius=0.1)
+    state = (PREPARED | Thinner() | RingBuilder())(sample.points)
+    area = 4 * np.pi**2 * 0.4 * 0.1
+    around = 2 * np.pi * 0.1 / np.sqrt(area / len(state))
+    assert 18 < around < 45
+    assert len(state) < 0.9 * n
+    assert state.mass.mean() == pytest.approx(1, rel=1e-12)
+    if n > 4000:  # of fewer all of the surface has no more than its share
+        finer = (PREPARED | Thinner(around=45))(sample.points)
+        assert len(finer) > len(state)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # normals are those of the lines
+def test_scan_lines_much_denser_than_they_are_apart_are_a_surface():
+    """The nearest points of each are of its own line, and show no plane; among those that are left they do."""
+    height, turn = np.meshgrid(np.linspace(0, 3, 44), np.linspace(0, 2 * np.pi, 450, endpoint=False))
+    turn = turn + 6 * np.random.default_rng(0).random(44)
+    found = pipelines.default()(
+        np.column_stack([0.3 * np.cos(turn).ravel(), 0.3 * np.sin(turn).ravel(), height.ravel()])
+    )
+    assert found.report.n_contracted < 3000
+    assert (found.n_components, found.n_loops, len(found.leaves)) == (1, 0, 2)
+
+
+@pytest.mark.parametrize("around", [1e-310, 1, 1000])
+def test_any_number_around_is_taken_on_curves_and_surfaces(around):
+    t = np.linspace(0, 6, 3000)
+    for points in (np.column_stack([np.cos(t), np.sin(t), 0.3 * t]), samples.torus(3000).points):
+        assert 100 < len(Thinner(around=around)(points)) <= 3000
+
+
+def test_thin_parts_keep_their_points():
+    """A thick and a thin tube, equally dense: the thick one is merged, the thin one stays."""
+    thick, thin_ = samples.tube(9000, radius=0.3, length=1.5).points, samples.tube(600, radius=0.02, length=1.5).points
+    state = Thinner()(np.concatenate([thick, thin_ + [0, 1, 0]]))
+    kept = state.point_of_survivor
+    assert (kept < 9000).sum() < 0.5 * 9000
+    assert (kept >= 9000).sum() > 0.7 * 600  # not those that are nearer than a twentieth of the way around
+    gone = np.setdiff1d(np.arange(9000, 9600), kept) - 9000
+    nearest = np.linalg.norm(thin_[gone, None] - thin_[kept[kept >= 9000] - 9000], axis=2).min(axis=1)
+    assert np.quantile(nearest, 0.8) < np.sqrt(2 * np.pi * 0.02 * 1.5 / 600)  # their spacing

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from glsk_o3d.errors import InvalidCloudError
+from glsk_o3d.numerics.frame import FRAME_SIDE, Frame, check_extent
 from glsk_o3d.numerics.morton import morton_order
-from glsk_o3d.preparation.frame import FRAME_SIDE, Frame, check_extent
 
 CLOUD = np.random.default_rng(0).normal(size=(500, 3)) * [1, 3, 0.2]
 

@@ -1,20 +1,23 @@
-"""Denoise a surface: average points where there are plenty, and draw noisy ones to the ridge of their density."""
+"""Denoiser: points -> averaged where there are plenty, and noisy ones drawn to the ridge of their density."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..numerics.eigen import main_direction
-from ..numerics.groups import group_sum
-from ..numerics.neighbourhoods import local_outlier_ratio, nearest_left, nearest_moved, nearest_neighbours, principal
-from ..numerics.pairing import Pairs, merge_pairs
-from ..numerics.vectors import PAIRS
-from .frame import MIN_POINTS
-from .surface import STEADY_SHARE, Surface
+from .numerics.eigen import main_direction
+from .numerics.frame import MIN_POINTS
+from .numerics.groups import group_sum
+from .numerics.neighbourhoods import local_outlier_ratio, nearest_left, nearest_moved, nearest_neighbours
+from .numerics.pairing import Pairs, merge_pairs
+from .numerics.vectors import PAIRS
+from .parameters import documented, parameter
+from .pipeline import Filter, Watch
+from .points import Points, default_k
+from .thinner import STEADY_SHARE
 
 RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
 RIDGE_CHUNK = 1024  # speed: points at a time: the (3, points, 32) work arrays then stay in the cache
@@ -24,55 +27,77 @@ ENOUGH_NOISY = 4096  # fitted: noisy points that are enough; down to about so ma
 DENOISED_RATIO, DENOISED_NOISE = 1.8, 0.2  # fitted: local outlier ratio of a denoised outlier, and its least noise
 
 
-def average_noise(surface: Surface, k: Callable[[int], int]) -> Surface:
-    """Put means in the place of noisy points while there are plenty; of n points `k(n)` neighbours are looked up."""
-    while np.count_nonzero(surface.noise) >= 2 * ENOUGH_NOISY:
-        representative, mean, weight = average_noisy(
-            surface.points, surface.neighbours, surface.noise, surface.weight, ENOUGH_NOISY
-        )
-        if len(mean) > STEADY_SHARE * len(representative):
-            break
-        neighbours = nearest_neighbours(mean, k(len(mean)))[1]
-        merged = np.bincount(representative, surface.merged)
-        of_sample = representative[surface.representative]
-        surface = Surface.measured(surface.frame, mean, neighbours, weight, merged, of_sample, surface.outlier)
-    return surface
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Denoiser(Filter[Points]):
+    """Average noisy points where there are plenty, then draw them to the ridge of their density.
 
+    A neighbourhood narrower than the noise is a ball, and says nothing of the surface; the mean of several points has
+    less noise. Points that stand alone on a ridge are outliers.
 
-def denoise(surface: Surface, passes: int, set_aside: bool) -> Surface:
-    """Draw noisy points to the ridges of their density, and set aside those that then are outliers, if `set_aside`.
+    References
+    ----------
+    Ozertem and Erdogmus 2011, Locally defined principal curves and surfaces.
 
-    The surface keeps the normals that it came with, since a ridge has none.
+    Examples
+    --------
+    >>> from glsk_o3d import Sampler
+    >>> from glsk_o3d.samples import tube
+    >>> noisy = Sampler()(tube(800, radius=0.1, noise=0.04).points)
+    >>> bool(Denoiser()(noisy).spread[:, 0].mean() < noisy.spread[:, 0].mean())
+    True
     """
-    if not (passes and surface.noise.any()):
-        return surface
-    denoised = subspace_mean_shift(surface.points, surface.noise, passes, surface.weight)
-    k, outlier = surface.neighbours.shape[1], np.zeros(len(denoised), bool)
-    neighbours = nearest_moved(denoised, surface.neighbours, surface.noise > 0)
+
+    consumes: ClassVar[type] = Points
+    produces: ClassVar[type] = Points
+
+    denoise: int = parameter(
+        4,
+        "Passes that draw the points of noisy neighbourhoods to the ridge of their density. 0 leaves all as it is.",
+        unit="passes",
+        low=0,
+    )
+
+    def _run(self, points: Points, watch: Watch | None) -> Points:
+        if not self.denoise:
+            return points
+        points.check_whole(self)
+        return to_ridges(averaged(points), self.denoise)
+
+
+def averaged(points: Points) -> Points:
+    """Points with means in the place of noisy ones, while there are plenty of these."""
+    while np.count_nonzero(points.noise) >= 2 * ENOUGH_NOISY:
+        row, mean, weight = average_noisy(points.cloud, points.neighbours, points.noise, points.weight, ENOUGH_NOISY)
+        if len(mean) > STEADY_SHARE * len(row):
+            break
+        neighbours = nearest_neighbours(mean, default_k(len(mean)))[1]
+        points = points.remade(row, mean, neighbours, weight=weight, merged=np.bincount(row, points.merged))
+    return points
+
+
+def to_ridges(points: Points, passes: int) -> Points:
+    """Noisy points drawn to the ridges of their density, without those that then are outliers.
+
+    The points keep the normals that they came with, since a ridge has none.
+    """
+    if not points.noise.any():
+        return points
+    denoised = subspace_mean_shift(points.cloud, points.noise, passes, points.weight)
+    k, outlier = points.neighbours.shape[1], np.zeros(len(denoised), bool)
+    neighbours = nearest_moved(denoised, points.neighbours, points.noise > 0)
     away = denoised[neighbours[:, 1:]] - denoised[:, None]
     mean_distance = np.sqrt(np.einsum("nki,nki->nk", away, away)).mean(axis=1)
-    found = local_outlier_ratio(mean_distance, neighbours) > DENOISED_RATIO
-    found &= (surface.noise > DENOISED_NOISE) & set_aside
+    found = (local_outlier_ratio(mean_distance, neighbours) > DENOISED_RATIO) & (points.noise > DENOISED_NOISE)
     if 0 < found.sum() <= len(denoised) - max(k, MIN_POINTS):
         outlier = found
-    left, representative = np.flatnonzero(~outlier), np.cumsum(~outlier) - 1
+    left, row = np.flatnonzero(~outlier), np.cumsum(~outlier) - 1
     if len(left) < len(denoised):
-        representative[outlier] = cKDTree(denoised[left]).query(denoised[outlier])[1]
+        row[outlier] = cKDTree(denoised[left]).query(denoised[outlier])[1]
         denoised, neighbours = denoised[left], nearest_left(denoised, neighbours, ~outlier, k)
-    spread, ring_normals = principal(denoised, neighbours)
-    return replace(
-        surface,
-        points=denoised,
-        neighbours=neighbours,
-        weight=surface.weight[left],
-        merged=surface.merged[left],
-        noise=surface.noise[left],
-        normals=surface.normals[left],
-        spread=spread,
-        ring_normals=ring_normals,
-        representative=representative[surface.representative],
-        outlier=surface.outlier | outlier[surface.representative],
-    )
+        points = points.aside(outlier)
+    kept = {name: getattr(points, name)[left] for name in ("weight", "merged", "noise", "normals")}
+    return points.remade(row, denoised, neighbours, **kept)
 
 
 def average_noisy(

@@ -1,74 +1,20 @@
-"""The points that say where the surface is, and fewer of them where there are more than it takes."""
+"""Thinner: points -> fewer of them where there are more than it takes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..numerics.eigen import principal_parts
-from ..numerics.neighbourhoods import nearest_left, principal, sphericity
-from ..numerics.pairing import Pairs, merge_pairs
-from ..numerics.vectors import PAIRS, TINY
-from .frame import Frame
-
-# Fitted: median sphericity of clean neighbourhoods at most, and of nothing but noise.
-CLEAN_SPHERICITY, NOISE_SPHERICITY = 0.2, 0.35
-
-
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """Points in the working frame, and what their neighbourhoods are like.
-
-    On the way to the rings points are merged, copies, noisy and near ones, and outliers are set aside. A point that is
-    left represents those that went into it, and the outliers nearest to it; its `weight` and `merged` say how many.
-    """
-
-    frame: Frame
-    points: np.ndarray  # (m, 3)
-    neighbours: np.ndarray  # (m, k) nearest first, the point itself ahead of them
-    weight: np.ndarray  # (m,) points of the cloud that each stands for
-    merged: np.ndarray  # (m,) distinct points that each is the mean of
-    noise: np.ndarray  # (m,) see `noise_share`
-    normals: np.ndarray  # (m, 3) of the surface as it came, up to their sign: on a ridge there are none any more
-    spread: np.ndarray  # (m, 3) as from `principal`
-    ring_normals: np.ndarray  # (m, 3) of the planes that the rings lie in: those of the points as they are now
-    representative: np.ndarray  # (s,) of every sampled point its row
-    outlier: np.ndarray  # (s,) sampled points that were set aside
-
-    @classmethod
-    def measured(
-        cls,
-        frame: Frame,
-        points: np.ndarray,
-        neighbours: np.ndarray,
-        weight: np.ndarray,
-        merged: np.ndarray,
-        representative: np.ndarray,
-        outlier: np.ndarray,
-    ) -> Surface:
-        """The surface with noise, normals and spread measured in the neighbourhoods."""
-        spread, normals = principal(points, neighbours)
-        noise = noise_share(spread, neighbours)
-        return cls(frame, points, neighbours, weight, merged, noise, normals, spread, normals, representative, outlier)
-
-    def __len__(self) -> int:
-        return len(self.points)
-
-
-def noise_share(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """How far the neighbourhoods of a cloud are noise, from 0 to 1, (n,) float array.
-
-    That is how much they fill space: the sphericity, smoothed by the median, is near 0 on a surface and along a curve,
-    however dense, and 1 in a ball of noise (Demantke et al. 2011, "Dimensionality based scale selection in 3D lidar
-    point clouds"); from 0.2 to 0.35 it is mapped to 0 to 1.
-    """
-    rise = (sphericity(spread, neighbours) - CLEAN_SPHERICITY) / (NOISE_SPHERICITY - CLEAN_SPHERICITY)
-    return np.clip(rise, 0, 1)
-
+from .numerics.eigen import principal_parts
+from .numerics.neighbourhoods import nearest_left, principal
+from .numerics.pairing import Pairs, merge_pairs
+from .numerics.vectors import PAIRS, TINY
+from .parameters import documented, parameter
+from .pipeline import Filter, Watch
+from .points import Points, default_k
 
 ASK_AGAIN = 0.25  # speed: share of the points left, below which the neighbours are looked up anew
 DENSE_FROM = 2000  # fitted: points from which on more than enough are merged
@@ -83,42 +29,78 @@ WIDER_BIAS = 1.25  # measured: on tubes with 18 to 80 points around them, noise 
 STEADY_SHARE = 0.9  # fitted: share of the points left by a pass at which passes end
 
 
-class Thinned(NamedTuple):
-    """The points to contract."""
+def default_size(n: int) -> int:
+    """Points to contract: at most 25000, but 64 times the square root of their number from 152588 points on.
 
-    survivors: np.ndarray  # (n,) rows of the surface
-    representative: np.ndarray  # (m,) for every point of the surface the position in `survivors` of what it went into
-    neighbours: np.ndarray  # (n, k) among the survivors
-    spread: np.ndarray  # (n, 3) of these, as from `principal`
-    ring_normals: np.ndarray  # (n, 3) of their planes: among points of one scan line any that has the line in it is one
-
-
-def thin_surface(surface: Surface, around: float, most: int, k: Callable[[int], int]) -> Thinned:
-    """Merge points where there are more than enough, and then until no more than `most` are left.
-
-    See `spacing_enough` for how many points `around` a part are enough; 0 merges none for this. `k` says how many
-    neighbours to have among so many points.
+    More points make the axis hardly more exact, since neither noise nor the thickness of parts shrinks with their
+    spacing; they only cost time.
     """
-    points, all_of_them = surface.points, np.arange(len(surface))
-    thinned = Thinned(all_of_them, all_of_them, surface.neighbours, surface.spread, surface.ring_normals)
-    before = np.inf
-    while around and DENSE_FROM <= len(thinned.survivors) <= STEADY_SHARE * before:
-        before, here = len(thinned.survivors), points[thinned.survivors]
-        apart = spacing_enough(here, thinned.neighbours, thinned.spread, around)
-        thinned = _merged(points, thinned, thin_nearer(here, thinned.neighbours, apart), k)
-    if most < len(thinned.survivors):
-        thinned = _merged(points, thinned, thin(points[thinned.survivors], thinned.neighbours, most), k)
-    return thinned
+    return min(n, max(25000, round(64 * np.sqrt(n))))
 
 
-def _merged(points: np.ndarray, thinned: Thinned, representative: np.ndarray, k: Callable[[int], int]) -> Thinned:
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Thinner(Filter[Points]):
+    """Merge points into near ones, which take over their mass, where there are more than a skeleton needs.
+
+    No point moves, gaps stay smaller than in a random sample, and thin parts keep their points.
+
+    Examples
+    --------
+    >>> from glsk_o3d import Sampler
+    >>> from glsk_o3d.samples import torus
+    >>> points = (Sampler() | Thinner())(torus(5000).points)
+    >>> len(points) < 2500, len(points.cloud)
+    (True, 5000)
+    """
+
+    consumes: ClassVar[type] = Points
+    produces: ClassVar[type] = Points
+
+    around: float = parameter(
+        20.0,
+        "Points around a part that are enough: where there are more, near ones are merged; with 0 none.",
+        unit="points",
+        low=0,
+        high=1000,
+    )
+    thin_to: int | Literal["auto", "all"] = parameter(
+        "auto",
+        "Most points to contract. 'auto' is 25000, or 64 times the square root of their number if that is more; 'all' "
+        "merges none, whatever `around` says.",
+        type="int",
+        unit="points",
+        low=8,
+        choices=("auto", "all"),
+    )
+
+    def _run(self, points: Points, watch: Watch | None) -> Points:
+        if self.thin_to == "all":
+            return points
+        before = np.inf
+        while self.around and DENSE_FROM <= len(points) <= STEADY_SHARE * before:
+            before, here = len(points), points.cloud[points.survivors]
+            apart = spacing_enough(here, points.neighbours, points.spread, self.around)
+            points = _merged(points, thin_nearer(here, points.neighbours, apart))
+        report = points.report
+        if report.is_sampled and self.thin_to != "auto" and self.thin_to > report.n_sampled:
+            told = (
+                f"Thinner.thin_to = {self.thin_to}: the Sampler left {report.n_sampled} points: set Sampler.size, too"
+            )
+            points = replace(points, report=report.with_warning(told))
+        most = default_size(report.n_input - report.n_dropped) if self.thin_to == "auto" else self.thin_to
+        if most < len(points):
+            points = _merged(points, thin(points.cloud[points.survivors], points.neighbours, most))
+        return points
+
+
+def _merged(points: Points, representative: np.ndarray) -> Points:
     """What is left when survivors are merged into others."""
     kept = representative == np.arange(len(representative))
-    rank = np.cumsum(kept) - 1
-    survivors = thinned.survivors[kept]
-    neighbours = nearest_left(points[thinned.survivors], thinned.neighbours, kept, k(len(survivors)))
-    measured = principal(points[survivors], neighbours)
-    return Thinned(survivors, rank[representative][thinned.representative], neighbours, *measured)
+    here = points.cloud[points.survivors]
+    neighbours = nearest_left(here, points.neighbours, kept, default_k(int(kept.sum())))
+    spread, normals = principal(here[kept], neighbours)
+    return points.merged_into(representative, neighbours=neighbours, spread=spread, ring_normals=normals)
 
 
 def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:

@@ -5,7 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from glsk_o3d.preparation.sampling import sample_blocks, sample_cloud, sample_grid
+from glsk_o3d.numerics.grid_sampling import sample_blocks, sample_cloud, sample_grid
 from glsk_o3d.samples import torus
 
 
@@ -30,19 +30,19 @@ def clouds():
 @pytest.mark.parametrize("rows", [7919, 1 << 20])
 @pytest.mark.parametrize("points", [pytest.param(points, id=name) for name, points in clouds()])
 def test_the_sample_of_blocks_is_that_of_the_whole(points, rows):
-    sample = sample_grid(points, 2500)
+    kept, _, weight = sample_grid(points, 2500)
     found, counts = sample_blocks(in_blocks(points, rows), lambda n: 2500)
-    np.testing.assert_array_equal(found, points[sample.kept])
-    np.testing.assert_array_equal(counts, sample.counts)
+    np.testing.assert_array_equal(found, points[kept])
+    np.testing.assert_array_equal(counts, weight)
 
 
 def test_a_sample_of_a_sample_counts_all_points():
     points = torus(20000).points
-    first = sample_grid(points, 4000)
-    second = sample_cloud(points[first.kept], 1000, first.counts)
-    assert len(second.kept) < 1500
-    assert second.counts.sum() == 20000
-    np.testing.assert_array_equal(sample_cloud(points[first.kept], 4000, first.counts).counts, first.counts)
+    kept, _, counts = sample_grid(points, 4000)
+    fewer, _, of_these = sample_cloud(points[kept], 1000, counts)
+    assert len(fewer) < 1500
+    assert of_these.sum() == 20000
+    np.testing.assert_array_equal(sample_cloud(points[kept], 4000, counts)[2], counts)
 
 
 @pytest.mark.slow

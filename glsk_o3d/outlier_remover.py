@@ -1,17 +1,18 @@
-"""Set outliers aside: single points far from all others, and clusters that float in space."""
+"""OutlierRemover: points -> those that are no outliers, single points far from all others or clusters that float."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ..numerics.groups import component_labels
-from ..numerics.morton import morton_order
-from ..numerics.neighbourhoods import local_outlier_ratio, nearest_neighbours, principal, row_medians
-from .frame import MIN_POINTS, Frame, to_working_frame
-from .surface import Surface
+from .numerics.frame import MIN_POINTS
+from .numerics.groups import component_labels
+from .numerics.neighbourhoods import local_outlier_ratio, nearest_neighbours, principal, row_medians
+from .parameters import documented, parameter
+from .pipeline import Filter, Watch
+from .points import Points
 
 # All fitted, on clouds with outliers of 1 to 10 %, sparse limbs and crowns.
 OUTLIER_ROUNDS = 6  # since what is left of a cluster stands out once the rest is gone
@@ -24,38 +25,49 @@ LIMB_NEIGHBOURS = 64  # among points far from theirs, that a limb of an object i
 FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
 
 
-def set_aside_outliers(
-    points: np.ndarray, counts: np.ndarray, by: str, k: Callable[[int], int], factor: float
-) -> Surface:
-    """The surface that a cloud shows without its outliers, in the frame of the points without these.
+@documented
+@dataclass(frozen=True, kw_only=True)
+class OutlierRemover(Filter[Points]):
+    """Set outliers aside: they have no say from here on, but go with the nearest point.
 
-    The arguments are those of `to_working_frame` and, as `factor`, `inliers`; 0 keeps all. The representative of an
-    outlier is the point nearest to it.
+    A point is one that is far from its neighbours, compared with how far these are from theirs; and so are clusters
+    that float in space. ``remove_statistical_outlier`` takes points of sparse limbs as well.
+
+    References
+    ----------
+    Breunig et al. 2000, LOF: identifying density-based local outliers.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from glsk_o3d import Sampler
+    >>> from glsk_o3d.samples import torus
+    >>> points = (Sampler() | OutlierRemover())(np.append(torus(500).points, [[0, 0, 1]], axis=0))
+    >>> np.flatnonzero(points.outlier)
+    array([500])
     """
-    frame, cloud, representative, weight, distance, neighbours = to_working_frame(points, counts, by, k)
-    outlier = np.zeros(len(points), bool)
-    if factor:
-        left, among_left = inliers(cloud, weight, distance, neighbours, factor, MIN_POINTS)
-        kept = np.zeros(len(cloud), bool)
-        kept[left] = True
-        outlier = ~kept[representative]
-    if outlier.any():
-        inside = ~outlier
-        if len(cloud) == len(points):  # the neighbours are known
-            given, place = np.empty(len(cloud), int), np.empty(len(cloud), int)
-            given[representative] = np.arange(len(points))
-            order = morton_order(points[given[left]])
-            left, among_left = left[order], among_left[order, : k(len(left))]
-            place[left] = np.arange(len(left))
-            frame = Frame.of(points[given[left]], by)
-            cloud, weight, neighbours = frame.into(points[given[left]]), weight[left], np.argsort(order)[among_left]
-            representative = place[representative]
-        else:  # copies in a frame that far ones made wide may be none in their own
-            frame, cloud, representative[inside], weight, _, neighbours = to_working_frame(
-                points[inside], counts[inside], by, k
-            )
-        representative[outlier] = cKDTree(cloud).query(frame.into(points[outlier]))[1]
-    return Surface.measured(frame, cloud, neighbours, weight, np.ones(len(cloud)), representative, outlier)
+
+    consumes: ClassVar[type] = Points
+    produces: ClassVar[type] = Points
+
+    outlier_factor: float = parameter(
+        2.5,
+        "A point this many times farther from its neighbours than these are from theirs is an outlier. 0 keeps all.",
+        low=0,
+    )
+
+    def _run(self, points: Points, watch: Watch | None) -> Points:
+        if not self.outlier_factor:
+            return points
+        points.check_whole(self)
+        cloud, neighbours = points.cloud, points.neighbours
+        distance = np.linalg.norm(cloud[neighbours] - cloud[:, None], axis=2)
+        left, neighbours = inliers(cloud, points.weight, distance, neighbours, self.outlier_factor, MIN_POINTS)
+        if len(left) == len(points):
+            return points
+        gone = np.ones(len(points), bool)
+        gone[left] = False
+        return points.without(gone, neighbours)
 
 
 def inliers(

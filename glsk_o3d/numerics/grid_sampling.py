@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from ..numerics.morton import MORTON_BITS, morton_codes, sort_within
-from ..numerics.vectors import dot
 from .frame import check_extent
+from .morton import MORTON_BITS, morton_codes, sort_within
+from .vectors import dot
 
 GRID_TAIL = 0.001  # fitted: share of the points that may be far off, at either end of each axis
 TAIL_POINTS = 100000  # fitted: points by which that is told
@@ -18,12 +18,9 @@ MIXING = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], 
 ALL_BITS = np.uint64(2**64 - 1)  # derived
 
 
-class Sample(NamedTuple):
-    """Points that stand for a cloud."""
-
-    kept: np.ndarray  # (c,) points of the cloud
-    representative: np.ndarray  # (m,) for every point the position in `kept` of the one that stands for it
-    counts: np.ndarray  # (c,) points that each stands for; copies in a row of the grid's finest cells count once
+Sample: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Rows (c,) of the points kept of a cloud; for each of its points the position among these of what stands for it; and
+how many points each of these stands for, copies in a row of the grid's finest cells once."""
 
 
 def sample_cloud(points: np.ndarray, n: int, counts: np.ndarray | None = None) -> Sample:
@@ -31,13 +28,13 @@ def sample_cloud(points: np.ndarray, n: int, counts: np.ndarray | None = None) -
 
     Each of the points may stand for `counts` (m,) points of another cloud already.
     """
-    sample = sample_grid(points, n) if len(points) > 2 * n else everybody(points)
-    return sample if counts is None else sample._replace(counts=np.bincount(sample.representative, counts))
+    kept, position, weight = sample_grid(points, n) if len(points) > 2 * n else everybody(points)
+    return kept, position, weight if counts is None else np.bincount(position, counts)
 
 
 def everybody(points: np.ndarray) -> Sample:
     """All points, each for itself."""
-    return Sample(np.arange(len(points)), np.arange(len(points)), np.ones(len(points)))
+    return np.arange(len(points)), np.arange(len(points)), np.ones(len(points))
 
 
 class Grid(NamedTuple):
@@ -144,7 +141,7 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     kept[cell[nearest[::-1]]] = order[nearest[::-1]]
     representative = np.empty(len(points), int)
     representative[order] = cell
-    return Sample(kept, representative, weight)
+    return kept, representative, weight
 
 
 Blocks = Callable[[], Iterable[np.ndarray]]

@@ -1,0 +1,271 @@
+"""Points: a cloud in its working frame, and which of its points speak for which."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .errors import StageError
+from .interop.clouds import cloud_counts, cloud_points, to_point_cloud
+from .numerics.frame import Frame, finite_points, to_working_frame
+from .numerics.grid_sampling import sample_cloud
+from .numerics.neighbourhoods import principal, sphericity
+from .report import Report
+
+Some = TypeVar("Some", bound="Representatives")
+
+# Fitted: median sphericity of clean neighbourhoods at most, and of nothing but noise.
+CLEAN_SPHERICITY, NOISE_SPHERICITY = 0.2, 0.35
+
+
+def default_k(n: int) -> int:
+    """Neighbours per point, itself included: 16 from 4096 points on, fewer by the cube root below, at least 8.
+
+    In a sparse cloud 16 neighbours would reach across thin parts.
+    """
+    return min(int(np.clip(np.floor(16 * np.cbrt(n / 4096) + 0.5), 8, 16)), n)
+
+
+@dataclass(frozen=True, eq=False)
+class Representatives:
+    """What `Points` and `Contraction` have in common: who speaks for whom.
+
+    Arrays over the N input points are in the user's order and units. Everything else lives in the working frame: m
+    distinct points in Morton order, of which n survive.
+    """
+
+    points: np.ndarray
+    representative_of_point: np.ndarray
+    outlier: np.ndarray
+    sampled: np.ndarray
+    frame: Frame
+    cloud: np.ndarray
+    weight: np.ndarray
+    merged: np.ndarray
+    noise: np.ndarray
+    normals: np.ndarray
+    survivors: np.ndarray
+    representative: np.ndarray
+    report: Report
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} of {len(self.points)} points left)"
+
+    def __len__(self) -> int:
+        return len(self.survivors)
+
+    @property
+    def survivor_of_point(self) -> np.ndarray:
+        """For every input point the survivor that speaks for it, (N,) int array; -1 for dropped points."""
+        return self._of_points(self.representative)
+
+    @property
+    def point_of_survivor(self) -> np.ndarray:
+        """For every survivor the first input point that it is, (n,) int array."""
+        points = np.flatnonzero(self.sampled)[::-1]  # of several writes the last one stays
+        first = np.empty(len(self.cloud), int)
+        first[self.representative_of_point[points]] = points
+        return first[self.survivors]
+
+    def merged_into(self: Some, representative: np.ndarray, **changes: Any) -> Some:
+        """The same with survivors merged into others, each into the `representative` (n,) of it; a survivor is its own.
+
+        `changes` are the fields over the survivors that are left.
+        """
+        kept = representative == np.arange(len(representative))
+        left = (np.cumsum(kept) - 1)[representative]
+        return replace(self, survivors=self.survivors[kept], representative=left[self.representative], **changes)
+
+    def _of_points(self, values: np.ndarray) -> np.ndarray:
+        """Ints (m,) of distinct points for every input point, -1 for dropped ones."""
+        known = self.representative_of_point >= 0
+        return np.where(known, values[self.representative_of_point], -1)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Points(Representatives):
+    """A cloud on its way to its rings.
+
+    Filters that prepare a cloud merge points, copies, noisy and near ones, and set outliers aside. A point that is left
+    represents those that went into it, and the outliers nearest to it.
+
+    Attributes
+    ----------
+    points : (N, 3) float64 array
+        The input.
+    representative_of_point : (N,) int array
+        Row of `cloud` that each input point is; -1 if it was dropped as not finite.
+    outlier, sampled : (N,) bool array
+        Input points that were set aside, whose distinct point is the nearest one, and those that say where the surface
+        is: no outliers, and of a large cloud a sample.
+    frame : Frame
+    cloud : (m, 3) float64 array
+        Distinct input points; noisy ones denoised, and where there are many, means of several.
+    weight, merged : (m,) float64 array
+        Input points that each stands for, and distinct points that it is the mean of.
+    noise : (m,) float64 array
+        How far the neighbourhood of each is noise, from 0 to 1.
+    normals : (m, 3) float64 array
+        Unit normals of the tangent planes before points were moved to ridges, up to their sign.
+    survivors : (n,) int array
+        Rows of `cloud` still there, ascending; all of them until the cloud is thinned.
+    representative : (m,) int array
+        The survivor (0 .. n-1) that each distinct point was merged into; itself for a survivor.
+    neighbours : (n, k) int array
+        The nearest survivors of each, nearest first, the point itself ahead of them.
+    spread : (n, 3) float64 array
+        Sums of squares along the principal axes of these neighbourhoods, ascending.
+    ring_normals : (n, 3) float64 array
+        Unit normals of the planes of these neighbourhoods, in which the rings lie.
+    report : Report
+
+    Examples
+    --------
+    >>> from glsk_o3d import OutlierRemover, Sampler
+    >>> from glsk_o3d.samples import torus
+    >>> points = (Sampler() | OutlierRemover())(torus(500).points)
+    >>> len(points), points.neighbours.shape, int(points.outlier.sum())
+    (500, (500, 8), 0)
+    """
+
+    neighbours: np.ndarray
+    spread: np.ndarray
+    ring_normals: np.ndarray
+
+    @property
+    def coordinates(self) -> np.ndarray:
+        """Positions of the survivors in the user's units, (n, 3) float64 array."""
+        return self.frame.out_of(self.cloud[self.survivors])
+
+    def to_point_cloud(self) -> Any:
+        """The survivors as an ``open3d.geometry.PointCloud``."""
+        return to_point_cloud(self.coordinates)
+
+    @classmethod
+    def of(
+        cls, cloud: Any, size: Callable[[int], int] = int, frame: str = "spread", drop_invalid: bool = False
+    ) -> Points:
+        """The points of a cloud: of n about `size(n)` from the cells of a grid, if there are more than twice as many.
+
+        InvalidCloudError as of `RingBuilder`.
+        """
+        points = cloud_points(cloud)
+        finite = finite_points(points, drop_invalid)
+        counts, n, dropped = cloud_counts(cloud, finite)
+        given = points if finite.all() else points[finite]
+        kept, position, counts = sample_cloud(given, size(n), counts)
+        kept, place = np.flatnonzero(finite)[kept], np.full(len(points), -1)
+        place[finite] = position
+        report = Report(n_input=n + dropped, n_dropped=dropped, n_sampled=len(kept))
+        return cls._of_rows(points, kept, place, counts, frame, report)
+
+    @classmethod
+    def _of_rows(
+        cls,
+        points: np.ndarray,
+        kept: np.ndarray,
+        place: np.ndarray,
+        counts: np.ndarray,
+        by: str,
+        report: Report,
+        neighbours: np.ndarray | None = None,
+    ) -> Points:
+        """Those of the rows `kept` (s,) of a cloud, each of which stands for `counts` (s,) points.
+
+        `place` (N,) is the position in `kept` of what stands for each input point, -1 for none. `neighbours` (s, k), if
+        they are known, are positions in `kept` that are all distinct.
+        """
+        frame, cloud, row, weight, neighbours = to_working_frame(points[kept], counts, by, default_k, neighbours)
+        spread, normals = principal(cloud, neighbours)
+        sampled = np.zeros(len(points), bool)
+        sampled[kept] = True
+        everybody = np.arange(len(cloud))
+        return cls(
+            points=points,
+            representative_of_point=np.where(place >= 0, row[place], -1),
+            outlier=np.zeros(len(points), bool),
+            sampled=sampled,
+            frame=frame,
+            cloud=cloud,
+            weight=weight,
+            merged=np.ones(len(cloud)),
+            noise=noise_share(spread, neighbours),
+            normals=normals,
+            survivors=everybody,
+            representative=everybody,
+            neighbours=neighbours,
+            spread=spread,
+            ring_normals=normals,
+            report=report,
+        )
+
+    def without(self, gone: np.ndarray, neighbours: np.ndarray) -> Points:
+        """These without some rows, (m,) bool array, which are outliers, in the frame of those left.
+
+        `neighbours` are those of the rows left, as positions among these.
+        """
+        first, aside = self.point_of_survivor, self._of_points(gone) > 0
+        kept = np.flatnonzero(self.sampled & ~aside)
+        position = np.full(len(self.points), -1)
+        position[kept] = np.arange(len(kept))
+        left = position[first]
+        place = np.where(aside, -1, self._of_points(left))
+        place[kept] = np.arange(len(kept))
+        by, known = ("box" if self.frame.mean is None else "spread"), None
+        if len(kept) == np.count_nonzero(~gone):  # copies in a frame that far ones made wide may be none in their own
+            rows = left[~gone]
+            known = np.empty_like(neighbours)
+            known[rows] = rows[neighbours]
+        weight = np.ones(len(kept))
+        weight[left[~gone]] = self.weight[~gone]
+        points = self._of_rows(self.points, kept, place, weight, by, self.report, known)
+        nearest = np.full(len(gone), -1)
+        nearest[gone] = cKDTree(points.cloud).query(points.frame.into(self.points[first[gone]]))[1]
+        representative = np.where(aside, self._of_points(nearest), points.representative_of_point)
+        return replace(points, representative_of_point=representative, outlier=self.outlier | aside)
+
+    def aside(self, rows: np.ndarray) -> Points:
+        """These with some rows, (m,) bool array, counted as outliers."""
+        aside = self._of_points(rows) > 0
+        return replace(self, outlier=self.outlier | aside, sampled=self.sampled & ~aside)
+
+    def check_whole(self, filter: Any) -> None:
+        """Raise StageError if they were thinned, since a filter wants all of them."""
+        if len(self) < len(self.cloud):
+            raise StageError(f"{type(filter).__name__} comes before Thinner, which has merged points already")
+
+    def remade(self, row: np.ndarray, cloud: np.ndarray, neighbours: np.ndarray, **changes: Any) -> Points:
+        """These with other rows, each of the old ones gone into the new `row` (m,) of it, and measured anew.
+
+        `changes` are other fields over the new rows.
+        """
+        spread, normals = principal(cloud, neighbours)
+        everybody = np.arange(len(cloud))
+        measured = dict(noise=noise_share(spread, neighbours), normals=normals)
+        changed = dict(cloud=cloud, neighbours=neighbours, spread=spread, ring_normals=normals)
+        return replace(
+            self,
+            representative_of_point=self._of_points(row),
+            survivors=everybody,
+            representative=everybody,
+            **(measured | changed | changes),
+        )
+
+    def common(self) -> dict[str, Any]:
+        """The fields of `Representatives`, for those who go on."""
+        return {field.name: getattr(self, field.name) for field in fields(Representatives)}
+
+
+def noise_share(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """How far the neighbourhoods of a cloud are noise, from 0 to 1, (n,) float array.
+
+    That is how much they fill space: the sphericity, smoothed by the median, is near 0 on a surface and along a curve,
+    however dense, and 1 in a ball of noise (Demantke et al. 2011, "Dimensionality based scale selection in 3D lidar
+    point clouds"); from 0.2 to 0.35 it is mapped to 0 to 1.
+    """
+    rise = (sphericity(spread, neighbours) - CLEAN_SPHERICITY) / (NOISE_SPHERICITY - CLEAN_SPHERICITY)
+    return np.clip(rise, 0, 1)

@@ -1,0 +1,59 @@
+"""Sampler: cloud -> points in a working frame, of a large cloud a sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+from .parameters import documented, parameter
+from .pipeline import Filter, Watch
+from .points import Points
+from .thinner import default_size
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Sampler(Filter[Points]):
+    """Bring a cloud into its working frame: centred, longest side 1.6, in Morton order and without duplicates.
+
+    Points that differ by rounding are one. Of a large cloud, the points nearest to the means of the cells of a grid say
+    where the surface is; every other point goes where that of its cell goes. What comes out of a pipeline is in the
+    user's order and units.
+
+    Raises
+    ------
+    InvalidCloudError
+        For points that are not finite (unless dropped), fewer than 8 distinct points, and anything that is no cloud.
+
+    Examples
+    --------
+    >>> from glsk_o3d.samples import torus
+    >>> points = Sampler(size=1000)(torus(5000).points)
+    >>> len(points) < 1500, points.points.shape
+    (True, (5000, 3))
+    """
+
+    produces: ClassVar[type] = Points
+
+    size: int | Literal["auto", "all"] = parameter(
+        "auto",
+        "About how many points are sampled of a cloud of more than twice as many. 'auto' is twice what the Thinner "
+        "leaves: 50000, or 128 times the square root of their number if that is more; 'all' takes all.",
+        type="int",
+        unit="points",
+        low=8,
+        choices=("auto", "all"),
+    )
+    frame: Literal["spread", "box"] = parameter(
+        "spread",
+        "What percentages and weights refer to: the box with the spread of the points, or the axis-aligned one.",
+        choices=("spread", "box"),
+    )
+    drop_invalid: bool = parameter(False, "Drop points with NaN or infinite coordinates instead of refusing.")
+
+    def _run(self, cloud: Any, watch: Watch | None) -> Points:
+        return Points.of(cloud, self.sample_size, self.frame, self.drop_invalid)
+
+    def sample_size(self, n: int) -> int:
+        """About how many of n points say where the surface is, if these are more than twice as many."""
+        return {"auto": 2 * default_size(n), "all": n}[self.size] if isinstance(self.size, str) else self.size
