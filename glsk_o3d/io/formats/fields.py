@@ -16,6 +16,7 @@ import numpy as np
 
 from ...report import Report
 from ...skeleton import Skeleton
+from ..paths import check_budget
 from .graphs import checked
 
 FORMAT, FORMAT_VERSION = "glsk-o3d skeleton", 1
@@ -34,8 +35,6 @@ ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {
 """The arrays of a skeleton: the shape of a row and the type of each. The one field more is ``report``."""
 LATER = ("half_width", "half_thickness", "support")
 """Those that older files lack: there they are the radii, and the support is not known."""
-MOST_EXPANDED = 200  # fitted: times the size of a file that its arrays may have; those of skeletons have 1 to 20
-SMALL_ARCHIVE = 1 << 26  # derived: bytes that may always be held
 
 
 def write_json(skeleton: Skeleton) -> bytes:
@@ -58,8 +57,7 @@ def write_npz(skeleton: Skeleton) -> bytes:
 def read_npz(data: bytes) -> Skeleton:
     """The skeleton in the content of an npz file."""
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
-        if sum(info.file_size for info in packed.infolist()) > max(MOST_EXPANDED * len(data), SMALL_ARCHIVE):
-            raise ValueError(f"it would become more than {MOST_EXPANDED} times as large: no skeleton packs so")
+        check_budget(sum(info.file_size for info in packed.infolist()), len(data))
     words = ("format", "format_version", "report")
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         values = {name: archive[name] for name in (*words, *ARRAYS) if name in archive.files}

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import io
 import os
+import struct
+from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -20,7 +22,7 @@ import numpy as np
 
 from ...errors import FileFormatError
 from ...skeleton import Skeleton
-from ..paths import breaks_off
+from ..paths import check_promised, number_rows, text_lines
 from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, brightest, named_attributes, unit_colors
 from .graphs import NoEdges, graph_skeleton
 
@@ -56,20 +58,39 @@ class Element(NamedTuple):
     rows: int
     columns: list[Column]
 
+    @property
+    def has_lists(self) -> bool:
+        """Whether rows differ in length."""
+        return any(column.counts for column in self.columns)
+
     def dtype(self, order: str, lengths: Iterable[int] = ()) -> np.dtype:
-        """A row of binary data in a byte order, whose lists have so many values."""
+        """A row of binary data in a byte order, whose lists have so many values, none by default."""
         left = iter(lengths)
         fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
         for i, (name, kind, counts) in enumerate(self.columns):
             if counts is None:
                 fields.append((name, f"{order}{kind}"))
             else:
-                fields += [(f"{i} counts", f"{order}{counts}"), (name, f"{order}{kind}", (next(left),))]
+                fields += [(f"{i} counts", f"{order}{counts}"), (name, f"{order}{kind}", (next(left, 0),))]
         return np.dtype(fields)
 
-    def breaks_off(self, found: int) -> ValueError:
-        """The error where the file holds fewer rows."""
-        return breaks_off(self.rows, found, "points" if self.name == "vertex" else f"rows of {self.name!r}")
+    def check(self, held: int) -> None:
+        """Raise ValueError where there are less rows."""
+        check_promised(self.rows, held, "points" if self.name == "vertex" else f"rows of {self.name!r}")
+
+
+def check_elements(elements: list[Element], order: str, size: int) -> int:
+    """What elements take of so many bytes at the least; ValueError where that is more, or names repeat."""
+    at = 0
+    for element in elements:
+        if len({column.name for column in element.columns}) < len(element.columns):
+            raise ValueError(f"element {element.name!r} has two properties of one name")
+        lists = sum(column.counts is not None for column in element.columns)
+        corners = [int(element.name == "face")] * lists  # at least one, or it is no mesh
+        least = element.dtype(order, corners).itemsize if order else 2 * (len(element.columns) + sum(corners))
+        element.check((size - at) // least if least else element.rows)
+        at += element.rows * least
+    return at
 
 
 def read_header(stream: BinaryIO) -> tuple[str, list[Element]]:
@@ -119,98 +140,138 @@ def holds_lines(stream: BinaryIO) -> bool:
 
 
 class Lists(NamedTuple):
-    """A column of lists: how many values each row has, and all of them one after the other."""
+    """A column of lists: how many values each row has, and where the first is; the next is a `step` behind it."""
 
     counts: np.ndarray
+    first: np.ndarray
     values: np.ndarray
+    step: int
 
 
-Table = Mapping[str, "np.ndarray | Lists"]
-_Take = Callable[[str, int], Any]  # the next so many values of a type
+Table = Mapping[str, Any]  # of arrays and lists
 
 
 def read_tables(stream: BinaryIO, *wanted: str) -> dict[str, Table]:
-    """Elements that a file has, columns by name; text becomes float64. What follows them is not looked at."""
+    """Elements that a file has, columns by name; text becomes float64. The others are read over: nothing may lack."""
     order, elements = read_header(stream)
-    last = max((i for i, element in enumerate(elements) if element.name in wanted), default=-1)
-    _check_names(elements[: last + 1])
-    if not order:
-        lines = (line.decode("ascii", "replace") for line in stream if line.strip())
-        return {element.name: _text(lines, element) for element in elements[: last + 1]}
-    tables, data, at = dict[str, Table](), stream.read(), 0
-    for element in elements[: last + 1]:
-        tables[element.name], at = _binary(data, at, element, order)
-    return tables
+    start = stream.tell()
+    end = stream.seek(0, os.SEEK_END)
+    check_elements(elements, order, end - start + (not order))  # the last line of text may have no end
+    stream.seek(start)
+    tables = dict[str, Table]()
+    if order:
+        data, at = stream.read(), 0
+        for element in elements:
+            tables[element.name], at = _binary(data, at, element, order, element.name in wanted)
+        rest = data[at : at + LONGEST_LINE].strip()
+    else:
+        lines = text_lines(stream)
+        for element in elements:
+            tables[element.name] = text_table(lines, element)
+        rest = next(lines, "").encode()
+    if rest and sum(element.rows > 0 for element in elements) > 1:  # then a wrong count shifts what comes after it
+        raise ValueError("it holds more than its header promises")
+    return {name: table for name, table in tables.items() if name in wanted}
 
 
-def _text(lines: Iterator[str], element: Element) -> Table:
-    held = list(islice(lines, element.rows))
-    if len(held) < element.rows:
-        raise element.breaks_off(len(held))
-    if not any(column.counts for column in element.columns):
-        shape = len(held), len(element.columns)
-        rows = np.loadtxt(held, ndmin=2, comments=None, usecols=range(shape[1])) if all(shape) else np.empty(shape)
+def text_table(lines: Iterator[str], element: Element) -> Table:
+    """The next rows of text as a table."""
+    if not element.has_lists:
+        rows = number_rows(lines, element.rows, len(element.columns))
+        element.check(len(rows))
         return dict(zip([column.name for column in element.columns], rows.T, strict=True))
+    words, ends = array("d"), array("q", [0])
+    for line in islice(lines, element.rows):
+        words.extend(map(float, line.split()))
+        ends.append(len(words))
+    element.check(len(ends) - 1)
+    held = np.frombuffer(words, float)
+    return _columns(element, np.frombuffer(ends, np.int64), lambda kind: (held, 1))
 
-    def row(line: str) -> _Take:
-        words = iter([float(word) for word in line.split()])
-        return lambda kind, n: list(islice(words, n))
 
-    return _row_by_row(element, map(row, held), "f8")
+def _binary(data: bytes, at: int, element: Element, order: str, wanted: bool) -> tuple[Table, int]:
+    """A table, empty if it is not wanted, and where it ends."""
+    if not element.has_lists:
+        row = element.dtype(order)
+        end = at + element.rows * row.itemsize
+        element.check((len(data) - at) // row.itemsize if row.itemsize else element.rows)
+        rows = np.frombuffer(data, row, element.rows, at) if end > at else np.empty(0, row)
+        return {name: rows[name] for name in row.names or ()}, end
+    starts = _starts(data, at, element, order, wanted)
+
+    def values(kind: str) -> tuple[np.ndarray, int]:
+        size = np.dtype(kind).itemsize
+        return np.ndarray(max(len(data) - size + 1, 0), order + kind, data, strides=(1,)), size  # one at every byte
+
+    return _columns(element, starts, values) if wanted else {}, int(starts[-1])
 
 
-def _binary(data: bytes, at: int, element: Element, order: str) -> tuple[Table, int]:
-    """A table and where it ends: at once if the lists of a column are as long as that of the first row."""
-    place, lists = at, [i for i, column in enumerate(element.columns) if column.counts]
+def _starts(data: bytes, at: int, element: Element, order: str, wanted: bool) -> np.ndarray:
+    """Where rows with lists begin, and the last ends, if they are wanted; else where they begin and end.
 
-    def take(kind: str, n: int) -> np.ndarray:
+    At once if all lists of a column are as long as that of the first row.
+    """
+    sizes = [
+        (np.dtype(kind).itemsize, struct.Struct(order + np.dtype(counts).char) if counts else None)
+        for _, kind, counts in element.columns
+    ]
+
+    def row_from(place: int) -> list[int]:
+        """The lengths of its lists, and where it ends."""
+        lengths = []
+        for size, count in sizes:
+            n = 1
+            if count is not None:
+                (n,) = count.unpack_from(data, place)
+                place += count.size
+                lengths.append(n)
+                if n < 0:
+                    raise ValueError(f"a row of {element.name!r} has a list of {n} values")
+            place += size * n
+        return [*lengths, place]
+
+    starts, found = array("q", [at]), 0
+    with suppress(struct.error):  # there is no more count
+        if element.rows:
+            *lengths, after = row_from(at)
+            end = at + element.rows * (after - at)
+            if end <= len(data):
+                rows = np.frombuffer(data, element.dtype(order, lengths), element.rows, at)
+                counted = [rows[name] for name in rows.dtype.names or () if name.endswith(" counts")]
+                if all((counts == n).all() for counts, n in zip(counted, lengths, strict=True)):
+                    return np.arange(at, end + 1, after - at) if wanted else np.array([at, end])
+        while found < element.rows and (after := row_from(at)[-1]) <= len(data):
+            at, found = after, found + 1
+            if wanted:
+                starts.append(at)
+    element.check(found)
+    return np.frombuffer(starts, np.int64) if wanted else np.array([at])
+
+
+def _columns(element: Element, starts: np.ndarray, values: Callable[[str], tuple[np.ndarray, int]]) -> Table:
+    """Columns of rows that begin where they do, among the values of a type, which are so far from each other."""
+    table: dict[str, Any] = {}
+    place, ends = starts[:-1], starts[1:]
+
+    def passed(size: int | np.ndarray) -> np.ndarray:
         nonlocal place
-        values = np.frombuffer(data, order + kind, n, place) if n else np.empty(0, kind)
-        place += values.nbytes
-        return values
+        before, place = place, place + size
+        if (short := place > ends).any():
+            element.check(int(short.argmax()))
+        return before
 
-    lengths = [0] * len(lists)
-    if lists and element.rows:
-        first = _row_by_row(element._replace(rows=1), [take])
-        lengths = [int(column.counts[0]) for column in first.values() if isinstance(column, Lists)]
-    row = element.dtype(order, lengths)
-    end = at + element.rows * row.itemsize
-    if end <= len(data):
-        rows = np.frombuffer(data, row, element.rows, at) if end > at else np.empty(element.rows, row)
-        if all((rows[f"{i} counts"] == n).all() for i, n in zip(lists, lengths, strict=True)):
-            return {
-                name: Lists(rows[f"{i} counts"].astype(np.int64), rows[name].ravel()) if counts else rows[name]
-                for i, (name, _, counts) in enumerate(element.columns)
-            }, end
-    elif not lists:
-        raise element.breaks_off((len(data) - at) // row.itemsize)
-    place = at
-    return _row_by_row(element, (take for _ in range(element.rows))), place
-
-
-def _row_by_row(element: Element, rows: Iterable[_Take], kind: str | None = None) -> Table:
-    """A table of rows that each give their values in turn, so many of a type; `kind` is that of text."""
-    found: list[list[Any]] = [[] for _ in element.columns]
-    for done, take in enumerate(rows):
-        for column, held in zip(element.columns, found, strict=True):
-            try:
-                n = int(take(column.counts, 1)[0]) if column.counts else 1
-                held.append(take(column.kind, n))
-            except (ValueError, IndexError):
-                raise element.breaks_off(done) from None
-            if n < 0 or len(held[-1]) < n:
-                raise element.breaks_off(done)
-    table: dict[str, np.ndarray | Lists] = {}
-    for (name, own, counts), held in zip(element.columns, found, strict=True):
-        values = np.concatenate([np.empty(0, kind or own), *held])
-        table[name] = Lists(np.array([len(each) for each in held], np.int64), values) if counts else values
+    for name, kind, counts in element.columns:
+        held, size = values(counts or kind)
+        column = held[passed(size)]
+        if counts:
+            if not ((column >= 0) & (column <= len(held)) & (column % 1 == 0)).all():
+                raise ValueError(f"a list of {element.name!r} has a number of values that makes no sense")
+            held, size = values(kind)
+            n = column.astype(np.int64)
+            table[name] = Lists(n, passed(n * size), held, size)
+        else:
+            table[name] = column
     return table
-
-
-def _check_names(elements: Iterable[Element]) -> None:
-    for element in elements:
-        if len({column.name for column in element.columns}) < len(element.columns):
-            raise ValueError(f"element {element.name!r} has two properties of one name")
 
 
 # ----------------------------------------------------------------------------------------------------------- skeletons
@@ -243,22 +304,20 @@ def read(data: bytes) -> Skeleton:
 
 
 def blocks(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan]]:
-    """Text, meshes, and files with lists before the last vertex are read whole."""
+    """Text, and files with lists, are read whole."""
     with path.open("rb") as stream:
         order, elements = read_header(stream)
         start = stream.tell()
-    names = [element.name for element in elements]
-    ahead = elements[: names.index("vertex") + 1] if "vertex" in names else []
-    lists = any(column.counts for element in ahead for column in element.columns)
-    if not order or not ahead or lists or any(element.rows for element in elements if element.name == "face"):
+    held = [element for element in elements if element.rows]
+    names = [element.name for element in held]
+    if not order or "vertex" not in names or any(element.has_lists for element in held):
         return None, map(_whole, [path])
-    _check_names(ahead)
-    start += sum(element.rows * element.dtype(order).itemsize for element in ahead[:-1])
-    vertex, row = ahead[-1], ahead[-1].dtype(order)
-    held = max(path.stat().st_size - start, 0) // max(row.itemsize, 1)
-    if held < vertex.rows:
-        raise vertex.breaks_off(held)
-    return vertex.rows, _blocks(path, start, row, vertex.rows, rows, bare)
+    size = path.stat().st_size - start
+    if size > check_elements(held, order, size) and len(held) > 1:
+        raise ValueError("it holds more than its header promises")
+    at = names.index("vertex")
+    start += sum(element.rows * element.dtype(order).itemsize for element in held[:at])
+    return held[at].rows, _blocks(path, start, held[at].dtype(order), held[at].rows, rows, bare)
 
 
 def _whole(path: Path) -> Scan:
@@ -267,7 +326,7 @@ def _whole(path: Path) -> Scan:
     if "vertex" not in tables:
         raise ValueError("it has no element 'vertex'")
     scan = _scan(tables["vertex"])
-    return replace(scan, triangles=_triangles(tables.get("face", {}), len(scan)), types={})
+    return replace(scan, triangles=triangles(tables.get("face", {}), len(scan)), types={})
 
 
 def _blocks(path: Path, start: int, row: np.dtype, n: int, rows: int, bare: bool) -> Iterator[Scan]:
@@ -311,18 +370,16 @@ def _scan(table: Table, top: float | None = None) -> Scan:
     )
 
 
-def _triangles(faces: Table, n: int) -> np.ndarray:
+def triangles(faces: Table, n: int) -> np.ndarray:
     """Polygons as fans of triangles; those with a corner that is not there are left out."""
     corners = faces.get("vertex_indices", faces.get("vertex_index"))
-    if not isinstance(corners, Lists) or len(corners.counts) == 0:
+    if not isinstance(corners, Lists) or not len(face := np.flatnonzero(corners.counts > 2)):
         return NO_TRIANGLES
-    first = np.cumsum(corners.counts) - corners.counts
-    fans = np.maximum(corners.counts - 2, 0)
-    face = np.repeat(np.arange(len(fans)), fans)
-    step = np.arange(len(face)) - np.repeat(np.cumsum(fans) - fans, fans)
-    at = first[face]
-    found = corners.values.astype(np.int64)[np.column_stack([at, at + step + 1, at + step + 2])]
-    return found[((found >= 0) & (found < n)).all(axis=1)]
+    fans = corners.counts[face] - 2
+    first = np.repeat(corners.first[face], fans)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(fans) - fans, fans)
+    found = np.column_stack([corners.values[first + corners.step * each] for each in (0, step + 1, step + 2)])
+    return found[((found >= 0) & (found < n)).all(axis=1)].astype(np.int64)
 
 
 # ------------------------------------------------------------------------------------------------------------- writing

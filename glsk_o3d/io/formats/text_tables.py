@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import io
 import logging
+import os
 import re
+from array import array
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
@@ -18,7 +20,7 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from ...interop.packages import following_open3d
-from ..paths import breaks_off
+from ..paths import check_line, check_promised
 from ..scan import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, named_attributes, unit_colors
 
 _log = logging.getLogger(__name__)
@@ -75,8 +77,11 @@ def read(path: Path) -> Scan:
         layout = _layout(stream)
         stream.seek(0)
         rows = _rows(stream, layout, path)
-    if first and len(rows) < int(first):
-        raise breaks_off(int(first), len(rows))
+    if first:
+        check_promised(int(first), len(rows))
+        with path.open("rb") as data:
+            data.seek(-1, os.SEEK_END)
+            check_line(data.read())
     names = [layout.names[column] for column in layout.columns] if layout.names else []
     roles = [_role(name) for name in names] or _guess(rows, ending)
     used = [roles.index(axis) for axis in "xyz"]
@@ -144,7 +149,7 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
             ndmin=2,
         )
     stream.seek(0)
-    found, lost, last = [], 0, layout.columns[-1]
+    found, lost, last = array("d"), 0, layout.columns[-1]
     for line in islice(stream, layout.skip, None):
         text = re.split("|".join(_COMMENTS), line, maxsplit=1)[0].strip()
         if not text:
@@ -155,11 +160,12 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
         if broken_off or any(i >= len(words) or not _is_number(words[i]) for i in layout.columns[:3]):
             lost += 1
         else:
-            found.append(row)
+            found.extend(row)
+    rows = np.array(found).reshape(-1, len(layout.columns))
     if lost:
         with following_open3d():
-            _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(found))
-    return np.array(found, float).reshape(-1, len(layout.columns))
+            _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(rows))
+    return rows
 
 
 def _guess(rows: np.ndarray, ending: str) -> list[str]:
