@@ -71,9 +71,9 @@ def _opened(path: Path, end: int, parts: str) -> Iterator[Any]:
     laspy = require("laspy")
     selection = laspy.DecompressionSelection
     chosen = selection.all() if parts == "all" else getattr(selection.base(), parts)()
-    backend = laspy.LazBackend.Lazrs
+    options = dict(laz_backend=laspy.LazBackend.Lazrs, decompression_selection=chosen, read_evlrs=False)
     try:
-        with _Part(path) as stream, laspy.open(stream, laz_backend=backend, decompression_selection=chosen) as file:
+        with _Part(path) as stream, laspy.open(stream, **options) as file:
             _ = file.point_source  # which reads what stands behind the points
             stream.end = end
             yield file
