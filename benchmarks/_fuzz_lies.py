@@ -319,7 +319,7 @@ BOMBS: dict[str, Callable[[int], bytes]] = {
     "cloud .xyz uneven": lambda n: b"1 2 3\n4 5\n" * n,
     "cloud .xyz wide": lambda n: b"1 " * (3 * n) + b"\n",
     "cloud .csv commas": lambda n: b"1,2,3,,,\n" * n,
-    "cloud .obj polygon": lambda n: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf" + b" 1 2 3" * min(n, 30000) + b"\n",
+    "cloud .obj polygon": lambda n: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf" + b" 1 2 3" * min(n, 300000) + b"\n",
     "cloud .obj faces": lambda n: b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"f 1 2 3\n" * min(n, 400000),
     "cloud .obj groups": lambda n: b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"g a\nf 1 2 3\n" * min(n, 100000),
     "cloud .off faces": lambda n: b"OFF\n3 %d 0\n0 0 0\n1 0 0\n0 1 0\n" % n + b"3 0 1 2\n" * n,

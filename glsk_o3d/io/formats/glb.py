@@ -14,6 +14,7 @@ MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # publishe
 COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # published: glTF 2.0, 3.6.2.2
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}  # published: glTF 2.0, 3.6.2.2
 DEEPEST = 500  # fitted: nodes inside each other; what reads them calls itself
+PART_BYTES = 2048  # measured: that Open3D takes for a part of a mesh beyond its arrays
 MOST_REPEATED = 16  # fitted: times the size of a file that its meshes may take, since nodes share them
 _OF_NODES = ("mesh", "matrix", "translation", "rotation", "scale")
 _OF_PRIMITIVES = ("attributes", "indices", "mode", "material")
@@ -103,7 +104,7 @@ def _buffer(buffer: dict[str, Any], chunk: bytes, path: Path) -> tuple[bytes, in
 
 def _taken(primitive: dict[str, Any], accessors: list[dict[str, Any]], views: list[dict[str, Any]]) -> int:
     """The bytes of a primitive's arrays, each of which must be there and have as many rows as the others."""
-    total, rows = 0, set()
+    total, rows = PART_BYTES, set()
     for name in (*primitive["attributes"], "indices"):
         number = primitive.get("indices") if name == "indices" else primitive["attributes"][name]
         if number is None:

@@ -28,6 +28,7 @@ _log = logging.getLogger(__name__)
 _COMMENTS = ["#", "//", "%"]
 LOOK_AHEAD = 20  # fitted: lines in which a decimal comma shows
 HEADER_LINES = 100  # fitted to nothing: longer headers are those of other files
+MOST_COLUMNS = 1000  # fitted: a point has a few
 UNIT_SLACK = 0.01  # measured: normals in text have two digits at the least
 _ROLES = {
     **dict.fromkeys(("x", "easting"), "x"),
@@ -107,6 +108,8 @@ def _layout(stream: TextIO) -> Layout:
         comment = re.match(r"\s*(" + "|".join(_COMMENTS) + ")", line)
         words, delimiter, decimal_comma = _parted(line[comment.end() :] if comment else line)
         columns = [] if comment else [i for i, word in enumerate(words) if _is_number(word)]
+        if len(columns) > MOST_COLUMNS:
+            raise ValueError(f"a line has {len(columns)} numbers, and at most {MOST_COLUMNS} are read")
         if len(columns) >= 3:
             following = [_parted(next_line) for next_line in islice(stream, LOOK_AHEAD)]
             decimal_comma |= delimiter != "," and any(comma for _, _, comma in following)
