@@ -147,7 +147,8 @@ def e57(content: bytes, told: bool = False) -> bytes:
     """Content in pages with checksums; the length of the file and its XML are said as they are unless that was told."""
     start = content.find(b"<?xml")
     if not told and start >= 0:
-        text = content[start:].rstrip(b"\0")
+        ends = [match.end() for match in re.finditer(rb"</e57Root>\s*", content)]
+        text = content[start : ends[-1] if ends else None]
         pages = -(-len(content) // PAGE_DATA)
         head = struct.pack("<Q", pages * PAGE), struct.pack("<Q", len(text))
         content = content[:16] + head[0] + content[24:32] + head[1] + content[40:]

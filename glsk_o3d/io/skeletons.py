@@ -8,8 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from ..analysis.comparison import Truth
 from ..errors import FileFormatError, brief
 from ..interop.atomic import write_atomically

@@ -100,8 +100,8 @@ def _compressed(path: Path) -> Scan:
     with path.open("rb") as stream:
         row, points, _ = read_header(stream)
         packed, size = np.frombuffer(stream.read(8).ljust(8, b"\0"), "<u4").tolist()
+        check_promised(packed, path.stat().st_size - stream.tell(), "compressed bytes")
         data = stream.read(packed)
-    check_promised(packed, len(data), "compressed bytes")
     check_promised(size, MOST_PACKED * packed, "bytes")
     if size != points * row.itemsize:
         raise ValueError(f"its {points} points have {points * row.itemsize} bytes, and those that are packed {size}")

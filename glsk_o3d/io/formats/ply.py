@@ -371,15 +371,17 @@ def _scan(table: Table, top: float | None = None) -> Scan:
 
 
 def triangles(faces: Table, n: int) -> np.ndarray:
-    """Polygons as fans of triangles; those with a corner that is not there are left out."""
+    """Polygons as fans of triangles; ValueError for one without corners, or with one that is not there."""
     corners = faces.get("vertex_indices", faces.get("vertex_index"))
-    if not isinstance(corners, Lists) or not len(face := np.flatnonzero(corners.counts > 2)):
+    if not isinstance(corners, Lists) or len(corners.counts) == 0:
         return NO_TRIANGLES
-    fans = corners.counts[face] - 2
-    first = np.repeat(corners.first[face], fans)
+    fans = np.maximum(corners.counts - 2, 0)
+    first = np.repeat(corners.first, fans)
     step = np.arange(len(first)) - np.repeat(np.cumsum(fans) - fans, fans)
     found = np.column_stack([corners.values[first + corners.step * each] for each in (0, step + 1, step + 2)])
-    return found[((found >= 0) & (found < n)).all(axis=1)].astype(np.int64)
+    if corners.counts.min() < 1 or not ((found >= 0) & (found < n)).all():
+        raise ValueError("a face has no corners, or one that is no vertex")
+    return found.astype(np.int64)
 
 
 # ------------------------------------------------------------------------------------------------------------- writing

@@ -106,9 +106,7 @@ def test_lines_of_others_in_all_byte_orders(tmp_path, format):
         ([(0, 1, 2), (0, 2, 3)], [[0, 1, 2], [0, 2, 3]]),
         ([(0, 1, 2, 3)], [[0, 1, 2], [0, 2, 3]]),
         ([(0, 1, 2, 3), (3, 1, 0)], [[0, 1, 2], [0, 2, 3], [3, 1, 0]]),
-        ([(), (1, 2, 3), (1, 2)], [[1, 2, 3]]),
-        ([(0, 1, 9), (0, 1, 2), (0, -1, 2)], [[0, 1, 2]]),
-        ([(0, 1, 2, 7)], [[0, 1, 2]]),
+        ([(1, 2, 3), (1, 2), (0,)], [[1, 2, 3]]),
         ([], []),
     ],
     ids=str,
@@ -117,6 +115,13 @@ def test_faces_become_triangles(scan, format, faces, triangles):
     mesh = scan(ply(format, ("vertex", XYZ, SQUARE), ("face", FACE, [(face,) for face in faces])))
     np.testing.assert_array_equal(mesh.positions, SQUARE)
     np.testing.assert_array_equal(mesh.triangles, np.reshape(triangles, (-1, 3)))
+
+
+@all_formats
+@pytest.mark.parametrize("face", [(), (0, 1, 9), (0, -1, 2), (0, 1, 2, 7)], ids=str)
+def test_faces_of_what_is_no_vertex_are_refused(scan, format, face):
+    with pytest.raises(FileFormatError, match="a face has no corners, or one that is no vertex"):
+        scan(ply(format, ("vertex", XYZ, SQUARE), ("face", FACE, [((0, 1, 2, 3),), (face,)])))
 
 
 @all_formats
