@@ -316,7 +316,7 @@ BOMBS: dict[str, Callable[[int], bytes]] = {
     "cloud .e57 scans": _scans,
     "cloud .e57 entities": lambda n: _e57_of(b"<e57Root", _entities("e57Root") + b"<e57Root"),
     "cloud .e57 constant": lambda n: _e57_of(b'recordCount="60"', b'recordCount="%d"' % n**2),
-    "cloud .xyz short": lambda n: b"1 2 3\n" * (3 * n),
+    "cloud .xyz short": lambda n: b"1 2 3\n" * n,
     "cloud .xyz uneven": lambda n: b"1 2 3\n4 5\n" * n,
     "cloud .xyz wide": lambda n: b"1 " * (3 * n) + b"\n",
     "cloud .csv commas": lambda n: b"1,2,3,,,\n" * n,
