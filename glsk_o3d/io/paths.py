@@ -80,8 +80,6 @@ def text_lines(stream: BinaryIO) -> Iterator[str]:
 
 def number_rows(lines: Iterator[str], rows: int, columns: int) -> np.ndarray:
     """The next rows of text, or those that are left, (n, columns) float array; more numbers in a row are left out."""
-    if not columns:
-        return np.empty((sum(1 for _ in islice(lines, rows)), 0))
     first = list(islice(lines, min(rows, 1)))
     if not first:
         return np.empty((0, columns))

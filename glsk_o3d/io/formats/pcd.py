@@ -17,17 +17,6 @@ _NORMALS = ["normal_x", "normal_y", "normal_z"]
 _TYPES = {kind + size for kind, sizes in (("F", "48"), ("I", "1248"), ("U", "1248")) for size in sizes}
 _PLACE = (" x", " y", " z")  # after the number of the field
 MOST_PACKED = 88  # derived: LZF's longest copy, of 264 bytes, takes three
-_BYTES = """VERSION 0.7
-FIELDS x y z
-SIZE 8 8 8
-TYPE U U U
-COUNT 1 1 1
-WIDTH {0}
-HEIGHT 1
-VIEWPOINT 0 0 0 1 0 0 0
-POINTS {0}
-DATA binary_compressed
-"""
 _PACKED_COLORS = ("rgb", "rgba")
 
 
@@ -117,10 +106,14 @@ def _unpacked(data: bytes, size: int) -> bytes:
     """What LZF has packed, of so many bytes. Open3D unpacks it as a cloud whose coordinates are eight bytes each."""
     o3d, missing = import_open3d(), -size % 24
     data += bytes([missing - 1, *[0] * missing] if missing else [])  # a run of so many bytes as they are
-    head = _BYTES.format((size + missing) // 24).encode() + np.array([len(data), size + missing], "<u4").tobytes()
+    n = (size + missing) // 24
+    head = (
+        f"FIELDS x y z\nSIZE 8 8 8\nTYPE U U U\nCOUNT 1 1 1\nWIDTH {n}\nHEIGHT 1\nPOINTS {n}\nDATA binary_compressed\n"
+    )
+    sizes = np.array([len(data), size + missing], "<u4").tobytes()
     with TemporaryDirectory() as folder, o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         path = Path(folder, "bytes.pcd")
-        path.write_bytes(head + data)
+        path.write_bytes(head.encode() + sizes + data)
         cloud = o3d.t.io.read_point_cloud(str(path))
     unpacked = cloud.point.positions.numpy().T.tobytes() if "positions" in cloud.point else b""
     check_promised(size, len(unpacked), "bytes")

@@ -83,12 +83,12 @@ def check_elements(elements: list[Element], order: str, size: int) -> int:
     """What elements take of so many bytes at the least; ValueError where that is more, or names repeat."""
     at = 0
     for element in elements:
-        if len({column.name for column in element.columns}) < len(element.columns):
-            raise ValueError(f"element {element.name!r} has two properties of one name")
+        if len({column.name for column in element.columns}) < max(len(element.columns), element.rows > 0):
+            raise ValueError(f"element {element.name!r} has two properties of one name, or none")
         lists = sum(column.counts is not None for column in element.columns)
         corners = [int(element.name == "face")] * lists  # at least one, or it is no mesh
         least = element.dtype(order, corners).itemsize if order else 2 * (len(element.columns) + sum(corners))
-        element.check((size - at) // least if least else element.rows)
+        element.check((size - at) // max(least, 1))
         at += element.rows * least
     return at
 
@@ -158,6 +158,7 @@ def read_tables(stream: BinaryIO, *wanted: str) -> dict[str, Table]:
     end = stream.seek(0, os.SEEK_END)
     check_elements(elements, order, end - start + (not order))  # the last line of text may have no end
     stream.seek(start)
+    elements = [element for element in elements if element.columns]
     tables = dict[str, Table]()
     if order:
         data, at = stream.read(), 0
@@ -194,8 +195,8 @@ def _binary(data: bytes, at: int, element: Element, order: str, wanted: bool) ->
     if not element.has_lists:
         row = element.dtype(order)
         end = at + element.rows * row.itemsize
-        element.check((len(data) - at) // row.itemsize if row.itemsize else element.rows)
-        rows = np.frombuffer(data, row, element.rows, at) if end > at else np.empty(0, row)
+        element.check((len(data) - at) // row.itemsize)
+        rows = np.frombuffer(data[at:end], row)
         return {name: rows[name] for name in row.names or ()}, end
     starts = _starts(data, at, element, order, wanted)
 
