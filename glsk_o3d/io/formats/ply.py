@@ -11,7 +11,7 @@ import io
 import os
 import struct
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
@@ -22,13 +22,14 @@ import numpy as np
 
 from ...errors import FileFormatError
 from ...skeleton import Skeleton
-from ..paths import check_promised, number_rows, text_lines
+from ..paths import check_budget, check_promised, number_rows, text_lines
 from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, brightest, named_attributes, unit_colors
 from .graphs import NoEdges, graph_skeleton
 
 SECTION = ("half_width", "half_thickness")
 LONGEST_LINE = 1 << 16  # derived: far beyond any line of a header, so that an endless file without lines ends
 LONGEST_HEADER = 1 << 12  # derived: in lines, likewise
+LIST_BYTES, MOST_IN_LISTS = 32, 16  # derived: taken for a row with a list; fitted: times the size of a file, for all
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _KINDS = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4"},
@@ -63,16 +64,16 @@ class Element(NamedTuple):
         """Whether rows differ in length."""
         return any(column.counts for column in self.columns)
 
-    def dtype(self, order: str, lengths: Iterable[int] = ()) -> np.dtype:
-        """A row of binary data in a byte order, whose lists have so many values, none by default."""
-        left = iter(lengths)
-        fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
-        for i, (name, kind, counts) in enumerate(self.columns):
-            if counts is None:
-                fields.append((name, f"{order}{kind}"))
-            else:
-                fields += [(f"{i} counts", f"{order}{counts}"), (name, f"{order}{kind}", (next(left, 0),))]
-        return np.dtype(fields)
+    def dtype(self, order: str) -> np.dtype:
+        """A row of binary data without lists in a byte order."""
+        return np.dtype([(column.name, order + column.kind) for column in self.columns])
+
+    def least(self, order: str) -> int:
+        """The bytes of a row at the least: in text two for a number, of a face those of one corner."""
+        columns = [
+            (each.counts, each.kind) if self.name == "face" else (each.counts or each.kind,) for each in self.columns
+        ]
+        return sum(np.dtype(kind).itemsize if order else 2 for kinds in columns for kind in kinds if kind)
 
     def check(self, held: int) -> None:
         """Raise ValueError where there are less rows."""
@@ -85,9 +86,7 @@ def check_elements(elements: list[Element], order: str, size: int) -> int:
     for element in elements:
         if len({column.name for column in element.columns}) < max(len(element.columns), element.rows > 0):
             raise ValueError(f"element {element.name!r} has two properties of one name, or none")
-        lists = sum(column.counts is not None for column in element.columns)
-        corners = [int(element.name == "face")] * lists  # at least one, or it is no mesh
-        least = element.dtype(order, corners).itemsize if order else 2 * (len(element.columns) + sum(corners))
+        least = element.least(order)
         element.check((size - at) // max(least, 1))
         at += element.rows * least
     return at
@@ -163,7 +162,7 @@ def read_tables(stream: BinaryIO, *wanted: str) -> dict[str, Table]:
     if order:
         data, at = stream.read(), 0
         for element in elements:
-            tables[element.name], at = _binary(data, at, element, order, element.name in wanted)
+            tables[element.name], at = _binary(data, at, element, order)
         rest = data[at : at + LONGEST_LINE].strip()
     else:
         lines = text_lines(stream)
@@ -187,70 +186,53 @@ def text_table(lines: Iterator[str], element: Element) -> Table:
         ends.append(len(words))
     element.check(len(ends) - 1)
     held = np.frombuffer(words, float)
-    return _columns(element, np.frombuffer(ends, np.int64), lambda kind: (held, 1))
+    return _columns(element, np.frombuffer(ends, np.int64), lambda kind: (held, 1))[0]
 
 
-def _binary(data: bytes, at: int, element: Element, order: str, wanted: bool) -> tuple[Table, int]:
-    """A table, empty if it is not wanted, and where it ends."""
+def _binary(data: bytes, at: int, element: Element, order: str) -> tuple[Table, int]:
+    """A table and where it ends; at once if its rows are all as long as the first."""
     if not element.has_lists:
         row = element.dtype(order)
         end = at + element.rows * row.itemsize
         element.check((len(data) - at) // row.itemsize)
         rows = np.frombuffer(data[at:end], row)
         return {name: rows[name] for name in row.names or ()}, end
-    starts = _starts(data, at, element, order, wanted)
-
-    def values(kind: str) -> tuple[np.ndarray, int]:
-        size = np.dtype(kind).itemsize
-        return np.ndarray(max(len(data) - size + 1, 0), order + kind, data, strides=(1,)), size  # one at every byte
-
-    return _columns(element, starts, values) if wanted else {}, int(starts[-1])
-
-
-def _starts(data: bytes, at: int, element: Element, order: str, wanted: bool) -> np.ndarray:
-    """Where rows with lists begin, and the last ends, if they are wanted; else where they begin and end.
-
-    At once if all lists of a column are as long as that of the first row.
-    """
+    check_budget(LIST_BYTES * element.rows, len(data), MOST_IN_LISTS)
     sizes = [
         (np.dtype(kind).itemsize, struct.Struct(order + np.dtype(counts).char) if counts else None)
         for _, kind, counts in element.columns
     ]
 
-    def row_from(place: int) -> list[int]:
-        """The lengths of its lists, and where it ends."""
-        lengths = []
+    def end_of(place: int) -> int:
         for size, count in sizes:
             n = 1
             if count is not None:
                 (n,) = count.unpack_from(data, place)
                 place += count.size
-                lengths.append(n)
-                if n < 0:
-                    raise ValueError(f"a row of {element.name!r} has a list of {n} values")
-            place += size * n
-        return [*lengths, place]
+            place += size * max(n, 0)  # that none is negative is asked of the columns
+        return place
 
-    starts, found = array("q", [at]), 0
+    def values(kind: str) -> tuple[np.ndarray, int]:
+        size = np.dtype(kind).itemsize
+        return np.ndarray(max(len(data) - size + 1, 0), order + kind, data, strides=(1,)), size  # one at every byte
+
+    starts = array("q", [at])
     with suppress(struct.error):  # there is no more count
-        if element.rows:
-            *lengths, after = row_from(at)
-            end = at + element.rows * (after - at)
-            if end <= len(data):
-                rows = np.frombuffer(data, element.dtype(order, lengths), element.rows, at)
-                counted = [rows[name] for name in rows.dtype.names or () if name.endswith(" counts")]
-                if all((counts == n).all() for counts, n in zip(counted, lengths, strict=True)):
-                    return np.arange(at, end + 1, after - at) if wanted else np.array([at, end])
-        while found < element.rows and (after := row_from(at)[-1]) <= len(data):
-            at, found = after, found + 1
-            if wanted:
-                starts.append(at)
-    element.check(found)
-    return np.frombuffer(starts, np.int64) if wanted else np.array([at])
+        alike = at + (end_of(at) - at) * np.arange(element.rows + 1)
+        with suppress(ValueError, IndexError):
+            table, ends = _columns(element, alike, values)
+            if (ends == alike[1:]).all() and alike[-1] <= len(data):
+                return table, int(alike[-1])
+        while len(starts) <= element.rows and (after := end_of(starts[-1])) <= len(data):
+            starts.append(after)
+    element.check(len(starts) - 1)
+    return _columns(element, np.frombuffer(starts, np.int64), values)[0], starts[-1]
 
 
-def _columns(element: Element, starts: np.ndarray, values: Callable[[str], tuple[np.ndarray, int]]) -> Table:
-    """Columns of rows that begin where they do, among the values of a type, which are so far from each other."""
+def _columns(
+    element: Element, starts: np.ndarray, values: Callable[[str], tuple[np.ndarray, int]]
+) -> tuple[Table, np.ndarray]:
+    """Columns of rows that begin where they do, and where the rows end, among the values of a type, a step apart."""
     table: dict[str, Any] = {}
     place, ends = starts[:-1], starts[1:]
 
@@ -272,7 +254,7 @@ def _columns(element: Element, starts: np.ndarray, values: Callable[[str], tuple
             table[name] = Lists(n, passed(n * size), held, size)
         else:
             table[name] = column
-    return table
+    return table, place
 
 
 # ----------------------------------------------------------------------------------------------------------- skeletons
