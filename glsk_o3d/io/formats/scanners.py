@@ -25,7 +25,7 @@ VLR_BYTES, EVLR_BYTES = 54, 60  # published: LAS 1.4 R15, of the heads of record
 PACKED_RECORD, LAYERED = 22204, 3  # published: LASzip's own record, and its way to pack in which chunks have layers
 LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}  # published: of the parts of a point, by their types; others have one per byte
 PAGE, PAGE_DATA = 1024, 1020  # published: E57's bytes of a page, and those before its checksum
-DEEPEST_XML = 100  # fitted: E57 needs 8 elements inside each other
+DEEPEST_XML, WIDEST_XML = 100, 5000  # fitted: E57 needs 8 elements inside each other, and one in another for each scan
 _E57_PLACE = ["cartesianX", "cartesianY", "cartesianZ"]
 _E57_POLAR = ["sphericalRange", "sphericalAzimuth", "sphericalElevation"]
 _E57_COLORS = ["colorRed", "colorGreen", "colorBlue"]
@@ -209,16 +209,16 @@ def _check_xml(path: Path) -> None:
         stream.seek(at - at % PAGE)
         pages = stream.read(at % PAGE + length + (length // PAGE_DATA + 2) * (PAGE - PAGE_DATA))
     data = b"".join(pages[i : i + PAGE_DATA] for i in range(0, len(pages), PAGE))
-    parser, depth = expat.ParserCreate(), 0
+    parser, inside = expat.ParserCreate(), [0]  # how many elements each of those that are open has
 
     def start(*_: Any) -> None:
-        nonlocal depth
-        if (depth := depth + 1) > DEEPEST_XML:
-            raise ValueError(f"its XML has more than {DEEPEST_XML} elements inside each other")
+        inside[-1] += 1
+        inside.append(0)
+        if len(inside) > DEEPEST_XML or inside[-2] > WIDEST_XML:
+            raise ValueError(f"its XML has more than {DEEPEST_XML} elements inside each other, or {WIDEST_XML} in one")
 
     def end(_: str) -> None:
-        nonlocal depth
-        depth -= 1
+        inside.pop()
 
     def doctype(*_: Any) -> None:
         raise ValueError("its XML has a DOCTYPE, which may name other files")
