@@ -153,11 +153,16 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
         )
     stream.seek(0)
     found, lost, last = array("d"), 0, layout.columns[-1]
+    comment = re.compile("|".join(_COMMENTS))
     for line in islice(stream, layout.skip, None):
-        text = re.split("|".join(_COMMENTS), line, maxsplit=1)[0].strip()
+        text = comment.split(line, maxsplit=1)[0].strip()
         if not text:
             continue
         words = text.split(layout.delimiter)
+        with suppress(ValueError, IndexError):  # most lines are like the first
+            if "_" not in text:
+                found.extend([float(words[i]) for i in layout.columns])
+                continue
         row = [float(words[i]) if i < len(words) and _is_number(words[i]) else np.nan for i in layout.columns]
         broken_off = not line.endswith("\n") and len(words) <= last  # its last number may be cut
         if broken_off or any(i >= len(words) or not _is_number(words[i]) for i in layout.columns[:3]):
