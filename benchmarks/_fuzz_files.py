@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import io
 import json
 import struct
 import tempfile
@@ -11,6 +12,7 @@ from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,26 +39,37 @@ EXTREMES = (-1, 0, 1, 2**31 - 1, 2**31, 2**32, 2**63, 10**18, 10**400, "1e308", 
 ENDINGS = (".ply", ".pcd", ".xyz", ".pts", ".obj", ".off", ".stl", ".las", ".laz", ".e57", ".json", ".npz", ".swc")
 
 
-def file_case(rng: np.random.Generator, folder: Path) -> tuple[str, str, list[str]]:
-    """Read one damaged file, written into a folder: its kind, whether it was ``"read"`` or ``"refused"``, findings."""
+def file_case(rng: np.random.Generator, folder: Path) -> tuple[str, str, list[str], int]:
+    """Read one damaged file, written into a folder: its kind, whether it was ``"read"`` or ``"refused"``, findings,
+    and its size.
+    """
     names = [*seeds()]
     name = names[rng.integers(len(names))]
     kind, ending = name.split()[:2]
     data = damaged(seeds()[name], rng)
     if kind in ("cloud", "skeleton") and rng.random() < 0.05:
         ending = str(rng.choice(ENDINGS))
+    told, findings, _ = read(kind, ending, data, folder)
+    return f"{kind} {name.split()[1]}", told, findings, len(data)
+
+
+def read(kind: str, ending: str, data: bytes, folder: Path) -> tuple[str, list[str], Any]:
+    """Read a file, written into a folder: whether it was ``"read"`` or ``"refused"``, findings, and what it holds."""
     path = folder / ("ledger.jsonl" if kind == "ledger" else f"f{ending}")
     path.write_bytes(data)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            READERS[kind](path)
+            return "read", [], READERS[kind](path)
         except (GlskError, OSError) as error:
-            wrong = [f"an error of {len(str(error))} characters"] if len(str(error)) > 2000 else []
-            return f"{kind} {name.split()[1]}", "refused", wrong
+            said, wrong = str(error), []
+            if len(said) > 2000 or "\n" in said:
+                wrong.append(f"an error of {len(said)} characters and {said.count(chr(10)) + 1} lines")
+            if isinstance(error.__cause__, MemoryError) or "bad_alloc" in said or "Unable to allocate" in said:
+                wrong.append("it asked for more memory than there is")
+            return "refused", wrong, None
         finally:
             path.unlink()
-    return f"{kind} {name.split()[1]}", "read", []
 
 
 def damaged(data: bytes, rng: np.random.Generator) -> bytes:
@@ -118,13 +131,14 @@ DAMAGES = (_flip, _flip, _fill, _zero, _repeat, _remove, _truncate, _number, _nu
 def seeds() -> dict[str, bytes]:
     """Sound files, by kind, ending and what else tells them apart; those of packages that are missing are left out."""
     with tempfile.TemporaryDirectory() as folder:
-        found = {**_clouds(Path(folder)), **_skeletons(Path(folder)), **_others(Path(folder))}
+        found = {**clouds(Path(folder)), **_skeletons(Path(folder)), **_others(Path(folder))}
     return found
 
 
-def _clouds(folder: Path) -> dict[str, bytes]:
+def clouds(folder: Path, n: int = 60) -> dict[str, bytes]:
+    """Sound files of so many points, or of a mesh."""
     o3d = import_open3d()
-    points = samples.torus(60).points
+    points = samples.torus(max(n, 60)).points[:n]
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.colors = cloud.normals = cloud.points
     mesh = o3d.geometry.TriangleMesh.create_torus(1, 0.3, 6, 5)
@@ -150,18 +164,21 @@ def _clouds(folder: Path) -> dict[str, bytes]:
     rows = "\n".join(",".join(f"{value:.3f}" for value in row) + ",1" for row in points)
     found["cloud .csv"] = f"x,y,z,label\n{rows}\n".encode()
     found["cloud .txt"] = rows.replace(",", " ").encode()
-    head = "ply\nformat ascii 1.0\nelement extra 2\nproperty list uchar int of\nelement vertex 60\n"
+    head = f"ply\nformat ascii 1.0\nelement extra 2\nproperty list uchar int of\nelement vertex {n}\n"
     head += "".join(f"property double {axis}\n" for axis in "xyz") + "property float label\nend_header\n2 0 1\n1 5\n"
     found["cloud .ply list"] = (head + found["cloud .txt"].decode() + "\n").encode()
     if find_spec("laspy") and find_spec("lazrs"):
         import laspy
 
-        for number in (0, 7):
-            scan = laspy.LasData(laspy.LasHeader(point_format=number, version="1.4" if number else "1.2"))
+        for number in (0, 3, 7):
+            scan = laspy.LasData(laspy.LasHeader(point_format=number, version="1.4" if number == 7 else "1.2"))
             scan.x, scan.y, scan.z = points.T
             for ending in (".las", ".laz"):
                 scan.write(str(folder / f"s{ending}"))
                 found[f"cloud {ending} {number}"] = (folder / f"s{ending}").read_bytes()
+            found[f"cloud .laz {number} chunks"] = _in_chunks(
+                found[f"cloud .laz {number}"], scan.points.array.tobytes()
+            )
     if find_spec("pye57"):
         import pye57
 
@@ -169,6 +186,21 @@ def _clouds(folder: Path) -> dict[str, bytes]:
             file.write_scan_raw(dict(zip(("cartesianX", "cartesianY", "cartesianZ"), points.T.copy(), strict=True)))
         found["cloud .e57"] = (folder / "s.e57").read_bytes()
     return found
+
+
+def _in_chunks(laz: bytes, points: bytes) -> bytes:
+    """The same file with chunks of 16 points each."""
+    import lazrs
+
+    record, start = laz.index(b"laszip encoded") - 2 + 54, int.from_bytes(laz[96:100], "little")
+    stream = io.BytesIO(laz[: record + 12] + (16).to_bytes(4, "little") + laz[record + 16 : start])
+    length = int.from_bytes(laz[record - 34 : record - 32], "little")
+    vlr = lazrs.LazVlr(stream.getvalue()[record : record + length])
+    stream.seek(start)
+    packer = lazrs.LasZipCompressor(stream, vlr)
+    packer.compress_many(points)
+    packer.done()
+    return stream.getvalue()
 
 
 def _packed(gltf: bytes) -> bytes:

@@ -25,11 +25,14 @@ import numpy as np
 import typer
 from _fuzz_arrays import array_case
 from _fuzz_files import file_case
+from _fuzz_lies import bomb_case, lie_case, named_case
 from _runs import application, cause_of_death
 from _tables import present
 from _unsound import unsound_case
 
 LIMIT_S = 60  # of one case; those that are sound take a second at most
+FILE_LIMIT_S = 20  # of one file
+LARGE = 1 << 20  # bytes of files of which it is said how much more memory they take
 MOST_MEMORY = 2 << 30  # bytes that a case may take more than were taken before
 MOST_CASES = 10**7  # more than there is time for
 
@@ -47,12 +50,15 @@ class Outcome(NamedTuple):
     kind: str  # of the cloud or file; empty if nobody lived to tell
     told: str  # skeleton, read, refused or failed
     findings: list[str]
+    size: int = 0  # of the file
+    memory: int = 0  # bytes that it took at most, where the system tells
+    seconds: float = 0.0
 
 
 def run_cases(what: str, seed: int, numbers: range) -> Iterator[Outcome]:
     """Run cases, one after another, in a process that is started anew where it ended."""
     context = get_context("spawn")
-    first, last = numbers.start, numbers.stop
+    first, last, limit = numbers.start, numbers.stop, LIMIT_S if what == "arrays" else min(LIMIT_S, FILE_LIMIT_S)
     while first < last:
         receiver, sender = context.Pipe(duplex=False)
         process = context.Process(target=_work, args=(sender, what, seed, range(first, last)), daemon=True)
@@ -61,9 +67,9 @@ def run_cases(what: str, seed: int, numbers: range) -> Iterator[Outcome]:
         try:
             receiver.recv()  # after all that is imported, however long that takes
             while first < last:
-                if not receiver.poll(LIMIT_S):
+                if not receiver.poll(limit):
                     first += 1
-                    yield Outcome(first - 1, "", "failed", [f"not done after {LIMIT_S} s"])
+                    yield Outcome(first - 1, "", "failed", [f"not done after {limit} s"])
                     break
                 yield receiver.recv()
                 first += 1
@@ -83,9 +89,10 @@ def run_cases(what: str, seed: int, numbers: range) -> Iterator[Outcome]:
 def one_case(what: str, seed: int, number: int, folder: Path) -> Outcome:
     """Run a case in this process; an error that is not one of the package's own is a finding."""
     rng = np.random.default_rng([seed, number])
+    cases = {"files": file_case, "lies": lie_case, "bombs": bomb_case, "named": named_case, "skeletons": unsound_case}
+    before, start = _measured("VmRSS"), time.monotonic()
     try:
-        of_file = unsound_case if what == "skeletons" else file_case
-        found = array_case(rng) if what == "arrays" else of_file(rng, folder)
+        found = array_case(rng) if what == "arrays" else cases[what](rng, folder)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # whatever it is; some is no Exception
@@ -93,7 +100,18 @@ def one_case(what: str, seed: int, number: int, folder: Path) -> Outcome:
         ours = [frame for frame in frames if "glsk_o3d" in frame.filename] or frames
         place = f"{Path(ours[-1].filename).name}:{ours[-1].lineno}"
         return Outcome(number, "", "failed", [f"{type(error).__name__} at {place}: {str(error)[:200]}"])
-    return Outcome(number, *found)
+    taken = {"memory": max(_measured("VmHWM") - before, 0), "seconds": time.monotonic() - start}
+    return Outcome(number, *found)._replace(**taken)
+
+
+def _measured(what: str) -> int:
+    """Bytes of memory that this process has now, from where on the most is measured; or had at most since then."""
+    try:
+        if what == "VmRSS":
+            Path("/proc/self/clear_refs").write_text("5")
+        return 1024 * int(re.search(rf"{what}:\s*(\d+)", Path("/proc/self/status").read_text())[1])
+    except OSError:  # no Linux
+        return 0
 
 
 def _work(sender, what: str, seed: int, numbers: range) -> None:
@@ -103,11 +121,14 @@ def _work(sender, what: str, seed: int, numbers: range) -> None:
     with TemporaryDirectory() as folder:
         one_case("arrays", 0, 0, Path(folder))  # imports what is imported when first needed
         one_case("files", 0, 0, Path(folder))
+        one_case("lies", 0, 0, Path(folder))
         sender.send(None)
         most = _taken() + MOST_MEMORY
         status = Path("/proc/self/status").read_text() if Path("/proc/self/status").exists() else "VmData: 4194304"
         data = 1024 * int(re.search(r"VmData:\s*(\d+)", status)[1])  # bytes of it now
-        resource.setrlimit(resource.RLIMIT_DATA, (data + 2 * MOST_MEMORY,) * 2)
+        resource.setrlimit(
+            resource.RLIMIT_DATA, (data + MOST_MEMORY * (1 if what in ("lies", "bombs", "named") else 2),) * 2
+        )
         for number in numbers:
             outcome = one_case(what, seed, number, Path(folder))
             if _taken() > most:
@@ -141,6 +162,24 @@ def skeletons(runs: Runs = 1000, seed: Seed = 0, case: Only = None) -> None:
 
 
 @app.command()
+def lies(runs: Runs = 1000, seed: Seed = 0, case: Only = None) -> None:
+    """Files that promise more or less than they hold, with checksums that are right."""
+    _run("lies", runs, seed, case)
+
+
+@app.command()
+def bombs(runs: Runs = 100, seed: Seed = 0, case: Only = None) -> None:
+    """Small files that unfold to more than memory."""
+    _run("bombs", runs, seed, case)
+
+
+@app.command()
+def named(runs: Runs = 100, seed: Seed = 0, case: Only = None) -> None:
+    """Files that name pipes, devices, folders, loops of links, and what is not there."""
+    _run("named", runs, seed, case)
+
+
+@app.command()
 def both(minutes: Minutes = 1.0, seed: Seed = 0) -> None:
     """First files, then arrays, as long as there is time: half of it for each."""
     start, bad = time.monotonic(), False
@@ -171,19 +210,33 @@ def _tell(what: str, seed: int, outcomes: Iterable[Outcome]) -> bool:
     """Print a table, and the findings with how to repeat them; gives whether there are any."""
     counts: Counter[tuple[str, str]] = Counter()
     findings = []
+    most: dict[str, Outcome] = {}
     with suppress(KeyboardInterrupt):  # what has come when somebody has seen enough
         for outcome in outcomes:
             kind = outcome.kind or "not known"
             counts[kind, outcome.told] += 1
+            old = most.get(kind, outcome)
+            ratio = max((each for each in (old, outcome) if each.size > LARGE), key=_ratio, default=old)
+            most[kind] = ratio._replace(seconds=max(old.seconds, outcome.seconds))
             counts[kind, "findings"] += len(outcome.findings)
             findings += [(outcome.number, finding) for finding in outcome.findings]
     told = sorted({word for _, word in counts} - {"findings"}) + ["findings"]
     rows = [[kind, *(str(counts[kind, word]) for word in told)] for kind in sorted({kind for kind, _ in counts})]
     rows.append(["all", *(str(sum(counts[kind, word] for kind in {kind for kind, _ in counts})) for word in told)])
+    if what != "arrays":
+        told[-1:-1] = ["seconds at most", "memory over size"]
+        for row in rows[:-1]:
+            share = f"{_ratio(most[row[0]]):.0f}" if most[row[0]].size > LARGE else "-"
+            row[-1:-1] = [f"{most[row[0]].seconds:.1f}", share]
+        rows[-1][-1:-1] = [f"{max((each.seconds for each in most.values()), default=0):.1f}", "-"]
     present([(f"{what}, seed {seed}", [what, *told], rows)], markdown=False)
     for number, finding in findings:
         typer.echo(f"benchmarks/fuzz.py {what} --seed {seed} --case {number}  # {finding}")
     return bool(findings)
+
+
+def _ratio(outcome: Outcome) -> float:
+    return outcome.memory / max(outcome.size, 1)
 
 
 if __name__ == "__main__":

@@ -60,8 +60,8 @@ class PluginWarning(UserWarning):
 
 
 def brief(error: object) -> str:
-    """The beginning of what another library's error says, or of a name in a file: some repeat the whole file."""
-    words = str(error)
+    """The beginning of what another library's error says, or of a name in a file, in one line: some repeat the file."""
+    words = " ".join(str(error).split())
     return words if len(words) <= LONGEST_QUOTED else f"{words[:LONGEST_QUOTED]}..."
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
 import os
-from itertools import islice
+import re
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -14,66 +14,64 @@ import numpy as np
 from ..errors import FileFormatError, InvalidParameterError
 from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
+from .formats import glb, ply
 from .formats.graphs import line, text
-from .paths import breaks_off, unknown_ending
-from .scan import Scan
+from .paths import text_lines, unknown_ending
+from .scan import COLOR_CHANNELS, NORMAL_NAMES, Scan
 
 WRITTEN_MESH_ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf")
 SINGLE_PRECISION = (".stl", ".glb", ".gltf")
 LOST_SHARE = 0.01  # derived: of an edge; an error of so much turns a triangle by less than a degree
 PLY_VERTEX_BYTES, PLY_COLOR_BYTES, PLY_TRIANGLE_BYTES, STL_TRIANGLE_BYTES = 48, 3, 13, 50
 """Published: formats, as Open3D fills them."""
+_NAMES_MATERIALS = re.compile(rb"((?:^|[\r\n\f\0\\])[ \t]*)m")  # ``mtllib``, also where a line goes on
 
 
 def read_vertices(path: Path) -> Scan:
-    """The vertices of an OFF, OBJ, STL, glTF or GLB file, and the triangles between them, as Open3D reads them."""
-    with path.open("rb") as stream:  # where it may not be read, this says so
-        head = stream.read(16)
-    if path.suffix.lower() == ".off":
-        _check_off(path)
-    length, size = int.from_bytes(head[12:], "little"), path.stat().st_size
-    if path.suffix.lower() == ".glb" and length > size:  # Open3D would take memory for all of it, and look behind it
-        raise ValueError(f"its header promises {length} bytes, and the file has {size}")
+    """The vertices of an OFF, OBJ, STL, glTF or GLB file, and the triangles between them."""
+    ending = path.suffix.lower()
+    if ending == ".off":
+        return _read_off(path)
+    if ending == ".obj":
+        return _read_open3d(path, _NAMES_MATERIALS.sub(rb"\1#", path.read_bytes()))
+    if ending == ".stl":
+        return _read_open3d(path)
+    return _read_open3d(path, glb.alone(path))
+
+
+def _read_open3d(path: Path, data: bytes | None = None) -> Scan:
+    """What Open3D reads of a file, or of other data in its place, which name no more files that it would open."""
     o3d = import_open3d()
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+    with TemporaryDirectory() as folder, o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+        if data is not None:
+            path = Path(folder, "mesh.obj" if path.suffix.lower() == ".obj" else "mesh.glb")
+            path.write_bytes(data)
         mesh = o3d.io.read_triangle_mesh(str(path))
     colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
     normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
     return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))
 
 
-def _check_off(path: Path) -> None:
-    """Raise ValueError where an OFF file breaks off or a vertex lacks numbers: Open3D would return uninitialised memory
-    for the rest; or where a face has a corner that is no vertex: Open3D would look for it in memory, and may crash.
-    """
+def _read_off(path: Path) -> Scan:
+    """An OFF file, whose rows are those of text in PLY; Open3D returns uninitialised memory for one that breaks off."""
     with path.open("rb") as stream:
-        rows = (line.split() for line in stream if line.strip() and not line.lstrip().startswith(b"#"))
-        words: list[bytes] = []
-        while len(words) < 4 and (row := next(rows, None)):
-            words += row
-        if not words or not words[0].endswith(b"OFF"):
+        lines = (line for line in text_lines(stream) if not line.lstrip().startswith("#"))
+        words: list[str] = []
+        while len(words) < 4 and (line := next(lines, None)):
+            words += line.split()
+        if not words or not words[0].endswith("OFF"):
             raise ValueError("it does not start with 'OFF'")
         n, m = (int(word) for word in words[1:3])
-        if n < 0 or m < 0:
-            raise ValueError("its numbers of vertices and faces are negative")
-        columns = 3 + 3 * (b"N" in words[0]) + 4 * (b"C" in words[0])  # with a normal, with a colour and its alpha
-        found = 0
-        for row in islice(rows, n):
-            numbers = [float(word) for word in row[:columns]]
-            if not all(map(math.isfinite, numbers)) or b"_" in b"".join(row[:columns]):
-                raise ValueError(f"vertex {found} has what Open3D takes for no number")
-            if len(numbers) < columns:
-                break
-            found += 1
-        for row in islice(rows, m):
-            if len(row) < 3:
-                break
-            corners = [int(word) for word in row[1 : 1 + int(row[0])]]
-            if len(corners) != int(row[0]) or not all(0 <= corner < n for corner in corners):
-                raise ValueError(f"a face has {row[0].decode(errors='replace')[:20]} corners, not all of them vertices")
-            found += 1
-    if found < n + m:
-        raise breaks_off(n + m, found, "vertices and faces")
+        names = [*"xyz", *NORMAL_NAMES * ("N" in words[0]), *[*COLOR_CHANNELS, "alpha"] * ("C" in words[0])]
+        elements = [
+            ply.Element("vertex", n, [ply.Column(name, "f8") for name in names]),
+            ply.Element("face", m, [ply.Column("vertex_indices", "i4", "i4")]),
+        ]
+        ply.check_elements(elements, "", path.stat().st_size)
+        vertex, face = (ply.text_table(lines, element) for element in elements)
+    columns = np.column_stack([vertex[name] for name in names])
+    colors, normals = columns[:, -4:-1] / 255 if "alpha" in names else None, columns[:, 3:6] if "nx" in names else None
+    return Scan(columns[:, :3], colors, normals, {}, ply.triangles(face, n))
 
 
 def save_mesh(mesh: Any, path: str | os.PathLike) -> None:

@@ -1,10 +1,18 @@
-"""Files that are to be read: their endings, whether they are there, and the errors for those that are not whole."""
+"""Files that are to be read: their endings, whether they are there, and whether they hold what they promise.
+
+Readers compare what a header promises with the size of the file before they take memory, and with what they read before
+they return it. What unpacks or repeats itself has a budget, a multiple of the size.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import chain, islice
 from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
 
 from ..errors import FileFormatError
 
@@ -15,6 +23,8 @@ CLOUD_ENDINGS = (".ply", ".pcd", *TEXT_ENDINGS, ".las", ".laz", ".e57")
 MESH_ENDINGS = (".off", ".obj", ".stl", ".gltf", ".glb")
 """Files that `read_cloud` reads as meshes, to take their vertices."""
 SCAN_ENDINGS = CLOUD_ENDINGS + MESH_ENDINGS
+MOST_EXPANDED = 200  # fitted: times the size of a file that its content may take; of skeletons and scans it is 1 to 20
+ALWAYS_TAKEN = 1 << 26  # derived: bytes that any machine has
 
 
 def existing_file(path: str | os.PathLike) -> Path:
@@ -41,6 +51,36 @@ def unknown_ending(what: object, known: Iterable[str]) -> FileFormatError:
     return FileFormatError(f"{what}: unknown ending; known are {', '.join(known)}")
 
 
-def breaks_off(promised: int, found: int, what: str = "points") -> ValueError:
-    """The error for a file that holds less than its header promises."""
-    return ValueError(f"it promises {promised} {what} and holds {found}: it breaks off")
+def check_promised(promised: int, held: int, what: str = "points") -> None:
+    """Raise ValueError where a file promises more of something than its size can hold, or than was read from it."""
+    if held < promised:
+        raise ValueError(f"it promises {promised} {what} and holds {max(held, 0)}: it breaks off")
+
+
+def check_budget(taken: int, size: int, times: int = MOST_EXPANDED) -> None:
+    """Raise ValueError where the content of so many bytes would take too many: it is packed, or repeats itself."""
+    if taken > (most := max(times * size, ALWAYS_TAKEN)):
+        raise ValueError(f"its {size} bytes would take {taken}, and at most {most} are allowed, {times} times as many")
+
+
+def check_line(line: bytes) -> None:
+    """Raise ValueError for a last line without an end: a number that was cut is another number."""
+    if not line.endswith((b"\n", b"\r")):
+        raise ValueError("its last line may be cut inside a number: end it with a line break if it is whole")
+
+
+def text_lines(stream: BinaryIO) -> Iterator[str]:
+    """Lines that are not blank, checked by `check_line`."""
+    for line in stream:
+        if not line.isspace():
+            if line[-1] != 10:
+                check_line(line)
+            yield line.decode("ascii", "replace")
+
+
+def number_rows(lines: Iterator[str], rows: int, columns: int) -> np.ndarray:
+    """The next rows of text, or those that are left, (n, columns) float array; more numbers in a row are left out."""
+    first = list(islice(lines, min(rows, 1)))
+    if not first:
+        return np.empty((0, columns))
+    return np.loadtxt(chain(first, islice(lines, rows - 1)), ndmin=2, comments=None, usecols=range(columns))

@@ -6,6 +6,7 @@ import ast
 import operator
 import re
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
@@ -166,12 +167,15 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
 def named_attributes(columns: Iterable[tuple[str, np.ndarray]]) -> dict[str, np.ndarray]:
     """Columns by names that can stand in an expression, each its own: ``class_``, ``Scalar_field_2``, ``column_7``."""
     found: dict[str, np.ndarray] = {}
+    taken, repeated = {"x", "y", "z", "positions", "colors", "normals"}, Counter[str]()
     for text, values in columns:
         name = re.sub(r"\W+", "_", text).strip("_") or "column"
         name = f"column_{name}" if name[0].isdigit() else f"{name}_" if iskeyword(name) else name
-        unique, n = name, 2
-        while unique in {"x", "y", "z", "positions", "colors", "normals", *found}:
-            unique, n = f"{name}_{n}", n + 1
+        unique = name
+        while unique in taken:
+            repeated[name] += 1
+            unique = f"{name}_{repeated[name] + 1}"
+        taken.add(unique)
         found[unique] = values
     return found
 

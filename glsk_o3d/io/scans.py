@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 from collections.abc import Callable, Iterator
@@ -207,6 +208,10 @@ def _refused_where_damaged(path: Path) -> Iterator[None]:
         yield
     except (MissingPackageError, PermissionError):
         raise
+    except OSError as error:
+        if error.errno in (None, errno.EINVAL):  # of a parser, on a hostile file
+            raise FileFormatError(f"{path}: not a valid {path.suffix.lower()} file: {brief(error)}") from error
+        raise OSError(error.errno, os.strerror(error.errno), error.filename or os.fspath(path)) from error
     except NoPoints as error:
         raise FileFormatError(f"{path}: no points could be read: {error}") from None
     except Exception as error:  # whatever a parser raises on a hostile file, std::bad_alloc

@@ -8,8 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from ..analysis.comparison import Truth
 from ..errors import FileFormatError, brief
 from ..interop.atomic import write_atomically
@@ -241,9 +239,9 @@ def read_truth(path: str | os.PathLike) -> Truth:
     path, names = existing_file(path), ("nodes", "edges", "radii")
     try:
         if path.suffix.lower() == ".npz" and zipfile.is_zipfile(path):
-            with np.load(path, allow_pickle=False) as archive:
-                if set(names) <= set(archive.files):
-                    return Truth(*(archive[name] for name in names))
+            arrays = fields.npz_arrays(path.read_bytes(), names)
+            if len(arrays) == len(names):
+                return Truth(*(arrays[name] for name in names))
         skeleton = read_skeleton(path)
         return Truth(skeleton.vertices, skeleton.edges, skeleton.radii)
     except FileFormatError:

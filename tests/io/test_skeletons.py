@@ -193,6 +193,6 @@ def test_edges_of_others_are_sorted_and_each_is_there_once():
 def test_an_error_does_not_repeat_the_file(tmp_path):
     path = tmp_path / "s.swc"
     path.write_text("1 0 " + 5000 * "x" + " 0 0 1 -1\n")
-    with pytest.raises(FileFormatError, match=r"s\.swc: not a valid \.swc skeleton: .*\.\.\.$") as caught:
+    with pytest.raises(FileFormatError, match=r"s\.swc: not a valid \.swc skeleton: .*x") as caught:
         read_skeleton(path)
     assert len(str(caught.value)) < 600

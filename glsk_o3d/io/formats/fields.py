@@ -10,6 +10,7 @@ import io
 import json
 import math
 import zipfile
+from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
@@ -17,12 +18,11 @@ import numpy as np
 
 from ...report import Report
 from ...skeleton import ARRAYS, Skeleton
+from ..paths import check_budget, check_promised
 
 FORMAT, FORMAT_VERSION = "glsk-o3d skeleton", 1
 LATER = ("half_width", "half_thickness", "support")
 """Those that older files lack."""
-MOST_EXPANDED = 200  # fitted: times the size of a file that its arrays may have; those of skeletons have 1 to 20
-SMALL_ARCHIVE = 1 << 26  # derived: bytes that may always be held
 
 
 def write_json(skeleton: Skeleton) -> bytes:
@@ -44,21 +44,25 @@ def write_npz(skeleton: Skeleton) -> bytes:
 
 def read_npz(data: bytes) -> Skeleton:
     """The skeleton in the content of an npz file."""
-    with zipfile.ZipFile(io.BytesIO(data)) as packed:
-        if sum(info.file_size for info in packed.infolist()) > max(MOST_EXPANDED * len(data), SMALL_ARCHIVE):
-            raise ValueError(f"it would become more than {MOST_EXPANDED} times as large: no skeleton packs so")
     words = ("format", "format_version", "report")
-    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-        values: dict[str, Any] = {name: _loaded(archive, name) for name in (*words, *ARRAYS) if name in archive.files}
+    values = npz_arrays(data, (*words, *ARRAYS))
     values |= {name: values[name].item() for name in words if name in values and values[name].ndim == 0}
     return _decode({**values, "report": json.loads(values["report"])})
 
 
-def _loaded(archive: Any, name: str) -> np.ndarray:
-    try:
-        return archive[name]
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from error
+def npz_arrays(data: bytes, names: Iterable[str]) -> dict[str, Any]:
+    """Those arrays of an npz archive that it has; ValueError where one promises more than there is, or is pickled."""
+    arrays, form = {}, np.lib.format
+    with zipfile.ZipFile(io.BytesIO(data)) as packed:
+        check_budget(sum(info.file_size for info in packed.infolist()), len(data))
+        for name in {*packed.namelist()} & {f"{name}.npy" for name in names}:
+            held = io.BytesIO(packed.read(name))
+            read = form.read_array_header_1_0 if form.read_magic(held) == (1, 0) else form.read_array_header_2_0
+            shape, _, kind = read(held)
+            check_promised(math.prod(shape) * kind.itemsize, len(held.getbuffer()) - held.tell(), f"bytes of {name}")
+            held.seek(0)
+            arrays[name[:-4]] = np.load(held, allow_pickle=False)
+    return arrays
 
 
 def dumps(value: Any) -> str:

@@ -6,7 +6,6 @@ numbers are float32, as glTF's are; of coordinates as on a map the large part is
 
 from __future__ import annotations
 
-import json
 import os
 from typing import Any
 
@@ -20,9 +19,9 @@ from ...numerics.vectors import norm, unit
 from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
 from ..geometry import to_tubes
+from .glb import binary
 from .graphs import as_forest, global_shift, holding_all
 
-MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
 COMPONENT_TYPES = {"f4": 5126, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
 MOST_JOINTS = 65535  # published: glTF 2.0, 3.7.3.3, in which joints are counted in 16 bits at most
 SRGB_KNEE = 0.04045  # published: IEC 61966-2-1, where the curve of sRGB begins
@@ -143,7 +142,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": len(buffer.data)}],
     }
-    return _binary(tree, buffer.data)
+    return binary(tree, buffer.data)
 
 
 def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
@@ -199,15 +198,3 @@ class _Buffer:
         self.accessors.append({**facts, "type": shape, **limits})
         self.data += array.tobytes()
         return len(self.accessors) - 1
-
-
-def _binary(tree: dict[str, Any], data: bytearray) -> bytes:
-    """A tree and its buffer as the chunks of a binary file."""
-    text = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
-    text += b" " * (-len(text) % 4)
-    body = bytes(data) + bytes(-len(data) % 4)
-    chunks = b"".join(
-        len(chunk).to_bytes(4, "little") + kind.to_bytes(4, "little") + chunk
-        for kind, chunk in ((JSON_CHUNK, text), (BINARY_CHUNK, body))
-    )
-    return b"".join(n.to_bytes(4, "little") for n in (MAGIC, 2, 12 + len(chunks))) + chunks

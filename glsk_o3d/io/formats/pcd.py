@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
 import numpy as np
 
-from ..paths import breaks_off
+from ...interop.packages import import_open3d
+from ..paths import check_promised, number_rows, text_lines
 from ..scan import Scan, named_attributes
 
 _NORMALS = ["normal_x", "normal_y", "normal_z"]
 _TYPES = {kind + size for kind, sizes in (("F", "48"), ("I", "1248"), ("U", "1248")) for size in sizes}
 _PLACE = (" x", " y", " z")  # after the number of the field
+MOST_PACKED = 88  # derived: LZF's longest copy, of 264 bytes, takes three
 _PACKED_COLORS = ("rgb", "rgba")
 
 
@@ -27,9 +29,8 @@ def blocks(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan
         return None, map(_compressed, [path])
     if kept not in ("ascii", "binary"):
         raise ValueError(f"its data are {kept!r}, which is not understood")
-    held = (path.stat().st_size - start) // row.itemsize
-    if kept == "binary" and held < points:
-        raise breaks_off(points, held)
+    least = row.itemsize if kept == "binary" else 2 * sum(row[name].shape[0] for name in row.names or ())
+    check_promised(points, (path.stat().st_size - start + (kept == "ascii")) // least)  # text may lack its last end
     return points, _blocks(path, start, row, points, kept == "binary", rows, bare)
 
 
@@ -47,6 +48,8 @@ def read_header(stream: BinaryIO) -> tuple[np.dtype, int, str]:
     points, (kept,) = int(header["POINTS"][0]), header["DATA"]
     if points < 0 or min(counts, default=0) < 1:
         raise ValueError("its header counts less than nothing")
+    if {"WIDTH", "HEIGHT"} <= header.keys() and int(header["WIDTH"][0]) * int(header["HEIGHT"][0]) != points:
+        raise ValueError(f"its header promises {points} points, and another width and height")
     if not all(kind + size in _TYPES for kind, size in zip(kinds, sizes, strict=True)):
         raise ValueError("its header has types that are not understood")
     fields = zip(names, sizes, kinds, counts, strict=True)
@@ -57,24 +60,24 @@ def read_header(stream: BinaryIO) -> tuple[np.dtype, int, str]:
 def _blocks(path: Path, start: int, row: np.dtype, points: int, binary: bool, rows: int, bare: bool) -> Iterator[Scan]:
     with path.open("rb") as stream:
         stream.seek(start)
+        lines = text_lines(stream)
         for begin in range(0, points, rows):
             n = min(rows, points - begin)
-            table = np.frombuffer(stream.read(n * row.itemsize), row) if binary else _text(stream, row, n)
+            table = np.frombuffer(stream.read(n * row.itemsize), row) if binary else _text(lines, row, n)
             if len(table) < n:
-                raise breaks_off(points, begin + len(table))
+                check_promised(points, begin + len(table))
             yield _scan({name: table[name] for name in row.names or () if not bare or name[-2:] in _PLACE})
 
 
-def _text(stream: BinaryIO, row: np.dtype, n: int) -> np.ndarray:
+def _text(lines: Iterator[str], row: np.dtype, n: int) -> np.ndarray:
     """The next n rows, or those that are left."""
-    lines = [line.decode("ascii", "replace") for line in islice((line for line in stream if line.strip()), n)]
-    table, names = np.empty(len(lines), row), row.names or ()
+    names = row.names or ()
     ends = np.cumsum([row[name].shape[0] for name in names])
-    if lines:
-        numbers = np.loadtxt(lines, ndmin=2, comments=None, usecols=range(ends[-1]))
-        with np.errstate(invalid="ignore"):
-            for name, values in zip(names, np.split(numbers, ends[:-1], axis=1), strict=True):
-                table[name] = values
+    numbers = number_rows(lines, n, ends[-1])
+    table = np.empty(len(numbers), row)
+    with np.errstate(invalid="ignore"):
+        for name, values in zip(names, np.split(numbers, ends[:-1], axis=1), strict=True):
+            table[name] = values
     return table
 
 
@@ -86,9 +89,11 @@ def _compressed(path: Path) -> Scan:
     with path.open("rb") as stream:
         row, points, _ = read_header(stream)
         packed, size = np.frombuffer(stream.read(8).ljust(8, b"\0"), "<u4").tolist()
+        check_promised(packed, path.stat().st_size - stream.tell(), "compressed bytes")
         data = stream.read(packed)
-    if len(data) < packed or size < points * row.itemsize:
-        raise ValueError("its compressed data break off")
+    check_promised(size, MOST_PACKED * packed, "bytes")
+    if size != points * row.itemsize:
+        raise ValueError(f"its {points} points have {points * row.itemsize} bytes, and those that are packed {size}")
     unpacked, columns, at = _unpacked(data, size), {}, 0
     for name in row.names or ():  # one after the other
         base, n = row[name].base, row[name].shape[0]
@@ -98,28 +103,21 @@ def _compressed(path: Path) -> Scan:
 
 
 def _unpacked(data: bytes, size: int) -> bytes:
-    """What LZF has packed, of so many bytes: runs as they are, and copies of what came before (liblzf's format)."""
-    out, at = bytearray(), 0
-    while at < len(data) and len(out) < size:
-        control = data[at]
-        at += 1
-        if control < 32:
-            out += data[at : at + control + 1]
-            at += control + 1
-            continue
-        length = control >> 5
-        if length == 7:
-            length += data[at]
-            at += 1
-        start = len(out) - ((control & 31) << 8) - data[at] - 1
-        at, length = at + 1, length + 2
-        if start < 0:
-            raise ValueError("its compressed data make no sense")
-        piece = out[start : start + length]
-        out += (piece * (length // len(piece) + 1))[:length]  # it may overlap what it makes
-    if len(out) != size:
-        raise ValueError("its compressed data break off")
-    return bytes(out)
+    """What LZF has packed, of so many bytes. Open3D unpacks it as a cloud whose coordinates are eight bytes each."""
+    o3d, missing = import_open3d(), -size % 24
+    data += bytes([missing - 1, *[0] * missing] if missing else [])  # a run of so many bytes as they are
+    n = (size + missing) // 24
+    head = (
+        f"FIELDS x y z\nSIZE 8 8 8\nTYPE U U U\nCOUNT 1 1 1\nWIDTH {n}\nHEIGHT 1\nPOINTS {n}\nDATA binary_compressed\n"
+    )
+    sizes = np.array([len(data), size + missing], "<u4").tobytes()
+    with TemporaryDirectory() as folder, o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+        path = Path(folder, "bytes.pcd")
+        path.write_bytes(head.encode() + sizes + data)
+        cloud = o3d.t.io.read_point_cloud(str(path))
+    unpacked = cloud.point.positions.numpy().T.tobytes() if "positions" in cloud.point else b""
+    check_promised(size, len(unpacked), "bytes")
+    return unpacked[:size]
 
 
 def _scan(columns: dict[str, np.ndarray]) -> Scan:

@@ -22,7 +22,7 @@ from ...decisions import coordinates
 from ...errors import FileFormatError
 from ...numerics.polylines import arc_lengths
 from ...skeleton import Skeleton
-from .graphs import global_shift, graph_skeleton, line, parents, text, words_by_line
+from .graphs import global_shift, graph_skeleton, line, parents, text
 
 _log = logging.getLogger(__name__)
 
@@ -69,9 +69,10 @@ def write_swc(forest: Skeleton) -> bytes:
 
 def read_swc(data: bytes) -> Skeleton:
     """The skeleton in the content of an SWC file."""
-    table = np.array([[float(word) for word in words[:7]] for words in words_by_line(data)])
-    if table.ndim != 2 or table.shape[1] != 7:
+    rows = [line for line in data.decode("utf-8", "replace").splitlines() if line.partition("#")[0].strip()]
+    if any(len(row.partition("#")[0].split()) < 7 for row in rows) or not rows:
         raise ValueError("it has no rows of 7 numbers (id type x y z radius parent)")
+    table = np.loadtxt(rows, ndmin=2, usecols=range(7))
     names, parent = table[:, 0], table[:, 6]
     order = np.argsort(names)
     child = np.flatnonzero(parent >= 0)

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import struct
+from array import array
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
@@ -20,13 +22,14 @@ import numpy as np
 
 from ...errors import FileFormatError
 from ...skeleton import Skeleton
-from ..paths import breaks_off
+from ..paths import check_budget, check_promised, number_rows, text_lines
 from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, brightest, named_attributes, unit_colors
 from .graphs import NoEdges, graph_skeleton
 
 SECTION = ("half_width", "half_thickness")
 LONGEST_LINE = 1 << 16  # derived: far beyond any line of a header, so that an endless file without lines ends
 LONGEST_HEADER = 1 << 12  # derived: in lines, likewise
+LIST_BYTES, MOST_IN_LISTS = 32, 16  # derived: taken for a row with a list; fitted: times the size of a file, for all
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _KINDS = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4"},
@@ -56,20 +59,37 @@ class Element(NamedTuple):
     rows: int
     columns: list[Column]
 
-    def dtype(self, order: str, lengths: Iterable[int] = ()) -> np.dtype:
-        """A row of binary data in a byte order, whose lists have so many values."""
-        left = iter(lengths)
-        fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
-        for i, (name, kind, counts) in enumerate(self.columns):
-            if counts is None:
-                fields.append((name, f"{order}{kind}"))
-            else:
-                fields += [(f"{i} counts", f"{order}{counts}"), (name, f"{order}{kind}", (next(left),))]
-        return np.dtype(fields)
+    @property
+    def has_lists(self) -> bool:
+        """Whether rows differ in length."""
+        return any(column.counts for column in self.columns)
 
-    def breaks_off(self, found: int) -> ValueError:
-        """The error where the file holds fewer rows."""
-        return breaks_off(self.rows, found, "points" if self.name == "vertex" else f"rows of {self.name!r}")
+    def dtype(self, order: str) -> np.dtype:
+        """A row of binary data without lists in a byte order."""
+        return np.dtype([(column.name, order + column.kind) for column in self.columns])
+
+    def least(self, order: str) -> int:
+        """The bytes of a row at the least: in text two for a number, of a face those of one corner."""
+        columns = [
+            (each.counts, each.kind) if self.name == "face" else (each.counts or each.kind,) for each in self.columns
+        ]
+        return sum(np.dtype(kind).itemsize if order else 2 for kinds in columns for kind in kinds if kind)
+
+    def check(self, held: int) -> None:
+        """Raise ValueError where there are less rows."""
+        check_promised(self.rows, held, "points" if self.name == "vertex" else f"rows of {self.name!r}")
+
+
+def check_elements(elements: list[Element], order: str, size: int) -> int:
+    """What elements take of so many bytes at the least; ValueError where that is more, or names repeat."""
+    at = 0
+    for element in elements:
+        if len({column.name for column in element.columns}) < max(len(element.columns), element.rows > 0):
+            raise ValueError(f"element {element.name!r} has two properties of one name, or none")
+        least = element.least(order)
+        element.check((size - at) // max(least, 1))
+        at += element.rows * least
+    return at
 
 
 def read_header(stream: BinaryIO) -> tuple[str, list[Element]]:
@@ -119,98 +139,122 @@ def holds_lines(stream: BinaryIO) -> bool:
 
 
 class Lists(NamedTuple):
-    """A column of lists: how many values each row has, and all of them one after the other."""
+    """A column of lists: how many values each row has, and where the first is; the next is a `step` behind it."""
 
     counts: np.ndarray
+    first: np.ndarray
     values: np.ndarray
+    step: int
 
 
-Table = Mapping[str, "np.ndarray | Lists"]
-_Take = Callable[[str, int], Any]  # the next so many values of a type
+Table = Mapping[str, Any]  # of arrays and lists
 
 
 def read_tables(stream: BinaryIO, *wanted: str) -> dict[str, Table]:
-    """Elements that a file has, columns by name; text becomes float64. What follows them is not looked at."""
+    """Elements that a file has, columns by name; text becomes float64. The others are read over: nothing may lack."""
     order, elements = read_header(stream)
-    last = max((i for i, element in enumerate(elements) if element.name in wanted), default=-1)
-    _check_names(elements[: last + 1])
-    if not order:
-        lines = (line.decode("ascii", "replace") for line in stream if line.strip())
-        return {element.name: _text(lines, element) for element in elements[: last + 1]}
-    tables, data, at = dict[str, Table](), stream.read(), 0
-    for element in elements[: last + 1]:
-        tables[element.name], at = _binary(data, at, element, order)
-    return tables
+    start = stream.tell()
+    end = stream.seek(0, os.SEEK_END)
+    check_elements(elements, order, end - start + (not order))  # the last line of text may have no end
+    stream.seek(start)
+    elements = [element for element in elements if element.columns]
+    tables = dict[str, Table]()
+    if order:
+        data, at = stream.read(), 0
+        for element in elements:
+            tables[element.name], at = _binary(data, at, element, order)
+        rest = data[at : at + LONGEST_LINE].strip()
+    else:
+        lines = text_lines(stream)
+        for element in elements:
+            tables[element.name] = text_table(lines, element)
+        rest = next(lines, "").encode()
+    if rest and sum(element.rows > 0 for element in elements) > 1:  # then a wrong count shifts what comes after it
+        raise ValueError("it holds more than its header promises")
+    return {name: table for name, table in tables.items() if name in wanted}
 
 
-def _text(lines: Iterator[str], element: Element) -> Table:
-    held = list(islice(lines, element.rows))
-    if len(held) < element.rows:
-        raise element.breaks_off(len(held))
-    if not any(column.counts for column in element.columns):
-        shape = len(held), len(element.columns)
-        rows = np.loadtxt(held, ndmin=2, comments=None, usecols=range(shape[1])) if all(shape) else np.empty(shape)
+def text_table(lines: Iterator[str], element: Element) -> Table:
+    """The next rows of text as a table."""
+    if not element.has_lists:
+        rows = number_rows(lines, element.rows, len(element.columns))
+        element.check(len(rows))
         return dict(zip([column.name for column in element.columns], rows.T, strict=True))
-
-    def row(line: str) -> _Take:
-        words = iter([float(word) for word in line.split()])
-        return lambda kind, n: list(islice(words, n))
-
-    return _row_by_row(element, map(row, held), "f8")
+    words, ends = array("d"), array("q", [0])
+    for line in islice(lines, element.rows):
+        words.extend(map(float, line.split()))
+        ends.append(len(words))
+    element.check(len(ends) - 1)
+    held = np.frombuffer(words, float)
+    return _columns(element, np.frombuffer(ends, np.int64), lambda kind: (held, 1))[0]
 
 
 def _binary(data: bytes, at: int, element: Element, order: str) -> tuple[Table, int]:
-    """A table and where it ends: at once if the lists of a column are as long as that of the first row."""
-    place, lists = at, [i for i, column in enumerate(element.columns) if column.counts]
+    """A table and where it ends; at once if its rows are all as long as the first."""
+    if not element.has_lists:
+        row = element.dtype(order)
+        end = at + element.rows * row.itemsize
+        element.check((len(data) - at) // row.itemsize)
+        rows = np.frombuffer(data[at:end], row)
+        return {name: rows[name] for name in row.names or ()}, end
+    check_budget(LIST_BYTES * element.rows, len(data), MOST_IN_LISTS)
+    sizes = [
+        (np.dtype(kind).itemsize, struct.Struct(order + np.dtype(counts).char) if counts else None)
+        for _, kind, counts in element.columns
+    ]
 
-    def take(kind: str, n: int) -> np.ndarray:
+    def end_of(place: int) -> int:
+        for size, count in sizes:
+            n = 1
+            if count is not None:
+                (n,) = count.unpack_from(data, place)
+                place += count.size
+            place += size * max(n, 0)  # that none is negative is asked of the columns
+        return place
+
+    def values(kind: str) -> tuple[np.ndarray, int]:
+        size = np.dtype(kind).itemsize
+        return np.ndarray(max(len(data) - size + 1, 0), order + kind, data, strides=(1,)), size  # one at every byte
+
+    starts = array("q", [at])
+    with suppress(struct.error):  # there is no more count
+        alike = at + (end_of(at) - at) * np.arange(element.rows + 1)
+        with suppress(ValueError, IndexError):
+            table, ends = _columns(element, alike, values)
+            if (ends == alike[1:]).all() and alike[-1] <= len(data):
+                return table, int(alike[-1])
+        while len(starts) <= element.rows and (after := end_of(starts[-1])) <= len(data):
+            starts.append(after)
+    element.check(len(starts) - 1)
+    return _columns(element, np.frombuffer(starts, np.int64), values)[0], starts[-1]
+
+
+def _columns(
+    element: Element, starts: np.ndarray, values: Callable[[str], tuple[np.ndarray, int]]
+) -> tuple[Table, np.ndarray]:
+    """Columns of rows that begin where they do, and where the rows end, among the values of a type, a step apart."""
+    table: dict[str, Any] = {}
+    place, ends = starts[:-1], starts[1:]
+
+    def passed(size: int | np.ndarray) -> np.ndarray:
         nonlocal place
-        values = np.frombuffer(data, order + kind, n, place) if n else np.empty(0, kind)
-        place += values.nbytes
-        return values
+        before, place = place, place + size
+        if (short := place > ends).any():
+            element.check(int(short.argmax()))
+        return before
 
-    lengths = [0] * len(lists)
-    if lists and element.rows:
-        first = _row_by_row(element._replace(rows=1), [take])
-        lengths = [int(column.counts[0]) for column in first.values() if isinstance(column, Lists)]
-    row = element.dtype(order, lengths)
-    end = at + element.rows * row.itemsize
-    if end <= len(data):
-        rows = np.frombuffer(data, row, element.rows, at) if end > at else np.empty(element.rows, row)
-        if all((rows[f"{i} counts"] == n).all() for i, n in zip(lists, lengths, strict=True)):
-            return {
-                name: Lists(rows[f"{i} counts"].astype(np.int64), rows[name].ravel()) if counts else rows[name]
-                for i, (name, _, counts) in enumerate(element.columns)
-            }, end
-    elif not lists:
-        raise element.breaks_off((len(data) - at) // row.itemsize)
-    place = at
-    return _row_by_row(element, (take for _ in range(element.rows))), place
-
-
-def _row_by_row(element: Element, rows: Iterable[_Take], kind: str | None = None) -> Table:
-    """A table of rows that each give their values in turn, so many of a type; `kind` is that of text."""
-    found: list[list[Any]] = [[] for _ in element.columns]
-    for done, take in enumerate(rows):
-        for column, held in zip(element.columns, found, strict=True):
-            try:
-                n = int(take(column.counts, 1)[0]) if column.counts else 1
-                held.append(take(column.kind, n))
-            except (ValueError, IndexError):
-                raise element.breaks_off(done) from None
-            if n < 0 or len(held[-1]) < n:
-                raise element.breaks_off(done)
-    table: dict[str, np.ndarray | Lists] = {}
-    for (name, own, counts), held in zip(element.columns, found, strict=True):
-        values = np.concatenate([np.empty(0, kind or own), *held])
-        table[name] = Lists(np.array([len(each) for each in held], np.int64), values) if counts else values
-    return table
-
-
-def _check_names(elements: Iterable[Element]) -> None:
-    for element in elements:
-        if len({column.name for column in element.columns}) < len(element.columns):
-            raise ValueError(f"element {element.name!r} has two properties of one name")
+    for name, kind, counts in element.columns:
+        held, size = values(counts or kind)
+        column = held[passed(size)]
+        if counts:
+            if not ((column >= 0) & (column <= len(held)) & (column % 1 == 0)).all():
+                raise ValueError(f"a list of {element.name!r} has a number of values that makes no sense")
+            held, size = values(kind)
+            n = column.astype(np.int64)
+            table[name] = Lists(n, passed(n * size), held, size)
+        else:
+            table[name] = column
+    return table, place
 
 
 # ----------------------------------------------------------------------------------------------------------- skeletons
@@ -243,22 +287,20 @@ def read(data: bytes) -> Skeleton:
 
 
 def blocks(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan]]:
-    """Text, meshes, and files with lists before the last vertex are read whole."""
+    """Text, and files with lists, are read whole."""
     with path.open("rb") as stream:
         order, elements = read_header(stream)
         start = stream.tell()
-    names = [element.name for element in elements]
-    ahead = elements[: names.index("vertex") + 1] if "vertex" in names else []
-    lists = any(column.counts for element in ahead for column in element.columns)
-    if not order or not ahead or lists or any(element.rows for element in elements if element.name == "face"):
+    held = [element for element in elements if element.rows]
+    names = [element.name for element in held]
+    if not order or "vertex" not in names or any(element.has_lists for element in held):
         return None, map(_whole, [path])
-    _check_names(ahead)
-    start += sum(element.rows * element.dtype(order).itemsize for element in ahead[:-1])
-    vertex, row = ahead[-1], ahead[-1].dtype(order)
-    held = max(path.stat().st_size - start, 0) // max(row.itemsize, 1)
-    if held < vertex.rows:
-        raise vertex.breaks_off(held)
-    return vertex.rows, _blocks(path, start, row, vertex.rows, rows, bare)
+    size = path.stat().st_size - start
+    if size > check_elements(held, order, size) and len(held) > 1:
+        raise ValueError("it holds more than its header promises")
+    at = names.index("vertex")
+    start += sum(element.rows * element.dtype(order).itemsize for element in held[:at])
+    return held[at].rows, _blocks(path, start, held[at].dtype(order), held[at].rows, rows, bare)
 
 
 def _whole(path: Path) -> Scan:
@@ -267,7 +309,7 @@ def _whole(path: Path) -> Scan:
     if "vertex" not in tables:
         raise ValueError("it has no element 'vertex'")
     scan = _scan(tables["vertex"])
-    return replace(scan, triangles=_triangles(tables.get("face", {}), len(scan)), types={})
+    return replace(scan, triangles=triangles(tables.get("face", {}), len(scan)), types={})
 
 
 def _blocks(path: Path, start: int, row: np.dtype, n: int, rows: int, bare: bool) -> Iterator[Scan]:
@@ -311,18 +353,18 @@ def _scan(table: Table, top: float | None = None) -> Scan:
     )
 
 
-def _triangles(faces: Table, n: int) -> np.ndarray:
-    """Polygons as fans of triangles; those with a corner that is not there are left out."""
+def triangles(faces: Table, n: int) -> np.ndarray:
+    """Polygons as fans of triangles; ValueError for one without corners, or with one that is not there."""
     corners = faces.get("vertex_indices", faces.get("vertex_index"))
     if not isinstance(corners, Lists) or len(corners.counts) == 0:
         return NO_TRIANGLES
-    first = np.cumsum(corners.counts) - corners.counts
     fans = np.maximum(corners.counts - 2, 0)
-    face = np.repeat(np.arange(len(fans)), fans)
-    step = np.arange(len(face)) - np.repeat(np.cumsum(fans) - fans, fans)
-    at = first[face]
-    found = corners.values.astype(np.int64)[np.column_stack([at, at + step + 1, at + step + 2])]
-    return found[((found >= 0) & (found < n)).all(axis=1)]
+    first = np.repeat(corners.first, fans)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(fans) - fans, fans)
+    found = np.column_stack([corners.values[first + corners.step * each] for each in (0, step + 1, step + 2)])
+    if corners.counts.min() < 1 or not ((found >= 0) & (found < n)).all():
+        raise ValueError("a face has no corners, or one that is no vertex")
+    return found.astype(np.int64)
 
 
 # ------------------------------------------------------------------------------------------------------------- writing

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import io
 import logging
+import os
 import re
+from array import array
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
@@ -18,7 +20,7 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from ...interop.packages import following_open3d
-from ..paths import breaks_off
+from ..paths import check_line, check_promised
 from ..scan import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, named_attributes, unit_colors
 
 _log = logging.getLogger(__name__)
@@ -26,6 +28,7 @@ _log = logging.getLogger(__name__)
 _COMMENTS = ["#", "//", "%"]
 LOOK_AHEAD = 20  # fitted: lines in which a decimal comma shows
 HEADER_LINES = 100  # fitted to nothing: longer headers are those of other files
+MOST_COLUMNS = 1000  # fitted: a point has a few
 UNIT_SLACK = 0.01  # measured: normals in text have two digits at the least
 _ROLES = {
     **dict.fromkeys(("x", "easting"), "x"),
@@ -75,8 +78,11 @@ def read(path: Path) -> Scan:
         layout = _layout(stream)
         stream.seek(0)
         rows = _rows(stream, layout, path)
-    if first and len(rows) < int(first):
-        raise breaks_off(int(first), len(rows))
+    if first:
+        check_promised(int(first), len(rows))
+        with path.open("rb") as data:
+            data.seek(-1, os.SEEK_END)
+            check_line(data.read())
     names = [layout.names[column] for column in layout.columns] if layout.names else []
     roles = [_role(name) for name in names] or _guess(rows, ending)
     used = [roles.index(axis) for axis in "xyz"]
@@ -102,6 +108,8 @@ def _layout(stream: TextIO) -> Layout:
         comment = re.match(r"\s*(" + "|".join(_COMMENTS) + ")", line)
         words, delimiter, decimal_comma = _parted(line[comment.end() :] if comment else line)
         columns = [] if comment else [i for i, word in enumerate(words) if _is_number(word)]
+        if len(columns) > MOST_COLUMNS:
+            raise ValueError(f"a line has {len(columns)} numbers, and at most {MOST_COLUMNS} are read")
         if len(columns) >= 3:
             following = [_parted(next_line) for next_line in islice(stream, LOOK_AHEAD)]
             decimal_comma |= delimiter != "," and any(comma for _, _, comma in following)
@@ -144,22 +152,28 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
             ndmin=2,
         )
     stream.seek(0)
-    found, lost, last = [], 0, layout.columns[-1]
+    found, lost, last = array("d"), 0, layout.columns[-1]
+    comment = re.compile("|".join(_COMMENTS))
     for line in islice(stream, layout.skip, None):
-        text = re.split("|".join(_COMMENTS), line, maxsplit=1)[0].strip()
+        text = comment.split(line, maxsplit=1)[0].strip()
         if not text:
             continue
         words = text.split(layout.delimiter)
+        with suppress(ValueError, IndexError):  # most lines are like the first
+            if "_" not in text:
+                found.extend([float(words[i]) for i in layout.columns])
+                continue
         row = [float(words[i]) if i < len(words) and _is_number(words[i]) else np.nan for i in layout.columns]
         broken_off = not line.endswith("\n") and len(words) <= last  # its last number may be cut
         if broken_off or any(i >= len(words) or not _is_number(words[i]) for i in layout.columns[:3]):
             lost += 1
         else:
-            found.append(row)
+            found.extend(row)
+    rows = np.array(found).reshape(-1, len(layout.columns))
     if lost:
         with following_open3d():
-            _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(found))
-    return np.array(found, float).reshape(-1, len(layout.columns))
+            _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(rows))
+    return rows
 
 
 def _guess(rows: np.ndarray, ending: str) -> list[str]:

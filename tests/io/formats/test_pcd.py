@@ -33,7 +33,7 @@ def test_padding_and_fields_of_many_values(tmp_path, kept):
     if kept == "ascii":
         shades = rows["f3"].view("<f4").tolist()
         lines = [(*at, shade, 0, 0, 0, label, 1, 2) for (*at, _, _, label, _), shade in zip(rows.tolist(), shades)]  # noqa: B905
-        body = "\n".join(" ".join(map(repr, line)) for line in lines).encode()
+        body = "\n".join(" ".join(map(repr, line)) for line in lines).encode() + b"\n"
     if kept == "binary_compressed":
         body = packed(rows[name] for name in rows.dtype.names)
     (tmp_path / "c.pcd").write_bytes(f"{HEAD}DATA {kept}\n".encode() + body)
@@ -93,7 +93,7 @@ def test_packed_data_that_make_no_sense(cloud, tmp_path, capfd, damage):
     whole = path.read_bytes()
     start = whole.index(b"compressed\n") + 19
     path.write_bytes(whole[:-9] if damage == "cut" else whole[:start] + b"\0" * (len(whole) - start))
-    with pytest.raises(FileFormatError, match=r"its compressed data (break off|make no sense)"):
+    with pytest.raises(FileFormatError, match=r"promises 1\d+ (compressed )?bytes"):
         read_scan(path)
     assert capfd.readouterr() == ("", "")
 

@@ -131,7 +131,7 @@ TABLE = r"chunks, or one of them, promises more than its \d+ bytes can hold"
         *(("table", at, 8, TABLE) for at in (0, 1, 2**40, 2**63)),
         *((f"layer {layer}", 2**32 - 1, 4, TABLE) for layer in (0, 5, 9)),
         ("item", 65535, 2, r"its points have \d+ bytes, and those that are packed \d{5}"),
-        ("points", 10**7, 8, "header promises more than its"),
+        ("points", 10**7, 8, "at most 67108864 are allowed, 200 times"),
     ],
 )
 def test_what_no_packed_file_holds_is_refused_before_memory_is_taken(las, place, number, length, says):
