@@ -1,7 +1,5 @@
 """Connector: contracted cloud -> graph (Cao et al. 2010, section 5)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 

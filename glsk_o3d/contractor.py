@@ -1,7 +1,5 @@
 """Contractor: rings -> contracted cloud (Wen et al. 2024, section II-B; Cao et al. 2010)."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """What is said about parts of a skeleton: how questions about its topology were answered, and which samples show it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

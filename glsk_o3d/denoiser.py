@@ -1,7 +1,5 @@
 """Denoiser: points -> averaged where there are plenty, and noisy ones drawn to the ridge of their density."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """LPRReducer: local point reduction (Wen et al. 2024, section II-C and algorithm 1)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 

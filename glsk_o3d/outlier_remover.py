@@ -1,7 +1,5 @@
 """OutlierRemover: points -> those that are no outliers, single points far from all others or clusters that float."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

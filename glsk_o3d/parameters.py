@@ -1,7 +1,5 @@
 """Parameters that describe and check themselves: what filters and stopping rules have."""
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import math

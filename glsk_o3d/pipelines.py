@@ -1,7 +1,5 @@
 """The named pipelines: the paper's baseline, the paper, what we recommend, and that for trees."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Refiner: raw graph -> one-dimensional, medial skeleton (Wen et al. 2024, section II-D)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 

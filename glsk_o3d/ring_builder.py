@@ -1,7 +1,5 @@
 """RingBuilder: points -> one-rings (Wen et al. 2024, section II-A)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 

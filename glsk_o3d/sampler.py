@@ -1,7 +1,5 @@
 """Sampler: cloud -> points in a working frame, of a large cloud a sample."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """What flows between the filters before there is a graph."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """When to stop contracting: small classes with one method."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

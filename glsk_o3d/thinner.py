@@ -1,7 +1,5 @@
 """Thinner: points -> fewer of them where there are more than it takes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 

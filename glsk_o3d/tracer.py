@@ -1,7 +1,5 @@
 """Tracer: thin parts without a surface -> shortest paths, and one rooted tree."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar

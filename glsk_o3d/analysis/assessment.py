@@ -1,7 +1,5 @@
 """How a skeleton lies in its cloud, without knowing the truth."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """The branches of a skeleton, measured one by one: a row of measures for each."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A known axis, and how far a skeleton is from it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

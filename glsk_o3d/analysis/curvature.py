@@ -1,7 +1,5 @@
 """Curvature and torsion along the branches of a skeleton."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 

@@ -1,7 +1,5 @@
 """Curves as arrays of edges, and as places along these."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 

@@ -1,7 +1,5 @@
 """What a gripper would run into on its straight way in: points, and what lies behind a plane."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 

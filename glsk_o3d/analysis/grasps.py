@@ -1,7 +1,5 @@
 """Where a gripper with parallel jaws can take an object: candidates along its skeleton, with a free way in."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections import Counter

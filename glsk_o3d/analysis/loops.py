@@ -1,7 +1,5 @@
 """The loops of a skeleton, and how probable it is that each is a handle of the object."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables of arrays with a row per thing: to read, to iterate over, to write."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What every point of a cloud belongs to: its branch, how thick that is, and the bones that move the point."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A run in a few numbers, as the commands and the ledger of a batch tell it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Cylinders along the branches of a tree, and what foresters read: height, stem, crown, volume by order."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Which clouds a batch takes, and what their results are called."""
 
-from __future__ import annotations
-
 import glob
 import os
 from collections import Counter

@@ -1,7 +1,5 @@
 """The ledger of a batch: one line per input, which a later batch reads."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import logging

@@ -1,7 +1,5 @@
 """A scene is taken apart into files of its own, a block at a time: a file per label, or per tile."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

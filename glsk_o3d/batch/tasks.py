@@ -1,7 +1,5 @@
 """What a worker does: one cloud, from file to files."""
 
-from __future__ import annotations
-
 import logging
 import math
 import os

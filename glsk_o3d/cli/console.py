@@ -1,7 +1,5 @@
 """What the commands print: results on stdout, lines and progress on stderr."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """``glsk crosscheck``: whether a scan is dense and clean enough."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

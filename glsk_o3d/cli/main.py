@@ -4,8 +4,6 @@ Exit codes: 0 all went well; 1 the input or the run failed; 2 the command line i
 An error is one line on stderr, ``glsk: error: ...``. Results go to stdout; warnings, logs and progress to stderr.
 """
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

@@ -1,7 +1,5 @@
 """``--set Filter.parameter=value``, or ``--set parameter=value``: a pipeline with some parameters changed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path

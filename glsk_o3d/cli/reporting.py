@@ -1,7 +1,5 @@
 """What all commands have: options about their output, and errors as a line and an exit code."""
 
-from __future__ import annotations
-
 import inspect
 import logging
 import sys

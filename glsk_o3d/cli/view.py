@@ -1,7 +1,5 @@
 """``glsk view``: look at a file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

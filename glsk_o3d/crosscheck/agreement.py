@@ -1,7 +1,5 @@
 """How the rings of a cloud and a mesh agree, and how their skeletons do, in numbers and as a verdict."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

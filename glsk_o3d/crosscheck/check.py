@@ -1,7 +1,5 @@
 """The check of a cloud against a mesh of it, with libigl: what is computed, what it found, and a picture of it."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from dataclasses import asdict, dataclass, field

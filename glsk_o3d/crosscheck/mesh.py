@@ -1,7 +1,5 @@
 """Meshes of clouds, reconstructed by Open3D or given; their Laplacian by libigl; the skeleton they contract to."""
 
-from __future__ import annotations
-
 import time
 import warnings
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """One component, no loops, another root, fewer branches, fewer vertices, smoother curves."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The points of anything that carries points; Open3D is imported when it is first needed, never for an array."""
 
-from __future__ import annotations
-
 import os
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """Other packages: imported only where they are needed, their plugins, and what Open3D's verbosity level asks for."""
 
-from __future__ import annotations
-
 import importlib
 import logging
 import re

@@ -1,7 +1,5 @@
 """Results as attributes of Open3D's tensor clouds, which keep them through selections, sampling and files."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Colours for the parts of a skeleton and of its cloud."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal, TypeAlias
 

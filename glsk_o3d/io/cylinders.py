@@ -8,8 +8,6 @@ root, whose parent is -1, and a segment per cylinder, its tip and radius; the cy
 parent, counted from 0 in its line, to its own.
 """
 
-from __future__ import annotations
-
 import io
 import os
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A skeleton as Open3D's line sets, and as a mesh of tubes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Triangle meshes from files, as scans of their vertices, to files, and from Open3D."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

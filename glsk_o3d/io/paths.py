@@ -4,8 +4,6 @@ Readers compare what a header promises with the size of the file before they tak
 they return it. What unpacks or repeats itself has a budget, a multiple of the size.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Iterator
 from itertools import chain, islice

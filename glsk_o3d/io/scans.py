@@ -1,7 +1,5 @@
 """Scans from files, clouds and meshes of which the vertices are taken, whole or in blocks; and clouds to files."""
 
-from __future__ import annotations
-
 import errno
 import logging
 import os

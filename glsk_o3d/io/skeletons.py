@@ -1,7 +1,5 @@
 """Skeletons to files and back: the table of formats."""
 
-from __future__ import annotations
-
 import os
 import zipfile
 from collections.abc import Callable

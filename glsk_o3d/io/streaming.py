@@ -1,7 +1,5 @@
 """Clouds larger than memory: a sample of a file to skeletonise, and labels from file to file."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path

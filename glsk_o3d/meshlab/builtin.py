@@ -1,7 +1,5 @@
 """What MeshLab's own filters are called and what they take."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """MeshSet: MeshLab's, with our filters among its own."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Callable

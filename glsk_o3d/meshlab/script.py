@@ -1,7 +1,5 @@
 """MeshLab's filter scripts (.mlx), read and written without MeshLab."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterable, Sequence

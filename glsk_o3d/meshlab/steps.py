@@ -1,7 +1,5 @@
 """From what a script says to what will be run: every name and value checked before anything is."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Our filters as MeshLab's users meet them: a verb for every filter and every edit of skeletons makes a new layer."""
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import re

@@ -1,7 +1,5 @@
 """Cores and threads at hand."""
 
-from __future__ import annotations
-
 import os
 
 

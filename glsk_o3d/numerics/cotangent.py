@@ -1,7 +1,5 @@
 """The cotangent Laplacian on one-rings."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csr_matrix
 

@@ -1,7 +1,5 @@
 """Cycles of a graph embedded in space, and how wide they open."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The Delaunay star of many points at once, by gift wrapping inverted neighbours."""
 
-from __future__ import annotations
-
 import numpy as np
 
 COINCIDENT_SQUARED = 1e-300  # derived: squared distance below which a neighbour counts as the origin itself

@@ -1,7 +1,5 @@
 """Diffusion over a surface that is known by its points."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csr_array
 

@@ -6,8 +6,6 @@ The matrices are a (6, n) array of their entries xx, xy, xz, yy, yz, zz: sums ov
 the memory.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .vectors import FULL, TINY, unit

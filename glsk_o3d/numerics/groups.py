@@ -1,7 +1,5 @@
 """Sums, medians and members of groups, and connected components."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One-rings of triangle meshes, manifold or not."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .groups import component_labels

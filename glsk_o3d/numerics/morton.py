@@ -1,7 +1,5 @@
 """Morton order: points that are near in space become near in memory."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .vectors import TINY

@@ -1,7 +1,5 @@
 """The graph of near points: what hangs together where no surface says so, and how it goes on from place to place."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, identity
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree

@@ -1,7 +1,5 @@
 """Nearest neighbours and how they are spread."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 

@@ -1,7 +1,5 @@
 """Merge points into their nearest neighbours, pair by pair."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How far points are from polylines, and the places on the edges of a graph that are nearest to points."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Local radius: how far the surface is from a vertex, also where noise has tilted the normals."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .groups import group_median, group_sum

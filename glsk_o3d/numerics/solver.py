@@ -1,7 +1,5 @@
 """The linear solve of the contraction."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

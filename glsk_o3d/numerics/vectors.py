@@ -1,7 +1,5 @@
 """Dot products and lengths of rows of vectors: several times faster than NumPy's own."""
 
-from __future__ import annotations
-
 import numpy as np
 
 TINY = np.finfo(float).tiny  # derived: what a divisor is at least

@@ -1,7 +1,5 @@
 """Inside or outside: the winding number of an oriented point cloud."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .vectors import TINY, dot, norm

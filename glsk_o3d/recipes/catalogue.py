@@ -1,7 +1,5 @@
 """What there is by name: the filters, the stopping rules and the pipelines, ours and those of plugins."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from ..errors import InvalidParameterError, did_you_mean

@@ -1,7 +1,5 @@
 """Filters, stopping rules and pipelines of other distributions, found through their entry points."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 import threading

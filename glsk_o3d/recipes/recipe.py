@@ -1,7 +1,5 @@
 """Pipelines as recipes, and these as JSON and TOML files: read and written."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import os

@@ -1,7 +1,5 @@
 """Runs repeated from the recipe in their report."""
 
-from __future__ import annotations
-
 import dataclasses
 import warnings
 from collections.abc import Callable

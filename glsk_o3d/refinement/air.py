@@ -1,7 +1,5 @@
 """Cut the edges that cross air: between parts that noise or flying points join."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from heapq import heappop, heappush
 

@@ -1,7 +1,5 @@
 """Bridge the gaps that a scan or the contraction leaves in an object."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Tell where no curve skeleton is meaningful, on sheets and balls, and where the points do not say where it is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

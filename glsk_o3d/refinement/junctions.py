@@ -1,7 +1,5 @@
 """Move junctions to where limbs meet: their lines and the surface around say it, and not the contraction."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The branches of a skeleton, seen from the junctions that they leave."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from functools import cache
 

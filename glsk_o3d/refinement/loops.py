@@ -1,7 +1,5 @@
 """Close loops that nothing passes through."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

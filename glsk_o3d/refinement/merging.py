@@ -1,7 +1,5 @@
 """Merge vertices of a skeleton, and collapse the triangles of a graph, so that it is one-dimensional."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The place a tree grows from, and its vertices in the order in which they grow."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The points around every vertex, and the section of the part there: how wide and how thick it is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Tell limbs from branches that hardly leave the parts they grow from, and cut these."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Tell where a cloud shows no surface: where its parts are thinner than its points are far apart."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

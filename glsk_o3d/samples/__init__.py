@@ -5,8 +5,6 @@ radius at every node. All clouds are uniform by area, reproducible through `seed
 in size. A shape that cannot be raises InvalidParameterError.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from ..errors import InvalidParameterError

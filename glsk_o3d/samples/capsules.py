@@ -1,7 +1,5 @@
 """What all samples share, and unions of tapered capsules, the convex hulls of two balls, of which most are."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Samples with limbs, unions of tapered capsules: a Y, an animal as two cameras see it, and a tree drawn at random."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.distance import cdist
 

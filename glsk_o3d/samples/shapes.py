@@ -3,8 +3,6 @@
 `n`, `noise` and `seed` are everywhere as in `sample_object`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..errors import InvalidParameterError

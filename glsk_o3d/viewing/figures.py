@@ -1,7 +1,5 @@
 """What all pictures share: a figure, three views of an object in it, a colour bar, and its file."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """A skeleton and its run as HTML in which every text is escaped: for a notebook, and the parts of the page."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json

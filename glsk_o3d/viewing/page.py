@@ -1,7 +1,5 @@
 """A run as one page for the browser: it holds all it needs, and asks no network for anything."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

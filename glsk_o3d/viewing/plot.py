@@ -1,7 +1,5 @@
 """A skeleton in matplotlib's axes, to draw more into."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures of a skeleton in its cloud, without a window: plain, and coloured by a measure."""
 
-from __future__ import annotations
-
 import os
 import textwrap
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """A window on the screen, where there is one."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import socket

@@ -4,8 +4,6 @@ In JSON NaN is null and the infinities are strings, since strict JSON has neithe
 report is a string of JSON.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import math

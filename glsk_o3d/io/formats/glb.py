@@ -1,7 +1,5 @@
 """GLB, the binary files of glTF 2.0: their chunks, and files of others that are made safe for Open3D to read."""
 
-from __future__ import annotations
-
 import json
 from base64 import b64decode
 from pathlib import Path

@@ -4,8 +4,6 @@ Blender and other programs for animation open it. Bones are called by their bran
 numbers are float32, as glTF's are; of coordinates as on a map the large part is a shift of the whole.
 """
 
-from __future__ import annotations
-
 import os
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the formats of skeletons have in common: graphs that are checked, trees with a root, lines of text."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 

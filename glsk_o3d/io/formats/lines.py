@@ -8,8 +8,6 @@ a loop without a junction. VTP, VTK's polydata, has the radii and confidences to
 the polylines. A vertex without edges is a polyline of one point, or a point.
 """
 
-from __future__ import annotations
-
 import base64
 import io
 import math

@@ -1,7 +1,5 @@
 """PCD, the files of PCL: text, binary and compressed; every field with one value, read without trust."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory

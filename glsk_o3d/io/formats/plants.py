@@ -10,8 +10,6 @@ what is above it in its column. TomatoWUR (van Marrewijk et al. 2025, https://gi
 has both here, so that all its readers take it.
 """
 
-from __future__ import annotations
-
 import logging
 import re
 

@@ -5,8 +5,6 @@ Skeletons have the radii as ``radius`` and ``quality``, by which MeshLab colours
 file that has edges and no faces. What a header promises and the file does not hold is an error.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import struct

@@ -4,8 +4,6 @@ They are read by laspy with lazrs (extra ``las``) and by pye57 (extra ``e57``), 
 checked before. XML of E57 may neither name other files nor be nested as no scanner does.
 """
 
-from __future__ import annotations
-
 import io
 import struct
 import sys

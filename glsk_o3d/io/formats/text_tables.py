@@ -5,8 +5,6 @@ first three numbers are a header. Without names the columns after z are colours 
 normals if they have the length 1.
 """
 
-from __future__ import annotations
-
 import io
 import logging
 import os

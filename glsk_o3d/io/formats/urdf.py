@@ -4,8 +4,6 @@ Planning scenes, RViz and simulators open it. URDF knows no capsule: a link is a
 the vertex that it leads to. Lengths are taken as metres, as URDF has them.
 """
 
-from __future__ import annotations
-
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
