@@ -91,6 +91,11 @@ def _read(value: Any, hint: Any, name: str = "it") -> Any:
     raise ValueError(f"{name} in its report is {repr(value)[:80]}")
 
 
+def _told(counts: Mapping[str, int]) -> str:
+    """Numbers with what they are of, but for zeros."""
+    return ", ".join(f"{n} {name}" for name, n in counts.items() if n)
+
+
 def warn(messages: Iterable[str]) -> None:
     """Issue SkeletonWarnings, unless Open3D's verbosity is Error."""
     for message in messages:
@@ -192,6 +197,28 @@ class Report:
     stop_reason: str = NOT_CONTRACTED
     warnings: tuple[str, ...] = ()
     versions: dict[str, str] = field(default_factory=_versions)
+
+    def __str__(self) -> str:
+        """What there is to say, in about ten lines; ``repr`` has it all."""
+        counts = dict(
+            contracted=self.n_contracted, dropped=self.n_dropped, outliers=self.n_outliers, traced=self.n_traced
+        )
+        changes = {"loops closed": self.n_loops_closed, "branches cut": self.n_cuts, "gaps bridged": self.n_bridges}
+        lines = {
+            "stopped": f"{self.stop_reason}, after {len(self.iterations)} solves",
+            "points": f"{self.n_input}{f', of which {self.n_sampled} are sampled' * self.is_sampled}: {_told(counts)}",
+            "noise": f"{self.noise:.2f}",
+            "graph": _told(changes) or "nothing closed, cut or bridged",
+            "decisions": f"{len(self.decisions)}, {len(self.uncertain)} of them uncertain",
+            "uncertain": self.uncertain[0] if self.uncertain else "",
+            "support": f"{self.n_agreeing} of {self.n_draws} samples have the same graph" if self.n_draws else "",
+            "weakest": self.unsupported[0] if self.unsupported else "",
+            "seconds": f"{sum(self.seconds.values()):.2f}: "
+            + ", ".join(f"{k} {v:.2f}" for k, v in self.seconds.items()),
+            "versions": ", ".join(map(" ".join, self.versions.items())),
+        }
+        told = [f"{name:10} {words}".rstrip(": ") for name, words in lines.items() if words != ""]
+        return "\n".join(["Report", *told, *(f"warning    {each}" for each in self.warnings)])
 
     def with_warning(self, message: str) -> Report:
         """This report with a warning in it; pipelines, and filters called by themselves, issue it in the end."""

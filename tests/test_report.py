@@ -56,6 +56,30 @@ def test_places_on_a_map_keep_their_digits():
     assert told == "the loop at (450123.46, 5600321.99, -0.01235) is a handle"
 
 
+def test_print_says_the_main_things_in_about_ten_lines():
+    report = Report(
+        n_input=900,
+        n_dropped=2,
+        n_contracted=500,
+        n_loops_closed=1,
+        decisions=(Decision("loop", (0.0, 0.5, -2.0), 0.45, changed=True),),
+        seconds={"Sampler": 0.25, "Refiner": 0.5},
+        warnings=("sheet-like: so it is",),
+    )
+    said = str(report)
+    for words in (
+        "points     900: 500 contracted, 2 dropped",
+        "graph      1 loops closed",
+        "uncertain  the loop at (0, 0.5, -2) is a handle: 0.45, loop closed",
+        "seconds    0.75: Sampler 0.25, Refiner 0.50",
+        "warning    sheet-like: so it is",
+    ):
+        assert words in said.splitlines()
+    assert len(said.splitlines()) <= 12
+    assert str(Report()).splitlines()[2] == "points     0"
+    assert eval(repr(report.decisions)) == report.decisions
+
+
 @pytest.mark.parametrize(
     ("counts", "sampled"),
     [((0, 0, 0), False), ((10, 0, 10), False), ((10, 2, 8), False), ((10, 0, 0), False), ((10, 0, 4), True)],
