@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..analysis import GraspCandidates
 
 GRASP_ENDINGS = (".json", ".csv", ".ply")
-HEADS = ("x", "y", "z", "approach x", "y", "z", "opening", "quality", "seen", "branch")
+HEADS = ("x", "y", "z", "approach x", "approach y", "approach z", "opening", "quality", "seen", "branch")
 
 
 def grasps(
@@ -30,6 +30,9 @@ def grasps(
     ] = None,
     finger: Annotated[str | None, option("THICKNESS,WIDTH,LENGTH", "By default as the Franka Hand has it.")] = None,
     palm: Annotated[str | None, option("EXTENT,WIDTH,DEPTH", "Of the hand behind the fingers; else the same.")] = None,
+    around: Annotated[int, option("N", "Directions around each place.", min=1)] = 8,
+    spacing: Annotated[float | None, option("LENGTH", "Of the places; by default the radius of the branch.")] = None,
+    margin: Annotated[float, option("RADII", "From the ends of a branch.")] = 1.0,
     min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.5,
     count: Annotated[int, option("N", "So many of the best.", "-n", min=1)] = 20,
     output: Annotated[
@@ -59,6 +62,9 @@ def grasps(
         cloud=None if cloud is None else read_cloud(cloud),
         obstacles=[*planes, *map(read_cloud, scene or [])],
         clearance=clearance,
+        around=around,
+        spacing=spacing,
+        margin=margin,
         min_confidence=min_confidence,
         cone=None if cone is None else _cone(cone),
         up=None if up is None else _direction("--up", up),
