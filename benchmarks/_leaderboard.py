@@ -38,8 +38,7 @@ MEASURES = {  # what may be lost, its digits, and whether more of it is better
     "completeness": ("completeness", 3, True),
     "ends": ("ends", 2, False),
 }
-SHORT = {"clean": "clean", "scan2": "two cameras", "depth2": "two depth cameras", "lidar": "lidar"}
-SHORT |= {"noise1": "1 % noise"}
+SHORT = {"clean": "clean", "scan2": "two cameras", "noise1": "1 % noise"}
 NUMBER = re.compile(r"(?<!code )(?<!signal )\d+(?:\.\d+)?")  # of a reason; those of codes and signals are names
 COLUMNS = 3
 VIEW = (14, -60)  # elevation and azimuth, in degrees
@@ -116,16 +115,17 @@ def overview(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
 
 
 def short(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
-    """The same in few columns, with right topologies of some kinds of clouds."""
-    lines = []
+    """The same in few columns, with the best way to run each tool alone."""
+    best: dict[str, list[str]] = {}
     for entry in board:
         name, mean, groups = entry["name"], entry["all"], entry["variants"]
+        tool = _label(name)[0].partition(",")[0]
         shares = [number(groups[it]["topology"][0], 2) for it in SHORT]
         error = number(mean["error"] and mean["error"][0], 2)
         cells = [*shares, number(mean["topology"][0], 2), number(mean["perfect"][0], 2), error]
-        lines.append([*_label(name), *cells, _cpu(cpu, name)])
-    heads = ["", "takes", *SHORT.values(), "all 11 kinds", "perfect", "error", "CPU s"]
-    return "right parts and loops, share of the clouds", heads, lines
+        best.setdefault(tool, [tool, *cells, _cpu(cpu, name)])
+    heads = ["", *SHORT.values(), "all 11 kinds", "perfect", "error", "CPU s"]
+    return "right components and loops, share of the clouds", heads, list(best.values())
 
 
 class Worse(NamedTuple):

@@ -1,4 +1,4 @@
-"""An Open3D pipeline with skeletons dropped in: crop, thin, clean, cluster, a skeleton per cluster, annotate, write."""
+"""An Open3D pipeline with skeletons: crop, thin, cluster, a skeleton per cluster, annotate, write."""
 
 import argparse
 import sys
@@ -17,8 +17,7 @@ def legacy_objects(path, floor, voxel, gap, least):
     box.min_bound = (*box.min_bound[:2], floor)
     scene = scene.crop(box)
     scene = scene.voxel_down_sample(voxel)
-    scene, _ = scene.remove_statistical_outlier(nb_neighbors=16, std_ratio=3.0)
-    labels = np.asarray(scene.cluster_dbscan(eps=gap, min_points=8))
+    labels = np.asarray(scene.cluster_dbscan(eps=gap, min_points=8))  # -1 for single outliers
     objects = [scene.select_by_index(np.flatnonzero(labels == label)) for label in range(labels.max(initial=-1) + 1)]
     return [cloud for cloud in objects if len(cloud.points) >= least]
 
@@ -30,7 +29,6 @@ def tensor_objects(path, floor, voxel, gap, least):
     low[2] = floor
     scene = scene.crop(o3d.t.geometry.AxisAlignedBoundingBox(low, high))
     scene = scene.voxel_down_sample(voxel)
-    scene, _ = scene.remove_statistical_outliers(nb_neighbors=16, std_ratio=3.0)
     labels = scene.cluster_dbscan(eps=gap, min_points=8)
     objects = [scene.select_by_mask(labels == label) for label in range(labels.numpy().max(initial=-1) + 1)]
     return [cloud for cloud in objects if len(cloud.point.positions) >= least]

@@ -33,7 +33,7 @@ def ring_laplacian(state: Contraction) -> csr_matrix:
 @documented
 @dataclass(frozen=True, kw_only=True)
 class Contractor(Filter[Contraction]):
-    r"""Contract a cloud onto its curve skeleton, reducing it on the way.
+    r"""Contract a cloud onto its curve skeleton, with an optional reduction after each solve.
 
     Each iteration solves :math:`(w_L^2 L^T M^{-1} L + M W_H^2) P' = M W_H^2 P` with the cotangent Laplacian L of the
     current points, raises :math:`w_L`, sets :math:`W_H = s(0) / s(t)`, and lets the reducer merge points. M is the
@@ -41,9 +41,8 @@ class Contractor(Filter[Contraction]):
     conserves mass.
 
     A late, ill-conditioned solve can throw points out of the cloud: beyond 1.2 times the bounding box or, in a frame
-    that turns with the cloud, the ball around it. Such a solve is repeated with the runaway points held; where that
-    does not help, or there is no trustworthy solution, it is dropped, the last sound state is kept, and the report
-    says so.
+    that turns with the cloud, the ball around it. Such a solve is repeated with the runaway points held. If that
+    fails, the last sound state is kept, and the report says so.
 
     References
     ----------

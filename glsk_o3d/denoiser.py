@@ -28,10 +28,10 @@ DENOISED_RATIO, DENOISED_NOISE = 1.8, 0.2  # fitted: local outlier ratio of a de
 @documented
 @dataclass(frozen=True, kw_only=True)
 class Denoiser(Filter[Points]):
-    """Average noisy points where there are plenty, then draw them to the ridge of their density.
+    """Average dense noisy points, then move noisy points to the ridge of their density.
 
-    A neighbourhood narrower than the noise is a ball, and says nothing of the surface; the mean of several points has
-    less noise. Points that stand alone on a ridge are outliers.
+    A neighbourhood narrower than the noise is a ball and does not show the surface; the mean of several points has less
+    noise. Isolated points on a ridge are outliers.
 
     References
     ----------

@@ -41,7 +41,7 @@ def skeletonize(
     on_state : callable, optional
         Called before it with the Contraction after each solve, such as a `ContractionRecorder`.
     **options
-        Parameters of the filters that are to differ, by name; where more than one filter has the name, as
+        Parameters of the filters, by name. If more than one filter has the name, use
         ``**{"Connector.radius": "2%"}``. See `Pipeline.with_options`.
 
     Returns
@@ -102,10 +102,10 @@ def remove_redundant_points(
     rings: Filter[Contraction] | Pipeline[Contraction] | None = None,
     reducer: LPRReducer | None = None,
 ) -> tuple[Any, Any]:
-    """Remove points that say little more about the skeleton than their neighbours, by local point reduction.
+    """Remove points that add little to the skeleton beyond their neighbours, by local point reduction.
 
-    One pass contracts the points, merges those that have become redundant into their neighbours, and leaves about three
-    fifths, with smaller gaps than in a random sample, where they were. Used like ``remove_statistical_outlier``.
+    One pass contracts the points, merges redundant ones into their neighbours, and keeps about three fifths at their
+    original places, with smaller gaps than a random sample has.
 
     Parameters
     ----------

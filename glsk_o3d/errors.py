@@ -24,7 +24,7 @@ class InvalidParameterError(GlskError, ValueError):
 
 
 class StageError(GlskError, TypeError):
-    """A filter was given what another stage should make first, gave what it should not, or is a plugin and failed."""
+    """A filter lacks the result of an earlier stage, returned the wrong type, or is a plugin and failed."""
 
 
 class FileFormatError(GlskError, ValueError):
@@ -32,7 +32,7 @@ class FileFormatError(GlskError, ValueError):
 
 
 class ScriptError(GlskError, ValueError):
-    """A filter script is malformed, asks for what there is not, or fails; the message names file and line."""
+    """A filter script is malformed, names an unknown filter or parameter, or fails; the message names file and line."""
 
 
 class RecipeError(GlskError, ValueError):
@@ -40,7 +40,7 @@ class RecipeError(GlskError, ValueError):
 
 
 class BatchError(GlskError, RuntimeError):
-    """A batch cannot run on: its folder is in use, or there is nobody to work."""
+    """A batch cannot continue: its folder is in use, or no worker is available."""
 
 
 class MissingPackageError(GlskError, ImportError):

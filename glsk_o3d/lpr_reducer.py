@@ -24,14 +24,14 @@ MIN_SHRINKAGE = 1e-4  # published: floor of s - psi' s(0) in the working frame, 
 @documented
 @dataclass(frozen=True, kw_only=True)
 class LPRReducer(Filter[Contraction]):
-    r"""Merge each point with its nearest ring neighbour where that costs little: one pass.
+    r"""Merge each point with its nearest ring neighbour if that costs little: one pass.
 
     A point i may swallow its nearest ring neighbour m where :math:`F = V_1 - V_2 + 3 U < \varphi s_i^2`. Its new ring
     is the Delaunay star of i among both rings, on the uncontracted points, projected along the Laplacian coordinate of
     i; m's entry in every other ring becomes i. A point takes part in at most one merge a pass.
 
     With `conserve_mass` a survivor takes over the mass of the point it swallows, and the ring sizes s(0) and s(t) are
-    measured anew on the combined rings; without it, bent parts are drawn off their axis.
+    measured anew on the combined rings. Without it, bent parts leave their axis.
 
     Raises
     ------

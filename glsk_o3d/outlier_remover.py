@@ -26,10 +26,10 @@ FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
 @documented
 @dataclass(frozen=True, kw_only=True)
 class OutlierRemover(Filter[Points]):
-    """Set outliers aside: they have no say from here on, but go with the nearest point.
+    """Set outliers aside: later filters ignore them, but each belongs to the vertex of the nearest point.
 
-    A point is one that is far from its neighbours, compared with how far these are from theirs; and so are clusters
-    that float in space. ``remove_statistical_outlier`` takes points of sparse limbs as well.
+    An outlier is far from its neighbours, compared with their distance from theirs, or in a small isolated cluster.
+    ``remove_statistical_outlier`` also removes points of sparse limbs.
 
     References
     ----------

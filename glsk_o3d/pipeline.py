@@ -140,7 +140,7 @@ class Filter(Parameters, Generic[Produced]):
 
 
 class Pipeline(Generic[Produced]):
-    """Filters in a row; called on a cloud, each takes what the one before made.
+    """A sequence of filters. Called on a cloud, it passes the result of each filter to the next.
 
     Parameters
     ----------

@@ -58,7 +58,7 @@ def _published(**contraction: Any) -> Pipeline[Skeleton]:
 
 
 def default() -> Pipeline[Skeleton]:
-    """What we recommend: GLSkeleton with the mass of merged points kept and the vertices centred in the surface.
+    """The recommended pipeline: GLSkeleton with conserved mass, a fit to the axis and a test of the topology.
 
     Examples
     --------
@@ -70,9 +70,9 @@ def default() -> Pipeline[Skeleton]:
 
 
 def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
-    """One rooted tree, for trees and plants: what `default` makes, with gaps joined and loops closed.
+    """One rooted tree, for trees and plants: the result of `default` with gaps joined and loops closed.
 
-    It assumes that all points are of one plant. What is there besides, ground, a pot, a neighbour, is best cut away.
+    It assumes that all points are of one plant. Remove ground, pot and neighbours first.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
 
 
 def rings() -> Pipeline[Contraction]:
-    """From a cloud to its rings, through all that a scan needs: what `default` begins with.
+    """From a cloud to its rings, with outliers, noise and surplus points removed: the start of `default`.
 
     Examples
     --------

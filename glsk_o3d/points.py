@@ -90,8 +90,8 @@ class Representatives:
 class Points(Representatives):
     """A cloud on its way to its rings.
 
-    Filters that prepare a cloud merge points, copies, noisy and near ones, and set outliers aside. A point that is left
-    represents those that went into it, and the outliers nearest to it.
+    Filters that prepare a cloud merge copies, noisy points and near points, and set outliers aside. A remaining point
+    represents the points merged into it, and the outliers nearest to it.
 
     Attributes
     ----------

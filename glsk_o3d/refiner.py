@@ -28,22 +28,21 @@ ORDER_OF_QUESTIONS = ("loop", "limb", "air", "limb", "gap", "loop", "limb")
 class Refiner(Filter[Skeleton]):
     """Make the graph one-dimensional, close false loops, prune spurs, and centre it in the surface around it.
 
-    1. Edges that lie on a triangle are collapsed, the shortest first, until there is none. This step is published, and
-       with all options 0 the only one.
+    1. Edges on triangles are collapsed, the shortest first, until there is no triangle. This step is published; with
+       all options 0 it is the only one.
     2. Loops narrower than their tube are collapsed, detached vertices brought back, and edges subdivided.
     3. The curve and its radii are fitted to the axis of the surface: to the normals of the points around, even if only
        one side was scanned, and to the points themselves where noise has spoilt the normals.
     4. The topology is judged by the surface around the curve: false loops are closed, spurs pruned, branches that cross
-       air cut, and gaps bridged across which the object goes on.
+       air cut, and gaps bridged across which the object continues.
     5. Junctions move to where limbs meet, and ends grow along their limbs to where these stop.
-    6. The sections are measured, and reasons not to trust the skeleton are looked for.
+    6. The sections are measured, and warnings are collected.
 
     Warns
     -----
     SkeletonWarning
-        Where no curve skeleton is meaningful, sphere-like or sheet-like clouds, and where many points do not say where
-        the axis is; it names the region. Where questions about loops, air or gaps were close calls; it names the
-        closest.
+        For sphere-like and sheet-like clouds, which have no meaningful curve skeleton. For regions where many points do
+        not determine the axis; it names the region. For close calls about loops, air or gaps; it names the closest.
 
     References
     ----------

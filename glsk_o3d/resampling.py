@@ -48,10 +48,10 @@ def support(
     on_draw: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> Skeleton:
-    """Curve skeleton of a cloud, and which part of it the skeletons of other samples of the object show.
+    """Curve skeleton of a cloud, with the share of its samples whose skeletons show each part.
 
-    Every sample leaves out a fifth of the points, at random, as in the delete-d jackknife. What only some of their
-    skeletons show hangs on chance. Trees of species get their support in this way, by bootstraps.
+    Every sample leaves out a random fifth of the points, as in the delete-d jackknife. A part that few samples show
+    depends on chance.
 
     Parameters
     ----------

@@ -25,10 +25,10 @@ def published_k(n: int) -> int:
 @documented
 @dataclass(frozen=True, kw_only=True)
 class RingBuilder(Filter[Contraction]):
-    """Surround every point with its one-ring.
+    """Give every point its one-ring.
 
     The ring of a point is its Delaunay star among its k nearest neighbours, projected on their principal plane. A cloud
-    is taken as by ``Sampler(size="all")``.
+    is treated as by ``Sampler(size="all")``.
 
     For `k` Open3D's search parameters may be given: ``KDTreeSearchParamKNN(knn)`` is ``k=knn``,
     ``KDTreeSearchParamHybrid(radius, max_nn)`` is ``k=max_nn, radius=radius``, and ``KDTreeSearchParamRadius(radius)``

@@ -14,14 +14,13 @@ from .thinner import default_size
 class Sampler(Filter[Points]):
     """Bring a cloud into its working frame: centred, longest side 1.6, in Morton order and without duplicates.
 
-    Points that differ by rounding are one. Of a large cloud, the points nearest to the means of the cells of a grid say
-    where the surface is; every other point goes where that of its cell goes. What comes out of a pipeline is in the
-    user's order and units.
+    Points that differ by rounding become one. A large cloud is sampled by the points nearest to the means of the cells
+    of a grid; every other point follows that of its cell. Results of a pipeline are in the user's order and units.
 
     Raises
     ------
     InvalidCloudError
-        For points that are not finite (unless dropped), fewer than 8 distinct points, and anything that is no cloud.
+        If points are not finite (unless dropped), fewer than 8 are distinct, or the input is no cloud.
 
     Examples
     --------

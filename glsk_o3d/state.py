@@ -29,7 +29,7 @@ def at_rest(positions: np.ndarray, rings: Rings) -> dict[str, Any]:
 class Contraction(Representatives):
     """A cloud on its way to its skeleton.
 
-    Of what `Points` has, all but the neighbourhoods; the arrays over the survivors, and then:
+    It has the attributes of `Points` except the neighbourhoods, the arrays over the survivors, and:
 
     Attributes
     ----------

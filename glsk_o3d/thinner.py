@@ -39,9 +39,10 @@ def default_size(n: int) -> int:
 @documented
 @dataclass(frozen=True, kw_only=True)
 class Thinner(Filter[Points]):
-    """Merge points into near ones, which take over their mass, where there are more than a skeleton needs.
+    """Merge near points where a part has more points than a skeleton needs.
 
-    No point moves, gaps stay smaller than in a random sample, and thin parts keep their points.
+    No point moves, and the one that stays takes over the mass. Gaps stay smaller than in a random sample, and thin
+    parts keep their points.
 
     Examples
     --------
@@ -57,7 +58,7 @@ class Thinner(Filter[Points]):
 
     around: float = parameter(
         20.0,
-        "Points around a part that are enough: where there are more, near ones are merged; with 0 none.",
+        "Points to keep around the circumference of a part; of more, near points are merged. 0 merges none.",
         unit="points",
         low=0,
         high=1000,

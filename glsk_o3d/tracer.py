@@ -19,11 +19,11 @@ from .skeleton import Skeleton
 @documented
 @dataclass(frozen=True, kw_only=True)
 class Tracer(Filter[Skeleton]):
-    """Trace what has no surface, such as twigs thinner than their points are far apart; make one tree of a skeleton.
+    """Trace parts without a visible surface, such as twigs thinner than the point spacing; make one tree with a root.
 
-    Where the cloud shows no surface, the curve is replaced by shortest paths through the points. With a `root` all is
-    made one tree: gaps are joined, loops opened, vertex 0 is the root, and every edge leads from parent to child.
-    Without, and with a surface everywhere, it is as it was.
+    Where the cloud shows no surface, shortest paths through the points replace the curve. With a `root` the result is
+    one tree: gaps are joined, loops opened, vertex 0 is the root, and every edge leads from parent to child. Without a
+    root, and with a surface everywhere, the skeleton is unchanged.
 
     Warns
     -----

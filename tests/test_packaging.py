@@ -32,12 +32,12 @@ def test_links_of_the_readme_lead_to_the_repository_on_pypi(root, pyproject):
         assert target.endswith(".png") or f"({pages}{home}/blob/v$HFPR_VERSION/{target}" in readme
 
 
-def test_every_extra_for_users_is_in_the_readme(root, pyproject):
-    readme = (root / "README.md").read_text("utf-8")
+def test_every_extra_for_users_is_where_one_installs(root, pyproject):
+    start = (root / "docs" / "start.md").read_text("utf-8")
     extras = pyproject["project"]["optional-dependencies"]
     (full,) = extras["full"]
     users = set(full[len("glsk-o3d[") : -1].split(","))
-    assert set(re.findall(r"^\| `(\w+)` \| .* \|$", readme, re.MULTILINE)) >= users
+    assert set(re.findall(r"^\| `(\w+)` \| .* \|$", start, re.MULTILINE)) >= users
     assert set(extras) == {*users, "full", "test", "lint", "docs", "dev"}
 
 

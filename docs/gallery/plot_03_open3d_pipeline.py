@@ -2,8 +2,8 @@
 Two objects on a table, with Open3D
 ===================================
 
-A scene with two objects on a table: Open3D thins, cleans, finds the table and the clusters; we make one skeleton per
-object and give it back as what Open3D works with.
+A scene with two objects on a table: Open3D thins it and finds the table and the clusters. Each cluster gets a skeleton,
+as objects that Open3D works with.
 """
 
 import matplotlib.pyplot as plt
@@ -34,13 +34,12 @@ scene.points = o3d.utility.Vector3dVector(
 )
 
 # %%
-# Open3D's part.
+# Open3D's part. ``cluster_dbscan`` gives single outliers the label -1.
 
 o3d.utility.random.seed(0)
 scene = scene.voxel_down_sample(0.012)
 plane, on_table = scene.segment_plane(distance_threshold=0.02, ransac_n=3, num_iterations=200)
 objects = scene.select_by_index(on_table, invert=True)
-objects, _ = objects.remove_statistical_outlier(nb_neighbors=16, std_ratio=3.0)
 labels = np.asarray(objects.cluster_dbscan(eps=0.06, min_points=8))
 clusters = [
     objects.select_by_index(np.flatnonzero(labels == label)) for label in range(labels.max() + 1)
@@ -59,13 +58,14 @@ for cluster, skeleton in zip(clusters, skeletons, strict=True):
     print(skeleton, annotated.point, lines, tubes, sep="\n  ")
 
 # %%
-# Left what went in, right what came out. A few strays next to the objects survive Open3D's filter; the skeletons do
-# not mind them.
+# Left the scene, right the clusters and their skeletons.
 
 figure = plt.figure(figsize=(11, 3.6), layout="constrained")
 left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))
 glsk.plot_skeleton(None, left, cloud=scene).set_title("the scene, thinned")
-glsk.plot_skeleton(None, right, cloud=objects).set_title("objects and skeletons")
+glsk.plot_skeleton(None, right, cloud=sum(clusters, o3d.geometry.PointCloud())).set_title(
+    "objects and skeletons"
+)
 for skeleton in skeletons:
     lines = glsk.to_line_set(skeleton, color="branch")
     ends, colours = np.asarray(lines.points)[np.asarray(lines.lines)], np.asarray(lines.colors)

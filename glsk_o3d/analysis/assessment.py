@@ -48,10 +48,10 @@ class LoopWidth:
 class Assessment:
     """How a skeleton lies in its cloud: four measures from 0 to 1, of which 1 is best, all without a unit.
 
-    They need no truth, and so cannot see everything: parts of the cloud without a branch, and missing loops, cost
-    little or nothing. Noise, and a scan from one side, cost something even on the true axis: compare skeletons of one
-    cloud. The properties are those of Wen et al. 2025, arXiv 2504.00032; the formulas, which are ours, and what they
-    give on closed forms: docs/evaluation.md.
+    They need no truth, and so miss some errors: parts of the cloud without a branch, and missing loops, cost little
+    or nothing. Noise and one-sided scans cost something even on the true axis. So compare skeletons of one cloud.
+    The properties are those of Wen et al. 2025, arXiv 2504.00032; the formulas, which are ours, and what they give
+    on closed forms: docs/evaluation.md.
 
     Attributes
     ----------

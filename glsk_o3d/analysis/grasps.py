@@ -36,9 +36,9 @@ def grasp_candidates(
 
     The jaws close across a branch: at places along its curve, from directions around it. The gripper comes in straight,
     open, from as far away as the diagonal of the object, until its fingertips are past the axis: by its reach, or as
-    far as the part if that is less. Ways on which a finger or the palm would sweep over points of the object, or over
-    an obstacle, are left out, and so are those on which there is no point between the jaws. What no camera has seen is
-    taken for free. The quality ranks; it is no measure of force closure. Its formula, each step, and the sources
+    far as the part if that is less. Approaches on which a finger or the palm would touch points of the object or an
+    obstacle are left out, and so are those without points between the jaws. Unseen space counts as free. The quality
+    ranks candidates; it does not measure force closure. Its formula, each step, and the sources
     (Vahrenkamp et al. 2018; ten Pas et al. 2017): docs/grasping.md.
 
     Parameters

@@ -135,8 +135,8 @@ def branch_of_point(skeleton, points, vertex):
 def thickness(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
     """Radius of the part that every point belongs to, over the distance to the eighth nearest point.
 
-    Well above 1 the cloud shows the surface of the part. Below 1 the part is thinner than its points are far apart, and
-    its radius is hardly more than a guess.
+    Well above 1 the cloud shows the surface of the part. Below 1 the part is thinner than the point spacing, and its
+    radius is a guess.
 
     Parameters
     ----------

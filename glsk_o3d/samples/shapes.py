@@ -171,7 +171,7 @@ def _ring(n, ring_radius, radius, rng):
 
 
 def sphere(n: int = 4096, *, radius: float = 0.5, noise: float = 0.0, seed: int = 0) -> Sample:
-    """A sphere about the origin. Its axis is one node; a curve skeleton of it means nothing.
+    """A sphere about the origin. Its axis is one node; its curve skeleton is meaningless.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def sphere(n: int = 4096, *, radius: float = 0.5, noise: float = 0.0, seed: int 
 def sheet(
     n: int = 4096, *, length: float = 1.0, width: float = 0.7, bend: float = 60.0, noise: float = 0.0, seed: int = 0
 ) -> Sample:
-    """A sheet of paper, rolled along x. It has no axis; a curve skeleton of it means nothing.
+    """A sheet of paper, rolled along x. It has no axis; its curve skeleton is meaningless.
 
     Parameters
     ----------

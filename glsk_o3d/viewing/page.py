@@ -27,10 +27,10 @@ _STORED_RANGE = 1.25  # half diagonals that positions are stored as shares of: c
 
 
 class ContractionRecorder:
-    """Remembers where the points of a cloud are after each solve: give it as ``on_state``.
+    """Record the points of a cloud after each solve: pass it as ``on_state``.
 
-    A large cloud is thinned, so that a record stays small: of N points at most `most_points` are followed. One that was
-    merged into another stands where the other does. A second run starts a new record.
+    A large cloud is thinned, so that a record stays small: at most `most_points` points are followed. A merged point
+    has the place of the one it was merged into. A second run starts a new record.
 
     Parameters
     ----------
