@@ -12,13 +12,13 @@ from scipy.sparse.csgraph import dijkstra, maximum_bipartite_matching
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from glsk_o3d import Pipeline
+from glsk_o3d import Pipeline, Refiner
 from glsk_o3d.analysis import Truth
 from glsk_o3d.analysis.comparison import TIP_REACH
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
 from glsk_o3d.refinement.air import branch_facts
 from glsk_o3d.refinement.bridging import gap_facts
-from glsk_o3d.refinement.evidence import Evidence, ordered
+from glsk_o3d.refinement.evidence import Evidence, in_order
 from glsk_o3d.refinement.loops import loop_facts
 from glsk_o3d.refinement.spurs import limb_facts
 from glsk_o3d.skeleton import Skeleton
@@ -41,10 +41,21 @@ def questions(case: Case, pipeline: Pipeline) -> dict:
     return dict(questions=found)
 
 
-def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> Iterator[tuple[str, dict[str, float], bool]]:
+def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> list[tuple[str, dict[str, float], bool]]:
     """The questions in the order in which a pipeline's refiner asks them, each of the skeleton that it has then."""
     *stages, refiner, _ = pipeline.stages
-    skeleton, surface = refiner._fit(ordered(Pipeline(*stages)(points))[0])
+    found = []
+
+    def ask(raw: Skeleton) -> Skeleton:
+        found.extend(_asked(refiner, raw, truth))
+        return raw
+
+    in_order(ask, Pipeline(*stages)(points))
+    return found
+
+
+def _asked(refiner: Refiner, raw: Skeleton, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
+    skeleton, surface = refiner._fit(raw)
     if not len(skeleton.edges):
         return
     evidence = Evidence.of(skeleton, surface)

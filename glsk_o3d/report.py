@@ -254,5 +254,5 @@ class Report:
         if not all(decision.about in QUESTIONS for decision in report.decisions):
             raise ValueError("a decision in its report is about nothing that is known")
         if not isinstance(report.recipe.get("pipeline", []), list):
-            raise ValueError("its recipe is none")
+            raise ValueError("the recipe in its report is none")
         return report

@@ -39,7 +39,7 @@ ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {
 """The arrays of a skeleton: the shape of a row and the type of each. The one field more is ``report``."""
 NOT_MEASURED: dict[str, Any] = dict.fromkeys(OF_VERTICES[1:])
 """For `replace`, where vertices are others than before."""
-LARGEST = 1e150  # derived: a float64 holds the squares of lengths up to it, and their sums
+FARTHEST_PLACE = 1e150  # derived: a float64 holds the squares of lengths up to it, and their sums
 UNIT = 1.001  # derived: a unit vector that was written in three digits is one
 
 
@@ -275,22 +275,25 @@ def _complete(skeleton: Skeleton) -> None:
 def _check_values(skeleton: Skeleton) -> None:
     """Raise InvalidParameterError for the first number that cannot be true."""
     m, owner = len(skeleton.vertices), skeleton.vertex_of_point
-    finite, there = f"must be finite, and at most {LARGEST:g}", f"names a vertex that is not there: there are {m}"
-    _check_range(skeleton, "vertices", -LARGEST, LARGEST, finite)
+    finite, there = (
+        f"must be finite, and at most {FARTHEST_PLACE:g}",
+        f"names a vertex that is not there: there are {m}",
+    )
+    _check_range(skeleton, "vertices", -FARTHEST_PLACE, FARTHEST_PLACE, finite)
     _check_range(skeleton, "edges", 0, m - 1, there)
     _refuse(skeleton, "edges", skeleton.edges[:, 0] == skeleton.edges[:, 1], "joins a vertex with itself")
     _check_range(skeleton, "vertex_of_point", -1, m - 1, there)
     _check_range(
         skeleton,
         "points",
-        -LARGEST,
-        LARGEST,
+        -FARTHEST_PLACE,
+        FARTHEST_PLACE,
         f"{finite}, as vertex_of_point gives it a vertex",
         lambda points: (owner < 0)[:, None],
     )
     _check_range(skeleton, "normals", -UNIT, UNIT, "must be unit vectors, or NaN", unless=np.isnan)
     for name in OF_VERTICES:
-        most = 1.0 if name in ("confidence", "support") else LARGEST
+        most = 1.0 if name in ("confidence", "support") else FARTHEST_PLACE
         _check_range(skeleton, name, 0, most, f"must lie between 0 and {most:g}, or be NaN", unless=np.isnan)
     thicker = skeleton.half_thickness > skeleton.half_width
     _refuse(skeleton, "half_thickness", thicker, "must be at most half_width")

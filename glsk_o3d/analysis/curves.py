@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 from ..errors import InvalidParameterError
 from ..numerics.vectors import norm
 
-MOST_PLACES = 10**7  # derived: on a curve; the arrays of so many take a gigabyte
+MOST_ON_A_CURVE = 10**7  # derived: on a curve; the arrays of so many take a gigabyte
 
 
 def pieces(nodes, edges, step):
@@ -28,7 +28,7 @@ def check_places(length, step):
     """Raise InvalidParameterError where curves are so long that places on them, `step` apart, would fill the memory."""
     with np.errstate(all="ignore"):
         places = np.sum(length / step)
-    if not places <= MOST_PLACES:
+    if not places <= MOST_ON_A_CURVE:
         far = f"{np.sum(length):.3g} long, too long for places {np.min(step):.3g} apart on it"
         raise InvalidParameterError(f"the skeleton is {far}: are all its coordinates and radii right?")
 

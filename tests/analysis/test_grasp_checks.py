@@ -162,7 +162,9 @@ def test_the_jaws_close_on_something():
 
 def test_what_was_seen_is_told_and_ranks():
     whole = rod()
-    half = grasp(replace(whole, points=whole.points[whole.points[:, 1] > 0.01]), around=4)
+    seen = whole.points[:, 1] > 0.01
+    owner, normals = whole.vertex_of_point[seen], whole.normals[seen]
+    half = grasp(replace(whole, points=whole.points[seen], vertex_of_point=owner, normals=normals), around=4)
     across = half.approach[:, 1].round(6)  # 1: from the side that is not there, past both edges of the other
     assert len(half) == 4 * half.places
     np.testing.assert_array_equal(half.seen, np.select([across == 1, across == -1], [2, 3], 2))
@@ -243,7 +245,7 @@ def test_what_is_refused(options, error, said):
 
 
 def test_a_skeleton_without_points_asks_for_them():
-    bare = replace(rod(), points=())
+    bare = replace(rod(), points=(), vertex_of_point=(), normals=())
     with pytest.raises(InvalidParameterError, match=r"cloud=\(\)"):
         grasp(bare)
     same(grasp(bare, cloud=rod().points), grasp(rod()))

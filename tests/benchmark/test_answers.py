@@ -57,7 +57,7 @@ NO_EDGES += b"end_header\n0 0 0\n"
         (b"rubbish", ".obj", "unreadable"),
         (NO_EDGES, ".ply", "is a cloud"),
         (b"v 0 0 0\nv 1 0 0\nl 1 3\n", ".obj", "unreadable"),
-        (b"v 0 0 0\nv 1e300 0 0\nl 1 2\n", ".obj", "units"),
+        (b"v 0 0 0\nv 1e300 0 0\nl 1 2\n", ".obj", "must be finite, and at most"),
     ],
 )
 def test_what_is_no_skeleton_is_a_failure(answer, tmp_path, content, ending, said):

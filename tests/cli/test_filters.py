@@ -49,7 +49,7 @@ def test_json_has_every_field(invoke):
     for each in told["filters"]:
         cls = catalogue()[each["name"]]
         assert each["kind"] == ("filter" if issubclass(cls, Filter) else "stopping rule")
-        flows = ("cloud", "Contraction", "Skeleton") if issubclass(cls, Filter) else (None,)
+        flows = ("cloud", "Points", "Contraction", "Skeleton") if issubclass(cls, Filter) else (None,)
         assert {each["consumes"], each["produces"]} <= set(flows)
         assert [p["name"] for p in each["parameters"]] == [f.name for f in dataclasses.fields(cls)]
         for parameter, field in zip(each["parameters"], dataclasses.fields(cls), strict=True):

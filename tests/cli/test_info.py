@@ -66,7 +66,7 @@ def test_skeletons_of_every_format_and_the_report_of_the_run(told, skeleton, inv
     table = invoke("info", "s.npz").stdout
     assert "Connector(radius='4%')\n" in table  # what is not the default of the filter
     assert re.search(r"^radii +[\d.]+ to [\d.]+$", table, re.MULTILINE)
-    assert re.search(r"^stages +RingBuilder\n +Contractor", table, re.MULTILINE)
+    assert re.search(r"^stages +Sampler\n +OutlierRemover", table, re.MULTILINE)
     assert all(f"{each.explained:.4f}" in table for each in report.iterations)
     call = Decision("gap", (1.0, 2.0, 3.0), 0.45, changed=False)
     save_skeleton(replace(skeleton["s.json"], report=replace(report, decisions=(call,))), tmp_path / "close.json")

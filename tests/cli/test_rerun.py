@@ -61,7 +61,7 @@ def test_another_scan_and_its_recipe_from_a_file(invoke, scans, tmp_path, made):
     assert a.report.recipe == b.report.recipe == to_recipe(load_recipe(tmp_path / "b.toml"))
     assert (tmp_path / "r.toml").read_text() == (tmp_path / "b.toml").read_text()
     assert invoke(*words, "--set", "Connector.radius=5%").exit_code == 0
-    assert read_skeleton(tmp_path / "b.json").report.stages[2].startswith("Connector(radius='5%'")
+    assert read_skeleton(tmp_path / "b.json").report.stages[6].startswith("Connector(radius='5%'")
 
 
 def test_refused_before_anything_runs(refused, scans, tmp_path, made, no_run, monkeypatch):

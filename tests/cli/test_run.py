@@ -43,8 +43,8 @@ def test_a_script_of_ours_is_the_pipeline(invoke, scans, script, tmp_path):
     assert result.stdout.endswith("wrote s.json\nwrote s.ply\n")
     contractor = glsk_o3d.Contractor(reducer=glsk_o3d.LPRReducer())
     connector = glsk_o3d.Connector(radius=0.02 * Layer.read(scan).diagonal)
-    stages = (glsk_o3d.RingBuilder(), contractor, connector, glsk_o3d.Refiner(), glsk_o3d.Tracer())
-    expected = glsk_o3d.Pipeline(*stages)(read_cloud(scan))
+    ahead, behind = glsk_o3d.pipelines.rings(), glsk_o3d.Refiner() | glsk_o3d.Tracer()
+    expected = (ahead | contractor | connector | behind)(read_cloud(scan))
     assert f", converged after {len(expected.report.iterations)} solves\n" in result.stdout
     assert "iterations" not in result.stdout
     back = read_skeleton(tmp_path / "s.json")

@@ -243,7 +243,7 @@ def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, monkeypatch):
     scan, n = tmp_path / "scan.ply", 9000
     save_cloud(scan, samples.torus(n).points)
     monkeypatch.setitem(scans.read_blocks.__kwdefaults__, "rows", 2000)
-    words = ("skeletonize", scan, "-o", "s.json", "--set", "thin_to=2000")
+    words = ("skeletonize", scan, "-o", "s.json", "--set", "size=4000", "--set", "thin_to=2000")
     assert invoke(*words).stderr == ""
     whole = read_skeleton("s.json")
     monkeypatch.setattr(streaming, "LARGE_CLOUD", n - 1)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glsk_o3d import Skeleton
 from glsk_o3d.crosscheck import save_crosscheck_picture
 from glsk_o3d.crosscheck.check import _drawn
 
@@ -50,7 +51,7 @@ def test_the_picture_has_room_for_both_skeletons(check):
 
 
 def test_a_skeleton_of_one_vertex_and_points_that_are_not_finite(check, tmp_path):
-    dot = replace(check.skeleton, vertices=check.skeleton.vertices[:1], edges=[], radii=[1], vertex_of_point=[])
+    dot = Skeleton(check.skeleton.vertices[:1], (), [1], (), (), ())
     spoilt = check.points.copy()
     spoilt[3] = np.nan
     save_crosscheck_picture(replace(check, mesh_skeleton=dot, points=spoilt), tmp_path / "p.png", size=(900, 430))

@@ -38,7 +38,7 @@ def test_is_sound_and_self_contained(skeleton):
 
 def test_is_small_even_for_large_clouds(tree):
     points = np.random.default_rng(0).normal(size=(100_000, 3))
-    many = dataclasses.replace(tree, points=points, normals=points, vertex_of_point=np.zeros(len(points)))
+    many = dataclasses.replace(tree, points=points, normals=None, vertex_of_point=np.zeros(len(points), int))
     assert len(to_html(many)) < 200_000
 
 

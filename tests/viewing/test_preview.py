@@ -100,10 +100,10 @@ def test_the_root_is_marked(tree):
 
 def test_planar_clouds_and_clouds_without_a_skeleton(make, tmp_path):
     flat = np.random.default_rng(0).random((500, 3)) * [1, 1, 0]
-    whole = dataclasses.replace(make(flat[:3], [[0, 1]]), points=flat)
-    none = dataclasses.replace(whole, vertices=(), edges=(), radii=())
+    whole = dataclasses.replace(make(flat[:3], [[0, 1]]), points=flat, vertex_of_point=None, normals=None)
+    none = Skeleton((), (), (), (), flat, ())
     colours = []
-    for skeleton in (whole, none, dataclasses.replace(none, points=())):
+    for skeleton in (whole, none, Skeleton((), (), (), (), (), ())):
         save_preview(skeleton, tmp_path / "p.png")
         image = imread(tmp_path / "p.png")
         colours.append((is_red(image).any(), is_grey(image).sum()))
@@ -113,7 +113,8 @@ def test_planar_clouds_and_clouds_without_a_skeleton(make, tmp_path):
 
 
 def test_the_same_picture_every_time_without_global_state(tree, tmp_path):
-    many = dataclasses.replace(tree, points=np.random.default_rng(0).normal(size=(20_001, 3)))
+    points = np.random.default_rng(0).normal(size=(20_001, 3))
+    many = dataclasses.replace(tree, points=points, vertex_of_point=None, normals=None)
     before = dict(matplotlib.rcParams)
     for name in "ab":
         save_preview(many, tmp_path / f"{name}.png")

@@ -59,7 +59,10 @@ def npz_arrays(data: bytes, names: Iterable[str]) -> dict[str, Any]:
             shape, _, kind = read(held)
             check_promised(math.prod(shape) * kind.itemsize, len(held.getbuffer()) - held.tell(), f"bytes of {name}")
             held.seek(0)
-            arrays[name[:-4]] = np.load(held, allow_pickle=False)
+            try:
+                arrays[name[:-4]] = np.load(held, allow_pickle=False)
+            except ValueError as error:
+                raise ValueError(f"{name[:-4]}: {error}") from error
     return arrays
 
 

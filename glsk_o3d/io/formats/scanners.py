@@ -170,8 +170,8 @@ def _check_packed(stream: BinaryIO, size: int, at: int, records: int, start: int
 
 def read_e57(path: Path) -> Scan:
     """The points of all scans of an E57 file, moved by their poses; ``scan`` says which one each is from."""
-    _check_xml(path)
     pye57 = require("pye57")
+    _check_xml(path)
     with pye57.E57(str(path)) as file:
         headers, left = [file.get_header(i) for i in range(file.scan_count)], path.stat().st_size
         check_budget(_E57_BYTES * sum(header.point_count for header in headers), left)
