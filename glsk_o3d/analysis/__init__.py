@@ -3,7 +3,7 @@
 from .assessment import Assessment, assess
 from .branches import BranchTable, branch_table
 from .comparison import Comparison, Truth, compare
-from .curvature import curvature_torsion
+from .curves import curvature_torsion
 from .grasps import grasp_candidates
 from .gripper import GraspCandidates, Gripper
 from .loops import Loop, find_loops

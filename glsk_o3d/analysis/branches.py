@@ -13,7 +13,7 @@ from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import norm
 from ..refinement.rooted import root_among
 from ..skeleton import Skeleton
-from .curvature import curvature_torsion
+from .curves import curvature_torsion
 from .rows import Rows
 from .segmentation import branch_of_point
 

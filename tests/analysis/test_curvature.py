@@ -5,7 +5,7 @@ import pytest
 
 from glsk_o3d import InvalidParameterError, Skeleton, samples, skeletonize
 from glsk_o3d.analysis import curvature_torsion
-from glsk_o3d.analysis.curvature import bend
+from glsk_o3d.analysis.curves import bend
 
 RNG = np.random.default_rng(0)
 TURN = np.linalg.qr(RNG.normal(size=(3, 3)))[0]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from glsk_o3d.crosscheck.mesh import orient_normals
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
-from glsk_o3d.numerics.orientation import orient_normals
 from glsk_o3d.samples import sphere, torus, two_rings
 
 
