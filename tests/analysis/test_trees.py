@@ -159,6 +159,16 @@ def test_the_stem_is_as_thick_as_at_breast_height_wherever_cylinders_end():
         assert tree_measures(stem, 0, up="z").stem_diameter == pytest.approx(0.3 * (1 - 1.3 / 3), rel=0.004)
 
 
+def test_what_lies_beyond_ends_no_stem():
+    """A limb that is thick and straight but soon ends: the stem goes on beside it, though it turns by 117 degrees there."""
+    places = [[0, 0, 0], [0, 0, 2], [0, 0, 3], [0.4, 0, 1.8], [0.4, 0, 9], [1, 0, 9.5], [0.4, 1, 9.5]]
+    edges = [[0, 1], [1, 2], [1, 3], [3, 4], [4, 5], [4, 6]]
+    tree = Skeleton(places, edges, [0.1, 0.1, 0.1, 0.05, 0.02, 0.01, 0.01], (), (), ())
+    table = branch_table(tree, 0)
+    assert table.end_point[table.order == 0][:, 2].max() == 9.5
+    assert table.order[table.end == 2] == 1
+
+
 def test_an_axis_goes_on_past_a_stub_as_thick_as_itself():
     """A spur inside the trunk, straight ahead and thicker than what goes on, ends nothing."""
     places = [[0, 0, 0], [0, 0, 3], [0, 0, 3.03], [0.3, 0, 6], [1, 1, 4]]
