@@ -251,7 +251,8 @@ def _axes(parent, level, start, angle, radius, length):
 
     What lies beyond comes first: those stay behind that have no fair share of the greatest growth length, their own and
     that of all that grows from them (Hackenberg et al. 2015, SimpleTree, https://doi.org/10.3390/f6114245). So a spur,
-    or a thick limb that soon ends, ends no stem. One alone goes on wherever it turns; of several the thick and straight.
+    or a thick limb that soon ends, ends no stem. One alone goes on wherever it turns; of several the thick and
+    straight one does.
     """
     growth = np.array(length, float)
     for row in np.argsort(-level, kind="stable").tolist():  # those farthest from the root first

@@ -13,7 +13,7 @@ SCORED = 1000  # speed: points that judge the triples
 OUTLYING = 3.0  # published: standard deviations beyond which residuals do not count
 ROUND = 0.02  # fitted: standard deviation over the radius, at least, by which residuals are judged: bark, oval stems
 SECTOR = 10.0  # fitted: degrees in which residuals are alike, as those of ridges and flat sides
-GAP = 20.0  # fitted: degrees without points that do not count as seen
+SEEN_GAP = 20.0, 6.0  # fitted: a gap between points is seen, too, up to so many degrees, or of the median gaps
 PASSES = 20  # derived: the points that count have settled after a few
 
 
@@ -25,7 +25,7 @@ class CircleFit(NamedTuple):
     interval: tuple[float, float]  # in which the radius is with 95 % confidence; may reach to infinity
     arc: float  # degrees in which points are
     rms: float  # of the distances of the points that count
-    count: int  # of these points
+    points: int  # of these, how many
 
 
 def fit_circle(points: np.ndarray) -> CircleFit | None:
@@ -74,16 +74,17 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
     return _judged(circle, p[on], origin)
 
 
-def _residuals(circle, p):
+def _residuals(circle: np.ndarray, p: np.ndarray) -> np.ndarray:
     return np.linalg.norm(p - circle[:2], axis=1) - circle[2]
 
 
-def _jacobian(circle, p):
+def _jacobian(circle: np.ndarray, p: np.ndarray) -> np.ndarray:
     offset = circle[:2] - p
     return np.column_stack([offset / np.linalg.norm(offset, axis=1)[:, None], np.full(len(p), -1.0)])
 
 
-def _judged(circle, p, origin):
+def _judged(circle: np.ndarray, p: np.ndarray, origin: np.ndarray) -> CircleFit:
+    """What the points on a circle say of it."""
     residual, rows = _residuals(circle, p), _jacobian(circle, p)
     spread = np.linalg.pinv(rows.T @ rows)
     angle = np.degrees(np.arctan2(*(p - circle[:2]).T))
@@ -100,11 +101,12 @@ def _judged(circle, p, origin):
     radius = abs(float(circle[2]))
     share = reach / radius  # of the curvature
     gaps = np.diff(np.sort(angle), append=angle.min() + 360)
+    seen = gaps <= max(SEEN_GAP[0], SEEN_GAP[1] * float(np.median(gaps)))
     return CircleFit(
         circle[:2] + origin,
         radius,
         (radius / (1 + share), radius / (1 - share) if share < 1 else np.inf),
-        float(gaps[gaps <= GAP].sum()),
+        float(gaps[seen].sum()),
         float(np.sqrt((residual**2).mean())),
         len(p),
     )
