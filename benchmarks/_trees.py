@@ -332,6 +332,60 @@ def measure_stem(seed: int) -> dict[str, float]:
     return said | wood | true | more | dict(scanners=scanned.scanners, density=scanned.density)
 
 
+def stem_tables(rows: list[dict]) -> Tables:
+    """Good diameters, and intervals that hold the truth, by seeds and scanners; and a line for each tree."""
+    lines = []
+    for seeds in dict.fromkeys(row["seeds"] for row in rows):
+        here = pick(rows, seeds=seeds)
+        sets = [(f"{seeds} seeds, {n} scanner{'s' * (n > 1)}", pick(good(here), scanners=n)) for n in (1, 2, 3)]
+        for label, some in (*sets, (f"{seeds} seeds, all", good(here))):
+            if some:
+                lines.append([label, *_stem_cells(some)])
+    header = ["", "trees", "within 3 %", "intervals hold", "median error %", "half interval %"]
+    header += ["volume: median error %", "intervals hold"]
+    found = [("Stem diameters at 1.3 m, and volumes, of scanned trees", header, lines)]
+    lines = []
+    for row in rows:
+        cells = [row["seeds"], str(row["tree"])]
+        if "failure" in row:
+            lines.append([*cells, *"-" * 9, row["failure"]])
+            continue
+        low, high = row["stem_interval"]
+        stem = (row["true_diameter"], row["stem_diameter"], low, high)
+        cells += [str(row["scanners"]), *(f"{100 * it:.2f}" for it in stem), f"{row['stem_arc']:.0f}"]
+        cells += [f"{1000 * row['stem_rms']:.1f}", f"{row['true_volume']:.3f}", f"{row['volume']:.3f}", ""]
+        lines.append(cells)
+    header = [
+        "seeds",
+        "tree",
+        "scanners",
+        "true cm",
+        "found cm",
+        "from",
+        "to",
+        "arc",
+        "rms mm",
+        "true m3",
+        "found m3",
+        "note",
+    ]
+    return [*found, ("Each tree", header, lines)]
+
+
+def _stem_cells(rows):
+    """How good the diameters and volumes of some trees are, and their intervals."""
+    true, said = (np.array([row[name] for row in rows]) for name in ("true_diameter", "stem_diameter"))
+    low, high = np.array([row["stem_interval"] for row in rows]).T
+    error = np.abs(said / true - 1)
+    wood = np.array([row["true_volume"] for row in rows])
+    least, most = np.array([row["volume_interval"] for row in rows]).T
+    volume = np.abs(np.array([row["volume"] for row in rows]) / wood - 1)
+    held, volumes = (low <= true) & (true <= high), (least <= wood) & (wood <= most)
+    shares = [f"{(error < 0.03).sum()}", f"{held.sum()}", f"{100 * np.nanmedian(error):.2f}"]
+    more = [f"{100 * np.nanmedian((high - low) / true / 2):.2f}", f"{100 * np.median(volume):.1f}", f"{volumes.sum()}"]
+    return [str(len(rows)), *shares, *more]
+
+
 def measure_tables(rows: list[dict]) -> Tables:
     """The median error of each measure, its quartiles, and the worst."""
     lines = []

@@ -226,7 +226,7 @@ def _find_doubts(
         thick = f"{200 * section.radius:.3g} cm thick, as at {BREAST_HEIGHT} m"
         doubts.append(
             f"the tree has {volume:.3g} m3 of wood, {share:.2g} times a cylinder as high and {thick}; more than "
-            f"{FORM_FACTOR:g} is hardly a tree: are leaves, undergrowth or other trees in the cloud?"
+            f"{FORM_FACTOR:g} is hardly one tree: are leaves, undergrowth or others in it, or does it fork below?"
         )
     return tuple(doubts)
 
