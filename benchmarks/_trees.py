@@ -342,7 +342,7 @@ def stem_tables(rows: list[dict]) -> Tables:
             if some:
                 lines.append([label, *_stem_cells(some)])
     header = ["", "trees", "within 3 %", "intervals hold", "median error %", "half interval %"]
-    header += ["volume: median error %", "intervals hold"]
+    header += ["volume: median error %", "its intervals hold"]
     found = [("Stem diameters at 1.3 m, and volumes, of scanned trees", header, lines)]
     lines = []
     for row in rows:

@@ -267,16 +267,15 @@ def _axes(parent, level, start, angle, radius, length):
     straight[fair & np.isfinite(angle) & (np.bincount(fork, fair)[fork] == 1)] = 1
     unknown = np.isin(fork, fork[(straight > 0) & np.isnan(radius)])  # there the angle alone decides
     onward = np.nan_to_num(straight * np.where(unknown, 1, radius))
-    straightest: dict[tuple[int, int], int] = {}
-    for row in np.lexsort((-np.arange(len(onward)), onward)).tolist():  # the last one stays
-        if onward[row] > 0:
-            straightest[int(parent[row]), int(start[row])] = row
+    chosen = np.empty(len(onward), int)
+    rows = np.lexsort((-np.arange(len(onward)), onward))
+    chosen[fork[rows]] = rows  # the last one stays
+    goes_on = (chosen[fork] == np.arange(len(onward))) & (onward > 0)
     axis, order = np.arange(len(parent)), np.zeros(len(parent), int)
     for row in np.argsort(level, kind="stable").tolist():
         before = parent[row]
         if before >= 0:
-            same = straightest.get((int(before), int(start[row]))) == row
-            axis[row], order[row] = (axis[before], order[before]) if same else (row, order[before] + 1)
+            axis[row], order[row] = (axis[before], order[before]) if goes_on[row] else (row, order[before] + 1)
     return axis, order
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from .vectors import TINY
+
 TRIPLES = 500  # derived: with half of the points astray 99.9 % of the draws have fifty triples that are on the circle
 SCORED = 1000  # speed: points that judge the triples
 OUTLYING = 3.0  # published: standard deviations beyond which residuals do not count
@@ -44,11 +46,10 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
     CircleFit or None
         None if there are fewer than four points on a circle.
     """
-    rng = np.random.default_rng(0)
-    origin = np.median(points, axis=0) if len(points) else np.zeros(2)
-    p = points - origin
-    if len(p) < 4:
+    if len(points) < 4:
         return None
+    rng, origin = np.random.default_rng(0), np.median(points, axis=0)
+    p = points - origin
     corners = p[rng.integers(len(p), size=(TRIPLES, 3))]
     sides = corners[:, 1:] - corners[:, :1]
     usable = np.abs(np.linalg.det(sides)) > 1e-9 * (sides**2).sum(axis=(1, 2))
@@ -80,7 +81,7 @@ def _residuals(circle: np.ndarray, p: np.ndarray) -> np.ndarray:
 
 def _jacobian(circle: np.ndarray, p: np.ndarray) -> np.ndarray:
     offset = circle[:2] - p
-    return np.column_stack([offset / np.linalg.norm(offset, axis=1)[:, None], np.full(len(p), -1.0)])
+    return np.column_stack([offset / np.maximum(np.linalg.norm(offset, axis=1), TINY)[:, None], np.full(len(p), -1.0)])
 
 
 def _judged(circle: np.ndarray, p: np.ndarray, origin: np.ndarray) -> CircleFit:
@@ -92,12 +93,9 @@ def _judged(circle: np.ndarray, p: np.ndarray, origin: np.ndarray) -> CircleFit:
     sectors = sector.max() + 1
     sums = np.stack([np.bincount(sector, column * residual) for column in rows.T], axis=1)
     alike = spread @ sums.T @ sums @ spread * sectors / max(sectors - 1, 1)
-    free, groups = len(p) - 3, max(sectors - 3, 1)
-    independent = spread * (residual @ residual) / free
-    reach = max(
-        student.ppf(0.975, freedom) * np.sqrt(variance[2, 2])
-        for variance, freedom in ((independent, free), (alike, groups))
-    )
+    independent = spread * (residual @ residual) / (len(p) - 3)
+    variances = np.array([independent[2, 2], alike[2, 2]])
+    reach = (student.ppf(0.975, [len(p) - 3, max(sectors - 3, 1)]) * np.sqrt(variances)).max()
     radius = abs(float(circle[2]))
     share = reach / radius  # of the curvature
     gaps = np.diff(np.sort(angle), append=angle.min() + 360)
