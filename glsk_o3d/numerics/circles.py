@@ -16,6 +16,7 @@ OUTLYING = 3.0  # published: standard deviations beyond which residuals do not c
 ROUND = 0.02  # fitted: standard deviation over the radius, at least, by which residuals are judged: bark, oval stems
 SECTOR = 10.0  # fitted: degrees in which residuals are alike, as those of ridges and flat sides
 SEEN_GAP = 20.0, 6.0  # fitted: a gap between points is seen, too, up to so many degrees, or of the median gaps
+FEW = 0.1  # fitted: of the points, on a side apart from others, where they may be undergrowth
 PASSES = 20  # derived: the points that count have settled after a few
 
 
@@ -35,7 +36,8 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
 
     The start is the circle through three points from which the median distance of all is least (least median of
     squares, Rousseeuw 1984), of many triples drawn. From there the sum of the squared distances is minimised
-    (Levenberg-Marquardt) over the points no farther than three standard deviations, until these stay the same.
+    (Levenberg-Marquardt) over the points no farther than three standard deviations, until these stay the same. A few
+    points on another side do not count, where they would weigh most.
 
     The interval is one of the curvature, 1 / radius, which is what a short arc shows: its errors are even, while those
     of the radius are not. The variance is the larger one of two: residuals are independent, or they are alike within
@@ -67,6 +69,12 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
         # 1.4826 median absolute deviations are a standard deviation
         scale = max(1.4826 * float(np.median(np.abs(residual[on] if on.any() else residual))), ROUND * circle[2])
         before, on = on, np.abs(residual) <= OUTLYING * scale
+        if not on.any():
+            return None
+        order, _, seen = _around(circle, p[on])
+        side = np.append(0, np.cumsum(~seen)[:-1])
+        side[side == side[-1]] *= not seen[-1]  # the last goes on in the first
+        on[np.flatnonzero(on)[order[np.bincount(side)[side] < FEW * len(side)]]] = False
         if on.sum() < 4:
             return None
         if (on == before).all():
@@ -84,6 +92,14 @@ def _jacobian(circle: np.ndarray, p: np.ndarray) -> np.ndarray:
     return np.column_stack([offset / np.maximum(np.linalg.norm(offset, axis=1), TINY)[:, None], np.full(len(p), -1.0)])
 
 
+def _around(circle: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points in their order around a circle, the degrees to the next of each, and whether these count as seen."""
+    angle = np.degrees(np.arctan2(*(p - circle[:2]).T))
+    order = np.argsort(angle)
+    gaps = np.diff(angle[order], append=angle.min() + 360)
+    return order, gaps, gaps <= max(SEEN_GAP[0], SEEN_GAP[1] * float(np.median(gaps)))
+
+
 def _judged(circle: np.ndarray, p: np.ndarray, origin: np.ndarray) -> CircleFit:
     """What the points on a circle say of it."""
     residual, rows = _residuals(circle, p), _jacobian(circle, p)
@@ -98,8 +114,7 @@ def _judged(circle: np.ndarray, p: np.ndarray, origin: np.ndarray) -> CircleFit:
     reach = (student.ppf(0.975, [len(p) - 3, max(sectors - 3, 1)]) * np.sqrt(variances)).max()
     radius = abs(float(circle[2]))
     share = reach / radius  # of the curvature
-    gaps = np.diff(np.sort(angle), append=angle.min() + 360)
-    seen = gaps <= max(SEEN_GAP[0], SEEN_GAP[1] * float(np.median(gaps)))
+    _, gaps, seen = _around(circle, p)
     return CircleFit(
         circle[:2] + origin,
         radius,

@@ -31,6 +31,17 @@ def test_outliers_have_no_say():
     assert fit_circle(np.concatenate([wood, clump])).radius == pytest.approx(1, rel=1e-6)
 
 
+def test_a_few_points_on_the_other_side_have_no_say():
+    """They would weigh most: two twigs hardly off the circle, opposite to an arc of 120 degrees."""
+    rng = np.random.default_rng(4)
+    wood = arc(120, 60, 0.02, rng, centre=(0, 0))
+    middle = np.arctan2(*wood.mean(axis=0)[::-1])
+    twigs = 1.09 * np.array([[np.cos(middle + turn), np.sin(middle + turn)] for turn in (2.9, 3.1)])
+    alone, more = fit_circle(wood), fit_circle(np.concatenate([wood, twigs]))
+    assert more.radius == pytest.approx(alone.radius, rel=1e-6)
+    assert more.points == alone.points
+
+
 def test_the_arc_is_what_has_points():
     rng = np.random.default_rng(2)
     sides = [[np.cos(a), np.sin(a)] for a in np.radians(np.r_[np.arange(0, 91), np.arange(180, 241)])]
