@@ -93,6 +93,17 @@ class TestCommands:
         assert all(abs(row["volume"]) < 0.05 for row in rows)
         assert "clean: stem diameter" in out
 
+    def test_stems(self, call, parts, tmp_path):
+        out = call("stems", "--trees", 1, "--jobs", 0, "-o", tmp_path / "s.json")
+        rows = json.loads((tmp_path / "s.json").read_text())["rows"]
+        assert [(row["seeds"], row["tree"]) for row in rows] == [("chosen", 0), ("other", 100)]
+        assert all(abs(row["stem_diameter"] / row["true_diameter"] - 1) < 0.03 for row in rows)
+        assert "other seeds, all" in out
+        (_, _, (line, *_)), (_, header, (*_, last)) = parts.stem_tables([rows[0], rows[1] | dict(failure="no")])
+        assert line[1:4] == ["1", "1", "1"]
+        assert len(last) == len(header)
+        assert last[-1] == "no"
+
     def test_large(self, parts, tmp_path):
         np.save(tmp_path / "scan.npy", samples.tree(2000, forks=2, cameras=parts.CAMERAS).points)
         facts = dict(n=2000, pipeline="default, untraced")

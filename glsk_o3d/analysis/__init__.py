@@ -4,11 +4,12 @@ from .assessment import Assessment, assess
 from .branches import BranchTable, branch_table
 from .comparison import Comparison, Truth, compare
 from .curves import curvature_torsion
+from .forestry import TreeMeasures, tree_measures
 from .grasps import grasp_candidates
 from .gripper import GraspCandidates, Gripper
 from .loops import Loop, find_loops
 from .segmentation import segment, thickness
-from .trees import Cylinders, TreeMeasures, cylinders, tree_measures
+from .trees import Cylinders, cylinders
 
 __all__ = [
     "Assessment",

@@ -19,6 +19,7 @@ from .segmentation import branch_of_point
 
 # fitted: radii from a junction between which a branch has its direction; nearer, parts blend
 HEADING_SPAN = (1.0, 3.0)
+FAIR_SHARE = 0.3  # fitted: of the greatest growth length at a junction; on conifers, and plants with long leaves
 PRINTED_ROWS = 20  # at most; fitted to a screen
 PRINTED_COLUMNS = {
     **dict(branch="d", kind="s", parent="d", level="d", axis="d", order="d", length=".4g", mean_radius=".3g"),
@@ -59,8 +60,9 @@ class BranchTable(Rows, row="branch"):
     confidence, support : (B,) float arrays
         Mean confidence; share of samples of the cloud that show its least shown place, or end, see `glsk_o3d.support`.
     axis, order : (B,) int arrays
-        The first row of the axis that a branch is part of: at a junction the thickest and straightest branch goes on.
-        Centrifugal (Gravelius) order: 0 for axes at the root, and one more for each axis that grows from another.
+        The first row of the axis that a branch is part of: at a junction one goes on of those that carry much, the
+        thickest and straightest. Centrifugal (Gravelius) order: 0 for axes at the root, and one more for each axis that
+        grows from another.
 
     Examples
     --------
@@ -162,7 +164,8 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         return np.array([_mean(values[path], weight) for path, weight in zip(paths, weights, strict=True)])
 
     section = mean((skeleton.radii / np.nanmax(skeleton.radii, initial=np.finfo(float).tiny)) ** 2)
-    parent, level, backwards = _grow(skeleton, paths, length, np.where(np.isnan(section), 1, section), chosen)
+    volume = length * np.where(np.isnan(section), 1, section)
+    parent, level, backwards = _grow(skeleton, paths, length, volume, chosen)
     outward = [path[::-1] if turn else path for path, turn in zip(paths, backwards, strict=True)]
     start, end = (np.array([path[i] for path in outward]) for i in (0, -1))
     first, last = skeleton.vertices[start], skeleton.vertices[end]
@@ -196,11 +199,11 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     )
 
 
-def _grow(skeleton, paths, length, section, chosen):
+def _grow(skeleton, paths, length, volume, chosen):
     """Parent and level of every path, and whether it runs towards the root: three (B,) arrays.
 
     Paths are reached from the roots, the nearest first. `chosen` is the root vertex of its component, or None; other
-    components grow from the path with the most volume, `length` times `section`.
+    components grow from the path with the most `volume`.
     """
     ends = [(int(path[0]), int(path[-1])) for path in paths]
     at: dict[int, list[int]] = {}
@@ -221,7 +224,7 @@ def _grow(skeleton, paths, length, section, chosen):
             backwards[row] = way[:place].sum() > way[place:].sum()
         else:
             rows = np.flatnonzero(component == part)
-            row = rows[np.argmax((length * section)[rows])]
+            row = rows[np.argmax(volume[rows])]
             free, thick = (np.take(values, ends[row]) for values in (skeleton.degree == 1, skeleton.radii))
             backwards[row] = free[1] if free[0] != free[1] else thick[1] > thick[0]
         level[row] = 0
@@ -244,35 +247,34 @@ def _grow(skeleton, paths, length, section, chosen):
 def _axes(parent, level, start, angle, radius, length):
     """First row of every row's axis, and the axes before it: of those that begin in one place, one goes on.
 
-    It is the one that is straight and thick, but no stub: one that ends within its own radius is inside the part.
+    What lies beyond comes first: those stay behind that have no fair share of the greatest growth length, their own and
+    that of all that grows from them (Hackenberg et al. 2015, SimpleTree, https://doi.org/10.3390/f6114245). So a spur,
+    or a thick limb that soon ends, ends no stem. One alone goes on wherever it turns; of several the thick and
+    straight one does.
     """
-    stub = _ahead(parent, level, length) < np.nan_to_num(radius)
-    straight = np.where(stub, 0, np.cos(np.radians(angle)))
+    growth = np.array(length, float)
+    for row in np.argsort(-level, kind="stable").tolist():  # those farthest from the root first
+        if parent[row] >= 0:
+            growth[parent[row]] += growth[row]
     _, fork = np.unique([parent, start], axis=1, return_inverse=True)
     fork = fork.ravel()  # NumPy 2.0 gives it two axes
+    greatest = np.zeros(len(growth))
+    np.maximum.at(greatest, fork, growth)
+    fair = growth >= FAIR_SHARE * greatest[fork]
+    straight = np.where(fair, np.cos(np.radians(angle)), 0)
+    straight[fair & np.isfinite(angle) & (np.bincount(fork, fair)[fork] == 1)] = 1
     unknown = np.isin(fork, fork[(straight > 0) & np.isnan(radius)])  # there the angle alone decides
     onward = np.nan_to_num(straight * np.where(unknown, 1, radius))
-    straightest: dict[tuple[int, int], int] = {}
-    for row in np.lexsort((-np.arange(len(onward)), onward)).tolist():  # the last one stays
-        if onward[row] > 0:
-            straightest[int(parent[row]), int(start[row])] = row
+    chosen = np.empty(len(onward), int)
+    rows = np.lexsort((-np.arange(len(onward)), onward))
+    chosen[fork[rows]] = rows  # the last one stays
+    goes_on = (chosen[fork] == np.arange(len(onward))) & (onward > 0)
     axis, order = np.arange(len(parent)), np.zeros(len(parent), int)
     for row in np.argsort(level, kind="stable").tolist():
         before = parent[row]
         if before >= 0:
-            same = straightest.get((int(before), int(start[row]))) == row
-            axis[row], order[row] = (axis[before], order[before]) if same else (row, order[before] + 1)
+            axis[row], order[row] = (axis[before], order[before]) if goes_on[row] else (row, order[before] + 1)
     return axis, order
-
-
-def _ahead(parent, level, length):
-    """The longest way from the start of every row to a tip, away from the root."""
-    ahead = np.array(length, float)
-    for row in np.argsort(-level, kind="stable").tolist():  # those farthest from the root first
-        before = parent[row]
-        if before >= 0:
-            ahead[before] = max(ahead[before], length[before] + ahead[row])
-    return ahead
 
 
 def _mean(values, weights):

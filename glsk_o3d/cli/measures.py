@@ -20,7 +20,8 @@ UNITS = {
     "crown_base": "m",
     "crown_width": "m",
     "crown_area": "m2",
-    "traced": "of the volume",
+    "volume": "m3",
+    "traced": "of the length",
 }
 """Fields of `TreeMeasures` that are printed, and what they are in."""
 
@@ -72,9 +73,10 @@ def tree(
 ) -> None:
     """Measure a tree: height, stem, crown, volume by order.
 
-    Length and surface, too. Orders count from the stem, 0. Where there was no surface, radii are the scatter of the
-    points, and volumes no more than a guess. JSON and npz files say where the tree grows from. All is in metres if
-    --unit says what a unit of the file is; only a csv file of cylinders is in the units of the file.
+    Length and surface, too. Orders count from the stem, 0. Volume is that of parts with a surface: where there was
+    none, radii are the scatter of the points. What is hardly as it should be is said on stderr, and in JSON as doubts.
+    JSON and npz files say where the tree grows from, and keep the points that the stem's diameter is measured on. All
+    is in metres if --unit says what a unit of the file is; only a csv file of cylinders is in the units of the file.
     """
     from .. import read_skeleton, save_cylinders
     from ..analysis import cylinders, tree_measures
@@ -92,10 +94,17 @@ def tree(
 
 
 def _print(measures: TreeMeasures) -> None:
+    interval = "95 %: {:.4g} to {:.4g}"
+    more = {
+        "stem_diameter": interval.format(*measures.stem_interval)
+        + f"; {measures.stem_points} points on {measures.stem_arc:.0f} degrees, rms {measures.stem_rms:.2g} m",
+        "volume": interval.format(*measures.volume_interval),
+        "traced": f"{measures.traced_volume:.3g} m3 by the scatter of its points, not counted",
+    }
     for name, unit in UNITS.items():
-        value = getattr(measures, name)
-        known = f"{value:.4g} {unit}" if math.isfinite(value) else f"not known: {_why_not(name, measures)}"
-        echo(f"{name.replace('_', ' ')}: {known}")
+        value = sum(measures.volume) if name == "volume" else getattr(measures, name)
+        known = f"{value:.4g} {unit}" + (f" ({more[name]})" if name in more else "")
+        echo(f"{name.replace('_', ' ')}: {known if math.isfinite(value) else f'not known: {_why_not(name, measures)}'}")
     columns = measures.length, measures.area, measures.volume
     names = [*map(str, range(len(measures.length))), "all"]
     numbers = [[f"{value:.4g}" for value in (*column, sum(column))] for column in columns]
@@ -104,7 +113,7 @@ def _print(measures: TreeMeasures) -> None:
 
 def _why_not(name: str, measures: TreeMeasures) -> str:
     """Why a measure is not known."""
-    from ..analysis.trees import BREAST_HEIGHT
+    from ..analysis.forestry import BREAST_HEIGHT
     from ..decisions import coordinates
 
     if name == "crown_base":
@@ -114,6 +123,6 @@ def _why_not(name: str, measures: TreeMeasures) -> str:
     if measures.height < BREAST_HEIGHT:
         return f"the tree is lower than {BREAST_HEIGHT} m, if a unit of the file is {measures.unit:g} m (--unit)"
     return (
-        f"the stem does not pass {BREAST_HEIGHT} m above the root, "
-        f"if {measures.up} points up (--up), and {coordinates(measures.root)} is the root (--root)"
+        f"see the warning; {measures.up} was taken to point up (--up), and {coordinates(measures.root)} for the root "
+        "(--root)"
     )

@@ -75,7 +75,8 @@ def test_units_and_directions(tree):
 
 def test_up_is_the_axis_of_the_root(tree):
     assert (tree_measures(tree).up, tree_measures(tree, "x").up) == ("z", "x")
-    assert tree_measures(by_hand(), (0, 0, 20), up="-z").root == (0, 0, 20)
+    with pytest.warns(SkeletonWarning, match="no points"):
+        assert tree_measures(by_hand(), (0, 0, 20), up="-z").root == (0, 0, 20)
     sideways = pipelines.tree("-x")(samples.tube(1000).points)
     assert tree_measures(sideways).up == "-x"
 
@@ -100,8 +101,9 @@ def test_by_hand():
     assert table.parent.tolist() == [-1, *range(9), 4, *range(10, 14)]
     rooted = replace(by_hand(), report=Report(root=(0.0, 0.0, 20.0)))  # where the tree was grown from
     assert cylinders(rooted).start_point[0].tolist() == [0, 0, 20]
-    measures = tree_measures(by_hand(), root=0)
-    assert (measures.height, measures.stem_diameter, measures.crown_base) == (20, 1, 10)
+    with pytest.warns(SkeletonWarning, match="no points"):
+        measures = tree_measures(by_hand(), root=0)
+    assert (measures.height, measures.crown_base) == (20, 10)
     assert measures.crown_width == 10
 
 
@@ -149,14 +151,76 @@ def test_a_file_without_a_report_keeps_its_root(tmp_path):
         assert np.isnan(tree_measures(read_skeleton(tmp_path / "t.ply")).traced)
 
 
-def test_the_stem_is_as_thick_as_at_breast_height_wherever_cylinders_end():
-    """A cone of 3 m from 0.3 to 0 in diameter: 0.17 at 1.3 m, though its cylinders are longer than that changes."""
-    for pieces in (4, 7, 301):
-        height = np.linspace(0, 3, pieces)
-        up = np.column_stack([0 * height, 0 * height, height])
-        edges = np.column_stack([np.arange(pieces - 1), np.arange(1, pieces)])
-        stem = Skeleton(up, edges, 0.15 * (1 - height / 3), (), (), ())
-        assert tree_measures(stem, 0, up="z").stem_diameter == pytest.approx(0.3 * (1 - 1.3 / 3), rel=0.004)
+def ring(radius, height, n, rng, degrees=360.0, noise=0.0):
+    """Points of a stem of 3 m seen over so many degrees, and a skeleton whose radii are half of the true ones."""
+    turn = np.radians(degrees) * (rng.random(n) - 0.5)
+    points = np.column_stack([np.cos(turn), np.sin(turn), height * rng.random(n)])
+    points[:, :2] *= (radius + noise * rng.normal(size=n))[:, None]
+    level = np.linspace(0, height, 31)
+    up = np.column_stack([0 * level, 0 * level, level])
+    edges = np.column_stack([np.arange(30), np.arange(1, 31)])
+    owner = np.abs(points[:, 2:] - level).argmin(axis=1)
+    return Skeleton(up, edges, np.full(31, radius / 2), owner, points, 0 * points, confidence=np.ones(31))
+
+
+def test_the_stem_is_measured_on_its_points():
+    """Not by the radii of the curve, which are wrong here; half of the ring is enough, and says so."""
+    rng = np.random.default_rng(0)
+    for degrees in (360, 180, 90):
+        found = tree_measures(ring(0.15, 3.0, 6000, rng, degrees), 0, up="z")
+        assert found.stem_diameter == pytest.approx(0.3, abs=1e-9)
+        assert found.stem_arc == pytest.approx(degrees, abs=10)
+        assert found.stem_rms < 1e-9
+        assert found.stem_points == pytest.approx(200, abs=50)
+    widths = []
+    for degrees in (360, 180, 90):
+        found = tree_measures(ring(0.15, 3.0, 6000, rng, degrees, noise=0.003), 0, up="z")
+        assert found.stem_rms == pytest.approx(0.003, rel=0.2)
+        low, high = found.stem_interval
+        assert low < 0.3 < high
+        widths.append(high - low)
+    assert widths[0] < widths[1] < widths[2]
+
+
+@pytest.mark.parametrize(
+    ("degrees", "n", "cause"), [(40, 6000, "show 4. degrees of it"), (360, 200, "points of the stem are on a circle")]
+)
+def test_why_a_stem_has_no_diameter(degrees, n, cause):
+    stem = ring(0.15, 3.0, n, np.random.default_rng(1), degrees)
+    with pytest.warns(SkeletonWarning, match=cause):
+        found = tree_measures(stem, 0, up="z")
+    assert np.isnan([found.stem_diameter, *found.stem_interval]).all()
+    assert len(found.doubts) == 1
+    with pytest.warns(SkeletonWarning, match="has no points"):
+        tree_measures(replace(stem, points=np.empty((0, 3)), normals=np.empty((0, 3)), vertex_of_point=[]), 0, up="z")
+
+
+def test_more_wood_than_trees_have_is_in_doubt():
+    stem = ring(0.15, 3.0, 6000, np.random.default_rng(2))
+    assert tree_measures(stem, 0, up="z").doubts == ()
+    with pytest.warns(SkeletonWarning, match="4 times a cylinder as high and 30 cm thick"):
+        tree_measures(replace(stem, radii=np.full(31, 0.3)), 0, up="z")
+
+
+def test_volume_is_that_of_parts_with_a_surface():
+    stem = ring(0.15, 3.0, 6000, np.random.default_rng(3))
+    upper = replace(stem, confidence=(np.arange(31) < 16).astype(float))
+    whole, half = (tree_measures(it, 0, up="z") for it in (stem, upper))
+    assert (whole.traced, whole.traced_volume) == (0, 0)
+    assert sum(half.volume) + half.traced_volume == pytest.approx(sum(whole.volume))
+    assert half.traced == pytest.approx(0.5, abs=0.1)
+    np.testing.assert_allclose(half.volume_interval[0], 0.92 * sum(half.volume))
+    np.testing.assert_allclose(half.volume_interval[1], 1.08 * sum(whole.volume))  # it is as thick above
+
+
+def test_what_lies_beyond_ends_no_stem():
+    """A limb that is thick and straight but soon ends: the stem goes on beside it, and turns by 117 degrees there."""
+    places = [[0, 0, 0], [0, 0, 2], [0, 0, 3], [0.4, 0, 1.8], [0.4, 0, 9], [1, 0, 9.5], [0.4, 1, 9.5]]
+    edges = [[0, 1], [1, 2], [1, 3], [3, 4], [4, 5], [4, 6]]
+    tree = Skeleton(places, edges, [0.1, 0.1, 0.1, 0.05, 0.02, 0.01, 0.01], (), (), ())
+    table = branch_table(tree, 0)
+    assert table.end_point[table.order == 0][:, 2].max() == 9.5
+    assert table.order[table.end == 2] == 1
 
 
 def test_an_axis_goes_on_past_a_stub_as_thick_as_itself():

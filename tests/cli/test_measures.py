@@ -86,11 +86,28 @@ def test_why_a_stem_has_no_diameter(invoke, tmp_path):
     points = [[0, 0, 0], [0, 0, 1], [3, 0, 1], [0, 0, 2.5]]
     bent = Skeleton(points, [[0, 1], [1, 2], [1, 3]], [0.2, 0.2, 0.2, 0.01], (), (), ())
     save_skeleton(bent, tmp_path / "t.json")
-    said = invoke("tree", "t.json", "--root", "z", "--up", "x").stdout.splitlines()
-    cause = "if x points up (--up), and 0, 0, 0 is the root (--root)"
-    assert f"stem diameter: not known: the stem does not pass 1.3 m above the root, {cause}" in said
+    result = invoke("tree", "t.json", "--root", "z", "--up", "x")
+    cause = "see the warning; x was taken to point up (--up), and 0, 0, 0 for the root (--root)"
+    assert f"stem diameter: not known: {cause}" in result.stdout.splitlines()
+    why = "the diameter of the stem at 1.3 m is not known: the stem does not pass 1.3 m above its foot"
+    assert result.stderr.splitlines()[-1].endswith(why)
+    assert json.loads(invoke("tree", "t.json", "--root", "z", "--up", "x", "--json").stdout)["doubts"][-1] == why
     save_skeleton(Skeleton(points[:2], [[0, 1]], [0.2, 0.2], (), (), ()), tmp_path / "s.json")
     assert "crown base: not known: no branch leaves the stem" in invoke("tree", "s.json", "--root", "z").stdout
+
+
+def test_a_stem_and_how_well_it_is_known(invoke, tmp_path):
+    save_skeleton(pipelines.tree()(samples.tree(4000, forks=2, length=2, seed=1).points), tmp_path / "t.json")
+    found = tree_measures(read_skeleton(tmp_path / "t.json"))
+    low, high = found.stem_interval
+    lines = invoke("tree", "t.json").stdout.splitlines()
+    (line,) = (line for line in lines if line.startswith("stem diameter"))
+    assert f"{found.stem_diameter:.4g} m (95 %: {low:.4g} to {high:.4g}; {found.stem_points} points on" in line
+    (line,) = (line for line in lines if line.startswith("volume:"))
+    assert line == f"volume: {sum(found.volume):.4g} m3 (95 %%: %.4g to %.4g)" % found.volume_interval
+    facts = json.loads(invoke("tree", "t.json", "--json").stdout)
+    assert facts["stem_interval"] == [low, high]
+    assert (facts["stem_arc"], facts["stem_rms"], facts["doubts"]) == (found.stem_arc, found.stem_rms, [])
 
 
 def test_units_and_what_is_up(invoke, tmp_path, y):
@@ -123,6 +140,7 @@ def test_a_tree_taller_than_any_is_in_doubt(invoke, tmp_path, y):
     save_skeleton(
         replace(skeleton, vertices=1000 * skeleton.vertices, radii=1000 * skeleton.radii), tmp_path / "mm.ply"
     )
-    (line,) = invoke("tree", "mm.ply", "--up", "z", "--root", "z").stderr.splitlines()
-    assert line.endswith("none is known above 116 m: is a unit of the cloud 1 m? pass unit=, such as 'mm'")
+    first, second = invoke("tree", "mm.ply", "--up", "z", "--root", "z").stderr.splitlines()
+    assert second.endswith("the skeleton has no points: .json and .npz files keep them")
+    assert first.endswith("none is known above 116 m: is a unit of the cloud 1 m? pass unit=, such as 'mm'")
     assert invoke("tree", "mm.ply", "--unit", "mm", "--up", "z", "--root", "z").stderr == ""

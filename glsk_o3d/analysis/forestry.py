@@ -1,0 +1,275 @@
+"""What foresters read of a tree: height, stem, crown, volume by order; and what of it is hardly as it should be."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.distance import pdist
+
+from ..errors import InvalidParameterError, SkeletonWarning
+from ..numerics.circles import CircleFit, fit_circle
+from ..numerics.neighbourhoods import plane_axes
+from ..numerics.vectors import AXES, TINY, along_axis, norm
+from ..numerics.vectors import unit as directions
+from ..skeleton import Skeleton
+from .trees import OUTSIDE, Cylinders, cylinders, metres
+
+BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
+TALLEST_TREE = 116.07  # published: metres, Hyperion, the tallest tree known, as measured in 2019
+SLICE = 0.1  # published: metres; the slice of a stem that its diameter is fitted to is from 5 cm below to 5 cm above
+STEM_SPAN = 0.5  # fitted: metres up and down, over which the stem has its direction there
+FEWEST_ON_CIRCLE = 12  # fitted: on a circle, of which fewer may be anything
+LEAST_ARC = 60.0  # derived: degrees of a circle; a chord of less leaves the surface by an eighth of the radius
+FORM_FACTOR = 2.0  # derived: wood over a cylinder as thick as at 1.3 m and as high as the tree; branches as thick as
+# the trunk together (Leonardo) that reach to the top fill one, and their ways and the foot are not twice that
+FOOT_SLACK = 0.003  # derived: of the diameter; the foot may be 3 cm off, and stems taper by up to a tenth in a metre
+VOLUME_SLACK = 0.08  # measured: of the volume, in 95 % of scans; benchmarks/trees.py stems
+UNKNOWN = CircleFit(np.zeros(2), np.nan, (np.nan, np.nan), np.nan, np.nan, 0)
+
+
+@dataclass(frozen=True)
+class TreeMeasures:
+    """A tree in numbers. Lengths are in metres, areas in square metres, volumes in cubic metres.
+
+    Attributes
+    ----------
+    height : float
+        Of the highest point above the foot of the stem, but for points farther than three radii from the curve.
+    stem_diameter, stem_interval : float, (low, high)
+        Of the circle through the points of the stem in a slice of 10 cm, across it and 1.3 m above the foot; in which
+        the diameter is with 95 % confidence, if the stem is round. NaN where there is no such circle.
+    stem_arc, stem_rms, stem_points : float, float, int
+        Degrees of that circle that have points; root mean square distance of the points on it, and their number.
+    crown_base : float
+        Height at which the lowest branch leaves the stem; NaN without one.
+    crown_width, crown_area : float
+        Largest horizontal distance of two points of the crown, of branches and of the stem above the lowest one; of its
+        convex hull as seen from above.
+    length, area, volume : tuple of float
+        Of the axes, lateral surface and volume of each order, the stem first; see `Cylinders`. Volume is that of parts
+        with a surface: confidence above 0, or not known.
+    volume_interval : (low, high)
+        In which the volume of all is: 8 % aside, as on scanned trees; what was traced may be nothing, or as thick as
+        the parts that it grows from.
+    traced, traced_volume : float
+        Share of the length that has confidence 0: twigs without a surface, leaves, and what noise has spoilt; the
+        volume that they would have. NaN if confidences are not known.
+    root, up, unit : (x, y, z), str, float
+        The foot of the stem in the cloud's units, the axis that was taken to point up, and metres of one unit.
+    doubts : tuple of str
+        What is hardly as it should be; the warnings.
+
+    Examples
+    --------
+    >>> from glsk_o3d import pipelines
+    >>> from glsk_o3d.samples import y_junction
+    >>> measures = tree_measures(pipelines.tree()(y_junction(2000).points))
+    >>> len(measures.volume), measures.height > 0.5
+    (2, True)
+    """
+
+    height: float
+    stem_diameter: float
+    stem_interval: tuple[float, float]
+    stem_arc: float
+    stem_rms: float
+    stem_points: int
+    crown_base: float
+    crown_width: float
+    crown_area: float
+    length: tuple[float, ...]
+    area: tuple[float, ...]
+    volume: tuple[float, ...]
+    volume_interval: tuple[float, float]
+    traced: float
+    traced_volume: float
+    root: tuple[float, float, float]
+    up: str
+    unit: float
+    doubts: tuple[str, ...]
+
+
+def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, unit: float | str = 1.0) -> TreeMeasures:
+    """Measure a tree as foresters do.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        One tree, as from `glsk_o3d.pipelines.tree`.
+    root : str, int or (x, y, z), optional
+        See `cylinders`.
+    up : {"x", "y", "z", "-x", "-y", "-z"}, optional
+        Axis that points up. By default that along which the tree was made to grow, by `root` here or in the pipeline
+        `tree`; else ``"z"``.
+    unit : float or {"m", "cm", "mm", "in", "ft"}
+        One unit of the cloud, in metres or by its name.
+
+    Returns
+    -------
+    TreeMeasures
+
+    Raises
+    ------
+    InvalidParameterError
+        See `cylinders`; or `up` is no axis, or `unit` is neither positive nor one of these.
+
+    Warns
+    -----
+    SkeletonWarning
+        The root is in the upper half of the tree, the tree is taller than any, it holds more wood than trees so thick
+        and high, or its diameter at 1.3 m cannot be told.
+
+    Examples
+    --------
+    >>> from glsk_o3d import pipelines
+    >>> from glsk_o3d.samples import tube
+    >>> stem = pipelines.tree("x")(tube(2000, length=2, radius=0.1).points)
+    >>> abs(tree_measures(stem).stem_diameter - 0.2) < 0.01  # up is x, as in the pipeline
+    True
+    """
+    steps = skeleton.report.recipe.get("pipeline", ())
+    grown = [root, *(step.get("root") for step in reversed(steps) if isinstance(step, dict)), "z"]
+    up = next(axis for axis in grown if isinstance(axis, str) and axis in AXES) if up is None else up
+    if up not in AXES:
+        raise InvalidParameterError(f"up = {up!r}: must be 'x', 'y' or 'z', with a minus where that points down")
+    unit = metres(unit)
+    pieces = cylinders(skeleton, root)
+    ground = pieces.start_point[0]
+
+    def height(places: np.ndarray) -> np.ndarray:
+        return unit * along_axis(places - ground, up)
+
+    stem = pieces.order == 0
+    bottom, top = height(pieces.start_point), height(pieces.end_point)
+    low, high = min(bottom.min(), top.min()), max(bottom.max(), top.max())
+    near = _points_near(skeleton)
+    highest = float(max(high, height(skeleton.points[near]).max(initial=high)))
+    leaving = bottom[(pieces.order == 1) & stem[pieces.parent]]
+    crowning = ~stem | (bottom > leaving.min(initial=np.inf))
+    crown = unit * np.concatenate([pieces.start_point[crowning], pieces.end_point[crowning]])
+    width, area = _extent(np.delete(crown, "xyz".index(up[-1]), axis=1))
+    sums = _sums_by_order(pieces, unit)
+    section, unknown = _stem_section(skeleton, pieces, bottom, top, near, unit)
+    doubts = _find_doubts(-low / max(high - low, TINY), highest, section, unknown, sum(sums["volume"]), up, unit)
+    for doubt in doubts:
+        warnings.warn(doubt, SkeletonWarning, stacklevel=2)
+    return TreeMeasures(
+        height=highest,
+        stem_diameter=2 * section.radius,
+        stem_interval=(2 * section.interval[0], 2 * section.interval[1]),
+        stem_arc=section.arc,
+        stem_rms=section.rms,
+        stem_points=section.points,
+        crown_base=float(leaving.min()) if len(leaving) else np.nan,
+        crown_width=width,
+        crown_area=area,
+        **sums,
+        root=tuple(ground.tolist()),
+        up=up,
+        unit=unit,
+        doubts=doubts,
+    )
+
+
+def _stem_section(
+    skeleton: Skeleton, pieces: Cylinders, bottom: np.ndarray, top: np.ndarray, near: np.ndarray, unit: float
+) -> tuple[CircleFit, str]:
+    """The circle around the stem 1.3 m above the foot, in metres; or an unknown one, and why.
+
+    Both ends of the cylinders, `bottom` and `top` (K,), are in metres above the foot; `near` has rows of the points.
+    """
+    stem = pieces.order == 0
+    there = np.flatnonzero(stem & (bottom <= BREAST_HEIGHT) & (top >= BREAST_HEIGHT))
+    if len(there) == 0:
+        return UNKNOWN, f"the stem does not pass {BREAST_HEIGHT} m above its foot"
+    at = there[0]
+    share = (BREAST_HEIGHT - bottom[at]) / max(top[at] - bottom[at], TINY)
+    place = pieces.start_point[at] + share * (pieces.end_point[at] - pieces.start_point[at])
+    beside = stem & (unit * norm((pieces.start_point + pieces.end_point) / 2 - place) <= STEM_SPAN)
+    beside[at] = True
+    way = directions((pieces.end_point - pieces.start_point)[beside].sum(axis=0, keepdims=True))
+    vertices = np.concatenate([skeleton.branches[row] for row in np.unique(pieces.branch[stem])])
+    offset = unit * (skeleton.points[near[np.isin(skeleton.vertex_of_point[near], vertices)]] - place)
+    offset = offset[np.abs(offset @ way[0]) <= SLICE / 2]
+    fit = fit_circle(offset @ plane_axes(way)[0])
+    if fit is None or fit.points < max(FEWEST_ON_CIRCLE, len(offset) / 2):
+        on = f"{0 if fit is None else fit.points} of {len(offset)} points of the stem are on a circle"
+        few = f"in a slice of {100 * SLICE:g} cm {on}, and half must be, at least {FEWEST_ON_CIRCLE}"
+        return UNKNOWN, few if len(skeleton.points) else "the skeleton has no points: .json and .npz files keep them"
+    if fit.arc < LEAST_ARC:
+        return UNKNOWN, f"points show {fit.arc:.0f} degrees of it, and at least {LEAST_ARC:.0f} are needed"
+    low, high = (abs(end - fit.radius) for end in fit.interval)
+    slack = FOOT_SLACK * fit.radius
+    return fit._replace(interval=(fit.radius - np.hypot(low, slack), fit.radius + np.hypot(high, slack))), ""
+
+
+def _find_doubts(
+    ground: float, highest: float, section: CircleFit, unknown: str, volume: float, up: str, unit: float
+) -> tuple[str, ...]:
+    """What of a tree is hardly as it should be, in words; `ground` is where its foot is, as a share of its height."""
+    doubts = []
+    if ground > 0.5:
+        doubts.append(f"the tree grows from {100 * ground:.0f} % of its height along {up}: does {up} point up?")
+    if highest > TALLEST_TREE:
+        doubts.append(
+            f"the tree is {highest:.4g} m high, and none is known above {TALLEST_TREE:.0f} m: is a unit of the cloud "
+            f"{unit:g} m? pass unit=, such as 'mm'"
+        )
+    if unknown and highest > BREAST_HEIGHT:
+        doubts.append(f"the diameter of the stem at {BREAST_HEIGHT} m is not known: {unknown}")
+    share = volume / (np.pi * section.radius**2 * highest)
+    if share > FORM_FACTOR:
+        thick = f"{200 * section.radius:.3g} cm thick, as at {BREAST_HEIGHT} m"
+        doubts.append(
+            f"the tree has {volume:.3g} m3 of wood, {share:.2g} times a cylinder as high and {thick}; more than "
+            f"{FORM_FACTOR:g} is hardly one tree: are leaves, undergrowth or others in it, or does it fork below?"
+        )
+    return tuple(doubts)
+
+
+def _points_near(skeleton: Skeleton) -> np.ndarray:
+    """Rows of the points no farther from their vertex than three radii and the longest edge there."""
+    owner, longest = skeleton.vertex_of_point, np.zeros(len(skeleton.vertices))
+    for ends in skeleton.edges.T:
+        np.maximum.at(longest, ends, skeleton.edge_lengths)
+    some = np.flatnonzero(owner >= 0)
+    away = norm(skeleton.points[some] - skeleton.vertices[owner[some]])
+    return some[away <= (OUTSIDE * skeleton.radii + longest)[owner[some]]]
+
+
+def _sums_by_order(pieces: Cylinders, unit: float) -> dict[str, Any]:
+    """The fields of `TreeMeasures` that are sums over cylinders."""
+
+    def by_order(values: np.ndarray, power: int) -> tuple[float, ...]:
+        return tuple((unit**power * np.bincount(pieces.order, values)).tolist())
+
+    traced = pieces.confidence == 0  # unknown is not
+    volume = by_order(np.where(traced, 0, pieces.volume), 3)
+    most = pieces.radius.copy()
+    for row in np.flatnonzero(traced & (pieces.parent >= 0)).tolist():  # parents come first
+        most[row] = max(most[row], most[pieces.parent[row]])
+    added = unit**3 * np.pi * float((most**2 * pieces.length)[traced].sum())
+    known = 1.0 if np.isfinite(pieces.confidence).all() else np.nan
+    return dict(
+        length=by_order(pieces.length, 1),
+        area=by_order(pieces.area, 2),
+        volume=volume,
+        volume_interval=((1 - VOLUME_SLACK) * sum(volume), (1 + VOLUME_SLACK) * (sum(volume) + added)),
+        traced=known * float(pieces.length[traced].sum() / max(pieces.length.sum(), TINY)),
+        traced_volume=known * unit**3 * float(pieces.volume[traced].sum()),
+    )
+
+
+def _extent(places: np.ndarray) -> tuple[float, float]:
+    """Largest distance, and area of the convex hull, of places in a plane."""
+    if len(places) == 0:
+        return 0.0, 0.0
+    try:
+        hull = ConvexHull(places)
+    except (QhullError, ValueError):  # they are on a line
+        return float(np.linalg.norm(np.ptp(places, axis=0))), 0.0
+    return float(pdist(places[hull.vertices]).max()), float(hull.volume)
