@@ -142,6 +142,7 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
         raise InvalidParameterError("the skeleton has no edge with a length: there is no curve to assess")
     if len(cloud) > 1:
         check_extent(cloud)
+    check_extent(np.concatenate([cloud, skeleton.vertices]))  # a point may be so far off that no place is near
     reach, clusters = _neighbourhood(cloud)
     sections = cross_sections(skeleton.vertices, skeleton.branches, cloud, shortest=reach)
     found = sections.counts >= MIN_SECTION_POINTS

@@ -144,6 +144,11 @@ def test_clouds_whose_squares_overflow_are_refused(pipe, axis_of, scale):
         assess(axis_of(pipe), pipe.points * scale)
 
 
+def test_a_point_too_far_off_to_have_a_place_is_refused(curve):
+    with pytest.raises(InvalidCloudError, match="too extreme for its squares"):
+        assess(curve(LINE), np.array([[1e200, 0, 0]]))
+
+
 @pytest.mark.parametrize(
     ("vertices", "edges", "message"),
     [
