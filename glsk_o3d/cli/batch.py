@@ -47,14 +47,14 @@ def batch(
     overlap: Annotated[
         float | None, option("LENGTH", "Of tiles, at least 2.7 radii of what is cut; by default an eighth of SIZE.")
     ] = None,
-    force: Annotated[bool, Option("--force", help="Do also what is done already.")] = False,
+    force: Annotated[bool, Option("--force", help="Do everything again, also scans that are done.")] = False,
     dry_run: Annotated[bool, Option("--dry-run", help="Only say what would be done, and why.")] = False,
 ) -> None:
     """Skeletonise many scans, several at a time.
 
     A scan that fails does not stop the others. FOLDER/ledger.jsonl (and ledger.csv) has a line for each; the same
-    command again skips what is done and tries again what failed. Ctrl-C leaves all that in order; press it twice not to
-    wait for scans that are in work. The exit code is 1 if a scan failed.
+    command again skips what is done and tries again what failed. Ctrl-C finishes the scans in work and stops; a second
+    Ctrl-C stops at once. Both leave the ledger in order. The exit code is 1 if a scan failed.
     """
     from ..batch import plan_batch, run_batch
     from .overrides import choose

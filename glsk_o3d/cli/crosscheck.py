@@ -16,7 +16,11 @@ def crosscheck(
         Path | None, option("MESH", "A mesh of the same surface to compare with: ply, off, obj, stl, gltf or glb.")
     ] = None,
     method: Annotated[
-        str, option("NAME", "How to make a mesh: ball_pivoting, poisson, or auto: the first where it closes.")
+        str,
+        option(
+            "NAME",
+            "How to make a mesh: ball_pivoting, poisson, or auto: Poisson only where ball pivoting leaves holes.",
+        ),
     ] = "auto",
     output: Numbers = None,
     picture: Annotated[Path | None, option("PNG", "Draw the disagreement on the cloud, and both skeletons.")] = None,

@@ -27,7 +27,8 @@ def edit(
     prune_radius: Annotated[float, option("RADIUS", "Drop thinner branches that end.", min=0)] = 0,
     smooth: Annotated[int, option("PASSES", "Smooth the branches.", min=0, max=10**6)] = 0,
     tolerance: Annotated[
-        float | None, option("TOLERANCE", "Drop vertices that leave the curve as near.", "--simplify", min=0)
+        float | None,
+        option("TOLERANCE", "Drop vertices as long as the curve moves by no more than this.", "--simplify", min=0),
     ] = None,
     vertices: Annotated[int | None, option("N", "Keep so many vertices, if the graph allows.", min=1)] = None,
 ) -> None:

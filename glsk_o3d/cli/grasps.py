@@ -34,16 +34,16 @@ def grasps(
     spacing: Annotated[float | None, option("LENGTH", "Of the places; by default the radius of the branch.")] = None,
     margin: Annotated[float, option("RADII", "From the ends of a branch.")] = 1.0,
     min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.5,
-    count: Annotated[int, option("N", "So many of the best.", "-n", min=1)] = 20,
+    count: Annotated[int, option("N", "How many of the best to show and write.", "-n", min=1)] = 20,
     output: Annotated[
         list[Path] | None, output_option("FILE", "json, csv, or ply to look at; may be repeated.")
     ] = None,
 ) -> None:
     """Find where a gripper with two jaws can take an object.
 
-    All lengths are in the file's units. The jaws close across the branches of the skeleton. Left out is where a finger
-    or the palm would meet points of the object or of the scene, or the far side of a plane, on a straight way in. What
-    was not scanned is taken for free.
+    All lengths are in the file's units. The jaws close across the branches of the skeleton. A grasp is left out where a
+    finger or the palm, on a straight way in, would meet points of the object or of the scene, or the far side of a
+    plane. Space that was not scanned counts as free.
     """
     from .. import read_cloud, read_skeleton
     from ..analysis import Gripper, grasp_candidates

@@ -28,8 +28,8 @@ def run(
 ) -> None:
     """Run a MeshLab filter script, with MeshLab's filters and ours.
 
-    The whole script is checked before anything is run. Filters of MeshLab's own need pymeshlab; --list tells of which
-    scripts that is so.
+    The whole script is checked before anything is run. Filters of MeshLab's own need pymeshlab; --list marks the
+    scripts that have some.
     """
     from ..meshlab.layers import Layer, check_ending
     from ..meshlab.steps import PlainLayers, find_script, read_steps
