@@ -226,6 +226,7 @@ def read_truth(path: str | os.PathLike) -> Truth:
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
+    >>> import numpy as np
     >>> from glsk_o3d.samples import torus
     >>> ring = torus(1000)
     >>> with TemporaryDirectory() as folder:
