@@ -138,7 +138,10 @@ def shown(value: Any) -> str:
     if isinstance(value, Integral) and abs(int(value)) > LARGEST_WHOLE:
         digits = round(math.log10(abs(int(value))))  # rounded; Python itself writes no number of more than 4300
         return f"a number of {digits + (abs(int(value)) >= 10**digits)} digits"
-    text = repr(value)
+    try:
+        text = repr(value)
+    except ValueError:  # of a number too long to be written, inside something else
+        text = f"a {type(value).__name__}"
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 

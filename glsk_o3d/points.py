@@ -106,7 +106,7 @@ class Points(Representatives):
     cloud : (m, 3) float64 array
         Distinct input points; noisy ones denoised, and where there are many, means of several.
     weight, merged : (m,) float64 array
-        Input points that each stands for, and distinct points that it is the mean of.
+        Input points that each stands for, copies once, and distinct points that it is the mean of.
     noise : (m,) float64 array
         How far the neighbourhood of each is noise, from 0 to 1.
     normals : (m, 3) float64 array

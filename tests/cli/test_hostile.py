@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import typer
 
-from glsk_o3d import InvalidParameterError, RingBuilder, Skeleton, Thinner, save_skeleton
+from glsk_o3d import InvalidParameterError, RingBuilder, Skeleton, Thinner, Tracer, save_skeleton
 from glsk_o3d.cli.console import echo, print_json, print_rows, print_table, say, visible
 from glsk_o3d.cli.reporting import reporting
 from glsk_o3d.errors import FileFormatError
@@ -106,3 +106,5 @@ def test_numbers_of_python_are_told_without_pages_of_digits():
         assert shown(number) == f"a number of {digits} digits"
     with pytest.raises(InvalidParameterError, match=r"around = a number of 401 digits: must be at most 1e\+100"):
         Thinner(around=10**400).check()
+    with pytest.raises(InvalidParameterError, match=r"root = a tuple: must be"):
+        Tracer(root=(10**5000, 0, 0)).check()
