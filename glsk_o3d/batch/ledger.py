@@ -42,6 +42,7 @@ class Ledger:
     def __init__(self, folder: Path):
         self.path, self.table = folder / "ledger.jsonl", folder / "ledger.csv"
         self.rows: dict[str, Row] = {}
+        refuse_ways_out(folder, (self.path.name, self.table.name))
         lines = self.path.read_bytes().splitlines() if self.path.exists() else []
         rows = [row for line in lines if (row := _checked(line)) is not None]
         for row in rows:
@@ -98,10 +99,17 @@ def _is_inside(path: Any) -> bool:
 
 
 def refuse_ways_out(folder: Path, paths: Iterable[str]) -> None:
-    """Raise InvalidParameterError where a link leads one of some paths in an output folder out of it."""
-    inside = os.path.join(os.path.realpath(folder), "")
+    """Raise InvalidParameterError where some paths in an output folder do not stay in it, or apart.
+
+    A link leads out of it, or two of them to one file; or there is a pipe or a device.
+    """
+    inside, taken = os.path.join(os.path.realpath(folder), ""), {}
     for path in paths:
         real = os.path.realpath(folder / path)
+        if taken.setdefault(real, path) != path:
+            raise InvalidParameterError(f"{folder / path}: a link makes it the same file as {taken[real]}: remove it")
+        if os.path.exists(real) and not (os.path.isfile(real) or os.path.isdir(real)):
+            raise InvalidParameterError(f"{folder / path}: is a pipe or a device, not a file: remove it")
         if not real.startswith(inside):
             raise InvalidParameterError(
                 f"{folder / path}: a link leads out of the output folder, to {real}: remove it, or give the results "

@@ -244,8 +244,7 @@ def planned(inputs: Any, out_dir: str | os.PathLike, wanted: Wanted, *, write: b
     sources = {text for task in tasks for text in (task.source, task.origin or task.path)}
     tasks = _with_reasons(list(_filled(tasks, out, wanted, ledger, sources)), ledger, wanted, hashed)
     _refuse_strangers(out, ledger, tasks)
-    refuse_ways_out(out, (ledger.path.name, ledger.table.name, RECIPE_FILE))
-    refuse_ways_out(out, (path for task in tasks for path in (*task.outputs, *task.stale)))
+    refuse_ways_out(out, (RECIPE_FILE, *(path for task in tasks for path in (*task.outputs, *task.stale))))
     _refuse_to_replace(tasks, ledger, sources)
     plan = Plan(out, wanted.recipe, wanted.parameters, tuple(tasks), ledger, left_out)
     if splitter is not None and write:  # parts of which some are to be done were removed when they had been done

@@ -305,6 +305,25 @@ class TestRefusals:
         assert not (tmp_path / "out").exists()
 
 
+def test_two_results_are_not_one_file(write, tmp_path):
+    for folder in ("one", "two"):
+        write(tmp_path / "in" / folder / "s.ply", seed=0)
+    (tmp_path / "out" / "one").mkdir(parents=True)
+    (tmp_path / "out" / "two").symlink_to("one")
+    with pytest.raises(InvalidParameterError, match=r"two/s\.ply: a link makes it the same file as one/s\.ply"):
+        run_batch(tmp_path / "in", tmp_path / "out", recursive=True)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes")
+@pytest.mark.parametrize("name", ["ledger.jsonl", "ledger.csv", ".ledger.lock"])
+def test_pipes_among_the_results_are_refused(write, tmp_path, name):
+    write(tmp_path / "in" / "s.ply", seed=0)
+    (tmp_path / "out").mkdir()
+    os.mkfifo(tmp_path / "out" / name)
+    with pytest.raises(InvalidParameterError, match=rf"{re.escape(name)}: is a pipe or a device"):
+        run_batch(tmp_path / "in", tmp_path / "out")
+
+
 @pytest.mark.parametrize("link", ["sub", "sub/s.ply", "ledger.jsonl", "ledger.csv", "recipe.json", ".ledger.lock"])
 def test_no_link_leads_out_of_the_output_folder(write, tmp_path, link):
     write(tmp_path / "in" / "sub" / "s.ply", seed=0)
