@@ -45,6 +45,8 @@ def _read_open3d(path: Path, data: bytes | None = None) -> Scan:
             path = Path(folder, "mesh.obj" if path.suffix.lower() == ".obj" else "mesh.glb")
             path.write_bytes(data)
         mesh = o3d.io.read_triangle_mesh(str(path))
+    if path.suffix == ".glb" and not np.isfinite(mesh.vertices).all():
+        raise ValueError("its nodes place vertices where no finite coordinates are")
     colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
     normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
     return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))

@@ -1,5 +1,6 @@
 """Triangle meshes from files, to files, and from Open3D."""
 
+import json
 import os
 
 import numpy as np
@@ -168,3 +169,12 @@ def test_every_kind_of_mesh_gives_the_same_arrays_and_what_is_useless_none():
 def test_a_mesh_of_nothing_is_not_written(tmp_path):
     with pytest.raises(FileFormatError, match=r"m\.ply: the mesh is empty: there is nothing to write"):
         save_mesh(to_tubes(Skeleton((), (), (), (), (), ())), tmp_path / "m.ply")
+
+
+def test_nodes_that_overflow_are_refused(tmp_path):
+    save_mesh(o3d.geometry.TriangleMesh.create_tetrahedron(), tmp_path / "m.gltf")
+    tree = json.loads((tmp_path / "m.gltf").read_text())
+    tree["nodes"][0]["scale"] = [1e308] * 3
+    (tmp_path / "m.gltf").write_text(json.dumps(tree))
+    with pytest.raises(FileFormatError, match="no finite coordinates"):
+        read_cloud(tmp_path / "m.gltf")
