@@ -82,8 +82,7 @@ class Representatives:
 
     def _of_points(self, values: np.ndarray) -> np.ndarray:
         """Ints (m,) of distinct points for every input point, -1 for dropped ones."""
-        known = self.representative_of_point >= 0
-        return np.where(known, values[self.representative_of_point], -1)
+        return np.append(values, -1)[self.representative_of_point]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -180,27 +179,18 @@ class Points(Representatives):
         they are known, are positions in `kept` that are all distinct.
         """
         frame, cloud, row, weight, neighbours = to_working_frame(points[kept], counts, by, default_k, neighbours)
-        spread, normals = principal(cloud, neighbours)
         sampled = np.zeros(len(points), bool)
         sampled[kept] = True
-        everybody = np.arange(len(cloud))
         return cls(
             points=points,
-            representative_of_point=np.where(place >= 0, row[place], -1),
+            representative_of_point=np.append(row, -1)[place],
             outlier=np.zeros(len(points), bool),
             sampled=sampled,
             frame=frame,
-            cloud=cloud,
             weight=weight,
             merged=np.ones(len(cloud)),
-            noise=noise_share(spread, neighbours),
-            normals=normals,
-            survivors=everybody,
-            representative=everybody,
-            neighbours=neighbours,
-            spread=spread,
-            ring_normals=normals,
             report=report,
+            **_measured(cloud, neighbours),
         )
 
     def without(self, gone: np.ndarray, neighbours: np.ndarray) -> Points:
@@ -243,21 +233,28 @@ class Points(Representatives):
 
         `changes` are other fields over the new rows.
         """
-        spread, normals = principal(cloud, neighbours)
-        everybody = np.arange(len(cloud))
-        measured = dict(noise=noise_share(spread, neighbours), normals=normals)
-        changed = dict(cloud=cloud, neighbours=neighbours, spread=spread, ring_normals=normals)
-        return replace(
-            self,
-            representative_of_point=self._of_points(row),
-            survivors=everybody,
-            representative=everybody,
-            **(measured | changed | changes),
-        )
+        made = _measured(cloud, neighbours) | changes
+        return replace(self, representative_of_point=self._of_points(row), **made)
 
     def common(self) -> dict[str, Any]:
         """The fields of `Representatives`, for those who go on."""
         return {field.name: getattr(self, field.name) for field in fields(Representatives)}
+
+
+def _measured(cloud: np.ndarray, neighbours: np.ndarray) -> dict[str, Any]:
+    """Rows that all survive, with what their neighbourhoods are like, as fields of `Points`."""
+    spread, normals = principal(cloud, neighbours)
+    everybody = np.arange(len(cloud))
+    return dict(
+        cloud=cloud,
+        noise=noise_share(spread, neighbours),
+        normals=normals,
+        survivors=everybody,
+        representative=everybody,
+        neighbours=neighbours,
+        spread=spread,
+        ring_normals=normals,
+    )
 
 
 def noise_share(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:

@@ -275,10 +275,8 @@ def _complete(skeleton: Skeleton) -> None:
 def _check_values(skeleton: Skeleton) -> None:
     """Raise InvalidParameterError for the first number that cannot be true."""
     m, owner = len(skeleton.vertices), skeleton.vertex_of_point
-    finite, there = (
-        f"must be finite, and at most {FARTHEST_PLACE:g}",
-        f"names a vertex that is not there: there are {m}",
-    )
+    finite = f"must be finite, and at most {FARTHEST_PLACE:g}"
+    there = f"names a vertex that is not there: there are {m}"
     _check_range(skeleton, "vertices", -FARTHEST_PLACE, FARTHEST_PLACE, finite)
     _check_range(skeleton, "edges", 0, m - 1, there)
     _refuse(skeleton, "edges", skeleton.edges[:, 0] == skeleton.edges[:, 1], "joins a vertex with itself")
