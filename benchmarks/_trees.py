@@ -10,13 +10,14 @@ from statistics import fmean
 
 import numpy as np
 from _peers import PEERS, Graph, Peer, ours, separators_of_points, skeleton_of
+from _qsm import BREAST_HEIGHT, read_cylinder_model
 from _stopwatch import MB, peak, reset_peak, resident
 from _tables import Tables, good, number, pick, short
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from glsk_o3d import Skeleton, pipelines, samples
+from glsk_o3d import Skeleton, pipelines, read_cloud, samples
 from glsk_o3d.analysis import cylinders, tree_measures
 from glsk_o3d.analysis.curves import distances
 from glsk_o3d.numerics.vectors import dot, norm, unit
@@ -33,7 +34,6 @@ HEIGHT = 10.0  # in metres, to which trees are scaled for PyTLidar, whose parame
 STEP = 0.002  # between the places at which curves are measured, as a share of the diagonal
 CLOSE = 0.01  # places nearer to the other curve are right, as a share of the diagonal
 CURVE_MEASURES = ("f1", "precision", "recall", "accuracy", "completeness", "tips", "components", "loops", "cpu")
-BREAST_HEIGHT = 1.3  # of the stem's diameter, in metres
 TREE_MEASURES = ("volume", "stem_diameter", "height", "radius")
 NOISE = 0.001  # share of the diagonal, 7 mm
 PIPELINES = {"default, untraced": ("default", {"Tracer.surface": 0}), "default": ("default", {}), "tree": ("tree", {})}
@@ -330,6 +330,30 @@ def measure_stem(seed: int) -> dict[str, float]:
     true = dict(true_diameter=scanned.stem_diameter, true_volume=scanned.volume)
     more = dict(height=found.height, noise=scanned.noise, doubts=len(found.doubts))
     return said | wood | true | more | dict(scanners=scanned.scanners, density=scanned.density)
+
+
+def measure_model(cloud: Path, model: Path, unit: str) -> dict:
+    """What we and a cylinder model say of a scanned tree, and in which intervals we expect the truth."""
+    found, theirs = tree_measures(pipelines.tree()(read_cloud(cloud)), unit=unit), read_cylinder_model(model)
+    mine = dict(height=found.height, stem_diameter=found.stem_diameter, volume=float(sum(found.volume)))
+    said = {name: (value, getattr(theirs, name)) for name, value in mine.items()}
+    return said | dict(stem_interval=found.stem_interval, volume_interval=found.volume_interval, doubts=found.doubts)
+
+
+def model_tables(rows: list[dict]) -> Tables:
+    """A line for each tree: ours, with intervals, and theirs."""
+    lines = []
+    for row in rows:
+        if "failure" in row:
+            lines.append([row["tree"], *"-" * 8, row["failure"]])
+            continue
+        stem, volumes = (f"{low:.3g} to {high:.3g}" for low, high in (row["stem_interval"], row["volume_interval"]))
+        pairs = {name: [f"{it:.3g}" for it in row[name]] for name in ("height", "stem_diameter", "volume")}
+        (ours_d, theirs_d), (ours_v, theirs_v) = pairs["stem_diameter"], pairs["volume"]
+        doubts = "; ".join(row["doubts"])
+        lines.append([row["tree"], *pairs["height"], ours_d, stem, theirs_d, ours_v, volumes, theirs_v, doubts])
+    header = ["", "height m", "theirs", "stem m", "interval", "theirs", "volume m3", "interval", "theirs", "doubts"]
+    return [("Scanned trees, and cylinder models of them", header, lines)]
 
 
 def stem_tables(rows: list[dict]) -> Tables:

@@ -92,6 +92,26 @@ def stems(
 
 
 @app.command()
+def models(
+    paths: Annotated[list[Path], typer.Argument(metavar="CLOUD MODEL...", exists=True, dir_okay=False)],
+    unit: Annotated[str, typer.Option("--unit", help="Of the clouds: m, cm, mm; models are in metres.")] = "m",
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Scanned trees beside the cylinder models that TreeQSM, SimpleForest or aRchi made of them: pairs of files.
+
+    A model is a .mat of TreeQSM or a table of any of the three; z points up.
+    """
+    if len(paths) % 2:
+        raise typer.BadParameter("give pairs: each cloud, and then its model")
+    where = machine()
+    work = [(dict(tree=cloud.stem), (cloud, model, unit)) for cloud, model in zip(paths[::2], paths[1::2], strict=True)]
+    rows = run(_trees.measure_model, work, 1)
+    save(output, rows)
+    present(_trees.model_tables(rows), markdown, where)
+
+
+@app.command()
 def large(
     sizes: Annotated[str, typer.Option("--sizes", metavar="N,N", help="Points.")] = "100000,1000000",
     forks: Annotated[int, typer.Option("--forks", min=1, max=8, help="Of the tree, from foot to tip.")] = 4,

@@ -4,7 +4,10 @@ import json
 import sys
 
 import numpy as np
+import open3d as o3d
 import pytest
+from scipy.io import savemat
+from typer import BadParameter
 
 from glsk_o3d import samples
 from glsk_o3d.samples import Sample
@@ -60,6 +63,74 @@ class TestTools:
         vertices, edges = parts.level_sets(points)
         assert len(edges) == len(vertices) - 1
         assert np.linalg.norm(np.diff(vertices[edges], axis=1)[:, 0], axis=1).max() < 3.5
+
+
+START = np.array([[0, 0, 0.5], [0, 0, 2.5], [0, 0, 2.5]])
+END = np.array([[0, 0, 2.5], [0, 0, 4.5], [1.5, 0, 4.5]])
+LENGTH, RADIUS, ORDER, PARENT = np.array([2, 2, 2.5]), np.array([0.2, 0.15, 0.1]), [0, 0, 1], [-1, 0, 0]
+AXIS = (END - START) / LENGTH[:, None]
+"""A stem of two cylinders, the lower one 1.3 m above the foot, and a branch."""
+
+
+def written(path, names, columns, between=","):
+    """A file with a line of names above columns of numbers."""
+    rows = [between.join(names), *(between.join(map(str, row)) for row in np.column_stack(columns).tolist())]
+    path.write_text("\n".join(rows))
+    return path
+
+
+class TestModels:
+    @pytest.fixture(params=("TreeQSM", "TreeQSM text", "TreeQSM matrix", "SimpleForest", "aRchi"))
+    def model(self, request, tmp_path):
+        """The three cylinders as programs write them."""
+        path, ends = tmp_path / "model.txt", [f"{end}{axis}" for end in ("start", "end") for axis in "XYZ"]
+        if request.param == "TreeQSM":
+            names = ["radius", "length", *(f"{it}.{axis}" for it in ("start", "axis") for axis in "xyz"), "BranchOrder"]
+            return written(path, names, [RADIUS, LENGTH, START, AXIS, ORDER])
+        if request.param == "TreeQSM text":
+            names = ["radius (m)", "length (m)", "start_point", "axis_direction", "parent", "extension", "branch"]
+            columns = [RADIUS, LENGTH, START, AXIS, PARENT, [2, 0, 0], [1, 1, 2], ORDER, [1, 2, 1], [0, 0, 0]]
+            return written(path, [*names, "branch_order", "position_in_branch", "added"], columns, "\t")
+        if request.param == "TreeQSM matrix":
+            cylinder = dict(radius=RADIUS[:, None], length=LENGTH[:, None], start=START, axis=AXIS, BranchOrder=ORDER)
+            savemat(tmp_path / "model.mat", {"QSM": [{"cylinder": cylinder}, {"cylinder": dict(radius=[1.0])}]})
+            return tmp_path / "model.mat"
+        if request.param == "SimpleForest":
+            names = ["ID", "parentID", *ends, "radius", "length", "branchOrder"]
+            return written(path, names, [[0, 1, 2], PARENT, START, END, RADIUS, LENGTH, ORDER])
+        names = [f'"{it}"' for it in (*ends, "cyl_ID", "parent_ID", "radius_cyl", "length", "branching_order")]
+        columns = [[1, 2, 3], START, END, [1, 2, 3], [0, 1, 1], RADIUS, LENGTH, [1, 1, 2]]  # R numbers its rows
+        return written(path, names, columns)
+
+    def test_measures_are_those_of_the_cylinders(self, parts, model):
+        found = parts.read_cylinder_model(model)
+        assert found.height == pytest.approx(4)
+        assert found.stem_diameter == pytest.approx(0.4)
+        assert found.volume == pytest.approx(np.pi * (0.04 * 2 + 0.0225 * 2 + 0.01 * 2.5))
+        assert found.order.tolist() == [0, 0, 1]
+        np.testing.assert_allclose(found.end, END)
+
+    def test_other_tables_are_named(self, parts, tmp_path):
+        with pytest.raises(BadParameter, match="columns of TreeQSM, SimpleForest, aRchi; there are a, b"):
+            parts.read_cylinder_model(written(tmp_path / "no.csv", ["a", "b"], [[1.0], [2.0]]))
+        with pytest.raises(BadParameter, match="3 names stand above 1 columns"):
+            parts.read_cylinder_model(written(tmp_path / "torn.csv", ["a", "b", "c"], [[1.0]]))
+
+    def test_a_scan_beside_its_model(self, call, tmp_path):
+        drawn = samples.tree(8000, forks=2, length=4, radius=0.2, seed=3)
+        scan = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(drawn.points))
+        o3d.io.write_point_cloud(str(tmp_path / "scan.ply"), scan)
+        names = ["ID", "parentID", *(f"{end}{axis}" for end in ("start", "end") for axis in "XYZ"), "radius", "length"]
+        columns = [[0, 1, 2], PARENT, START, END, RADIUS, LENGTH, ORDER]
+        model = written(tmp_path / "model.csv", [*names, "branchOrder"], columns)
+        out = call("models", tmp_path / "scan.ply", model, "-o", tmp_path / "m.json")
+        (row,) = json.loads((tmp_path / "m.json").read_text())["rows"]
+        assert row["stem_diameter"] == pytest.approx(
+            [2 * np.interp(1.1, drawn.nodes[:7, 2], drawn.radii[:7]), 0.4], rel=0.05
+        )
+        assert row["height"][1] == 4
+        assert "scan" in out
+        call("models", tmp_path / "scan.ply", code=2)
 
 
 class TestCommands:
