@@ -11,7 +11,7 @@ from .refinement.axis_fit import fit_axis, pull_back_detached, subdivide_edges
 from .refinement.bridging import bridge_gaps
 from .refinement.diagnostics import measured
 from .refinement.ends import regrow_ends
-from .refinement.evidence import Evidence, SurfaceGraph, in_order
+from .refinement.evidence import Evidence, SurfaceGraph, in_order, on_sample
 from .refinement.junctions import move_junctions
 from .refinement.loops import close_loops, collapse_narrow_loops
 from .refinement.merging import binary_size, collapse_triangles, scaled
@@ -84,7 +84,9 @@ class Refiner(Filter[Skeleton]):
     )
 
     def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
-        return in_order(self._refined, given)
+        if not self.recentre:
+            return in_order(self._refined, given)  # every point keeps its vertex
+        return on_sample(lambda skeleton: in_order(self._refined, skeleton), given)
 
     def _refined(self, skeleton: Skeleton) -> Skeleton:
         skeleton, surface = self._fit(skeleton)
