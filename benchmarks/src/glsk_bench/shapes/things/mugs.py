@@ -36,7 +36,7 @@ def mugs(rng: np.random.Generator) -> Solid:
         size = u(0.6, 0.8) + (1 - u(0.6, 0.8)) * np.sin(np.pi * t ** u(0.7, 1.4)) ** 1.2
     radius, aspect, power = u(0.05, 0.085), u(1, 2.5), u(2, 6)
     a, b = map(float, half_axes(radius, aspect, power))
-    vessel = _Vessel(Solid(), t * high, 0.5 * size / size.max(), wall, power, a, b)
+    vessel = Vessel(Solid(), t * high, 0.5 * size / size.max(), wall, power, a, b)
     low, top = high * u(0.15, 0.3), high * u(0.7, 0.88)
     if kind == "bucket":
         _bucket(vessel, rng, high)
@@ -46,7 +46,7 @@ def mugs(rng: np.random.Generator) -> Solid:
 
 
 @dataclass
-class _Vessel:
+class Vessel:
     """A hollow body around the z axis, open at the top, and what its handles are like."""
 
     solid: Solid
