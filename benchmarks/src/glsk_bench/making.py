@@ -83,7 +83,7 @@ def make(
     for family in wanted[0]:
         for seed in map(int, numbers):
             name = f"{family}_{seed}"
-            missing = _missing(made, name, [each for each in asked.variants_of(name) if each in wanted[1]])
+            missing = _missing(made, name, [each for each in wanted[1] if each in asked.variants_of(name)])
             if missing:
                 todo[name] = partial(_make_shape, made.path, version, family, seed, missing)
     made = replace(made, complete=False) if todo else made

@@ -10,6 +10,7 @@ Shape('groups_0': 2 components, 0 loops, 4 leaves)
 >>> FAMILIES["v2"]
 ('prisms', 'implements', 'animals', 'plates', 'blades', 'mugs')
 >>> shape("plates", 0)
+Shape('plates_0': 1 component, 4 loops, 0 leaves)
 """
 
 from .drawing import FAMILIES, Shape, Thing, shape

@@ -127,8 +127,8 @@ class Thing(Shape):
     Examples
     --------
     >>> mug = shape("mugs", 1)
-    >>> mug.judged.all(), mug.mirror.shape
-    (False, (0, 3))
+    >>> int(mug.judged.sum()), len(mug.edges), mug.mirror.shape
+    (29, 43, (0, 3))
     """
 
     half_width: np.ndarray
