@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE, BENCHMARK = ROOT / "glsk_o3d", ROOT / "benchmarks" / "src" / "glsk_bench"
 ROOMS = (
     *(PACKAGE / name for name in ("numerics", "refinement", "analysis", "crosscheck")),
-    *(BENCHMARK, BENCHMARK / "shapes"),
+    *(BENCHMARK, BENCHMARK / "shapes", BENCHMARK / "shapes" / "things"),
 )
 sys.path.insert(0, str(ROOT / "docs" / "_ext"))
 steering = importlib.import_module("steering")

@@ -82,12 +82,12 @@ NAMES = {
         "Distances": ("signed_distance",),
     },
     "benchmark": {
-        "Its clouds": ("make", "read_folder", "BenchmarkFolder"),
+        "Its clouds": ("make", "read_folder", "BenchmarkFolder", "ThingTruth"),
         "Clouds of your own": ("add_shape",),
         "Answers": ("run",),
         "Scores": ("score", "Scores", "score_answers", "Results", "read_results", "leaderboard", "Leaderboard"),
     },
-    "benchmark_shapes": {"Drawing one": ("shape", "Shape")},
+    "benchmark_shapes": {"Drawing one": ("shape", "Shape", "Thing")},
     "benchmark_clouds": {"Drawing one": ("cloud",), "How much it shows": ("coverage",)},
     "meshlab": {"A session": ("MeshSet",)},
     "errors": {

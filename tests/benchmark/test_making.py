@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from glsk_bench import make, read_folder, versions
 from glsk_bench.folders import INDEX_NAME
+from glsk_bench.shapes import shape
+from glsk_bench.truths import THING_ARRAYS, ThingTruth
 
 from glsk_o3d import read_cloud
 from glsk_o3d.errors import BatchError, FileFormatError, InvalidParameterError
@@ -99,6 +101,39 @@ def test_sameness_is_told(rods, tmp_path, monkeypatch):
     again = make(tmp_path / "b", families=["tubes"], seeds=[100, 101, 103], variants=["clean"], jobs=1)
     said = [told["clouds"]["clean"]["sameness"] for told in again.shapes.values()]
     assert said == ["bits", "other", None]
+
+
+def test_a_cloud_that_cannot_be_made_is_told_and_not_tried_again(rods, tmp_path, monkeypatch):
+    clouds = sys.modules["glsk_bench.clouds"]
+    drawn = clouds.cloud
+
+    def cloud(shape, variant, n=4096, seed=0):
+        if (shape.name, variant) == ("trees_101", "scan2"):
+            raise InvalidParameterError("too little is seen")
+        return drawn(shape, variant, n, seed)
+
+    monkeypatch.setattr(clouds, "cloud", cloud)
+    made = make(tmp_path / "bench", **CHOICE)
+    assert len(made.clouds) == 7
+    assert made.shapes["trees_101"]["not_made"] == {"scan2": "too little is seen"}
+    rods.clear()
+    again = make(tmp_path / "bench", **{**CHOICE, "variants": ["clean", "scan2", "holes"]})
+    assert sorted(again.shapes["trees_101"]["clouds"]) == ["clean", "holes"]
+    assert again.shapes["trees_101"]["not_made"] == {"scan2": "too little is seen"}
+    rods.clear()
+    make(tmp_path / "bench", **CHOICE)
+    assert rods == []
+
+
+def test_things_and_what_is_known_of_them(tmp_path):
+    made = make(tmp_path, "v2", families=["plates"], seeds=[110], variants=["clean", "depth2"], jobs=1)
+    told, drawn, truth = made.shapes["plates_110"], shape("plates", 110), made.truth("plates_110")
+    assert list(told["clouds"]) == ["clean"]  # of the other, two cameras see too little
+    assert told["clouds"]["clean"]["sameness"] in ("bits", "rounding")
+    assert isinstance(truth, ThingTruth)
+    for name in ("nodes", "edges", "radii", *THING_ARRAYS):
+        np.testing.assert_array_equal(getattr(truth, name), getattr(drawn, name))
+    assert "half_width" in json.loads((tmp_path / INDEX_NAME).read_text())["explained"]["truth/SHAPE.npz"]
 
 
 @pytest.mark.parametrize(

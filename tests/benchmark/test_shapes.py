@@ -15,7 +15,7 @@ from scipy.spatial.distance import cdist
 from glsk_o3d.errors import InvalidParameterError
 
 ARRAYS = ("nodes", "edges", "radii", "points", "normals")
-EACH = [(family, seed) for family in FAMILIES for seed in (0, 1)]
+EACH = [(family, seed) for family in FAMILIES["v1"] for seed in (0, 1)]
 FINGERPRINTS = {
     "tubes": "513563cf574befa2",
     "trees": "9e102b2b1753e0fa",
@@ -27,7 +27,7 @@ FINGERPRINTS = {
 """Of shapes with seed 0, coordinates to six decimals; other draws, or random numbers in another order, have others."""
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", FAMILIES["v1"])
 def test_fingerprints(family, drawn, fingerprint):
     one, again = drawn(family, 0), shape(family, 0)
     np.testing.assert_array_equal(one.points, again.points)

@@ -25,6 +25,16 @@ def test_the_first_version_never_changes():
     assert " ".join(first.whole) == "clean outliers noise05 noise1 noise2"
 
 
+def test_the_second_version_has_other_shapes_and_the_same_clouds_of_them():
+    first, second = version("v1"), version("v2")
+    assert second.families == ("prisms", "implements", "animals", "plates", "blades", "mugs")
+    assert second.left_out == ("plates_110_depth2",)
+    assert set(second.variants_of("plates_110")) == {*second.variants} - {"depth2"}
+    assert second.variants_of("plates_111") == first.variants == second.variants
+    same = ("seeds", "variants", "points", "draw", "whole", "least_coverage")
+    assert [getattr(first, name) for name in same] == [getattr(second, name) for name in same]
+
+
 def test_what_a_fingerprint_is_never_changes(points):
     assert fingerprint(np.zeros((2, 3))) == "9d908ecf 0 0"  # SHA-256 of 24 zeros
     assert fingerprint(np.arange(12.0).reshape(4, 3)).split()[1:] == ["82249263", "837992698"]
@@ -69,7 +79,8 @@ def test_the_package_knows_all_clouds_of_a_version_or_none():
     for asked in versions.VERSIONS.values():
         known = fingerprints(asked.name)
         shapes = [f"{family}_{seed}" for family in asked.families for seed in asked.seeds]
-        assert not known or sorted(known) == sorted(f"{shape}_{each}" for shape in shapes for each in asked.variants)
+        names = [f"{shape}_{each}" for shape in shapes for each in asked.variants_of(shape)]
+        assert not known or sorted(known) == sorted(names)
         assert len(json.dumps(known)) < 50_000
 
 

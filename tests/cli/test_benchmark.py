@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from glsk_o3d.errors import InvalidParameterError
+
 CHOICE = ("--families", "tubes,trees", "--seeds", "100:102", "--variants", "clean, scan2", "--jobs", 1)
 """Rods in the place of the shapes, of which one cloud of eight is not scored."""
 ONE = ("--families", "tubes", "--variants", "clean", "--jobs", 1)
@@ -78,12 +80,22 @@ def test_seeds_in_words_and_another_cloud_than_is_meant(invoke, rods, monkeypatc
     assert "sameness  1 other" in made.stdout
 
 
+def test_a_cloud_that_cannot_be_made_is_named(invoke, rods, monkeypatch):
+    def cloud(shape, variant, n=4096, seed=0):
+        raise InvalidParameterError("too little is seen")
+
+    monkeypatch.setattr(sys.modules["glsk_bench.clouds"], "cloud", cloud)
+    made = invoke("benchmark", "make", "a", *ONE, "--seeds", "100")
+    assert made.stderr == "glsk: warning: 1 clouds cannot be made, see benchmark.json: tubes_100_clean\n"
+    assert "clouds   0" in made.stdout
+
+
 @pytest.mark.parametrize(
     ("code", "words", "said"),
     [
         (2, ("make", "new", "--seeds", "a:b"), "--seeds a:b: write FIRST:BEYOND"),
         (2, ("make", "new", "--families", "tube"), "did you mean 'tubes'"),
-        (2, ("make", "new", "--version", "v2"), "no version of the benchmark is called 'v2'"),
+        (2, ("make", "new", "--version", "v9"), "no version of the benchmark is called 'v9'"),
         (1, ("run", "none", "out"), "make a benchmark with 'glsk benchmark make none' first"),
         (2, ("run", "bench", "out", "--command", "true {cloud}"), "has no {skeleton}"),
         (2, ("run", "bench", "out", "--pipeline", "defualt"), "did you mean 'default'"),

@@ -16,8 +16,8 @@ from glsk_o3d.analysis.comparison import Truth
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.interop.atomic import write_atomically, write_json
 from glsk_o3d.io.formats.ply import header_of, rows_of
-from glsk_o3d.io.skeletons import read_truth
 
+from .truths import THING_ARRAYS, read_axis
 from .versions import OWN, VERSIONS
 
 INDEX_NAME = "benchmark.json"
@@ -27,6 +27,11 @@ _EXPLAINED = {
     "scored": "whether answers to this cloud count: it shows enough of the shape",
     "coverage": "the share of the axis that the cloud shows",
     "sameness": "to the cloud that is meant: bits, rounding or other; null where the package knows none",
+}
+_EXPLAINED_OF_THINGS = _EXPLAINED | {
+    "truth/SHAPE.npz": _EXPLAINED["truth/SHAPE.npz"]
+    + ", half_width (V,); flat (k,), nodes at flat ends; judged (E,); mirror (2, 3), a point and a normal, or (0, 3)",
+    "not_made": "clouds that cannot be made, and why",
 }
 _EXPLAINED_OF_OWN = {
     "clouds/SHAPE_VARIANT.ply": "a cloud: binary PLY, little-endian, float or double x, y, z, in units of its own",
@@ -107,8 +112,9 @@ class BenchmarkFolder:
             return False
         asked = VERSIONS[self.version]
         names = {f"{family}_{seed}" for family in asked.families for seed in asked.seeds}
-        variants = set(asked.variants)
-        return names == self.shapes.keys() and all(variants == told["clouds"].keys() for told in self.shapes.values())
+        return names == self.shapes.keys() and all(
+            set(asked.variants_of(name)) == told["clouds"].keys() for name, told in self.shapes.items()
+        )
 
     @property
     def name(self) -> str:
@@ -131,6 +137,7 @@ class BenchmarkFolder:
         Returns
         -------
         Truth
+            Of a thing, a `ThingTruth`, which also has `half_width`, `flat`, `judged` and `mirror`.
 
         Raises
         ------
@@ -138,17 +145,20 @@ class BenchmarkFolder:
         FileFormatError
             What there is, is no axis.
         """
-        return read_truth(self.path / self.shapes[shape]["truth"])
+        return read_axis(self.path / self.shapes[shape]["truth"])
 
     def save(self) -> None:
         """Write ``benchmark.json``."""
         asked = VERSIONS.get(self.version)
         choice = asked and {"points": asked.points, "draw": asked.draw, "least_coverage": asked.least_coverage}
+        explained = _EXPLAINED_OF_OWN
+        if asked:
+            explained = _EXPLAINED_OF_THINGS if asked.things else _EXPLAINED
         told = {
             "benchmark": "curve skeletons of point clouds",
             **{"version": self.version, "complete": self.complete, "whole": self.whole},
             **(choice or {}),
-            "explained": _EXPLAINED if asked else _EXPLAINED_OF_OWN,
+            "explained": explained,
             "shapes": dict(sorted(self.shapes.items())),
         }
         write_json(self.path / INDEX_NAME, told)
@@ -228,8 +238,9 @@ def begun(path: Path, version: str) -> BenchmarkFolder:
 
 
 def write_axis(path: Path, axis: Any) -> None:
-    """Write the `nodes`, `edges` and `radii` of anything that has them."""
+    """Write the `nodes`, `edges` and `radii` of anything that has them; and of a thing, what else is known."""
     parts = {"nodes": axis.nodes, "edges": axis.edges, "radii": axis.radii}
+    parts |= {name: getattr(axis, name) for name in THING_ARRAYS if hasattr(axis, name)}
     write_atomically(path, lambda temporary: np.savez(temporary, **parts))
 
 

@@ -1,0 +1,263 @@
+"""Things: distances and areas in closed form, what is known of their axes, what is refused, and the same for ever."""
+
+import importlib
+import sys
+
+import numpy as np
+import pytest
+from glsk_bench.clouds import VARIANTS, cloud, coverage
+from glsk_bench.shapes import FAMILIES, Thing
+from glsk_bench.shapes.axis import UnfitDraw
+from glsk_bench.shapes.curves import generator, polygon
+from glsk_bench.shapes.drawing import DRAWN_BY
+from glsk_bench.shapes.things.fairness import fault_of
+from glsk_bench.shapes.things.field import distance, surface_of
+from glsk_bench.shapes.things.lines import X, Y
+from glsk_bench.shapes.things.mugs import Vessel
+from glsk_bench.shapes.things.section import half_axes, section_radius, unit_area
+from glsk_bench.shapes.things.solid import ROUND_ENDS, Solid
+from glsk_bench.truths import THING_ARRAYS
+from scipy.spatial import cKDTree
+
+from glsk_o3d.samples.capsules import capsule_distance
+
+EACH = [(family, seed) for family in FAMILIES["v2"] for seed in (0, 1)]
+FINGERPRINTS = {
+    "prisms": ["7db03f02a9d53e0a", "56150273bec88e0c", "d1db317436267352", "f48fa822db8e7ccd"],
+    "implements": ["06d399945635d146", "11f5ef252cada7c8", "24e9d8805fc90854", "f2ff1c606e59e220"],
+    "animals": ["ce1192a6c43caa0f", "0dc5c4ff3ab8291f", "de7620626be24a97", "2cdfd2a50a1a997f"],
+    "plates": ["d83d04a19482281d", "a8f1ae021f56af4a", "88ae2694b709d0b5", "5e3f44b811900fe2"],
+    "blades": ["f33781045e2d6e70", "28d62b5e817607b6", "f41e7b067bff70ef", "62cd83c7d4434d20"],
+    "mugs": ["1b80ebff416a3a5a", "5f6e4cbde317f497", "585cb5052647f761", "884f80cf378c267e"],
+}
+"""Of shapes with seed 0 and of three of their clouds, coordinates to six decimals."""
+
+
+@pytest.mark.parametrize("family", FAMILIES["v2"])
+def test_fingerprints(family, drawn, fingerprint):
+    one = drawn(family, 0)
+    truth = (one.nodes, one.radii, one.edges, one.points, one.normals, *(getattr(one, name) for name in THING_ARRAYS))
+    clouds = [cloud(one, variant, 1000, 5) for variant in ("noise1", "scan2", "depth2")]
+    assert [fingerprint(*truth), *map(fingerprint, clouds)] == FINGERPRINTS[family]
+
+
+def inside(one, places):
+    """Whether places are inside the surface, as the normal of the nearest point of it tells."""
+    nearest = cKDTree(one.points).query(places)[1]
+    return ((one.points[nearest] - places) * one.normals[nearest]).sum(axis=1) > 0
+
+
+@pytest.mark.parametrize(("family", "seed"), EACH)
+def test_what_is_told_is_so(family, seed, drawn):
+    one = drawn(family, seed)
+    assert isinstance(one, Thing)
+    low, high = one.points.min(axis=0), one.points.max(axis=0)
+    assert np.linalg.norm(high - low) == pytest.approx(1)
+    np.testing.assert_allclose(low, -high, atol=1e-12)
+    judged = np.unique(one.edges[one.judged])
+    out = judged[~inside(one, one.nodes[judged])]
+    if family == "plates":  # where a sheet is bent, the centroid of the section, an L, is beside it
+        assert (cKDTree(one.points).query(one.nodes[out])[0] < 0.5 * one.half_width[out]).all()
+        assert len(out) in (0, 3)
+    else:
+        assert len(out) == 0
+    assert (one.half_width > 0.88 * one.radii).all()  # the square has 4 half axes squared, the circle pi radii squared
+    facts = one.facts
+    assert (facts["n_flat"], facts["judged_share"]) == (len(one.flat), one.judged.mean())
+    assert facts["symmetric"] == (len(one.mirror) == 2)
+    degree = np.bincount(one.edges.ravel())
+    assert (degree[one.flat] == 1).all()
+    assert one.judged.all() == (family != "mugs")
+    assert coverage(one, one.points) == 1
+
+
+@pytest.mark.parametrize(("family", "seed"), EACH)
+def test_the_axis_ends_half_a_radius_inside_of_flat_faces(family, seed, drawn):
+    one = drawn(family, seed)
+    tree = cKDTree(one.points)
+    for tip in one.flat:
+        edge = one.edges[(one.edges == tip).any(axis=1)][0]
+        out = one.nodes[tip] - one.nodes[edge[edge != tip][0]]
+        out, radius = out / np.linalg.norm(out), one.radii[tip]
+        near = np.array(tree.query_ball_point(one.nodes[tip], 1.2 * radius))
+        offset = one.points[near] - one.nodes[tip]
+        along = offset @ out
+        ahead = np.linalg.norm(offset - np.outer(along, out), axis=1) < 0.3 * radius
+        face = ahead & (along > 0) & (one.normals[near] @ out > 0.97)
+        assert face.sum() >= 3
+        np.testing.assert_allclose(
+            along[face], 0.5 * radius, rtol=0.15
+        )  # that of the face is less in a limb that tapers
+
+
+@pytest.mark.parametrize(("family", "seed"), [("animals", 0), ("animals", 2), ("blades", 1), ("blades", 3)])
+def test_a_mirror_is_one(family, seed, drawn):
+    one = drawn(family, seed)
+    place, normal = one.mirror
+    assert np.linalg.norm(normal) == pytest.approx(1)
+    nodes, points = (each - 2 * np.outer((each - place) @ normal, normal) for each in (one.nodes, one.points))
+    assert cKDTree(one.nodes).query(nodes)[0].max() < 1e-9
+    assert cKDTree(one.points).query(points)[0].max() < 5 * one.spacing
+    assert drawn("animals", 1).mirror.shape == (0, 3)
+
+
+# ----------------------------------------------------------------------------------------------------- sections, sweeps
+
+
+@pytest.mark.parametrize("power", [2, 3.7, 10])
+def test_sections_have_the_area_that_is_asked_for(power):
+    a, b = half_axes(0.3, 2.5, power)
+    assert (a / b, section_radius(a, b, power)) == (pytest.approx(2.5), pytest.approx(0.3))
+    assert unit_area(2) == pytest.approx(np.pi)
+    x = np.linspace(0, 1, 200_001)
+    assert unit_area(power) == pytest.approx(4 * np.trapezoid((1 - x**power) ** (1 / power), x), rel=1e-5)
+
+
+def rod(ends, places=((0, 0, 0), (1, 0, 0)), radius=0.1, power=2.0, blend=0.0):
+    solid = Solid(blend=blend)
+    solid.limb(np.array(places, float), radius, None, power, Y, ends)
+    return solid
+
+
+@pytest.mark.parametrize("steps", [1, 20])
+@pytest.mark.parametrize("blend", [0, 0.1])
+def test_distances_to_a_rod(steps, blend):
+    points = np.random.default_rng(0).uniform(-0.4, 1.4, (3000, 3)) * [1, 0.3, 0.3]
+    places = np.column_stack([np.linspace(0, 1, steps + 1), np.zeros((steps + 1, 2))])
+    found, gradients = distance(rod(ROUND_ENDS, places, blend=blend), points, 1.0)
+    expected = np.maximum(capsule_distance(points, *places[[0, -1]], 0.1, 0.1), -0.1)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+    step = 1e-6 * np.random.default_rng(1).normal(size=3)
+    ahead, _ = distance(rod(ROUND_ENDS, places, blend=blend), points + step, 1.0)
+    smooth = found > -0.099
+    np.testing.assert_allclose((ahead - found)[smooth], (gradients @ step)[smooth], atol=1e-9)
+
+
+def test_flat_ends_cut_a_rod_off_and_bevels_its_edges():
+    points = np.array([[-0.05, 0, 0], [1.07, 0, 0], [0.02, 0.05, 0], [0.5, 0, 0.13], [0.02, 0.095, 0]])
+    found, gradients = distance(rod(("flat", "flat")), points, 1.0)
+    np.testing.assert_allclose(found, [0.05, 0.07, -0.02, 0.03, -0.005], atol=1e-12)
+    np.testing.assert_allclose(gradients, [-X, X, -X, [0, 0, 1], Y], atol=1e-12)
+    solid = Solid()
+    solid.limb([[0, 0, 0], [1, 0, 0]], 0.1, bevel=0.5, side=Y)
+    assert solid.sweeps[0].a.tolist() == pytest.approx([0.05, 0.1, 0.1, 0.05])
+    assert distance(solid, points[-1:], 1.0)[0][0] > 0 > distance(solid, points[2:3], 1.0)[0][0]
+
+
+@pytest.mark.parametrize(
+    ("ends", "area"), [(("flat", "flat"), 2 * np.pi * 0.1 * 1.1), (ROUND_ENDS, 2 * np.pi * 0.1 * 1.2)]
+)
+@pytest.mark.parametrize("blend", [0, 0.01])
+def test_points_are_uniform_by_area(ends, area, blend):
+    found = surface_of(rod(ends, blend=blend), 20_000, generator("rod"))
+    assert found.area == pytest.approx(area, rel=0.03)
+    side = np.abs(found.points[:, 0] - 0.5) < 0.49
+    assert side.mean() == pytest.approx(2 * np.pi * 0.1 * 0.98 / area, abs=0.02)
+    np.testing.assert_allclose(
+        found.normals[side, 1:], found.points[side, 1:] / 0.1, atol=1.01 * np.pi / 96
+    )  # of facets
+
+
+def test_a_void_and_a_part_inside_show_on_the_outside_only():
+    solid = rod(("flat", "flat"))
+    solid.body([[0.2, 0, 0], [0.8, 0, 0]], 0.05, side=Y)
+    solid.void([[0.4, -0.2, 0], [0.4, 0.2, 0]], 0.03, 0.03, 2, X)
+    found = surface_of(solid, 20_000, generator("void"))
+    off = np.hypot(found.points[:, 0] - 0.4, found.points[:, 2])
+    assert off.min() > 0.0299
+    wall = off < 0.03 + 1e-9
+    assert wall.mean() > 0.02
+    inward = found.points[wall] * [-1, 0, -1] + [0.4, 0, 0]
+    assert ((found.normals[wall] * inward).sum(axis=1) > 0.0299).all()
+    outer = found.points[~wall & (np.abs(found.points[:, 0] - 0.5) < 0.49)]
+    assert (np.abs(np.hypot(*outer[:, 1:].T) - 0.1) < 1e-3).all()
+
+
+# ------------------------------------------------------------------------------------------------------ what is refused
+
+
+def two(gap):
+    solid = rod(("flat", "flat"))
+    solid.limb(np.array([[0, 0, 0.2 + gap], [1, 0, 0.2 + gap]]), 0.1, None, 2, Y)
+    return solid
+
+
+def fork(length):
+    solid = Solid()
+    middle = solid.limb(np.array([[-1, 0, 0], [0, 0, 0], [1, 0, 0.0]]), 0.2, None, 2, Y)[1]
+    solid.limb(np.array([[0, 0, 0], [0, 0, length]]), 0.1, None, 2, X, ROUND_ENDS, middle)
+    return solid
+
+
+def plate(hole):
+    solid = Solid()
+    solid.ring(polygon(48, radius=0.3), 0.05, 0.1, 8)
+    solid.openings = [hole]
+    return solid
+
+
+def cup(hollow):
+    vessel = Vessel(Solid(), np.linspace(0, 1, 15), np.full(15, 0.4), 0.1, 2, 0.06, 0.06)
+    vessel.build([0.3, 0.7])
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 30)
+    handle = np.column_stack([0.35 + 0.3 * np.cos(angle), 0 * angle, 0.5 + 0.2 * np.sin(angle)])
+    vessel.handle(handle, 0.06, 0.06)
+    vessel.solid.hollow = hollow
+    return vessel.solid
+
+
+@pytest.mark.parametrize(
+    ("word", "bad", "good", "spacing"),
+    [
+        ("thin", rod(ROUND_ENDS, radius=0.0119), rod(ROUND_ENDS, radius=0.0121), 0.01),
+        ("narrow", plate(0.0249), plate(0.0251), 0.01),
+        ("stub", fork(0.274), fork(0.276), 0.01),
+        ("holes", two(-0.02), two(0.1), 0.01),
+        ("gap", two(0.04), two(0.06), 0.01),
+        ("gap", two(0.09), two(0.12), 0.08),
+        ("gap", cup(False), cup(True), 0.02),
+    ],
+)
+def test_what_is_refused_and_what_just_is_not(word, bad, good, spacing):
+    assert fault_of(bad, spacing) == word
+    assert fault_of(good, spacing) is None
+
+
+def test_a_paddle_whose_bars_differ_too_much_is_another_draw():
+    with pytest.raises(UnfitDraw, match="bars"):
+        DRAWN_BY["plates"](generator("paddle", 1044))
+
+
+# ------------------------------------------------------------------------------------------------------- the same again
+
+
+@pytest.fixture(scope="module")
+def yardstick(shared_dir):
+    """The program that these shapes come from; points of clouds are in an order that processors agree about."""
+
+    def draw(weights, n, rng):
+        fit = np.flatnonzero(weights > 0)
+        score = np.log(weights[fit]) + rng.gumbel(size=len(fit))
+        return fit[np.argsort(-score, kind="stable")[:n]]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(shared_dir)
+        patch.setattr(sys, "dont_write_bytecode", True)
+        things = importlib.import_module("things")
+        patch.setattr(sys.modules["zoo"], "draw", draw)
+        yield things
+    for name in ("things", "zoo"):
+        del sys.modules[name]
+
+
+@pytest.mark.parametrize("family", FAMILIES["v2"])
+@pytest.mark.parametrize("seed", [107])
+def test_shapes_and_clouds_are_the_yardsticks_to_the_last_bit(family, seed, yardstick, drawn):
+    one, expected = drawn(family, seed), yardstick.shape(family, seed)
+    for name in ("nodes", "edges", "radii", "points", "normals", *THING_ARRAYS):
+        np.testing.assert_array_equal(getattr(one, name), expected[name])
+    assert one.facts == {name: value for name, value in expected.items() if not isinstance(value, np.ndarray)}
+    for variant in VARIANTS:
+        points = cloud(one, variant).astype(np.float32)
+        np.testing.assert_array_equal(points, yardstick.cloud(expected, variant, 4096).astype(np.float32))
+        assert coverage(one, points) == yardstick.coverage(expected, points)
