@@ -7,7 +7,7 @@ import json
 import os
 import zlib
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from glsk_o3d.io.skeletons import READABLE, read_skeleton
 from glsk_o3d.skeleton import Skeleton
 
 from .folders import BenchmarkFolder, CloudFile, read_folder
+from .measures import details, of_thing
 
 # Where an answer is refused, so that no program can fill the memory of who scores it.
 MOST_ANSWER_PLACES = 2_000_000  # fitted: along an answer; axes of the benchmark have a thousand to ten thousand
@@ -52,9 +53,27 @@ class Scores:
         are none.
     components, loops, leaves, junctions : int or None
         How many more the answer has than the axis.
+    hooks : float or None
+        Share of the answer's ends, of branches longer than 3.5 radii, whose last radius turns by more than 30 degrees
+        against the run from 1.5 to 3.5 radii behind the tip, beyond what the true end turns. 0 is best.
+    reach, overshoot : float or None
+        How far along the axis the answer ends from where it should at a flat face, half a radius inside: the mean
+        without and with the sign, of which + is too far. 4 radii where none of it comes near. 0 is best.
+    wiggle : float or None
+        Length of the answer over that of the axis, less 1, where each runs beside the other. 0 is best.
+    mirror : float or None
+        Mean distance of the answer from its mirror image, of what has a plane of symmetry. 0 is best.
+    junction_offset : float or None
+        Mean distance of the junctions that are paired with true ones. 0 is best.
     failure : str or None
         Why there is no answer that could be scored. Then `perfect` and `topology` are false, both F1 are 0, and all
         others are None.
+
+    Notes
+    -----
+    From `hooks` to `junction_offset` they are None unless the truth is that of a thing, as of version 2. Where edges of
+    it are not judged, all is measured on the judged ones and on what of the answer is nearest to these, `topology`
+    excepted; then `junctions_f1`, `length`, `junctions` and `junction_offset` are None.
 
     Examples
     --------
@@ -65,7 +84,7 @@ class Scores:
     perfect: bool
     topology: bool
     tips_f1: float
-    junctions_f1: float
+    junctions_f1: float | None
     error: float | None = None
     inside: float | None = None
     completeness: float | None = None
@@ -75,6 +94,12 @@ class Scores:
     loops: int | None = None
     leaves: int | None = None
     junctions: int | None = None
+    hooks: float | None = None
+    reach: float | None = None
+    overshoot: float | None = None
+    wiggle: float | None = None
+    mirror: float | None = None
+    junction_offset: float | None = None
     failure: str | None = None
 
     @classmethod
@@ -107,6 +132,8 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
     Parameters
     ----------
     truth : Truth, Sample, or anything else with `nodes`, `edges` and `radii`
+        Of a thing it also has `half_width` (V,), `flat` (k,), the nodes that are tips at flat faces, `judged` (E,),
+        or `mirror` (2, 3), a point and the normal of a plane of symmetry, or empty.
     vertices : (M, 3) array_like of float
         In the units of the truth.
     edges : (E, 2) array_like of int
@@ -139,9 +166,13 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
         if isinstance(error, InvalidParameterError):
             raise
         raise InvalidParameterError(f"the skeleton has vertices or edges of no use: {error}") from None
+    told = details(truth)
     _check_size(axis, places, links)
-    found = compare(Skeleton(places, links, (), (), (), ()), axis).as_dict()  # type: ignore[arg-type]
-    return Scores(**{name: found[name] for name in Scores.__dataclass_fields__ if name != "failure"})
+    answer = Skeleton(places, links, (), (), (), ())  # type: ignore[arg-type]
+    found = compare(answer, axis).as_dict()
+    if told is not None:
+        found |= of_thing(axis, told, answer, found["topology"])
+    return Scores(**{name: found[name] for name in Scores.__dataclass_fields__ if name in found})
 
 
 def _check_size(axis: Truth, vertices: np.ndarray, edges: np.ndarray) -> None:
@@ -161,7 +192,12 @@ def _check_size(axis: Truth, vertices: np.ndarray, edges: np.ndarray) -> None:
         )
 
 
-MEASURES = ("perfect", "topology", "tips_f1", "junctions_f1", "error", "inside", "completeness", "length", "ends")
+OF_THINGS = ("hooks", "reach", "overshoot", "wiggle", "mirror", "junction_offset")
+"""The measures that only things have."""
+MEASURES = (
+    *("perfect", "topology", "tips_f1", "junctions_f1", "error", "inside", "completeness", "length", "ends"),
+    *OF_THINGS,
+)
 """What is averaged: shares and F1 over all clouds, what comes after them over the answers that could be scored."""
 TIMES_NAME = "times.json"
 MOST_RESULTS = 1 << 28  # derived: bytes, far more than any version has, so that a few bytes cannot fill the memory
@@ -293,21 +329,27 @@ def answer_files(place: Path) -> dict[str, list[Path]]:
 
 def _score(made: BenchmarkFolder, cloud: CloudFile, files: list[Path], told: dict[str, Any]) -> Scores:
     """The scores of the answer to a cloud: that of a failure if there is none."""
+    truth = made.truth(cloud.shape)
+    parts = details(truth)
+
+    def failed(reason: str) -> Scores:
+        scores = Scores.of_failure(reason)
+        return scores if parts is None or parts.judged.all() else replace(scores, junctions_f1=None)
+
     failure = told.get("failure")
     if told.get("digits") not in (None, made.digits(cloud)):
-        return Scores.of_failure("no answer: what is there answers another cloud of this name")
+        return failed("no answer: what is there answers another cloud of this name")
     if len(files) > 1:
         raise FileFormatError(f"{files[0]}: {files[1].name} answers the same cloud: keep one of them")
     if not files:
-        return Scores.of_failure(f"no answer: {failure}" if failure else "no answer")
-    truth = made.truth(cloud.shape)
+        return failed(f"no answer: {failure}" if failure else "no answer")
     try:
         answer = read_skeleton(files[0])
         return score(truth, answer.vertices, answer.edges)
     except MissingPackageError:
         raise
     except (FileFormatError, InvalidParameterError, OSError, MemoryError) as error:
-        return Scores.of_failure(f"unreadable: {brief(error).removeprefix(f'{files[0]}: ')}")
+        return failed(f"unreadable: {brief(error).removeprefix(f'{files[0]}: ')}")
 
 
 def read_times(place: Path) -> dict[str, dict[str, Any]]:
@@ -359,9 +401,10 @@ def read_results(path: str | os.PathLike) -> Results:
             raise ValueError("it is too large")
         told = json.loads(data)
         benchmark, name, whole, rows = (told[fact] for fact in _FACTS)
-        known = {"shape", "variant", "seconds", *Scores.__dataclass_fields__}
+        known = {"shape", "variant", "seconds", *Scores.__dataclass_fields__} - {*OF_THINGS}
         if not all(isinstance(fact, str) for fact in (benchmark, name)) or any(known - row.keys() for row in rows):
             raise ValueError("a part is missing")
+        rows = [dict.fromkeys(OF_THINGS) | row for row in rows]  # which older scores lack
         if not all(isinstance(row[measure], int | float | None) for row in rows for measure in (*MEASURES, "seconds")):
             raise ValueError("a measure is no number")
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, *_BROKEN) as error:
