@@ -16,8 +16,8 @@ from glsk_o3d.analysis.comparison import Truth
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.interop.atomic import write_atomically, write_json
 from glsk_o3d.io.formats.ply import header_of, rows_of
-from glsk_o3d.io.skeletons import read_truth
 
+from .truths import THING_ARRAYS, read_axis
 from .versions import OWN, VERSIONS
 
 INDEX_NAME = "benchmark.json"
@@ -131,6 +131,7 @@ class BenchmarkFolder:
         Returns
         -------
         Truth
+            Of a thing, a `ThingTruth`, which also has `half_width`, `flat`, `judged` and `mirror`.
 
         Raises
         ------
@@ -138,7 +139,7 @@ class BenchmarkFolder:
         FileFormatError
             What there is, is no axis.
         """
-        return read_truth(self.path / self.shapes[shape]["truth"])
+        return read_axis(self.path / self.shapes[shape]["truth"])
 
     def save(self) -> None:
         """Write ``benchmark.json``."""
@@ -228,8 +229,9 @@ def begun(path: Path, version: str) -> BenchmarkFolder:
 
 
 def write_axis(path: Path, axis: Any) -> None:
-    """Write the `nodes`, `edges` and `radii` of anything that has them."""
+    """Write the `nodes`, `edges` and `radii` of anything that has them; and of a thing, what else is known."""
     parts = {"nodes": axis.nodes, "edges": axis.edges, "radii": axis.radii}
+    parts |= {name: getattr(axis, name) for name in THING_ARRAYS if hasattr(axis, name)}
     write_atomically(path, lambda temporary: np.savez(temporary, **parts))
 
 
