@@ -6,7 +6,7 @@ nearest place of the true axis.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,7 +16,6 @@ from glsk_o3d.analysis.comparison import (
     JUNCTION_REACH,
     PLACE_SPACING,
     TIP_REACH,
-    Truth,
     matching_f1,
     merged_junctions,
     nearest_pairs,
@@ -27,6 +26,8 @@ from glsk_o3d.numerics.polylines import arc_lengths, place_at
 from glsk_o3d.numerics.vectors import dot, norm, unit
 from glsk_o3d.skeleton import Skeleton
 
+from .truths import ThingTruth
+
 HOOK_ANGLE = 30.0  # fitted: degrees by which an end may turn; what is seen to bend bends by more
 # Fitted: where an end is looked at, in radii behind its tip: the last radius turns, the run is where it came from
 LAST, RUN_START, RUN_END = 1.0, 1.5, 3.5
@@ -34,53 +35,19 @@ REACH_BEHIND, REACH_BEYOND = 4.0, 2.0  # fitted: how far before and beyond where
 REACH_BESIDE = 1.2  # fitted: how far beside, in radii; in wide sections, half the width
 CLEAR_OF_JUNCTIONS = 1.5  # fitted: local radii around a true junction where lengths are not compared
 LEAST_COMPARED = 3.0  # fitted: length in median radii below which lengths are not compared
-NAMES = ("half_width", "flat", "judged", "mirror")
-
-
-class Details(NamedTuple):
-    """What the truth of a thing says beside its axis."""
-
-    half_width: np.ndarray  # (V,) float: of the section at each node, to its wider side
-    flat: np.ndarray  # (k,) int: nodes that are tips half a radius inside a flat face
-    judged: np.ndarray  # (E,) bool: False where the axis is a matter of taste
-    mirror: np.ndarray  # a point of a plane of symmetry and its normal, (2, 3) float, or none
-
-
-def details(truth: Any) -> Details | None:
-    """What a truth says beside its axis; None if it says nothing, as those of round cones."""
-    told = [getattr(truth, name, None) for name in NAMES]
-    if all(each is None for each in told):
-        return None
-    n, edges = len(truth.nodes), len(np.asarray(truth.edges).reshape(-1, 2))
-    defaults = (truth.radii, (), np.ones(edges, bool), ())
-    width, flat, judged, mirror = (
-        default if each is None else each for each, default in zip(told, defaults, strict=True)
-    )
-    found = Details(
-        np.asarray(width, float), np.array(flat, int), np.array(judged, bool), np.asarray(mirror, float).reshape(-1, 3)
-    )
-    if found.half_width.shape != (n,) or not (np.isfinite(found.half_width) & (found.half_width > 0)).all():
-        raise InvalidParameterError("the truth must have a positive, finite half width at each of its nodes")
-    if found.flat.ndim != 1 or not ((found.flat >= 0) & (found.flat < n)).all():
-        raise InvalidParameterError("a flat end of the truth names a node that is not there")
-    if found.judged.shape != (edges,) or edges == 0 or not found.judged.any():
-        raise InvalidParameterError("the truth must say of each of its edges whether it is judged, and some must be")
-    if len(found.mirror) not in (0, 2) or not np.isfinite(found.mirror).all():
-        raise InvalidParameterError("the mirror of the truth must be a point and a normal, or empty")
-    return found
 
 
 class _Pair:
     """A skeleton and the axis of a thing, cut into places: what all measures are made of."""
 
-    def __init__(self, truth: Truth, told: Details, found: Skeleton):
-        self.told, self.found, self.radii = told, found, truth.radii
+    def __init__(self, truth: ThingTruth, found: Skeleton):
+        self.truth, self.found, self.radii = truth, found, truth.radii
         self.axis = Skeleton(truth.nodes, simple_edges(truth.edges), truth.radii, (), (), ())  # type: ignore[arg-type]
         step = PLACE_SPACING * np.median(truth.radii)
         row, part = pieces(truth.nodes, truth.edges, step)
         self.place, self.radius = (along(truth.edges, row, part, values) for values in (truth.nodes, truth.radii))
         length = norm(truth.nodes[truth.edges[:, 0]] - truth.nodes[truth.edges[:, 1]])
-        self.counts, self.length = told.judged[row], (length / np.bincount(row, minlength=len(length)))[row]
+        self.counts, self.length = truth.judged[row], (length / np.bincount(row, minlength=len(length)))[row]
         edge, self.curve, _ = places_along(found, step)
         share = found.edge_lengths / np.bincount(edge, minlength=len(found.edges)) if len(found.edges) else None
         self.span = np.zeros(len(self.curve)) if share is None else share[edge]
@@ -88,10 +55,10 @@ class _Pair:
         self.away, nearest = self.tree.query(self.curve)
         self.back = cKDTree(self.curve).query(self.place)[0]
         self.mine, self.here = self.counts[nearest], self.radius[nearest]
-        self.all_judged = bool(told.judged.all())
+        self.all_judged = bool(truth.judged.all())
         self.tips, self.leaves = self.axis.leaves, found.leaves
         if not self.all_judged:
-            touched = np.bincount(truth.edges[told.judged].ravel(), minlength=len(truth.nodes)) > 0
+            touched = np.bincount(truth.edges[truth.judged].ravel(), minlength=len(truth.nodes)) > 0
             self.tips = self.tips[touched[self.tips]]
             self.leaves = self.leaves[self.counts[self._nearest(self.leaves)]]
 
@@ -130,11 +97,11 @@ class _Pair:
     def overshoots(self) -> np.ndarray:
         """How far beyond the true tip the skeleton goes, for each tip at a flat face, in radii."""
         edges, nodes = self.axis.edges, self.axis.vertices
-        flat = self.told.flat[self.axis.degree[self.told.flat] == 1]
+        flat = self.truth.flat[self.axis.degree[self.truth.flat] == 1]
         before = np.bincount(edges.ravel(), edges[:, ::-1].ravel(), len(nodes)).astype(int)  # of a tip: its neighbour
         places, found = np.vstack([self.curve, self.found.vertices]), np.full(len(flat), -REACH_BEHIND)
         outward = unit(nodes[flat] - nodes[before[flat]])
-        beside = np.maximum(REACH_BESIDE * self.radii[flat], self.told.half_width[flat])
+        beside = np.maximum(REACH_BESIDE * self.radii[flat], self.truth.half_width[flat])
         for i, (tip, out, radius) in enumerate(zip(nodes[flat], outward, self.radii[flat], strict=True)):
             beyond = (places - tip) @ out
             near = (beyond > -REACH_BEHIND * radius) & (beyond < REACH_BEYOND * radius)
@@ -157,9 +124,9 @@ class _Pair:
 
     def mirror(self) -> float | None:
         """Mean distance of the skeleton from its mirror image; None for what has no plane of symmetry."""
-        if len(self.told.mirror) == 0:
+        if len(self.truth.mirror) == 0:
             return None
-        point, normal = self.told.mirror
+        point, normal = self.truth.mirror
         image = self.curve - 2 * np.outer((self.curve - point) @ normal, normal)
         return float(np.mean(cKDTree(self.curve).query(image)[0] / self.here))
 
@@ -174,12 +141,14 @@ class _Pair:
         return float(apart[tuple(pairs.T)].mean()) if len(pairs) else None
 
 
-def of_thing(truth: Truth, told: Details, found: Skeleton, topology: bool) -> dict[str, Any]:
+def of_thing(truth: ThingTruth, found: Skeleton, topology: bool) -> dict[str, Any]:
     """The measures of things, and those of `compare` that differ since not all of the axis is judged.
 
     `topology` says whether that is right.
     """
-    pair = _Pair(truth, told, found)
+    if not truth.judged.any():
+        raise InvalidParameterError("no edge of the truth is judged: there is nothing to score")
+    pair = _Pair(truth, found)
     beyond = pair.overshoots()
     return {
         **({} if pair.all_judged else pair.of_judged(topology)),

@@ -21,7 +21,8 @@ from glsk_o3d.io.skeletons import READABLE, read_skeleton
 from glsk_o3d.skeleton import Skeleton
 
 from .folders import BenchmarkFolder, CloudFile, read_folder
-from .measures import details, of_thing
+from .measures import of_thing
+from .truths import THING_ARRAYS, ThingTruth
 
 # Where an answer is refused, so that no program can fill the memory of who scores it.
 MOST_ANSWER_PLACES = 2_000_000  # fitted: along an answer; axes of the benchmark have a thousand to ten thousand
@@ -132,8 +133,7 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
     Parameters
     ----------
     truth : Truth, Sample, or anything else with `nodes`, `edges` and `radii`
-        Of a thing it also has `half_width` (V,), `flat` (k,), the nodes that are tips at flat faces, `judged` (E,),
-        or `mirror` (2, 3), a point and the normal of a plane of symmetry, or empty.
+        Of a thing it also has `half_width`, `flat`, `judged` and `mirror`, as `BenchmarkFolder.truth` gives them.
     vertices : (M, 3) array_like of float
         In the units of the truth.
     edges : (E, 2) array_like of int
@@ -158,7 +158,7 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
     >>> score(ring, ring.nodes, ring.edges[1:]).loops
     -1
     """
-    axis = truth if isinstance(truth, Truth) else Truth(truth.nodes, truth.edges, truth.radii)
+    axis = _truth(truth)
     try:
         places = np.asarray(vertices, float).reshape(-1, 3)
         links = simple_edges(check_graph(places, edges, "skeleton"))
@@ -166,13 +166,22 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
         if isinstance(error, InvalidParameterError):
             raise
         raise InvalidParameterError(f"the skeleton has vertices or edges of no use: {error}") from None
-    told = details(truth)
     _check_size(axis, places, links)
     answer = Skeleton(places, links, (), (), (), ())  # type: ignore[arg-type]
     found = compare(answer, axis).as_dict()
-    if told is not None:
-        found |= of_thing(axis, told, answer, found["topology"])
+    if isinstance(axis, ThingTruth):
+        found |= of_thing(axis, answer, found["topology"])
     return Scores(**{name: found[name] for name in Scores.__dataclass_fields__ if name in found})
+
+
+def _truth(truth: Any) -> Truth:
+    """The truth as its class, if it is something else that has what it has."""
+    if isinstance(truth, Truth):
+        return truth
+    parts = (truth.nodes, truth.edges, truth.radii)
+    if not all(hasattr(truth, name) for name in THING_ARRAYS):
+        return Truth(*parts)
+    return ThingTruth(*parts, *(getattr(truth, name) for name in THING_ARRAYS))
 
 
 def _check_size(axis: Truth, vertices: np.ndarray, edges: np.ndarray) -> None:
@@ -330,11 +339,11 @@ def answer_files(place: Path) -> dict[str, list[Path]]:
 def _score(made: BenchmarkFolder, cloud: CloudFile, files: list[Path], told: dict[str, Any]) -> Scores:
     """The scores of the answer to a cloud: that of a failure if there is none."""
     truth = made.truth(cloud.shape)
-    parts = details(truth)
+    in_part = isinstance(truth, ThingTruth) and not truth.judged.all()
 
     def failed(reason: str) -> Scores:
         scores = Scores.of_failure(reason)
-        return scores if parts is None or parts.judged.all() else replace(scores, junctions_f1=None)
+        return replace(scores, junctions_f1=None) if in_part else scores  # as an answer's
 
     failure = told.get("failure")
     if told.get("digits") not in (None, made.digits(cloud)):
