@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from .folders import BenchmarkFolder, CloudFile, read_folder
 from .measures import of_thing
 from .truths import THING_ARRAYS, ThingTruth
 
+T = TypeVar("T")
 # Where an answer is refused, so that no program can fill the memory of who scores it.
 MOST_ANSWER_PLACES = 2_000_000  # fitted: along an answer; axes of the benchmark have a thousand to ten thousand
 MOST_ANSWER_JUNCTIONS = 5000  # fitted: of which all pairs are compared; axes have up to some twenty
@@ -166,7 +167,7 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
         if isinstance(error, InvalidParameterError):
             raise
         raise InvalidParameterError(f"the skeleton has vertices or edges of no use: {error}") from None
-    _check_size(axis, places, links)
+    check_size(float(np.median(axis.radii)), places, links)
     answer = Skeleton(places, links, (), (), (), ())  # type: ignore[arg-type]
     found = compare(answer, axis).as_dict()
     if isinstance(axis, ThingTruth):
@@ -184,11 +185,11 @@ def _truth(truth: Any) -> Truth:
     return ThingTruth(*parts, *(getattr(truth, name) for name in THING_ARRAYS))
 
 
-def _check_size(axis: Truth, vertices: np.ndarray, edges: np.ndarray) -> None:
-    """Raise InvalidParameterError for what would take too much memory to score."""
+def check_size(radius: float, vertices: np.ndarray, edges: np.ndarray) -> None:
+    """Raise InvalidParameterError for what would take too much memory to score, with places by the median radius."""
     with np.errstate(over="ignore"):
         length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1).sum()
-    places = length / (PLACE_SPACING * np.median(axis.radii)) + len(edges) + len(vertices)
+    places = length / (PLACE_SPACING * radius) + len(edges) + len(vertices)
     if not places <= MOST_ANSWER_PLACES:
         raise InvalidParameterError(
             f"the skeleton is {length:.3g} long and has {len(edges)} edges, too much for an answer: is it in the units "
@@ -305,25 +306,54 @@ def score_answers(
     >>> [(row["variant"], row["perfect"], row["failure"]) for row in results.rows]
     [('clean', True, None), ('holes', False, 'no answer')]
     """
-    made = folder if isinstance(folder, BenchmarkFolder) else read_folder(folder)
-    place = Path(answers)
-    if not place.is_dir():
-        raise FileNotFoundError(f"{place}: no such folder of answers")
-    files, times, clouds = answer_files(place), read_times(place), made.scored
-    if not times and not any(cloud.name in files for cloud in clouds):
-        example = f"{clouds[0].name}.ply" if clouds else "SHAPE_VARIANT.ply"
-        raise FileFormatError(
-            f"{place}: has no answer to any cloud: they are called as the clouds are, such as {example}"
-        )
-    rows = []
+    given = Answers(folder, answers)
+    made, clouds, rows = given.made, given.made.scored, []
+    for shape, told in made.shapes.items():
+        if not (made.path / told["truth"]).is_file():
+            raise FileNotFoundError(
+                f"{made.path}: has no true axis of {shape}: 'glsk benchmark repeat' compares answers with each other"
+            )
     for done, cloud in enumerate(clouds, 1):
-        told = times.get(cloud.name, {})
-        scores = _score(made, cloud, files.get(cloud.name, []), told)
+        scores = _score(given, cloud)
         facts = {"shape": cloud.shape, "family": cloud.family, "variant": cloud.variant}
-        rows.append({**facts, **scores.as_dict(), "seconds": told.get("seconds")})
+        rows.append({**facts, **scores.as_dict(), "seconds": given.times.get(cloud.name, {}).get("seconds")})
         if on_cloud is not None:
             on_cloud(cloud.name, done, len(clouds))
-    return Results(made.name, name or place.resolve().name, made.whole, rows)
+    return Results(made.name, name or given.name, made.whole, rows)
+
+
+class Answers:
+    """The answers in a folder to the clouds of a benchmark."""
+
+    def __init__(self, folder: BenchmarkFolder | str | os.PathLike, answers: str | os.PathLike):
+        self.made = folder if isinstance(folder, BenchmarkFolder) else read_folder(folder)
+        place = Path(answers)
+        if not place.is_dir():
+            raise FileNotFoundError(f"{place}: no such folder of answers")
+        self.name, self.files, self.times = place.resolve().name, answer_files(place), read_times(place)
+        clouds = self.made.scored
+        if not self.times and not any(cloud.name in self.files for cloud in clouds):
+            example = f"{clouds[0].name}.ply" if clouds else "SHAPE_VARIANT.ply"
+            raise FileFormatError(
+                f"{place}: has no answer to any cloud: they are called as the clouds are, such as {example}"
+            )
+
+    def use(self, cloud: CloudFile, make: Callable[[Skeleton], T]) -> T | str:
+        """What is made of the answer to a cloud; or in words, why there is none of which it can be made."""
+        told, files = self.times.get(cloud.name, {}), self.files.get(cloud.name, [])
+        failure = told.get("failure")
+        if told.get("digits") not in (None, self.made.digits(cloud)):
+            return "no answer: what is there answers another cloud of this name"
+        if len(files) > 1:
+            raise FileFormatError(f"{files[0]}: {files[1].name} answers the same cloud: keep one of them")
+        if not files:
+            return f"no answer: {failure}" if failure else "no answer"
+        try:
+            return make(read_skeleton(files[0]))
+        except MissingPackageError:
+            raise
+        except (FileFormatError, InvalidParameterError, OSError, MemoryError) as error:
+            return f"unreadable: {brief(error).removeprefix(f'{files[0]}: ')}"
 
 
 def answer_files(place: Path) -> dict[str, list[Path]]:
@@ -336,29 +366,15 @@ def answer_files(place: Path) -> dict[str, list[Path]]:
     return found
 
 
-def _score(made: BenchmarkFolder, cloud: CloudFile, files: list[Path], told: dict[str, Any]) -> Scores:
+def _score(given: Answers, cloud: CloudFile) -> Scores:
     """The scores of the answer to a cloud: that of a failure if there is none."""
-    truth = made.truth(cloud.shape)
+    truth = given.made.truth(cloud.shape)
+    found = given.use(cloud, lambda answer: score(truth, answer.vertices, answer.edges))
+    if not isinstance(found, str):
+        return found
     in_part = isinstance(truth, ThingTruth) and not truth.judged.all()
-
-    def failed(reason: str) -> Scores:
-        scores = Scores.of_failure(reason)
-        return replace(scores, junctions_f1=None) if in_part else scores  # as an answer's
-
-    failure = told.get("failure")
-    if told.get("digits") not in (None, made.digits(cloud)):
-        return failed("no answer: what is there answers another cloud of this name")
-    if len(files) > 1:
-        raise FileFormatError(f"{files[0]}: {files[1].name} answers the same cloud: keep one of them")
-    if not files:
-        return failed(f"no answer: {failure}" if failure else "no answer")
-    try:
-        answer = read_skeleton(files[0])
-        return score(truth, answer.vertices, answer.edges)
-    except MissingPackageError:
-        raise
-    except (FileFormatError, InvalidParameterError, OSError, MemoryError) as error:
-        return failed(f"unreadable: {brief(error).removeprefix(f'{files[0]}: ')}")
+    scores = Scores.of_failure(found)
+    return replace(scores, junctions_f1=None) if in_part else scores  # of an answer it would be None, too
 
 
 def read_times(place: Path) -> dict[str, dict[str, Any]]:

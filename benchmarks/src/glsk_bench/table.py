@@ -190,17 +190,23 @@ def _cell(rows: Sequence[dict[str, Any]]) -> Cell:
 
 
 def _table(title: str, first: str, cells: Iterable[tuple[str, Cell]], measures: Sequence[str]) -> str:
-    """A table in Markdown; no name breaks it."""
+    """A table in Markdown."""
     heads = [first, "clouds", "failures", *(_HEADS.get(measure, measure) for measure in measures), "s"]
-    lines = [heads, ["---", *["--:"] * (len(heads) - 1)]]
+    lines = []
     for name, cell in cells:
         means = []
         for measure in measures:
             mean, low, high = cell[measure] or (np.nan, np.nan, np.nan)
             means.append(told(mean, low, high, _DIGITS.get(measure, 2)))
         seconds = "-" if cell["seconds"] is None else f"{cell['seconds']:.2f}"
-        lines.append([_plain(name), str(cell["clouds"]), str(cell["failures"]), *means, seconds])
-    return "\n".join([f"**{_plain(title)}**", "", *(f"| {' | '.join(words)} |" for words in lines)])
+        lines.append([name, str(cell["clouds"]), str(cell["failures"]), *means, seconds])
+    return markdown_lines(title, heads, lines)
+
+
+def markdown_lines(title: str, heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown, of words: no name breaks it."""
+    rows = [heads, ["---", *["--:"] * (len(heads) - 1)], *([_plain(word) for word in words] for words in lines)]
+    return "\n".join([f"**{_plain(title)}**", "", *(f"| {' | '.join(words)} |" for words in rows)])
 
 
 def _plain(name: str) -> str:
