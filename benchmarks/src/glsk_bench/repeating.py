@@ -25,7 +25,7 @@ from .table import markdown_lines
 
 PLACES = ("ends", "junctions", "elsewhere", "limbs")
 """Where skeletons are apart: near ends, near junctions, elsewhere; and limbs that the other does not have."""
-NEAR = 2.0  # fitted: radii around an end or a junction, and from the other skeleton where that has no such limb
+NEAR_PLACE = 2.0  # fitted: radii around an end or a junction, and from the other skeleton where that has no such limb
 _SHARES = ("agree", "loops", "ends")
 _KNOWN = ("components", "loops", "ends")
 
@@ -102,14 +102,14 @@ def _moves(skeletons: Sequence[Skeleton], radius: float) -> tuple[float | None, 
     trees, moved, where = [cKDTree(curve) for curve in curves], [], np.zeros(len(PLACES))
     for one, (skeleton, curve) in enumerate(zip(skeletons, curves, strict=True)):
         at_end, at_junction = (
-            cKDTree(skeleton.vertices[some]).query(curve)[0] < NEAR * radius
+            cKDTree(skeleton.vertices[some]).query(curve)[0] < NEAR_PLACE * radius
             if len(some)
             else np.zeros(len(curve), bool)
             for some in (skeleton.leaves, skeleton.junctions)
         )
         for tree in trees[:one] + trees[one + 1 :]:
             away = tree.query(curve)[0] / radius
-            place = np.select([away > NEAR, at_end, at_junction], [3, 0, 1], 2)
+            place = np.select([away > NEAR_PLACE, at_end, at_junction], [3, 0, 1], 2)
             where += np.bincount(place, away, len(PLACES)) / len(away)
             moved.append(float(away.mean()))
     if not moved:

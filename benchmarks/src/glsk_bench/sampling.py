@@ -26,11 +26,11 @@ from .repeating import of_axis
 
 MANIFEST_NAME = "manifest.json"
 FIRST_DRAW = 100  # fitted: the seed of the first cloud of a mesh; any would do
-_FACTS = ("components", "loops", "ends", "radius")
+_KNOWN_OF_MESHES = ("components", "loops", "ends", "radius")
 
 
 class _Object(NamedTuple):
-    """Something of which clouds are drawn: its name, how, and what is known of it: `_FACTS`, and perhaps its axis."""
+    """Something of which clouds are drawn: its name, how, and what is known of it: `_KNOWN_OF_MESHES`, and perhaps its axis."""
 
     name: str
     family: str
@@ -221,7 +221,7 @@ def _manifest(path: Path) -> dict[str, dict[str, Any]]:
 
 def _checked(row: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     """The facts of a mesh that are given; ValueError for what is none."""
-    for name in _FACTS:
+    for name in _KNOWN_OF_MESHES:
         value = row.get(name)
         if value is None:
             continue
