@@ -30,7 +30,7 @@ _KNOWN_OF_MESHES = ("components", "loops", "ends", "radius")
 
 
 class _Object(NamedTuple):
-    """Something of which clouds are drawn: its name, how, and what is known of it: `_KNOWN_OF_MESHES`, and perhaps its axis."""
+    """Something of which clouds are drawn: its name, how, and `_KNOWN_OF_MESHES`, and perhaps its axis."""
 
     name: str
     family: str
