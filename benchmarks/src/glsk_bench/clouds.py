@@ -15,7 +15,7 @@ from glsk_o3d.numerics.vectors import norm
 from glsk_o3d.samples.capsules import check
 
 from .scanning import camera_places, depth_image, lidar_scan, seen_cosines
-from .shapes import Shape
+from .shapes import Shape, Thing
 from .shapes.axis import subdivided
 from .shapes.curves import direction, generator
 from .shapes.drawing import check_seed
@@ -175,13 +175,16 @@ SHOWN_BESIDE, SHOWN_LENGTH = 0.75, 0.5  # how far along the axis a point shows i
 EVERY = 12  # which points of the whole surface are asked: as many as a cloud of 4096 has, about
 LONG_GAP = 2  # a stretch that shows nothing and is longer than so many radii is a gap
 COVERAGE_WITH_GAP = 0.96  # at most, where there is a gap
+NEAREST_THING_PIECES = 24  # of the axis of a thing, among which the one is nearest whose surface a point is on
+SHOWN_AROUND = 0.05  # how near a point of the surface of a thing is to one that shows it, at most
 
 
 def coverage(shape: Shape, points: np.ndarray) -> float:
     """Share of the axis that a cloud shows, of what the whole surface shows.
 
-    A piece of the axis is shown if a point lies on its own surface, not on that of another part nearby. Where a stretch
-    of more than two radii is not shown, the share is 0.96 at most. Below 0.97 nobody can be asked for the true axis.
+    A piece of the axis is shown if a point lies on its own surface, not on that of another part nearby. The surface of
+    a `Thing` belongs to the piece that is nearest in its half widths. Where a stretch of more than two radii is not
+    shown, the share is 0.96 at most. Below 0.97 nobody can be asked for the true axis.
 
     Parameters
     ----------
@@ -212,8 +215,10 @@ def coverage(shape: Shape, points: np.ndarray) -> float:
     nodes, edges, radii = subdivided(shape.nodes, shape.edges, shape.radii)
     start, end = edges.T
     middle, radius, length = nodes[edges].mean(axis=1), radii[edges].mean(axis=1), norm(nodes[start] - nodes[end])
-    whole = _shown(middle, radius, length, shape.points[::EVERY])
-    missed = whole & ~_shown(middle, radius, length, points)
+    own = _thing_pieces if isinstance(shape, Thing) else _cone_pieces
+    of_surface, of_cloud = own(shape, middle, radius, points)
+    whole = _shown(middle, radius, length, of_surface)
+    missed = whole & ~_shown(middle, radius, length, of_cloud)
     share = 1 - length[missed].sum() / length[whole].sum()
     if missed.any():
         stretch = component_labels(len(nodes), edges[missed])[start[missed]]
@@ -222,12 +227,33 @@ def coverage(shape: Shape, points: np.ndarray) -> float:
     return float(share)
 
 
-def _shown(middle, radius, length, points):
-    """Beside which pieces of the axis there is a point of their own surface: (pieces,) bool array."""
+def _cone_pieces(shape, middle, radius, points):
+    """The pieces of the axis on whose own surface points are: those of the whole surface, and some others."""
+    return _nearest_surface(middle, radius, shape.points[::EVERY]), _nearest_surface(middle, radius, points)
+
+
+def _nearest_surface(middle, radius, points):
+    """The pieces of which the surface is the nearest to a point, and near."""
     distance, near = cKDTree(middle).query(points, np.arange(1, min(NEAREST_PIECES, len(middle)) + 1))
     off = np.abs(distance - radius[near])
     own = near[np.arange(len(points)), off.argmin(axis=1)]
-    found = np.unique(own[off.min(axis=1) < OWN_SURFACE * radius[own] + OWN_NOISE])
+    return own[off.min(axis=1) < OWN_SURFACE * radius[own] + OWN_NOISE]
+
+
+def _thing_pieces(shape, middle, radius, points):
+    """The pieces of the axis that points of the whole surface are nearest to, and those that some others are, which are
+    told by the nearest of these.
+    """
+    surface, wide = shape.points[::EVERY], shape.half_width[cKDTree(shape.nodes).query(middle)[1]]
+    distance, near = cKDTree(middle).query(surface, np.arange(1, min(NEAREST_THING_PIECES, len(middle)) + 1))
+    own = near[np.arange(len(surface)), (distance / wide[near]).argmin(axis=1)]
+    distance, nearest = cKDTree(surface).query(points, distance_upper_bound=SHOWN_AROUND)
+    return own, own[nearest[np.isfinite(distance)]]
+
+
+def _shown(middle, radius, length, pieces):
+    """Beside which pieces of the axis there is one of some pieces that a point shows: (pieces,) bool array."""
+    found = np.unique(pieces)
     if len(found) == 0:
         return np.zeros(len(middle), bool)
     return cKDTree(middle[found]).query(middle)[0] < SHOWN_BESIDE * radius + SHOWN_LENGTH * length

@@ -43,7 +43,9 @@ def make(
     variants: Annotated[
         str | None, typer.Option(metavar="NAMES", help="Of clouds, with commas; by default all of the version.")
     ] = None,
-    version: Annotated[str, typer.Option(metavar="NAME", help="Of the benchmark.")] = "v1",
+    version: Annotated[
+        str, typer.Option(metavar="NAME", help="Of the benchmark: v1, round shapes, or v2, things.")
+    ] = "v1",
     jobs: Jobs = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -79,6 +81,10 @@ def make(
             print_rows({**told, "whole": "yes" if made.whole else "no", "sameness": words or None})
         if same.count("other") and not quiet:
             say("warning", f"{same.count('other')} clouds are not those that {made.version} means: see benchmark.json")
+        lacking = ((shape, variant) for shape, each in made.shapes.items() for variant in each.get("not_made", {}))
+        impossible = [f"{shape}_{variant}" for shape, variant in lacking]
+        if impossible and not quiet:
+            say("warning", f"{len(impossible)} clouds cannot be made, see benchmark.json: {', '.join(impossible)}")
 
 
 @app.command()

@@ -28,6 +28,11 @@ _EXPLAINED = {
     "coverage": "the share of the axis that the cloud shows",
     "sameness": "to the cloud that is meant: bits, rounding or other; null where the package knows none",
 }
+_EXPLAINED_OF_THINGS = _EXPLAINED | {
+    "truth/SHAPE.npz": _EXPLAINED["truth/SHAPE.npz"]
+    + ", half_width (V,); flat (k,), nodes at flat ends; judged (E,); mirror (2, 3), a point and a normal, or (0, 3)",
+    "not_made": "clouds that cannot be made, and why",
+}
 _EXPLAINED_OF_OWN = {
     "clouds/SHAPE_VARIANT.ply": "a cloud: binary PLY, little-endian, float or double x, y, z, in units of its own",
     "truth/SHAPE.npz": _EXPLAINED["truth/SHAPE.npz"],
@@ -107,8 +112,9 @@ class BenchmarkFolder:
             return False
         asked = VERSIONS[self.version]
         names = {f"{family}_{seed}" for family in asked.families for seed in asked.seeds}
-        variants = set(asked.variants)
-        return names == self.shapes.keys() and all(variants == told["clouds"].keys() for told in self.shapes.values())
+        return names == self.shapes.keys() and all(
+            set(asked.variants_of(name)) == told["clouds"].keys() for name, told in self.shapes.items()
+        )
 
     @property
     def name(self) -> str:
@@ -145,11 +151,14 @@ class BenchmarkFolder:
         """Write ``benchmark.json``."""
         asked = VERSIONS.get(self.version)
         choice = asked and {"points": asked.points, "draw": asked.draw, "least_coverage": asked.least_coverage}
+        explained = _EXPLAINED_OF_OWN
+        if asked:
+            explained = _EXPLAINED_OF_THINGS if asked.things else _EXPLAINED
         told = {
             "benchmark": "curve skeletons of point clouds",
             **{"version": self.version, "complete": self.complete, "whole": self.whole},
             **(choice or {}),
-            "explained": _EXPLAINED if asked else _EXPLAINED_OF_OWN,
+            "explained": explained,
             "shapes": dict(sorted(self.shapes.items())),
         }
         write_json(self.path / INDEX_NAME, told)

@@ -82,13 +82,18 @@ def make(
     todo = {}
     for family in wanted[0]:
         for seed in map(int, numbers):
-            missing = _missing(made, f"{family}_{seed}", wanted[1])
+            name = f"{family}_{seed}"
+            missing = _missing(made, name, [each for each in asked.variants_of(name) if each in wanted[1]])
             if missing:
-                todo[f"{family}_{seed}"] = partial(_make_shape, made.path, version, family, seed, missing)
+                todo[name] = partial(_make_shape, made.path, version, family, seed, missing)
     made = replace(made, complete=False) if todo else made
     for done, (name, told) in enumerate(_done(todo, cores() if jobs is None else jobs), 1):
         before = made.shapes.get(name, {"clouds": {}})
-        made.shapes[name] = told | {"clouds": before["clouds"] | told["clouds"]}
+        made.shapes[name] = told | {
+            part: before.get(part, {}) | told.get(part, {})
+            for part in ("clouds", "not_made")
+            if part in told or part in before
+        }
         made.save()
         if on_shape is not None:
             on_shape(name, done, len(todo))
@@ -109,13 +114,13 @@ def _known(words: Iterable[str] | None, known: Sequence[str], what: str) -> list
 
 
 def _missing(made: BenchmarkFolder, name: str, variants: Sequence[str]) -> list[str]:
-    """The variants of a shape of which there is no cloud; all of them where there is no truth."""
+    """The variants of a shape of which there is no cloud, and that can be made; all where there is no truth."""
     told = made.shapes.get(name)
     if told is None or not (made.path / told["truth"]).is_file():
         made.shapes.pop(name, None)
         return list(variants)
     there = {variant for variant, each in told["clouds"].items() if (made.path / each["file"]).is_file()}
-    return [variant for variant in variants if variant not in there]
+    return [variant for variant in variants if variant not in there | told.get("not_made", {}).keys()]
 
 
 def _done(todo: Mapping[str, Callable[[], Told]], jobs: int) -> Iterator[tuple[str, Told]]:
@@ -149,9 +154,13 @@ def _make_shape(folder: Path, name: str, family: str, seed: int, variants: Seque
     asked, known, drawn = versions.version(name), versions.fingerprints(name), shape(family, seed)
     truth = f"truth/{drawn.name}.npz"
     write_axis(folder / truth, drawn)
-    clouds = {}
+    clouds, not_made = {}, {}
     for variant in variants:
-        points = np.asarray(cloud(drawn, variant, n=asked.points, seed=asked.draw), np.float32)
+        try:
+            points = np.asarray(cloud(drawn, variant, n=asked.points, seed=asked.draw), np.float32)
+        except InvalidParameterError as error:  # too little of the shape is seen
+            not_made[variant] = str(error)
+            continue
         share = 1.0 if variant in asked.whole else float(coverage(drawn, points))
         called = f"{drawn.name}_{variant}"
         file, expected = f"clouds/{called}.ply", known.get(called)
@@ -161,7 +170,8 @@ def _make_shape(folder: Path, name: str, family: str, seed: int, variants: Seque
             **{"fingerprint": versions.fingerprint(points)},
             "sameness": versions.sameness(points, expected) if expected else None,
         }
-    return {"family": family, "seed": seed, "truth": truth, "facts": _plain(drawn.facts), "clouds": clouds}
+    told = {"family": family, "seed": seed, "truth": truth, "facts": _plain(drawn.facts), "clouds": clouds}
+    return told | ({"not_made": not_made} if not_made else {})
 
 
 def _plain(value: Any) -> Any:

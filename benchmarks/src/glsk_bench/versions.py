@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,26 +32,35 @@ class Version:
     draw: int  # the seed of the clouds
     whole: tuple[str, ...]  # the variants that show the whole surface: their coverage is 1
     least_coverage: float  # clouds with less are not scored: nobody can be asked for what they do not show
+    things: bool = False  # whether its shapes are things, of whose truth more is known
+    left_out: tuple[str, ...] = ()  # clouds that cannot be made: scanners see too little of the shape
+
+    def variants_of(self, shape: str) -> tuple[str, ...]:
+        """The variants that there are of a shape."""
+        return tuple(each for each in self.variants if f"{shape}_{each}" not in self.left_out)
 
 
-VERSIONS = {
-    each.name: each
-    for each in (
-        Version(
-            "v1",
-            families=("tubes", "trees", "frames", "figures", "handles", "groups"),
-            seeds=tuple(range(100, 112)),
-            variants=(
-                *("clean", "density", "holes", "outliers", "noise05", "noise1", "noise2"),
-                *("scan2", "depth2", "misreg", "lidar"),
-            ),
-            points=4096,
-            draw=0,
-            whole=("clean", "outliers", "noise05", "noise1", "noise2"),
-            least_coverage=0.97,
-        ),
-    )
-}
+_V1 = Version(
+    "v1",
+    families=("tubes", "trees", "frames", "figures", "handles", "groups"),
+    seeds=tuple(range(100, 112)),
+    variants=(
+        *("clean", "density", "holes", "outliers", "noise05", "noise1", "noise2"),
+        *("scan2", "depth2", "misreg", "lidar"),
+    ),
+    points=4096,
+    draw=0,
+    whole=("clean", "outliers", "noise05", "noise1", "noise2"),
+    least_coverage=0.97,
+)
+_V2 = replace(
+    _V1,
+    name="v2",
+    families=("prisms", "implements", "animals", "plates", "blades", "mugs"),
+    things=True,
+    left_out=("plates_110_depth2",),
+)
+VERSIONS = {each.name: each for each in (_V1, _V2)}
 """All versions by name. One that has been published is never changed."""
 OWN = "own"
 """What stands for the version where clouds and axes are somebody's own."""

@@ -1,14 +1,17 @@
-"""Random shapes with exactly known axes: six families, as many shapes as there are seeds.
+"""Random shapes with exactly known axes: twelve families, as many shapes as there are seeds.
 
 Examples
 --------
 >>> from glsk_bench.shapes import FAMILIES, shape
->>> FAMILIES
+>>> FAMILIES["v1"]
 ('tubes', 'trees', 'frames', 'figures', 'handles', 'groups')
 >>> shape("groups", 0)
 Shape('groups_0': 2 components, 0 loops, 4 leaves)
+>>> FAMILIES["v2"]
+('prisms', 'implements', 'animals', 'plates', 'blades', 'mugs')
+>>> shape("plates", 0)
 """
 
-from .drawing import FAMILIES, Shape, shape
+from .drawing import FAMILIES, Shape, Thing, shape
 
-__all__ = ["FAMILIES", "Shape", "shape"]
+__all__ = ["FAMILIES", "Shape", "Thing", "shape"]

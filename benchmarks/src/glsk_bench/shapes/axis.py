@@ -28,11 +28,8 @@ class UnfitDraw(Exception):
 
 
 @dataclass(eq=False)
-class Axis:
-    """Balls joined by round cones, the convex hulls of two balls each: a shape and, at once, its true axis.
-
-    Families draw on it; `nodes`, `edges` and `radii` are what comes of it.
-    """
+class Draft:
+    """The axis of a shape while families draw on it; `nodes`, `edges` and `radii` are what comes of it."""
 
     places: list[np.ndarray] = field(default_factory=list)
     sizes: list[float] = field(default_factory=list)
@@ -58,6 +55,11 @@ class Axis:
         self.places.append(np.asarray(place, float))
         self.sizes.append(float(radius))
         return len(self.places) - 1
+
+
+@dataclass(eq=False)
+class Axis(Draft):
+    """Balls joined by round cones, the convex hulls of two balls each: a shape and, at once, its true axis."""
 
     def path(
         self, places: np.ndarray, radii: float | np.ndarray, start: int | None = None, end: int | None = None

@@ -12,33 +12,45 @@ from glsk_o3d.errors import InvalidParameterError, did_you_mean
 from glsk_o3d.numerics.groups import component_labels
 from glsk_o3d.numerics.vectors import norm
 
-from .axis import UnfitDraw
+from .axis import Draft, UnfitDraw
 from .curves import generator
 from .fairness import fault
 from .figures import figures
 from .frames import frames
 from .groups import groups
 from .handles import handles
-from .surface import surface
+from .surface import Surface, surface
+from .things.animals import animals
+from .things.blades import blades
+from .things.fairness import fault_of
+from .things.field import surface_of
+from .things.implements import implements
+from .things.mugs import mugs
+from .things.plates import plates
+from .things.prisms import prisms
+from .things.solid import Solid
 from .trees import trees
 from .tubes import tubes
 
-DRAWN_BY = {each.__name__: each for each in (tubes, trees, frames, figures, handles, groups)}
+ROUND_CONES = (tubes, trees, frames, figures, handles, groups)
+THINGS = (prisms, implements, animals, plates, blades, mugs)
+DRAWN_BY = {each.__name__: each for each in (*ROUND_CONES, *THINGS)}
 """The functions that draw, by family."""
-FAMILIES = tuple(DRAWN_BY)
-"""The names of the families."""
+FAMILIES = {version: tuple(each.__name__ for each in group) for version, group in (("v1", ROUND_CONES), ("v2", THINGS))}
+"""The names of the families, by the version of the benchmark that has them."""
 SURFACE_POINTS = 50_000  # fitted: of the whole surface, of which clouds are drawn: a dozen times as many as one has
 JUDGED_CLOUD = 4096  # fitted: points of the cloud that must be able to show the shape
 AREA_POINTS = 2000  # fitted: tell the area of a draw to a few percent
-MOST_DRAWS = 3000  # fitted: hundreds of times what any seed has needed
+MOST_DRAWS, MOST_THING_DRAWS = 3000, 400  # fitted: tens to hundreds of times what any seed has needed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Shape:
     """A random shape: its true axis and points of its whole surface; the diagonal of its bounding box is 1.
 
-    The shape is the union of round cones: each node is a ball, and each edge the convex hull of its two balls. Its
-    nodes, edges and radii are its curve skeleton; the last node of a tube is the middle of its round end.
+    Unless it is a `Thing`, the shape is the union of round cones: each node is a ball, and each edge the convex hull of
+    its two balls. Its nodes, edges and radii are its curve skeleton; the last node of a tube is the middle of its round
+    end.
 
     Attributes
     ----------
@@ -91,6 +103,40 @@ class Shape:
         return float(np.sqrt(self.facts["area"] / len(self.points)))
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Thing(Shape):
+    """A random shape like a real object: sweeps of superellipses, with flat or round ends, and perhaps hollow.
+
+    Its nodes and edges are the curve of the sections' centroids, its radii those of circles with the areas of the
+    sections.
+
+    Attributes
+    ----------
+    half_width : (M,) float64 array
+        The longer half axis of the section at each node.
+    flat : (k,) int64 array
+        Nodes that are tips at a flat end: the axis stops half a radius inside the face.
+    judged : (E,) bool array
+        False for edges of which the axis is a matter of taste: those in the bowl of a vessel.
+    mirror : (2, 3) float64 array
+        A point of the plane of symmetry, and its unit normal; (0, 3) where there is none.
+    facts : dict
+        Those of a `Shape`; ``aspect_max``, the largest of the ratios of half axes; ``n_flat``; ``judged_share``, of the
+        edges; ``symmetric``.
+
+    Examples
+    --------
+    >>> mug = shape("mugs", 1)
+    >>> mug.judged.all(), mug.mirror.shape
+    (False, (0, 3))
+    """
+
+    half_width: np.ndarray
+    flat: np.ndarray
+    judged: np.ndarray
+    mirror: np.ndarray
+
+
 def shape(family: str, seed: int) -> Shape:
     """Draw a shape: the first fair draw of a family for this seed.
 
@@ -100,13 +146,14 @@ def shape(family: str, seed: int) -> Shape:
     Parameters
     ----------
     family : str
-        One of `FAMILIES`.
+        One of those in `FAMILIES`.
     seed : int
         Not negative. The same numbers give the same shape.
 
     Returns
     -------
     Shape
+        A `Thing` of families whose shapes are things.
 
     Raises
     ------
@@ -120,26 +167,59 @@ def shape(family: str, seed: int) -> Shape:
     (0, (50000, 3))
     """
     if not isinstance(family, str) or family not in DRAWN_BY:
-        raise InvalidParameterError(did_you_mean(str(family), FAMILIES, "family of shapes"))
+        raise InvalidParameterError(did_you_mean(str(family), DRAWN_BY, "family of shapes"))
     check_seed(seed)
+    is_thing = DRAWN_BY[family] in THINGS
     refused: Counter[str] = Counter()
-    for attempt in range(MOST_DRAWS):
-        rng = generator("shape", family, seed, attempt)
+    for attempt in range(MOST_THING_DRAWS if is_thing else MOST_DRAWS):
+        rng = generator("thing" if is_thing else "shape", family, seed, attempt)
         try:
-            axis = DRAWN_BY[family](rng).normalised()
+            drawn = DRAWN_BY[family](rng).normalised()
         except UnfitDraw as reason:
             refused[str(reason)] += 1
             continue
-        graph = axis.nodes, axis.edges, axis.radii
-        spacing = np.sqrt(surface(*graph, AREA_POINTS, rng).area / JUDGED_CLOUD)
-        wrong = fault(*graph, spacing)
+        spacing = np.sqrt(_surface(drawn, AREA_POINTS, rng).area / JUDGED_CLOUD)
+        wrong = _fault(drawn, spacing)
         if wrong is None:
-            points, normals, area = surface(*graph, SURFACE_POINTS, rng)
-            name = f"{family}_{seed}"
-            facts: dict[str, Any] = {"name": name, "kind": family, "meaningful_skeleton": True, **_facts(*graph, area)}
-            return Shape(name, family, int(seed), *graph, points, normals, facts | {"refused": dict(refused)})
+            return _finished(drawn, family, int(seed), _surface(drawn, SURFACE_POINTS, rng), dict(refused))
         refused[wrong] += 1
     raise InvalidParameterError(f"no draw of {family} {seed} is fair ({dict(refused)}): take another seed")
+
+
+def _surface(drawn: Draft, n: int, rng: np.random.Generator) -> Surface:
+    """Points of the surface of a draw."""
+    return (
+        surface_of(drawn, n, rng)
+        if isinstance(drawn, Solid)
+        else surface(drawn.nodes, drawn.edges, drawn.radii, n, rng)
+    )
+
+
+def _fault(drawn: Draft, spacing: float) -> str | None:
+    """What is wrong with a draw, in a word."""
+    return (
+        fault_of(drawn, spacing) if isinstance(drawn, Solid) else fault(drawn.nodes, drawn.edges, drawn.radii, spacing)
+    )
+
+
+def _finished(drawn: Draft, family: str, seed: int, found: Surface, refused: dict[str, int]) -> Shape:
+    """What is told of a fair draw."""
+    points, normals, area = found
+    if isinstance(drawn, Solid):
+        drawn, scale, points = drawn.boxed(points)
+        area = area * scale**2
+    name, graph = f"{family}_{seed}", (drawn.nodes, drawn.edges, drawn.radii)
+    facts: dict[str, Any] = {"name": name, "kind": family, "meaningful_skeleton": True, **_facts(*graph, area)}
+    facts["refused"] = refused
+    if not isinstance(drawn, Solid):
+        return Shape(name, family, seed, *graph, points, normals, facts)
+    wide, thick = np.array(drawn.half_axes).T
+    judged = ~np.isin(np.arange(len(drawn.links)), list(drawn.unjudged))
+    mirror = np.empty((0, 3)) if drawn.mirror is None else drawn.mirror
+    facts |= {"aspect_max": float((wide / thick).max()), "n_flat": len(drawn.flat)}
+    facts |= {"judged_share": float(judged.mean()), "symmetric": drawn.mirror is not None}
+    flat = np.array(drawn.flat, np.int64)
+    return Thing(name, family, seed, *graph, points, normals, facts, wide.copy(), flat, judged, mirror)
 
 
 def check_seed(seed: int) -> None:

@@ -132,12 +132,16 @@ def shortest_loop(n: int, edges: np.ndarray, lengths: np.ndarray, path: list[int
 
 
 def topology(centres: np.ndarray, radii: np.ndarray) -> tuple[int, int, int]:
-    """Components, loops and cavities of a union of balls, as its cells on a grid have them.
+    """Components, loops and cavities of a union of balls, as its cells on a grid have them."""
+    return grid_topology(_cells(centres, radii))
+
+
+def grid_topology(cells: np.ndarray) -> tuple[int, int, int]:
+    """Components, loops and cavities of cells of a grid, (x, y, z) bool array, of which those at its rim are empty.
 
     Components are cells that share a corner at least, cavities empty cells that share a face with no outer one. The
     Euler characteristic is components less loops plus cavities.
     """
-    cells = _cells(centres, radii)
     components = label(cells, np.ones((3, 3, 3)))[1]
     cavities = label(~cells)[1] - 1
     return components, components + cavities - _euler(cells), cavities
