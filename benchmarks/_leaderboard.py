@@ -290,7 +290,7 @@ def runs(entries: Sequence[Entry]) -> Table:
     for entry in entries:
         made = entry.made
         packages = ", ".join(f"{name} {version}" for name, version in made["packages"].items()) or "glsk-o3d"
-        lines.append([*_label(entry.tool), packages, str(made["commit"]), number(made["hours"], 2)])
+        lines.append([*_label(entry.tool), packages, made["commit"] or "-", number(made["hours"], 2)])
     hours = sum(entry.made["hours"] for entry in entries)
     return "runs", ["", "takes", "packages", "commit", "hours"], [*lines, ["all", "", "", "", number(hours, 1)]]
 

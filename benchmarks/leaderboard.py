@@ -18,7 +18,7 @@ from _leaderboard import Entry, kept, repeats, seconds
 from _peers import PEERS, Peer, installed, one_thread, silence, skeleton_of
 from _runs import application, writable
 from _runs import run as in_processes
-from _tables import ROOT, Table, fill, machine, markdown_table, read, surroundings
+from _tables import ROOT, Table, fill, machine, markdown_table, number, read, surroundings
 from glsk_bench import BenchmarkFolder, leaderboard, make, read_folder, repeat, sample, score_answers
 from glsk_bench.clouds import cloud
 from glsk_bench.scoring import TIMES_NAME, read_times
@@ -60,16 +60,23 @@ Version = Annotated[str, typer.Option("--version", metavar="NAME", help="Of the 
 Limit = Annotated[float, typer.Option("--limit", help="Seconds for a skeleton.")]
 Jobs = Annotated[int, typer.Option("--jobs", min=1, help="Processes at once.")]
 Retry = Annotated[bool, typer.Option("--retry", help="Run again what failed.")]
+There = Annotated[bool, typer.Option("--there", help="Run nothing: take the answers that are there.")]
 
 
 @app.command("run")
 def run_(
-    place: Place, tool: Tool = "", limit: Limit = 60.0, jobs: Jobs = 2, retry: Retry = False, version: Version = "v1"
+    place: Place,
+    tool: Tool = "",
+    limit: Limit = 60.0,
+    jobs: Jobs = 2,
+    retry: Retry = False,
+    there: There = False,
+    version: Version = "v1",
 ) -> None:
     """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/VERSION."""
-    peers = installed(PEERS, tool)
+    peers = with_answers(place, tool) if there else installed(PEERS, tool)
     bench = make(place / BENCH, version, jobs=jobs)
-    for name, made in answered(bench, place, peers, limit, jobs, retry):
+    for name, made in found_in(place, peers) if there else answered(bench, place, peers, limit, jobs, retry):
         results = score_answers(bench, place / name, name=name)
         typer.echo(f"{tables.keep_scores(results, made)}: {results.failures} failures")
 
@@ -83,16 +90,35 @@ def repeat_(
     limit: Limit = 60.0,
     jobs: Jobs = 2,
     retry: Retry = False,
+    there: There = False,
     version: Version = "v2",
 ) -> None:
     """Run tools over several clouds of each object, and keep how far their answers are apart in benchmarks/VERSION."""
-    peers, objects = installed(PEERS, tool), "things" if meshes is None else "meshes"
+    objects = "things" if meshes is None else "meshes"
     folder = place / f"{OBJECTS}_{objects}"
+    peers = with_answers(folder, tool) if there else installed(PEERS, tool)
     bench = sample(folder / BENCH, meshes, version=version, draws=draws)
-    for name, made in answered(bench, folder, peers, limit, jobs, retry):
+    for name, made in found_in(folder, peers) if there else answered(bench, folder, peers, limit, jobs, retry):
         found = repeat(bench, folder / name, name=name)
         where = tables.keep_repeat(version, objects, found, made)
-        typer.echo(f"{where}: {name}: moved {found.means()['moved']:.3f}, {found.means()['failures']} failures")
+        moved, failures = (found.means()[it] for it in ("moved", "failures"))
+        typer.echo(f"{where}: {name}: moved {number(moved)}, {failures} failures")
+
+
+def with_answers(place: Path, names: str) -> dict[str, Peer]:
+    """The tools of these names, with commas, of which there are answers; for no names all."""
+    wanted = names.split(",") if names else [name for name in PEERS if (place / name).is_dir()]
+    if not wanted or (absent := [name for name in wanted if name not in PEERS or not (place / name).is_dir()]):
+        raise typer.BadParameter(f"{place} has no answers of {', '.join(absent) if wanted else 'any tool'}")
+    return {name: PEERS[name] for name in wanted}
+
+
+def found_in(place: Path, peers: Mapping[str, Peer]) -> Iterator[tuple[str, dict]]:
+    """Tools of which there are answers, and what these were made with, if that is known."""
+    for name, peer in peers.items():
+        times = place / name / TIMES_NAME
+        told = read(times).get("made") if times.is_file() else None
+        yield name, told or {"commit": None, "packages": peer.versions(), "limit": None}
 
 
 def answered(

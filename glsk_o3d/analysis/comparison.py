@@ -209,8 +209,7 @@ def matching_f1(found, true, reach):
 def matched(found, true, reach):
     """The pairs of `matching_f1`: a list of (row of `found`, row of `true`)."""
     apart = cdist(found, true)
-    apart[apart > reach] = np.inf
-    return nearest_pairs(apart)
+    return nearest_pairs(np.where(apart <= reach, apart, np.inf))
 
 
 def nearest_pairs(apart):

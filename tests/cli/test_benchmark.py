@@ -100,7 +100,7 @@ def test_several_clouds_of_each_object(invoke, rods, program, tmp_path):
     [
         (2, ("make", "new", "--seeds", "a:b"), "--seeds a:b: write FIRST:BEYOND"),
         (2, ("make", "new", "--families", "tube"), "did you mean 'tubes'"),
-        (2, ("make", "new", "--version", "v2"), "no version of the benchmark is called 'v2'"),
+        (2, ("make", "new", "--version", "v9"), "no version of the benchmark is called 'v9'"),
         (1, ("run", "none", "out"), "make a benchmark with 'glsk benchmark make none' first"),
         (2, ("run", "bench", "out", "--command", "true {cloud}"), "has no {skeleton}"),
         (2, ("run", "bench", "out", "--pipeline", "defualt"), "did you mean 'default'"),
