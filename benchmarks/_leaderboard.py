@@ -10,25 +10,26 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import typer
 from _peers import PEERS, skeleton_of
 from _tables import BLUE, ORANGE, ROOT, Table, keep, number, read, sheet, write_packed
-from glsk_bench import BenchmarkFolder, Results, read_results
-from glsk_bench.scoring import answer_files
+from glsk_bench import BenchmarkFolder, Repeat, Results, read_results
+from glsk_bench.repeating import PLACES
+from glsk_bench.scoring import OF_THINGS, answer_files
 from glsk_bench.table import mean_with_interval, told
 
 from glsk_o3d import plot_skeleton, read_cloud, read_skeleton
-from glsk_o3d.interop.atomic import write_atomically
+from glsk_o3d.interop.atomic import write_atomically, write_json
 from glsk_o3d.interop.clouds import cloud_points
 from glsk_o3d.recipes.catalogue import named_pipeline
 
-KEPT = ROOT / "benchmarks" / "v1"
-SECONDS = KEPT / "seconds.json"
+KEPT = ROOT / "benchmarks"  # a folder of it for each version of the benchmark
 DECIMALS = 4  # of what is kept, far more than intervals are wide
 GOLDEN = ROOT / "tests" / "golden"
 KNOWN = {"y_unequal": (1, 0, 3), "torus": (1, 1, 0), "quadruped": (1, 0, 6)}  # components, loops, leaves
 
 OURS = "default"
-MEASURES = {  # what may be lost, its digits, and whether more of it is better
+MEASURES = {  # what may be lost, its digits, and whether more of it is better; of what has a sign, its size counts
     "perfect": ("perfect", 2, True),
     "topology": ("topology", 2, True),
     "tips_f1": ("tips F1", 2, True),
@@ -37,9 +38,15 @@ MEASURES = {  # what may be lost, its digits, and whether more of it is better
     "inside": ("inside", 3, True),
     "completeness": ("completeness", 3, True),
     "ends": ("ends", 2, False),
+    "hooks": ("hooks", 2, False),
+    "reach": ("reach", 2, False),
+    "wiggle": ("wiggle", 3, False),
+    "mirror": ("mirror", 3, False),
+    "junction_offset": ("junction offset", 2, False),
 }
 SHORT = {"clean": "clean", "scan2": "two cameras", "noise1": "1 % noise"}
 NUMBER = re.compile(r"(?<!code )(?<!signal )\d+(?:\.\d+)?")  # of a reason; those of codes and signals are names
+SPREAD = ("moved", "agree", "loops", "ends")  # of several clouds of an object, with intervals
 COLUMNS = 3
 VIEW = (14, -60)  # elevation and azimuth, in degrees
 
@@ -65,20 +72,49 @@ def keep_scores(results: Results, made: Mapping[str, Any]) -> Path:
     ]
     hours = round(sum(row["seconds"] or 0 for row in rows) / 3600, 2)
     told = {"benchmark": results.benchmark, "name": results.name, "whole": results.whole, "clouds": rows}
-    path = KEPT / f"{results.name}.json.gz"
+    path = kept_in(results.benchmark) / f"{results.name}.json.gz"
     write_packed(path, {**told, "made": {**made, "hours": hours}})
     return path
 
 
-def kept() -> list[Entry]:
-    """All that is kept, in the order of the tools."""
-    paths = {name: KEPT / f"{name}.json.gz" for name in PEERS}
+def kept_in(version: str) -> Path:
+    """The folder of what is kept of a version of the benchmark."""
+    (KEPT / version).mkdir(exist_ok=True)
+    return KEPT / version
+
+
+def kept(version: str) -> list[Entry]:
+    """All scores that are kept, in the order of the tools."""
+    paths = {name: KEPT / version / f"{name}.json.gz" for name in PEERS}
     return [Entry(read_results(path), read(path)["made"]) for path in paths.values() if path.is_file()]
 
 
-def seconds() -> dict[str, dict[str, Any]]:
-    """The median CPU seconds `cpu` of each tool, and `where` they were measured; of those that were."""
-    return read(SECONDS) if SECONDS.is_file() else {}
+def keep_seconds(version: str, found: Seconds) -> None:
+    """Keep the median CPU seconds `cpu` of some tools, and `where` they were measured, beside those of others."""
+    write_json(kept_in(version) / "seconds.json", seconds(version) | found)
+
+
+def seconds(version: str) -> Seconds:
+    """What `keep_seconds` has kept."""
+    path = KEPT / version / "seconds.json"
+    return read(path) if path.is_file() else {}
+
+
+def keep_repeat(version: str, objects: str, found: Repeat, made: Mapping[str, Any]) -> Path:
+    """Keep how far a tool's answers to several clouds of each object are apart, beside those of others."""
+    path = kept_in(version) / f"repeat_{objects}.json.gz"
+    before = read(path) if path.is_file() else {}
+    if any(each["benchmark"] != found.benchmark for name, each in before.items() if name != found.name):
+        raise typer.BadParameter(f"{path} has other clouds: remove it, and run all tools anew")
+    write_packed(path, before | {found.name: {**found.as_dict(), "made": dict(made)}})
+    return path
+
+
+def repeats(version: str, objects: str) -> list[Repeat]:
+    """What `keep_repeat` has kept, in the order of the tools."""
+    path = KEPT / version / f"repeat_{objects}.json.gz"
+    found = read(path) if path.is_file() else {}
+    return [Repeat(found[name]["benchmark"], name, found[name]["objects"]) for name in PEERS if name in found]
 
 
 def recorded() -> Table:
@@ -100,15 +136,17 @@ def recorded() -> Table:
 
 def overview(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
     """All tools over all clouds, the best first: the entries of a `Leaderboard`."""
-    lines = []
+    lines, more = [], [name for name in OF_THINGS if name in MEASURES and any(entry["all"][name] for entry in board)]
     for entry in board:
         name, mean = entry["name"], entry["all"]
         shares = [told(*mean[measure]) for measure in ("perfect", "topology")]
         plain = [number(mean[measure][0], 2) for measure in ("tips_f1", "junctions_f1")]
         error = told(*mean["error"], 3) if mean["error"] else "-"
         rest = [number(mean[measure] and mean[measure][0], 3) for measure in ("inside", "completeness")]
+        rest += [told(*mean[it], MEASURES[it][1]) if mean[it] else "-" for it in more]
         lines.append([*_label(name), *shares, *plain, error, *rest, str(mean["failures"]), _cpu(cpu, name)])
-    heads = ["tips F1", "junctions F1", "error", "inside", "complete", "failures", "CPU s"]
+    heads = ["tips F1", "junctions F1", "error", "inside", "complete"]
+    heads += [*(MEASURES[it][0] for it in more), "failures", "CPU s"]
     first = board[0]["all"]
     title = f"{first['clouds']} clouds of {first['shapes']} random shapes"
     return title, ["", "takes", "perfect", "topology", *heads], lines
@@ -120,11 +158,12 @@ def short(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
     for entry in board:
         name, mean, groups = entry["name"], entry["all"], entry["variants"]
         tool = _label(name)[0].partition(",")[0]
-        shares = [number(groups[it]["topology"][0], 2) for it in SHORT]
+        shares = [number(groups[it]["topology"][0], 2) for it in SHORT if it in groups]
         error = number(mean["error"] and mean["error"][0], 2)
         cells = [*shares, number(mean["topology"][0], 2), number(mean["perfect"][0], 2), error]
         best.setdefault(tool, [tool, *cells, _cpu(cpu, name)])
-    heads = ["", *SHORT.values(), "all 11 kinds", "perfect", "error", "CPU s"]
+    kinds = [words for it, words in SHORT.items() if it in board[0]["variants"]]
+    heads = ["", *kinds, f"all {len(board[0]['variants'])} kinds", "perfect", "error", "CPU s"]
     return "right components and loops, share of the clouds", heads, list(best.values())
 
 
@@ -156,7 +195,8 @@ def worse(entries: Sequence[Entry]) -> list[Worse]:
             groups.setdefault(row[part], []).append(key)
     for (group, here), (name, theirs), measure in product(groups.items(), by_name.items(), MEASURES):
         pairs = [(theirs[key][measure], ours[key][measure]) for key in here]
-        known = [(key[0], pair) for key, pair in zip(here, pairs, strict=True) if None not in pair]
+        pairs = [(abs(a), abs(b)) if None not in (a, b) else None for a, b in pairs]
+        known = [(key[0], pair) for key, pair in zip(here, pairs, strict=True) if pair]
         if known:
             shapes, both = zip(*known, strict=True)
             difference = mean_with_interval(shapes, [other - mine for other, mine in both])
@@ -207,6 +247,28 @@ def by_group(entries: Sequence[Entry], group: str, measure: str, digits: int, ti
     return title, ["", "takes", *(f"{name} ({sizes[name]})" for name in names)], lines
 
 
+def repeated(found: Sequence[Repeat]) -> Table:
+    """How far the answers to several clouds of each object are apart, the nearest first."""
+    lines = []
+    for means, it in sorted(((each.means(), each) for each in found), key=lambda both: _last(both[0]["moved"])):
+        shown = {name: [(row["object"], row[name]) for row in it.rows if row[name] is not None] for name in SPREAD}
+        cells = {
+            name: told(*mean_with_interval(*zip(*rows, strict=True))) if rows else "-" for name, rows in shown.items()
+        }
+        where = [number((means["where"] or {}).get(place), 2) for place in PLACES]
+        moved = [cells["moved"], number(means["median"], 2), *where]
+        rest = [*(cells[name] for name in ("agree", "loops", "ends")), number(means["hooks"], 2)]
+        lines.append([*_label(it.name), *moved, *rest, str(means["failures"])])
+    means = found[0].means()
+    heads = ["moved", "median", "near ends", "near junctions", "elsewhere", "limbs", "agree", "loops", "ends", "hooks"]
+    title = f"{means['draws']} clouds of {means['objects']} objects"
+    return title, ["", "takes", *heads, "failures"], lines
+
+
+def _last(value: float | None) -> float:
+    return float("inf") if value is None else value
+
+
 def failures(entries: Sequence[Entry]) -> Table:
     """Which clouds have no answer, by tool and reason."""
     lines = []
@@ -228,7 +290,7 @@ def runs(entries: Sequence[Entry]) -> Table:
     for entry in entries:
         made = entry.made
         packages = ", ".join(f"{name} {version}" for name, version in made["packages"].items()) or "glsk-o3d"
-        lines.append([*_label(entry.tool), packages, str(made["commit"]), number(made["hours"], 2)])
+        lines.append([*_label(entry.tool), packages, made["commit"] or "-", number(made["hours"], 2)])
     hours = sum(entry.made["hours"] for entry in entries)
     return "runs", ["", "takes", "packages", "commit", "hours"], [*lines, ["all", "", "", "", number(hours, 1)]]
 
@@ -255,8 +317,8 @@ def _span(reasons: Sequence[str]) -> str:
     return NUMBER.sub(lambda _: next(each), reasons[0])
 
 
-def draw_board(rows: list[dict[str, Any]], folder: Path) -> None:
-    """The entries of a `Leaderboard`, with intervals: right topologies and perfect ones, and errors."""
+def draw_board(rows: list[dict[str, Any]], folder: Path, name: str) -> None:
+    """The entries of a `Leaderboard`, with intervals: right topologies and perfect ones, and errors; as NAME.png."""
     places = np.arange(len(rows))
     figure, (left, right) = sheet(1.1 + 0.27 * len(rows), columns=2, sharey=True, width=7.0)
     for axes, measures in ((left, ("topology", "perfect")), (right, ("error",))):
@@ -274,7 +336,7 @@ def draw_board(rows: list[dict[str, Any]], folder: Path) -> None:
     right.set_xticks(ticks, map(str, ticks))
     right.minorticks_off()
     figure.legend(loc="outside upper center", ncols=3, frameon=False)
-    keep(figure, folder, "leaderboard")
+    keep(figure, folder, name)
 
 
 def title(name: str) -> str:

@@ -7,28 +7,31 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from statistics import median
 from typing import Annotated
 
 import _leaderboard as tables
 import typer
-from _leaderboard import SECONDS, Entry, kept, seconds
+from _leaderboard import Entry, kept, repeats, seconds
 from _peers import PEERS, Peer, installed, one_thread, silence, skeleton_of
 from _runs import application, writable
 from _runs import run as in_processes
-from _tables import ROOT, fill, machine, markdown_table, read, surroundings
-from glsk_bench import leaderboard, make, read_folder, score_answers
+from _tables import ROOT, Table, fill, machine, markdown_table, number, read, surroundings
+from glsk_bench import BenchmarkFolder, leaderboard, make, read_folder, repeat, sample, score_answers
 from glsk_bench.clouds import cloud
 from glsk_bench.scoring import TIMES_NAME, read_times
-from glsk_bench.shapes import FAMILIES, shape
+from glsk_bench.shapes import shape
+from glsk_bench.versions import VERSIONS
 
 from glsk_o3d import read_cloud, save_skeleton
 from glsk_o3d.interop.atomic import write_json
 from glsk_o3d.interop.clouds import cloud_points
 
 BENCH = "bench"  # the clouds, in the folder that a run is given; beside it a folder of answers for each tool
-TIMED = [(family, variant) for family in FAMILIES["v1"] for variant in ("clean", "depth2")]  # with the seed 100
+OBJECTS = "repeat"  # several clouds of each object, and answers to these, in the same way
+TIMED = ("clean", "depth2")  # of the first shape of each family
 KEPT_AFTER = 20  # skeletons, so that little is lost when a run is stopped
 PRELOADED = (  # by all processes at once, since imports take longer than some skeletons
     *("glsk_o3d.pipelines", "glsk_bench.scoring", "glsk_bench.making", "glsk_bench.table"),
@@ -36,27 +39,92 @@ PRELOADED = (  # by all processes at once, since imports take longer than some s
     *("pc_skeletor", "pygel3d.graph", "compas_cgal.skeletonization", "compas_cgal.meshing", "skan"),
 )
 IMAGES = ROOT / "docs" / "images"
-PARTS = (
-    *("short", "leaderboard", "losses", "unclear", "topologies", "errors", "families", "failures", "runs"),
-    "recorded",
-)
+PARTS = {  # of pages, by the version of the benchmark
+    "v1": (
+        *("short", "leaderboard", "losses", "unclear", "topologies", "errors", "families", "failures", "runs"),
+        "recorded",
+    ),
+    "v2": (
+        *("things-short", "things-leaderboard", "things-losses", "things-unclear", "things-topologies"),
+        *("things-errors", "things-hooks", "things-reach", "things-families", "things-families-hooks"),
+        *("things-failures", "things-runs", "things-repeat", "things-repeat-meshes"),
+    ),
+}
+REPEATED = {"repeat": "things", "repeat-meshes": "meshes"}
+PICTURES = {"v1": "leaderboard", "v2": "leaderboard_things"}
 
 app = application(__doc__)
 Place = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the clouds and of all answers.")]
 Tool = Annotated[str, typer.Option("--tool", metavar="NAMES", help="With commas; else all that are installed.")]
+Version = Annotated[str, typer.Option("--version", metavar="NAME", help="Of the benchmark.")]
+Limit = Annotated[float, typer.Option("--limit", help="Seconds for a skeleton.")]
+Jobs = Annotated[int, typer.Option("--jobs", min=1, help="Processes at once.")]
+Retry = Annotated[bool, typer.Option("--retry", help="Run again what failed.")]
+There = Annotated[bool, typer.Option("--there", help="Run nothing: take the answers that are there.")]
 
 
 @app.command("run")
 def run_(
     place: Place,
     tool: Tool = "",
-    limit: Annotated[float, typer.Option("--limit", help="Seconds for a skeleton.")] = 60.0,
-    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes at once.")] = 2,
-    retry: Annotated[bool, typer.Option("--retry", help="Run again what failed.")] = False,
+    limit: Limit = 60.0,
+    jobs: Jobs = 2,
+    retry: Retry = False,
+    there: There = False,
+    version: Version = "v1",
 ) -> None:
-    """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/v1."""
-    peers = installed(PEERS, tool)
-    bench = make(place / BENCH, jobs=jobs)
+    """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/VERSION."""
+    peers = with_answers(place, tool) if there else installed(PEERS, tool)
+    bench = make(place / BENCH, version, jobs=jobs)
+    for name, made in found_in(place, peers) if there else answered(bench, place, peers, limit, jobs, retry):
+        results = score_answers(bench, place / name, name=name)
+        typer.echo(f"{tables.keep_scores(results, made)}: {results.failures} failures")
+
+
+@app.command("repeat")
+def repeat_(
+    place: Place,
+    meshes: Annotated[Path | None, typer.Argument(metavar="MESHES", help="A folder; else things.")] = None,
+    tool: Tool = "",
+    draws: Annotated[int, typer.Option("--draws", min=2, help="Clouds of each object.")] = 5,
+    limit: Limit = 60.0,
+    jobs: Jobs = 2,
+    retry: Retry = False,
+    there: There = False,
+    version: Version = "v2",
+) -> None:
+    """Run tools over several clouds of each object, and keep how far their answers are apart in benchmarks/VERSION."""
+    objects = "things" if meshes is None else "meshes"
+    folder = place / f"{OBJECTS}_{objects}"
+    peers = with_answers(folder, tool) if there else installed(PEERS, tool)
+    bench = sample(folder / BENCH, meshes, version=version, draws=draws)
+    for name, made in found_in(folder, peers) if there else answered(bench, folder, peers, limit, jobs, retry):
+        found = repeat(bench, folder / name, name=name)
+        where = tables.keep_repeat(version, objects, found, made)
+        moved, failures = (found.means()[it] for it in ("moved", "failures"))
+        typer.echo(f"{where}: {name}: moved {number(moved)}, {failures} failures")
+
+
+def with_answers(place: Path, names: str) -> dict[str, Peer]:
+    """The tools of these names, with commas, of which there are answers; for no names all."""
+    wanted = names.split(",") if names else [name for name in PEERS if (place / name).is_dir()]
+    if not wanted or (absent := [name for name in wanted if name not in PEERS or not (place / name).is_dir()]):
+        raise typer.BadParameter(f"{place} has no answers of {', '.join(absent) if wanted else 'any tool'}")
+    return {name: PEERS[name] for name in wanted}
+
+
+def found_in(place: Path, peers: Mapping[str, Peer]) -> Iterator[tuple[str, dict]]:
+    """Tools of which there are answers, and what these were made with, if that is known."""
+    for name, peer in peers.items():
+        times = place / name / TIMES_NAME
+        told = read(times).get("made") if times.is_file() else None
+        yield name, told or {"commit": None, "packages": peer.versions(), "limit": None}
+
+
+def answered(
+    bench: BenchmarkFolder, place: Path, peers: Mapping[str, Peer], limit: float, jobs: int, retry: bool
+) -> Iterator[tuple[str, dict]]:
+    """Run tools over all clouds, or go on; gives the name of each, when all are done, and what it was made with."""
     one_thread()
     for name, peer in peers.items():
         made, times = begun(place / name, peer, limit)
@@ -68,8 +136,7 @@ def run_(
                 spent = limit if "not done" in row.get("failure", "") else None
                 times[row["cloud"]] = {"seconds": row.get("seconds", spent), "failure": row.get("failure")}
             write_json(place / name / TIMES_NAME, {"made": made, "clouds": times})
-        results = score_answers(bench, place / name, name=name)
-        typer.echo(f"{tables.keep_scores(results, made)}: {results.failures} failures")
+        yield name, made
 
 
 def begun(folder: Path, peer: Peer, limit: float) -> tuple[dict, dict]:
@@ -97,66 +164,80 @@ def answer(cloud: Path, peer: Peer, path: Path) -> dict:
 
 
 @app.command("seconds")
-def seconds_(tool: Tool = "") -> None:
-    """CPU seconds of each tool on twelve clouds, one at a time; kept in benchmarks/v1. The machine should be idle."""
+def seconds_(tool: Tool = "", version: Version = "v1") -> None:
+    """CPU seconds of each tool on twelve clouds, one at a time; kept in benchmarks/VERSION. Let the machine be idle."""
     peers = installed(PEERS, tool)
     where = machine()
     one_thread()
-    rows = in_processes(timed, [(dict(tool=name), (peer,)) for name, peer in peers.items()], 1, fresh=True)
-    found = seconds() | {row["tool"]: dict(cpu=round(row["cpu"], 3), where=where) for row in rows if "cpu" in row}
-    write_json(SECONDS, found)
+    rows = in_processes(timed, [(dict(tool=name), (peer, version)) for name, peer in peers.items()], 1, fresh=True)
+    tables.keep_seconds(
+        version, {row["tool"]: dict(cpu=round(row["cpu"], 3), where=where) for row in rows if "cpu" in row}
+    )
     for row in rows:
         typer.echo(f"{row['tool']}: " + (row["failure"] if "failure" in row else f"{row['cpu']:.2f} s"))
 
 
-def timed(peer: Peer) -> dict:
+def timed(peer: Peer, version: str) -> dict:
     """The median CPU seconds of a tool, after a first call."""
-    clouds = [cloud(shape(family, 100), variant) for family, variant in TIMED]
-    return dict(cpu=median(peer.timed(points)[1] for points in clouds))
+    asked = VERSIONS[version]
+    shapes = [shape(family, asked.seeds[0]) for family in asked.families]
+    return dict(cpu=median(peer.timed(cloud(it, variant))[1] for it in shapes for variant in TIMED))
 
 
 def parts_of(path: Path) -> list[str]:
     """The tables for which a page has a place."""
     text = path.read_text(encoding="utf-8") if path.is_file() else ""
-    names = [name for name in PARTS if f"<!-- {name} -->\n" in text]
+    known = [name for names in PARTS.values() for name in names]
+    names = [name for name in known if f"<!-- {name} -->\n" in text]
     if not names:
-        raise typer.BadParameter(f"there is no page {path} with a line <!-- NAME -->: {', '.join(PARTS)}")
+        raise typer.BadParameter(f"there is no page {path} with a line <!-- NAME -->: {', '.join(known)}")
     return names
 
 
 @app.command()
 def page(paths: Annotated[list[Path] | None, typer.Argument(metavar="MD...")] = None) -> None:
-    """The tables of the scores that are kept, printed; or put into pages, with a picture in docs/images."""
+    """The tables of what is kept, printed; or put into pages, with pictures in docs/images."""
     places = {path: parts_of(path) for path in paths or ()}
-    entries = kept()
-    rows = leaderboard(entry.results for entry in entries).entries
-    found = pieces(entries, rows)
+    found = {}
+    for version in PARTS:
+        entries = kept(version)
+        rows = leaderboard(entry.results for entry in entries).entries if entries else []
+        found |= pieces(version, entries, rows)
+        if rows and places:
+            tables.draw_board(rows, IMAGES, PICTURES[version])
     if not places:
         typer.echo("\n".join(found.values()))
-        return
     for path, names in places.items():
-        fill(path, {name: found[name] for name in names})
-    tables.draw_board(rows, IMAGES)
+        fill(path, {name: found[name] for name in names if name in found})
 
 
-def pieces(entries: list[Entry], rows: list[dict]) -> dict[str, str]:
+def pieces(version: str, entries: list[Entry], rows: list[dict]) -> dict[str, str]:
     """What stands at the places of the pages, by their names; of what is kept, and its leaderboard's entries."""
-    cpu, worse = seconds(), tables.worse(entries)
-    found = {
-        "short": tables.short(rows, cpu),
-        "leaderboard": tables.overview(rows, cpu),
-        "losses": tables.losses(worse),
-        "unclear": tables.unclear(worse),
-        "topologies": tables.by_group(entries, "variant", "topology", 2, "right topology, by kind of cloud"),
-        "errors": tables.by_group(entries, "variant", "error", 3, "error, by kind of cloud"),
-        "families": tables.by_group(entries, "family", "topology", 2, "right topology, by family of shapes"),
-        "failures": tables.failures(entries),
-        "runs": tables.runs(entries),
-        "recorded": tables.recorded(),
-    }
-    told = {name: markdown_table(*table) for name, table in found.items()}
-    told["leaderboard"] += "".join(f"\nCPU seconds: {where}\n" for where in {it["where"]: None for it in cpu.values()})
-    return told
+    found: dict[str, Table] = {}
+    if entries:
+        cpu, worse = seconds(version), tables.worse(entries)
+        found = {
+            "short": tables.short(rows, cpu),
+            "leaderboard": tables.overview(rows, cpu),
+            "losses": tables.losses(worse),
+            "unclear": tables.unclear(worse),
+            "topologies": tables.by_group(entries, "variant", "topology", 2, "right topology, by kind of cloud"),
+            "errors": tables.by_group(entries, "variant", "error", 3, "error, by kind of cloud"),
+            "hooks": tables.by_group(entries, "variant", "hooks", 2, "ends that are hooks, by kind of cloud"),
+            "reach": tables.by_group(entries, "variant", "reach", 2, "reach, by kind of cloud"),
+            "families": tables.by_group(entries, "family", "topology", 2, "right topology, by family of shapes"),
+            "families-hooks": tables.by_group(entries, "family", "hooks", 2, "ends that are hooks, by family"),
+            "failures": tables.failures(entries),
+            "runs": tables.runs(entries),
+            "recorded": tables.recorded(),
+        }
+    found |= {name: tables.repeated(it) for name, objects in REPEATED.items() if (it := repeats(version, objects))}
+    prefix = "" if version == "v1" else "things-"
+    told = {f"{prefix}{name}": markdown_table(*table) for name, table in found.items()}
+    if entries:
+        where = {it["where"]: None for it in cpu.values()}
+        told[f"{prefix}leaderboard"] += "".join(f"\nCPU seconds: {it}\n" for it in where)
+    return {name: told[name] for name in PARTS[version] if name in told}
 
 
 @app.command()
@@ -165,9 +246,10 @@ def picture(
     path: Annotated[Path, typer.Argument(metavar="PNG", callback=writable)],
     name: Annotated[str, typer.Option("--cloud", help="One of the benchmark.")] = "figures_100_scan2",
     tool: Tool = "default,pygel-points,cgal,pc-skeletor,cgal-poisson,skeletor-wavefront",
+    version: Version = "v1",
 ) -> None:
     """Draw the answers of some tools to one cloud, side by side."""
-    entries = {entry.tool: entry for entry in kept()}
+    entries = {entry.tool: entry for entry in kept(version)}
     tables.draw_answers(
         read_folder(place / BENCH), place, name, [entries[it] for it in tool.split(",") if it in entries], path
     )

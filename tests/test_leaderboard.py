@@ -11,8 +11,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from glsk_bench import Results, leaderboard, read_folder, read_results
-from glsk_bench.scoring import Scores
+import typer
+from glsk_bench import Repeat, Results, leaderboard, read_folder, read_results
+from glsk_bench.scoring import OF_THINGS, Scores
 from typer.testing import CliRunner
 
 from glsk_o3d import read_skeleton
@@ -87,6 +88,26 @@ class TestTables:
         assert (cells["failures"], cells["CPU s"], cells["takes"]) == ("1", "2.35", "wrap")
         assert cells["error"].startswith("0.400")  # of the answer alone
 
+    def test_what_only_things_have_is_shown_and_can_be_lost(self, parts):
+        shapes = [f"mugs_{seed}" for seed in range(4)]
+        ours = [row(it, hooks=0.5, reach=None, wiggle=-0.3) for it in shapes]
+        theirs = [row(it, hooks=0.25, reach=1.0, wiggle=0.2) for it in shapes]
+        both = entries(parts, default=ours, cgal=theirs)
+        lines = [line[2:] for line in parts.tables.losses(parts.tables.worse(both))[2] if line[0] == "all"]
+        told = [
+            ["hooks", "0.25", "0.50", "-0.25 [-0.25, -0.25]"],
+            ["wiggle", "0.200", "0.300", "-0.100 [-0.100, -0.100]"],
+        ]
+        assert [[words, *rest] for words, _, *rest in lines] == told
+        rows = leaderboard(entry.results for entry in both).entries
+        _, header, lines = parts.tables.overview(rows, {})
+        cells = {line[0]: dict(zip(header, line, strict=True)) for line in lines}
+        assert cells["`default`"]["wiggle"].startswith("-0.300")
+        assert (cells["`default`"]["reach"], cells["CGAL"]["reach"][:4]) == ("-", "1.00")
+        plain = [dict(each, **dict.fromkeys(OF_THINGS)) for each in ours]
+        rows = leaderboard(entry.results for entry in entries(parts, default=plain)).entries
+        assert not {"hooks", "reach", "wiggle", "mirror", "junction offset"} & {*parts.tables.overview(rows, {})[1]}
+
     def test_groups(self, parts):
         rows = [row(), row("trees_100", topology=0.0), row("trees_100", "holes", error=None)]
         (line,) = parts.tables.by_group(entries(parts, cgal=rows), "family", "topology", 2, "")[2]
@@ -114,13 +135,15 @@ class TestKept:
         monkeypatch.setattr(parts.tables, "KEPT", tmp_path)
         results = Results("v1", "default", True, [row(error=0.123456, seconds=7200.0)])
         first = parts.tables.keep_scores(results, dict(limit=60.0))
-        (entry,) = parts.tables.kept()
+        assert first == tmp_path / "v1" / "default.json.gz"
+        assert parts.tables.kept("v2") == []
+        (entry,) = parts.tables.kept("v1")
         assert entry.results.rows[0]["error"] == 0.1235
         assert (entry.tool, entry.made) == ("default", dict(limit=60.0, hours=2.0))
         assert first.read_bytes() == parts.tables.keep_scores(results, dict(limit=60.0)).read_bytes()
 
     def test_those_of_the_package_are_whole(self, parts):
-        found = parts.tables.kept()
+        found = parts.tables.kept("v1")
         assert {"default", "wen2024"} <= {entry.tool for entry in found}
         clouds = {(each["shape"], each["variant"]) for each in found[0].results.rows}
         for entry in found:
@@ -130,11 +153,18 @@ class TestKept:
 
     def test_the_pages_have_what_is_kept(self, tool, parts, root):
         pages = "".join((root / name).read_text(encoding="utf-8") for name in ("README.md", "docs/comparison.md"))
-        found = parts.tables.kept()
-        for name, text in tool.pieces(found, leaderboard(entry.results for entry in found).entries).items():
-            there = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", pages, re.S)[1].strip()
-            if name != "recorded":  # late solves of wen2024 round otherwise elsewhere
-                assert there == text.strip()
+        for version in tool.PARTS:
+            found = parts.tables.kept(version)
+            rows = leaderboard(entry.results for entry in found).entries if found else []
+            for name, text in tool.pieces(version, found, rows).items():
+                there = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", pages, re.S)[1].strip()
+                if name != "recorded":  # late solves of wen2024 round otherwise elsewhere
+                    assert there == text.strip()
+
+    def test_every_table_has_a_place(self, tool, root):
+        pages = "".join((root / name).read_text(encoding="utf-8") for name in ("README.md", "docs/comparison.md"))
+        places = [name for names in tool.PARTS.values() for name in names]
+        assert [name for name in places if pages.count(f"<!-- {name} -->\n") != 1] == []
 
     def test_what_is_recorded_of_the_authors_code(self, parts):
         _, header, lines = parts.tables.recorded()
@@ -146,24 +176,28 @@ class TestKept:
 
 class TestCommands:
     def test_run_keeps_the_scores_and_goes_on(self, tool, parts, call, small, tmp_path, monkeypatch):
-        monkeypatch.setattr(tool, "make", lambda place, jobs: read_folder(place))
+        monkeypatch.setattr(tool, "make", lambda place, version, jobs: read_folder(place))
         monkeypatch.setattr(parts.tables, "KEPT", tmp_path)
         assert "default.json.gz: 0 failures" in call("run", tmp_path, "--tool", "default", "--jobs", 2)
-        rows = read_results(tmp_path / "default.json.gz").rows
+        rows = read_results(tmp_path / "v1" / "default.json.gz").rows
         assert len(rows) == 7
         assert all(each["topology"] for each in rows)
         written = {path: path.stat().st_mtime_ns for path in (tmp_path / "default").glob("*.npz")}
         call("run", tmp_path, "--tool", "default", "--jobs", 2)
         assert written == {path: path.stat().st_mtime_ns for path in (tmp_path / "default").glob("*.npz")}
+        kept = (tmp_path / "v1" / "default.json.gz").read_bytes()
+        assert "default.json.gz: 0 failures" in call("run", tmp_path, "--there")
+        assert (tmp_path / "v1" / "default.json.gz").read_bytes() == kept
+        assert "no answers of cgal" in " ".join(call("run", tmp_path, "--there", "--tool", "cgal", code=2).split())
         call("picture", tmp_path, tmp_path / "p.png", "--cloud", "tubes_100_clean", "--tool", "default,cgal")
         assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 
     def test_answers_of_other_settings_are_not_gone_on_with(self, tool, parts, call, small, tmp_path, monkeypatch):
-        monkeypatch.setattr(tool, "make", lambda place, jobs: read_folder(place))
+        monkeypatch.setattr(tool, "make", lambda place, version, jobs: read_folder(place))
         monkeypatch.setattr(parts.tables, "KEPT", tmp_path)
         monkeypatch.setattr(tool, "in_processes", lambda answer, work, *_, **__: [job[0] | FAILED for job in work])
         assert "7 failures" in call("run", tmp_path, "--tool", "default", "--limit", 5)
-        (entry,) = parts.tables.kept()
+        (entry,) = parts.tables.kept("v1")
         assert {each["failure"] for each in entry.results.rows} == {"no answer: not done after 5 s"}
         assert (entry.made["limit"], entry.made["hours"]) == (5, round(7 * 5 / 3600, 2))
         assert "has answers of 5" in call("run", tmp_path, "--tool", "default", "--limit", 6, code=2)
@@ -175,26 +209,45 @@ class TestCommands:
         assert len(asked) == 7
 
     def test_seconds_are_kept_and_added_to(self, tool, parts, call, tmp_path, monkeypatch):
-        for it in (tool, parts.tables):
-            monkeypatch.setattr(it, "SECONDS", tmp_path / "seconds.json")
-        (tmp_path / "seconds.json").write_text('{"cgal": {"cpu": 2.5, "where": "there"}}')
+        monkeypatch.setattr(parts.tables, "KEPT", tmp_path)
+        (tmp_path / "v1").mkdir()
+        (tmp_path / "v1" / "seconds.json").write_text('{"cgal": {"cpu": 2.5, "where": "there"}}')
         rows = [dict(tool="default", cpu=0.125), dict(tool="cgal", failure="gone")]
         monkeypatch.setattr(tool, "in_processes", lambda work, jobs, *_, **__: rows)
         assert "cgal: gone" in call("seconds", "--tool", "default")
-        found = parts.tables.seconds()
+        found = parts.tables.seconds("v1")
         assert (found["cgal"], found["default"]["cpu"]) == (dict(cpu=2.5, where="there"), 0.125)
         assert "one thread" in found["default"]["where"]
 
     def test_pages_are_filled_or_all_is_printed(self, tool, parts, call, tmp_path, monkeypatch):
-        monkeypatch.setattr(tool, "kept", lambda: entries(parts, default=[row()]))
+        monkeypatch.setattr(tool, "kept", lambda version: entries(parts, default=[row()]) if version == "v1" else [])
         monkeypatch.setattr(tool, "IMAGES", tmp_path)
-        monkeypatch.setattr(tool, "pieces", lambda entries, rows: {name: f"of {name}" for name in tool.PARTS})
+        words = {name: f"of {name}" for name in tool.PARTS["v1"]}
+        monkeypatch.setattr(tool, "pieces", lambda version, entries, rows: words if entries else {})
         one = tmp_path / "one.md"
-        one.write_text("<!-- short -->\n<!-- end -->\n<!-- another -->\nkept\n<!-- end -->\n")
+        others = "<!-- another -->\nkept\n<!-- end -->\n<!-- things-short -->\nto come\n<!-- end -->\n"
+        one.write_text(f"<!-- short -->\n<!-- end -->\n{others}")
         call("page", one)
-        assert one.read_text() == "<!-- short -->\n\nof short\n<!-- end -->\n<!-- another -->\nkept\n<!-- end -->\n"
-        assert (tmp_path / "leaderboard.png").is_file()
-        assert call("page").split() == [word for name in tool.PARTS for word in ("of", name)]
+        assert one.read_text() == f"<!-- short -->\n\nof short\n<!-- end -->\n{others}"
+        assert sorted(path.name for path in tmp_path.glob("*.png")) == ["leaderboard.png"]
+        assert call("page").split() == [word for name in tool.PARTS["v1"] for word in ("of", name)]
+
+    def test_repeat_keeps_how_far_answers_are_apart(self, tool, parts, call, rods, tmp_path, monkeypatch):
+        monkeypatch.setattr(parts.tables, "KEPT", tmp_path)
+        words = ("--tool", "default", "--version", "v1", "--draws", 2)
+        assert "repeat_things.json.gz: default: moved 0." in call("repeat", tmp_path, *words)
+        assert len([*tmp_path.glob("repeat_things/default/*.npz")]) == 12
+        (found,) = parts.tables.repeats("v1", "things")
+        assert [each["draws"] for each in found.rows] == [2] * 6
+        _, header, (line,) = parts.tables.repeated([found])
+        cells = dict(zip(header, line, strict=True))
+        assert (cells[""], cells["loops"], cells["failures"]) == ("`default`", "1.00 [1.00, 1.00]", "0")
+        assert parts.tables.repeats("v1", "meshes") == []
+        other = Repeat("own 0", "cgal", found.rows)
+        with pytest.raises(typer.BadParameter, match="has other clouds"):
+            parts.tables.keep_repeat("v1", "things", other, {})
+        parts.tables.keep_repeat("v1", "things", Repeat(found.benchmark, "cgal", found.rows), {})
+        assert [each.name for each in parts.tables.repeats("v1", "things")] == ["default", "cgal"]
 
     @pytest.mark.parametrize(
         "wrong",

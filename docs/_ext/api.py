@@ -86,6 +86,7 @@ NAMES = {
         "Clouds of your own": ("add_shape",),
         "Answers": ("run",),
         "Scores": ("score", "Scores", "score_answers", "Results", "read_results", "leaderboard", "Leaderboard"),
+        "Repeated": ("sample", "repeat", "Repeat", "spread"),
     },
     "benchmark_shapes": {"Drawing one": ("shape", "Shape", "Thing")},
     "benchmark_clouds": {"Drawing one": ("cloud",), "How much it shows": ("coverage",)},

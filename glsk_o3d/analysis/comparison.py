@@ -209,7 +209,11 @@ def matching_f1(found, true, reach):
 def matched(found, true, reach):
     """The pairs of `matching_f1`: a list of (row of `found`, row of `true`)."""
     apart = cdist(found, true)
-    apart[apart > reach] = np.inf
+    return nearest_pairs(np.where(apart <= reach, apart, np.inf))
+
+
+def nearest_pairs(apart):
+    """Pairs (row, column) of finite distances, which become infinite: the nearest first, each row and column once."""
     pairs = []
     while np.isfinite(apart.min(initial=np.inf)):
         row, column = np.unravel_index(apart.argmin(), apart.shape)

@@ -5,6 +5,8 @@ import json
 
 import pytest
 from glsk_bench import read_results, score_answers, scoring
+from glsk_bench.folders import write_axis
+from glsk_bench.truths import ThingTruth
 
 from glsk_o3d import Skeleton, save_skeleton
 from glsk_o3d.errors import FileFormatError
@@ -115,6 +117,32 @@ def test_results_are_read_as_they_were_written(perfect, small, tmp_path):
     packed = tmp_path / "scores.json.gz"
     packed.write_bytes(gzip.compress((tmp_path / "scores.json").read_bytes()))
     assert read_results(packed) == results
+
+
+def test_results_without_the_measures_of_things_are_read(perfect, small, tmp_path):
+    results = score_answers(small, perfect)
+    results.save(tmp_path / "scores.json")
+    told = json.loads((tmp_path / "scores.json").read_text())
+    for row in told["clouds"]:
+        for name in scoring.OF_THINGS:
+            assert row.pop(name) is None
+    (tmp_path / "old.json").write_text(json.dumps(told))
+    assert read_results(tmp_path / "old.json") == results
+    del told["clouds"][0]["ends"]
+    (tmp_path / "old.json").write_text(json.dumps(told))
+    with pytest.raises(FileFormatError, match="a part is missing"):
+        read_results(tmp_path / "old.json")
+
+
+def test_a_thing_of_which_a_part_is_not_judged(perfect, small):
+    axis = small.truth("tubes_100")
+    parts = (axis.nodes, axis.edges, axis.radii, axis.radii, [2])
+    write_axis(small.path / "truth/tubes_100.npz", ThingTruth(*parts, [False, True], []))
+    (perfect / "tubes_100_scan2.obj").unlink()
+    rows = rows_of(score_answers(small, perfect))
+    assert (rows[CLOUD]["perfect"], rows[CLOUD]["junctions_f1"], rows[CLOUD]["reach"]) == (True, None, pytest.approx(0))
+    assert (rows["tubes_100_scan2"]["tips_f1"], rows["tubes_100_scan2"]["junctions_f1"]) == (0, None)
+    assert (rows["tubes_101_clean"]["junctions_f1"], rows["tubes_101_clean"]["reach"]) == (1, None)
 
 
 def test_packed_results_that_are_damaged_or_fill_the_memory(tmp_path, monkeypatch):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from glsk_bench import Scores, score
-from glsk_bench.scoring import MOST_ANSWER_JUNCTIONS, MOST_ANSWER_PLACES
+from glsk_bench.scoring import MOST_ANSWER_JUNCTIONS, MOST_ANSWER_PLACES, OF_THINGS
 
 from glsk_o3d import Skeleton
 from glsk_o3d.analysis import Truth, compare
@@ -26,7 +26,7 @@ def test_the_axis_is_perfect(star):
     assert told.pop("length") == pytest.approx(1)
     counts = dict.fromkeys(("components", "loops", "leaves", "junctions"), 0)
     best = dict(perfect=True, topology=True, tips_f1=1, junctions_f1=1, inside=1, completeness=1, ends=0)
-    assert told == best | counts | dict(failure=None)
+    assert told == best | counts | dict.fromkeys(OF_THINGS) | dict(failure=None)
 
 
 def test_a_leg_that_is_missing(star):
@@ -48,7 +48,7 @@ def test_faults_of_every_kind_have_the_measures_of_compare(star):
     vertices, edges = [*vertices, vertices[0] + [0.3, 0.2, 0.5]], [*star.edges[:-1], [0, 5]]
     expected = compare(Skeleton(vertices, edges, np.ones(6), (), (), ()), Truth(star.nodes, star.edges, star.radii))
     found = score(star, vertices, edges).as_dict()
-    assert found.pop("failure") is None
+    assert {found.pop(name) for name in ("failure", *OF_THINGS)} == {None}
     assert found == {name: expected.as_dict()[name] for name in found}
 
 

@@ -1,6 +1,7 @@
 """The table: its numbers, its words, and what cannot be compared."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from glsk_bench import Results, Scores, leaderboard
@@ -64,6 +65,16 @@ def test_in_markdown(two, tmp_path):
     assert board.markdown() == GOLDEN
     board.save(tmp_path / "table.md")
     assert (tmp_path / "table.md").read_text() == GOLDEN
+
+
+def test_what_only_things_have_has_columns_where_it_is_known(two):
+    thing = replace(BEST, hooks=0.25, wiggle=-0.0123)
+    board = leaderboard([*two, results("thing", thing, thing, FAILED, FAILED)])
+    heads, _, *lines = board.markdown().split("\n\n")[2].splitlines()
+    assert heads.endswith("| completeness | hooks | wiggle | s |")
+    cells = {line.split(" | ")[0]: line.split(" | ")[-3:-1] for line in lines}
+    assert cells["| thing"] == ["0.25 [0.25, 0.25]", "-0.012 [-0.012, -0.012]"]
+    assert cells["| good"] == ["-", "-"]
 
 
 def test_in_json(two, tmp_path):

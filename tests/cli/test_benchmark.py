@@ -90,6 +90,23 @@ def test_a_cloud_that_cannot_be_made_is_named(invoke, rods, monkeypatch):
     assert "clouds   0" in made.stdout
 
 
+def test_several_clouds_of_each_object(invoke, rods, program, tmp_path):
+    drawn = invoke("benchmark", "sample", "objects", "--version", "v1", "--draws", 2, "--points", 100)
+    assert (drawn.exit_code, drawn.stderr) == (0, "")
+    assert drawn.stdout.splitlines() == ["folder   objects", "objects  6", "clouds   12"]
+    command = quoted(program("write(skeleton)"))
+    invoke("benchmark", "run", "objects", "mine", "--command", command, "--ending", ".obj", "-q")
+    shown = invoke("benchmark", "repeat", "objects", "mine", "-o", "r.json")
+    assert (shown.exit_code, shown.stderr) == (0, "")
+    lines = shown.stdout.splitlines()
+    assert lines[0] == "**mine: answers to several clouds of each object**"
+    assert lines[-2].startswith("| mean | 0.00 |")
+    assert lines[-1] == "wrote r.json"
+    told = json.loads(invoke("benchmark", "repeat", "objects", "mine", "--name", "x", "--json").stdout)
+    assert (told["name"], told["means"]["agree"], len(told["objects"]), told["files"]) == ("x", 1, 6, [])
+    assert json.loads((tmp_path / "r.json").read_text())["objects"] == told["objects"]
+
+
 @pytest.mark.parametrize(
     ("code", "words", "said"),
     [
@@ -102,6 +119,10 @@ def test_a_cloud_that_cannot_be_made_is_named(invoke, rods, monkeypatch):
         (1, ("score", "bench", "none", "-o", "s.json"), "no such folder of answers"),
         (1, ("score", "bench", "bench", "-o", "s.json"), "has no answer to any cloud"),
         (2, ("score", "bench", "bench", "-o", "s.csv"), "its name ends in .json"),
+        (1, ("sample", "new", "none"), "none: has no meshes"),
+        (2, ("sample", "new", "--version", "v0"), "no version of the benchmark is called 'v0'"),
+        (1, ("repeat", "bench", "none"), "no such folder of answers"),
+        (2, ("repeat", "bench", "bench", "-o", "r.csv"), "its name ends in .json"),
         (1, ("table", "none.json"), "none.json: no such file"),
         (1, ("table", "bench/benchmark.json"), "not the scores of a benchmark"),
         (2, ("table", "bench/benchmark.json", "-o", "t.csv"), "its name ends in .md or .json"),

@@ -1,7 +1,9 @@
 from .folders import BenchmarkFolder, read_folder
 from .making import make
 from .own import add_shape
+from .repeating import Repeat, repeat, spread
 from .running import run
+from .sampling import sample
 from .scoring import Results, Scores, read_results, score, score_answers
 from .table import Leaderboard, leaderboard
 from .truths import ThingTruth
@@ -9,6 +11,7 @@ from .truths import ThingTruth
 __all__ = [
     "BenchmarkFolder",
     "Leaderboard",
+    "Repeat",
     "Results",
     "Scores",
     "ThingTruth",
@@ -17,7 +20,10 @@ __all__ = [
     "make",
     "read_folder",
     "read_results",
+    "repeat",
     "run",
+    "sample",
     "score",
     "score_answers",
+    "spread",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -177,6 +177,70 @@ def score(
             means = {measure: told[0] for measure, told in found.items() if isinstance(told, list)}
             print_rows({"name": results.name, "clouds": found["clouds"], "failures": found["failures"], **means})
             echo(f"wrote {output}")
+
+
+@app.command()
+def sample(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Made if needed; what it has is not drawn again.")],
+    meshes: Annotated[
+        Path | None, typer.Argument(metavar="MESHES", help="A folder of meshes; else things of the benchmark.")
+    ] = None,
+    version: Annotated[str, typer.Option(metavar="NAME", help="Of the benchmark, without MESHES.")] = "v2",
+    draws: Annotated[int, typer.Option(metavar="N", min=2, help="Clouds of each object.")] = 5,
+    points: Annotated[int, typer.Option(metavar="N", min=1, help="Of each cloud.")] = 4096,
+    noise: Annotated[float, typer.Option(metavar="SHARE", min=0, help="Of the diagonal, on every coordinate.")] = 0.0,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Draw several clouds of each object, for 'run' and 'repeat'."""
+    with reporting(quiet=quiet, verbose=verbose):
+        from . import sample as sample_objects
+
+        with progress(not quiet, remaining=True) as update:
+            update("reading")
+            options: dict[str, Any] = {"version": version, "draws": draws, "n": points, "noise": noise}
+            made = sample_objects(folder, meshes, **options, on_object=update)
+        told = {"folder": str(folder), "objects": len(made.shapes), "clouds": len(made.clouds)}
+        if as_json:
+            print_json(told)
+        elif not quiet:
+            print_rows(told)
+
+
+@app.command()
+def repeat(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="As 'glsk benchmark sample' made it.")],
+    answers: Annotated[Path, typer.Argument(metavar="ANSWERS", help="A folder of skeletons named OBJECT_DRAW.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="JSON", help="Write all numbers there.")
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of the program; by default that of its folder.")
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Compare the answers to several clouds of each object with each other. What is missing counts as a failure."""
+    with reporting(quiet=quiet, verbose=verbose):
+        from glsk_o3d.cli.outputs import REPORT_FILE, check_outputs
+
+        from . import repeat as compare_answers
+
+        files = [] if output is None else [output]
+        check_outputs([(path, *REPORT_FILE) for path in files])
+        with progress(not quiet, remaining=True) as update:
+            update("reading")
+            found = compare_answers(folder, answers, name=name, on_object=update)
+        for path in files:
+            found.save(path)
+        if as_json:
+            print_json({**found.as_dict(), "files": [str(path) for path in files]})
+        elif not quiet:
+            echo(found.markdown().rstrip())
+            for path in files:
+                echo(f"wrote {path}")
 
 
 @app.command()

@@ -23,7 +23,7 @@ from .versions import OWN, fingerprint
 
 FLOAT_ROUNDING = 1e-6  # fitted: how far float32 may move a point, in the diagonal: less than scanners tell apart
 OTHER_UNITS = 30.0  # fitted: ratio of the boxes' diagonals beyond which axis and cloud are not in one unit
-_PLAIN = re.compile(r"\w[\w.+-]*")  # on every system the name of a file, in the folder where it is written
+PLAIN = re.compile(r"\w[\w.+-]*")  # on every system the name of a file, in the folder where it is written
 
 
 def add_shape(
@@ -86,15 +86,15 @@ def add_shape(
     True
     """
     for word in (shape, family, *clouds):
-        if not isinstance(word, str) or not _PLAIN.fullmatch(word):
+        if not isinstance(word, str) or not PLAIN.fullmatch(word):
             raise InvalidParameterError(f"{word!r} is no plain name: use letters, digits and _.+-, no others first")
     if not clouds:
         raise InvalidParameterError(f"{shape}: no cloud is given")
-    points = {variant: _points(f"{shape}_{variant}", cloud) for variant, cloud in clouds.items()}
+    points = {variant: stored_points(f"{shape}_{variant}", cloud) for variant, cloud in clouds.items()}
     for variant, each in points.items():
         _check_units(f"{shape}_{variant}", each, nodes)
     made = begun(Path(folder), OWN)
-    _check_names(made, shape, points)
+    check_names(made, shape, points)
     axis, told = _axis(made, shape, points, nodes, edges, radii)
     for variant, each in points.items():
         before, now = told["clouds"].get(variant), fingerprint(each)
@@ -113,7 +113,7 @@ def add_shape(
     return made
 
 
-def _points(name: str, cloud: Any) -> np.ndarray:
+def stored_points(name: str, cloud: Any) -> np.ndarray:
     """The points of a cloud as they are written: float32, or float64 where that would move them too far."""
     points = cloud_points(cloud)
     with np.errstate(over="ignore"):
@@ -137,7 +137,7 @@ def _check_units(name: str, points: np.ndarray, nodes: Any) -> None:
         )
 
 
-def _check_names(made: BenchmarkFolder, shape: str, variants: Mapping[str, Any]) -> None:
+def check_names(made: BenchmarkFolder, shape: str, variants: Mapping[str, Any]) -> None:
     """Raise InvalidParameterError for names that another shape or cloud has, on systems without capitals too."""
     taken = {name.lower(): name for name in made.shapes}
     if taken.get(shape.lower(), shape) != shape:

@@ -7,9 +7,9 @@ import json
 import os
 import zlib
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,7 +21,10 @@ from glsk_o3d.io.skeletons import READABLE, read_skeleton
 from glsk_o3d.skeleton import Skeleton
 
 from .folders import BenchmarkFolder, CloudFile, read_folder
+from .measures import of_thing
+from .truths import THING_ARRAYS, ThingTruth
 
+T = TypeVar("T")
 # Where an answer is refused, so that no program can fill the memory of who scores it.
 MOST_ANSWER_PLACES = 2_000_000  # fitted: along an answer; axes of the benchmark have a thousand to ten thousand
 MOST_ANSWER_JUNCTIONS = 5000  # fitted: of which all pairs are compared; axes have up to some twenty
@@ -52,9 +55,27 @@ class Scores:
         are none.
     components, loops, leaves, junctions : int or None
         How many more the answer has than the axis.
+    hooks : float or None
+        Share of the answer's ends, of branches longer than 3.5 radii, whose last radius turns by more than 30 degrees
+        against the run from 1.5 to 3.5 radii behind the tip, beyond what the true end turns. 0 is best.
+    reach, overshoot : float or None
+        How far along the axis the answer ends from where it should at a flat face, half a radius inside: the mean
+        without and with the sign, of which + is too far. 4 radii where none of it comes near. 0 is best.
+    wiggle : float or None
+        Length of the answer over that of the axis, less 1, where each runs beside the other. 0 is best.
+    mirror : float or None
+        Mean distance of the answer from its mirror image, of what has a plane of symmetry. 0 is best.
+    junction_offset : float or None
+        Mean distance of the junctions that are paired with true ones. 0 is best.
     failure : str or None
         Why there is no answer that could be scored. Then `perfect` and `topology` are false, both F1 are 0, and all
         others are None.
+
+    Notes
+    -----
+    From `hooks` to `junction_offset` they are None unless the truth is that of a thing, as of version 2. Where edges of
+    it are not judged, all is measured on the judged ones and on what of the answer is nearest to these, `topology`
+    excepted; then `junctions_f1`, `length`, `junctions` and `junction_offset` are None.
 
     Examples
     --------
@@ -65,7 +86,7 @@ class Scores:
     perfect: bool
     topology: bool
     tips_f1: float
-    junctions_f1: float
+    junctions_f1: float | None
     error: float | None = None
     inside: float | None = None
     completeness: float | None = None
@@ -75,6 +96,12 @@ class Scores:
     loops: int | None = None
     leaves: int | None = None
     junctions: int | None = None
+    hooks: float | None = None
+    reach: float | None = None
+    overshoot: float | None = None
+    wiggle: float | None = None
+    mirror: float | None = None
+    junction_offset: float | None = None
     failure: str | None = None
 
     @classmethod
@@ -107,6 +134,7 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
     Parameters
     ----------
     truth : Truth, Sample, or anything else with `nodes`, `edges` and `radii`
+        Of a thing it also has `half_width`, `flat`, `judged` and `mirror`, as `BenchmarkFolder.truth` gives them.
     vertices : (M, 3) array_like of float
         In the units of the truth.
     edges : (E, 2) array_like of int
@@ -131,7 +159,7 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
     >>> score(ring, ring.nodes, ring.edges[1:]).loops
     -1
     """
-    axis = truth if isinstance(truth, Truth) else Truth(truth.nodes, truth.edges, truth.radii)
+    axis = _truth(truth)
     try:
         places = np.asarray(vertices, float).reshape(-1, 3)
         links = simple_edges(check_graph(places, edges, "skeleton"))
@@ -139,16 +167,29 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
         if isinstance(error, InvalidParameterError):
             raise
         raise InvalidParameterError(f"the skeleton has vertices or edges of no use: {error}") from None
-    _check_size(axis, places, links)
-    found = compare(Skeleton(places, links, (), (), (), ()), axis).as_dict()  # type: ignore[arg-type]
-    return Scores(**{name: found[name] for name in Scores.__dataclass_fields__ if name != "failure"})
+    check_size(float(np.median(axis.radii)), places, links)
+    answer = Skeleton(places, links, (), (), (), ())  # type: ignore[arg-type]
+    found = compare(answer, axis).as_dict()
+    if isinstance(axis, ThingTruth):
+        found |= of_thing(axis, answer, found["topology"])
+    return Scores(**{name: found[name] for name in Scores.__dataclass_fields__ if name in found})
 
 
-def _check_size(axis: Truth, vertices: np.ndarray, edges: np.ndarray) -> None:
-    """Raise InvalidParameterError for what would take too much memory to score."""
+def _truth(truth: Any) -> Truth:
+    """The truth as its class, if it is something else that has what it has."""
+    if isinstance(truth, Truth):
+        return truth
+    parts = (truth.nodes, truth.edges, truth.radii)
+    if not all(hasattr(truth, name) for name in THING_ARRAYS):
+        return Truth(*parts)
+    return ThingTruth(*parts, *(getattr(truth, name) for name in THING_ARRAYS))
+
+
+def check_size(radius: float, vertices: np.ndarray, edges: np.ndarray) -> None:
+    """Raise InvalidParameterError for what would take too much memory to score, with places by the median radius."""
     with np.errstate(over="ignore"):
         length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1).sum()
-    places = length / (PLACE_SPACING * np.median(axis.radii)) + len(edges) + len(vertices)
+    places = length / (PLACE_SPACING * radius) + len(edges) + len(vertices)
     if not places <= MOST_ANSWER_PLACES:
         raise InvalidParameterError(
             f"the skeleton is {length:.3g} long and has {len(edges)} edges, too much for an answer: is it in the units "
@@ -161,7 +202,12 @@ def _check_size(axis: Truth, vertices: np.ndarray, edges: np.ndarray) -> None:
         )
 
 
-MEASURES = ("perfect", "topology", "tips_f1", "junctions_f1", "error", "inside", "completeness", "length", "ends")
+OF_THINGS = ("hooks", "reach", "overshoot", "wiggle", "mirror", "junction_offset")
+"""The measures that only things have."""
+MEASURES = (
+    *("perfect", "topology", "tips_f1", "junctions_f1", "error", "inside", "completeness", "length", "ends"),
+    *OF_THINGS,
+)
 """What is averaged: shares and F1 over all clouds, what comes after them over the answers that could be scored."""
 TIMES_NAME = "times.json"
 MOST_RESULTS = 1 << 28  # derived: bytes, far more than any version has, so that a few bytes cannot fill the memory
@@ -260,25 +306,54 @@ def score_answers(
     >>> [(row["variant"], row["perfect"], row["failure"]) for row in results.rows]
     [('clean', True, None), ('holes', False, 'no answer')]
     """
-    made = folder if isinstance(folder, BenchmarkFolder) else read_folder(folder)
-    place = Path(answers)
-    if not place.is_dir():
-        raise FileNotFoundError(f"{place}: no such folder of answers")
-    files, times, clouds = answer_files(place), read_times(place), made.scored
-    if not times and not any(cloud.name in files for cloud in clouds):
-        example = f"{clouds[0].name}.ply" if clouds else "SHAPE_VARIANT.ply"
-        raise FileFormatError(
-            f"{place}: has no answer to any cloud: they are called as the clouds are, such as {example}"
-        )
-    rows = []
+    given = Answers(folder, answers)
+    made, clouds, rows = given.made, given.made.scored, []
+    for shape, told in made.shapes.items():
+        if not (made.path / told["truth"]).is_file():
+            raise FileNotFoundError(
+                f"{made.path}: has no true axis of {shape}: 'glsk benchmark repeat' compares answers with each other"
+            )
     for done, cloud in enumerate(clouds, 1):
-        told = times.get(cloud.name, {})
-        scores = _score(made, cloud, files.get(cloud.name, []), told)
+        scores = _score(given, cloud)
         facts = {"shape": cloud.shape, "family": cloud.family, "variant": cloud.variant}
-        rows.append({**facts, **scores.as_dict(), "seconds": told.get("seconds")})
+        rows.append({**facts, **scores.as_dict(), "seconds": given.times.get(cloud.name, {}).get("seconds")})
         if on_cloud is not None:
             on_cloud(cloud.name, done, len(clouds))
-    return Results(made.name, name or place.resolve().name, made.whole, rows)
+    return Results(made.name, name or given.name, made.whole, rows)
+
+
+class Answers:
+    """The answers in a folder to the clouds of a benchmark."""
+
+    def __init__(self, folder: BenchmarkFolder | str | os.PathLike, answers: str | os.PathLike):
+        self.made = folder if isinstance(folder, BenchmarkFolder) else read_folder(folder)
+        place = Path(answers)
+        if not place.is_dir():
+            raise FileNotFoundError(f"{place}: no such folder of answers")
+        self.name, self.files, self.times = place.resolve().name, answer_files(place), read_times(place)
+        clouds = self.made.scored
+        if not self.times and not any(cloud.name in self.files for cloud in clouds):
+            example = f"{clouds[0].name}.ply" if clouds else "SHAPE_VARIANT.ply"
+            raise FileFormatError(
+                f"{place}: has no answer to any cloud: they are called as the clouds are, such as {example}"
+            )
+
+    def use(self, cloud: CloudFile, make: Callable[[Skeleton], T]) -> T | str:
+        """What is made of the answer to a cloud; or in words, why there is none of which it can be made."""
+        told, files = self.times.get(cloud.name, {}), self.files.get(cloud.name, [])
+        failure = told.get("failure")
+        if told.get("digits") not in (None, self.made.digits(cloud)):
+            return "no answer: what is there answers another cloud of this name"
+        if len(files) > 1:
+            raise FileFormatError(f"{files[0]}: {files[1].name} answers the same cloud: keep one of them")
+        if not files:
+            return f"no answer: {failure}" if failure else "no answer"
+        try:
+            return make(read_skeleton(files[0]))
+        except MissingPackageError:
+            raise
+        except (FileFormatError, InvalidParameterError, OSError, MemoryError) as error:
+            return f"unreadable: {brief(error).removeprefix(f'{files[0]}: ')}"
 
 
 def answer_files(place: Path) -> dict[str, list[Path]]:
@@ -291,23 +366,15 @@ def answer_files(place: Path) -> dict[str, list[Path]]:
     return found
 
 
-def _score(made: BenchmarkFolder, cloud: CloudFile, files: list[Path], told: dict[str, Any]) -> Scores:
+def _score(given: Answers, cloud: CloudFile) -> Scores:
     """The scores of the answer to a cloud: that of a failure if there is none."""
-    failure = told.get("failure")
-    if told.get("digits") not in (None, made.digits(cloud)):
-        return Scores.of_failure("no answer: what is there answers another cloud of this name")
-    if len(files) > 1:
-        raise FileFormatError(f"{files[0]}: {files[1].name} answers the same cloud: keep one of them")
-    if not files:
-        return Scores.of_failure(f"no answer: {failure}" if failure else "no answer")
-    truth = made.truth(cloud.shape)
-    try:
-        answer = read_skeleton(files[0])
-        return score(truth, answer.vertices, answer.edges)
-    except MissingPackageError:
-        raise
-    except (FileFormatError, InvalidParameterError, OSError, MemoryError) as error:
-        return Scores.of_failure(f"unreadable: {brief(error).removeprefix(f'{files[0]}: ')}")
+    truth = given.made.truth(cloud.shape)
+    found = given.use(cloud, lambda answer: score(truth, answer.vertices, answer.edges))
+    if not isinstance(found, str):
+        return found
+    in_part = isinstance(truth, ThingTruth) and not truth.judged.all()
+    scores = Scores.of_failure(found)
+    return replace(scores, junctions_f1=None) if in_part else scores  # of an answer it would be None, too
 
 
 def read_times(place: Path) -> dict[str, dict[str, Any]]:
@@ -359,9 +426,10 @@ def read_results(path: str | os.PathLike) -> Results:
             raise ValueError("it is too large")
         told = json.loads(data)
         benchmark, name, whole, rows = (told[fact] for fact in _FACTS)
-        known = {"shape", "variant", "seconds", *Scores.__dataclass_fields__}
+        known = {"shape", "variant", "seconds", *Scores.__dataclass_fields__} - {*OF_THINGS}
         if not all(isinstance(fact, str) for fact in (benchmark, name)) or any(known - row.keys() for row in rows):
             raise ValueError("a part is missing")
+        rows = [dict.fromkeys(OF_THINGS) | row for row in rows]  # which older scores lack
         if not all(isinstance(row[measure], int | float | None) for row in rows for measure in (*MEASURES, "seconds")):
             raise ValueError("a measure is no number")
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, *_BROKEN) as error:

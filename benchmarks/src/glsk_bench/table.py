@@ -15,12 +15,12 @@ import numpy as np
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.interop.atomic import write_atomically, write_json
 
-from .scoring import MEASURES, Results
+from .scoring import MEASURES, OF_THINGS, Results
 from .versions import OWN
 
-_COLUMNS = MEASURES[:7]  # in Markdown; JSON has them all
-_HEADS = {"tips_f1": "tips F1", "junctions_f1": "junctions F1"}
-_DIGITS = {"error": 3}
+_COLUMNS = (*MEASURES[:7], "hooks", "reach", "wiggle", "mirror", "junction_offset")  # in Markdown; JSON has them all
+_HEADS = {"tips_f1": "tips F1", "junctions_f1": "junctions F1", "junction_offset": "junction offset"}
+_DIGITS = {"error": 3, "wiggle": 3, "mirror": 3}
 _CAPTION = (
     "Means, and in brackets 95 % intervals from drawing the shapes anew. A failure is neither perfect nor right in its "
     "topology, and its F1 are 0; what comes after these are means over the answers that could be scored. Seconds are "
@@ -119,8 +119,9 @@ class Leaderboard:
         if self.entries:
             first = self.entries[0]["all"]
             title = f"{first['clouds']} clouds of {first['shapes']} shapes"
-            parts.append(_table(title, "program", ((each["name"], each["all"]) for each in self.entries)))
-        parts += [_table(each["name"], "variant", each["variants"].items()) for each in self.entries]
+            known = [name for name in _COLUMNS if name not in OF_THINGS or any(it["all"][name] for it in self.entries)]
+            parts.append(_table(title, "program", ((each["name"], each["all"]) for each in self.entries), known))
+            parts += [_table(each["name"], "variant", each["variants"].items(), known) for each in self.entries]
         return "\n\n".join(parts) + "\n"
 
 
@@ -188,18 +189,24 @@ def _cell(rows: Sequence[dict[str, Any]]) -> Cell:
     return cell
 
 
-def _table(title: str, first: str, cells: Iterable[tuple[str, Cell]]) -> str:
-    """A table in Markdown; no name breaks it."""
-    heads = [first, "clouds", "failures", *(_HEADS.get(measure, measure) for measure in _COLUMNS), "s"]
-    lines = [heads, ["---", *["--:"] * (len(heads) - 1)]]
+def _table(title: str, first: str, cells: Iterable[tuple[str, Cell]], measures: Sequence[str]) -> str:
+    """A table in Markdown."""
+    heads = [first, "clouds", "failures", *(_HEADS.get(measure, measure) for measure in measures), "s"]
+    lines = []
     for name, cell in cells:
         means = []
-        for measure in _COLUMNS:
+        for measure in measures:
             mean, low, high = cell[measure] or (np.nan, np.nan, np.nan)
             means.append(told(mean, low, high, _DIGITS.get(measure, 2)))
         seconds = "-" if cell["seconds"] is None else f"{cell['seconds']:.2f}"
-        lines.append([_plain(name), str(cell["clouds"]), str(cell["failures"]), *means, seconds])
-    return "\n".join([f"**{_plain(title)}**", "", *(f"| {' | '.join(words)} |" for words in lines)])
+        lines.append([name, str(cell["clouds"]), str(cell["failures"]), *means, seconds])
+    return markdown_lines(title, heads, lines)
+
+
+def markdown_lines(title: str, heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown, of words: no name breaks it."""
+    rows = [heads, ["---", *["--:"] * (len(heads) - 1)], *([_plain(word) for word in words] for words in lines)]
+    return "\n".join([f"**{_plain(title)}**", "", *(f"| {' | '.join(words)} |" for words in rows)])
 
 
 def _plain(name: str) -> str:
