@@ -12,6 +12,7 @@ from ..numerics.cycles import minimum_cycle_basis
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import norm
 from ..refinement.rooted import root_among
+from ..report import html_table
 from ..skeleton import Skeleton
 from .curves import curvature_torsion
 from .rows import Rows
@@ -111,14 +112,27 @@ class BranchTable(Rows, row="branch"):
         return {name: [cell(name, value) for value in columns[name]] for name in PRINTED_COLUMNS if name in columns}
 
     def __str__(self):
-        columns = [[name, *cells] for name, cells in self.printed().items()]
+        columns = self._cut()
         for column in columns:
-            if len(self) > PRINTED_ROWS:
-                column[PRINTED_ROWS - 4 : -4] = ["..." if column is columns[0] else ""]
             width = max(map(len, column))
             column[:] = [text.ljust(width) if column[0] == "kind" else text.rjust(width) for text in column]
         lines = ["  ".join(row).rstrip() for row in zip(*columns, strict=True)]
-        return "\n".join([f"{self!r}: lengths in the cloud's units, angles in degrees", *lines])
+        return "\n".join([self._heading, *lines])
+
+    def _repr_html_(self):
+        heads, *rows = zip(*self._cut(), strict=True)
+        return f"<p>{self._heading}</p>{html_table(rows, [head.replace('_', ' ') for head in heads], 'right')}"
+
+    @property
+    def _heading(self):
+        return f"{self!r}: lengths in the cloud's units, angles in degrees"
+
+    def _cut(self):
+        """The printed columns, each under its name; of a long table the first rows and the last ones."""
+        columns = [[name, *cells] for name, cells in self.printed().items()]
+        for column in columns if len(self) > PRINTED_ROWS else ():
+            column[PRINTED_ROWS - 4 : -4] = ["..." if column is columns[0] else ""]
+        return columns
 
 
 @np.errstate(all="ignore")  # a file may hold coordinates whose squares no float64 holds

@@ -38,11 +38,13 @@ def edit(
     root, the stem is 0.
     """
     from .. import editing
+    from ..analysis.summary import structure
     from ..decisions import coordinates
     from ..io.skeletons import read_skeleton
 
     check_outputs(skeleton_files(output), skeleton, needed="an output with -o")
-    edited, done = read_skeleton(skeleton), []
+    before, done = read_skeleton(skeleton), []
+    edited = before
     if largest:
         done.append(f"kept one of {edited.n_components} components")
         edited = editing.largest_component(edited)
@@ -58,10 +60,11 @@ def edit(
         done.append(f"pruned {n_ends - len(edited.leaves)} of {n_ends} ends")
     if smooth:
         edited = editing.smooth(edited, passes=smooth)
+        done.append(f"smoothed in {smooth} pass{'es' * (smooth > 1)}")
     if tolerance is not None or vertices is not None:
         n_vertices, edited = len(edited.vertices), editing.simplify(edited, tolerance=tolerance, n=vertices)
         done.append(f"kept {len(edited.vertices)} of {n_vertices} vertices")
-    _write(edited, output or [], done)
+    _write(edited, output or [], done, before=structure(before))
 
 
 def convert(
@@ -82,9 +85,22 @@ def convert(
     _write(read_skeleton(skeleton), output, [], cut_loops=cut_loops, root=root)
 
 
-def _write(skeleton: Skeleton, output: list[Path], done: list[str], **options: Any) -> None:
+def _write(
+    skeleton: Skeleton, output: list[Path], done: list[str], before: dict[str, Any] | None = None, **options: Any
+) -> None:
+    """Write a skeleton, and say what was done to it, and what that changed of its counts before."""
+    from ..analysis.summary import structure
+
     written, problems = write_each(skeleton_writers(skeleton, output, **options))
-    tell(None, lambda: echo("\n".join(done)) if done else None, written, problems)
+    facts = {"done": done, "before": before, "after": structure(skeleton), "files": list(map(str, written))}
+
+    def words() -> None:
+        pairs = {name: (count, facts["after"][name]) for name, count in (before or {}).items()}
+        changed = [f"{name} {old:.6g} -> {new:.6g}" for name, (old, new) in pairs.items() if old != new]
+        for line in [*done, *[", ".join(changed) or "all counts are as before"] * bool(before)]:
+            echo(line)
+
+    tell(facts, words, written, problems)
 
 
 def rig(

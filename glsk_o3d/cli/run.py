@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from typer import Option
 
 from ..errors import FileFormatError, MissingPackageError
+from .completion import complete_scripts
 from .console import echo, flags, print_table, progress
 from .options import CutLoops, argument, output_option
 from .outputs import check_outputs, tell, write_each
@@ -14,7 +15,10 @@ from .reporting import WrongUsage, load_open3d
 
 
 def run(
-    script: Annotated[str | None, argument("SCRIPT", "A filter script (.mlx), or the name of one in --list.")] = None,
+    script: Annotated[
+        str | None,
+        argument("SCRIPT", "A filter script (.mlx), or the name of one in --list.", autocompletion=complete_scripts),
+    ] = None,
     scan: Annotated[Path | None, argument("SCAN", "The cloud or mesh it starts from.")] = None,
     output: Annotated[
         list[Path] | None,
@@ -108,8 +112,8 @@ def _words(value: Any) -> str:
 
 def _list() -> None:
     from ..interop.packages import require
-    from ..meshlab.script import comment, read_script
-    from ..meshlab.steps import meshlabs_own, scripts
+    from ..meshlab.script import comment, read_script, scripts
+    from ..meshlab.steps import meshlabs_own
 
     found: list[dict[str, Any]] = [
         {"name": name, "needs_pymeshlab": bool(meshlabs_own(read_script(path), path)), "doc": comment(path)}

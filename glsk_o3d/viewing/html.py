@@ -16,7 +16,7 @@ from ..decisions import coordinates
 from ..errors import MissingPackageError
 from ..interop.packages import require
 from ..io.colors import shades
-from ..report import Report
+from ..report import Report, html_table
 from ..skeleton import Skeleton
 from .figures import DPI
 from .preview import draw
@@ -70,9 +70,7 @@ def to_html(skeleton: Skeleton) -> str:
 
     Without what draws pictures, the numbers and what to install.
     """
-    style = 'style="text-align:right;padding:2px 10px"'  # all here, since not every notebook has Jupyter's sheet
-    heads = "".join(f"<th {style}>{name}</th>" for name in counts(skeleton))
-    cells = "".join(f"<td {style}>{text}</td>" for text in counts(skeleton).values())
+    table = html_table([list(counts(skeleton).values())], list(counts(skeleton)), "right")
     image, missing = "", []
     try:
         style = 'style="width:100%;background:#fff;border-radius:4px"'
@@ -82,11 +80,7 @@ def to_html(skeleton: Skeleton) -> str:
     style = 'style="margin:4px 0;border-left:3px solid #c77700;padding-left:8px"'
     messages = dict.fromkeys([*missing, *skeleton.report.warnings])
     warnings = "".join(f"<p {style}>{escape(text)}</p>" for text in messages)
-    return (
-        '<div style="max-width:1100px;font:13px/1.5 system-ui,sans-serif">'
-        f'{image}<table style="font:inherit;border-collapse:collapse;margin-top:4px"><thead>'
-        f"<tr>{heads}</tr></thead><tbody><tr>{cells}</tr></tbody></table>{warnings}</div>"
-    )
+    return f'<div style="max-width:1100px;font:13px/1.5 system-ui,sans-serif">{image}{table}{warnings}</div>'
 
 
 def figures(skeleton: Skeleton) -> str:
