@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator, MutableMapping
+from collections.abc import MutableMapping
 from dataclasses import Field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -42,7 +42,7 @@ def complete_settings(ctx: typer.Context, incomplete: str) -> list[str]:
 
     recipe, name = ctx.params.get("recipe"), ctx.params.get("pipeline") or "default"
     try:
-        known = dict(_settings(named_pipeline(name) if recipe is None else load_recipe(recipe)))
+        known = _settings(named_pipeline(name) if recipe is None else load_recipe(recipe))
     except (GlskError, OSError):  # it is said when the command runs
         return []
     if _parted:
@@ -54,35 +54,32 @@ def complete_settings(ctx: typer.Context, incomplete: str) -> list[str]:
     return [f"{fitting[0]}={value}" for value in known.get(fitting[0], [])]
 
 
-def _settings(pipeline: Pipeline[Any]) -> Iterator[tuple[str, list[str]]]:
-    """The parameters of a pipeline, also without their filter where that is clear, each with its values."""
+def _settings(pipeline: Pipeline[Any]) -> dict[str, list[str]]:
+    """The values of the parameters of a pipeline, by their names with their filter and, where it is clear, without."""
     from dataclasses import fields
 
     from ..pipeline import parts
 
-    present = {type(part): part for part in parts(pipeline)}
-    owned = [(part, field) for part in present.values() for field in fields(part)]  # type: ignore[arg-type]
-    names = Counter(field.name for _, field in owned)
-    for part, field in owned:
-        values = _values(type(part), field, getattr(part, field.name))
-        yield f"{type(part).__name__}.{field.name}", values
-        if names[field.name] == 1:
-            yield field.name, values
+    present = {type(part).__name__: part for part in parts(pipeline)}
+    owned = [(name, part, field) for name, part in present.items() for field in fields(part)]  # type: ignore[arg-type]
+    names = Counter(field.name for _, _, field in owned)
+    named = {f"{name}.{field.name}": _values(part, field) for name, part, field in owned}
+    return named | {field.name: _values(part, field) for _, part, field in owned if names[field.name] == 1}
 
 
-def _values(cls: type[Parameters], field: Field[Any], value: Any) -> list[str]:
+def _values(part: Parameters, field: Field[Any]) -> list[str]:
     """The words that a parameter may be, and else what it is."""
     from ..recipes.catalogue import catalogue, serves
 
-    kind = field.metadata["type"].rstrip("?")
-    words = list(field.metadata["choices"])
-    if kind in ("reducer", "stop"):
-        words += [name for name, other in catalogue().items() if other is not cls and serves(other, kind)]
+    kind, is_set = field.metadata["type"], str(getattr(part, field.name))
+    words, none = list(field.metadata["choices"]), ["none"] * kind.endswith("?")
+    if kind.startswith(("reducer", "stop")):
+        words += [name for name, cls in catalogue().items() if cls is not type(part) and serves(cls, kind.rstrip("?"))]
     elif kind == "bool":
         words += ["true", "false"]
-    elif isinstance(value, int | float | str) and str(value) not in words:
-        words.insert(0, str(value))
-    return words + ["none"] * field.metadata["type"].endswith("?")
+    elif is_set not in (*words, "None"):
+        words.insert(0, is_set)
+    return words + none
 
 
 _parted = ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from typer import Option
 
@@ -11,9 +11,6 @@ from .console import echo
 from .options import TREE_ENDINGS, CutLoops, Output, SkeletonFile, argument, option, output_option, root_option
 from .outputs import check_outputs, skeleton_files, skeleton_writers, tell, write_each
 from .reporting import WrongUsage, load_open3d
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
 
 
 def edit(
@@ -64,7 +61,15 @@ def edit(
     if tolerance is not None or vertices is not None:
         n_vertices, edited = len(edited.vertices), editing.simplify(edited, tolerance=tolerance, n=vertices)
         done.append(f"kept {len(edited.vertices)} of {n_vertices} vertices")
-    _write(edited, output or [], done, before=structure(before))
+    written, problems = write_each(skeleton_writers(edited, output))
+    counts = {"before": structure(before), "after": structure(edited)}
+
+    def words() -> None:
+        pairs = {name: (count, counts["after"][name]) for name, count in counts["before"].items()}
+        changed = [f"{name} {old:.6g} -> {new:.6g}" for name, (old, new) in pairs.items() if old != new]
+        echo("\n".join([*done, ", ".join(changed) or "all counts are as before"]))
+
+    tell({"done": done, **counts, "files": list(map(str, written))}, words, written, problems)
 
 
 def convert(
@@ -82,25 +87,8 @@ def convert(
         raise WrongUsage(
             f"--root is for formats that hold only trees, {', '.join(TREE_ENDINGS)}: for others use 'glsk edit'"
         )
-    _write(read_skeleton(skeleton), output, [], cut_loops=cut_loops, root=root)
-
-
-def _write(
-    skeleton: Skeleton, output: list[Path], done: list[str], before: dict[str, Any] | None = None, **options: Any
-) -> None:
-    """Write a skeleton, and say what was done to it, and what that changed of its counts before."""
-    from ..analysis.summary import structure
-
-    written, problems = write_each(skeleton_writers(skeleton, output, **options))
-    facts = {"done": done, "before": before, "after": structure(skeleton), "files": list(map(str, written))}
-
-    def words() -> None:
-        pairs = {name: (count, facts["after"][name]) for name, count in (before or {}).items()}
-        changed = [f"{name} {old:.6g} -> {new:.6g}" for name, (old, new) in pairs.items() if old != new]
-        for line in [*done, *[", ".join(changed) or "all counts are as before"] * bool(before)]:
-            echo(line)
-
-    tell(facts, words, written, problems)
+    written, problems = write_each(skeleton_writers(read_skeleton(skeleton), output, cut_loops=cut_loops, root=root))
+    tell(None, lambda: None, written, problems)
 
 
 def rig(

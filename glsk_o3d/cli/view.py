@@ -24,15 +24,16 @@ def view(
     the skeleton, and its tubes of true radius; H helps, Q closes. A scan has its colours, or else those of its labels.
     Labels have colours in turn, as branches do; measures go from dark blue to yellow.
     """
-    from functools import partial
+    from dataclasses import replace
 
     import numpy as np
 
-    from .. import Skeleton, read_skeleton, save_preview
-    from ..interop.packages import import_open3d
+    from .. import Skeleton, read_skeleton
     from ..io.colors import attribute_shades
     from ..io.scans import read_scan
     from ..io.skeletons import holds_skeleton
+    from ..viewing import figures
+    from ..viewing.preview import draw
     from ..viewing.window import show
 
     check_outputs(skeleton_files([], preview, report), file)
@@ -44,19 +45,20 @@ def view(
         skeleton = read_skeleton(file)
     else:
         scan = read_scan(file)
-        cloud, points, none, colors = scan.to_legacy(), scan.positions, np.empty(0), scan.colors
         if color is not None and color not in scan.given:
             raise WrongUsage(f"{file}: {did_you_mean(color, scan.given, 'attribute of its points')}")
-        shown = color or next((name for name in LABELS if name in scan.given and colors is None), None)
+        shown = color or next((name for name in LABELS if name in scan.given and scan.colors is None), None)
         if shown is not None:
-            colors = attribute_shades(scan.given[shown])
-            cloud.colors = import_open3d().utility.Vector3dVector(colors)
+            scan = replace(scan, colors=attribute_shades(scan.given[shown]))
+        cloud, points, colors, none = scan.to_legacy(), scan.positions, scan.colors, np.empty(0)
         skeleton = Skeleton(none, none, none, np.full(len(points), -1), points, np.full_like(points, np.nan))
     if preview is None and report is None:
         show(skeleton, cloud, title=file.name)
     else:
         writers = skeleton_writers(skeleton, [], preview, report, title=file.name)
         if preview is not None:
-            writers[preview] = partial(save_preview, skeleton, title=file.name, point_colors=colors)
+            warnings = skeleton.report.warnings
+            picture = draw(skeleton, None, file.name, warnings=warnings, point_colors=colors)
+            writers[preview] = lambda path: figures.save_figure(picture, path)
         written, problems = write_each(writers)
         tell(None, lambda: None, written, problems)

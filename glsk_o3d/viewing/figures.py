@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InvalidParameterError
 from ..interop.atomic import write_atomically
 from ..interop.packages import require
 
@@ -55,12 +54,6 @@ def colour_bar(figure, scale, box, ticks: list[float], labels: list[str] | None 
     bar.set_ticks(ticks, labels=labels)
     bar.outline.set_visible(False)
     bar.ax.tick_params(length=0, pad=2, labelsize=7, labelcolor=INK)
-
-
-def check_point_colors(points: np.ndarray, colors: Any) -> None:
-    """Raise InvalidParameterError unless there are as many colours as points, or None."""
-    if colors is not None and np.shape(colors) != points.shape:
-        raise InvalidParameterError(f"{len(points)} points need as many colours, not {np.shape(colors)}")
 
 
 def thinned(points: np.ndarray, most: int) -> np.ndarray:

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 
 from ..analysis.segmentation import branch_of_edge
+from ..errors import InvalidParameterError
 from ..interop.clouds import cloud_points
 from ..interop.packages import require
 from ..io.colors import shades
 from ..skeleton import Skeleton
-from .figures import check_point_colors
 from .preview import ROOT_MARK
 
 _FAR_GREY, _NEAR_GREY = 0.93, 0.55  # of the farthest and of the nearest point
@@ -85,7 +85,8 @@ def plot_skeleton(
     none = np.empty(0)
     skeleton = Skeleton(none, none, none, none, none, none) if skeleton is None else skeleton
     points, vertices = skeleton.points if cloud is None else cloud_points(cloud), skeleton.vertices
-    check_point_colors(points, point_colors)
+    if point_colors is not None and np.shape(point_colors) != points.shape:
+        raise InvalidParameterError(f"{len(points)} points need as many colours, not {np.shape(point_colors)}")
     finite = np.flatnonzero(np.isfinite(points).all(axis=1))
     shown = np.concatenate([points[finite], vertices])
     low, high = (shown.min(axis=0), shown.max(axis=0)) if len(shown) else (np.zeros(3), np.ones(3))

@@ -32,12 +32,7 @@ _BAR_CORNER = (0.3, 0.2)  # from the upper right corner of the picture to that o
 
 
 def save_preview(
-    skeleton: Skeleton,
-    path: str | os.PathLike,
-    *,
-    size: tuple[int, int] | None = None,
-    title: str | None = None,
-    point_colors: np.ndarray | None = None,
+    skeleton: Skeleton, path: str | os.PathLike, *, size: tuple[int, int] | None = None, title: str | None = None
 ) -> None:
     """Draw a skeleton and its cloud from three sides into a PNG file.
 
@@ -57,13 +52,9 @@ def save_preview(
         In pixels. By default as the object is wide and tall: from 900 x 450 to 1800 x 1200.
     title : str, optional
         Above the views.
-    point_colors : (N, 3) float array, optional
-        Red, green and blue of the cloud's points from 0 to 1, instead of greys.
 
     Raises
     ------
-    InvalidParameterError
-        There are not as many colours as points.
     FileFormatError, MissingPackageError, OSError
         The ending is not ``.png``, matplotlib is not installed, or the file cannot be written.
 
@@ -76,9 +67,7 @@ def save_preview(
     ...     save_preview(skeletonize(torus(1000).points), f"{folder}/ring.png")
     """
     check_ending(path, "preview is a picture", ".png")
-    figures.check_point_colors(skeleton.points, point_colors)
-    warnings = skeleton.report.warnings
-    figures.save_figure(draw(skeleton, size, title, warnings=warnings, point_colors=point_colors), path)
+    figures.save_figure(draw(skeleton, size, title, warnings=skeleton.report.warnings), path)
 
 
 def save_assessment(
