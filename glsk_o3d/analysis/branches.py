@@ -21,6 +21,7 @@ from .segmentation import branch_of_point
 # fitted: radii from a junction between which a branch has its direction; nearer, parts blend
 HEADING_SPAN = (1.0, 3.0)
 FAIR_SHARE = 0.3  # fitted: of the greatest growth length at a junction; on conifers, and plants with long leaves
+TABLE_UNITS = "lengths in the cloud's units, angles in degrees"
 PRINTED_ROWS = 20  # at most; fitted to a screen
 PRINTED_COLUMNS = {
     **dict(branch="d", kind="s", parent="d", level="d", axis="d", order="d", length=".4g", mean_radius=".3g"),
@@ -117,15 +118,11 @@ class BranchTable(Rows, row="branch"):
             width = max(map(len, column))
             column[:] = [text.ljust(width) if column[0] == "kind" else text.rjust(width) for text in column]
         lines = ["  ".join(row).rstrip() for row in zip(*columns, strict=True)]
-        return "\n".join([self._heading, *lines])
+        return "\n".join([f"{self!r}: {TABLE_UNITS}", *lines])
 
     def _repr_html_(self):
         heads, *rows = zip(*self._cut(), strict=True)
-        return f"<p>{self._heading}</p>{html_table(rows, [head.replace('_', ' ') for head in heads], 'right')}"
-
-    @property
-    def _heading(self):
-        return f"{self!r}: lengths in the cloud's units, angles in degrees"
+        return f"<p>{self!r}: {TABLE_UNITS}</p>{html_table(rows, [head.replace('_', ' ') for head in heads], 'right')}"
 
     def _cut(self):
         """The printed columns, each under its name; of a long table the first rows and the last ones."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..parameters import Parameters
     from ..pipeline import Pipeline
 
-PIPELINES = ("default", "tree", "wen2024", "cao2010")
+OWN_PIPELINES = ("default", "tree", "wen2024", "cao2010")
 """Those of this package, written out, since all filters would have to be imported to name them."""
 
 
@@ -25,7 +25,7 @@ def complete_pipelines() -> list[str]:
     """Names of pipelines; plugins are not loaded for theirs."""
     from ..interop.packages import PIPELINE_GROUP, entry_points
 
-    return [*PIPELINES, *(entry.name for _, entry in entry_points(PIPELINE_GROUP, []))]
+    return [*OWN_PIPELINES, *(entry.name for _, entry in entry_points(PIPELINE_GROUP, []))]
 
 
 def complete_scripts() -> list[str]:

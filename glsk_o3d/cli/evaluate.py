@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
-from .console import flags, print_table, progress
+from .console import flags, print_table, progress, value_in_words
 from .options import Numbers, SkeletonFile, argument, option
 from .outputs import PICTURE_FILE, REPORT_FILE, check_outputs, tell
 from .reporting import WrongUsage, load_open3d
@@ -137,15 +137,11 @@ def _rows(assessment: Assessment | None, comparison: Comparison | None) -> Itera
         for name in ("components", "loops", "leaves", "junctions"):
             difference = getattr(comparison, name)
             yield name, f"{difference:+d}" if difference else "0", "0", "more, or fewer, than in the axis"
-        yield "true topology", _yes(comparison.topology), "yes", "components and loops as in the axis"
-        yield "perfect", _yes(comparison.perfect), "yes", "so are the leaves, each near one of it"
+        yield "true topology", value_in_words(comparison.topology), "yes", "components and loops as in the axis"
+        yield "perfect", value_in_words(comparison.perfect), "yes", "so are the leaves, each near one of it"
 
 
 def _numbers(measures: Assessment | Comparison) -> Iterator[tuple[str, str, str, str]]:
     for name, value in measures.as_dict().items():
         if isinstance(value, float) and name in _MEASURES:
             yield name.replace("_", " "), f"{value:.4f}", *_MEASURES[name]
-
-
-def _yes(agrees: bool) -> str:
-    return "yes" if agrees else "no"

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from typer import Argument, Option
 
-from .completion import PIPELINES, complete_pipelines, complete_settings
+from .completion import OWN_PIPELINES, complete_pipelines, complete_settings
 
 SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "graphml", "cgal", "polylines.txt"]
 SKELETON_ENDINGS += ["vtp", "dxf", "glb", "mtg", "plant.csv", "urdf"]
@@ -55,7 +55,7 @@ PipelineName = Annotated[
     str,
     option(
         "NAME",
-        f"One of {', '.join(PIPELINES)}, or a plugin's; see 'glsk filters'.",
+        f"One of {', '.join(OWN_PIPELINES)}, or a plugin's; see 'glsk filters'.",
         autocompletion=complete_pipelines,
     ),
 ]

@@ -28,6 +28,7 @@ _LINE_SHARE, _LINE_WIDTH = 0.065, (0.6, 1.5)
 _DOT_SHARE, _WIDEST_DOT, _LONE_DOT = 0.12, 3.0, 3.7
 _MOST_MARKS = 12  # of what samples disagree with
 _BAR = (1.7, 0.09)  # width and height of the colour bar, in inches
+_BAR_ROOM = 0.75  # for it and the words below, in inches
 _BAR_CORNER = (0.3, 0.2)  # from the upper right corner of the picture to that of the bar, in inches
 
 
@@ -127,18 +128,18 @@ def save_assessment(
     if np.shape(values) != (len(skeleton.edges),):
         raise InvalidParameterError(f"{len(skeleton.edges)} edges need as many values, not {np.shape(values)}")
     shown = replace(skeleton, points=points, vertex_of_point=np.empty(0), normals=np.empty(0))
-    figure = draw(shown, size, title)
+    figure = draw(shown, size, title, least_head=_BAR_ROOM)
     _colour(figure, values, label, best, unknown)
     figures.save_figure(figure, path)
 
 
-def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] = (), point_colors=None):
+def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] = (), point_colors=None, least_head=0):
     """The figure, not yet in a file."""
     drawn = figures.thinned(skeleton.points, figures.MOST_DRAWN_POINTS)
     cloud, paint = skeleton.points[drawn], None if point_colors is None else np.asarray(point_colors)[drawn]
     centre, extent = figures.room(np.concatenate([cloud, skeleton.vertices]))
     foot, root = 0.34, skeleton.report.root
-    head = 0.58 if title else 0.42 if root else 0.25
+    head = max(0.58 if title else 0.42 if root else 0.25, least_head)
     if size is None:
         told = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if warnings else 0
         size = figures.DPI * figures.fitting_size(extent, head=head, foot=foot + told)

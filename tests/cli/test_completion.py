@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from glsk_o3d.cli.completion import PIPELINES, join_words
-from glsk_o3d.pipelines import PIPELINES as MADE
+from glsk_o3d.cli.completion import OWN_PIPELINES, join_words
+from glsk_o3d.pipelines import PIPELINES
 
 RUN = """
 import sys
@@ -64,4 +64,4 @@ def test_every_parameter_is_named_and_nothing_is_parted_but_settings():
 
 
 def test_the_names_written_out_are_those_there_are():
-    assert set(MADE) == set(PIPELINES)
+    assert set(OWN_PIPELINES) == set(PIPELINES)
