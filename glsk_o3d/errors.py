@@ -90,9 +90,11 @@ def did_you_mean(word: str, known: Iterable[str], what: str) -> str:
     "no parameter of Connector is called 'radios': did you mean 'radius'?"
     """
     names, word = {name.lower(): name for name in known}, brief(word)
-    close = difflib.get_close_matches(word.lower(), names, n=1)
+    close = difflib.get_close_matches(word.lower(), names, n=1) or [name for name in names if name.startswith(word)]
     listed = f"there are {', '.join(names.values()) or 'none'}" if len(names) <= 40 else "and none is like it"
-    hint = f"did you mean {names[close[0]]!r}?" if close else listed
+    hint = f"did you mean {names[close[0]]!r}?" if word and close else listed
+    if what.startswith("attribute") and hint != listed and len(names) <= 40:  # files differ in what they have
+        hint = f"{hint} ({listed})"
     if what.startswith("parameter"):  # in scripts with the filter's name ahead of it
         hint = next((cure for old, cure in MOVED.items() if f"_{word}".endswith(f"_{old}")), hint)
     return f"no {what} is called {word!r}: {hint}"

@@ -88,10 +88,13 @@ RESERVED_WORDS = ("filter", "rule", UNWRITTEN, FROM)
 
 
 class Parameters:
-    """Mixin of frozen dataclasses whose fields are made by `parameter`: checked when used, not when made."""
+    """Mixin of frozen dataclasses whose fields are made by `parameter`: checked when made, and again when used."""
 
     kind: ClassVar[str] = "rule"
     """What a recipe calls it."""
+
+    def __post_init__(self) -> None:
+        self.check()
 
     def check(self) -> None:
         """Raise InvalidParameterError if a parameter has the wrong type or is out of range."""

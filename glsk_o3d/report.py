@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 import sys
 import warnings as _warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
+from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
@@ -94,6 +95,19 @@ def _read(value: Any, hint: Any, name: str = "it") -> Any:
 def _told(counts: Mapping[str, int]) -> str:
     """Numbers with what they are of, but for zeros."""
     return ", ".join(f"{n} {name}" for name, n in counts.items() if n)
+
+
+def html_table(rows: Iterable[Sequence[str]], heads: Sequence[str] = (), align: str = "left") -> str:
+    """Texts as a table for a notebook, escaped; its style is in it, since not every notebook has Jupyter's sheet."""
+
+    def row(tag: str, texts: Sequence[str]) -> str:
+        cells = (f'<{tag} style="text-align:{align};padding:2px 10px">{escape(text)}</{tag}>' for text in texts)
+        return f"<tr>{''.join(cells)}</tr>"
+
+    head = f"<thead>{row('th', heads)}</thead>" if heads else ""
+    body = "".join(row("td", texts) for texts in rows)
+    style = "font:13px/1.5 system-ui,sans-serif;border-collapse:collapse;margin-top:4px"
+    return f'<table style="{style}">{head}<tbody>{body}</tbody></table>'
 
 
 def warn(messages: Iterable[str]) -> None:
@@ -200,6 +214,13 @@ class Report:
 
     def __str__(self) -> str:
         """What there is to say, in about ten lines; ``repr`` has it all."""
+        return "\n".join(["Report", *(f"{name:10} {words}".rstrip(": ") for name, words in self._told())])
+
+    def _repr_html_(self) -> str:
+        return html_table((name, words.rstrip(": ")) for name, words in self._told())
+
+    def _told(self) -> list[tuple[str, str]]:
+        """The lines, each as a name and what there is to say of it; the warnings come last."""
         counts = dict(
             contracted=self.n_contracted, dropped=self.n_dropped, outliers=self.n_outliers, traced=self.n_traced
         )
@@ -210,15 +231,15 @@ class Report:
             "noise": f"{self.noise:.2f}",
             "graph": _told(changes) or "nothing closed, cut or bridged",
             "decisions": f"{len(self.decisions)}, {len(self.uncertain)} of them uncertain",
-            "uncertain": self.uncertain[0] if self.uncertain else "",
+            "uncertain": str(self.uncertain[0]) if self.uncertain else "",
             "support": f"{self.n_agreeing} of {self.n_draws} samples have the same graph" if self.n_draws else "",
-            "weakest": self.unsupported[0] if self.unsupported else "",
+            "weakest": str(self.unsupported[0]) if self.unsupported else "",
             "seconds": f"{sum(self.seconds.values()):.2f}: "
             + ", ".join(f"{k} {v:.2f}" for k, v in self.seconds.items()),
             "versions": ", ".join(map(" ".join, self.versions.items())),
         }
-        told = [f"{name:10} {words}".rstrip(": ") for name, words in lines.items() if words != ""]
-        return "\n".join(["Report", *told, *(f"warning    {each}" for each in self.warnings)])
+        told = [(name, words) for name, words in lines.items() if words]
+        return told + [("warning", each) for each in self.warnings]
 
     def with_warning(self, message: str) -> Report:
         """This report with a warning in it; pipelines, and filters called by themselves, issue it in the end."""

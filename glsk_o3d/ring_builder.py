@@ -85,6 +85,7 @@ class RingBuilder(Filter[Contraction]):
                 )
             for name, value in given.items():
                 object.__setattr__(self, name, value)
+        super().__post_init__()
 
     def _run(self, points: Points, watch: Watch | None) -> Contraction:
         cloud = points.cloud[points.survivors]

@@ -60,10 +60,11 @@ class Tracer(Filter[Skeleton]):
     def __post_init__(self) -> None:
         # as plain text it can be compared, printed and written to files
         if not isinstance(self.root, str | None):
-            with suppress(TypeError, ValueError, OverflowError):  # what is no point is found when the filter is checked
+            with suppress(TypeError, ValueError, OverflowError):  # the check finds what is no point
                 point = np.asarray(self.root, float)
                 if point.shape == (3,):
                     object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))
+        super().__post_init__()
 
     def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
         if self.root is None and not (self.surface and may_lack_surface(given, self.surface)):

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -76,6 +77,9 @@ def test_print_says_the_main_things_in_about_ten_lines():
     ):
         assert words in said.splitlines()
     assert len(said.splitlines()) <= 12
+    html = replace(report, warnings=("a < b",))._repr_html_()
+    assert html.count("<tr>") == len(said.splitlines()) - 1
+    assert re.findall("<td [^>]*>([^<]*)</td>", html)[-2:] == ["warning", "a &lt; b"]
     assert str(Report()).splitlines()[2] == "points     0"
     assert eval(repr(report.decisions)) == report.decisions
 

@@ -12,6 +12,7 @@ from ..numerics.cycles import minimum_cycle_basis
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import norm
 from ..refinement.rooted import root_among
+from ..report import html_table
 from ..skeleton import Skeleton
 from .curves import curvature_torsion
 from .rows import Rows
@@ -20,6 +21,7 @@ from .segmentation import branch_of_point
 # fitted: radii from a junction between which a branch has its direction; nearer, parts blend
 HEADING_SPAN = (1.0, 3.0)
 FAIR_SHARE = 0.3  # fitted: of the greatest growth length at a junction; on conifers, and plants with long leaves
+TABLE_UNITS = "lengths in the cloud's units, angles in degrees"
 PRINTED_ROWS = 20  # at most; fitted to a screen
 PRINTED_COLUMNS = {
     **dict(branch="d", kind="s", parent="d", level="d", axis="d", order="d", length=".4g", mean_radius=".3g"),
@@ -111,14 +113,23 @@ class BranchTable(Rows, row="branch"):
         return {name: [cell(name, value) for value in columns[name]] for name in PRINTED_COLUMNS if name in columns}
 
     def __str__(self):
-        columns = [[name, *cells] for name, cells in self.printed().items()]
+        columns = self._cut()
         for column in columns:
-            if len(self) > PRINTED_ROWS:
-                column[PRINTED_ROWS - 4 : -4] = ["..." if column is columns[0] else ""]
             width = max(map(len, column))
             column[:] = [text.ljust(width) if column[0] == "kind" else text.rjust(width) for text in column]
         lines = ["  ".join(row).rstrip() for row in zip(*columns, strict=True)]
-        return "\n".join([f"{self!r}: lengths in the cloud's units, angles in degrees", *lines])
+        return "\n".join([f"{self!r}: {TABLE_UNITS}", *lines])
+
+    def _repr_html_(self):
+        heads, *rows = zip(*self._cut(), strict=True)
+        return f"<p>{self!r}: {TABLE_UNITS}</p>{html_table(rows, [head.replace('_', ' ') for head in heads], 'right')}"
+
+    def _cut(self):
+        """The printed columns, each under its name; of a long table the first rows and the last ones."""
+        columns = [[name, *cells] for name, cells in self.printed().items()]
+        for column in columns if len(self) > PRINTED_ROWS else ():
+            column[PRINTED_ROWS - 4 : -4] = ["..." if column is columns[0] else ""]
+        return columns
 
 
 @np.errstate(all="ignore")  # a file may hold coordinates whose squares no float64 holds

@@ -1,11 +1,24 @@
 """A run in a few numbers, as the commands and the ledger of a batch tell it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..report import NOT_CONTRACTED
+from ..report import NOT_CONTRACTED, IterationRecord
 from ..skeleton import Skeleton
 
+ITERATION_COLUMNS = {
+    "solve": ("iteration", "d"),
+    "points": ("n_points", ",d"),
+    "merged": ("n_merged", ",d"),
+    "held": ("n_held", ",d"),
+    "e": ("explained", ".4f"),
+    "De": ("explained_change", ".4f"),
+    "ring ratio": ("ring_ratio", ".4f"),
+    "w_L": ("contraction_weight", ".4g"),
+    "solver error": ("solve_error", ".1e"),
+    "seconds": ("seconds", ".3f"),
+}
+"""What people read of a contraction: the field of an IterationRecord by the heading, and its format."""
 ENDING_FACTS = ("iterations", "converged", "stop_reason")
 """What `ending` tells in one line."""
 
@@ -33,6 +46,11 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
         "stop_reason": report.stop_reason,
         "seconds": seconds,
     }
+
+
+def iteration_rows(records: Iterable[IterationRecord]) -> list[list[str]]:
+    """The iterations of a contraction as the rows of a table with `ITERATION_COLUMNS`."""
+    return [[f"{getattr(record, name):{form}}" for name, form in ITERATION_COLUMNS.values()] for record in records]
 
 
 def ending(facts: Mapping[str, Any]) -> str | None:

@@ -119,11 +119,12 @@ def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
     """
     if title:
         heading(title)
-    words = {name.replace("_", " "): _in_words(value) for name, value in rows.items()}
+    words = {name.replace("_", " "): value_in_words(value) for name, value in rows.items()}
     print_table(((name, text) for name, text in words.items() if text), wrap=console().file.isatty())
 
 
-def _in_words(value: Any) -> str:
+def value_in_words(value: Any) -> str:
+    """A value as people read it: each item of a list on a line, those of a tuple behind each other."""
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -131,9 +132,9 @@ def _in_words(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, dict):
-        return ", ".join(f"{name} {text}" for name, text in value.items())
+        return ", ".join(f"{name.replace('_', ' ')} {value_in_words(each)}" for name, each in value.items())
     if isinstance(value, list | tuple):
-        return ("\n" if isinstance(value, list) else " ").join(map(_in_words, value))
+        return ("\n" if isinstance(value, list) else " ").join(map(value_in_words, value))
     return str(value)
 
 

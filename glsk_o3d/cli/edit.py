@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from typer import Option
 
@@ -11,9 +11,6 @@ from .console import echo
 from .options import TREE_ENDINGS, CutLoops, Output, SkeletonFile, argument, option, output_option, root_option
 from .outputs import check_outputs, skeleton_files, skeleton_writers, tell, write_each
 from .reporting import WrongUsage, load_open3d
-
-if TYPE_CHECKING:
-    from ..skeleton import Skeleton
 
 
 def edit(
@@ -38,11 +35,13 @@ def edit(
     root, the stem is 0.
     """
     from .. import editing
+    from ..analysis.summary import structure
     from ..decisions import coordinates
     from ..io.skeletons import read_skeleton
 
     check_outputs(skeleton_files(output), skeleton, needed="an output with -o")
-    edited, done = read_skeleton(skeleton), []
+    before, done = read_skeleton(skeleton), []
+    edited = before
     if largest:
         done.append(f"kept one of {edited.n_components} components")
         edited = editing.largest_component(edited)
@@ -58,10 +57,19 @@ def edit(
         done.append(f"pruned {n_ends - len(edited.leaves)} of {n_ends} ends")
     if smooth:
         edited = editing.smooth(edited, passes=smooth)
+        done.append(f"smoothed in {smooth} pass{'es' * (smooth > 1)}")
     if tolerance is not None or vertices is not None:
         n_vertices, edited = len(edited.vertices), editing.simplify(edited, tolerance=tolerance, n=vertices)
         done.append(f"kept {len(edited.vertices)} of {n_vertices} vertices")
-    _write(edited, output or [], done)
+    written, problems = write_each(skeleton_writers(edited, output))
+    counts = {"before": structure(before), "after": structure(edited)}
+
+    def words() -> None:
+        pairs = {name: (count, counts["after"][name]) for name, count in counts["before"].items()}
+        changed = [f"{name} {old:.6g} -> {new:.6g}" for name, (old, new) in pairs.items() if old != new]
+        echo("\n".join([*done, ", ".join(changed) or "all counts are as before"]))
+
+    tell({"done": done, **counts, "files": list(map(str, written))}, words, written, problems)
 
 
 def convert(
@@ -79,12 +87,8 @@ def convert(
         raise WrongUsage(
             f"--root is for formats that hold only trees, {', '.join(TREE_ENDINGS)}: for others use 'glsk edit'"
         )
-    _write(read_skeleton(skeleton), output, [], cut_loops=cut_loops, root=root)
-
-
-def _write(skeleton: Skeleton, output: list[Path], done: list[str], **options: Any) -> None:
-    written, problems = write_each(skeleton_writers(skeleton, output, **options))
-    tell(None, lambda: echo("\n".join(done)) if done else None, written, problems)
+    written, problems = write_each(skeleton_writers(read_skeleton(skeleton), output, cut_loops=cut_loops, root=root))
+    tell(None, lambda: None, written, problems)
 
 
 def rig(

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
-from .console import flags, print_table, progress
+from .console import flags, print_table, progress, value_in_words
 from .options import Numbers, SkeletonFile, argument, option
 from .outputs import PICTURE_FILE, REPORT_FILE, check_outputs, tell
-from .reporting import load_open3d
+from .reporting import WrongUsage, load_open3d
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,7 +38,9 @@ _MEASURES = {  # measure: (best, what it is), as the table shows them
 
 def evaluate(
     skeleton: SkeletonFile,
-    cloud: Annotated[Path, argument("CLOUD", "The cloud it was made from, in the same units.")],
+    cloud: Annotated[
+        Path | None, argument("[CLOUD]", "The cloud it was made from, in its units; by default the one in its file.")
+    ] = None,
     truth: Annotated[
         Path | None, option("FILE", "Also compare with a known axis: npz with nodes, edges and radii, or a skeleton.")
     ] = None,
@@ -59,17 +61,21 @@ def evaluate(
         update(f"reading {skeleton.name}")
         curve = read_skeleton(skeleton)
         axis = read_truth(truth) if truth is not None else None
-        update(f"reading {cloud.name}")
-        load_open3d()
-        points = cloud_points(read_cloud(cloud))
+        points = curve.points
+        if cloud is not None:
+            update(f"reading {cloud.name}")
+            load_open3d()
+            points = cloud_points(read_cloud(cloud))
+        elif not len(points):
+            raise WrongUsage(f"{skeleton}: holds no cloud, as json and npz files of a run do: give the CLOUD, too")
         update("measuring")
         assessment, comparison = _measured(skeleton, curve, points, axis)
         if assessment is not None and _elsewhere(assessment, curve.vertices, points):
             message = "the skeleton does not lie in it: is this the cloud it was made from, in its units?"
-            warnings.warn(f"{cloud}: {message}", SkeletonWarning, stacklevel=1)
+            warnings.warn(f"{cloud or skeleton}: {message}", SkeletonWarning, stacklevel=1)
         facts = {
             "skeleton": str(skeleton),
-            "cloud": str(cloud),
+            "cloud": None if cloud is None else str(cloud),
             "truth": None if truth is None else str(truth),
             "assessment": None if assessment is None else assessment.as_dict(),
             "comparison": None if comparison is None else comparison.as_dict(),
@@ -131,15 +137,11 @@ def _rows(assessment: Assessment | None, comparison: Comparison | None) -> Itera
         for name in ("components", "loops", "leaves", "junctions"):
             difference = getattr(comparison, name)
             yield name, f"{difference:+d}" if difference else "0", "0", "more, or fewer, than in the axis"
-        yield "true topology", _yes(comparison.topology), "yes", "components and loops as in the axis"
-        yield "perfect", _yes(comparison.perfect), "yes", "so are the leaves, each near one of it"
+        yield "true topology", value_in_words(comparison.topology), "yes", "components and loops as in the axis"
+        yield "perfect", value_in_words(comparison.perfect), "yes", "so are the leaves, each near one of it"
 
 
 def _numbers(measures: Assessment | Comparison) -> Iterator[tuple[str, str, str, str]]:
     for name, value in measures.as_dict().items():
         if isinstance(value, float) and name in _MEASURES:
             yield name.replace("_", " "), f"{value:.4f}", *_MEASURES[name]
-
-
-def _yes(agrees: bool) -> str:
-    return "yes" if agrees else "no"

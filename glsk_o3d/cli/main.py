@@ -39,7 +39,7 @@ app = typer.Typer(
     epilog=EPILOG,
 )
 ANALYSES = (evaluate, crosscheck, branches, tree, grasps)
-WITHOUT_JSON = (edit, convert, rig, view, demo)
+WITHOUT_JSON = (convert, rig, view, demo)
 
 
 def add_plugged(app: typer.Typer) -> None:

@@ -5,6 +5,8 @@ from typing import Annotated, Any
 
 from typer import Argument, Option
 
+from .completion import OWN_PIPELINES, complete_pipelines, complete_settings
+
 SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "graphml", "cgal", "polylines.txt"]
 SKELETON_ENDINGS += ["vtp", "dxf", "glb", "mtg", "plant.csv", "urdf"]
 """Endings of skeletons; written out, since the table of formats is slow to import."""
@@ -12,9 +14,9 @@ TREE_ENDINGS = ["swc", "glb", "mtg", "plant.csv", "urdf"]
 """Endings of formats that hold only trees."""
 
 
-def argument(metavar: str, help: str) -> Any:
+def argument(metavar: str, help: str, **more: Any) -> Any:
     """An argument, as `Annotated` takes it; that a file cannot be read is no mistake in the command line."""
-    return Argument(metavar=metavar, help=help, readable=False)
+    return Argument(metavar=metavar, help=help, readable=False, **more)
 
 
 def option(metavar: str, help: str, *names: str, **more: Any) -> Any:
@@ -50,7 +52,12 @@ Where = Annotated[
 DropInvalid = Annotated[bool, Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")]
 
 PipelineName = Annotated[
-    str, option("NAME", "One of default, tree, wen2024 and cao2010, or a plugin's; see 'glsk filters'.")
+    str,
+    option(
+        "NAME",
+        f"One of {', '.join(OWN_PIPELINES)}, or a plugin's; see 'glsk filters'.",
+        autocompletion=complete_pipelines,
+    ),
 ]
 Recipe = Annotated[Path | None, option("FILE", "Run a pipeline from a json or toml file instead of a named one.")]
 Settings = Annotated[
@@ -60,6 +67,7 @@ Settings = Annotated[
         "Change a parameter, such as Connector.radius=2%, or k=24 where only one filter has a k; see 'glsk filters'; "
         "may be repeated.",
         "--set",
+        autocompletion=complete_settings,
     ),
 ]
 Root = Annotated[Any, root_option("Where the skeleton grows from, by default from where its file says")]

@@ -7,14 +7,18 @@ from typing import Annotated, Any
 from typer import Option
 
 from ..errors import FileFormatError, MissingPackageError
-from .console import echo, flags, print_table, progress
+from .completion import complete_scripts
+from .console import echo, flags, print_table, progress, value_in_words
 from .options import CutLoops, argument, output_option
 from .outputs import check_outputs, tell, write_each
 from .reporting import WrongUsage, load_open3d
 
 
 def run(
-    script: Annotated[str | None, argument("SCRIPT", "A filter script (.mlx), or the name of one in --list.")] = None,
+    script: Annotated[
+        str | None,
+        argument("SCRIPT", "A filter script (.mlx), or the name of one in --list.", autocompletion=complete_scripts),
+    ] = None,
     scan: Annotated[Path | None, argument("SCAN", "The cloud or mesh it starts from.")] = None,
     output: Annotated[
         list[Path] | None,
@@ -79,11 +83,11 @@ def _plain(result: Any) -> Any:
     if isinstance(result, dict):
         return {key: _plain(value) for key, value in result.items()}
     if isinstance(result, list | tuple):
-        return [_plain(value) for value in result]
+        return tuple(map(_plain, result))
     if hasattr(result, "diagonal") and hasattr(result, "dim_x"):  # pymeshlab.BoundingBox
         return {name: _plain(getattr(result, name)()) for name in ("min", "max", "diagonal")}
     if hasattr(result, "tolist"):
-        return result.tolist()
+        return _plain(result.tolist())
     return result if isinstance(result, bool | int | float | str | None) else str(result)
 
 
@@ -91,25 +95,17 @@ def _in_words(result: dict[str, Any]) -> str:
     """What a filter says, with the end of a contraction in a few words."""
     from ..analysis.summary import ENDING_FACTS, ending
 
-    words = [_words({key: value for key, value in result.items() if key not in ("warnings", *ENDING_FACTS)})]
+    words = [value_in_words({key: value for key, value in result.items() if key not in ("warnings", *ENDING_FACTS)})]
     if result.keys() >= set(ENDING_FACTS):
         words.append(ending(result) or "")
     joined = ", ".join(filter(None, words))
     return f": {joined}" if joined else ""
 
 
-def _words(value: Any) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{key.replace('_', ' ')} {_words(each)}" for key, each in value.items())
-    if isinstance(value, list):
-        return f"[{', '.join(map(_words, value))}]"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
 def _list() -> None:
     from ..interop.packages import require
-    from ..meshlab.script import comment, read_script
-    from ..meshlab.steps import meshlabs_own, scripts
+    from ..meshlab.script import comment, read_script, scripts
+    from ..meshlab.steps import meshlabs_own
 
     found: list[dict[str, Any]] = [
         {"name": name, "needs_pymeshlab": bool(meshlabs_own(read_script(path), path)), "doc": comment(path)}

@@ -23,18 +23,6 @@ if TYPE_CHECKING:
     from ..report import IterationRecord, Report
     from ..skeleton import Skeleton
 
-_ITERATIONS = {  # head of a column, field of IterationRecord, format
-    "solve": ("iteration", "d"),
-    "points": ("n_points", "d"),
-    "merged": ("n_merged", "d"),
-    "e": ("explained", ".4f"),
-    "De": ("explained_change", ".4f"),
-    "rings": ("ring_ratio", ".4f"),
-    "w_L": ("contraction_weight", ".4g"),
-    "error": ("solve_error", ".1e"),
-    "seconds": ("seconds", ".3f"),
-}
-
 
 def skeletonize(
     scan: options.ScanFile,
@@ -248,9 +236,10 @@ def _run(pipeline: Callable[..., Skeleton], cloud: Any, update, on_state=None) -
 
 def print_iterations(records: Sequence[IterationRecord], *, err: bool = False) -> None:
     """Print a contraction's iterations as a table."""
-    rows = [[format(getattr(record, name), form) for name, form in _ITERATIONS.values()] for record in records]
-    if rows:
-        print_table(rows, list(_ITERATIONS), err=err)
+    from ..analysis.summary import ITERATION_COLUMNS, iteration_rows
+
+    if records:
+        print_table(iteration_rows(records), list(ITERATION_COLUMNS), err=err)
 
 
 def _tell(

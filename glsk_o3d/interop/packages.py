@@ -28,6 +28,8 @@ _NEEDED = {  # ending of a file -> modules that read or write it
 _OPEN3D_LIBRARIES = "libegl1 libgl1 libgomp1 libidn2-0 libudev1 libusb-1.0-0 libx11-6"
 """What Debian calls the shared libraries that Open3D loads."""
 
+FILTER_GROUP, PIPELINE_GROUP = "glsk_o3d.filters", "glsk_o3d.pipelines"
+"""The entry points of plugins."""
 QUIET, TALKATIVE = 0, 3  # int(o3d.utility.VerbosityLevel.Error) and .Debug
 
 

@@ -125,15 +125,20 @@ _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.NotIn: lambda values, among: ~np.isin(values, among),
 }
 _JOINS = {ast.And: np.logical_and, ast.Or: np.logical_or}
+_JOINING = ("and", "or", "not", "in")
 
 
 def parsed(where: str) -> ast.expr:
-    """A condition as a tree of Python's grammar; InvalidParameterError if it is none."""
+    """A condition as a tree of Python's grammar; InvalidParameterError if it is none.
+
+    A word of Python's, such as ``class``, means the attribute that has a ``_`` behind it.
+    """
+    words = re.sub(r"\b[a-z]+\b", lambda word: word[0] + "_" * (iskeyword(word[0]) and word[0] not in _JOINING), where)
     try:
-        return ast.parse(where.strip(), mode="eval").body
+        return ast.parse(words.strip(), mode="eval").body
     except (SyntaxError, RecursionError, MemoryError) as error:
         why = getattr(error, "msg", "it is nested too deeply")
-        cure = "write such as 'classification == 5 and not z < 2', and class_ for class"
+        cure = "write such as 'classification == 5 and not z < 2'"
         raise InvalidParameterError(f"where = {where[:200]!r}: {why}: {cure}") from None
 
 
@@ -156,7 +161,8 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
             return number
         case ast.Name(id=name):
             if name not in columns:
-                raise InvalidParameterError(did_you_mean(name, columns, "attribute of the points"))
+                asked = word if iskeyword(word := name.removesuffix("_")) else name
+                raise InvalidParameterError(did_you_mean(asked, columns, "attribute of the points"))
             return columns[name]
     raise InvalidParameterError(f"{ast.unparse(node)!r} is not understood: compare attributes with numbers")
 

@@ -4,6 +4,7 @@ import math
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from importlib import resources
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
@@ -181,3 +182,11 @@ def comment(path: str | os.PathLike) -> str:
     parser.CommentHandler = comments.append
     parser.Parse(Path(path).read_bytes(), True)
     return " ".join(comments[0].split()) if comments else ""
+
+
+def scripts() -> dict[str, Path]:
+    """The files of the filter scripts that come with the package, by name."""
+    package = Path(str(resources.files("glsk_o3d")))
+    places = (package / "filters", package.parent / "filters")  # installed, and in a checkout
+    folder = next((place for place in places if place.is_dir()), None)
+    return {path.stem: path for path in sorted(folder.glob("*.mlx"))} if folder else {}

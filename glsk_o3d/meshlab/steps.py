@@ -4,7 +4,6 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from ..errors import GlskError, InvalidParameterError, MissingPackageError, Scri
 from ..interop.packages import require
 from . import builtin
 from .layers import Layer
-from .script import Call, read_script
+from .script import Call, read_script, scripts
 from .verbs import Verb, verbs
 
 
@@ -117,14 +116,6 @@ def _step(call: Call, path: str | os.PathLike, any_filter: bool) -> Step:
     except InvalidParameterError as error:
         raise wrong(error) from None
     return Step(name, values, call, f"{path}, line {call.line}")
-
-
-def scripts() -> dict[str, Path]:
-    """The files of the filter scripts that come with the package, by name."""
-    package = Path(str(resources.files("glsk_o3d")))
-    places = (package / "filters", package.parent / "filters")  # installed, and in a checkout
-    folder = next((place for place in places if place.is_dir()), None)
-    return {path.stem: path for path in sorted(folder.glob("*.mlx"))} if folder else {}
 
 
 def find_script(name: str | os.PathLike) -> Path:

@@ -9,15 +9,13 @@ from typing import Any
 
 from ..errors import PluginWarning
 from ..interop.clouds import Cloud
-from ..interop.packages import entry_points
+from ..interop.packages import FILTER_GROUP, entry_points
 from ..parameters import RESERVED_WORDS, TYPES, Parameters
 from ..pipeline import FLOWS, Filter, Pipeline
 from ..pipelines import BUILTIN, PIPELINES
 from ..report import outside
 
 __all__ = ["forget_plugins"]
-
-FILTER_GROUP, PIPELINE_GROUP = "glsk_o3d.filters", "glsk_o3d.pipelines"
 
 
 class _Unfit(Exception):

@@ -16,12 +16,13 @@ MOST_DRAWN_POINTS = 20_000
 # All fitted to the eye; lengths in inches.
 VIEW_GAP, VIEW_NAME = 0.3, 0.28  # between views at least; below each, for the names of its axes
 SMALLEST_PICTURE, LARGEST_PICTURE = (6.0, 3.0), (12.0, 8.0)  # width and height of one that is cut to its object
+LONGEST_BAR, ABOVE_VIEWS = 0.9, 0.12  # of the scale, which stands so far above the views
 WORTH_A_CHANGE = 1.2  # how much larger views must be in several rows than in one
 THINNEST = 0.08  # of an extent, over the largest: flat things have room for the width of their lines
 _ARRANGEMENTS = (  # rows of views, each by the coordinates that go across and up; the usual one first
-    (((0, 1), (0, 2), (1, 2)),),
+    (((0, 2), (1, 2), (0, 1)),),
     (((0, 2), (1, 2)), ((0, 1),)),
-    (((0, 1),), ((0, 2),), ((1, 2),)),
+    (((0, 2),), ((1, 2),), ((0, 1),)),
 )
 
 
@@ -79,11 +80,12 @@ def fitting_size(extent: np.ndarray, *, head: float, foot: float) -> np.ndarray:
 
 
 def three_views(figure: Any, extent: np.ndarray, *, head: float, foot: float) -> Iterator[tuple[int, int, Any]]:
-    """Axes for the views along the coordinate axes, all at one scale, with the names of their axes below each.
+    """Axes for the views from the front, the side and above, all at one scale, with the names of their axes below each.
 
-    They are side by side, or where they are larger so, two above one or one above the other. What is drawn is around
-    the origin, of this extent, (3,) float array; head and foot are the room above and below in inches. Gives the
-    coordinates that are drawn, across and up, and their axes.
+    A bar of a round length, in the units of the coordinates, stands above the first one. They are side by side, or
+    where they are larger so, two above one or one above the other. What is drawn is around the origin, of this extent,
+    (3,) float array; head and foot are the room above and below in inches. Gives the coordinates that are drawn, across
+    and up, and their axes.
     """
     whole = figure.get_size_inches()
     free = whole - [0, head + foot]
@@ -91,6 +93,7 @@ def three_views(figure: Any, extent: np.ndarray, *, head: float, foot: float) ->
     spare = free - used
     base = whole[1] - head - spare[1] / 2
     gap = VIEW_GAP + spare[0] / (max(map(len, rows)) + 1)
+    _scale_bar(figure, scale, gap, base + ABOVE_VIEWS)
     for row in rows:
         tallest = scale * max(extent[b] for _, b in row)
         base, left = base - tallest, gap
@@ -105,6 +108,17 @@ def three_views(figure: Any, extent: np.ndarray, *, head: float, foot: float) ->
             figure.text(*place, told, ha="center", color="#999999", fontsize=7)
             left += size[0] + gap
         base -= VIEW_NAME
+
+
+def _scale_bar(figure: Any, scale: float, left: float, up: float) -> None:
+    """A bar as long as some round number, with the number: of so many inches per unit, and at a place in inches."""
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import MaxNLocator
+
+    length = MaxNLocator(2, steps=[1, 2, 5, 10]).tick_values(0, LONGEST_BAR / scale)[1]
+    ends, inches = [left, left + scale * length], {"transform": figure.dpi_scale_trans, "color": INK}
+    figure.add_artist(Line2D(ends, [up, up], marker="|", markersize=5, linewidth=0.9, **inches))
+    figure.text(ends[1] + 0.08, up, f"{length:g}", va="center_baseline", fontsize=7, **inches)
 
 
 def _arrange(extent: np.ndarray, free: np.ndarray) -> tuple[Any, float, np.ndarray]:

@@ -11,12 +11,12 @@ from html import escape
 import numpy as np
 
 from ..analysis.branches import branch_table
-from ..analysis.summary import point_count, structure, summary
+from ..analysis.summary import ITERATION_COLUMNS, iteration_rows, point_count, structure, summary
 from ..decisions import coordinates
 from ..errors import MissingPackageError
 from ..interop.packages import require
 from ..io.colors import shades
-from ..report import Report
+from ..report import Report, html_table
 from ..skeleton import Skeleton
 from .figures import DPI
 from .preview import draw
@@ -25,20 +25,8 @@ NOTEBOOK_SIZE = (1200, 500)
 NOTEBOOK_MARGIN = 16  # in pixels
 NOTEBOOK_COLOURS = 48  # of the picture: greys, red, and what lies between; a third of the bytes of the full range
 MOST_LISTED_ROWS = 12  # of a table
-_SOLVE_COLUMNS = {  # by heading: the field of a record, and its format
-    "solve": ("iteration", "d"),
-    "points": ("n_points", ",d"),
-    "merged": ("n_merged", ",d"),
-    "held": ("n_held", ",d"),
-    "e": ("explained", ".4f"),
-    "De": ("explained_change", ".4f"),
-    "ring ratio": ("ring_ratio", ".4f"),
-    "w<sub>L</sub>": ("contraction_weight", ".4g"),
-    "solver error": ("solve_error", ".1e"),
-    "seconds": ("seconds", ".3f"),
-}
 _BRANCH_COLUMNS = ("branch", "kind", "length", "mean_radius", "tortuosity", "confidence", "points")
-_EXTRA = ("held", "e", "w<sub>L</sub>", "solver error", "seconds", "tortuosity", "confidence")
+_EXTRA = ("held", "e", "w_L", "solver error", "seconds", "tortuosity", "confidence")
 """Columns that a narrow screen has no room for."""
 _WIDTH, _HEIGHT, _LEFT, _TOP, _BOTTOM = 320, 150, 46, 12, 22  # of a chart and of what surrounds its curve
 
@@ -70,9 +58,7 @@ def to_html(skeleton: Skeleton) -> str:
 
     Without what draws pictures, the numbers and what to install.
     """
-    style = 'style="text-align:right;padding:2px 10px"'  # all here, since not every notebook has Jupyter's sheet
-    heads = "".join(f"<th {style}>{name}</th>" for name in counts(skeleton))
-    cells = "".join(f"<td {style}>{text}</td>" for text in counts(skeleton).values())
+    table = html_table([list(counts(skeleton).values())], list(counts(skeleton)), "right")
     image, missing = "", []
     try:
         style = 'style="width:100%;background:#fff;border-radius:4px"'
@@ -82,11 +68,7 @@ def to_html(skeleton: Skeleton) -> str:
     style = 'style="margin:4px 0;border-left:3px solid #c77700;padding-left:8px"'
     messages = dict.fromkeys([*missing, *skeleton.report.warnings])
     warnings = "".join(f"<p {style}>{escape(text)}</p>" for text in messages)
-    return (
-        '<div style="max-width:1100px;font:13px/1.5 system-ui,sans-serif">'
-        f'{image}<table style="font:inherit;border-collapse:collapse;margin-top:4px"><thead>'
-        f"<tr>{heads}</tr></thead><tbody><tr>{cells}</tr></tbody></table>{warnings}</div>"
-    )
+    return f'<div style="max-width:1100px;font:13px/1.5 system-ui,sans-serif">{image}{table}{warnings}</div>'
 
 
 def figures(skeleton: Skeleton) -> str:
@@ -117,9 +99,8 @@ def contraction(report: Report) -> str:
         _chart("Change of the explained score, <i>De</i>", records, "explained_change", ".3g"),
         _chart("Ring ratio, <i>a</i>", records, "ring_ratio", ".3g"),
     ]
-    rows = [[f"{getattr(record, name):{form}}" for name, form in _SOLVE_COLUMNS.values()] for record in records]
     marks = [f' data-solve="{record.iteration:d}"' for record in records]
-    table = _table(_SOLVE_COLUMNS, rows, marks=marks)
+    table = _table(ITERATION_COLUMNS, iteration_rows(records), marks=marks)
     return f'{told}<div class="charts">{"".join(charts)}</div><h2>Solve by solve</h2>{table}'
 
 
@@ -166,12 +147,7 @@ def branches(skeleton: Skeleton) -> str:
 
 def branch_colors(skeleton: Skeleton, n: int) -> list[str]:
     """The colours of the first n branches as ``"#rrggbb"``, the same as in Open3D's windows."""
-    return hexadecimal(shades(skeleton, "branch", np.arange(n), np.arange(n)))
-
-
-def hexadecimal(colors: np.ndarray) -> list[str]:
-    """Colours from 0 to 1, (n, 3) or (n, 4) float array, as ``"#rrggbb"``."""
-    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(255 * colors[:, :3]).astype(int).tolist()]
+    return list(map(require("matplotlib.colors").to_hex, shades(skeleton, "branch", np.arange(n), np.arange(n))))
 
 
 def origin(skeleton: Skeleton) -> str:

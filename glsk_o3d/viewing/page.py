@@ -154,7 +154,7 @@ def _followed(skeleton, recorder) -> tuple[np.ndarray, list[np.ndarray]]:
 
 
 def _data(skeleton, shown, positions) -> dict[str, Any]:
-    colormaps = require("matplotlib").colormaps
+    viridis, to_hex = require("matplotlib").colormaps["viridis"], require("matplotlib.colors").to_hex
     box = np.concatenate([positions[0], skeleton.vertices])
     low, high = (box.min(axis=0), box.max(axis=0)) if len(box) else np.zeros((2, 3))
     centre = low + (high - low) / 2
@@ -179,7 +179,7 @@ def _data(skeleton, shown, positions) -> dict[str, Any]:
         "view": ("yz", "xz", "xy")[across],  # what is flat from its broad side; else z is up, or y if that is longest
         "unit": unit,
         "palette": sections.branch_colors(skeleton, len(skeleton.branches) + len(lone)),
-        "ramp": sections.hexadecimal(colormaps["viridis"](np.linspace(0, 1, 24))),
+        "ramp": list(map(to_hex, viridis(np.linspace(0, 1, 24)))),
         "ranges": ranges,
         "positions": _packed(np.rint(32767 * steps), "<i2"),
         "vertex_of_point": _packed(vertex, "<i4"),

@@ -17,17 +17,18 @@ from .figures import INK, PAPER
 
 _RED, _AMBER = "#d0121f", "#a05000"
 _LINE_HEIGHT, _LETTER_WIDTH, _MOST_LINES, _MOST_WARNINGS = 0.16, 0.066, 2, 2  # inches; lines of each warning, warnings
-_FAR_DOT, _NEAR_DOT = np.array([0.91] * 3), np.array([0.70] * 3)
+_FAR_DOT, _NEAR_DOT = np.array([0.89] * 3), np.array([0.64] * 3)
 ROOT_MARK = {"marker": "D", "s": 22, "facecolors": "#1f5fbf", "edgecolors": "white", "linewidths": 0.6, "label": "root"}
 """How the place is drawn that a tree grows from."""
 
 # Fitted to the eye: the cloud's dots as a share of the area of a view, and each in square points at least and at most;
 # the width of lines and of the dots on them over the median branch, and at least and at most in points.
-_DOTS_SHARE, _DOT_AREA = 0.1, (0.5, 3)
+_DOTS_SHARE, _DOT_AREA = 0.12, (0.6, 5)
 _LINE_SHARE, _LINE_WIDTH = 0.065, (0.6, 1.5)
 _DOT_SHARE, _WIDEST_DOT, _LONE_DOT = 0.12, 3.0, 3.7
 _MOST_MARKS = 12  # of what samples disagree with
 _BAR = (1.7, 0.09)  # width and height of the colour bar, in inches
+_BAR_ROOM = 0.75  # for it and the words below, in inches
 _BAR_CORNER = (0.3, 0.2)  # from the upper right corner of the picture to that of the bar, in inches
 
 
@@ -36,12 +37,12 @@ def save_preview(
 ) -> None:
     """Draw a skeleton and its cloud from three sides into a PNG file.
 
-    The three views look along the coordinate axes, all at one scale: x across and y up, x across and z up, y across and
-    z up. They are arranged so that they are large. The cloud is grey, lighter where it is farther; edges are red,
-    junctions dark dots and leaves open ones, unless branches are too short for dots; a blue diamond is where a tree
-    grows from, ``Report.root``. Where `support` was asked for, amber rings mark what few samples show, and crosses what
-    some show and the skeleton lacks, with how many. Below are the counts and the first two warnings of the
-    run, and how many more there are.
+    The three views look along the coordinate axes, all at one scale, that of the bar above them: x across and z up, y
+    across and z up, x across and y up. They are arranged so that they are large. The cloud is grey, lighter where it is
+    farther; edges are red, junctions dark dots and leaves open ones, unless branches are too short for dots; a blue
+    diamond is where a tree grows from, ``Report.root``. Where `support` was asked for, amber rings mark what few
+    samples show, and crosses what some show and the skeleton lacks, with how many. Below are the counts and the first
+    two warnings of the run, and how many more there are.
 
     Parameters
     ----------
@@ -127,16 +128,18 @@ def save_assessment(
     if np.shape(values) != (len(skeleton.edges),):
         raise InvalidParameterError(f"{len(skeleton.edges)} edges need as many values, not {np.shape(values)}")
     shown = replace(skeleton, points=points, vertex_of_point=np.empty(0), normals=np.empty(0))
-    figure = draw(shown, size, title)
+    figure = draw(shown, size, title, least_head=_BAR_ROOM)
     _colour(figure, values, label, best, unknown)
     figures.save_figure(figure, path)
 
 
-def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] = ()):
+def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] = (), point_colors=None, least_head=0):
     """The figure, not yet in a file."""
-    cloud = skeleton.points[figures.thinned(skeleton.points, figures.MOST_DRAWN_POINTS)]
+    drawn = figures.thinned(skeleton.points, figures.MOST_DRAWN_POINTS)
+    cloud, paint = skeleton.points[drawn], None if point_colors is None else np.asarray(point_colors)[drawn]
     centre, extent = figures.room(np.concatenate([cloud, skeleton.vertices]))
-    head, foot, root = 0.55 if title else 0.25, 0.34, skeleton.report.root
+    foot, root = 0.34, skeleton.report.root
+    head = max(0.58 if title else 0.42 if root else 0.25, least_head)
     if size is None:
         told = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if warnings else 0
         size = figures.DPI * figures.fitting_size(extent, head=head, foot=foot + told)
@@ -146,14 +149,15 @@ def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] 
     below = _LINE_HEIGHT * len(warned)
     for a, b, axes in figures.three_views(figure, extent, head=head, foot=foot + below):
         scale = 72 * axes.get_position().width * width / extent[a]  # points per unit
-        _draw_cloud(axes, cloud - centre, a, b, scale**2 * np.prod(np.sort(extent)[1:]))
+        _draw_cloud(axes, cloud - centre, paint, a, b, scale**2 * np.prod(np.sort(extent)[1:]))
         _draw_curve(axes, skeleton, skeleton.vertices - centre, [a, b], scale)
         _mark_doubts(axes, skeleton.report, centre, [a, b])
         if root:
             mark = axes.scatter(*np.subtract(root, centre)[[a, b]], **ROOT_MARK, zorder=4, clip_on=False)
     if root:
-        style = dict(loc="upper left", frameon=False, borderaxespad=0.3)
-        figure.legend(handles=[mark], fontsize=8, labelcolor=INK, **style)
+        style = dict(loc="upper left", frameon=False, borderpad=0, borderaxespad=0, handlelength=0.8)
+        corner = (figures.VIEW_GAP / width, 1 - 0.1 / height)
+        figure.legend(handles=[mark], fontsize=8, labelcolor=INK, bbox_to_anchor=corner, **style)
     if caption:
         counts = _caption(skeleton)
         points = 8 * min(1, (width - figures.VIEW_GAP) / (_LETTER_WIDTH * len(counts)))
@@ -167,13 +171,14 @@ def draw(skeleton: Skeleton, size, title, caption=True, warnings: Sequence[str] 
     return figure
 
 
-def _draw_cloud(axes, cloud, a, b, area):
-    """Grey dots, lighter where they are farther, smaller where they are many in such an area [square points]."""
+def _draw_cloud(axes, cloud, paint, a, b, area):
+    """Dots of such colours, or grey and lighter where they are farther; smaller the more are in the area [points^2]."""
     depth, toward = cloud[:, 3 - a - b], 1 if (a, b) != (0, 2) else -1  # x, y, z are right-handed
     order = np.argsort(toward * depth, kind="stable")
     near = (np.arange(len(order)) / max(len(order) - 1, 1))[:, None]
     style = {"linewidths": 0, "clip_on": False, "s": np.clip(_DOTS_SHARE * area / max(len(cloud), 1), *_DOT_AREA)}
-    axes.scatter(cloud[order, a], cloud[order, b], c=_FAR_DOT + near * (_NEAR_DOT - _FAR_DOT), **style)
+    colors = _FAR_DOT + near * (_NEAR_DOT - _FAR_DOT) if paint is None else paint[order]
+    axes.scatter(cloud[order, a], cloud[order, b], c=colors, **style)
 
 
 def _draw_curve(axes, skeleton, vertices, across_up, scale):
@@ -217,7 +222,8 @@ def _warned(warnings: Sequence[str], width: float, height: float) -> list[str]:
 
 
 def _caption(skeleton: Skeleton) -> str:
-    counts = {"points": point_count(skeleton), **structure(skeleton)}
+    n = point_count(skeleton)
+    counts = {"points": n, **(structure(skeleton) if len(skeleton.vertices) or not n else {})}  # else a cloud alone
     told = [name for name in counts if name != "length" and (name != "points" or counts[name])]
     one = {"vertices": "vertex", "leaves": "leaf"}
     words = [f"{counts[name]} {one.get(name, name[:-1]) if counts[name] == 1 else name}" for name in told]

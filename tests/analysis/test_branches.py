@@ -248,6 +248,10 @@ def test_print():
     assert [line.split()[-1] for line in str(supported).splitlines()[1:3]] == ["support", "0.50"]
     long = str(branch_table(grow(5))).splitlines()
     assert [line.split()[0] for line in long[2:]] == [*map(str, range(15)), "...", "59", "60", "61", "62"]
+    html = branch_table(grow(5))._repr_html_()
+    assert html.startswith(f"<p>{long[0]}</p><table")
+    assert html.count("<tr>") == len(long) - 1
+    assert html.count("<td ") == 20 * html.count("<th ")
 
 
 def test_csv_and_dicts(tmp_path):

@@ -1,6 +1,7 @@
 """`glsk evaluate`: how good a skeleton is."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,6 +42,17 @@ def test_without_a_truth(invoke, scans, tmp_path, ring, moved):
     assert run.stdout.endswith("wrote r.json\nwrote p.png\n")
     assert imread(tmp_path / "p.png").shape[:2] == (760, 1800)
     assert invoke("evaluate", "s.json", scans / "ring.ply", "--quiet").output == ""
+
+
+def test_with_the_cloud_of_its_file(invoke, tmp_path, ring, moved):
+    held = replace(moved, points=ring.points, vertex_of_point=None, normals=None)
+    save_skeleton(held, tmp_path / "held.npz")
+    told = json.loads(invoke("evaluate", "held.npz", "--json").stdout)
+    assert told["cloud"] is None
+    assert told["assessment"] == assess(moved, ring.points).as_dict()
+    refused = invoke("evaluate", "s.json")
+    assert refused.exit_code == 2
+    assert "s.json: holds no cloud" in refused.stderr
 
 
 def test_with_a_truth(invoke, scans, ring, moved):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from glsk_o3d import Decision, read_skeleton, save_skeleton
 
@@ -170,6 +171,22 @@ def test_a_window_shows_a_skeleton_or_a_scan(invoke, scans, tmp_path, y, shown):
     assert options == {"title": "y.ply"}
     assert len(empty.vertices) == 0
     assert len(cloud.points) == len(empty.points) == 1100
+
+
+def test_a_labelled_scan_is_shown_in_colour(invoke, tmp_path, shown, y):
+    (tmp_path / "c.csv").write_text("x,y,z,label,height\n0,0,0,1,0\n0,0,1,2,5\n0,1,1,2,9\n1,1,1,-1,nan\n")
+    assert all(invoke("view", "c.csv", *words).exit_code == 0 for words in ((), ("--color", "height")))
+    labels, heights = (np.asarray(cloud.colors) for _, cloud, _ in shown)
+    assert len(np.unique(labels, axis=0)) == 3
+    assert (labels[1] == labels[2]).all()
+    assert (labels[3] == heights[3]).all()  # grey
+    assert heights[0, 2] > heights[0, 0]  # dark blue
+    assert heights[2, 0] > 0.9 > heights[2, 2]  # yellow
+    assert invoke("view", "c.csv", "--preview", "p.png").exit_code == 0
+    coloured = np.ptp(imread(tmp_path / "p.png")[..., :3], axis=-1) > 0.3
+    assert coloured.sum() > 20
+    assert "did you mean 'label'" in invoke("view", "c.csv", "--color", "lable").stderr
+    assert "--color is for scans" in invoke("view", y, "--color", "branch").stderr
 
 
 def test_files_instead_of_a_window(invoke, scans, shown, tmp_path, y):

@@ -173,7 +173,7 @@ def test_measures_are_plain_and_a_mesh_can_be_written_as_points(invoke, script, 
     assert step["result"]["bbox"]["max"] == pytest.approx([1.5, 1.5, 0.5])
     said = invoke("run", name, "m.ply").stdout
     assert said.count("\n") == 1
-    assert "bbox min [-1.5, -1.5, -0.5], max [1.5, 1.5, 0.5], diagonal 4.3589, " in said
+    assert "bbox min -1.5 -1.5 -0.5, max 1.5 1.5 0.5, diagonal 4.3589, " in said
     assert invoke("run", "scan_cleanup", "m.ply", "-o", "c.pcd", "-o", "c.xyz").exit_code == 0
     for ending in ("pcd", "xyz"):
         assert n_vertices / 2 < len(read_cloud(tmp_path / f"c.{ending}").points) <= n_vertices

@@ -28,8 +28,9 @@ def test_it_means_what_python_means(where):
 @pytest.mark.parametrize(
     ("where", "why"),
     [
-        ("lable == 1", "did you mean 'label'"),
-        ("class == 1", "class_ for class"),
+        ("lable == 1", r"did you mean 'label'\? \(there are x, y, z, label, intensity\)"),
+        ("intens > 1", "did you mean 'intensity'"),
+        ("class == 1", "no attribute of the points is called 'class': there are x, y, z, label, intensity"),
         ("label = 1", "write such as"),
         ("label in 1, 2", r"write such as 'label in \(1, 2\)'"),
         ("label", "is no condition"),

@@ -53,9 +53,21 @@ def test_three_views_at_one_scale(make, tmp_path, offset):
     box = dataclasses.replace(make(corners, [[0, 1], [1, 2], [2, 3]]), **WITHOUT_POINTS)
     save_preview(box, tmp_path / "p.png", size=(2400, 800))
     measured = columns_and_rows(is_red(imread(tmp_path / "p.png")))
-    expected = np.array([(4, 2), (4, 1), (2, 1)])
+    expected = np.array([(4, 1), (2, 1), (4, 2)])
     unit = np.ptp([0, measured[0][0]]) / 4
     np.testing.assert_allclose(np.array(measured) / unit, expected, atol=0.1)
+
+
+@pytest.mark.parametrize("size", [(4, 2, 1), (1, 1, 9), (3e-7, 0, 0), (2e90, 1e90, 1)])
+def test_the_bar_is_as_long_as_it_says(make, size):
+    figure = preview.draw(shaped(make, *size), None, None)
+    (bar,) = figure.artists
+    inches = np.ptp(bar.get_xdata())
+    (told,) = [float(text.get_text()) for text in figure.texts if re.fullmatch(r"[-+.e\d]+", text.get_text())]
+    front = figure.axes[0]
+    scale = front.get_position().width * figure.get_figwidth() / np.ptp(front.get_xlim())
+    assert inches == pytest.approx(told * scale)
+    assert 0.35 < inches < 1
 
 
 def shaped(make, *size):

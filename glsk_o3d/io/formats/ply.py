@@ -18,7 +18,6 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
-from ...errors import FileFormatError
 from ...skeleton import Skeleton
 from ..paths import check_budget, check_promised, number_rows, text_lines
 from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, brightest, named_attributes, unit_colors
@@ -113,16 +112,6 @@ def read_header(stream: BinaryIO) -> tuple[str, list[Element]]:
             case _:
                 raise ValueError(f"its header has the line {line[:80]!r}")
     raise ValueError("its header does not end")
-
-
-def ply_elements(path: str | os.PathLike) -> dict[str, list[str]]:
-    """The elements that a PLY file holds at least one of, with the names of their properties."""
-    with open(path, "rb") as stream:
-        try:
-            _, elements = read_header(stream)
-        except ValueError as error:
-            raise FileFormatError(f"{os.fspath(path)}: not a valid .ply file: {error}") from None
-    return {element.name: [column.name for column in element.columns] for element in elements if element.rows}
 
 
 def holds_lines(stream: BinaryIO) -> bool:
