@@ -16,6 +16,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
+from glsk_bench import score
+from glsk_bench.clouds import cloud
+from glsk_bench.shapes import shape
 from PIL import Image
 from scipy.spatial import Delaunay, cKDTree
 
@@ -470,10 +473,37 @@ def limits():
     return figure
 
 
+THINGS = {  # of version 2 of the benchmark: one that comes out well, and one that does not
+    "flat": (("blades", 100, "clean"), ("blades", 109, "scan2")),
+    "hollow": (("mugs", 101, "clean"), ("mugs", 106, "clean")),
+    "bulky": (("animals", 100, "clean"), ("animals", 111, "scan2")),
+    "two depth cameras": (("implements", 101, "depth2"), ("implements", 107, "depth2")),
+}
+
+
+def things():
+    """Things with exact axes: one that comes out well above one that does not, and the axis beside each skeleton."""
+    figure, axes = panels([""] * 2 * len(THINGS), 0.8, columns=len(THINGS))
+    for column, (name, pair) in enumerate(THINGS.items()):
+        for row, (family, seed, variant) in enumerate(pair):
+            thing, each = shape(family, seed), axes[row * len(THINGS) + column]
+            points = cloud(thing, variant)
+            skeleton = skeletonised(points)
+            dots(each, points, size=1.2)
+            edges = view(thing.nodes)[:, :2][thing.edges[thing.judged]]
+            each.add_collection(LineCollection(edges, colors=BLUE, linewidths=3.2, alpha=0.6, capstyle="round"))
+            graph(each, skeleton)
+            found = score(thing, skeleton.vertices, skeleton.edges)
+            each.set_title(
+                f"{name}: error {found.error:.2f}, {'right' if found.perfect else 'wrong'}", fontsize=9, color=INK
+            )
+    return figure
+
+
 FIGURES = (
     *(showcase, card_robots, card_trees, card_shapes),
     *(denoiser, contractor, lpr_reducer, connector, refiner, stopping),
-    *(hull, contraction, reduction, mass, centring, loop_test, limits),
+    *(hull, contraction, reduction, mass, centring, loop_test, limits, things),
 )
 
 
