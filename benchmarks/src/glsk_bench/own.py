@@ -157,7 +157,7 @@ def _axis(
         places = np.asarray(nodes, float).reshape(-1, 3)
         links = simple_edges(check_graph(places, edges, "axis"))
     except (TypeError, ValueError) as error:
-        raise InvalidParameterError(f"{shape}: the axis has nodes or edges of no use: {error}") from None
+        raise InvalidParameterError(f"{shape}: the axis has invalid nodes or edges: {error}") from None
     before = made.shapes.get(shape)
     variant, first = next(iter(points.items()))
     source = variant if radii is None else "given"

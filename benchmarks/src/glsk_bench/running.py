@@ -223,7 +223,7 @@ def words_of(command: str | Sequence[str]) -> list[str]:
     for place in _PLACES:
         if not any(place in word for word in words):
             raise InvalidParameterError(
-                f"the command must say where names of files go: it has no {place}, as in 'mytool {' '.join(_PLACES)}'"
+                f"the command has no {place} for the name of a file, as in 'mytool {' '.join(_PLACES)}'"
             )
     if shutil.which(words[0]) is None:
         raise InvalidParameterError(f"the command cannot be run: there is no program {words[0]!r}")

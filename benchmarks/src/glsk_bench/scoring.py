@@ -138,7 +138,7 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
     except (TypeError, ValueError) as error:
         if isinstance(error, InvalidParameterError):
             raise
-        raise InvalidParameterError(f"the skeleton has vertices or edges of no use: {error}") from None
+        raise InvalidParameterError(f"the skeleton has invalid vertices or edges: {error}") from None
     _check_size(axis, places, links)
     found = compare(Skeleton(places, links, (), (), (), ()), axis).as_dict()  # type: ignore[arg-type]
     return Scores(**{name: found[name] for name in Scores.__dataclass_fields__ if name != "failure"})
