@@ -178,10 +178,10 @@ COVERAGE_WITH_GAP = 0.96  # at most, where there is a gap
 
 
 def coverage(shape: Shape, points: np.ndarray) -> float:
-    """Share of the axis that a cloud shows, of what the whole surface shows.
+    """Share of the axis that a cloud shows, relative to the whole surface.
 
-    A piece of the axis is shown if a point lies on its own surface, not on that of another part nearby. Where a stretch
-    of more than two radii is not shown, the share is 0.96 at most. Below 0.97 nobody can be asked for the true axis.
+    A piece of the axis is shown by a point on its own surface, not on that of another part nearby. If a stretch of more
+    than two radii is not shown, the share is 0.96 at most. Below 0.97 the true axis cannot be asked for.
 
     Parameters
     ----------
