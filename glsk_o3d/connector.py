@@ -30,8 +30,9 @@ class Connector(Filter[Skeleton]):
 
     Notes
     -----
-    The published codes use one radius of 2 % of the bounding box's diagonal, and join a point's vertex to that of its
-    first foreign neighbour in the ring, wherever that happens to start; ``links="nearest"`` takes the nearest instead.
+    The published codes use one radius of 2 % of the bounding box's diagonal, and join a point's vertex to that of the
+    first foreign neighbour in its ring. That depends on where the ring starts, so ``links="nearest"`` takes the
+    nearest.
 
     References
     ----------

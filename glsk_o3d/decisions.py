@@ -78,7 +78,7 @@ QUESTIONS = {
 
 @dataclass(frozen=True)
 class Decision:
-    """A question about the topology, and how it was answered.
+    """A question about the topology and its answer.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class Decision:
 
     @property
     def outcome(self) -> str:
-        """What was done, in two words, such as ``"loop closed"`` or ``"gap left"``."""
+        """The action in two words, such as ``"loop closed"`` or ``"gap left"``."""
         question = QUESTIONS[self.about]
         return question.changed if self.changed else question.kept
 
@@ -125,7 +125,7 @@ class Decision:
 
     @property
     def otherwise(self) -> str:
-        """The option with which the Refiner would have answered a close call otherwise, as ``"Refiner.limb=0.56"``."""
+        """The option that would have changed a close call of the Refiner, such as ``"Refiner.limb=0.56"``."""
         question = QUESTIONS[self.about]
         if self.changed == question.changes_from:
             hundredths = math.ceil(100 * self.probability + 0.5)
@@ -142,7 +142,7 @@ WELL_SUPPORTED = 0.8  # warning: of the samples show what can be relied on, and 
 
 @dataclass(frozen=True)
 class Supported:
-    """A part of a skeleton, or one that it lacks, and how many skeletons of other samples of the cloud show it.
+    """A part that a skeleton has or lacks, and the share of samples of the cloud whose skeletons have it.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ DENOISED_RATIO, DENOISED_NOISE = 1.8, 0.2  # fitted: local outlier ratio of a de
 class Denoiser(Filter[Points]):
     """Average dense noisy points, then move noisy points to the ridge of their density.
 
-    A neighbourhood narrower than the noise is a ball and does not show the surface; the mean of several points has less
+    A neighbourhood narrower than the noise is a ball and does not show the surface. The mean of several points has less
     noise. Isolated points on a ridge are outliers.
 
     References

@@ -98,13 +98,13 @@ def skeletonize(
     Parameters
     ----------
     cloud : open3d.geometry.PointCloud, open3d.t.geometry.PointCloud, TriangleMesh of either kind, or (N, 3) array
-        Points without order, normals or orientation; of a mesh the vertices. It is not modified.
+        Points, or the vertices of a mesh. They need no order, normals or orientation, and are not modified.
     pipeline : Pipeline, {"default", "wen2024", "cao2010"}, name of a plugin's pipeline, or path of a recipe
         A name that ends in ``.json`` or ``.toml`` is a path. A mapping is options for ``"default"``.
     on_iteration : callable, optional
         Called with the IterationRecord of each solve; return False to stop the contraction there.
     on_state : callable, optional
-        Called before it with the Contraction after each solve, such as a `ContractionRecorder`.
+        Called before `on_iteration` with the Contraction after each solve, such as a `ContractionRecorder`.
     **options
         Parameters of the filters, by name; type checkers know them. If more than one filter has the name, give the
         mapping ``{"Connector.radius": "2%"}`` for `pipeline`. See `Pipeline.with_options`.

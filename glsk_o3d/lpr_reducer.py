@@ -26,9 +26,9 @@ MIN_SHRINKAGE = 1e-4  # published: floor of s - psi' s(0) in the working frame, 
 class LPRReducer(Filter[Contraction]):
     r"""Merge each point with its nearest ring neighbour if that costs little: one pass.
 
-    A point i may swallow its nearest ring neighbour m where :math:`F = V_1 - V_2 + 3 U < \varphi s_i^2`. Its new ring
-    is the Delaunay star of i among both rings, on the uncontracted points, projected along the Laplacian coordinate of
-    i; m's entry in every other ring becomes i. A point takes part in at most one merge a pass.
+    A point i may take over its nearest ring neighbour m if :math:`F = V_1 - V_2 + 3 U < \varphi s_i^2`. Its new ring is
+    the Delaunay star of i among both rings, on the uncontracted points, projected along the Laplacian coordinate of i;
+    m's entry in every other ring becomes i. A point takes part in at most one merge a pass.
 
     With `conserve_mass` a survivor takes over the mass of the point it swallows, and the ring sizes s(0) and s(t) are
     measured anew on the combined rings. Without it, bent parts leave their axis.
@@ -60,13 +60,13 @@ class LPRReducer(Filter[Contraction]):
     consumes: ClassVar[type] = Contraction
 
     phi: float = parameter(1e5, "Merge where F is below phi times the squared ring size.", low=0, open_low=True)
-    conserve_mass: bool = parameter(True, "Survivors take over the mass of the points they swallow.")
+    conserve_mass: bool = parameter(True, "Survivors take over the mass of merged points.")
     mend_rings: bool = parameter(
         True, "Rebuild rings that no longer surround their point; otherwise such points later run away."
     )
     order: Literal["cheapest", "index"] = parameter(
         "cheapest",
-        "Which pairs are merged first: those with the least F / s^2, or those of the lowest point index.",
+        "Order of merges: the least F / s^2 first, or the lowest point index.",
         choices=("cheapest", "index"),
     )
 

@@ -28,8 +28,8 @@ FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
 class OutlierRemover(Filter[Points]):
     """Set outliers aside: later filters ignore them, but each belongs to the vertex of the nearest point.
 
-    An outlier is far from its neighbours, compared with their distance from theirs, or in a small isolated cluster.
-    ``remove_statistical_outlier`` also removes points of sparse limbs.
+    An outlier is far from its neighbours, relative to their spacing, or in a small isolated cluster. Do not call
+    Open3D's ``remove_statistical_outlier`` first: it also removes points of sparse limbs.
 
     References
     ----------
@@ -50,7 +50,7 @@ class OutlierRemover(Filter[Points]):
 
     outlier_factor: float = parameter(
         2.5,
-        "A point this many times farther from its neighbours than these are from theirs is an outlier. 0 keeps all.",
+        "Ratio of a point's distance to its neighbours over theirs above which it is an outlier. 0 keeps all.",
         low=0,
     )
 

@@ -1,4 +1,4 @@
-"""Parameters that describe and check themselves: what filters and stopping rules have."""
+"""Parameters of filters and stopping rules, which describe and check themselves."""
 
 import dataclasses
 import inspect
@@ -45,10 +45,10 @@ def parameter(
         A trailing ``?`` allows None.
     unit : str
     low, high : float, optional
-        Inclusive limits (`low` is exclusive with `open_low`); for a length in percent they limit nothing.
+        Inclusive limits (`low` is exclusive with `open_low`), which do not apply to a length in percent.
     open_low : bool
     choices : tuple of str
-        What the type ``"choice"`` may be; any other type may also be one of these words.
+        The values of the type ``"choice"``; any other type may also be one of these words.
     """
     kind = type or ("choice" if isinstance(default, str) else default.__class__.__name__)
     facts = dict(doc=doc, type=kind, unit=unit, low=low, high=high, open_low=open_low, choices=choices)
@@ -58,7 +58,7 @@ def parameter(
 def documented(cls: _Class) -> _Class:
     """Class decorator: append the numpydoc "Parameters" section made from the fields' own facts.
 
-    The docstrings of this package's own classes also say which page has all about the options.
+    The docstrings of this package's own classes also name the page of the options.
 
     Parameters
     ----------
@@ -107,14 +107,14 @@ class Parameters:
                 value.check()
 
     def table(self) -> dict[str, Any]:
-        """Name and parameters as the plain table that stands for it in a recipe.
+        """Name and parameters as a plain table for a recipe.
 
         Returns
         -------
         dict
             Of dicts, strings, numbers and bools, with the class under ``"filter"`` or ``"rule"`` and, unless it is of
-            this package, its module under ``"from"``. In the place of what a file cannot hold stands a table with the
-            key ``"unwritten"``, which says what it was.
+            this package, its module under ``"from"``. A value that a file cannot hold is a table with the key
+            ``"unwritten"``, which names it.
         """
         cls = type(self)
         origin = {} if cls.__module__.startswith(f"{__package__}.") else {FROM: cls.__module__}

@@ -90,9 +90,9 @@ class Filter(Parameters, Generic[Produced]):
         return result
 
     def run(self, data: Any, *, on_iteration: OnIteration | None = None, on_state: OnState | None = None) -> Any:
-        """The same without a check of the parameters and without warnings, but in the report: a pipeline sees to these.
+        """Run without checking parameters or issuing warnings, which are only in the report: a pipeline does both.
 
-        What a filter warns of may be mended by the next.
+        The next filter may resolve a warning.
         """
         name = type(self).__name__
         if not (_is_of(data, self.consumes) or (_is_of(data, Cloud) and self.takes_clouds())):
@@ -116,7 +116,7 @@ class Filter(Parameters, Generic[Produced]):
 
     @classmethod
     def takes_clouds(cls) -> bool:
-        """Whether a cloud will do; of one that wants `Points` all are taken, as by ``Sampler(size="all")``."""
+        """Whether the filter takes a cloud; one of `Points` takes all its points, as by ``Sampler(size="all")``."""
         return cls.consumes in (Cloud, Points)
 
     def __or__(self, other: Filter[Next] | Pipeline[Next]) -> Pipeline[Next]:
@@ -145,7 +145,7 @@ class Pipeline(Generic[Produced]):
     Parameters
     ----------
     *stages : Filter
-        At least one; made more comfortably with ``RingBuilder() | Contractor() | ...``.
+        At least one. ``RingBuilder() | Contractor() | ...`` is shorter.
 
     Examples
     --------
@@ -223,9 +223,9 @@ class Pipeline(Generic[Produced]):
         Parameters
         ----------
         options : mapping of str to object, optional
-            A value by ``"RingBuilder.k"`` or, where only one part of the pipeline has a parameter of that name, by
-            ``"k"``; it is replaced wherever its filter occurs, also inside another filter. Reducers and stopping rules
-            are put in first, so that the order does not matter.
+            A value by ``"RingBuilder.k"``, or by ``"k"`` if only one part of the pipeline has that parameter. It is
+            replaced wherever its filter occurs, also inside another filter. Reducers and stopping rules are replaced
+            first, so the order does not matter.
         **named
             More of them.
 
@@ -253,14 +253,14 @@ class Pipeline(Generic[Produced]):
         for name, value in sorted(given, key=lambda option: _turn(option[1])):
             cls, field = pipeline.class_of_option(name)
             if (cls, field.name) in names:
-                raise InvalidParameterError(f"{names[cls, field.name]} and {name} are one option: give it once")
+                raise InvalidParameterError(f"{names[cls, field.name]} and {name} are the same option: give it once")
             names[cls, field.name] = name
             pipeline = _changed(pipeline, cls, field.name, value)
         pipeline.check()
         return pipeline
 
     def class_of_option(self, name: str) -> tuple[type[Parameters], dataclasses.Field[Any]]:
-        """The class in the pipeline and the field of it that the name of an option, such as ``"k"``, means.
+        """The class in the pipeline and its field for the name of an option, such as ``"k"``.
 
         InvalidParameterError if there is none, or more than one.
         """

@@ -1,4 +1,4 @@
-"""The named pipelines: the paper's baseline, the paper, what we recommend, and that for trees."""
+"""The named pipelines: the baseline, the paper, the recommended pipeline, and that for trees."""
 
 from collections.abc import Callable
 from typing import Any
@@ -34,8 +34,8 @@ def cao2010() -> Pipeline[Skeleton]:
 def wen2024() -> Pipeline[Skeleton]:
     """GLSkeleton as published (Wen et al. 2024), with the choices of the authors' code where it differs from the paper.
 
-    Merges visit the points in the order of the input and drop the mass of what they merge; the stopping rule waits for
-    the fourth solve. The pages of the filters list every difference.
+    Merges visit the points in the order of the input and drop the mass of merged points. The stopping rule waits for
+    the fourth solve. docs/differences.md lists every difference.
 
     Examples
     --------

@@ -97,25 +97,25 @@ class Points(Representatives):
     points : (N, 3) float64 array
         The input.
     representative_of_point : (N,) int array
-        Row of `cloud` that each input point is; -1 if it was dropped as not finite.
+        Row of `cloud` of each input point; -1 if it is not finite.
     outlier, sampled : (N,) bool array
-        Input points that were set aside, whose distinct point is the nearest one, and those that say where the surface
-        is: no outliers, and of a large cloud a sample.
+        Outliers, which the nearest distinct point represents; and points that determine the surface: no outliers, and
+        only the sample of a large cloud.
     frame : Frame
     cloud : (m, 3) float64 array
         Distinct input points; noisy ones denoised, and where there are many, means of several.
     weight, merged : (m,) float64 array
-        Input points that each stands for, copies once, and distinct points that it is the mean of.
+        Number of input points that each represents, without copies, and of distinct points that it is the mean of.
     noise : (m,) float64 array
-        How far the neighbourhood of each is noise, from 0 to 1.
+        Share of noise in the neighbourhood of each, from 0 to 1.
     normals : (m, 3) float64 array
         Unit normals of the tangent planes before points were moved to ridges, up to their sign.
     survivors : (n,) int array
-        Rows of `cloud` still there, ascending; all of them until the cloud is thinned.
+        Remaining rows of `cloud`, ascending; all until the cloud is thinned.
     representative : (m,) int array
         The survivor (0 .. n-1) that each distinct point was merged into; itself for a survivor.
     neighbours : (n, k) int array
-        The nearest survivors of each, nearest first, the point itself ahead of them.
+        The nearest survivors of each, nearest first after the point itself.
     spread : (n, 3) float64 array
         Sums of squares along the principal axes of these neighbourhoods, ascending.
     ring_normals : (n, 3) float64 array
@@ -148,7 +148,7 @@ class Points(Representatives):
     def of(
         cls, cloud: Any, size: Callable[[int], int] = int, frame: str = "spread", drop_invalid: bool = False
     ) -> Points:
-        """The points of a cloud: of n about `size(n)` from the cells of a grid, if there are more than twice as many.
+        """The points of a cloud, or about `size(n)` of n from the cells of a grid if n is more than twice as large.
 
         InvalidCloudError as of `RingBuilder`.
         """
@@ -194,9 +194,9 @@ class Points(Representatives):
         )
 
     def without(self, gone: np.ndarray, neighbours: np.ndarray) -> Points:
-        """These without some rows, (m,) bool array, which are outliers, in the frame of those left.
+        """These without the outliers in the (m,) bool array, in the frame of the rest.
 
-        `neighbours` are those of the rows left, as positions among these.
+        `neighbours` are those of the remaining rows, as positions among these.
         """
         first, aside = self.point_of_survivor, self._of_points(gone) > 0
         kept = np.flatnonzero(self.sampled & ~aside)
@@ -224,12 +224,12 @@ class Points(Representatives):
         return replace(self, outlier=self.outlier | aside, sampled=self.sampled & ~aside)
 
     def check_whole(self, filter: Any) -> None:
-        """Raise StageError if they were thinned, since a filter wants all of them."""
+        """Raise StageError if they were thinned: the filter needs all of them."""
         if len(self) < len(self.cloud):
             raise StageError(f"{type(filter).__name__} comes before Thinner, which has merged points already")
 
     def remade(self, row: np.ndarray, cloud: np.ndarray, neighbours: np.ndarray, **changes: Any) -> Points:
-        """These with other rows, each of the old ones gone into the new `row` (m,) of it, and measured anew.
+        """These with new rows: `row` (m,) is the new row of each old one. Neighbourhoods are measured anew.
 
         `changes` are other fields over the new rows.
         """
@@ -237,7 +237,7 @@ class Points(Representatives):
         return replace(self, representative_of_point=self._of_points(row), **made)
 
     def common(self) -> dict[str, Any]:
-        """The fields of `Representatives`, for those who go on."""
+        """The fields of `Representatives`, for the next state."""
         return {field.name: getattr(self, field.name) for field in fields(Representatives)}
 
 

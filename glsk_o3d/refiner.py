@@ -63,17 +63,17 @@ class Refiner(Filter[Skeleton]):
 
     collapse: Literal["length", "degree"] = parameter(
         "length",
-        "Which edge of a triangle collapses first: the shortest, or that with the least mean degree of its ends.",
+        "Edge of a triangle to collapse first: the shortest, or that with the least mean degree of its ends.",
         choices=("length", "degree"),
     )
     handle: float = parameter(
         0.5, "Least probability that a loop is a handle of the object; others are closed. 0 keeps all.", low=0, high=1
     )
     air: float = parameter(
-        0.5, "Probability that a branch crosses air from which on it is cut there. 0 cuts none.", low=0, high=1
+        0.5, "Least probability that a branch crosses air for a cut there. 0 cuts none.", low=0, high=1
     )
     bridge: float = parameter(
-        0.5, "Probability that the object crosses a gap from which on it is bridged. 0 bridges none.", low=0, high=1
+        0.5, "Least probability that the object continues across a gap for a bridge. 0 bridges none.", low=0, high=1
     )
     limb: float = parameter(
         0.25, "Least probability that a branch is a limb; others, spurs, are pruned. 0 keeps all.", low=0, high=1

@@ -32,8 +32,8 @@ class IterationRecord:
     iteration : int
         Counted from 1.
     n_points, n_merged, n_held : int
-        Points that were solved for, those that the reduction after the solve merged away, and those held in place
-        because the solve would have thrown them out of the bounding box.
+        Points of the solve, points merged after it, and points held because the solve would have thrown them out of the
+        bounding box.
     explained, explained_change : float
         PCA score e of the contracted points, 1 for a straight line (Wen et al. 2024, equation 14), and De, its change
         per share of points kept (equation 16).
@@ -136,36 +136,35 @@ def _versions() -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Report:
-    """The record of a run; it travels with the result and is saved with it.
+    """The record of a run, kept and saved with the result.
 
     Attributes
     ----------
     n_input, n_dropped, n_sampled, n_outliers, n_distinct, n_contracted : int
-        Input points, those dropped as not finite, those that a large cloud was sampled to (all of a smaller one), those
-        set aside as outliers, the distinct ones of the sample, and those of them that were contracted.
+        Numbers of input points, points dropped as not finite, points of the sample of a large cloud (all of a small
+        one), outliers, distinct points of the sample, and contracted points.
     noise : float
         Mean share of noise of the neighbourhoods, from 0 to 1.
     n_loops_closed, n_cuts, n_bridges : int
-        Loops that were closed because they are probably no handles, branches that were cut because they probably
-        cross air, and gaps that were bridged.
+        Probable non-handles that were closed, branches that were cut because they probably cross air, and bridged gaps.
     n_traced : int
-        Input points around which there is no surface, whose parts were traced along shortest paths.
+        Input points without a surface, whose parts were traced along shortest paths.
     joined : tuple of ((x, y, z), (x, y, z))
-        Ends of the gaps that were joined there, or to make one tree, in the cloud's units.
+        Ends of the gaps joined there, or to make one tree, in the cloud's units.
     root : (x, y, z) or ()
-        Where a tree grows from; empty if none was asked for.
+        The root of a tree; empty without one.
     decisions : tuple of Decision
-        What was asked about the topology, with probabilities, and what was done.
+        The questions about the topology, with probabilities and actions.
     n_draws, n_agreeing : int
-        Samples of the cloud whose skeletons were compared with this one, see `glsk_o3d.support`, and those of them with
-        as many components, loops and ends.
+        Number of samples of the cloud compared by `glsk_o3d.support`, and of those with as many components, loops and
+        ends.
     support : tuple of Supported
-        Share of them that show each branch, loop and end of this skeleton; and loops and ends that it lacks.
+        Share of the samples with each branch, loop and end of this skeleton, and with loops and ends that it lacks.
     stages : tuple of str
         The filters that ran, as the expressions that rebuild them.
     recipe : dict
-        The same as `glsk_o3d.from_recipe` reads it; empty if it is not known. In the place of what a recipe cannot hold
-        is an entry ``"unwritten"`` that says what was there.
+        The pipeline as `glsk_o3d.from_recipe` reads it; empty if unknown. An entry ``"unwritten"`` names a part that a
+        recipe cannot hold.
     seconds : dict of str to float
         Wall time per filter.
     iterations : tuple of IterationRecord
@@ -242,23 +241,23 @@ class Report:
         return told + [("warning", each) for each in self.warnings]
 
     def with_warning(self, message: str) -> Report:
-        """This report with a warning in it; pipelines, and filters called by themselves, issue it in the end."""
+        """This report with one more warning, which a pipeline, or a filter called alone, issues at the end."""
         return dataclasses.replace(self, warnings=(*self.warnings, message))
 
     @property
     def is_sampled(self) -> bool:
-        """Whether the cloud was so large that a sample stands for it."""
+        """Whether a sample represents the cloud."""
         return 0 < self.n_sampled < self.n_input - self.n_dropped
 
     @property
     def uncertain(self) -> tuple[Decision, ...]:
-        """What was judged with a probability between a quarter and three quarters, the least certain first."""
+        """Decisions with a probability between a quarter and three quarters, the least certain first."""
         uncertain = (each for each in self.decisions if each.is_uncertain)
         return tuple(sorted(uncertain, key=lambda each: abs(each.probability - 0.5)))
 
     @property
     def unsupported(self) -> tuple[Supported, ...]:
-        """What more than a fifth of the samples disagree with, the most doubtful first."""
+        """Parts that more than a fifth of the samples contradict, the most doubtful first."""
         unsupported = (each for each in self.support if not each.is_well_supported)
         return tuple(sorted(unsupported, key=lambda each: -each.doubt))
 
@@ -268,12 +267,12 @@ class Report:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Report:
-        """Inverse of `to_dict`; entries of a later version that this one does not know are passed over."""
+        """Inverse of `to_dict`; unknown entries of later versions are ignored."""
         if "judgements" in data:  # what decisions were called in files of before
             data = {"decisions": data["judgements"], **data}
         report = _read(data, cls)
         if not all(decision.about in QUESTIONS for decision in report.decisions):
-            raise ValueError("a decision in its report is about nothing that is known")
+            raise ValueError("a decision in its report is about an unknown question")
         if not isinstance(report.recipe.get("pipeline", []), list):
-            raise ValueError("the recipe in its report is none")
+            raise ValueError("the recipe in its report has no list of stages")
         return report

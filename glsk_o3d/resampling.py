@@ -67,9 +67,9 @@ def support(
     Returns
     -------
     Skeleton
-        That of all points, with ``Skeleton.support``, the share of samples that show the curve within a local radius of
-        each vertex, at an end an end within two; and with ``Report.support``, the share for every branch, loop and end,
-        and for those ends and loops of other samples that this skeleton lacks.
+        That of all points. ``Skeleton.support`` is the share of samples with the curve within a local radius of each
+        vertex, or at an end with an end within two. ``Report.support`` has the share for every branch, loop and end,
+        and for ends and loops of samples that this skeleton lacks.
 
     Raises
     ------
@@ -79,8 +79,8 @@ def support(
     Warns
     -----
     SkeletonWarning
-        The skeletons of three tenths of the samples or more have other numbers of components, loops or ends; it says
-        where.
+        At least three tenths of the samples have skeletons with other numbers of components, loops or ends. It names
+        the place.
 
     References
     ----------

@@ -30,7 +30,7 @@ class RingBuilder(Filter[Contraction]):
     The ring of a point is its Delaunay star among its k nearest neighbours, projected on their principal plane. A cloud
     is treated as by ``Sampler(size="all")``.
 
-    For `k` Open3D's search parameters may be given: ``KDTreeSearchParamKNN(knn)`` is ``k=knn``,
+    `k` may be one of Open3D's search parameters: ``KDTreeSearchParamKNN(knn)`` is ``k=knn``,
     ``KDTreeSearchParamHybrid(radius, max_nn)`` is ``k=max_nn, radius=radius``, and ``KDTreeSearchParamRadius(radius)``
     is ``k=30, radius=radius``.
 
@@ -67,7 +67,7 @@ class RingBuilder(Filter[Contraction]):
     )
     radius: float | str | None = parameter(
         None,
-        "Neighbours farther away than this are left out of the ring, but for the three nearest; None for no limit.",
+        "Neighbours farther away than this are left out of the ring, except the three nearest; None for no limit.",
         type="length?",
         unit="cloud's units, or % of the diagonal",
         low=0,

@@ -14,8 +14,8 @@ from .thinner import default_size
 class Sampler(Filter[Points]):
     """Bring a cloud into its working frame: centred, longest side 1.6, in Morton order and without duplicates.
 
-    Points that differ by rounding become one. A large cloud is sampled by the points nearest to the means of the cells
-    of a grid; every other point follows that of its cell. Results of a pipeline are in the user's order and units.
+    Points that differ by rounding become one. The sample of a large cloud has the points nearest to the means of the
+    cells of a grid; other points follow that of their cell. Results of a pipeline are in the user's order and units.
 
     Raises
     ------
@@ -34,7 +34,7 @@ class Sampler(Filter[Points]):
 
     size: int | Literal["auto", "all"] = parameter(
         "auto",
-        "About how many points are sampled of a cloud of more than twice as many. 'auto' is twice what the Thinner "
+        "Approximate sample size of a cloud with more than twice as many points. 'auto' is twice what the Thinner "
         "leaves: 50000, or 128 times the square root of their number if that is more; 'all' takes all.",
         type="int",
         unit="points",
@@ -52,5 +52,5 @@ class Sampler(Filter[Points]):
         return Points.of(cloud, self.sample_size, self.frame, self.drop_invalid)
 
     def sample_size(self, n: int) -> int:
-        """About how many of n points say where the surface is, if these are more than twice as many."""
+        """Size of the sample of n points if n is more than twice as large."""
         return {"auto": 2 * default_size(n), "all": n}[self.size] if isinstance(self.size, str) else self.size

@@ -47,44 +47,41 @@ UNIT = 1.001  # derived: a unit vector that was written in three digits is one
 class Skeleton:
     """A curve skeleton: a graph embedded in space, in the units of the cloud it was made from.
 
-    It is sound, or it is not made. Arrays without rows stand for what is not known: they are filled in with NaN, or -1
-    for `vertex_of_point`. Edges in another order are sorted.
+    All fields are checked. Arrays without rows mean unknown values and are filled with NaN, or -1 for
+    `vertex_of_point`. Edges in another order are sorted.
 
     Attributes
     ----------
     vertices : (M, 3) float64 array
         Finite, and at most 1e150.
     edges : (E, 2) int64 array
-        Pairs i < j, sorted, each once.
+        Sorted pairs i < j without repetitions.
     radii : (M,) float64 array
-        Local radius: the median distance from the vertex to the tangent planes of the points it owns, or, where
-        noise has tilted these, from the fitted curve to the points; on the axis of a tube the tube's radius. Where
-        there is no surface, how far the points scatter around the curve. NaN where it is not known.
+        Local radius: that of a circle with the area of the section, or of the tube on the axis of a tube. In noise it
+        moves towards the median distance from the curve to the points. Without a surface it is the scatter of the
+        points around the curve. NaN if unknown.
     vertex_of_point : (N,) int64 array
-        For every input point the vertex it belongs to; -1 for points that were dropped as not finite, or whose vertex
-        was left out.
+        The vertex of every input point; -1 for points that are not finite, or whose vertex was left out.
     points : (N, 3) float64 array
-        The input points, in the order they came in.
+        The input points in their order.
     normals : (N, 3) float64 array
-        Unit normals estimated from the neighbourhoods, up to their sign; NaN for points that have no say, because they
-        were dropped as not finite, set aside as outliers, or left out of the sample of a large cloud, and where there
-        is no surface.
+        Unit normals estimated from the neighbourhoods, up to their sign; NaN for points that are not finite, outliers,
+        outside the sample of a large cloud, or without a surface.
     report : Report
-        What the run did.
+        The record of the run.
     confidence : (M,) float64 array
-        How well its points support each vertex, from 0 to 1: the share of what they say about where the axis is that
-        they agree on, less where they are few; 0 where there is no surface. NaN where nobody has measured it.
+        How well the points of each vertex agree on the axis, from 0 to 1: less with few points, and 0 without a
+        surface. NaN if not measured.
     half_width, half_thickness : (M,) float64 array
-        Half axes of the part's section at every vertex, the longer and the shorter one: of a bar half its width and
-        half its thickness. The radius where nobody has measured them.
+        Half axes of the part's section at every vertex, such as half the width and half the thickness of a bar. The
+        radius if not measured.
     support : (M,) float64 array
-        Share of samples of the cloud whose skeletons show the curve there, see `glsk_o3d.support`; NaN where nobody has
-        measured it.
+        Share of samples of the cloud whose skeletons show the curve there, see `glsk_o3d.support`; NaN if not measured.
 
     Raises
     ------
     InvalidParameterError
-        An array has another shape or type, or a number that cannot be true: the message names the first such row.
+        An array has a wrong shape or type, or an impossible number: the message names the first such row.
 
     Examples
     --------
@@ -134,7 +131,7 @@ class Skeleton:
 
     @property
     def supporting_points(self) -> np.ndarray:
-        """Input points that have a vertex and a normal, int array: those that say where the skeleton is."""
+        """Input points with a vertex and a normal, which determine the skeleton, int array."""
         return supporting_points(self.vertex_of_point, self.normals)
 
     @property
@@ -198,7 +195,7 @@ class Skeleton:
         return tuple(paths)
 
     def to_networkx(self) -> networkx.Graph:
-        """The graph, with what is known of every vertex.
+        """The graph with the attributes of every vertex.
 
         Returns
         -------
@@ -276,7 +273,7 @@ def _check_values(skeleton: Skeleton) -> None:
     """Raise InvalidParameterError for the first number that cannot be true."""
     m, owner = len(skeleton.vertices), skeleton.vertex_of_point
     finite = f"must be finite, and at most {FARTHEST_PLACE:g}"
-    there = f"names a vertex that is not there: there are {m}"
+    there = f"names a missing vertex: there are {m}"
     _check_range(skeleton, "vertices", -FARTHEST_PLACE, FARTHEST_PLACE, finite)
     _check_range(skeleton, "edges", 0, m - 1, there)
     _refuse(skeleton, "edges", skeleton.edges[:, 0] == skeleton.edges[:, 1], "joins a vertex with itself")

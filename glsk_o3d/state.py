@@ -40,8 +40,8 @@ class Contraction(Representatives):
     rings : Rings
         Over the survivors; they keep their indices while the points move.
     mass : (n,) float64 array
-        The number of distinct points a survivor speaks for, over its mean before the contraction: all 1 unless points
-        were merged before. It grows in reductions that conserve it.
+        The number of distinct points that a survivor represents, over its mean before the contraction: all 1 unless
+        points were merged before. It grows in reductions that conserve it.
     ring_size0, ring_size : (n,) float64 array
         Distance to the nearest ring neighbour in the uncontracted and in the contracted cloud: s(0), s(t).
     ring_ratio_drop : float

@@ -19,8 +19,8 @@ class StopRule(Protocol):
 class ExplainedScore(Parameters):
     """Stop when the cloud's PCA score settles: De < threshold (Wen et al. 2024, equations 13 to 16).
 
-    De is the change of e between two solves over the share of points kept between them. The published code never stops
-    before the fourth solve, and so does this rule; without that it often stops after two, on an uncontracted cloud.
+    De is the change of e between two solves over the share of points kept between them. Like the published code, the
+    rule never stops before the fourth solve. Otherwise it often stops after two, on an uncontracted cloud.
 
     Examples
     --------

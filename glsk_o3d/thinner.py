@@ -58,7 +58,7 @@ class Thinner(Filter[Points]):
 
     around: float = parameter(
         20.0,
-        "Points to keep around the circumference of a part; of more, near points are merged. 0 merges none.",
+        "Points to keep around the circumference of a part; surplus near points are merged. 0 merges none.",
         unit="points",
         low=0,
         high=1000,

@@ -51,7 +51,7 @@ class Tracer(Filter[Skeleton]):
     )
     root: str | Any = parameter(
         None,
-        "Where one tree grows from: the lowest place along an axis, the thickest end, or the place nearest to a point. "
+        "Root of one tree: the lowest place along an axis, the thickest end, or the place nearest to a point. "
         "None keeps parts and loops.",
         type="point?",
         choices=(*AXES, "thickest"),

@@ -96,7 +96,7 @@ def test_the_page_says_what_is_so(root, tmp_path, monkeypatch, capsys):
     (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     exec(compile(code, "docs/meshlab.md", "exec"), {})
     assert capsys.readouterr().out == "".join(re.findall(r"# prints (.*\n)", code))
-    assert len(read_steps("mine.mlx")) == 4
+    assert len(read_steps("mine.mlx")) == 2
     (script,) = re.findall(r"```xml\n(.*?)```", page, re.DOTALL)
     assert ElementTree.fromstring(script).tag == "FilterScript"
     (tmp_path / "page.mlx").write_text(script)

@@ -1,4 +1,4 @@
-"""What a skeleton says about its object, and how good it is: against a known axis, or its cloud alone."""
+"""Measures of an object by its skeleton, and of a skeleton against a known axis or its cloud."""
 
 from .assessment import Assessment, assess
 from .branches import BranchTable, branch_table

@@ -46,9 +46,9 @@ class LoopWidth:
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """How a skeleton lies in its cloud: four measures from 0 to 1, of which 1 is best, all without a unit.
+    """How well a skeleton fits its cloud: four measures without units, from 0 to 1. 1 is best.
 
-    They need no truth, and so miss some errors: parts of the cloud without a branch, and missing loops, cost little
+    They need no truth, so they miss some errors: parts of the cloud without a branch, and missing loops, cost little
     or nothing. Noise and one-sided scans cost something even on the true axis. So compare skeletons of one cloud.
     The properties are those of Wen et al. 2025, arXiv 2504.00032; the formulas, which are ours, and what they give
     on closed forms: docs/evaluation.md.
@@ -59,9 +59,9 @@ class Assessment:
         Mean over the length of max(0, 1 - d / r), with d from the curve to the centre of its cross-section and r that
         section's radius.
     boundedness : float
-        Share of the length that sees its cross-section in more than a third of all directions.
+        Share of the length from which the cross-section is seen in more than a third of all directions.
     smoothness : float
-        1 minus how much the curve turns per radius travelled, in half turns; 0 where it turns more.
+        1 minus the turn of the curve per radius of length, in half turns; at least 0.
     topology : float
         min(components, clusters) / max(components, clusters), times the share of the loops that open wider than their
         tube (1 without loops).
@@ -105,14 +105,14 @@ class Assessment:
 
 
 def assess(skeleton: Skeleton, points: Any) -> Assessment:
-    """Measure how a skeleton lies in its cloud, without knowing the truth.
+    """Measure how well a skeleton fits its cloud, without a known axis.
 
     Parameters
     ----------
     skeleton : Skeleton
         Only `vertices` and `edges` count.
     points : cloud
-        Anything that carries points, in the units of the skeleton. Those that are not finite are passed over.
+        Anything with points, in the units of the skeleton. Points that are not finite are ignored.
 
     Returns
     -------

@@ -33,7 +33,7 @@ PRINTED_COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class BranchTable(Rows, row="branch"):
-    """One row per branch: those of `Skeleton.branches` in their order, then the vertices without edges.
+    """One row per branch, in the order of `Skeleton.branches`, and then one per vertex without edges.
 
     Lengths are in the cloud's units, means are along the curve, NaN is unknown. Iteration gives a dict of plain numbers
     and strings per row; the two points become ``start_point_x`` and so on. ``print`` shows the main columns. More on
@@ -46,25 +46,27 @@ class BranchTable(Rows, row="branch"):
         junctions, ``"isolated"`` for a vertex without edges.
     component : (B,) int array
     parent, level : (B,) int arrays
-        The row that a branch grows from, on the shortest way from the root, -1 for those at the root; steps from there.
+        The row of the branch that it grows from, on the shortest way from the root, or -1 at the root; steps from the
+        root.
     start, end, start_point, end_point : (B,) int and (B, 3) float arrays
-        Vertices at the ends, `start` towards the root, and where they are.
+        Vertices at the ends, `start` towards the root, and their coordinates.
     length, tortuosity : (B,) float arrays
         Along the curve; over the distance of the ends: 1 for a straight branch, infinite for a closed one.
     mean_radius, start_radius, end_radius : (B,) float arrays
     angle : (B,) float array
-        Degrees between the direction in which the parent arrives and that in which the branch leaves: 0 goes straight
-        on. NaN without a parent, and where the branch or its parent is closed.
+        Degrees between the directions of parent and branch at their junction: 0 goes straight on. NaN without a parent,
+        and for a closed branch or parent.
     mean_curvature, mean_torsion : (B,) float arrays
         See `curvature_torsion`.
     points : (B,) int array
         Points of the skeleton's cloud that belong to the branch; see `segment`.
     confidence, support : (B,) float arrays
-        Mean confidence; share of samples of the cloud that show its least shown place, or end, see `glsk_o3d.support`.
+        Mean confidence; share of samples of the cloud that show its least supported place or end, see
+        `glsk_o3d.support`.
     axis, order : (B,) int arrays
-        The first row of the axis that a branch is part of: at a junction one goes on of those that carry much, the
-        thickest and straightest. Centrifugal (Gravelius) order: 0 for axes at the root, and one more for each axis that
-        grows from another.
+        The first row of the axis of the branch. At a junction the thickest and straightest of the branches with much
+        growth beyond them continues the axis. Centrifugal (Gravelius) order: 0 for axes at the root, and one more for
+        each axis that grows from another.
 
     Examples
     --------
@@ -101,7 +103,7 @@ class BranchTable(Rows, row="branch"):
         return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
 
     def printed(self) -> dict[str, list[str]]:
-        """The main columns as people read them, a dash for what is unknown; the support only if any is known."""
+        """The main columns, with a dash for unknown values, and the support only if known."""
         columns = self._columns()
         if not np.isfinite(self.support).any():
             del columns["support"]
@@ -141,8 +143,8 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     skeleton : Skeleton
     root : str, int or (x, y, z), optional
         As of `editing.reroot`: ``"x"`` to ``"-z"`` for the vertex that is lowest along this axis, ``"thickest"`` for
-        the thickest end, a vertex, or a point whose nearest vertex it is. By default that is where the tree was made to
-        grow from, if it was; else, and in other components, the branch with the most volume has level 0.
+        the thickest end, a vertex, or a point whose nearest vertex it is. By default the root of the pipeline `tree`,
+        if it made the skeleton. Without it, and in other components, the branch with the most volume has level 0.
 
     Returns
     -------

@@ -56,7 +56,7 @@ class Truth:
             nodes = np.asarray(self.nodes, float).reshape(-1, 3)
             radii = np.asarray(self.radii, float).reshape(-1)
         except (TypeError, ValueError) as error:
-            raise InvalidParameterError(f"the truth has nodes or radii of no use: {error}") from None
+            raise InvalidParameterError(f"the truth has invalid nodes or radii: {error}") from None
         if len(nodes) == 0:
             raise InvalidParameterError("the truth has no nodes: there is no axis to compare with")
         if len(radii) != len(nodes) or not (np.isfinite(radii) & (radii > 0)).all():

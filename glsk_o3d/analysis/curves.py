@@ -75,7 +75,7 @@ def check_graph(vertices, edges, name):
     if edges.ndim != 2 or edges.shape[1] != 2 or edges.dtype.kind not in "iu":
         raise InvalidParameterError(f"the {name}'s edges must be an (E, 2) array of whole numbers")
     if edges.size and (edges.min() < 0 or edges.max() >= len(vertices)):
-        raise InvalidParameterError(f"an edge of the {name} names a vertex that is not there")
+        raise InvalidParameterError(f"an edge of the {name} names a missing vertex")
     return edges.astype(np.int64)
 
 
@@ -97,17 +97,17 @@ def curvature_torsion(skeleton: Skeleton, window: float | None = None) -> tuple[
 
     Around every vertex a polynomial of fourth degree is fitted to the branch by weighted least squares, in arc length
     over a window; the Frenet formulas give curvature ``|r' x r''| / |r'|^3`` and torsion
-    ``(r' x r'') . r''' / |r' x r''|^2``.
-    Closed branches are taken as closed. Nearer to an open end than a quarter of the window, the values are those a
-    quarter of the window away from it: one-sided fits mean little. How exact it is: docs/branches.md.
+    ``(r' x r'') . r''' / |r' x r''|^2``. Closed branches are treated as closed. Nearer to an open end than a quarter of
+    the window, the values are those a quarter of the window away from it, because one-sided fits are inexact. Errors:
+    docs/branches.md.
 
     Parameters
     ----------
     skeleton : Skeleton
     window : float, optional
         Half the length of the window, in the cloud's units; by default five median radii of the branch, or a quarter of
-        its length where radii are unknown. Bends that are tighter are smoothed; the rest comes out better the longer
-        it is. It is never so short that it holds fewer than seven vertices.
+        its length where radii are unknown. A longer window smooths tighter bends and is more exact elsewhere. It always
+        has at least seven vertices.
 
     Returns
     -------

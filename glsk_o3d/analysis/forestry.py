@@ -1,4 +1,4 @@
-"""What foresters read of a tree: height, stem, crown, volume by order; and what of it is hardly as it should be."""
+"""Forest measures of a tree: height, stem, crown, volume by order; and doubts about them."""
 
 from __future__ import annotations
 
@@ -38,30 +38,30 @@ class TreeMeasures:
     Attributes
     ----------
     height : float
-        Of the highest point above the foot of the stem, but for points farther than three radii from the curve.
+        Of the highest point above the foot of the stem, without points farther than three radii from the curve.
     stem_diameter, stem_interval : float, (low, high)
-        Of the circle through the points of the stem in a slice of 10 cm, across it and 1.3 m above the foot; in which
-        the diameter is with 95 % confidence, if the stem is round. NaN where there is no such circle.
+        Of the circle through the points of the stem in a slice of 10 cm across it, 1.3 m above the foot; the 95 %
+        confidence interval, if the stem is round. NaN without such a circle.
     stem_arc, stem_rms, stem_points : float, float, int
-        Degrees of that circle that have points; root mean square distance of the points on it, and their number.
+        Degrees of that circle with points; root mean square distance of these points, and their number.
     crown_base : float
         Height at which the lowest branch leaves the stem; NaN without one.
     crown_width, crown_area : float
         Largest horizontal distance of two points of the crown, of branches and of the stem above the lowest one; of its
         convex hull as seen from above.
     length, area, volume : tuple of float
-        Of the axes, lateral surface and volume of each order, the stem first; see `Cylinders`. Volume is that of parts
-        with a surface: confidence above 0, or not known.
+        Length of the axes, lateral surface and volume of each order, the stem first; see `Cylinders`. The volume is
+        that of parts with a surface: confidence above 0, or unknown.
     volume_interval : (low, high)
-        In which the volume of all is: 8 % aside, as on scanned trees; what was traced may be nothing, or as thick as
-        the parts that it grows from.
+        Interval of the whole volume, with 8 % on either side as on scanned trees. Traced parts are between nothing and
+        as thick as the parts that they grow from.
     traced, traced_volume : float
-        Share of the length that has confidence 0: twigs without a surface, leaves, and what noise has spoilt; the
-        volume that they would have. NaN if confidences are not known.
+        Share of the length with confidence 0 (twigs without a surface, leaves, noisy parts), and its volume. NaN if
+        confidences are unknown.
     root, up, unit : (x, y, z), str, float
-        The foot of the stem in the cloud's units, the axis that was taken to point up, and metres of one unit.
+        The foot of the stem in the cloud's units, the axis that points up, and the metres of one unit.
     doubts : tuple of str
-        What is hardly as it should be; the warnings.
+        The warnings about implausible results.
 
     Examples
     --------
@@ -103,8 +103,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     root : str, int or (x, y, z), optional
         See `cylinders`.
     up : {"x", "y", "z", "-x", "-y", "-z"}, optional
-        Axis that points up. By default that along which the tree was made to grow, by `root` here or in the pipeline
-        `tree`; else ``"z"``.
+        Axis that points up. By default that of `root` here or in the pipeline `tree`, or else ``"z"``.
     unit : float or {"m", "cm", "mm", "in", "ft"}
         One unit of the cloud, in metres or by its name.
 
@@ -120,8 +119,8 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     Warns
     -----
     SkeletonWarning
-        The root is in the upper half of the tree, the tree is taller than any, it holds more wood than trees so thick
-        and high, or its diameter at 1.3 m cannot be told.
+        The root is in the upper half of the tree, the tree is taller than any known one or has too much wood for its
+        size, or the diameter at 1.3 m is unknown.
 
     Examples
     --------
@@ -210,7 +209,7 @@ def _stem_section(
 def _find_doubts(
     ground: float, highest: float, section: CircleFit, unknown: str, volume: float, up: str, unit: float
 ) -> tuple[str, ...]:
-    """What of a tree is hardly as it should be, in words; `ground` is where its foot is, as a share of its height."""
+    """Implausible results of a tree, in words; `ground` is the place of its foot, as a share of its height."""
     doubts = []
     if ground > 0.5:
         doubts.append(f"the tree grows from {100 * ground:.0f} % of its height along {up}: does {up} point up?")

@@ -34,30 +34,29 @@ def grasp_candidates(
 ) -> GraspCandidates:
     """Candidates for grasps with parallel jaws, from the axis and the radii of a skeleton's branches.
 
-    The jaws close across a branch: at places along its curve, from directions around it. The gripper comes in straight,
-    open, from as far away as the diagonal of the object, until its fingertips are past the axis: by its reach, or as
-    far as the part if that is less. Approaches on which a finger or the palm would touch points of the object or an
-    obstacle are left out, and so are those without points between the jaws. Unseen space counts as free. The quality
-    ranks candidates; it does not measure force closure. Its formula, each step, and the sources
-    (Vahrenkamp et al. 2018; ten Pas et al. 2017): docs/grasping.md.
+    The jaws close across a branch, at places along its curve and from directions around it. The open gripper approaches
+    in a straight line, from as far away as the diagonal of the object, until its fingertips are past the axis by its
+    reach, but not past the part. Approaches are left out if a finger or the palm would touch points of the object or an
+    obstacle, or if no points are between the jaws. Unseen space counts as free. The quality ranks candidates; it does
+    not measure force closure. Its formula, each step, and the sources (Vahrenkamp et al. 2018; ten Pas et al. 2017):
+    docs/grasping.md.
 
     Parameters
     ----------
     skeleton : Skeleton
         With radii.
     gripper : Gripper or float
-        Or its widest opening [cloud's units]; then all else is in proportion.
+        Or its widest opening [cloud's units], with the other sizes in proportion.
     cloud : cloud, optional
         All points of the object; by default the skeleton's. With an empty tuple a finger may go through the object.
     obstacles : cloud or (4,) array_like, or a sequence of these, optional
-        Clouds of what else is there; of a mesh the vertices count, and points of the object do no harm. Four numbers
-        are a plane, as Open3D's ``segment_plane`` gives it: what is behind it, as seen from the object, is solid.
+        Clouds of other objects, or the vertices of meshes; they may include points of the object. Four numbers are a
+        plane as from Open3D's ``segment_plane``, solid behind it as seen from the object.
     cone : (direction, degrees), optional
-        Approaches may differ from this (3,) direction by no more.
+        Largest angle of an approach to this (3,) direction.
     clearance : float, optional
-        What the opening exceeds the width w by [cloud's units], half on either side; twice or three times as much
-        where less is not free, as in noise. Half of it is also kept all around the gripper. By default a tenth of the
-        widest opening.
+        Opening beyond the width w [cloud's units], half on either side; twice or three times as much where less is not
+        free, as in noise. Half of it is also kept all around the gripper. By default a tenth of the widest opening.
     around : int
         Approach directions at each place, evenly around the axis.
     spacing : float, optional
@@ -65,26 +64,26 @@ def grasp_candidates(
     margin : float
         Least distance along the curve from the ends of the branch, over the radius at that end.
     min_confidence : float
-        Least confidence of the skeleton, from 0 to 1. 0 takes also what nobody has measured.
+        Least confidence of the skeleton, from 0 to 1. 0 also takes unknown confidences.
     up : (3,) float array_like, optional
-        The first approach comes from there, as nearly as it can. By default against the cone's direction, or else z.
+        The first approach is as near to it as possible. By default against the cone's direction, or else z.
 
     Returns
     -------
     GraspCandidates
-        Best first; of equal ones, in the order of the branches, along them and around.
+        Best first; equal ones in the order of the branches, along them and around.
 
     Raises
     ------
     InvalidParameterError
-        The skeleton is empty or lacks radii, confidence or points that are needed; or a parameter is out of range.
+        The skeleton is empty or lacks radii, confidence or points; or a parameter is out of range.
     InvalidCloudError
         An obstacle or the object is no cloud.
 
     Warns
     -----
     SkeletonWarning
-        There is no candidate; it says why.
+        There is no candidate, with the reason.
 
     Examples
     --------
@@ -226,7 +225,7 @@ def _object(skeleton, cloud):
         return np.empty((0, 3))
     if cloud is None and len(skeleton.points) == 0:
         raise InvalidParameterError(
-            "this skeleton does not know the points of the object: give cloud=points, or cloud=() to check nothing"
+            "this skeleton has no points of the object: give cloud=points, or cloud=() to check nothing"
         )
     points = skeleton.points if cloud is None else cloud_points(cloud)
     return points[np.isfinite(points).all(axis=1)]

@@ -29,19 +29,19 @@ REACH_PER_OPENING = 9.5 / 80
 class Gripper:
     """A gripper with two parallel jaws, as boxes. Lengths are in the cloud's units.
 
-    What is not given is in proportion to `max_opening`, as on the Franka Hand, which opens 0.08 m.
+    Default sizes are proportional to `max_opening`, as on the Franka Hand, which opens 0.08 m.
 
     Attributes
     ----------
     max_opening : float
-        Between the jaws, as wide as they open.
+        Widest opening between the jaws.
     min_opening : float
-        Down to which they close; parts that are no wider cannot be held.
+        Least opening; thinner parts cannot be held.
     finger, palm : (3,) tuples of float
         Extents along the closing direction, along the part, and along the approach: of a finger, from the palm to its
         tip, and of what is behind the fingers.
     reach : float
-        How far the fingertips reach past the axis of the part; less on parts that are thinner than twice this.
+        Distance that the fingertips reach past the axis of the part; less on parts thinner than twice this.
 
     Raises
     ------
@@ -74,8 +74,8 @@ class Gripper:
     def boxes(self, opening: Any, depth: Any) -> tuple[np.ndarray, np.ndarray]:
         """The two fingers and the palm, in the frame of the gripper: x closing, y along the part, z approach.
 
-        Of an opening between the jaws, and a depth of the fingertips past the axis of the part, where the origin is,
-        each a number or an (n,) array: `low` and `high`, (3, 3) or (n, 3, 3) float arrays, are opposite corners of the
+        The origin is on the axis of the part. The opening between the jaws and the depth of the fingertips past the
+        axis are numbers or (n,) arrays. `low` and `high`, (3, 3) or (n, 3, 3) float arrays, are opposite corners of the
         finger towards -x, of that towards +x, and of the palm.
         """
         inner, tip = np.asarray(opening, float)[..., None, None] / 2, np.asarray(depth, float)[..., None, None]
@@ -97,24 +97,24 @@ class GraspCandidates(Rows, row="grasp"):
     Attributes
     ----------
     position, approach, closing : (G, 3) float arrays
-        On the axis, midway between the jaws; where the gripper comes in, perpendicular to the axis; from jaw to jaw,
+        On the axis, midway between the jaws; direction of the approach, perpendicular to the axis; from jaw to jaw,
         perpendicular to both.
     opening, depth : (G,) float arrays
-        Between the jaws as they come in: the width of the part and the clearance, or up to three of it. How far the
-        fingertips are past the position.
+        Between the jaws during the approach: the width of the part plus one to three clearances. Distance of the
+        fingertips past the position.
     branch : (G,) int array
         Position in `Skeleton.branches`.
     confidence, quality : (G,) float arrays
         From 0 to 1; the skeleton's confidence there is NaN where it is unknown.
     seen : (G,) int array
-        How many have points of the three sides that the gripper is around: those on which the jaws close, and the one
-        towards the palm. What was not seen may be in the way. 0 if nobody has looked.
+        Number of sides with points of the three around the gripper: two at the jaws and one towards the palm. Unseen
+        surface may be in the way. 0 if not checked.
     gripper : Gripper
-        That they are for.
+        The gripper of the candidates.
     places : int
-        Places along the skeleton that were looked at.
+        Number of examined places along the skeleton.
     left_out : dict of str to int
-        How many places were not taken, and how many ways in to the others, by the first reason that holds.
+        Numbers of rejected places, and of rejected approaches to the others, by the first reason.
 
     Examples
     --------
@@ -183,7 +183,7 @@ class GraspCandidates(Rows, row="grasp"):
         return drawn
 
     def to_json(self, path: str | os.PathLike) -> None:
-        """Write candidates, poses, gripper, and the reasons for what was left out; an unknown confidence is null."""
+        """Write candidates, poses, gripper and `left_out`; an unknown confidence is null."""
         write_json(path, self.as_dict())
 
     def as_dict(self) -> dict:

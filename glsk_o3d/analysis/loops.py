@@ -21,8 +21,8 @@ class Loop:
     opening : float
         Radius of the largest circle inside it, in the cloud's units.
     probability : float
-        That it is a handle of the object, as `Refiner.handle` means it; NaN where nobody knows: without points and
-        normals, or without the confidence that the `Refiner` measures.
+        Probability that it is a handle of the object, see `Refiner.handle`; NaN without points and normals, or without
+        the confidence of the `Refiner`.
 
     Examples
     --------

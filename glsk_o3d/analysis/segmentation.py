@@ -25,8 +25,8 @@ def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
     ----------
     skeleton : Skeleton
     cloud : cloud, optional
-        By default the cloud that the skeleton was made from. Points of another one go with the nearest point of that;
-        if the skeleton came from a file that holds no cloud, with the nearest place on the curve.
+        By default that of the skeleton. Points of another cloud have the branch of its nearest point, or of the nearest
+        place on the curve if the skeleton's file held no cloud.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
     Raises
     ------
     InvalidCloudError, InvalidParameterError
-        There is no cloud, or it is none; the skeleton is empty.
+        There is no cloud, or it has no points; or the skeleton is empty.
 
     Examples
     --------
@@ -133,7 +133,7 @@ def branch_of_point(skeleton, points, vertex):
 
 
 def thickness(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
-    """Radius of the part that every point belongs to, over the distance to the eighth nearest point.
+    """Local radius at every point over the distance to its eighth nearest point.
 
     Well above 1 the cloud shows the surface of the part. Below 1 the part is thinner than the point spacing, and its
     radius is a guess.
@@ -142,7 +142,7 @@ def thickness(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
     ----------
     skeleton : Skeleton
     cloud : cloud, optional
-        As for `segment`; how far its own points are apart counts.
+        As for `segment`; the distances are those of its own points.
 
     Returns
     -------
@@ -152,7 +152,7 @@ def thickness(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
     Raises
     ------
     InvalidCloudError, InvalidParameterError
-        There is no cloud, or it is none; the skeleton is empty.
+        There is no cloud, or it has no points; or the skeleton is empty.
 
     Examples
     --------

@@ -32,10 +32,9 @@ class Cylinders(Rows, row="cylinder"):
     radius, length : (K,) float arrays
         Of the cylinder with the volume of the part; along the curve.
     parent, branch, order : (K,) int arrays
-        The cylinder that it grows from, -1 at the root; row of the branch table, and that branch's order, 0 for the
-        stem.
+        The cylinder that it grows from, -1 at the root; row of the branch table, and its order, 0 for the stem.
     confidence : (K,) float array
-        Mean confidence along it; 0 where there was no surface to fit it to and its radius is the scatter of its points.
+        Mean confidence along it; 0 without a surface, where the radius is the scatter of the points.
 
     Examples
     --------
@@ -77,16 +76,16 @@ class Cylinders(Rows, row="cylinder"):
 def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     """Cylinders along the branches of a skeleton, each about four radii long.
 
-    A branch that leaves its parent begins a radius of the parent away, so that nothing counts twice; the one that goes
-    straight on begins at the junction. Free ends reach as far as their points do, but for the root less a third of the
-    radius: a round cap has the volume of so much less of a cylinder.
+    A branch begins one radius of its parent away from the junction, so that nothing counts twice; the one that
+    continues the axis begins at the junction. Free ends, except the root, reach as far as their points less a third of
+    the radius, which accounts for the volume of a round cap.
 
     Parameters
     ----------
     skeleton : Skeleton
     root : str, int or (x, y, z), optional
-        See `branch_table`. By default `report.root`, where the pipeline `tree` made it grow from; in a file that lacks
-        that, vertex 0 if vertices are numbered from there outwards; else the branch with the most volume.
+        See `branch_table`. By default `report.root` of the pipeline `tree`; without it vertex 0 if vertices are
+        numbered outwards from it; else the branch with the most volume.
 
     Returns
     -------
@@ -108,11 +107,11 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     """
     if skeleton.n_loops:
         raise InvalidParameterError(
-            f"the skeleton has {skeleton.n_loops} loops: cylinders are of trees; see pipelines.tree()"
+            f"the skeleton has {skeleton.n_loops} loops: cylinders need a tree; see pipelines.tree()"
         )
     if skeleton.n_components > 1:
         raise InvalidParameterError(
-            f"the skeleton has {skeleton.n_components} components: cylinders are of one tree; see pipelines.tree() and "
+            f"the skeleton has {skeleton.n_components} components: cylinders need one tree; see pipelines.tree() and "
             "editing.largest_component()"
         )
     if not np.isfinite(skeleton.radii).all():

@@ -1,4 +1,4 @@
-"""Many clouds: worked through in parallel, recorded in a ledger, and carried on where they were left."""
+"""Many clouds in parallel, with a ledger that lets an interrupted batch continue."""
 
 import lazy_loader as _lazy
 

@@ -36,7 +36,7 @@ class Grid:
         extent = np.asarray(high, float) - low
         if not (np.isfinite(extent).all() and (extent / size < 2**20).all()):
             raise InvalidParameterError(
-                f"tiles = {size:g}: the points span {' x '.join(f'{each:.4g}' for each in extent)}: set far ones aside "
+                f"tiles = {size:g}: the points span {' x '.join(f'{each:.4g}' for each in extent)}: remove far ones "
                 "with a condition, or give larger tiles"
             )
         counts = np.maximum(np.ceil(extent / size), 1)

@@ -104,7 +104,7 @@ def _listed(path: str) -> list[str]:
     lines = [os.fsdecode(line.strip()) for line in Path(path).read_bytes().removeprefix(b"\xef\xbb\xbf").splitlines()]
     lines = [line for line in lines if line and not line.startswith("#")]
     if any("\0" in line for line in lines):
-        raise FileNotFoundError(f"{path}: is no list of files: it holds a NUL, which no name does")
+        raise FileNotFoundError(f"{path}: is no list of files: it holds a NUL character")
     if not any(map(os.path.lexists, lines)):
         what = (
             f"none of {len(lines)} lines names one that is there, not {lines[0][:60]!r}" if lines else "it names none"

@@ -33,7 +33,7 @@ TILES_FOLDER = ".tiles/"
 
 @dataclass(frozen=True)
 class Plan:
-    """What a batch has to do.
+    """The work of a batch.
 
     Attributes
     ----------
@@ -44,15 +44,15 @@ class Plan:
     parameters : str
         The hash by which it is known.
     tasks : tuple
-        One per input, in the order of their names; after those of its tiles that of what is joined from them. Each has
-        a ``name``, that of its results without ending; the ``source``, as the ledger calls it; ``outputs``, files to
-        write, from `out_dir`; and ``why``: ``"done"`` if it is to be skipped, else ``"new"``, ``"failed before"``,
-        ``"interrupted before"``, ``"other parameters"``, ``"outputs are gone"``, ``"input changed"``, ``"asked for"``
-        or, of what is joined from tiles, ``"tiles to do"``.
+        One per input, in the order of their names; a scene follows its tiles. Each has a ``name``, that of its results
+        without ending; the ``source`` in the ledger; ``outputs``, files to write, relative to `out_dir`; and ``why``:
+        ``"done"`` if it is to be skipped, else ``"new"``, ``"failed before"``, ``"interrupted before"``,
+        ``"other parameters"``, ``"outputs are gone"``, ``"input changed"``, ``"asked for"`` or, for a scene,
+        ``"tiles to do"``.
     ledger : Ledger
-        As it is in the folder.
+        The ledger in the folder.
     left_out : dict of str to str
-        Files in the folders and patterns that are not taken, with the reason.
+        Skipped files in the folders and patterns, with the reason.
 
     Examples
     --------
@@ -97,20 +97,20 @@ def plan_batch(
     overlap: float | None = None,
     force: bool = False,
 ) -> Plan:
-    """Find out what a batch would do. Nothing is written.
+    """Plan a batch without writing anything.
 
     Parameters
     ----------
     inputs : path-like, or several
         Folders, glob patterns, lists of files (``.txt``, one path a line, from the working folder) and clouds.
     out_dir : path-like
-        Where results and ledger go; sub-folders as there are below each folder, pattern or list that is given.
+        Folder of results and ledger, with the sub-folders below each given folder, pattern or list.
     pipeline : Pipeline, name, or path of a recipe
         See `glsk_o3d.skeletonize`.
     formats : sequence of str
         Endings that `glsk_o3d.save_skeleton` knows; one file of each per cloud.
     preview : bool
-        Also a picture of each.
+        Also make pictures.
     cut_loops : bool
         Cut loops open for formats that hold only trees.
     recursive : bool
@@ -120,11 +120,11 @@ def plan_batch(
     by : str, optional
         One skeleton for each value of this attribute of the points, such as ``"treeID"``.
     tiles : float, optional
-        Take scenes apart into tiles of at most this size, in the cloud's units, along every axis along which they are
-        longer, and join the skeletons of these into one. For scenes that are too large to be taken at once.
+        Split scenes into tiles of at most this size, in the cloud's units, along every longer axis, and join their
+        skeletons into one. For scenes that are too large for one run.
     overlap : float, optional
-        How far a tile looks beyond itself, in the cloud's units: at least 2.7 times the radius of the thickest part
-        that crosses its faces, and at most a quarter of `tiles`. By default an eighth of it.
+        Width around a tile from which it takes more points, in the cloud's units: at least 2.7 times the radius of the
+        thickest part that crosses its faces, and at most a quarter of `tiles`. By default an eighth of `tiles`.
     force : bool
         Do everything anew.
 
@@ -135,17 +135,17 @@ def plan_batch(
     Raises
     ------
     FileNotFoundError
-        A file is not there, or a folder or pattern has no cloud.
+        A file is missing, or a folder or pattern has no cloud.
     InvalidParameterError
-        The pipeline or a format is wrong, there is nothing to write, or a result would replace an input, the result of
-        another input that is still there, or, in a folder without a ledger, a file that no batch has made; `by` and
-        `tiles` are given both, or tiles with a pipeline that makes one tree.
+        The pipeline or a format is wrong, or nothing would be written. A result would replace an input, the result of
+        another existing input, or, in a folder without a ledger, a file of somebody else. Both `by` and `tiles` are
+        given, or `tiles` with a pipeline that makes one tree.
     MissingPackageError
-        A format, or the picture, is written by a package that is not installed.
+        A format or the picture needs a package that is not installed.
     RecipeError
-        No recipe can hold the pipeline: then it cannot be told whether two runs are the same.
+        No recipe can hold the pipeline, so runs cannot be compared.
     BatchError
-        Where the parts of a scene are to be, in the output folder, there is something else.
+        Something else is in the place of the parts of a scene in the output folder.
 
     Examples
     --------
@@ -212,10 +212,10 @@ class Wanted:
         """How scenes are to be taken apart, if they are."""
         if self.tiles is None:
             if self.overlap is not None:
-                raise InvalidParameterError(f"overlap = {self.overlap!r}: is that of tiles: give their size, too")
+                raise InvalidParameterError(f"overlap = {self.overlap!r}: needs tiles: give their size, too")
             return None if self.by is None else Cut(by=self.by, where=self.where)
         if self.by is not None:
-            raise InvalidParameterError("by and tiles: labels have no seams, tiles have: give one of them")
+            raise InvalidParameterError("by and tiles cannot be combined: give one of them")
         stages = list(parts(pipeline))
         if any(getattr(stage, "root", None) is not None for stage in stages):
             raise InvalidParameterError(
@@ -269,7 +269,7 @@ def _apart(named: dict[str, Path], left_out: dict[str, str], splitter: Splitter)
             tasks[task.name] = task
     if not tasks:
         path, reason = next(iter(left_out.items()))
-        raise InvalidParameterError(f"{splitter.cut}: no input can be taken apart; {path}: {reason}")
+        raise InvalidParameterError(f"{splitter.cut}: no input can be split; {path}: {reason}")
     return list(tasks.values())
 
 

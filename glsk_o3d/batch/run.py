@@ -37,15 +37,15 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class BatchResult:
-    """What a batch did.
+    """The result of a batch.
 
     Attributes
     ----------
     rows : dict of str to dict
-        What the ledger says about the inputs, by name, those skipped included.
+        The ledger's rows of the inputs by name, also of skipped ones.
     done, skipped, failed : int
     seconds : float
-        Wall time, from the first cloud handed out.
+        Wall time from the first cloud.
     ledger : Path
 
     Examples
@@ -80,23 +80,23 @@ def run_batch(
 ) -> BatchResult:
     """Skeletonise many clouds, several at a time.
 
-    One bad file does not stop the others. What is done is in the ledger, ``ledger.jsonl`` in `out_dir`; the same call
-    again skips it, and tries again what failed. The first Ctrl-C hands out no more work and waits for what is in work;
-    the second one does not wait. Both leave a ledger from which the next call goes on.
+    A failed file does not stop the others. Finished clouds are in the ledger, ``ledger.jsonl`` in `out_dir`. The same
+    call again skips them and retries failures. The first Ctrl-C starts no more work and waits for running work; the
+    second does not wait. The next call continues in both cases.
 
     Parameters
     ----------
     inputs : path-like, or several
         Folders, glob patterns, lists of files (``.txt``) and clouds.
     out_dir : path-like
-        Made if it is not there.
+        Created if missing.
     workers : int, optional
         Processes on this machine, by default one for each core that this process may use.
     scheduler : str, path-like or distributed.Client, optional
-        Instead, a Dask cluster: the address of its scheduler, or the file that this wrote. Its workers read and write
-        the same files, by the same paths.
+        A Dask cluster instead: the address of its scheduler, or its scheduler file. Its workers read and write the same
+        files, by the same paths.
     executor : concurrent.futures.Executor, optional
-        Instead, any other executor; `workers` says how many clouds it gets at a time.
+        Another executor instead; `workers` is the number of clouds that it gets at a time.
     on_plan : callable, optional
         Called with the `Plan` before the work begins.
     on_result : callable, optional
@@ -111,17 +111,17 @@ def run_batch(
     Raises
     ------
     BatchError
-        Another batch writes into `out_dir`, it has something else where the parts of a scene are to be, or the workers
-        cannot be had any more.
+        Another batch writes into `out_dir`, something else is in the place of the parts of a scene, or the workers are
+        lost.
     KeyboardInterrupt
-        After the ledger has been put in order.
+        After the ledger is complete.
     FileNotFoundError, InvalidParameterError, RecipeError
         As in `plan_batch`.
 
     Notes
     -----
-    A worker that dies, say for lack of memory, is replaced. What it was doing is done again in the end, by itself, and
-    has failed if the worker dies again.
+    A worker that dies, for example for lack of memory, is replaced. Its cloud is tried again at the end, alone, and has
+    failed if the worker dies again.
 
     Examples
     --------
@@ -252,7 +252,7 @@ class _Run:
                 break
             if self._interrupts and not self._is_warned:
                 self._is_warned = True
-                _log.warning("finishing what is in work (%d), nothing else: Ctrl-C again stops at once", len(running))
+                _log.warning("finishing %d running clouds, starting no more: Ctrl-C again stops at once", len(running))
             if not ended:
                 self._workers.capacity()  # notices that a scheduler has gone
         return lost

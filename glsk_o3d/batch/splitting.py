@@ -99,7 +99,7 @@ class Splitter:
         straight = Path(os.path.realpath(self.folder.parent), PARTS_FOLDER, name)
         if Path(os.path.realpath(place)) != straight or (place.exists() and not self._list(name).is_file()):
             raise BatchError(
-                f"{place}: is not of a batch, which would keep the parts of a scene there: move it away, or give the "
+                f"{place}: was not made by a batch, which keeps the parts of a scene there: move it away, or give the "
                 "results another folder"
             )
 
@@ -239,7 +239,7 @@ def _parted(scan: Scan, valid: np.ndarray, by: Any, grid: Grid | None) -> Iterat
     for value, rows in zip(values.tolist(), rows_of, strict=False):  # of no values, split makes one group
         label = label_text(value)
         if len(label) > LONGEST_LABEL:
-            raise InvalidParameterError(f"{by}: {value!r} is no label: no name has that many digits")
+            raise InvalidParameterError(f"{by}: {value!r} is no label: it has too many digits for a file name")
         yield label, f"where {by} == {value!r}", rows
 
 

@@ -1,4 +1,4 @@
-"""The cross-check: a mesh of the same points, libigl's Laplacian on it, and the skeleton that it contracts to."""
+"""The cross-check with a mesh of the same points: libigl's Laplacian on it, and its skeleton."""
 
 from .check import CrossCheck, cross_check, save_crosscheck_picture
 

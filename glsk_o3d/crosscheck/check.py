@@ -32,31 +32,30 @@ _HEAD_ROOM, _FOOT_ROOM = 0.95, 0.57  # inches above and below the three views
 
 @dataclass(frozen=True, eq=False)
 class CrossCheck:
-    """What the check of a cloud against a mesh found.
+    """The result of the check of a cloud against a mesh.
 
     Attributes
     ----------
     verdict : {"agrees", "agrees in part", "do not trust", "cannot tell"}
-        The last where the skeletons differ and the mesh is no good, so that this says nothing about the cloud.
+        "cannot tell" if the skeletons differ because the mesh is bad.
     reasons : tuple of str
-        What speaks against a better verdict.
+        The reasons against a better verdict.
     surface : {"ball_pivoting", "poisson", "given"}
     n_input : int
-        Points that were given; fewer are in `points` if the cloud was thinned.
+        Number of input points; `points` has fewer if the cloud was thinned.
     fit, rows, skeletons : MeshFit, RowAgreement, SkeletonAgreement
         The numbers that `to_dict` lists.
     points : (N, 3) float64 array
-        The points that were used, in the user's order and units, as all below.
+        The used points, in the user's order and units, as all below.
     angle : (N,) float64 array
-        Between our Laplacian coordinates and the mesh's, in degrees; NaN where they could not be compared, 0 where both
-        are flat.
+        Between our Laplacian coordinates and the mesh's, in degrees; NaN if not comparable, 0 where both are flat.
     length_ratio : (N,) float64 array
-        Ours over the mesh's; NaN alike.
+        Ours over the mesh's; NaN as in `angle`.
     ring_share : (N,) float64 array
-        Triangles of the ring in the mesh, over those in either; NaN where rows are not one to one.
+        Triangles common to ring and mesh over those in either; NaN if rows are not one to one.
     skeleton, mesh_skeleton : Skeleton
     vertices : (V, 3) float64 array
-        The mesh, if it has the cloud's own points, these as they are after denoising.
+        The mesh. If it has the cloud's own points, they are denoised.
     faces : (F, 3) int64 array
 
     Examples
@@ -88,7 +87,7 @@ class CrossCheck:
         return ~(self.angle <= agreement.TURNED_ANGLE)
 
     def to_dict(self) -> dict[str, Any]:
-        """The verdict and all numbers but those of single points, as JSON holds them."""
+        """The verdict and all numbers except those of single points, as for JSON."""
         return {
             "verdict": self.verdict,
             "reasons": list(self.reasons),
@@ -128,14 +127,14 @@ def cross_check(
     cloud : cloud
         Anything `glsk_o3d.skeletonize` takes.
     mesh : {"auto", "ball_pivoting", "poisson"} or a triangle mesh
-        How to reconstruct one, or a mesh of the cloud's surface in its units: an Open3D TriangleMesh of either kind, or
-        a pair of arrays (V, 3) and (F, 3). "auto" is ball pivoting, or Poisson where that closes less than 70 % of the
+        The reconstruction, or a mesh of the cloud's surface in its units: an Open3D TriangleMesh of either kind, or a
+        pair of arrays (V, 3) and (F, 3). "auto" is ball pivoting, or Poisson if that closes less than 70 % of the
         rings.
     pipeline : Pipeline or str
         ... | RingBuilder | Contractor | ... | Refiner. The mesh's skeleton is made with the same parameters but without
         reduction.
     max_points : int or None
-        Larger clouds are thinned to so many points, evenly along their Morton curve. None for no limit.
+        Larger clouds are thinned to this number, evenly along their Morton curve. None for no limit.
 
     Returns
     -------
@@ -144,7 +143,7 @@ def cross_check(
     Raises
     ------
     InvalidCloudError
-        The points cannot be skeletonised, no surface be reconstructed from them, or the mesh lies elsewhere.
+        The points cannot be skeletonised, no surface can be reconstructed, or the mesh is elsewhere.
     InvalidParameterError
         An argument is wrong.
     MissingPackageError
@@ -218,9 +217,9 @@ def save_crosscheck_picture(
 ) -> None:
     """Draw a cross-check from three sides into a PNG file.
 
-    Points go from pale yellow, where the Laplacian coordinates of cloud and mesh have one direction, to dark red at 60
-    degrees and more; grey ones could not be compared. The worst lie on top. The cloud's skeleton is black, that of the
-    mesh blue.
+    Points are pale yellow where the Laplacian coordinates of cloud and mesh have the same direction, up to dark red at
+    60 degrees and more. Grey points could not be compared. The worst points are on top. The cloud's skeleton is black,
+    that of the mesh blue.
 
     Parameters
     ----------
@@ -230,7 +229,7 @@ def save_crosscheck_picture(
     size : (width, height)
         In pixels.
     title : str, optional
-        Ahead of the verdict.
+        Before the verdict.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""After the skeleton: shorten it, thin it out, smooth it, and make a tree of it. Each gives a new skeleton."""
+"""Functions that prune, simplify, smooth and reroot a skeleton. Each returns a new one."""
 
 from .edits import cut_loops, largest_component, prune, reroot, simplify, smooth
 

@@ -30,7 +30,7 @@ def largest_component(skeleton: Skeleton) -> Skeleton:
     Returns
     -------
     Skeleton
-        Points of the others have no vertex any more, -1.
+        Points of other components have no vertex, -1.
 
     Examples
     --------
@@ -66,7 +66,7 @@ def cut_loops(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
     Skeleton
         Without loops; its vertices are the same.
     cut : (k, 2, 3) float64 array
-        Both ends of every edge that was dropped.
+        Both ends of every dropped edge.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
     Returns
     -------
     Skeleton
-        Vertex 0 is the root, `report.root` says where it is, and the first vertex of every edge is nearer to it. Other
+        Vertex 0 is the root, `report.root` is its place, and the first vertex of every edge is nearer to it. Other
         components follow, each from its vertex nearest to the root.
 
     Raises
@@ -131,14 +131,14 @@ def prune(
     order: int | None = None,
     root: RootPlace | None = None,
 ) -> Skeleton:
-    """Drop branches that leave a junction and end, and are short, thin, or of a high order.
+    """Drop branches with a free end that are short, thin, or of a high order.
 
     Parameters
     ----------
     skeleton : Skeleton
     length : float
-        Least length of a branch, from junction to tip, in the cloud's units. Of every junction the shortest goes first,
-        and what is left of the junction is measured anew, so that the longest way through it stays.
+        Least length of a branch, from junction to tip, in the cloud's units. At every junction the shortest is dropped
+        first and the rest is measured anew, so the longest path through it stays.
     radius : float
         Least mean radius of a branch, in the same way.
     order : int, optional
@@ -154,7 +154,7 @@ def prune(
     Raises
     ------
     InvalidParameterError
-        A number is out of its range, radii are not known, or orders are asked for of a skeleton with loops.
+        A number is out of range, radii are unknown, or `order` is given for a skeleton with loops.
 
     Examples
     --------
@@ -220,18 +220,18 @@ def simplify(skeleton: Skeleton, *, tolerance: float | None = None, n: int | Non
     tolerance : float, optional
         How far a dropped vertex may be from the simpler curve, in the cloud's units.
     n : int, optional
-        How many vertices to keep, those first that matter most; one of the two is given. Ends, junctions, and what it
-        takes to keep every loop always stay.
+        Number of vertices to keep, the most important first; give either this or `tolerance`. Ends, junctions, and the
+        vertices that keep every loop always stay.
 
     Returns
     -------
     Skeleton
-        Points of a dropped vertex belong to the nearest one left along the branch.
+        Points of a dropped vertex belong to the nearest remaining one along the branch.
 
     Raises
     ------
     InvalidParameterError
-        None of the two is given, or both, or one is out of its range.
+        Neither is given, or both, or one is out of range.
 
     Examples
     --------
@@ -293,7 +293,7 @@ def smooth(skeleton: Skeleton, *, passes: int = 10) -> Skeleton:
     ----------
     skeleton : Skeleton
     passes : int
-        There and back; more make longer waves disappear. Ends and junctions stay where they are.
+        Number of passes; more remove longer waves. Ends and junctions do not move.
 
     Returns
     -------

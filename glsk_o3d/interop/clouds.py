@@ -20,7 +20,7 @@ MOST_NEIGHBOURS = 30  # within a radius without a limit of its own: as many as O
 class Cloud:
     """Anything that carries points: what a filter of clouds `consumes` or `produces`.
 
-    A name alone, without instances and without subclasses; `cloud_points` says what counts as a cloud.
+    It is only a name, without instances and subclasses. `cloud_points` defines what counts as a cloud.
 
     Examples
     --------
@@ -92,8 +92,8 @@ def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int
     counts, n = cloud.point[SAMPLE_COUNT].cpu().numpy().astype(float), len(cloud.point.positions)
     if not (counts.shape in ((n, 1), (n,)) and (counts >= 1).all() and counts.sum() <= MOST_COUNTED):
         raise InvalidCloudError(
-            f"the cloud's attribute {SAMPLE_COUNT} of shape {counts.shape} must say how many points each of the {n} "
-            "stands for: at least 1, and less than 2^63 together; rename what says something else"
+            f"the cloud's attribute {SAMPLE_COUNT} of shape {counts.shape} must be the number of points that each "
+            f"of the {n} represents: at least 1, and less than 2^63 together; rename an attribute of another meaning"
         )
     counts = counts.reshape(-1)
     return counts[finite], int(counts[finite].sum()), int(counts[~finite].sum())

@@ -16,7 +16,7 @@ __all__ = ["annotate", "annotate_contraction"]
 
 
 def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None = None) -> Any:
-    """A copy of a cloud that says of every point where it belongs.
+    """A copy of a cloud with the vertex, branch and radius of every point.
 
     The copy has all attributes of the original, and
 
@@ -33,8 +33,8 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     ----------
     skeleton : Skeleton
     cloud : cloud, optional
-        By default the one the skeleton was made from. Points of another one go with the nearest point of that, or with
-        the nearest place on the curve if the skeleton's file held no cloud.
+        By default that of the skeleton. Points of another cloud have the attributes of its nearest point, or of the
+        nearest place on the curve if the skeleton's file held no cloud.
     color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1], optional
         What the colours of the points show, or the one colour of all.
 
@@ -53,7 +53,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
 
     Notes
     -----
-    ``voxel_down_sample`` takes the mean of every attribute: that of labels means nothing. Annotate its result again.
+    ``voxel_down_sample`` averages attributes, which is wrong for labels. Annotate its result again.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def labels(
 
 
 def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
-    """A copy of a cloud with the attribute ``contracted`` (N, 3): where the contraction has brought every point.
+    """A copy of a cloud with the attribute ``contracted`` (N, 3), the contracted position of every point.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from .colors import ColorChoice, shades
 
 
 def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
-    """A skeleton as a legacy line set, coloured by what is known of it.
+    """A skeleton as a legacy line set, coloured by an attribute.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
 
 
 def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> Any:
-    """A skeleton as a tensor line set on the CPU, with all that is known of its vertices and edges.
+    """A skeleton as a tensor line set on the CPU, with all attributes of vertices and edges.
 
     Parameters
     ----------
@@ -92,9 +92,9 @@ def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> 
 def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
     """A skeleton as a mesh of tubes, one for every branch, closed by half balls.
 
-    The tubes have the sections of the vertices, linear between them: ellipses with their half axes, or circles of their
-    radius where the skeleton has no points to say where the width is. They overlap at the junctions, where the half
-    balls of all branches make one ball if they are round. Their cross-sections do not twist along the curve.
+    The tubes have the sections of the vertices, linear between them: ellipses with their half axes, or circles with
+    their radius if the skeleton has no points to determine the direction of the width. They overlap at junctions, where
+    round half balls form one ball. The cross-sections do not twist along the curve.
 
     Parameters
     ----------

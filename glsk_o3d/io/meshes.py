@@ -46,7 +46,7 @@ def _read_open3d(path: Path, data: bytes | None = None) -> Scan:
             path.write_bytes(data)
         mesh = o3d.io.read_triangle_mesh(str(path))
     if path.suffix == ".glb" and not np.isfinite(mesh.vertices).all():
-        raise ValueError("its nodes place vertices where no finite coordinates are")
+        raise ValueError("its nodes place vertices beyond finite coordinates")
     colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
     normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
     return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))
@@ -189,5 +189,5 @@ def mesh_arrays(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
     if vertices.dtype.kind not in "iuf" or not np.isfinite(vertices).all():
         raise InvalidParameterError("the mesh has vertices that are not finite numbers")
     if faces.dtype.kind not in "iu" or faces.min() < 0 or faces.max() >= len(vertices):
-        raise InvalidParameterError("a triangle of the mesh names a vertex that is not there")
+        raise InvalidParameterError("a triangle of the mesh names a missing vertex")
     return vertices.astype(float), faces.astype(np.int64)

@@ -41,7 +41,7 @@ def existing_file(path: str | os.PathLike) -> Path:
 def check_ends(path: str | os.PathLike) -> None:
     """Raise FileFormatError for a pipe or a device: what it gives may never end."""
     if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
-        raise FileFormatError(f"{path}: is a pipe or a device, not a file: write what it gives to one first")
+        raise FileFormatError(f"{path}: is a pipe or a device, not a file: write its output to a file first")
 
 
 def unknown_ending(what: object, known: Iterable[str]) -> FileFormatError:
@@ -52,7 +52,7 @@ def unknown_ending(what: object, known: Iterable[str]) -> FileFormatError:
 def check_promised(promised: int, held: int, what: str = "points") -> None:
     """Raise ValueError where a file promises more of something than its size can hold, or than was read from it."""
     if held < promised:
-        raise ValueError(f"it promises {promised} {what} and holds {max(held, 0)}: it breaks off")
+        raise ValueError(f"it promises {promised} {what} and holds {max(held, 0)}: it is truncated")
 
 
 def check_budget(taken: int, size: int, times: int = MOST_EXPANDED) -> None:

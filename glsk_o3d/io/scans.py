@@ -47,9 +47,9 @@ _SCAN_READERS: dict[str, Reader] = {
 def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     """Read a point cloud, or the vertices of a mesh.
 
-    Open3D returns an empty cloud for a file that it cannot read and uninitialised points for one that breaks off; here
-    both are errors. All coordinates keep their full digits. Of a mesh with large triangles, whose vertices say little
-    about the surface, a warning in the log says so.
+    Unreadable and truncated files are errors; Open3D returns an empty cloud or uninitialised points for them. All
+    coordinates keep their digits. A warning is logged for a mesh with large triangles, whose vertices describe the
+    surface badly.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     Returns
     -------
     open3d.geometry.PointCloud
-        With the normals and colours that the file has; for all else that it says of its points see
-        `read_tensor_cloud`. STL repeats a vertex for every triangle around it.
+        With the normals and colours of the file; `read_tensor_cloud` reads all attributes. STL repeats a vertex for
+        every triangle around it.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     FileFormatError
         A folder, a skeleton, an unknown ending, or a file that is empty, damaged, broken off, or without points.
     InvalidParameterError
-        `where` is no condition, or names what the points do not have.
+        `where` is no condition, or names a missing attribute.
     InvalidCloudError
         It holds for no point.
     MissingPackageError
@@ -90,7 +90,7 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
 
 
 def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
-    """Read a cloud as `read_cloud` does, with everything that the file says of its points.
+    """Read a cloud as `read_cloud` does, with all attributes of its points.
 
     Parameters
     ----------
@@ -100,8 +100,8 @@ def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> A
     Returns
     -------
     open3d.t.geometry.PointCloud
-        Positions are float64. Attributes have the names of the file, such as ``intensity`` and ``classification``;
-        what cannot stand in an expression is an underscore. `glsk_o3d.annotate` keeps them.
+        Positions are float64. Attributes have the names of the file, such as ``intensity`` and ``classification``, with
+        an underscore for characters that expressions do not allow. `glsk_o3d.annotate` keeps them.
 
     Examples
     --------
@@ -170,7 +170,7 @@ def read_blocks(
     Joined the blocks are the scan, to the last bit; in a block, attributes are unset that are so there. LAS, LAZ, PCD
     (text and binary) and binary PLY without faces are read in blocks; everything else is one block. With `where` blocks
     have fewer points, and there is none without. Errors are those of `read_cloud`, before the first block where the
-    size of the file shows that it breaks off.
+    size of the file shows that it is truncated.
     """
     if isinstance(rows, bool) or not isinstance(rows, int) or rows < 1:
         raise InvalidParameterError(f"rows = {rows!r}: must be an int of at least 1")

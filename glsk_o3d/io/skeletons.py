@@ -77,27 +77,26 @@ def save_skeleton(
     .urdf                 trees, as a robot of cylinders and balls        ROS, simulators
     ===================== =============================================== =======================================
 
-    Those after CGAL's are only written, not read. Numbers keep their full precision, but in glTF, which has float32.
-    The file appears complete or not at all; on an error an existing file stays as it was.
+    Formats below CGAL's are only written, not read. Numbers keep their full precision, except in glTF, which has
+    float32. The file appears complete or not at all; after an error an existing file is unchanged.
 
     Parameters
     ----------
     skeleton : Skeleton
     path : path-like
     cut_loops : bool
-        For formats that hold only trees: drop one edge per loop, keeping the spanning forest of least length, instead
-        of refusing.
+        For formats of trees: keep the spanning forest of least length, instead of refusing loops.
     root : str, int or (x, y, z), optional
-        For the same formats: where the tree grows from, as for `glsk_o3d.editing.reroot`; the vertices are numbered
-        from there. By default vertex 0, if the numbers go outwards from it, as those of `pipelines.tree` do, or else
-        the root of `glsk_o3d.analysis.branch_table`.
+        For the same formats: the root, as for `glsk_o3d.editing.reroot`, from which the vertices are numbered. By
+        default vertex 0 if the numbers already go outwards from it, as from `pipelines.tree`; otherwise the root of
+        `glsk_o3d.analysis.branch_table`.
     format : str, optional
         The ending of another format than that of `path`, with or without its dot.
 
     Raises
     ------
     FileFormatError
-        The ending is unknown, or the skeleton has loops, or lacks what the format needs.
+        The ending is unknown, or the skeleton has loops or lacks data that the format needs.
     InvalidParameterError
         There is no such root.
     OSError
@@ -133,9 +132,9 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     Returns
     -------
     Skeleton
-        From JSON and npz everything. From other formats the graph alone: `points`, `normals` and `vertex_of_point` are
-        empty, and radii that the format has no place for are NaN. Edges are sorted; repeated edges and those from a
-        vertex to itself are dropped. Polylines are joined where their ends have equal coordinates.
+        JSON and npz give everything. Other formats give only the graph: `points`, `normals` and `vertex_of_point` are
+        empty, and missing radii are NaN. Edges are sorted; repeated edges and those from a vertex to itself are
+        dropped. Polylines are joined at ends with equal coordinates.
 
     Raises
     ------
@@ -221,7 +220,7 @@ def read_truth(path: str | os.PathLike) -> Truth:
     ------
     FileNotFoundError
     FileFormatError
-        It is neither, or what it holds is no axis.
+        It is neither, or it holds no axis.
 
     Examples
     --------

@@ -33,18 +33,18 @@ LARGE_CLOUD = 10_000_000  # measured: points that in memory take 2 GB, and in bl
 def read_sample(
     path: str | os.PathLike, *, n: int | None = None, where: str | None = None, drop_invalid: bool = False
 ) -> Any:
-    """Read of a large scan the points that its skeleton is made from, in memory that does not grow with the file.
+    """Read the sample of a large scan that its skeleton needs, in memory that does not grow with the file.
 
-    Of large clouds `Sampler` keeps the point nearest to the mean of each cell of a grid. Here it is found while
-    reading, block by block: the skeleton of the sample is that of the whole.
+    `Sampler` keeps the point nearest to the mean of each cell of a grid. This function finds these points block by
+    block while reading, so the skeleton of the sample is that of the whole.
 
     Parameters
     ----------
     path : path-like
-        As for `read_cloud`. LAS, LAZ, PCD and binary PLY are read in blocks, all else is read whole.
+        As for `read_cloud`. LAS, LAZ, PCD and binary PLY are read in blocks, other formats as a whole.
     n : int, optional
-        About how many points; all, if they are not more than twice as many. By default what `Sampler` takes: twice
-        25000 or, from 152588 points on, 128 times the square root of their number, 1.28 of 100 million.
+        About how many points; all, if they are not more than twice as many. By default the number of `Sampler`: twice
+        25000 or, from 152588 points on, 128 times the square root of their number, 1.28 million of 100 million.
     where : str, optional
         As for `read_cloud`.
     drop_invalid : bool
@@ -53,13 +53,13 @@ def read_sample(
     Returns
     -------
     open3d.t.geometry.PointCloud
-        Points of the file, float64, and the attribute ``sample_count`` (N, 1) int32: how many points of the file each
-        stands for. Filters take it into account; the commands, which begin with a file, count its points.
+        Points of the file, float64, with the attribute ``sample_count`` (N, 1) int32: the number of points of the file
+        that each represents. Filters use it, and the commands count the points of the file.
 
     Raises
     ------
     InvalidCloudError
-        There are points that are not finite. Other errors are those of `read_cloud`.
+        Some points are not finite. Other errors are those of `read_cloud`.
 
     Examples
     --------
@@ -148,9 +148,9 @@ def annotate_file(
     """Write a scan with labels to a file, block by block, in memory that does not grow with it.
 
     `glsk_o3d.annotate` for files: the same attributes, coloured by branch. The scan's own colours are attributes
-    ``scan_red``, ``scan_green`` and ``scan_blue``. What a binary PLY file holds as float, double, uchar or int stays
-    so, and radius, confidence and thickness are float where the coordinates are. All else becomes int, or double.
-    ``thickness`` takes the spacing of the points that the skeleton was made from; NaN if it came without.
+    ``scan_red``, ``scan_green`` and ``scan_blue``. Attributes of a binary PLY file of the types float, double, uchar or
+    int keep them, and radius, confidence and thickness are float if the coordinates are. Other attributes become int or
+    double. ``thickness`` uses the spacing of the skeleton's points, and is NaN without them.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def annotate_file(
     Raises
     ------
     FileFormatError
-        The scan changes while it is read, or the output is no PLY file, or is the scan.
+        The scan changed during reading, or the output is no PLY file, or is the scan.
     InvalidParameterError
         The skeleton is empty. Other errors are those of `read_cloud`.
     OSError

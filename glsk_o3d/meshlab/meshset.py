@@ -25,19 +25,18 @@ pymeshlab = require("pymeshlab")
 
 
 class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
-    """``pymeshlab.MeshSet`` with the filters of this package among MeshLab's own.
+    """``pymeshlab.MeshSet`` with the filters of this package added.
 
-    Ours are applied as MeshLab's are, by name or as methods, and can be mixed with them in filter scripts. Each makes a
-    new layer from the current one, which becomes the current layer: a skeleton has vertices, edges, and the radii as
-    vertex scalars. Where a layer came from one of our filters and its vertices and edges are as they were, the next one
-    goes on from there; on any other layer the vertices are the cloud, and whatever must run first is run with its
-    defaults.
+    Our filters are called like MeshLab's, by name or as methods, and can be mixed with them in filter scripts. Each
+    makes a new current layer: a skeleton has vertices, edges, and the radii as vertex scalars. A filter continues from
+    the layer of an earlier one of ours if its vertices and edges are unchanged. On any other layer the vertices are the
+    cloud, and the earlier steps run with their defaults.
 
-    Lengths are ``pymeshlab.PercentageValue``, as MeshLab's own of the diagonal of the layer's bounding box, or
-    ``pymeshlab.PureValue``, in the units of the cloud; a float and a string such as ``"2%"`` are understood too. What
-    is not given is as elsewhere in this package, of the box that ``Sampler.frame`` names: ``"1% of the frame"``.
+    A length is ``pymeshlab.PercentageValue`` or a string such as ``"2%"``, of the diagonal of the layer's bounding box
+    as in MeshLab; or ``pymeshlab.PureValue`` or a float, in the units of the cloud. Defaults refer to the box of
+    ``Sampler.frame`` as elsewhere in this package: ``"1% of the frame"``.
 
-    Where pymeshlab is not installed, importing the class raises MissingPackageError.
+    Without pymeshlab the import of the class raises MissingPackageError.
 
     Examples
     --------
@@ -68,7 +67,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         Returns
         -------
         dict of str to object
-            What the filter says about its result.
+            Facts about the result.
 
         Raises
         ------
@@ -122,7 +121,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             return read_script(file)[0]
 
     def filter_parameter_values(self, filter_name: str, **params: Any) -> dict[str, Any]:
-        """The parameters that `apply_filter` would use: those given, and the defaults of the others."""
+        """The parameters that `apply_filter` would use: the given ones, and defaults."""
         if filter_name in verbs():
             return verbs()[filter_name].values(_plain_lengths(params))
         return super().filter_parameter_values(filter_name, **params)
@@ -158,13 +157,13 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         pymeshlab.search(word)
 
     def load_filter_script(self, filter_script_name: str | os.PathLike, *, any_filter: bool = False) -> None:
-        """Make a script file the current script. Nothing is run; everything is checked, ScriptError says what is wrong.
+        """Make a script file the current script. It is checked and not run; ScriptError names faults.
 
         Parameters
         ----------
         filter_script_name : path-like
         any_filter : bool
-            Take also filters of MeshLab's that write, read or send files, from a script that is trusted.
+            Allow filters of MeshLab that write, read or send files; only for trusted scripts.
         """
         self._script = read_steps(filter_script_name, any_filter)
 
@@ -174,9 +173,9 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             self.apply_step(each)
 
     def save_filter_script(self, filter_script_name: str | os.PathLike) -> None:
-        """Write the current script: what was loaded, and the filters applied since. Our lengths in percent stay so.
+        """Write the current script: loaded filters, and those applied since. Our lengths in percent stay percentages.
 
-        Which layer was the current one is not in it: a filter of ours that names its layer acts on it again.
+        It does not record the current layer, so name the layer in our filters.
         """
         write_script(filter_script_name, [each.call for each in self._script])
 
@@ -193,7 +192,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         self.add_mesh(Layer.of(points).to_pymeshlab(), name)
 
     def layer(self, number: int = -1) -> Layer:
-        """A layer as our filters see it, with what they passed on if its vertices and edges are unchanged since.
+        """A layer for our filters, with their earlier results if its vertices and edges are unchanged.
 
         -1 is the current layer. InvalidCloudError without any, InvalidParameterError without one of that number.
         """
@@ -213,7 +212,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
     def current_skeleton(self) -> Skeleton:
         """The skeleton in the current layer; its radii are the layer's scalars. InvalidCloudError if it has no edges.
 
-        It has its report and its points if nothing changed its vertices and edges since they were made.
+        It has its report and its points if its vertices and edges are unchanged.
         """
         layer = self.layer()
         if layer.edges is None:
@@ -221,7 +220,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         return layer.to_skeleton()
 
     def load_scan(self, path: str | os.PathLike) -> None:
-        """Add a scan from a file as a new layer: what `read_cloud` reads as ``glsk run`` does, all else by MeshLab.
+        """Add a scan from a file as a new layer, by `read_cloud` as in ``glsk run`` or else by MeshLab.
 
         FileNotFoundError or FileFormatError without points. `load_new_mesh` also has colours of faces and textures.
         """
@@ -237,9 +236,9 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             raise FileFormatError(f"{path}: no points could be read")
 
     def save_current_mesh(self, file_name: str | os.PathLike, *args: Any, **kwargs: Any) -> None:
-        """Write the current layer: as pymeshlab, but without options a layer of vertices and edges as `save_skeleton`.
+        """Write the current layer as pymeshlab; without options a layer of vertices and edges by `save_skeleton`.
 
-        So edges and their radii survive in PLY, which MeshLab would drop, and there are all formats of skeletons.
+        So PLY files keep edges and radii, which MeshLab drops, and all formats of skeletons are available.
         """
         lines = self.current_mesh().edge_number() and not self.current_mesh().face_number()
         if lines and not args and not kwargs and os.fspath(file_name).lower().endswith(tuple(FORMATS)):

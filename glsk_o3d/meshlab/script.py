@@ -50,7 +50,7 @@ class Param:
         """
         if self.type not in types:
             fitting = f"it may be a {' or '.join(types)}" if types else "scripts cannot give it"
-            raise ValueError(f"a {brief(self.type)} is not what it takes: {fitting}")
+            raise ValueError(f"it has the wrong type {brief(self.type)}: {fitting}")
         names = _VECTORS.get(self.type, ("value",))
         if not self.attributes.keys() >= set(names):
             raise ValueError(f"it has no value: a {self.type} has it in {', '.join(names)}")

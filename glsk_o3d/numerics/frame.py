@@ -145,10 +145,10 @@ def check_extent(points: np.ndarray, n: int | None = None) -> None:
     if extent == 0:
         raise InvalidCloudError(f"all {n or len(points)} points coincide: there is nothing to skeletonise")
     if not MIN_EXTENT < extent < MAX_EXTENT:
-        raise InvalidCloudError(f"the cloud is {extent:g} long, too extreme for its squares: rescale it")
+        raise InvalidCloudError(f"the cloud is {extent:g} long, and its square is out of range: rescale it")
     away = np.abs(points).max()
     if extent < MIN_STEPS * np.spacing(away):
         raise InvalidCloudError(
             f"the cloud is {extent:g} long and {away:g} away from the origin, where numbers are {np.spacing(away):g} "
-            "apart: what shape it had is lost in rounding; subtract an offset before the coordinates are first stored"
+            "apart: its shape is lost in rounding; subtract an offset before the coordinates are first stored"
         )

@@ -1,4 +1,4 @@
-"""What there is by name: the filters, the stopping rules and the pipelines, ours and those of plugins."""
+"""Filters, stopping rules and pipelines by name, built in and of plugins."""
 
 from collections.abc import Callable
 
@@ -61,7 +61,7 @@ def named_pipeline(name: str) -> Pipeline:
     Raises
     ------
     InvalidParameterError
-        If there is none; the message says which was meant, or lists the names.
+        There is none; the message suggests one, or lists the names.
     """
     make = PIPELINES.get(name) or known_pipelines().get(name)
     if make is None:

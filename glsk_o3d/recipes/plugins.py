@@ -46,7 +46,7 @@ def plugins(group: str) -> dict[str, Any]:
 
 
 def forget_plugins() -> None:
-    """Look for plugins anew when they are next asked for, after one was installed into a running process."""
+    """Search for plugins again at the next use, after one was installed into a running process."""
     with _lock:
         _found.clear()
 

@@ -43,8 +43,7 @@ def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
     InvalidParameterError
         A parameter is wrong.
     RecipeError
-        A filter or rule is not in `glsk_o3d.recipes.catalogue.catalogue`, or a parameter is something that no file can
-        hold.
+        A filter or rule is not in `glsk_o3d.recipes.catalogue.catalogue`, or a file cannot hold a parameter.
 
     Examples
     --------
@@ -142,7 +141,7 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     OSError
         The file cannot be read.
     RecipeError
-        It is no file, no recipe, or a wrong one; the message names the file and the place in it.
+        The file is no valid recipe; the message names the file and the place in it.
 
     Examples
     --------
@@ -155,7 +154,7 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     """
     ending = _ending(path)
     if os.path.exists(path) and not os.path.isfile(path):
-        raise RecipeError(f"{os.fspath(path)}: is no file but a folder, or a pipe or a device, which may never end")
+        raise RecipeError(f"{os.fspath(path)}: is a folder, a pipe or a device, not a file")
     data = Path(path).read_bytes()
     try:
         text = data.decode("utf-8-sig")
@@ -172,7 +171,7 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """A table of JSON, in which no key may stand twice."""
     often = Counter(key for key, _ in pairs)
     if len(often) < len(pairs):
-        raise ValueError(f"the key {often.most_common(1)[0][0]!r} stands twice in one table")
+        raise ValueError(f"the key {often.most_common(1)[0][0]!r} appears twice in one table")
     return dict(pairs)
 
 

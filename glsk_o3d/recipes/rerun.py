@@ -36,10 +36,10 @@ def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -
     skeleton : Skeleton
         With its points, as it was computed or as a JSON or npz file holds it.
     cloud : cloud, optional
-        Another cloud to run the recipe on; by default the skeleton's own points. They are what the first filter after
-        those of clouds took, so that these do not run again.
+        Another cloud for the recipe; by default the skeleton's own points. These have passed the filters of clouds,
+        which are then skipped.
     **callbacks : callable, optional
-        Those that a Pipeline takes when it is called.
+        Callbacks of the Pipeline.
 
     Returns
     -------
@@ -78,7 +78,9 @@ def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -
     if not len(skeleton.points):
         raise RecipeError("it holds no points: give the scan")
     if is_of_sample(skeleton):
-        raise RecipeError("it holds a sample of a large cloud, and not how many points each stands for: give the scan")
+        raise RecipeError(
+            "it holds a sample of a large cloud without the number of points that each represents: give the scan"
+        )
     first = max((i for i, stage in enumerate(pipeline.stages) if stage.produces is Cloud), default=-1) + 1
     again = Pipeline(*pipeline.stages[first:])(skeleton.points, **callbacks)
     if first:
@@ -90,7 +92,7 @@ def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -
         then, now = skeleton.report.versions, again.report.versions
         others = [f"{name} {then.get(name)} instead of {now[name]}" for name in now if then.get(name) != now[name]]
         warnings.warn(
-            f"the rerun differs from the result: that was made with {', '.join(others) or 'the same releases'}",
+            f"the rerun differs from the result, which was made with {', '.join(others) or 'the same releases'}",
             SkeletonWarning,
             stacklevel=outside(),
         )

@@ -1,4 +1,4 @@
-"""Tell where no curve skeleton is meaningful, on sheets and balls, and where the points do not say where it is."""
+"""Warnings about places without a meaningful curve skeleton: sheets, balls, and points that do not determine it."""
 
 from dataclasses import replace
 
@@ -54,8 +54,8 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     if sheet > MAJORITY:
         return [
             f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
-            "so that a curve skeleton says little about it; where that is the table or the floor under an object, "
-            "remove it first, with Open3D's segment_plane or read_cloud(..., where='z > ...')"
+            "so a curve skeleton has little meaning; if that is a table or a floor under an object, remove it first, "
+            "with Open3D's segment_plane or read_cloud(..., where='z > ...')"
         ]
 
     component, n = skeleton.component_of_vertex[vertex], skeleton.n_components
@@ -74,7 +74,7 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     if share > MAJORITY:
         return [
             f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
-            "so that no curve skeleton is meaningful there"
+            "so no curve skeleton is meaningful there"
         ]
     spread = group_sum(np.einsum("ni,nj->nij", points, points), component, n) / np.maximum(size, 1)[:, :, None]
     mean = group_sum(points, component, n) / np.maximum(size, 1)
@@ -84,7 +84,7 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     if share > MAJORITY:
         return [
             f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
-            "so that no curve skeleton is meaningful there"
+            "so no curve skeleton is meaningful there"
         ]
     if len(skeleton.edges) == 0:
         return ["no edges: every part became one vertex; is Connector.radius larger than the parts are long?"]
@@ -116,5 +116,5 @@ def _weak_region(skeleton: Skeleton, count: np.ndarray) -> list[str]:
     reach, place = norm(region - middle).max(), coordinates(middle)
     return [
         f"weakly supported: around {share:.0%} of the points, above all within {reach:.3g} of ({place}), the points do "
-        "not agree on an axis: too sparse or too noisy for how thin the parts are, or no tubes at all"
+        "not agree on an axis: they are too sparse or too noisy for thin parts, or the parts are no tubes"
     ]

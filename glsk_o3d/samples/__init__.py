@@ -1,8 +1,8 @@
-"""Sample clouds with exactly known axes, made from formulas: to try things on, to test with, to draw.
+"""Sample clouds with exactly known axes, from formulas.
 
 Most shapes are unions of tapered capsules (the convex hull of two balls), so a shape *is* its axis: nodes, edges, and a
 radius at every node. All clouds are uniform by area, reproducible through `seed`, and, but for the tree, about one unit
-in size. A shape that cannot be raises InvalidParameterError.
+in size. An impossible shape raises InvalidParameterError.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ SAMPLES: dict[str, Callable[..., Sample]] = {
 
 
 def sample_object(n: int = 8192, noise: float = 0.002, seed: int = 0, name: str = "sauropod") -> Sample:
-    """The object of ``glsk demo``, or any other sample by its name.
+    """The object of ``glsk demo``, or another sample by its name.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from ..errors import InvalidParameterError
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sample:
-    """A cloud and the axis it was made from.
+    """A cloud and its axis.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ def union_sample(name, nodes, edges, radii, n, noise, seed, cameras=None) -> Sam
     length = np.linalg.norm(b - a, axis=1)
     slope = (ra - rb) / length
     if (np.abs(slope) >= 1).any():
-        raise InvalidParameterError(f"{name}: a part is wider than it is long, so that one end swallows the other")
+        raise InvalidParameterError(f"{name}: a part is wider than it is long, so one end contains the other")
     if cameras is not None:
         cameras = np.asarray(cameras, float).reshape(-1, 3)
         if len(cameras) == 0 or not (signed_distance(cameras, nodes, edges, radii) > 0).all():

@@ -65,7 +65,7 @@ def sauropod(
     n, noise, seed : int, float, int
         As in `sample_object`.
     cameras : tuple of points, optional
-        Only points that one of these sees are kept, as in a scan: the belly and parts of the legs and of the flanks
+        Keep only points that one of these cameras sees, as in a scan: the belly and parts of the legs and of the flanks
         behind them are missing. None keeps the whole surface.
 
     Examples
@@ -132,8 +132,7 @@ def tree(
     """A tree drawn at random: a trunk that forks in two and forks again, each limb tapering to half its cross-section.
 
     The first node is the foot, and each edge leads away from it. Tips are ``2 * radius / 2 ** ((forks + 1) / 2)``
-    thick; where points are farther apart than that, as with 5 forks and 4096 points, twigs are no more than rows of
-    points.
+    thick. If the point spacing is larger, as with 5 forks and 4096 points, twigs are only rows of points.
 
     Parameters
     ----------
@@ -144,7 +143,7 @@ def tree(
     length, radius : float
         Of the trunk, which stands upright in the origin; in metres it is a small tree.
     cameras : (k, 3) array, optional
-        Where the tree was scanned from: points that none of them sees are missing.
+        Places of the scanners: points that none of them sees are missing.
 
     Examples
     --------

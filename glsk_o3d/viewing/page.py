@@ -29,8 +29,8 @@ _STORED_RANGE = 1.25  # half diagonals that positions are stored as shares of: c
 class ContractionRecorder:
     """Record the points of a cloud after each solve: pass it as ``on_state``.
 
-    A large cloud is thinned, so that a record stays small: at most `most_points` points are followed. A merged point
-    has the place of the one it was merged into. A second run starts a new record.
+    At most `most_points` points are followed, so a record stays small. A merged point has the place of the one it was
+    merged into. A second run starts a new record.
 
     Parameters
     ----------
@@ -84,9 +84,9 @@ def save_report(
     path : path-like
         HTML; it appears complete or not at all.
     recorder : ContractionRecorder, optional
-        What was given as ``on_state`` to the run that made the skeleton. Without it there is no slider.
+        The ``on_state`` of the run that made the skeleton. Without it there is no slider.
     title : str
-        Shown as it is, whatever signs are in it.
+        Shown literally.
 
     Raises
     ------

@@ -31,10 +31,9 @@ def plot_skeleton(
 ) -> Any:
     """Draw a skeleton and its cloud into matplotlib's three-dimensional axes.
 
-    All axes have one scale and no ticks, the projection is orthographic, points are lighter where they are farther, and
-    the skeleton lies on top, with a blue diamond where a tree grows from, which ``axes.legend()`` calls root. The axes
-    come back to draw more into; since the drawing fills the place of the axes, which matplotlib clips to a square, give
-    ``clip_on=False`` with what you add.
+    All axes have one scale and no ticks, and the projection is orthographic. Farther points are lighter, and the
+    skeleton is on top. A blue diamond is the root of a tree, which ``axes.legend()`` names. You can draw more into the
+    returned axes; use ``clip_on=False``, because matplotlib clips to a square.
 
     Parameters
     ----------
@@ -51,7 +50,7 @@ def plot_skeleton(
     view : (float, float)
         Elevation and azimuth of the eye [degrees].
     most_points : int
-        Of larger clouds so many are drawn, evenly picked in their order.
+        At most so many points are drawn, evenly picked in their order.
     point_size : float
         Area of a dot [square points].
     line_width : float
@@ -64,7 +63,7 @@ def plot_skeleton(
     Raises
     ------
     InvalidCloudError, InvalidParameterError
-        The cloud is none; the colour is unknown.
+        The cloud has no points, or the colour is unknown.
     MissingPackageError
         matplotlib is not installed.
 

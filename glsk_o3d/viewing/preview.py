@@ -37,12 +37,12 @@ def save_preview(
 ) -> None:
     """Draw a skeleton and its cloud from three sides into a PNG file.
 
-    The three views look along the coordinate axes, all at one scale, that of the bar above them: x across and z up, y
-    across and z up, x across and y up. They are arranged so that they are large. The cloud is grey, lighter where it is
+    The three views look along the coordinate axes, all at the scale of the bar above them: x across and z up, y across
+    and z up, x across and y up. They are arranged so that they are large. The cloud is grey, lighter where it is
     farther; edges are red, junctions dark dots and leaves open ones, unless branches are too short for dots; a blue
-    diamond is where a tree grows from, ``Report.root``. Where `support` was asked for, amber rings mark what few
-    samples show, and crosses what some show and the skeleton lacks, with how many. Below are the counts and the first
-    two warnings of the run, and how many more there are.
+    diamond is where a tree grows from, ``Report.root``. After `support`, amber rings mark parts that few samples show,
+    and crosses those that the skeleton lacks but samples show, with their numbers. Below are the counts, the first two
+    warnings, and the number of the others.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def save_preview(
     path : path-like
         PNG; it appears complete or not at all.
     size : (width, height), optional
-        In pixels. By default as the object is wide and tall: from 900 x 450 to 1800 x 1200.
+        In pixels. By default it follows the object: from 900 x 450 to 1800 x 1200.
     title : str, optional
         Above the views.
 
@@ -91,15 +91,15 @@ def save_assessment(
     points : (N, 3) float array
         The cloud, in grey.
     values : (E,) float array
-        One per edge, shown from 0 to 1; those outside have the colour of the nearer end, and NaN is drawn in black.
+        One per edge, shown from 0 to 1 and clipped to that range; NaN is black.
     path : path-like
         PNG; it appears complete or not at all.
     label : str
-        What the values are, on the colour bar.
+        Name of the values, on the colour bar.
     best : {0, 1}
         The good end of the scale, dark blue; the bad one is orange.
     unknown : str
-        What NaN means, below the colour bar if there is any.
+        Meaning of NaN, below the colour bar if there is any.
     size : (width, height)
         In pixels.
     title : str, optional

@@ -230,9 +230,9 @@ LINE = [[0, 0, 0], [1, 0, 0]]
         (LINE, [[0, 1]], [1, np.inf], "positive, finite radius"),
         (LINE, [[0, 1]], [1], "positive, finite radius"),
         ([[0, 0, np.inf], [1, 0, 0]], [[0, 1]], [1, 1], "not finite"),
-        (LINE, [[0, 5]], [1, 1], "not there"),
+        (LINE, [[0, 5]], [1, 1], "missing vertex"),
         (LINE, [[0.5, 1]], [1, 1], "whole numbers"),
-        ([[0, 0]], [[0, 1]], [1, 1], "of no use"),
+        ([[0, 0]], [[0, 1]], [1, 1], "invalid nodes or radii"),
     ],
 )
 def test_truths_that_are_none(nodes, edges, radii, message):

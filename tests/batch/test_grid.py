@@ -62,5 +62,5 @@ def test_sizes(sizes, message):
 
 
 def test_a_point_far_off_is_named():
-    with pytest.raises(InvalidParameterError, match=r"the points span 1e\+12 x 1 x 1: set far ones aside"):
+    with pytest.raises(InvalidParameterError, match=r"the points span 1e\+12 x 1 x 1: remove far ones"):
         Grid.over(np.zeros(3), np.array([1e12, 1, 1]), 0.5, 0.1)

@@ -185,11 +185,11 @@ def test_the_points_of_a_file_taken_apart_and_files_that_cannot_be(here):
         **{f"forest-{i}": f"{here / 'forest.csv'} where tree == {i}.0" for i in range(3)},
     }
     assert left_out["bare.xyz"] == "no attribute of its points is called 'tree': there are none"
-    assert left_out["huge.csv"] == "tree: 1e+300 is no label: no name has that many digits"
+    assert left_out["huge.csv"] == "tree: 1e+300 is no label: it has too many digits for a file name"
     assert (
         "no attribute of the points is called 'cl'" in apart("forest.csv", "huge.csv", where="cl == 5")[1]["huge.csv"]
     )
-    with pytest.raises(InvalidParameterError, match=r"no input can be taken .*bare\.xyz: no attribute"):
+    with pytest.raises(InvalidParameterError, match=r"no input can be split.*bare\.xyz: no attribute"):
         apart("bare.xyz")
 
 

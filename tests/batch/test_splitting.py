@@ -149,7 +149,7 @@ def test_a_folder_of_somebody_else_stays_also_behind_a_link(scene, passes, split
         (parts / linked).parent.mkdir(parents=True)
         (parts / linked).symlink_to(tmp_path / "mine", target_is_directory=True)
         (parts / "scene.json").touch()
-    with pytest.raises(BatchError, match=r"scene: is not of a batch, .*: move it away, or give"):
+    with pytest.raises(BatchError, match=r"scene: was not made by a batch, .*: move it away, or give"):
         splitter(**LABELS).split("scene", scene)
     assert (mine.read_text(), passes) == ("mine", [])
     assert not list(tmp_path.rglob("*.ply"))
@@ -205,7 +205,9 @@ def test_labels(splitter, table):
     assert (list(split.parts), split.points, split.dropped) == (["1.5"], 12, 6)
     split = splitter(**LABELS).split("a", table(corners, [1.0, 1e18, -2.2250738585072014e-308] * 4))
     assert list(split.parts) == ["-2.2250738585072014e-308", "1", "1000000000000000000"]
-    with pytest.raises(InvalidParameterError, match=r"tree: 1e\+300 is no label: no name has that many digits"):
+    with pytest.raises(
+        InvalidParameterError, match=r"tree: 1e\+300 is no label: it has too many digits for a file name"
+    ):
         splitter(**LABELS).split("a", table(corners, [1.0, 1e300] * 6))
 
 

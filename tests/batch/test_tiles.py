@@ -148,8 +148,8 @@ def test_the_plan_writes_nothing(scene, tmp_path):
     [
         (dict(tiles=-1), "tiles = -1: must be above 0"),
         (dict(tiles=1.0, overlap=0.5), "at most a quarter"),
-        (dict(overlap=0.1), "is that of tiles: give their size, too"),
-        (dict(tiles=1.0, by="tree"), "labels have no seams, tiles have: give one of them"),
+        (dict(overlap=0.1), "needs tiles: give their size, too"),
+        (dict(tiles=1.0, by="tree"), "by and tiles cannot be combined: give one of them"),
         (dict(tiles=1.0, pipeline="tree"), "makes one tree of all that is in a tile"),
         (dict(tiles=1e-7, overlap=1e-8), "the points span"),
         (dict(by="tree"), "no attribute of its points is called 'tree'"),

@@ -91,7 +91,7 @@ def begin(saboteur, start, waiting, write, tmp_path):
         [worker] = map(psutil.Process, waiting(batch))
         os.killpg(batch.pid, signal.SIGINT)
         for line in batch.stderr:
-            if "finishing what is in work (1), nothing else: Ctrl-C again stops at once" in line:
+            if "finishing 1 running clouds, starting no more: Ctrl-C again stops at once" in line:
                 return batch, worker
         pytest.fail("ended without a word of it")
 

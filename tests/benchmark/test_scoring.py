@@ -57,9 +57,9 @@ def test_faults_of_every_kind_have_the_measures_of_compare(star):
     [
         ([], [], "empty"),
         ([[0, 0, np.nan], [1, 0, 0]], [[0, 1]], "not finite"),
-        ([[0, 0, 0], [1, 0, 0]], [[0, 2]], "not there"),
+        ([[0, 0, 0], [1, 0, 0]], [[0, 2]], "missing vertex"),
         ([[0, 0, 0], [1, 0, 0]], [[0.0, 1.0]], "whole numbers"),
-        ([[0, 0], [1, 0]], [[0, 1]], "of no use"),
+        ([[0, 0], [1, 0]], [[0, 1]], "invalid vertices or edges"),
         ([[0, 0, 0], [1e9, 0, 0]], [[0, 1]], "units"),
         (np.zeros((MOST_ANSWER_PLACES + 1, 3)), [], "too much for an answer"),
     ],

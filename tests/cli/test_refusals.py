@@ -16,8 +16,8 @@ TABLE = """
     2 tree y.ply --root a,b,c                              | root = 'a,b,c': must be an axis
     2 tree y.ply --up w                                    | up = 'w': must be
     2 tree y.ply --unit 0                                  | unit = '0': must be metres, above 0, or one of m, cm, mm
-    2 tree o.ply                                           | 1 loops: cylinders are of trees; see pipelines.tree()
-    2 tree two.json                                        | 2 components: cylinders are of one tree
+    2 tree o.ply                                           | 1 loops: cylinders need a tree; see pipelines.tree()
+    2 tree two.json                                        | 2 components: cylinders need one tree
     2 tree y.ply -o c.xlsx                                 | c.xlsx: the file is a table of cylinders and its name ends
     2 edit o.ply                                           | nothing to write: give an output with -o
     2 edit o.ply -o o.ply                                  | o.ply: is an input
@@ -47,7 +47,7 @@ TABLE = """
     2 grasps rod.npz --opening 1 --finger a,b,c            | --finger a,b,c: write 3 numbers
     2 grasps rod.npz --opening 1 -o g.txt                  | the grasps are JSON, CSV or PLY and its name ends in .json
     2 grasps y.ply --opening 1                             | has no confidence, perhaps due to its file: give min_con
-    2 grasps y.ply --opening 1 --min-confidence 0          | does not know the points of the object: give cloud=
+    2 grasps y.ply --opening 1 --min-confidence 0          | has no points of the object: give cloud=
     1 grasps rod.npz --opening 1 --scene none.ply          | none.ply: no such file
     1 evaluate y.ply no.ply                                | no.ply: no such file
     1 evaluate y.ply SCANS/ring.ply --truth none.npz       | none.npz: not a valid truth: the truth has no nodes

@@ -246,7 +246,7 @@ def test_poisson_and_a_single_method(ring):
     ("mesh", "message"),
     [
         ("alpha", "mesh = 'alpha': must be 'auto', 'ball_pivoting', 'poisson', or a mesh"),
-        ((np.eye(3), [[0.0, 1, 2]]), "names a vertex that is not there"),
+        ((np.eye(3), [[0.0, 1, 2]]), "names a missing vertex"),
         (o3d.geometry.TriangleMesh(), "needs"),
         ((np.zeros((3, 3)), [[0, 1, 2]]), "no triangle of the mesh has an area"),
     ],

@@ -42,7 +42,7 @@ def refused(path, says=REFUSAL):
 
 def test_one_rule():
     check_promised(5, 5)
-    with pytest.raises(ValueError, match="it promises 6 rows and holds 5: it breaks off"):
+    with pytest.raises(ValueError, match="it promises 6 rows and holds 5: it is truncated"):
         check_promised(6, 5, "rows")
     check_budget(ALWAYS_TAKEN, 1)
     check_budget(3 * ALWAYS_TAKEN, ALWAYS_TAKEN, 3)

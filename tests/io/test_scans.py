@@ -279,5 +279,5 @@ def test_files_that_break_off_are_refused_wherever(tmp_path, capfd, name):
     assert capfd.readouterr() == ("", "")
     if name in ("PLY", "PCD", "LAS"):  # there is no block at all
         path.write_bytes(whole[:-60])
-        with pytest.raises(FileFormatError, match=r"promises 53 points and holds 5[012]: it breaks off"):
+        with pytest.raises(FileFormatError, match=r"promises 53 points and holds 5[012]: it is truncated"):
             read_blocks(path, rows=10)

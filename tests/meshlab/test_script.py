@@ -80,9 +80,9 @@ COLOUR = '<Param type="RichColor" name="color1" r="{}" g="1" b="{}" a="{}"/>'
         (
             _of(THEIRS, "RichBool KNearest true"),
             4,
-            "'KNearest': a RichBool .* may be a RichInt or RichEnum or RichMesh",
+            "'KNearest': .* type RichBool: it may be a RichInt or RichEnum or RichMesh",
         ),
-        (_of(OURS, "RichFloat refiner_recentre 3"), 4, "'refiner_recentre': a RichFloat .*: it may be a RichInt"),
+        (_of(OURS, "RichFloat refiner_recentre 3"), 4, "'refiner_recentre': .* type RichFloat: it may be a RichInt"),
         (_of(THEIRS, "RichInt KNearest many"), 4, "'KNearest': 'many' is not an int"),
         (_of(THEIRS, "RichInt KNearest 1_0"), 4, "'KNearest': '1_0' is not an int"),
         (_of(THEIRS, '<Param type="RichInt" name="KNearest"/>'), 4, "'KNearest': it has no value: .* in value"),

@@ -180,11 +180,11 @@ SHOWN_AROUND = 0.05  # how near a point of the surface of a thing is to one that
 
 
 def coverage(shape: Shape, points: np.ndarray) -> float:
-    """Share of the axis that a cloud shows, of what the whole surface shows.
+    """Share of the axis that a cloud shows, relative to the whole surface.
 
-    A piece of the axis is shown if a point lies on its own surface, not on that of another part nearby. The surface of
-    a `Thing` belongs to the piece that is nearest in its half widths. Where a stretch of more than two radii is not
-    shown, the share is 0.96 at most. Below 0.97 nobody can be asked for the true axis.
+    A piece of the axis is shown by a point on its own surface, not on that of another part nearby. The surface of a
+    `Thing` belongs to the piece that is nearest in its half widths. If a stretch of more than two radii is not shown,
+    the share is 0.96 at most. Below 0.97 the true axis cannot be asked for.
 
     Parameters
     ----------

@@ -64,11 +64,11 @@ class BenchmarkFolder:
     ----------
     path : Path
     version : str
-        "own" where the clouds are somebody's own.
+        "own" for clouds of your own.
     shapes : dict of str to dict
-        What ``benchmark.json`` says of each shape: family, seed, truth, facts, and clouds by variant.
+        The entries of ``benchmark.json``: family, seed, truth, facts, and clouds by variant.
     complete : bool
-        Whether all that was asked for is made.
+        Whether all requested clouds are made.
 
     Examples
     --------
@@ -94,7 +94,7 @@ class BenchmarkFolder:
         return found
 
     def digits(self, cloud: CloudFile) -> str | None:
-        """What tells a cloud of somebody's own from another of its name; None in a version, whose names say all."""
+        """Digits that identify one of your own clouds; None for those of a version, which their names identify."""
         shape = self.shapes[cloud.shape]
         if self.version != OWN:
             return None
@@ -102,7 +102,7 @@ class BenchmarkFolder:
 
     @property
     def scored(self) -> list[CloudFile]:
-        """The clouds of which answers count."""
+        """The scored clouds."""
         return [cloud for cloud in self.clouds if cloud.scored]
 
     @property
@@ -143,7 +143,7 @@ class BenchmarkFolder:
         ------
         FileNotFoundError
         FileFormatError
-            What there is, is no axis.
+            The file holds no axis.
         """
         return read_axis(self.path / self.shapes[shape]["truth"])
 

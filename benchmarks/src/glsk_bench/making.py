@@ -32,23 +32,23 @@ def make(
     jobs: int | None = None,
     on_shape: Callable[[str, int, int], object] | None = None,
 ) -> BenchmarkFolder:
-    """Make a benchmark, or go on where it was left.
+    """Make a benchmark, or continue an interrupted one.
 
     Parameters
     ----------
     folder : path-like
-        Made if it is not there. What it has of the same version stays, and is not made again.
+        Created if missing. Existing clouds of the same version stay.
     version : str
     families : iterable of str, optional
         Of shapes; by default all of the version.
     seeds : iterable of int, optional
-        Of the shapes of each family; by default those of the version. Others make other shapes, to develop with.
+        Of the shapes of each family; by default those of the version. Use others for development.
     variants : iterable of str, optional
         Of the clouds; by default all of the version.
     jobs : int, optional
         Processes; by default one for each core.
     on_shape : callable, optional
-        Called with the name of each shape that is done, how many are, and of how many.
+        Called with the name of each finished shape, the number of finished ones, and that of all.
 
     Returns
     -------

@@ -43,21 +43,21 @@ def add_shape(
     Parameters
     ----------
     folder : path-like
-        Made if it is not there.
+        Created if missing.
     shape : str
         Its name: letters, digits and ``_.+-``.
     clouds : mapping of str to cloud
-        By the names of the variants, such as ``{"scan": points}``: anything that `skeletonize` takes.
+        Clouds by variant, such as ``{"scan": points}``: anything that `skeletonize` takes.
     nodes : (M, 3) array_like of float
         Of the true axis, in the units of the clouds.
     edges : (E, 2) array_like of int
-        Nodes in one place that no edge joins are apart: weld them before.
+        Nodes at the same place without an edge are not connected: weld them first.
     radii : (M,) array_like of float, optional
-        Distance to the surface at each node. By default measured in the first of the clouds: at each node the median
-        distance of the points whose nearest place on the axis belongs to it, and where fewer than three do, the radius
-        of the nearest node along the axis that has enough.
+        Distance to the surface at each node. By default measured in the first cloud: at each node the median distance
+        of the points whose nearest place on the axis belongs to it; with fewer than three points, the radius of the
+        nearest node along the axis with enough.
     family : str
-        What kind of shape it is.
+        Kind of the shape.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def _axis(
         places = np.asarray(nodes, float).reshape(-1, 3)
         links = simple_edges(check_graph(places, edges, "axis"))
     except (TypeError, ValueError) as error:
-        raise InvalidParameterError(f"{shape}: the axis has nodes or edges of no use: {error}") from None
+        raise InvalidParameterError(f"{shape}: the axis has invalid nodes or edges: {error}") from None
     before = made.shapes.get(shape)
     variant, first = next(iter(points.items()))
     source = variant if radii is None else "given"

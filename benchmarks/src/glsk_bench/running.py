@@ -67,21 +67,21 @@ def run(
     retry: bool = False,
     on_cloud: Callable[[str, Outcome, int, int], object] | None = None,
 ) -> RunResult:
-    """Run a program over all clouds that are scored, or go on where a run was left.
+    """Run a program over all scored clouds, or continue an interrupted run.
 
-    Each cloud has a process of its own. What it writes is taken if it ends well, and if that can be read. Answers are
-    called SHAPE_VARIANT, with the ending; ``times.json`` has the seconds, from the start of each process to its end,
-    and why there is no answer.
+    Each cloud has a process of its own. Its file counts if the process succeeds and the file is readable. Answers have
+    the name SHAPE_VARIANT and the ending; ``times.json`` has the seconds from the start of each process to its end, and
+    the reasons for missing answers.
 
     Parameters
     ----------
     folder : BenchmarkFolder or path-like
     answers : path-like
-        A folder, made if it is not there.
+        A folder, created if missing.
     pipeline : str, optional
         One of ours by name; "default" if there is no command.
     command : str or sequence of str, optional
-        Any program, such as ``"mytool {cloud} {skeleton}"``: the places are for the files that it reads and writes.
+        Any program, such as ``"mytool {cloud} {skeleton}"``, with places for the files that it reads and writes.
     ending : str
         Of the files that the command writes, one that `read_skeleton` reads.
     time_limit : float
@@ -89,11 +89,11 @@ def run(
     memory_limit : float, optional
         GB of address space for each process, on Linux.
     jobs : int
-        Clouds at a time. More than one disturb the seconds.
+        Clouds at a time. More than one make the seconds inexact.
     retry : bool
-        Run again what failed before.
+        Repeat failed clouds.
     on_cloud : callable, optional
-        Called with the name of each cloud that is done, the `Outcome`, how many are, and of how many.
+        Called with the name of each finished cloud, its `Outcome`, the number of finished ones, and that of all.
 
     Returns
     -------
@@ -223,7 +223,7 @@ def words_of(command: str | Sequence[str]) -> list[str]:
     for place in _PLACES:
         if not any(place in word for word in words):
             raise InvalidParameterError(
-                f"the command must say where names of files go: it has no {place}, as in 'mytool {' '.join(_PLACES)}'"
+                f"the command has no {place} for the name of a file, as in 'mytool {' '.join(_PLACES)}'"
             )
     if shutil.which(words[0]) is None:
         raise InvalidParameterError(f"the command cannot be run: there is no program {words[0]!r}")

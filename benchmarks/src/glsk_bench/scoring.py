@@ -166,7 +166,7 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
     except (TypeError, ValueError) as error:
         if isinstance(error, InvalidParameterError):
             raise
-        raise InvalidParameterError(f"the skeleton has vertices or edges of no use: {error}") from None
+        raise InvalidParameterError(f"the skeleton has invalid vertices or edges: {error}") from None
     check_size(float(np.median(axis.radii)), places, links)
     answer = Skeleton(places, links, (), (), (), ())  # type: ignore[arg-type]
     found = compare(answer, axis).as_dict()

@@ -38,8 +38,8 @@ def save_rig(
 ) -> None:
     """Write a mesh or a cloud with a skeleton's armature that moves it, as a binary glTF file.
 
-    Each edge is a bone. Its joint is at the end that is nearer to the root, so that every branch turns by itself. A
-    point follows the edge nearest to it; over the first half of an edge its motion fades in.
+    Each edge is a bone with its joint at the end nearer to the root, so every branch turns by itself. A point follows
+    its nearest edge; over the first half of an edge its motion fades in.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def save_rig(
     root : str, int or (x, y, z), optional
         Which joint moves all others; as for `glsk_o3d.editing.reroot`.
     up : {"z", "y"}
-        Which axis of the data points up. In glTF y does; programs turn it into what is theirs.
+        The vertical axis of the data. It is y in glTF, and programs convert it.
 
     Raises
     ------

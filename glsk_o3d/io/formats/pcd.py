@@ -26,7 +26,7 @@ def blocks(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan
     if kept == "binary_compressed":
         return None, map(_compressed, [path])
     if kept not in ("ascii", "binary"):
-        raise ValueError(f"its data are {kept!r}, which is not understood")
+        raise ValueError(f"its data are {kept!r}, which is unknown")
     least = row.itemsize if kept == "binary" else 2 * sum(row[name].shape[0] for name in row.names or ())
     check_promised(points, (path.stat().st_size - start + (kept == "ascii")) // least)  # text may lack its last end
     return points, _blocks(path, start, row, points, kept == "binary", rows, bare)
@@ -45,11 +45,11 @@ def read_header(stream: BinaryIO) -> tuple[np.dtype, int, str]:
     counts = [int(count) for count in header.get("COUNT", ["1"] * len(names))]
     points, (kept,) = int(header["POINTS"][0]), header["DATA"]
     if points < 0 or min(counts, default=0) < 1:
-        raise ValueError("its header counts less than nothing")
+        raise ValueError("its header has a negative count")
     if {"WIDTH", "HEIGHT"} <= header.keys() and int(header["WIDTH"][0]) * int(header["HEIGHT"][0]) != points:
         raise ValueError(f"its header promises {points} points, and another width and height")
     if not all(kind + size in _TYPES for kind, size in zip(kinds, sizes, strict=True)):
-        raise ValueError("its header has types that are not understood")
+        raise ValueError("its header has unknown types")
     fields = zip(names, sizes, kinds, counts, strict=True)
     row = np.dtype([(f"{i} {name}", f"<{kind.lower()}{size}", (n,)) for i, (name, size, kind, n) in enumerate(fields)])
     return row, points, kept

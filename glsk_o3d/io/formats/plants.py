@@ -76,7 +76,7 @@ def read_swc(data: bytes) -> Skeleton:
     child = np.flatnonzero(parent >= 0)
     place = np.searchsorted(names[order], parent[child]).clip(max=len(names) - 1)
     if (names[order][place] != parent[child]).any() or len(np.unique(names)) < len(names):
-        raise ValueError("a parent is not there, or two rows have one id")
+        raise ValueError("a parent is missing, or two rows have the same id")
     shift = _SHIFT.search(data.decode("utf-8", "replace"))
     origin = [float(word) for word in shift.groups()] if shift else 0.0
     return graph_skeleton(table[:, 2:5] + origin, np.column_stack([child, order[place]]), table[:, 5])

@@ -235,7 +235,7 @@ def _columns(
         column = held[passed(size)]
         if counts:
             if not ((column >= 0) & (column <= len(held)) & (column % 1 == 0)).all():
-                raise ValueError(f"a list of {element.name!r} has a number of values that makes no sense")
+                raise ValueError(f"a list of {element.name!r} has an impossible number of values")
             held, size = values(kind)
             n = column.astype(np.int64)
             table[name] = Lists(n, passed(n * size), held, size)

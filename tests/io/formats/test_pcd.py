@@ -66,11 +66,11 @@ def test_compressed_fields_that_open3d_would_crash_on(tmp_path, fields, attribut
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("DATA binary", "DATA zipped", "'zipped', which is not understood"),
-        ("TYPE F F F F", "TYPE F F F X", "types that are not understood"),
-        ("SIZE 4 4 8", "SIZE 4 4 3", "types that are not understood"),
-        ("COUNT 1 1", "COUNT 0 1", "less than nothing"),
-        ("POINTS 2", "POINTS -5", "less than nothing"),
+        ("DATA binary", "DATA zipped", "'zipped', which is unknown"),
+        ("TYPE F F F F", "TYPE F F F X", "unknown types"),
+        ("SIZE 4 4 8", "SIZE 4 4 3", "unknown types"),
+        ("COUNT 1 1", "COUNT 0 1", "negative count"),
+        ("POINTS 2", "POINTS -5", "negative count"),
         ("POINTS 2", "POINTS 99999999999", "promises 99999999999"),
         ("DATA", "DATUM", "no DATA"),
         ("FIELDS x y", "FIELDS x w", "no fields x, y and z"),
