@@ -12,13 +12,13 @@ from pathlib import Path
 
 import architecture
 import numpy as np
+from glsk_bench import score
+from glsk_bench.clouds import cloud
+from glsk_bench.shapes import shape
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
-from glsk_bench import score
-from glsk_bench.clouds import cloud
-from glsk_bench.shapes import shape
 from PIL import Image
 from scipy.spatial import Delaunay, cKDTree
 
