@@ -13,10 +13,9 @@ from ..skeleton import Skeleton
 from .segmentation import branch_of_edge
 
 MOST_WEIGHTS = 4  # published: glTF 2.0, 3.7.3.3, joints of a vertex in one set
-BLEND = (
-    np.sqrt(2) - 1
-)  # derived: r sqrt 2 - r, what a bone is farther one radius r beyond its end than the next one, on a tube
+BLEND = 1.5  # fitted: radii beyond its end at which a bone ceases to move a tube; with 1 a bent elbow has a dent
 JOINTS_BETWEEN = 3  # derived: from the bone beyond a limb's root over the trunk's joint to that beyond another's
+MOST_PRODUCTS = 10**8  # speed: a second's; only where thousands of bones meet are there more
 
 
 def armature(forest: Skeleton) -> Skeleton:
@@ -102,15 +101,15 @@ def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tu
 
     The forest has no loops and is numbered from its roots outwards; each edge is a bone, a row of `forest.edges`, with
     its joint at the end that is nearer to the root. `vertex`, (N,), says which part of the curve a point is on. The
-    farther away a bone is than the nearest one, the less it moves the point: not at all one radius beyond the joint,
-    on a tube, or where the fifth bone is. So weights are continuous along the curve and across the creases at
-    junctions. They sum to 1.
+    farther away a bone is than the nearest one, the less it moves the point: not at all one and a half radii beyond the
+    joint, on a tube, or where the fifth bone is. So weights are continuous along the curve and across the creases
+    at junctions. They sum to 1.
     """
     around, table = incident_edges(forest.edges, len(forest.vertices)), _bones_around(forest)
     own, _ = nearest_on_edges(forest.vertices, forest.edges, around[vertex], points)
     own, along = nearest_on_edges(forest.vertices, forest.edges, table[own], points)  # the vertex may be another part's
     bones = table[own]
-    far = np.stack([_distance(forest, np.where(bone < 0, own, bone), points) for bone in bones.T], axis=1)
+    far = np.stack([_squared_distance(forest, np.where(bone < 0, own, bone), points) for bone in bones.T], axis=1)
     far[bones < 0] = np.inf
     least = far.min(axis=1, keepdims=True)
     thick = forest.radii[forest.edges[own]]
@@ -118,8 +117,9 @@ def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tu
     order = np.argsort(far, axis=1, kind="stable")[:, : MOST_WEIGHTS + 1]
     bones, far = (np.take_along_axis(each, order, axis=1) for each in (bones, far))
     fifth = far[:, MOST_WEIGHTS:].min(axis=1, initial=np.inf, keepdims=True)
-    reach = np.minimum(BLEND * np.where(np.isnan(radius), least, radius), fifth - least)
-    share = np.clip(1 - (far - least) / np.maximum(reach, TINY), 0, 1)
+    reach = np.minimum(BLEND**2 * np.fmax(radius**2, least), fifth - least)
+    # on a tube at s beyond the joint the squares of the distances are r^2 + s^2 and r^2: what counts is (s / r)^2
+    share = np.clip(1 - (far - least) / np.maximum(reach, TINY), 0, 1) ** 2
     bones, share = (np.pad(each, ((0, 0), (0, MOST_WEIGHTS)))[:, :MOST_WEIGHTS] for each in (bones, share))
     return np.where(share > 0, bones, 0), share / share.sum(axis=1, keepdims=True)
 
@@ -131,6 +131,8 @@ def _bones_around(forest):
     linked = (ends.T @ ends).astype(bool)
     near = linked
     for _ in range(JOINTS_BETWEEN - 1):
+        if np.diff(near.indptr) @ np.diff(linked.indptr) > MOST_PRODUCTS:
+            break
         near = near @ linked
     count = np.diff(near.indptr)
     table = np.full((n, count.max()), -1)
@@ -138,11 +140,11 @@ def _bones_around(forest):
     return table
 
 
-def _distance(forest, bone, points):
+def _squared_distance(forest, bone, points):
     """From each point to a bone of its own, (N,) float array."""
     _, along = nearest_on_edges(forest.vertices, forest.edges, bone[:, None], points)
     start, end = forest.vertices[forest.edges[bone]].swapaxes(0, 1)
-    return norm(start + along[:, None] * (end - start) - points)
+    return ((start + along[:, None] * (end - start) - points) ** 2).sum(axis=1)
 
 
 def bone_before(forest: Skeleton) -> np.ndarray:

@@ -73,22 +73,20 @@ def dense_weights(bones, points):
     return dense
 
 
-def test_on_a_tube_bones_share_what_is_within_one_radius_of_the_joint():
+def test_on_a_tube_bones_share_what_is_around_the_joint():
     bones = bare([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1), (1, 2)], [0.2] * 3)
     x = np.linspace(0.5, 1.5, 1001)
     first, second = dense_weights(bones, np.column_stack([x, 0 * x, 0 * x + 0.2])).T
-    np.testing.assert_array_equal(first > 1e-9, x < 1.2 - 1e-9)
-    np.testing.assert_array_equal(second > 1e-9, x > 0.8 + 1e-9)
-    assert (np.diff(second) >= 0).all()
-    assert np.abs(np.diff(second)).max() < 0.01
-    assert second[500] == 0.5
+    less = np.clip(1 - ((x - 1) / 0.3) ** 2, 0, 1) ** 2  # of the farther bone, before both are made to sum to 1
+    np.testing.assert_allclose(first, np.where(x < 1, 1, less) / (1 + less), atol=1e-9)
+    np.testing.assert_allclose(second, first[::-1], atol=1e-9)
 
 
 def test_weights_go_over_from_bone_to_bone_also_at_creases():
-    sample = samples.y_junction(20000)
+    sample = samples.y_junction(40000)
     bones = armature(bare(sample.nodes, sample.edges, sample.radii))
     dense = dense_weights(bones, sample.points)
-    first, second = cKDTree(sample.points).query_pairs(0.02 * sample.radii.min(), output_type="ndarray").T
-    assert len(first) > 100
+    first, second = cKDTree(sample.points).query_pairs(0.05 * sample.radii.min(), output_type="ndarray").T
+    assert len(first) > 10000
     assert np.abs(dense[first] - dense[second]).max() < 0.15
     assert (np.count_nonzero(dense, axis=1) > 1).mean() > 0.05

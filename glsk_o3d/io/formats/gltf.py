@@ -26,6 +26,9 @@ from .graphs import as_forest, global_shift, holding_all
 RIG_ENDINGS = (".glb", ".gltf", ".bvh")
 COMPONENT_TYPES = {"f4": 5126, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
 MOST_JOINTS = 65535  # published: glTF 2.0, 3.7.3.3, in which joints are counted in 16 bits at most
+WEIGHT_STEPS = (
+    2**16
+)  # derived: float32 holds its parts, and they sum to 1 exactly: else far from the origin points move
 SRGB_KNEE = 0.04045  # published: IEC 61966-2-1, where the curve of sRGB begins
 POINTS_MODE, TRIANGLES_MODE = 0, 4  # published: glTF 2.0, 5.24
 UPRIGHT = {"z": [-(0.5**0.5), 0.0, 0.0, 0.5**0.5], "y": [0.0, 0.0, 0.0, 1.0]}  # derived: turns up into glTF's y
@@ -44,7 +47,7 @@ def save_rig(
 
     Joints are the junctions, the places where limbs leave a junction's ball, and vertices between that are a radius
     apart or more. Each edge between joints is a bone. It turns about the end that is nearer to the root, so that every
-    branch turns by itself. Around a joint the motion of a point goes over from bone to bone within about one radius.
+    branch turns by itself. Within one and a half radii of a joint the motion of a point goes over from bone to bone.
 
     Parameters
     ----------
@@ -134,6 +137,8 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> tuple[dict[str, Any], byte
     origin, buffer = global_shift(forest), _Buffer()
     nodes, heads = _bones(forest, origin)
     bones, weights = skin_weights(forest, points, vertex_of_cloud(forest, points)[1])
+    weights[:, 1:] = np.round(weights[:, 1:] * WEIGHT_STEPS) / WEIGHT_STEPS
+    weights[:, 0] = 1 - weights[:, 1:].sum(axis=1)
     inverse = np.tile(np.eye(4), (len(heads), 1, 1))
     inverse[:, :3, 3] = -heads
     attributes = {

@@ -75,7 +75,7 @@ def test_at_rest_everything_is_where_it_was(tree, rig, up, offset):
 
 def test_turning_a_bone_moves_what_hangs_on_it_and_nothing_else(rig):
     fork = Skeleton([[0, 0, 0], [0, 0, 1], [0, 1, 2], [0, -1, 2]], [[0, 1], [1, 2], [1, 3]], [0.1] * 4, (), (), ())
-    cloud = np.array([[0, 0, 0.2], [0, 0, 0.9], [0, 0.9, 1.9], [0, -0.9, 1.9], [0, 0.25, 1.25]])
+    cloud = np.array([[0, 0, 0.2], [0, 0, 0.8], [0, 0.9, 1.9], [0, -0.9, 1.9], [0, 0.25, 1.25]])
     file = rig(fork, cloud, up="y", root=0)
     along_y = next(joint for joint in file.skins[0].joints if (world(file)[joint][:3, 3] == [0, 0, 1]).all())
     before, after = skinned(file), skinned(file, (along_y, np.pi))
