@@ -103,7 +103,7 @@ def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tu
     its joint at the end that is nearer to the root. `vertex`, (N,), says which part of the curve a point is on. The
     farther away a bone is than the nearest one, the less it moves the point: not at all one and a half radii beyond the
     joint, on a tube, or where the fifth bone is. So weights are continuous along the curve and across the creases
-    at junctions. They sum to 1.
+    at junctions, but not between bones more than three joints apart. They sum to 1.
     """
     around, table = incident_edges(forest.edges, len(forest.vertices)), _bones_around(forest)
     own, _ = nearest_on_edges(forest.vertices, forest.edges, around[vertex], points)
