@@ -38,7 +38,7 @@ glsk.save_rig(skeleton, path, mesh, cut_loops=True, root="thickest")
 print(f"{path.stat().st_size // 1024} kB")
 
 # %%
-# What a glTF library makes of it: joints, and for every vertex of the mesh the two that move it. Blender shows the
+# What a glTF library makes of it: joints, and for every vertex of the mesh the few that move it. Blender shows the
 # same, with the bones called after their branches.
 
 file = pygltflib.GLTF2().load(str(path))

@@ -71,7 +71,8 @@ def grasp_candidates(
     Returns
     -------
     GraspCandidates
-        Best first; equal ones in the order of the branches, along them and around.
+        The best of each place first, then the second best of each, and so on, each round by quality; equal ones in the
+        order of the branches, along them and around.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def grasp_candidates(
     gripper = gripper if isinstance(gripper, Gripper) else Gripper(gripper)
     clearance = gripper.max_opening / 10 if clearance is None else clearance
     _check(skeleton, clearance, around, spacing, margin, min_confidence)
-    cone = None if cone is None else _cone(cone)
+    cone = None if cone is None else checked_cone(cone)
     above = _direction("up", up) if up is not None else np.array([0.0, 0, 1]) if cone is None else -cone[0]
     points = _object(skeleton, cloud)
     middle = points if len(points) else skeleton.vertices
@@ -114,7 +115,7 @@ def grasp_candidates(
     )
     free, ways_left_out = _sorted_out({"ways in outside the cone": ~wanted, **blocked})
     quality = quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
-    order = np.argsort(-quality.round(9), kind="stable")  # equal ones differ in their last digits
+    order = _in_rounds(free // around, quality.round(9))  # equal ones differ in their last digits
     free, quality = free[order], quality[order]
     row = free // around
     candidates = GraspCandidates(
@@ -159,6 +160,17 @@ def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
     if short:
         left_out["branches without a place between their margins"] = short
     return place[some], branch[some], width[some], quality[some], left_out, len(place)
+
+
+def _in_rounds(place, quality):
+    """The order in which grasps are listed: the best of each place, then the second best of each, and so on; in each
+    round the best first."""
+    best = np.argsort(-quality, kind="stable")
+    grouped = best[np.argsort(place[best], kind="stable")]
+    _, first, count = np.unique(place[grouped], return_index=True, return_counts=True)
+    rank = np.empty(len(place), int)
+    rank[grouped] = np.arange(len(place)) - np.repeat(first, count)
+    return best[np.argsort(rank[best], kind="stable")]
 
 
 def _sorted_out(reasons):
@@ -246,8 +258,8 @@ def _check(skeleton, clearance, around, spacing, margin, min_confidence):
     check_number("around", around, "int", low=1)
 
 
-def _cone(cone):
-    """Its unit direction, and the least cosine of the angle to it."""
+def checked_cone(cone: Any) -> tuple[np.ndarray, float]:
+    """Its unit direction, and the least cosine of the angle to it; InvalidParameterError if it is none."""
     try:
         direction, degrees = cone
     except (TypeError, ValueError):

@@ -89,7 +89,7 @@ class Gripper:
 
 @dataclass(frozen=True, eq=False)
 class GraspCandidates(Rows, row="grasp"):
-    """Places and directions for a gripper with parallel jaws, best first.
+    """Places and directions for a gripper with parallel jaws: the best of each place first, then the second best.
 
     Lengths are in the cloud's units, directions have the length 1. Iteration gives a dict of plain numbers per
     candidate, with ``position_x`` and so on; an index, a slice or a mask selects some.

@@ -1,4 +1,4 @@
-"""What every point of a cloud belongs to: its branch, how thick that is, and the bones that move the point."""
+"""What every point of a cloud belongs to: its branch, and how thick that is."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
 from ..numerics.neighbourhoods import nearest_neighbours
-from ..numerics.polylines import incident_edges, nearest_on_edges
+from ..numerics.polylines import nearest_on_edges
 from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from ..skeleton import Skeleton
 from .curves import along, pieces
@@ -174,25 +174,3 @@ def thickness_of_points(skeleton: Skeleton, points: np.ndarray, vertex: np.ndarr
         with np.errstate(divide="ignore", invalid="ignore"):
             found[some] = skeleton.radii[vertex[some]] / apart
     return found
-
-
-def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which bones move each point, and how much, for linear blend skinning: (N, 2) int and (N, 2) float array.
-
-    The forest has no loops and is numbered from its roots outwards; each edge is a bone with its joint at the end that
-    is nearer to the root. A point goes with the edge nearest to it among those of its vertex. Over the first half of
-    an edge its motion fades in, from that of the bone before it: the motion is continuous along the curve and at
-    junctions. Bones are rows of `forest.edges`: the one before and the point's own, or twice that where none is before.
-    """
-    around = incident_edges(forest.edges, len(forest.vertices))
-    bone, along = nearest_on_edges(forest.vertices, forest.edges, around[vertex], points)
-    parent = bone_before(forest)[bone]
-    own = np.where(parent >= 0, np.minimum(2 * along, 1), 1)
-    return np.column_stack([np.where(parent >= 0, parent, bone), bone]), np.column_stack([1 - own, own])
-
-
-def bone_before(forest: Skeleton) -> np.ndarray:
-    """The bone that each bone hangs on, (E,) int array of rows of `forest.edges`; -1 for bones at a root."""
-    leading = np.full(len(forest.vertices), -1)
-    leading[forest.edges[:, 1]] = np.arange(len(forest.edges))
-    return leading[forest.edges[:, 0]]

@@ -94,23 +94,25 @@ def convert(
 def rig(
     skeleton: SkeletonFile,
     mesh: Annotated[Path | None, argument("MESH", "A mesh or a cloud; by default the skeleton's tubes.")] = None,
-    output: Annotated[list[Path] | None, output_option("GLB", "Where to write the rig: binary glTF.")] = None,
+    output: Annotated[list[Path] | None, output_option("FILE", "The rig: glb, gltf, or bvh without surface.")] = None,
     root: Annotated[Any, root_option("Which joint moves all others")] = None,
     cut_loops: Annotated[bool, Option("--cut-loops", help="Cut loops open; the surface stays whole.")] = False,
     up: Annotated[str, option("AXIS", "Which axis of the data points up: z or y.")] = "z",
 ) -> None:
     """Write a mesh with the skeleton's armature, for Blender.
 
-    Every edge of the skeleton is a bone, named by its branch, and moves what is next to it. Textures do not go
-    along.
+    Joints are at the junctions, where limbs leave them, and along the limbs, at least a radius apart. Bones are named
+    by their branch and move what is next to them. Textures do not go along.
     """
     from .. import FileFormatError, read_cloud, read_skeleton, save_rig
+    from ..io.formats.gltf import RIG_ENDINGS
     from ..io.scans import read_mesh
 
     if output is None or len(output) > 1:
         raise WrongUsage("nothing to write: give one output with -o")
-    check_outputs([(output[0], ".glb", "rig is binary glTF")], skeleton, mesh)
-    curve, moved = read_skeleton(skeleton), "the skeleton's own surface"
+    check_outputs([(output[0], RIG_ENDINGS, "rig is glTF or BVH")], skeleton, mesh)
+    curve = read_skeleton(skeleton)
+    moved = "nothing" if output[0].suffix.lower() == ".bvh" else "the skeleton's own surface"
     surface: Any = None
     if mesh is not None:
         load_open3d()
@@ -120,5 +122,5 @@ def rig(
         except FileFormatError:
             surface = read_cloud(mesh)  # knows best what else may be wrong with the file
             moved = f"{len(surface.points)} points"
-    save_rig(curve, output[0], surface, cut_loops=cut_loops, root=root, up=up)
-    tell(None, lambda: echo(f"{len(curve.vertices) - curve.n_components} bones move {moved}"), output)
+    bones = save_rig(curve, output[0], surface, cut_loops=cut_loops, root=root, up=up)
+    tell(None, lambda: echo(f"{len(bones.edges)} bones move {moved}"), output)

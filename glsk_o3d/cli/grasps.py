@@ -34,7 +34,7 @@ def grasps(
     spacing: Annotated[float | None, option("LENGTH", "Of the places; by default the radius of the branch.")] = None,
     margin: Annotated[float, option("RADII", "From the ends of a branch.")] = 1.0,
     min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.5,
-    count: Annotated[int, option("N", "How many of the best to show and write.", "-n", min=1)] = 20,
+    count: Annotated[int, option("N", "How many to show and write, of each place its best first.", "-n", min=1)] = 20,
     output: Annotated[
         list[Path] | None, output_option("FILE", "json, csv, or ply to look at; may be repeated.")
     ] = None,

@@ -49,12 +49,13 @@ def test_a_straight_tube():
     grasps = grasp_candidates(TUBE, 0.5, clearance=0.03, around=6, spacing=0.1)
     directions_are_sound(grasps)
     assert (len(grasps), grasps.places, grasps.left_out) == (54, 9, {})
-    np.testing.assert_allclose(grasps.position[::6], np.linspace(-0.4, 0.4, 9)[:, None] * [1, 0, 0], atol=1e-12)
+    along = np.tile(np.linspace(-0.4, 0.4, 9)[:, None] * [1, 0, 0], (6, 1))  # each place once, six times over
+    np.testing.assert_allclose(grasps.position, along, atol=1e-12)
     np.testing.assert_allclose(grasps.opening, 0.23)
     np.testing.assert_allclose(grasps.quality, 1 - 0.2 / 0.5)
     np.testing.assert_allclose(grasps.axis, np.tile([1, 0, 0], (54, 1)), atol=1e-12)
     np.testing.assert_allclose(grasps.approach[0], [0, 0, -1], atol=1e-12)  # from above
-    turn = np.einsum("gij,gkj->gik", *[grasps.approach.reshape(9, 6, 3)] * 2)
+    turn = np.einsum("igj,kgj->gik", *[grasps.approach.reshape(6, 9, 3)] * 2)
     step = np.arange(6)
     np.testing.assert_allclose(turn, np.tile(np.cos(np.pi / 3 * (step - step[:, None])), (9, 1, 1)), atol=1e-12)
 
@@ -74,7 +75,7 @@ def test_a_cone_is_wider_across_than_the_ball_in_it():
     width = 2 * radius / np.sqrt(1 - slope**2)
     np.testing.assert_allclose(grasps.opening, width + 0.01)
     np.testing.assert_allclose(grasps.quality, (1 - width) * np.sqrt(1 - slope**2))
-    assert (np.diff(grasps.position[:, 0]) >= 0).all()  # the thin end is best
+    assert (np.diff(grasps.position[: grasps.places, 0]) > 0).all()  # the thin end is best
 
 
 def test_a_torus():
@@ -83,12 +84,12 @@ def test_a_torus():
     directions_are_sound(grasps)
     assert grasps.places == round(2 * np.pi * 0.4 / 0.1) == 25
     np.testing.assert_allclose(grasps.opening, 0.25)
-    position, out = grasps.position[::4], grasps.position / np.linalg.norm(grasps.position, axis=1, keepdims=True)
+    position, out = grasps.position[:25], grasps.position / np.linalg.norm(grasps.position, axis=1, keepdims=True)
     gap = np.linalg.norm(position - np.roll(position, 1, axis=0), axis=1)
     np.testing.assert_allclose(gap, 2 * 0.4 * np.sin(np.pi / 25), rtol=2e-3)
     turned = np.abs(np.einsum("ij,ij->i", grasps.axis, out))
     assert turned.max() <= np.sin(np.pi / 128)  # of the polygon that stands for the circle
-    np.testing.assert_allclose(grasps.approach[::4], np.tile([0, 0, -1], (25, 1)), atol=1e-9)
+    np.testing.assert_allclose(grasps.approach[:25], np.tile([0, 0, -1], (25, 1)), atol=1e-9)
 
 
 @pytest.mark.parametrize(("spacing", "count"), [(0.1, 9), (0.8, 2), (0.81, 1), (5.0, 1)])
@@ -103,7 +104,7 @@ def test_places_share_the_room_between_the_margins(spacing, count):
 def test_an_axis_that_points_up(up):
     grasps = grasp_candidates(TUBE, 0.5, up=up, around=2)
     directions_are_sound(grasps)
-    np.testing.assert_allclose(grasps.approach[::2], np.tile(grasps.approach[0], (grasps.places, 1)))
+    np.testing.assert_allclose(grasps.approach[: grasps.places], np.tile(grasps.approach[0], (grasps.places, 1)))
 
 
 # ------------------------------------------------------------------------------------------------------ what is taken
@@ -138,7 +139,6 @@ def test_every_place_is_taken_or_told():
     assert grasps.opening.max() <= 0.16
     assert grasps.opening.min() > 0.065 + 0.01
     assert grasps.confidence.min() >= 0.5
-    assert (np.diff(grasps.quality) <= 0).all()
     assert (grasps.quality > 0).all()
     assert (grasps.quality < 0.9).all()
     assert "too wide" in repr(grasps)

@@ -108,9 +108,9 @@ def test_a_mesh_hangs_on_the_bones(invoke, tmp_path, y, ending):
     result = invoke("rig", y, f"mesh.{ending}", "-o", "r.glb", "--root", "0,0,-0.5", "--up", "y")
     assert (result.exit_code, result.stderr) == (0, "")
     skeleton, mesh = read_skeleton(tmp_path / y), read_mesh(tmp_path / f"mesh.{ending}")
-    told = f"{len(skeleton.edges)} bones move {len(mesh.vertices)} vertices and 8 triangles\nwrote r.glb\n"
+    bones = save_rig(skeleton, tmp_path / "expected.glb", mesh, root=(0, 0, -0.5), up="y")
+    told = f"{len(bones.edges)} bones move {len(mesh.vertices)} vertices and 8 triangles\nwrote r.glb\n"
     assert result.stdout == told
-    save_rig(skeleton, tmp_path / "expected.glb", mesh, root=(0, 0, -0.5), up="y")
     assert (tmp_path / "r.glb").read_bytes() == (tmp_path / "expected.glb").read_bytes()
 
 
@@ -124,6 +124,15 @@ def test_a_cloud_hangs_on_the_bones(invoke, tmp_path, y, cloud, ending):
 
 def test_alone_it_has_its_tubes_and_loops_are_cut_if_one_says_so(invoke, ring_file, tmp_path):
     result = invoke("rig", ring_file, "-o", "r.glb", "--cut-loops")
-    assert result.stdout == "11 bones move the skeleton's own surface\nwrote r.glb\n"
-    save_rig(read_skeleton(tmp_path / ring_file), tmp_path / "expected.glb", cut_loops=True)
+    bones = save_rig(read_skeleton(tmp_path / ring_file), tmp_path / "expected.glb", cut_loops=True)
+    assert result.stdout == f"{len(bones.edges)} bones move the skeleton's own surface\nwrote r.glb\n"
     assert (tmp_path / "r.glb").read_bytes() == (tmp_path / "expected.glb").read_bytes()
+
+
+def test_an_armature_alone(invoke, y, tmp_path):
+    bones = save_rig(read_skeleton(tmp_path / y), tmp_path / "expected.bvh", up="y")
+    assert (
+        invoke("rig", y, "-o", "r.bvh", "--up", "y").stdout == f"{len(bones.edges)} bones move nothing\nwrote r.bvh\n"
+    )
+    assert (tmp_path / "r.bvh").read_bytes() == (tmp_path / "expected.bvh").read_bytes()
+    assert invoke("rig", y, "-o", "r.fbx").exit_code == 2

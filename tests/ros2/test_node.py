@@ -83,6 +83,17 @@ def test_with_an_opening_poses_are_grasps(ros, cloud, expected, rows):
     np.testing.assert_allclose(turns[:, :, 2], grasps.approach, atol=1e-12)
 
 
+def test_grasps_keep_above_a_table_and_in_a_cone(ros, cloud, expected, rows):
+    table, where = [0.0, 0.0, 1.0, 0.25], [0.0, 1.0, -1.0]
+    node = ros.node(opening=0.6, plane=table, approach=where, approach_angle=50.0)
+    node.on_cloud(cloud)
+    grasps = grasp_candidates(expected, 0.6, obstacles=table, cone=(where, 50))
+    assert (
+        8 < len(grasps) < len(grasp_candidates(expected, 0.6, cone=(where, 50))) < len(grasp_candidates(expected, 0.6))
+    )
+    np.testing.assert_array_equal(rows(pose.position for pose in node.published[1][1].poses), grasps.position)
+
+
 def test_without_a_grasp_the_markers_go_out_with_a_warning(ros, cloud):
     node = ros.node(opening=0.1)
     node.on_cloud(cloud)
@@ -118,6 +129,10 @@ def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, m
         (dict(pipeline="defualt"), "did you mean 'default'"),
         (dict(set=["k=no"]), "k = 'no'"),
         (dict(opening=float("nan")), "opening = nan"),
+        (dict(plane=[0.0, 0.0, 1.0]), r"plane = \[0.0, 0.0, 1.0\]: must be a, b, c, d"),
+        (dict(plane=[0.0, 0.0, 0.0, 0.7]), "is no plane"),
+        (dict(approach=[0.0, 0.0, 0.0]), "the direction of cone"),
+        (dict(approach_angle=181.0), "the angle of cone = 181.0: .* at most 180"),
     ],
 )
 def test_wrong_parameters_end_the_node_at_once(ros, parameters, message):
@@ -173,6 +188,9 @@ def messages(path, types):
 def test_the_script_does_what_the_node_does(recorded, types, tmp_path, expected, header, rows, capsys):
     with pytest.raises(SystemExit, match="opening = -1"):
         bag.main([str(recorded), str(tmp_path / "no"), "--topic", "/points", "--opening", "-1"])
+    words = [str(recorded), str(tmp_path / "no"), "--topic", "/points", "--plane", "0", "0", "-1", "inf"]
+    with pytest.raises(SystemExit, match="is no plane"):
+        bag.main(words)
     bag.main([str(recorded), str(tmp_path / "out"), "--topic", "/points"])
     said = capsys.readouterr()
     assert said.out == f"2 clouds skeletonised: {tmp_path / 'out'}\n"

@@ -5,6 +5,7 @@ import importlib
 import runpy
 import sys
 from types import ModuleType, SimpleNamespace
+from typing import get_origin
 from xml.etree import ElementTree
 
 import pytest
@@ -103,6 +104,6 @@ def test_the_launch_file_starts_the_node_with_its_parameters(package, ros, insta
         (name,) = argument.words
         kind = parameters[name].value_type
         assert parameters[name].words == (name,)
-        value = ast.literal_eval(argument.default_value) if kind is names["List"][str] else kind(argument.default_value)
+        value = ast.literal_eval(argument.default_value) if get_origin(kind) is list else kind(argument.default_value)
         assert value == asked[name]
         assert type(value) is type(asked[name])

@@ -1,7 +1,7 @@
 """GLB, the binary files of glTF 2.0: their chunks, and files of others that are made safe for Open3D to read."""
 
 import json
-from base64 import b64decode
+from base64 import b64decode, b64encode
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -28,6 +28,13 @@ def binary(tree: dict[str, Any], data: bytes | bytearray) -> bytes:
         for kind, chunk in ((JSON_CHUNK, text), (BINARY_CHUNK, body))
     )
     return b"".join(n.to_bytes(4, "little") for n in (MAGIC, 2, 12 + len(chunks))) + chunks
+
+
+def embedded(tree: dict[str, Any], data: bytes | bytearray) -> bytes:
+    """The same as text: the buffer is in it as a data URI."""
+    uri = "data:application/octet-stream;base64," + b64encode(data).decode()
+    buffers = [{"byteLength": len(data), "uri": uri}]
+    return json.dumps({**tree, "buffers": buffers}, separators=(",", ":"), allow_nan=False).encode()
 
 
 def alone(path: Path) -> bytes:

@@ -1,15 +1,17 @@
-"""glTF 2.0, binary: keeps trees, as an armature with a bone per edge, and a surface, or points, that it moves.
+"""glTF 2.0: keeps trees, as an armature with a bone per edge, and a surface, or points, that it moves.
 
 Blender and other programs for animation open it. Bones are called by their branch. Radii are in the surface only, and
 numbers are float32, as glTF's are; of coordinates as on a map the large part is a shift of the whole.
 """
 
 import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...analysis.segmentation import bone_before, branch_of_edge, skin_weights, vertex_of_cloud
+from ...analysis.rigging import armature, bone_before, bone_names, skin_weights
+from ...analysis.segmentation import vertex_of_cloud
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...interop.atomic import check_ending, write_atomically
 from ...interop.clouds import cloud_points, open3d_class
@@ -17,11 +19,16 @@ from ...numerics.vectors import norm, unit
 from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
 from ..geometry import to_tubes
-from .glb import binary
+from . import bvh
+from .glb import binary, embedded
 from .graphs import as_forest, global_shift, holding_all
 
+RIG_ENDINGS = (".glb", ".gltf", ".bvh")
 COMPONENT_TYPES = {"f4": 5126, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
 MOST_JOINTS = 65535  # published: glTF 2.0, 3.7.3.3, in which joints are counted in 16 bits at most
+WEIGHT_STEPS = (
+    2**16
+)  # derived: float32 holds its parts, and they sum to 1 exactly: else far from the origin points move
 SRGB_KNEE = 0.04045  # published: IEC 61966-2-1, where the curve of sRGB begins
 POINTS_MODE, TRIANGLES_MODE = 0, 4  # published: glTF 2.0, 5.24
 UPRIGHT = {"z": [-(0.5**0.5), 0.0, 0.0, 0.5**0.5], "y": [0.0, 0.0, 0.0, 1.0]}  # derived: turns up into glTF's y
@@ -35,17 +42,19 @@ def save_rig(
     cut_loops: bool = False,
     root: RootPlace | None = None,
     up: str = "z",
-) -> None:
-    """Write a mesh or a cloud with a skeleton's armature that moves it, as a binary glTF file.
+) -> Skeleton:
+    """Write a mesh or a cloud with a skeleton's armature that moves it, as glTF; or the armature alone, as BVH.
 
-    Each edge is a bone with its joint at the end nearer to the root, so every branch turns by itself. A point follows
-    its nearest edge; over the first half of an edge its motion fades in.
+    Joints are the junctions, the places where limbs leave a junction's ball, and vertices between that are a radius
+    apart or more. Each edge between joints is a bone. It turns about the end nearer to the root, so every branch turns
+    by itself. Within one and a half radii of a joint the motion of a point blends from bone to bone.
 
     Parameters
     ----------
     skeleton : Skeleton
     path : path-like
-        Ends in ``.glb``.
+        Ends in ``.glb``, in ``.gltf``, which is text with all in it, or in ``.bvh``: a hierarchy and one frame, at
+        rest, in the cloud's units.
     mesh : triangle mesh or cloud, optional
         Of Open3D, or anything that carries points. By default the skeleton's tubes, or if it has no radii, its points.
     cut_loops : bool
@@ -53,7 +62,12 @@ def save_rig(
     root : str, int or (x, y, z), optional
         Which joint moves all others; as for `glsk_o3d.editing.reroot`.
     up : {"z", "y"}
-        The vertical axis of the data. It is y in glTF, and programs convert it.
+        The vertical axis of the data. It is y in the files, and programs convert it.
+
+    Returns
+    -------
+    Skeleton
+        The armature: its edges are the bones.
 
     Raises
     ------
@@ -61,6 +75,7 @@ def save_rig(
         The skeleton has loops, or no edges; or the ending is another.
     InvalidCloudError
     InvalidParameterError
+        There is no such axis; or there is a mesh for BVH, which holds none.
 
     Examples
     --------
@@ -69,19 +84,36 @@ def save_rig(
     >>> from glsk_o3d.samples import sauropod
     >>> body = skeletonize(sauropod(4096).points)
     >>> with TemporaryDirectory() as folder:
-    ...     save_rig(body, f"{folder}/animal.glb", cut_loops=True, root="thickest")
+    ...     bones = save_rig(body, f"{folder}/animal.glb", cut_loops=True, root="thickest")
+    >>> len(bones.edges) < len(body.edges)
+    True
     """
-    check_ending(path, "rig is binary glTF", ".glb")
+    check_ending(path, "rig is glTF or BVH", *RIG_ENDINGS)
+    ending = Path(path).suffix.lower()
     if up not in UPRIGHT:
         raise InvalidParameterError(f"up = {up!r}: must be one of {', '.join(UPRIGHT)}")
+    if ending == ".bvh" and mesh is not None:
+        raise InvalidParameterError("a .bvh file holds no surface: leave the mesh out, or write .glb or .gltf")
     with holding_all(path):
-        data = _content(as_forest(skeleton, cut_loops, root), _surface(skeleton) if mesh is None else mesh, up)
+        bones = armature(_with_edges(as_forest(skeleton, cut_loops, root)))
+        if ending == ".bvh":
+            data = bvh.content(bones, up)
+        else:
+            pack = binary if ending == ".glb" else embedded
+            data = pack(*_content(bones, _surface(skeleton) if mesh is None else mesh, up))
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
+    return bones
 
 
 def write(forest: Skeleton) -> bytes:
     """The content of a GLB file: the tubes of a skeleton that is numbered from its roots outwards, and its armature."""
-    return _content(forest, _surface(forest), "z")
+    return binary(*_content(_with_edges(forest), _surface(forest), "z"))
+
+
+def _with_edges(forest: Skeleton) -> Skeleton:
+    if len(forest.edges) == 0:
+        raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
+    return forest
 
 
 def _surface(skeleton: Skeleton) -> Any:
@@ -92,9 +124,8 @@ def _surface(skeleton: Skeleton) -> Any:
     return skeleton.points[skeleton.vertex_of_point >= 0]
 
 
-def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
-    if len(forest.edges) == 0:
-        raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
+def _content(forest: Skeleton, mesh: Any, up: str) -> tuple[dict[str, Any], bytearray]:
+    """The tree of a glTF file, and its buffer."""
     if len(forest.edges) > MOST_JOINTS:
         raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
     points = cloud_points(mesh)
@@ -105,8 +136,9 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
         raise InvalidCloudError("the surface is not where the skeleton is: are they in the same units and place?")
     origin, buffer = global_shift(forest), _Buffer()
     nodes, heads = _bones(forest, origin)
-    found = skin_weights(forest, points, vertex_of_cloud(forest, points)[1])
-    bones, weights = (np.pad(each, ((0, 0), (0, 2))) for each in found)  # glTF has four joints for each point
+    bones, weights = skin_weights(forest, points, vertex_of_cloud(forest, points)[1])
+    weights[:, 1:] = np.round(weights[:, 1:] * WEIGHT_STEPS) / WEIGHT_STEPS
+    weights[:, 0] = 1 - weights[:, 1:].sum(axis=1)
     inverse = np.tile(np.eye(4), (len(heads), 1, 1))
     inverse[:, :3, 3] = -heads
     attributes = {
@@ -140,7 +172,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": len(buffer.data)}],
     }
-    return binary(tree, buffer.data)
+    return tree, buffer.data
 
 
 def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
@@ -164,14 +196,11 @@ def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
 
 def _bones(forest: Skeleton, origin: np.ndarray) -> tuple[list[dict[str, Any]], np.ndarray]:
     """The joints, one per edge, each placed from the one before it; and where they are from the origin."""
-    edges, branch = forest.edges, branch_of_edge(forest)
-    heads, parent = forest.vertices[edges[:, 0]] - origin, bone_before(forest)
+    heads, parent = forest.vertices[forest.edges[:, 0]] - origin, bone_before(forest)
     moved = np.where((parent >= 0)[:, None], heads - heads[parent], heads)
-    count: dict[int, int] = {}
-    nodes: list[dict[str, Any]] = []
-    for label, place in zip(branch.tolist(), moved.tolist(), strict=True):
-        count[label] = count.get(label, -1) + 1
-        nodes.append({"name": f"branch_{label}.{count[label]:03d}", "translation": place})
+    nodes: list[dict[str, Any]] = [
+        {"name": name, "translation": place} for name, place in zip(bone_names(forest), moved.tolist(), strict=True)
+    ]
     for child, bone in enumerate(parent.tolist()):
         if bone >= 0:
             nodes[bone].setdefault("children", []).append(child)

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning
-from glsk_o3d.analysis import grasp_candidates
+from glsk_o3d.analysis import Gripper, grasp_candidates
+from glsk_o3d.analysis.grasp_checks import obstacle_list
+from glsk_o3d.analysis.grasps import checked_cone
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.driver import as_pipeline
 
 from .messages import Make, frames_of, markers_of, points_of, poses_of
+
+NO_PLANE, DOWN = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0)
 
 
 @dataclass(frozen=True)
@@ -42,11 +46,17 @@ class Skeletonizer:
         Fewest points with finite coordinates that are worked on.
     opening : float
         Widest opening of a gripper, in the cloud's units; 0 for none.
+    plane : sequence of 4 floats
+        A table, ax + by + cz + d = 0, in the frame of the cloud: no grasp reaches behind it. Four zeros for none.
+    approach : sequence of 3 floats
+        A direction in the frame of the cloud.
+    approach_angle : float
+        Degrees by which the approach of a grasp may differ from it; with 180 none is left out.
 
     Raises
     ------
     GlskError
-        The pipeline, its recipe, a setting or the opening is wrong.
+        The pipeline, its recipe, a setting, the opening, the plane or the cone is wrong.
     """
 
     def __init__(
@@ -56,17 +66,30 @@ class Skeletonizer:
         settings: Iterable[str] = (),
         min_points: int = 100,
         opening: float = 0.0,
+        plane: Sequence[float] = NO_PLANE,
+        approach: Sequence[float] = DOWN,
+        approach_angle: float = 180.0,
     ) -> None:
         if not opening >= 0:
             raise InvalidParameterError(f"opening = {opening}: must be 0, for no grasps, or more")
-        self.make, self.min_points, self.opening = make, min_points, opening
+        if len(plane) != 4:
+            raise InvalidParameterError(
+                f"plane = {list(plane)}: must be a, b, c, d of ax + by + cz + d = 0; all 0 for none"
+            )
+        checked_cone((approach, approach_angle))
+        self.make, self.min_points = make, min_points
+        self.gripper = Gripper(opening) if opening else None
+        self.where = {
+            "obstacles": obstacle_list(list(plane) if any(plane) else None),
+            "cone": (approach, approach_angle),
+        }
         self.pipeline = override(as_pipeline(pipeline), filter(None, settings))
 
     def __call__(self, cloud: Any) -> Results:
         """The messages about a ``sensor_msgs/msg/PointCloud2``, in its frame and with its stamp.
 
-        Poses are the grasps, best first, if there is an opening, or else the frames along the skeleton. GlskError if
-        the cloud cannot be skeletonised.
+        Poses are the grasps if there is an opening, the best of each place first, or else the frames along the
+        skeleton. GlskError if the cloud cannot be skeletonised.
         """
         points = points_of(cloud)
         points = points[np.isfinite(points).all(axis=1)]
@@ -76,7 +99,10 @@ class Skeletonizer:
             warnings.simplefilter("ignore")
             warnings.simplefilter("always", SkeletonWarning)
             skeleton = self.pipeline(points)
-            frames = grasp_candidates(skeleton, self.opening).poses if self.opening else frames_of(skeleton)
+            if self.gripper is None:
+                frames = frames_of(skeleton)
+            else:
+                frames = grasp_candidates(skeleton, self.gripper, **self.where).poses
         return Results(
             markers_of(skeleton, cloud.header, self.make),
             poses_of(frames, cloud.header, self.make),

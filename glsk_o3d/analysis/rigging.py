@@ -1,0 +1,164 @@
+"""The armature of a skeleton for animation: where its joints are, and which bones move each point of a surface."""
+
+import itertools
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from ..numerics.polylines import arc_lengths, incident_edges, nearest_on_edges, place_at
+from ..numerics.vectors import TINY, norm
+from ..refinement.merging import merge_into
+from ..refinement.rooted import numbered_from
+from ..skeleton import Skeleton
+from .segmentation import branch_of_edge
+
+MOST_WEIGHTS = 4  # published: glTF 2.0, 3.7.3.3, joints of a vertex in one set
+BLEND = 1.5  # fitted: radii beyond its end at which a bone ceases to move a tube; with 1 a bent elbow has a dent
+JOINTS_BETWEEN = 3  # derived: from the bone beyond a limb's root over the trunk's joint to that beyond another's
+MOST_PRODUCTS = 10**8  # speed: a second's; only where thousands of bones meet are there more
+
+
+def armature(forest: Skeleton) -> Skeleton:
+    """The same forest with joints that can bend: none is nearer to another than the radius there.
+
+    Junctions inside the ball of a thicker one share its joint. Each limb begins there, on the axis of the trunk, and
+    has its next joint where it leaves the junction's ball, a pair of limbs equally far from it. Unknown radii count as
+    0: then all vertices are joints. Vertex 0 stays the root, and numbers lead outwards.
+    """
+    whole, root = _without_junctions_in_balls(forest)
+    radii, ends = np.nan_to_num(whole.radii), whole.degree != 2
+    into = np.where(ends, np.cumsum(ends) - 1, -1)  # which joint each vertex goes with
+    places, thick, edges, n = [whole.vertices[ends]], [whole.radii[ends]], [np.empty((0, 2), int)], int(ends.sum())
+    for path in whole.branches:
+        lengths = arc_lengths(whole.vertices[path])
+        at = _joints_along(whole.vertices[path], radii[path], whole.degree[path[[0, -1]]] > 2, path == root)
+        number = np.concatenate([into[path[:1]], n + np.arange(len(at) - 2), into[path[-1:]]])
+        into[path[1:-1]] = number[np.searchsorted((at[1:] + at[:-1]) / 2, lengths[1:-1])]
+        places.append(place_at(whole.vertices[path], lengths, at[1:-1]))
+        thick.append(np.interp(at[1:-1], lengths, whole.radii[path]))
+        edges.append(np.sort(np.column_stack([number[:-1], number[1:]]), axis=1))
+        n += len(at) - 2
+    vertex = np.append(into, -1)[whole.vertex_of_point]
+    joints, radii = np.concatenate(places), np.concatenate(thick)
+    thinned = Skeleton(joints, np.concatenate(edges), radii, vertex, whole.points, whole.normals)
+    return numbered_from(thinned, int(into[root]))
+
+
+def _without_junctions_in_balls(forest: Skeleton) -> tuple[Skeleton, int]:
+    """Without branches that join a junction to another in whose ball they are, and what vertex 0 has become."""
+    root = 0
+    while True:
+        radii, group, inside = np.nan_to_num(forest.radii), np.arange(len(forest.vertices)), []
+        for path in forest.branches:
+            path = path if radii[path[0]] >= radii[path[-1]] else path[::-1]
+            far = norm(forest.vertices[path] - forest.vertices[path[0]]).max()
+            if (forest.degree[path[[0, -1]]] > 2).all() and far <= radii[path[0]]:
+                inside.append(path)
+        if not inside:
+            return forest, root
+        joined: set[int] = set()
+        for path in sorted(inside, key=lambda path: -radii[path[0]]):
+            if joined.isdisjoint(path[[0, -1]].tolist()):  # else in the next round
+                joined |= {path[0], path[-1]}
+                group[path] = path[0]
+        root = int(np.searchsorted(np.unique(group), group[root]))
+        forest = merge_into(forest, group)
+
+
+def _joints_along(curve, radii, forks, kept):
+    """How far along a branch its joints are, its ends and the vertices `kept` among them, (k,) float array."""
+    lengths = arc_lengths(curve)
+    low = _leaves_ball(curve, radii[0]) if forks[0] else 0.0
+    high = lengths[-1] - (_leaves_ball(curve[::-1], radii[-1]) if forks[1] else 0.0)
+    inner = np.array([low, high])[forks] if low <= high else []
+    if low <= high and high - low < np.interp((low + high) / 2, lengths, radii):  # no room for a bone in between
+        inner = [(low + high) / 2] if forks.all() else []
+    fixed = np.unique([*lengths[[0, -1]], *inner, *lengths[kept]])
+    joints = [fixed[0]]
+    for here, there in itertools.pairwise(fixed):
+        if low <= here and there <= high:
+            for at, radius in zip(lengths, radii, strict=True):
+                if joints[-1] < at < there and joints[-1] + radius <= at <= there - radius:
+                    joints.append(at)
+        joints.append(there)
+    return np.array(joints)
+
+
+def _leaves_ball(curve, radius):
+    """How far along a curve it leaves the ball around its first place; infinite if it never does."""
+    away = curve - curve[0]
+    outside = np.flatnonzero(norm(away) > radius)
+    if len(outside) == 0:
+        return np.inf
+    start, step = away[outside[0] - 1], away[outside[0]] - away[outside[0] - 1]
+    before, size = start @ step, norm(step)
+    root = np.sqrt(before**2 - size**2 * (start @ start - radius**2))
+    return arc_lengths(curve)[outside[0] - 1] + (root - before) / size
+
+
+def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which bones move each point, and how much, for linear blend skinning: (N, 4) int and (N, 4) float array.
+
+    The forest has no loops and is numbered from its roots outwards; each edge is a bone, a row of `forest.edges`, with
+    its joint at the end that is nearer to the root. `vertex`, (N,), says which part of the curve a point is on. The
+    farther away a bone is than the nearest one, the less it moves the point: not at all one and a half radii beyond the
+    joint, on a tube, or where the fifth bone is. So weights are continuous along the curve and across the creases
+    at junctions, but not between bones more than three joints apart. They sum to 1.
+    """
+    around, table = incident_edges(forest.edges, len(forest.vertices)), _bones_around(forest)
+    own, _ = nearest_on_edges(forest.vertices, forest.edges, around[vertex], points)
+    own, along = nearest_on_edges(forest.vertices, forest.edges, table[own], points)  # the vertex may be another part's
+    bones = table[own]
+    far = np.stack([_squared_distance(forest, np.where(bone < 0, own, bone), points) for bone in bones.T], axis=1)
+    far[bones < 0] = np.inf
+    least = far.min(axis=1, keepdims=True)
+    thick = forest.radii[forest.edges[own]]
+    radius = (thick[:, 0] + along * (thick[:, 1] - thick[:, 0]))[:, None]
+    order = np.argsort(far, axis=1, kind="stable")[:, : MOST_WEIGHTS + 1]
+    bones, far = (np.take_along_axis(each, order, axis=1) for each in (bones, far))
+    fifth = far[:, MOST_WEIGHTS:].min(axis=1, initial=np.inf, keepdims=True)
+    reach = np.minimum(BLEND**2 * np.fmax(radius**2, least), fifth - least)
+    # on a tube at s beyond the joint the squares of the distances are r^2 + s^2 and r^2: what counts is (s / r)^2
+    share = np.clip(1 - (far - least) / np.maximum(reach, TINY), 0, 1) ** 2
+    bones, share = (np.pad(each, ((0, 0), (0, MOST_WEIGHTS)))[:, :MOST_WEIGHTS] for each in (bones, share))
+    return np.where(share > 0, bones, 0), share / share.sum(axis=1, keepdims=True)
+
+
+def _bones_around(forest):
+    """The bones that may move the same points as each bone, itself among them, (E, c) int array, filled up with -1."""
+    n = len(forest.edges)
+    ends = csr_array((np.ones(2 * n), (forest.edges.ravel(), np.repeat(np.arange(n), 2))))
+    linked = (ends.T @ ends).astype(bool)
+    near = linked
+    for _ in range(JOINTS_BETWEEN - 1):
+        if np.diff(near.indptr) @ np.diff(linked.indptr) > MOST_PRODUCTS:
+            break
+        near = near @ linked
+    count = np.diff(near.indptr)
+    table = np.full((n, count.max()), -1)
+    table[np.repeat(np.arange(n), count), np.arange(near.nnz) - np.repeat(near.indptr[:-1], count)] = near.indices
+    return table
+
+
+def _squared_distance(forest, bone, points):
+    """From each point to a bone of its own, (N,) float array."""
+    _, along = nearest_on_edges(forest.vertices, forest.edges, bone[:, None], points)
+    start, end = forest.vertices[forest.edges[bone]].swapaxes(0, 1)
+    return ((start + along[:, None] * (end - start) - points) ** 2).sum(axis=1)
+
+
+def bone_before(forest: Skeleton) -> np.ndarray:
+    """The bone that each bone hangs on, (E,) int array of rows of `forest.edges`; -1 for bones at a root."""
+    leading = np.full(len(forest.vertices), -1)
+    leading[forest.edges[:, 1]] = np.arange(len(forest.edges))
+    return leading[forest.edges[:, 0]]
+
+
+def bone_names(forest: Skeleton) -> list[str]:
+    """Of each bone: its branch, and which one of that it is."""
+    count: dict[int, int] = {}
+    names = []
+    for label in branch_of_edge(forest).tolist():
+        count[label] = count.get(label, -1) + 1
+        names.append(f"branch_{label}.{count[label]:03d}")
+    return names
