@@ -30,7 +30,7 @@ docs: $(VENV)/.installed-docs ## build the site into build/docs/index.html (SPHI
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -q -W --keep-going -c docs -d build/doctrees $(SPHINX_ARGS) . build/docs
 	@echo "The site is build/docs/index.html"
 
-figures: $(VENV)/.installed-demo ## draw the pictures of the README and of the pages anew, into docs/images
+figures: $(VENV)/.installed-test ## draw the pictures of the README and of the pages anew, into docs/images
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/_ext/figures.py docs/images
 	$(BIN)/python benchmarks/leaderboard.py page README.md docs/comparison.md
 
