@@ -63,6 +63,9 @@ Retry = Annotated[bool, typer.Option("--retry", help="Run again what failed.")]
 There = Annotated[bool, typer.Option("--there", help="Run nothing: take the answers that are there.")]
 
 
+Part = Annotated[bool, typer.Option("--part", help="Take DIR/bench as it is, though it lacks shapes or variants.")]
+
+
 @app.command("run")
 def run_(
     place: Place,
@@ -72,10 +75,11 @@ def run_(
     retry: Retry = False,
     there: There = False,
     version: Version = "v1",
+    part: Part = False,
 ) -> None:
     """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/VERSION."""
     peers = with_answers(place, tool) if there else installed(PEERS, tool)
-    bench = make(place / BENCH, version, jobs=jobs)
+    bench = read_folder(place / BENCH) if part else make(place / BENCH, version, jobs=jobs)
     for name, made in found_in(place, peers) if there else answered(bench, place, peers, limit, jobs, retry):
         results = score_answers(bench, place / name, name=name)
         typer.echo(f"{tables.keep_scores(results, made)}: {results.failures} failures")
