@@ -141,10 +141,8 @@ def _bones_around(forest):
 
 
 def _squared_distance(forest, bone, points):
-    """From each point to a bone of its own, (N,) float array; what is beyond an end counts twice.
-
-    Else all bones of a joint would be equally near behind it, also those that point away.
-    """
+    """From each point to a bone of its own, (N,) float array; what is beyond an end counts twice."""
+    # else all bones of a joint would be equally near behind it, also those that point away
     _, along = nearest_on_edges(forest.vertices, forest.edges, bone[:, None], points)
     start, end = forest.vertices[forest.edges[bone]].swapaxes(0, 1)
     away, axis = points - start - along[:, None] * (end - start), end - start
