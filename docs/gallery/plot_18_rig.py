@@ -34,7 +34,7 @@ skeleton = editing.simplify(glsk.skeletonize(cloud), tolerance=0.01)
 print(skeleton)
 folder = TemporaryDirectory()
 path = Path(folder.name, "animal.glb")
-glsk.save_rig(skeleton, path, mesh, cut_loops=True, root="thickest")
+glsk.save_rig(skeleton, path, mesh, cut_loops=True)
 print(f"{path.stat().st_size // 1024} kB")
 
 # %%

@@ -103,7 +103,7 @@ def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tu
     its joint at the end that is nearer to the root. `vertex`, (N,), says which part of the curve a point is on. The
     farther away a bone is than the nearest one, the less it moves the point: not at all one and a half radii beyond the
     joint, on a tube, or where the fifth bone is. So weights are continuous along the curve and across the creases
-    at junctions, but not between bones more than three joints apart. They sum to 1.
+    at junctions, but not between bones more than three joints apart, nor where five are equally near. They sum to 1.
     """
     around, table = incident_edges(forest.edges, len(forest.vertices)), _bones_around(forest)
     own, _ = nearest_on_edges(forest.vertices, forest.edges, around[vertex], points)
@@ -117,8 +117,8 @@ def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tu
     order = np.argsort(far, axis=1, kind="stable")[:, : MOST_WEIGHTS + 1]
     bones, far = (np.take_along_axis(each, order, axis=1) for each in (bones, far))
     fifth = far[:, MOST_WEIGHTS:].min(axis=1, initial=np.inf, keepdims=True)
-    reach = np.minimum(BLEND**2 * np.fmax(radius**2, least), fifth - least)
-    # on a tube at s beyond the joint the squares of the distances are r^2 + s^2 and r^2: what counts is (s / r)^2
+    reach = np.minimum(2 * BLEND**2 * np.fmax(radius**2, least), fifth - least)
+    # on a tube at s beyond the joint the squares of the distances are r^2 + 2 s^2 and r^2: what counts is (s / r)^2
     share = np.clip(1 - (far - least) / np.maximum(reach, TINY), 0, 1) ** 2
     bones, share = (np.pad(each, ((0, 0), (0, MOST_WEIGHTS)))[:, :MOST_WEIGHTS] for each in (bones, share))
     return np.where(share > 0, bones, 0), share / share.sum(axis=1, keepdims=True)
@@ -141,10 +141,13 @@ def _bones_around(forest):
 
 
 def _squared_distance(forest, bone, points):
-    """From each point to a bone of its own, (N,) float array."""
+    """From each point to a bone of its own, (N,) float array; what is beyond an end counts twice."""
+    # else all bones of a joint would be equally near behind it, also those that point away
     _, along = nearest_on_edges(forest.vertices, forest.edges, bone[:, None], points)
     start, end = forest.vertices[forest.edges[bone]].swapaxes(0, 1)
-    return ((start + along[:, None] * (end - start) - points) ** 2).sum(axis=1)
+    away, axis = points - start - along[:, None] * (end - start), end - start
+    beyond = (away * axis).sum(axis=1) / np.maximum(norm(axis), TINY)
+    return (away**2).sum(axis=1) + beyond**2
 
 
 def bone_before(forest: Skeleton) -> np.ndarray:

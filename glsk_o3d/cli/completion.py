@@ -98,7 +98,7 @@ def join_words(environ: MutableMapping[str, str]) -> None:
             joined[-1] += word
         else:
             joined.append(word)
-    if words[here] == "=" or words[here - 1] == "=":
+    if "=" in words[max(here - 1, 0) : here + 1]:
         _parted, _, joined[-1] = joined[-1].partition("=")
     environ.update(COMP_WORDS="\n".join(joined), COMP_CWORD=str(len(joined) - 1))
 

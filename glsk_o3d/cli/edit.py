@@ -109,10 +109,10 @@ def rig(
     from ..io.scans import read_mesh
 
     if output is None or len(output) > 1:
-        raise WrongUsage("nothing to write: give one output with -o")
+        raise WrongUsage(f"{'nothing to write' if output is None else 'rig writes one file'}: give one output with -o")
     check_outputs([(output[0], RIG_ENDINGS, "rig is glTF or BVH")], skeleton, mesh)
     curve = read_skeleton(skeleton)
-    moved = "nothing" if output[0].suffix.lower() == ".bvh" else "the skeleton's own surface"
+    moved = "no surface" if output[0].suffix.lower() == ".bvh" else "the skeleton's own surface"
     surface: Any = None
     if mesh is not None:
         load_open3d()

@@ -115,7 +115,7 @@ def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
     """
     if skeleton.n_loops:
         raise InvalidParameterError(
-            f"the skeleton has {skeleton.n_loops} loops: only trees have a root; see cut_loops()"
+            f"the skeleton has {skeleton.n_loops} loops: only trees have a root; see cut_loops (--cut-loops)"
         )
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: it has no vertex to be the root")
@@ -181,7 +181,7 @@ def prune(
 def _without_orders(skeleton: Skeleton, order: int, root: RootPlace | None) -> Skeleton:
     if skeleton.n_loops:
         raise InvalidParameterError(
-            f"the skeleton has {skeleton.n_loops} loops: branches have an order in a tree; see cut_loops()"
+            f"the skeleton has {skeleton.n_loops} loops: branches have an order in a tree; see cut_loops (--cut-loops)"
         )
     table = branch_table(skeleton, root)
     group = np.arange(len(skeleton.vertices))

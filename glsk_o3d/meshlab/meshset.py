@@ -1,6 +1,7 @@
 """MeshSet: MeshLab's, with our filters among its own."""
 
 import os
+import re
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -95,7 +96,8 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             try:
                 return self._run_theirs(step.name, step.values)
             except Exception as error:  # pymeshlab's have no base of their own
-                raise GlskError(" ".join(str(error).split())) from error
+                words = re.sub("</?[a-z]+>", " ", str(error)).split()  # MeshLab writes HTML
+                raise GlskError(" ".join(words)) from error
 
     def _run_ours(self, step: Step, on_iteration: Callable[..., Any] | None = None) -> dict[str, Any]:
         assert step.verb is not None

@@ -324,7 +324,7 @@ class EditVerb(Verb):
             found = self.function(layer.to_skeleton(), **self.in_units(made, layer.diagonal))
         except InvalidParameterError as error:
             cure = "cut them with generate_skeleton_without_loops_glsk"
-            raise InvalidParameterError(str(error).replace("see cut_loops()", cure)) from None
+            raise InvalidParameterError(str(error).replace("see cut_loops (--cut-loops)", cure)) from None
         skeleton, *cut = found if isinstance(found, tuple) else (found,)
         shown = self.shown(skeleton, layer.source or layer)
         return dataclasses.replace(shown, cut=cut[0].mean(axis=1).tolist()) if cut else shown

@@ -27,7 +27,7 @@ def show(skeleton: Skeleton, cloud: Any = None, *, title: str = "Curve skeleton"
     H lists Open3D's own, Q closes the window. Branches have colours in turn. A point cloud of Open3D takes the place of
     the skeleton's points. Without a display Open3D itself would render unseen, and wait for ever: that is an error.
     """
-    elsewhere = "save_report and save_preview make files to look at instead"
+    elsewhere = "save_report and save_preview (--report, --preview) make files to look at instead"
     if not has_display():
         raise DisplayError(f"there is no display to open a window on: {elsewhere}")
     o3d = import_open3d()

@@ -90,3 +90,14 @@ def test_weights_go_over_from_bone_to_bone_also_at_creases():
     assert len(first) > 10000
     assert np.abs(dense[first] - dense[second]).max() < 0.15
     assert (np.count_nonzero(dense, axis=1) > 1).mean() > 0.05
+
+
+def test_behind_a_joint_a_bone_that_points_away_moves_less():
+    bones = bare([[-1, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0, 1]], [(0, 1), (1, 2), (1, 3)], [0.2] * 4)
+    dense = dense_weights(bones, np.array([[0, 0, -0.2], [0, 0.2, 0]]))
+    limb = np.flatnonzero(bones.vertices[bones.edges].max(axis=1)[:, 2] > 0)
+    behind, beside = dense[:, limb].ravel()
+    share = (1 - 0.2**2 / (2 * 1.5**2 * 0.2**2)) ** 2  # 0.2 from its end, and as much beyond it, which counts twice
+    assert beside == pytest.approx(1 / 3)
+    assert behind == pytest.approx(share / (2 + share))
+    assert behind < 0.3

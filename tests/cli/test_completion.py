@@ -61,6 +61,9 @@ def test_every_parameter_is_named_and_nothing_is_parted_but_settings():
     joined = dict(line)
     join_words(joined)
     assert joined == line
+    short = {"_GLSK_COMPLETE": "complete_bash", "COMP_WORDS": "glsk info", "COMP_CWORD": "2"}
+    join_words(short)
+    assert short["COMP_WORDS"] == "glsk info"
 
 
 def test_the_names_written_out_are_those_there_are():

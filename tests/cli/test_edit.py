@@ -132,7 +132,8 @@ def test_alone_it_has_its_tubes_and_loops_are_cut_if_one_says_so(invoke, ring_fi
 def test_an_armature_alone(invoke, y, tmp_path):
     bones = save_rig(read_skeleton(tmp_path / y), tmp_path / "expected.bvh", up="y")
     assert (
-        invoke("rig", y, "-o", "r.bvh", "--up", "y").stdout == f"{len(bones.edges)} bones move nothing\nwrote r.bvh\n"
+        invoke("rig", y, "-o", "r.bvh", "--up", "y").stdout
+        == f"{len(bones.edges)} bones move no surface\nwrote r.bvh\n"
     )
     assert (tmp_path / "r.bvh").read_bytes() == (tmp_path / "expected.bvh").read_bytes()
     assert invoke("rig", y, "-o", "r.fbx").exit_code == 2

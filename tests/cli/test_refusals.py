@@ -22,20 +22,20 @@ TABLE = """
     2 edit o.ply                                           | nothing to write: give an output with -o
     2 edit o.ply -o o.ply                                  | o.ply: is an input
     2 edit o.ply -o new.ply --simplify 1 --vertices 3      | simplify needs either a tolerance or n
-    2 edit o.ply -o new.ply --root x                       | the skeleton has 1 loops: only trees have a root
+    2 edit o.ply -o new.ply --root x                       | only trees have a root; see cut_loops (--cut-loops)
     2 edit o.ply -o new.ply --prune-order 0                | the skeleton has 1 loops: branches have an order in a tree
     1 convert o.ply a.swc                                  | a.swc: this format holds trees only
     2 convert o.ply a.nope                                 | a.nope: the file is a skeleton and its name ends in
     2 convert y.ply a.ply --root x                         | for others use 'glsk edit'
     2 rig y.ply                                            | nothing to write: give one output with -o
-    2 rig y.ply -o a.glb -o b.glb                          | nothing to write: give one output with -o
-    2 rig none.ply -o r.fbx                                | r.fbx: the rig is binary glTF and its name ends in .glb
+    2 rig y.ply -o a.glb -o b.glb                          | rig writes one file: give one output with -o
+    2 rig none.ply -o r.fbx                                | r.fbx: the rig is glTF or BVH and its name ends in .glb
     2 rig y.ply -o r.glb --up x                            | up = 'x': must be one of z, y
     1 rig y.ply none.ply -o r.glb                          | none.ply: no such file
     1 rig y.ply y.ply -o r.glb                             | y.ply: is a skeleton, not a scan
     1 rig y.ply junk.ply -o r.glb                          | junk.ply: not a valid .ply file: it does not start with
     1 rig y.ply nan.xyz -o r.glb                           | nan.xyz: the surface has points that are not finite: drop
-    1 rig o.ply -o r.glb                                   | 1 loop(s): pass cut_loops=True to drop
+    1 rig o.ply -o r.glb                                   | 1 loop(s): pass cut_loops=True (--cut-loops) to drop
     1 rig bare.obj -o r.glb                                | a rig needs radii or points: read the skeleton from
     2 grasps rod.npz --opening -1                          | max_opening = -1.0: must be above 0
     2 grasps rod.npz --opening 1 --plane 0,0,1             | --plane 0,0,1: write 4 numbers with commas

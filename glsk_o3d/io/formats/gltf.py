@@ -60,7 +60,7 @@ def save_rig(
     cut_loops : bool
         Cut loops of the skeleton open instead of refusing them; the surface stays whole.
     root : str, int or (x, y, z), optional
-        Which joint moves all others; as for `glsk_o3d.editing.reroot`.
+        Which joint moves all others; as for `glsk_o3d.editing.reroot`. By default that of `branch_table`.
     up : {"z", "y"}
         The vertical axis of the data. It is y in the files, and programs convert it.
 
@@ -84,7 +84,7 @@ def save_rig(
     >>> from glsk_o3d.samples import sauropod
     >>> body = skeletonize(sauropod(4096).points)
     >>> with TemporaryDirectory() as folder:
-    ...     bones = save_rig(body, f"{folder}/animal.glb", cut_loops=True, root="thickest")
+    ...     bones = save_rig(body, f"{folder}/animal.glb", cut_loops=True)
     >>> len(bones.edges) < len(body.edges)
     True
     """

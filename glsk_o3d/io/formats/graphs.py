@@ -45,7 +45,7 @@ def as_forest(skeleton: Skeleton, cut: bool, root: RootPlace | None) -> Skeleton
     if skeleton.n_loops and not cut:
         raise FileFormatError(
             f"this format holds trees only and the skeleton has {skeleton.n_loops} loop(s): "
-            "pass cut_loops=True to drop an edge of each, or choose another format"
+            "pass cut_loops=True (--cut-loops) to drop an edge of each, or choose another format"
         )
     forest = cut_loops(skeleton)[0] if skeleton.n_loops else skeleton
     if len(forest.vertices) == 0:
