@@ -29,7 +29,7 @@ TABLE = """
     2 convert y.ply a.ply --root x                         | for others use 'glsk edit'
     2 rig y.ply                                            | nothing to write: give one output with -o
     2 rig y.ply -o a.glb -o b.glb                          | nothing to write: give one output with -o
-    2 rig none.ply -o r.fbx                                | r.fbx: the rig is binary glTF and its name ends in .glb
+    2 rig none.ply -o r.fbx                                | r.fbx: the rig is glTF or BVH and its name ends in .glb
     2 rig y.ply -o r.glb --up x                            | up = 'x': must be one of z, y
     1 rig y.ply none.ply -o r.glb                          | none.ply: no such file
     1 rig y.ply y.ply -o r.glb                             | y.ply: is a skeleton, not a scan
@@ -41,7 +41,7 @@ TABLE = """
     2 grasps rod.npz --opening 1 --plane 0,0,1             | --plane 0,0,1: write 4 numbers with commas
     2 grasps rod.npz --opening 1 --plane 0,0,0,1           | is no plane
     2 grasps rod.npz --opening 1 --cone down,30            | --cone down: write 3 numbers
-    2 grasps rod.npz --opening 1 --cone z                  | --cone
+    2 grasps rod.npz --opening 1 --cone z                  | --cone z: write a direction and degrees, such as -z,60
     2 grasps rod.npz --opening 1 --cone z,270              | the angle of cone = 270.0: must be
     2 grasps rod.npz --opening 1 --up w                    | --up w: write 3 numbers
     2 grasps rod.npz --opening 1 --finger a,b,c            | --finger a,b,c: write 3 numbers
