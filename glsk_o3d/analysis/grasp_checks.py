@@ -180,11 +180,11 @@ def obstacle_list(given: Any) -> list[np.ndarray]:
         return []
     found = []
     for each in [given] if _is_one(given) else given:
-        if not open3d_class(each)[0] and np.shape(each) == (4,):
+        if not open3d_class(each)[0] and np.ndim(each) == 1:
             plane = np.asarray(each, float)
-            if not (np.isfinite(plane).all() and plane[:3].any()):
+            if len(plane) != 4 or not (np.isfinite(plane).all() and plane[:3].any()):
                 raise InvalidParameterError(
-                    f"{list(each)} is no plane: a, b, c, d must be finite, and a, b, c not all 0"
+                    f"{list(each)} is no plane: give finite a, b, c, d of ax + by + cz + d = 0, a, b, c not all 0"
                 )
             found.append(plane)
         else:
@@ -200,4 +200,4 @@ def _is_one(given: Any) -> bool:
         array = np.asarray(given)
     except ValueError:  # several of different shapes
         return False
-    return array.dtype.kind in "iuf" and (array.shape == (4,) or (array.ndim == 2 and array.shape[1] == 3))
+    return array.dtype.kind in "iuf" and (len(array) > 0 if array.ndim == 1 else array.shape[1:] == (3,))

@@ -17,6 +17,8 @@ from .curves import check_places
 from .grasp_checks import Ways, free_ways, obstacle_list
 from .gripper import GraspCandidates, Gripper, listed
 
+UNLIKELY_OPENING = 20.0  # derived: openings over diagonals: above those of hands and screws, below those of mm and m
+
 
 def grasp_candidates(
     skeleton: Skeleton,
@@ -84,7 +86,7 @@ def grasp_candidates(
     Warns
     -----
     SkeletonWarning
-        There is no candidate, with the reason.
+        There is no candidate, with the reason; or the gripper is so large that it may be in other units.
 
     Examples
     --------
@@ -103,6 +105,9 @@ def grasp_candidates(
     above = _direction("up", up) if up is not None else np.array([0.0, 0, 1]) if cone is None else -cone[0]
     points = _object(skeleton, cloud)
     middle = points if len(points) else skeleton.vertices
+    if gripper.max_opening > UNLIKELY_OPENING * np.linalg.norm(np.ptp(middle, axis=0)):
+        many = f"more than {UNLIKELY_OPENING:g} times as wide as the object is long"
+        warnings.warn(f"the gripper opens {many}: are the units the same?", SkeletonWarning, stacklevel=outside())
     place, branch, width, quality, left_out, looked_at = _fitting(
         skeleton, gripper, clearance, spacing, margin, min_confidence
     )

@@ -95,7 +95,9 @@ def _direction(option: str, text: str) -> tuple[float, ...]:
 
 
 def _cone(text: str) -> tuple[tuple[float, ...], float]:
-    direction, _, degrees = text.rpartition(",")
+    direction, comma, degrees = text.rpartition(",")
+    if not comma:
+        raise WrongUsage(f"--cone {text}: write a direction and degrees, such as -z,60")
     return _direction("--cone", direction), _numbers("--cone", degrees, 1)[0]
 
 

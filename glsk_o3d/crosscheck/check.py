@@ -11,6 +11,7 @@ from ..contractor import Contractor
 from ..errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
 from ..interop.atomic import check_ending
 from ..interop.clouds import cloud_points
+from ..interop.packages import require
 from ..numerics.frame import MIN_POINTS
 from ..numerics.morton import morton_order
 from ..pipeline import Pipeline
@@ -167,6 +168,7 @@ def cross_check(
         raise InvalidParameterError(f"max_points = {max_points!r}: {words}")
     pipeline.check()
     pipeline.check_complete()
+    require("igl", "libigl")  # before the work that it is for
     given = cloud_points(cloud)
     points = _thinned(given, max_points)
     rings = kinds.index(RingBuilder) + 1

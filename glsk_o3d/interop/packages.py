@@ -38,15 +38,17 @@ def require(package: str, install: str | None = None) -> Any:
 
     `install` is what pip calls it, if it is not the module's name.
     """
-    name = install or package
+    root = package.partition(".")[0]
+    name = install or root
     try:
+        importlib.import_module(root)
         return importlib.import_module(package)
     except (ImportError, OSError) as error:
         library = re.search(r"(lib[\w.+-]+\.so[\w.]*): cannot open shared object file", str(error))
         if library:
             lack = f"needs {library[1]}, which this machine lacks; on Debian: apt-get install {_OPEN3D_LIBRARIES}"
-        elif isinstance(error, ModuleNotFoundError) and error.name == package.partition(".")[0]:
-            wanted = f"glsk-o3d[{EXTRA_OF[package]}]" if package in EXTRA_OF else name
+        elif isinstance(error, ModuleNotFoundError) and error.name == root:
+            wanted = f"glsk-o3d[{EXTRA_OF[root]}]" if root in EXTRA_OF else name
             lack = f'cannot be imported: pip install "{wanted}"'
         else:
             lack = f"cannot be imported: its installation is damaged ({error}): pip install --force-reinstall {name}"

@@ -174,7 +174,7 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
 
 
 def _is_cloud(path: Path) -> FileFormatError:
-    return FileFormatError(f"{path}: is a cloud, not a skeleton: make one with glsk_o3d.skeletonize")
+    return FileFormatError(f"{path}: is a cloud, not a skeleton: make one with skeletonize")
 
 
 def holds_skeleton(path: str | os.PathLike) -> bool:

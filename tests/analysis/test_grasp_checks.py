@@ -258,7 +258,9 @@ def test_nothing_is_in_the_object_by_its_formula():
     [
         (dict(obstacles=(0, 0, 0, 1)), InvalidParameterError, "is no plane"),
         (dict(obstacles=[(0, 0, np.nan, 1)]), InvalidParameterError, "is no plane"),
+        (dict(obstacles=(0, 0, 1)), InvalidParameterError, r"\[0, 0, 1\] is no plane: give finite a, b, c, d"),
         (dict(obstacles=["table.ply"]), InvalidCloudError, "not a file name"),
+        (dict(obstacles=np.empty((0, 3))), InvalidCloudError, "empty"),
         (dict(obstacles=3), InvalidCloudError, "is no cloud"),
         (dict(cloud=np.empty((0, 3))), InvalidCloudError, "empty"),
     ],

@@ -169,6 +169,11 @@ def test_nothing_to_grasp_is_told(skeleton, options, why, tmp_path):
     assert json.loads((tmp_path / "g.json").read_text())["grasps"] == []
 
 
+def test_a_gripper_in_other_units_is_told():
+    with pytest.warns(SkeletonWarning, match="more than 20 times as wide .* the same"):
+        assert len(grasp_candidates(TUBE, 80.0)) > 0
+
+
 def test_unknown_confidence_and_radii():
     unknown = replace(TUBE, confidence=())
     with pytest.raises(InvalidParameterError, match="min_confidence=0"):

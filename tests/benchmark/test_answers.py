@@ -91,6 +91,10 @@ def test_a_folder_without_any_answer_is_refused(small, tmp_path):
     (tmp_path / "none").mkdir()
     with pytest.raises(FileFormatError, match=r"such as trees_100_clean\.ply"):
         score_answers(small, tmp_path / "none")
+    told = {"clouds": {"hammer_0": dict(seconds=1.5)}}  # answers to the clouds of another benchmark
+    (tmp_path / "none" / "times.json").write_text(json.dumps(told))
+    with pytest.raises(FileFormatError, match="has no answer to any cloud of"):
+        score_answers(small, tmp_path / "none")
 
 
 def test_times_are_taken_over(perfect, small):

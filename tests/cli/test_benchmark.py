@@ -52,6 +52,12 @@ def test_from_nothing_to_a_table(invoke, rods, program, tmp_path):
     assert json.loads((tmp_path / "t.json").read_text())["entries"][0]["name"] == "good"
 
 
+def test_choices_may_be_repeated(invoke, rods):
+    words = ("--families", "tubes", "--families", "trees", "--seeds", "100", "--seeds", "101", "--variants", "clean")
+    made = invoke("benchmark", "make", "bench", *words, "--variants", "scan2", "--jobs", 1, "--json")
+    assert (json.loads(made.stdout)["shapes"], json.loads(made.stdout)["clouds"]) == (4, 8)
+
+
 def test_json(invoke, rods, program):
     made = json.loads(invoke("benchmark", "make", "bench", *CHOICE, "--json").stdout)
     assert (made["clouds"], made["scored"], made["whole"]) == (8, 7, False)

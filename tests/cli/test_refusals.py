@@ -41,7 +41,7 @@ TABLE = """
     2 grasps rod.npz --opening 1 --plane 0,0,1             | --plane 0,0,1: write 4 numbers with commas
     2 grasps rod.npz --opening 1 --plane 0,0,0,1           | is no plane
     2 grasps rod.npz --opening 1 --cone down,30            | --cone down: write 3 numbers
-    2 grasps rod.npz --opening 1 --cone z                  | --cone
+    2 grasps rod.npz --opening 1 --cone z                  | --cone z: write a direction and degrees, such as -z,60
     2 grasps rod.npz --opening 1 --cone z,270              | the angle of cone = 270.0: must be
     2 grasps rod.npz --opening 1 --up w                    | --up w: write 3 numbers
     2 grasps rod.npz --opening 1 --finger a,b,c            | --finger a,b,c: write 3 numbers

@@ -132,6 +132,8 @@ def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, m
         (dict(plane=[0.0, 0.0, 1.0]), r"plane = \[0.0, 0.0, 1.0\]: must be a, b, c, d"),
         (dict(plane=[0.0, 0.0, 0.0, 0.7]), "is no plane"),
         (dict(approach=[0.0, 0.0, 0.0]), "the direction of cone"),
+        (dict(plane=[0.0, 0.0, 1.0, 0.0]), "are for grasps: give the opening"),
+        (dict(approach_angle=60.0), "are for grasps: give the opening"),
         (dict(approach_angle=181.0), "the angle of cone = 181.0: .* at most 180"),
     ],
 )

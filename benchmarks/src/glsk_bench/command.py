@@ -32,16 +32,16 @@ Jobs = Annotated[
 def make(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Made if needed; what it has is not made again.")],
     families: Annotated[
-        str | None, typer.Option(metavar="NAMES", help="Of shapes, with commas; by default all of the version.")
+        list[str] | None, typer.Option(metavar="NAMES", help="Of shapes, with commas; by default all of the version.")
     ] = None,
     seeds: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
             metavar="FIRST:BEYOND", help="Or numbers with commas; others than the version's make other shapes."
         ),
     ] = None,
     variants: Annotated[
-        str | None, typer.Option(metavar="NAMES", help="Of clouds, with commas; by default all of the version.")
+        list[str] | None, typer.Option(metavar="NAMES", help="Of clouds, with commas; by default all of the version.")
     ] = None,
     version: Annotated[
         str, typer.Option(metavar="NAME", help="Of the benchmark: v1, round shapes, or v2, things.")
@@ -61,7 +61,7 @@ def make(
                 folder,
                 version,
                 families=_words(families),
-                seeds=_seeds(seeds),
+                seeds=[seed for text in seeds for seed in _seeds(text)] if seeds else None,
                 variants=_words(variants),
                 jobs=jobs,
                 on_shape=update,
@@ -276,14 +276,13 @@ def table(
             echo(board.markdown().rstrip())
 
 
-def _words(text: str | None) -> list[str] | None:
-    return None if text is None else [word.strip() for word in text.split(",") if word.strip()]
+def _words(texts: list[str] | None) -> list[str] | None:
+    """The names in an option that may be repeated, each time with several."""
+    return [word.strip() for text in texts for word in text.split(",") if word.strip()] if texts else None
 
 
-def _seeds(text: str | None) -> list[int] | None:
+def _seeds(text: str) -> list[int]:
     """What ``--seeds`` says: ``100:112``, or ``100,105``."""
-    if text is None:
-        return None
     try:
         if ":" in text:
             first, beyond = map(int, text.split(":"))

@@ -172,7 +172,7 @@ def _times(place: Path, made: BenchmarkFolder, program: Told) -> dict[str, Told]
     same = (before.get("benchmark"), before.get("program")) == (made.version, json.loads(json.dumps(program)))
     if not same and (before or any(cloud.name in files for cloud in made.scored)):
         raise InvalidParameterError(
-            f"{place}: has answers of another program, or with other limits: give another folder"
+            f"{place}: has answers of another program, with other limits, or to other clouds: give another folder"
         )
     digits = {cloud.name: made.digits(cloud) for cloud in made.scored}
     there = [name for name, told in times.items() if told.get("failure") is not None or name in files]

@@ -332,10 +332,11 @@ class Answers:
             raise FileNotFoundError(f"{place}: no such folder of answers")
         self.name, self.files, self.times = place.resolve().name, answer_files(place), read_times(place)
         clouds = self.made.scored
-        if not self.times and not any(cloud.name in self.files for cloud in clouds):
+        if not any(cloud.name in self.files or cloud.name in self.times for cloud in clouds):
             example = f"{clouds[0].name}.ply" if clouds else "SHAPE_VARIANT.ply"
             raise FileFormatError(
-                f"{place}: has no answer to any cloud: they are called as the clouds are, such as {example}"
+                f"{place}: has no answer to any cloud of {self.made.path}: they are called as the clouds are, such as "
+                f"{example}"
             )
 
     def use(self, cloud: CloudFile, make: Callable[[Skeleton], T]) -> T | str:

@@ -56,7 +56,8 @@ class Skeletonizer:
     Raises
     ------
     GlskError
-        The pipeline, its recipe, a setting, the opening, the plane or the cone is wrong.
+        The pipeline, its recipe, a setting, the opening, the plane or the cone is wrong, or there is a plane or a cone
+        without an opening.
     """
 
     def __init__(
@@ -83,6 +84,8 @@ class Skeletonizer:
             "obstacles": obstacle_list(list(plane) if any(plane) else None),
             "cone": (approach, approach_angle),
         }
+        if not opening and (any(plane) or approach_angle < 180):
+            raise InvalidParameterError("plane and approach_angle are for grasps: give the opening of the gripper, too")
         self.pipeline = override(as_pipeline(pipeline), filter(None, settings))
 
     def __call__(self, cloud: Any) -> Results:
