@@ -225,7 +225,8 @@ def _find_doubts(
         thick = f"{200 * section.radius:.3g} cm thick, as at {BREAST_HEIGHT} m"
         doubts.append(
             f"the tree has {volume:.3g} m3 of wood, {share:.2g} times a cylinder as high and {thick}; more than "
-            f"{FORM_FACTOR:g} is hardly one tree: are leaves, undergrowth or others in it, or does it fork below?"
+            f"{FORM_FACTOR:g} is hardly one tree: are leaves, undergrowth or others in it, does it fork below, or does "
+            f"{up} not point up?"
         )
     return tuple(doubts)
 
