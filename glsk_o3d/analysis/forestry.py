@@ -216,7 +216,7 @@ def _find_doubts(
     if highest > TALLEST_TREE:
         doubts.append(
             f"the tree is {highest:.4g} m high, and none is known above {TALLEST_TREE:.0f} m: is a unit of the cloud "
-            f"{unit:g} m? pass unit=, such as 'mm'"
+            f"{unit:g} m? name it: unit='mm', --unit mm"
         )
     if unknown and highest > BREAST_HEIGHT:
         doubts.append(f"the diameter of the stem at {BREAST_HEIGHT} m is not known: {unknown}")
