@@ -98,7 +98,10 @@ def _of_text(path: Path) -> Mapping[str, np.ndarray]:
     """Columns by their names; commas, semicolons, tabs or spaces are between them."""
     first, *rest = path.read_text(encoding="utf-8-sig").replace('"', "").splitlines() or [""]
     between = next((mark for mark in (",", ";", "\t") if mark in first), None)
-    rows = np.genfromtxt(rest, delimiter=between, ndmin=2) if any(line.strip() for line in rest) else np.empty((0, 0))
+    try:
+        rows = np.genfromtxt(rest, delimiter=between, ndmin=2) if any(map(str.strip, rest)) else np.empty((0, 0))
+    except ValueError:
+        raise typer.BadParameter(f"{path}: no table: its lines have different numbers of columns") from None
     names = [name.strip() for name in first.split(between)]
     if rows.shape[1] == len(names) + 1:  # R writes the numbers of rows, and no name above them
         rows = rows[:, 1:]

@@ -16,6 +16,7 @@ from _tables import Tables, good, number, pick, short
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
+from scipy.stats import qmc
 
 from glsk_o3d import Skeleton, pipelines, read_cloud, samples
 from glsk_o3d.analysis import cylinders, tree_measures
@@ -158,14 +159,19 @@ def scan(seed: int) -> Scan:
     return Scan(np.concatenate(found), tree, scanners, noise, density)
 
 
-def volume(tree: samples.Sample, n: int = 1_000_000) -> float:
-    """Of the union of its tapered capsules: of each the part that is inside no earlier one, by points in its box."""
-    rng, total = np.random.default_rng(0), 0.0
+def volume(tree: samples.Sample, n: int = 4_000_000) -> float:
+    """Of the union of its tapered capsules: of each the part that is inside no earlier one, by points in its box.
+
+    Points of a Halton sequence: a million random ones were 0.2 % too high, the same way for all trees.
+    """
+    total = 0.0
     low = (tree.nodes - tree.radii[:, None])[tree.edges].min(axis=1)
     high = (tree.nodes + tree.radii[:, None])[tree.edges].max(axis=1)
     boxes = (high - low).prod(axis=1)
+    counts = np.maximum(np.round(n * boxes / boxes.sum()).astype(int), 1000)
+    spread = qmc.Halton(3, seed=0).random(counts.max())
     for i, box in enumerate(boxes):
-        points = rng.uniform(low[i], high[i], (max(round(n * box / boxes.sum()), 1000), 3))
+        points = low[i] + (high[i] - low[i]) * spread[: counts[i]]
         earlier = np.flatnonzero(((low[:i] < high[i]) & (high[:i] > low[i])).all(axis=1))
         total += box * (_inside(tree, [i], points) & ~_inside(tree, earlier, points)).mean()
     return total

@@ -115,6 +115,9 @@ class TestModels:
             parts.read_cylinder_model(written(tmp_path / "no.csv", ["a", "b"], [[1.0], [2.0]]))
         with pytest.raises(BadParameter, match="3 names stand above 1 columns"):
             parts.read_cylinder_model(written(tmp_path / "torn.csv", ["a", "b", "c"], [[1.0]]))
+        (tmp_path / "ours.txt").write_text("# a tree of treetools\nx,y,z\n1,2,3, 4,5,6\n")
+        with pytest.raises(BadParameter, match=r"ours\.txt: no table: its lines have different numbers of columns"):
+            parts.read_cylinder_model(tmp_path / "ours.txt")
 
     def test_a_scan_beside_its_model(self, call, tmp_path):
         drawn = samples.tree(8000, forks=2, length=4, radius=0.2, seed=3)

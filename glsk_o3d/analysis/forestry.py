@@ -216,7 +216,7 @@ def _find_doubts(
     if highest > TALLEST_TREE:
         doubts.append(
             f"the tree is {highest:.4g} m high, and none is known above {TALLEST_TREE:.0f} m: is a unit of the cloud "
-            f"{unit:g} m? pass unit=, such as 'mm'"
+            f"{unit:g} m? name it: unit='mm', --unit mm"
         )
     if unknown and highest > BREAST_HEIGHT:
         doubts.append(f"the diameter of the stem at {BREAST_HEIGHT} m is not known: {unknown}")
@@ -225,7 +225,8 @@ def _find_doubts(
         thick = f"{200 * section.radius:.3g} cm thick, as at {BREAST_HEIGHT} m"
         doubts.append(
             f"the tree has {volume:.3g} m3 of wood, {share:.2g} times a cylinder as high and {thick}; more than "
-            f"{FORM_FACTOR:g} is hardly one tree: are leaves, undergrowth or others in it, or does it fork below?"
+            f"{FORM_FACTOR:g} is hardly one tree: are leaves, undergrowth or others in it, does it fork below, or does "
+            f"{up} not point up?"
         )
     return tuple(doubts)
 

@@ -7,8 +7,10 @@ import numpy as np
 
 from ..errors import InvalidParameterError
 from ..numerics.groups import Members
-from ..numerics.polylines import arc_lengths, place_at
+from ..numerics.neighbourhoods import plane_axes
+from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, norm
+from ..numerics.vectors import unit as directions
 from .branches import branch_table
 from .rows import Rows
 
@@ -16,6 +18,9 @@ METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}  # deri
 PIECE_LENGTH = 4.0  # derived: radii; the chord of a bend as sharp as that is 3 % too short
 TIP_QUANTILE = 0.95  # fitted: share of the points at a tip that its cylinder reaches
 OUTSIDE = 3.0  # fitted: radii aside of a tip, from which on points do not say how far it reaches
+BASE = 4.0  # derived: radii of a junction, within which a branch that leaves it by 15 degrees or more is outside
+BASE_SECTIONS = 24  # speed: places along that at which
+ON_SECTION = 32  # speed: so many points of a branch are tested
 RADIUS_SAMPLES = 8  # derived: places along a cylinder at which its radius is taken, evenly
 
 
@@ -76,9 +81,9 @@ class Cylinders(Rows, row="cylinder"):
 def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     """Cylinders along the branches of a skeleton, each about four radii long.
 
-    A branch begins one radius of its parent away from the junction, so that nothing counts twice; the one that
-    continues the axis begins at the junction. Free ends, except the root, reach as far as their points less a third of
-    the radius, which accounts for the volume of a round cap.
+    A branch begins where it has left its parent, on average over its section, so that nothing counts twice; the one
+    that continues the axis begins at the junction. Free ends, except the root, reach as far as their points less a
+    third of the radius, which accounts for the volume of a round cap.
 
     Parameters
     ----------
@@ -127,7 +132,12 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
         along = arc_lengths(skeleton.vertices[path])
         leaves_parent = before >= 0 and table.order[row] > table.order[before]
         # a stem is cut off flat, other ends are round: such a cap has the volume of a cylinder two thirds shorter
-        start = table.end_radius[before] if leaves_parent else -beyond.get(int(path[0]), 0.0)
+        if leaves_parent:  # of what several branches share at a junction, each part is the first one's
+            beside = (table.start == path[0]) & ((table.order == table.order[before]) | (np.arange(len(table)) < row))
+            others = [before, *np.flatnonzero(beside & (table.parent == before)).tolist()]
+            start = _length_inside(skeleton, path, along, [skeleton.branches[other] for other in others])
+        else:
+            start = -beyond.get(int(path[0]), 0.0)
         stop = along[-1] + max(beyond.get(int(path[-1]), 0.0) - skeleton.radii[path[-2]] / 3, 0.0)
         if stop <= start:
             continue
@@ -151,6 +161,26 @@ def _root(skeleton: Any, root: Any) -> Any:
     later = np.sort(skeleton.edges[:, 1])
     outwards = np.array_equal(later, np.arange(1, len(skeleton.vertices)))
     return 0 if root is None and not skeleton.report.root and outwards else root
+
+
+def _length_inside(skeleton: Any, path: np.ndarray, along: np.ndarray, others: list[np.ndarray]) -> float:
+    """Length of the base of a branch that is inside other branches of its junction, averaged over its section."""
+    length = min(along[-1], BASE * skeleton.radii[path[0]])
+    lengths = length * (np.arange(BASE_SECTIONS) + 0.5) / BASE_SECTIONS
+    places = place_at(skeleton.vertices[path], along, lengths)
+    beyond = np.maximum(lengths, skeleton.radii[path[0]])  # nearer to the junction radii are those of the junction
+    radius = np.interp(beyond, along, skeleton.radii[path])
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(ON_SECTION)  # a sunflower's, which fills a disc evenly
+    disc = np.sqrt((np.arange(ON_SECTION) + 0.5) / ON_SECTION) * np.stack([np.cos(turn), np.sin(turn)])
+    axes = plane_axes(directions(np.gradient(places, axis=0)))
+    points = places[:, None] + (radius[:, None, None] * (axes @ disc)).swapaxes(1, 2)
+    near = []
+    for other in others:
+        other = other if other[0] == path[0] else other[::-1]
+        reach = np.searchsorted(arc_lengths(skeleton.vertices[other]), 2 * length)
+        near.append(other[: max(reach, 1) + 1])
+    ratio, _ = relative_distance(points.reshape(-1, 3), skeleton.vertices, skeleton.radii, near)
+    return float(length * (ratio < 1).mean())
 
 
 def _beyond_tips(skeleton: Any) -> dict[int, float]:

@@ -96,8 +96,9 @@ def test_by_hand():
     table = cylinders(by_hand(), root=0)
     assert table.order.tolist() == 10 * [0] + 5 * [1]
     np.testing.assert_allclose(table.volume[:10].sum(), np.pi * 0.25 * 20)
-    np.testing.assert_allclose(table.length[10:].sum(), 9.5)  # from the surface of the stem on
-    np.testing.assert_allclose(table.start_point[10], [0.5, 0, 10])
+    inside = 4 / (3 * np.pi)  # of the branch in the stem, half a Steinmetz solid over its section
+    np.testing.assert_allclose(table.length[10:].sum(), 10 - inside, atol=0.005)
+    np.testing.assert_allclose(table.start_point[10], [inside, 0, 10], atol=0.005)
     assert table.parent.tolist() == [-1, *range(9), 4, *range(10, 14)]
     rooted = replace(by_hand(), report=Report(root=(0.0, 0.0, 20.0)))  # where the tree was grown from
     assert cylinders(rooted).start_point[0].tolist() == [0, 0, 20]
@@ -105,6 +106,18 @@ def test_by_hand():
         measures = tree_measures(by_hand(), root=0)
     assert (measures.height, measures.crown_base) == (20, 10)
     assert measures.crown_width == 10
+
+
+@pytest.mark.parametrize("degrees", [30, 45, 90, 135])
+@pytest.mark.parametrize("thin", [0.1, 0.6, 1.0])
+def test_a_branch_begins_where_it_has_left_its_parent(thin, degrees):
+    aside = np.array([np.sin(np.deg2rad(degrees)), 0, np.cos(np.deg2rad(degrees))])
+    places = [0 * Z, 20 * Z, 40 * Z, 20 * Z + aside, 20 * Z + 10 * aside]
+    tree = Skeleton(places, [(0, 1), (1, 2), (1, 3), (3, 4)], [1, 1, 1, thin, thin], (), (), ())
+    table = cylinders(tree, root=0)
+    v = thin * np.linspace(-1, 1, 20001)  # a strip of its section at v leaves the stem at sqrt(1 - v^2) / sin
+    inside = np.average(np.sqrt(1 - v**2), weights=np.sqrt(thin**2 - v**2)) / aside[0]
+    assert table.length[table.order == 1].sum() == pytest.approx(10 - inside, abs=0.06)
 
 
 def test_rows_have_diameter_area_and_volume():
@@ -198,7 +211,7 @@ def test_why_a_stem_has_no_diameter(degrees, n, cause):
 def test_more_wood_than_trees_have_is_in_doubt():
     stem = ring(0.15, 3.0, 6000, np.random.default_rng(2))
     assert tree_measures(stem, 0, up="z").doubts == ()
-    with pytest.warns(SkeletonWarning, match="4 times a cylinder as high and 30 cm thick"):
+    with pytest.warns(SkeletonWarning, match=r"4 times a cylinder as high and 30 cm thick.*does z not point up"):
         tree_measures(replace(stem, radii=np.full(31, 0.3)), 0, up="z")
 
 

@@ -142,5 +142,5 @@ def test_a_tree_taller_than_any_is_in_doubt(invoke, tmp_path, y):
     )
     first, second = invoke("tree", "mm.ply", "--up", "z", "--root", "z").stderr.splitlines()
     assert second.endswith("the skeleton has no points: .json and .npz files keep them")
-    assert first.endswith("none is known above 116 m: is a unit of the cloud 1 m? pass unit=, such as 'mm'")
+    assert first.endswith("none is known above 116 m: is a unit of the cloud 1 m? name it: unit='mm', --unit mm")
     assert invoke("tree", "mm.ply", "--unit", "mm", "--up", "z", "--root", "z").stderr == ""

@@ -62,7 +62,7 @@ def test_tree_file_keeps_volume_and_parents(tree):
     assert parent[0] == -1
     np.testing.assert_array_equal(parent[1:], tree.parent + 1)
     assert (parent < np.arange(len(parent))).all()
-    # treetools' own volume is from tip to tip, hence from the axis of the parent on: measured, 1.5 to 2.8 % above ours
+    # treetools' own volume is from tip to tip, hence from the axis of the parent on: measured, 2.2 to 2.5 % above ours
     apart = np.linalg.norm(x[1:] - x[parent[1:]], axis=1)
     assert 1.01 < np.pi * (radius**2 * apart).sum() / tree.volume.sum() < 1.03
     np.testing.assert_array_less(np.linalg.norm(tree.end_point - tree.start_point, axis=1) - 1e-9, tree.length)
