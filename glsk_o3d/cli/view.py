@@ -21,8 +21,8 @@ def view(
     """Look at a skeleton or a scan in a window.
 
     That needs a display; --preview and --report make files instead. In the window, C, S and T show and hide the cloud,
-    the skeleton, and its tubes of true radius; H helps, Q closes. A scan has its colours, or else those of its labels.
-    Labels have colours in turn, as branches do; measures go from dark blue to yellow.
+    the skeleton, and its tubes of true radius; H helps, Q closes. A scan has its colours, or else those of its labels,
+    but on a page it is grey. Labels have colours in turn, as branches do; measures go from dark blue to yellow.
     """
     from dataclasses import replace
 
@@ -37,6 +37,8 @@ def view(
     from ..viewing.window import show
 
     check_outputs(skeleton_files([], preview, report), file)
+    if color is not None and report is not None:
+        raise WrongUsage("--color is for the window and --preview: a page draws the points of a scan in grey")
     load_open3d()
     cloud = colors = None
     if holds_skeleton(file):

@@ -39,12 +39,13 @@ def test_other_axes_are_written_and_read_as_before(tmp_path):
     [
         (dict(half_width=RADII[:2]), "half_width at each"),
         (dict(half_width=0 * RADII), "half_width at each"),
-        (dict(half_width=["wide"] * 3), "half_width or mirror of no use"),
+        (dict(half_width=["wide"] * 3), "invalid half_width or mirror"),
         (dict(flat=np.array([3])), "some of its nodes"),
         (dict(flat=np.array([0.5])), "some of its nodes"),
         (dict(judged=np.array([True])), "each edge"),
         (dict(judged=np.array([1, 0])), "each edge"),
         (dict(mirror=np.zeros((1, 3))), "a point and a normal"),
+        (dict(mirror=[[0, 0, 0], [0, 2, 0.0]]), "must have length 1"),
     ],
 )
 def test_what_does_not_fit_is_refused(wrong, said, tmp_path):

@@ -187,6 +187,8 @@ def test_a_labelled_scan_is_shown_in_colour(invoke, tmp_path, shown, y):
     assert coloured.sum() > 20
     assert "did you mean 'label'" in invoke("view", "c.csv", "--color", "lable").stderr
     assert "--color is for scans" in invoke("view", y, "--color", "branch").stderr
+    assert "a page draws" in invoke("view", "c.csv", "--color", "height", "--report", "r.html").stderr
+    assert not (tmp_path / "r.html").exists()
 
 
 def test_files_instead_of_a_window(invoke, scans, shown, tmp_path, y):

@@ -59,7 +59,7 @@ class ThingTruth(Truth):
             width = np.asarray(self.half_width, float)
             mirror = np.asarray(self.mirror, float).reshape(-1, 3)
         except (TypeError, ValueError) as error:
-            raise InvalidParameterError(f"the truth has a half_width or mirror of no use: {error}") from None
+            raise InvalidParameterError(f"the truth has an invalid half_width or mirror: {error}") from None
         judged, flat = np.asarray(self.judged), np.asarray(self.flat)
         flat = flat if flat.size else np.empty(0, np.int64)
         if width.shape != self.radii.shape or not (np.isfinite(width) & (width > 0)).all():
@@ -70,6 +70,8 @@ class ThingTruth(Truth):
             raise InvalidParameterError("judged must be true or false for each edge of the truth")
         if len(mirror) not in (0, 2) or not np.isfinite(mirror).all():
             raise InvalidParameterError("the mirror of the truth must be a point and a normal, or nothing")
+        if len(mirror) and not np.isclose(np.linalg.norm(mirror[1]), 1):
+            raise InvalidParameterError(f"the normal of the truth's mirror must have length 1: {mirror[1].tolist()}")
         arrays = {"half_width": width, "flat": flat.astype(np.int64), "judged": judged, "mirror": mirror}
         for name, array in arrays.items():
             object.__setattr__(self, name, array)

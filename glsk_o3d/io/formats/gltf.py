@@ -26,9 +26,8 @@ from .graphs import as_forest, global_shift, holding_all
 RIG_ENDINGS = (".glb", ".gltf", ".bvh")
 COMPONENT_TYPES = {"f4": 5126, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
 MOST_JOINTS = 65535  # published: glTF 2.0, 3.7.3.3, in which joints are counted in 16 bits at most
-WEIGHT_STEPS = (
-    2**16
-)  # derived: float32 holds its parts, and they sum to 1 exactly: else far from the origin points move
+# derived: float32 holds its parts, and they sum to 1 exactly: else far from the origin points move
+WEIGHT_STEPS = 2**16
 SRGB_KNEE = 0.04045  # published: IEC 61966-2-1, where the curve of sRGB begins
 POINTS_MODE, TRIANGLES_MODE = 0, 4  # published: glTF 2.0, 5.24
 UPRIGHT = {"z": [-(0.5**0.5), 0.0, 0.0, 0.5**0.5], "y": [0.0, 0.0, 0.0, 1.0]}  # derived: turns up into glTF's y
