@@ -10,9 +10,9 @@ import numpy as np
 import typer
 from scipy.io import loadmat
 
+from glsk_o3d.analysis.forestry import BREAST_HEIGHT
 from glsk_o3d.numerics.vectors import norm
 
-BREAST_HEIGHT = 1.3  # metres above the foot
 MATRIX_STRUCTS = ("OptQSM", "QSM")  # of TreeQSM's .mat, each with a struct called cylinder
 # published: the columns of TreeQSM's text, which has one name for each three of them (TreeQSM's manual)
 TEXT_COLUMNS = ("radius", "length", "start.x", "start.y", "start.z", "axis.x", "axis.y", "axis.z")

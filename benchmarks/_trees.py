@@ -10,7 +10,7 @@ from statistics import fmean
 
 import numpy as np
 from _peers import PEERS, Graph, Peer, ours, separators_of_points, skeleton_of
-from _qsm import BREAST_HEIGHT, read_cylinder_model
+from _qsm import read_cylinder_model
 from _stopwatch import MB, peak, reset_peak, resident
 from _tables import Tables, good, number, pick, short
 from scipy.sparse import coo_matrix
@@ -21,6 +21,7 @@ from scipy.stats import qmc
 from glsk_o3d import Skeleton, pipelines, read_cloud, samples
 from glsk_o3d.analysis import cylinders, tree_measures
 from glsk_o3d.analysis.curves import distances
+from glsk_o3d.analysis.forestry import BREAST_HEIGHT
 from glsk_o3d.numerics.vectors import dot, norm, unit
 from glsk_o3d.recipes.catalogue import named_pipeline
 from glsk_o3d.samples.capsules import visible
