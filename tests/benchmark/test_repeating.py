@@ -63,11 +63,12 @@ class TestSpread:
         assert (found["hooks"], found["tips"]) == (1, 4)
         assert spread([hook, BAR], 6.0)["tips"] == 0
 
-    def test_a_failure_agrees_with_nothing(self):
-        found = spread([BAR, None, BAR], 1.0, loops=0, ends=[2, 2])
+    @pytest.mark.parametrize("nothing", [None, Skeleton(np.empty((0, 3)), [], [], (), (), ())])
+    def test_a_failure_agrees_with_nothing(self, nothing):
+        found = spread([BAR, nothing, BAR], 1.0, loops=0, ends=[2, 2])
         assert (found["moved"], found["failures"]) == (0, 1)
         assert found["agree"] == found["loops"] == found["ends"] == pytest.approx(2 / 3)
-        for few, agree in (([BAR, None], 0.5), ([None, None], 0)):
+        for few, agree in (([BAR, nothing], 0.5), ([nothing, nothing], 0)):
             found = spread(few, 1.0)
             assert (found["moved"], found["where"], found["agree"]) == (None, None, agree)
 

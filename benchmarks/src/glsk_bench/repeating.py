@@ -43,7 +43,8 @@ def spread(
     Parameters
     ----------
     skeletons : sequence of Skeleton or None
-        None where a program has found none: it agrees with no other, and has no right loops and ends.
+        None where a program has found none, or one without vertices: it agrees with no other, and has no right loops
+        and ends.
     radius : float
         Of the object, by which distances are divided: the same for all programs that are compared.
     components, loops : int, optional
@@ -77,7 +78,7 @@ def spread(
     """
     if len(skeletons) == 0 or not 0 < radius < np.inf:
         raise InvalidParameterError(f"there must be skeletons, and a positive radius, not {len(skeletons)}, {radius:g}")
-    there = [each for each in skeletons if each is not None]
+    there = [each for each in skeletons if each is not None and len(each.vertices)]
     facts = [(each.n_components, each.n_loops, len(each.leaves)) for each in there]
     moved, where = _moves(there, radius)
     turns = [last_turns(each, each.leaves, np.full(len(each.leaves), radius)) for each in there]
