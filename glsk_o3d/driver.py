@@ -106,8 +106,8 @@ def skeletonize(
     on_state : callable, optional
         Called before `on_iteration` with the Contraction after each solve, such as a `ContractionRecorder`.
     **options
-        Parameters of the filters, by name; type checkers know them. If more than one filter has the name, give the
-        mapping ``{"Connector.radius": "2%"}`` for `pipeline`. See `Pipeline.with_options`.
+        Parameters of the filters, by name; type checkers know them. If more than one filter has the name, give a
+        mapping, ``{"Connector.radius": "2%"}``: as `pipeline` for ``"default"``, else to `Pipeline.with_options`.
 
     Returns
     -------
