@@ -24,7 +24,7 @@ LEAST_INSIDE = 0.4
 
 ENOUGH_POINTS = 4096  # measured: points of one object beyond which a surface hangs together in the same way
 VERTEX_POINTS = 32  # derived: points to a vertex of a tube with 20 around it, whose vertices are half a radius apart
-REFINED_POINTS = 16384  # measured: points that a graph is refined by: of 65536 it takes half of the time
+REFINED_POINTS = 16384  # measured: points without noise that a graph is refined by: of 65536 it takes half of the time
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,17 +129,19 @@ class Evidence(SurfaceGraph):
 def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skeleton:
     """What a step makes of a skeleton with fewer points, where there are many: of every vertex a regular sample.
 
-    Thin parts keep all of theirs. In the result a point that had a vertex has that of the nearest point of the sample.
+    Thin parts keep all of theirs. The more of the cloud is noise, the more points are taken, since their mean is what
+    is known of the surface. In the result a point that had a vertex has that of the nearest point of the sample.
     """
     rows, m = skeleton.supporting_points, len(skeleton.vertices)
-    if len(rows) <= REFINED_POINTS:
+    enough = REFINED_POINTS / max(1 - skeleton.report.noise, TINY)
+    if len(rows) <= enough:
         return step(skeleton)
     rows = rows[morton_order(skeleton.points[rows])]
     vertex = skeleton.vertex_of_point[rows]
     order, count = np.argsort(vertex, kind="stable"), np.bincount(vertex, minlength=m)
     place = np.empty_like(order)  # among the points of its vertex
     place[order] = np.arange(len(rows)) - np.repeat(np.cumsum(count) - count, count)
-    most = max(REFINED_POINTS / np.count_nonzero(count), 2 * VERTEX_POINTS)
+    most = max(enough / np.count_nonzero(count), 2 * VERTEX_POINTS)
     every = np.ceil(count / most).astype(int)
     rows = rows[place % every[vertex] == 0]
     points, vertex = skeleton.points[rows], skeleton.vertex_of_point[rows]
