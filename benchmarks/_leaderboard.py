@@ -29,6 +29,7 @@ GOLDEN = ROOT / "tests" / "golden"
 KNOWN = {"y_unequal": (1, 0, 3), "torus": (1, 1, 0), "quadruped": (1, 0, 6)}  # components, loops, leaves
 
 OURS = "default"
+LEAST_SHAPES = 3  # of which a difference is told
 MEASURES = {  # what may be lost, its digits, and whether more of it is better; of what has a sign, its size counts
     "perfect": ("perfect", 2, True),
     "topology": ("topology", 2, True),
@@ -186,7 +187,7 @@ class Worse(NamedTuple):
 
 
 def worse(entries: Sequence[Entry]) -> list[Worse]:
-    """All of these, by clouds, tool and measure."""
+    """All of these, by clouds, tool and measure; fewer than three shapes have no interval to speak of."""
     by_name = {entry.tool: {(row["shape"], row["variant"]): row for row in entry.results.rows} for entry in entries}
     ours, found = by_name.pop(OURS), []
     groups: dict[str, list] = {"all": [*ours]}
@@ -197,7 +198,7 @@ def worse(entries: Sequence[Entry]) -> list[Worse]:
         pairs = [(theirs[key][measure], ours[key][measure]) for key in here]
         pairs = [(abs(a), abs(b)) if None not in (a, b) else None for a, b in pairs]
         known = [(key[0], pair) for key, pair in zip(here, pairs, strict=True) if pair]
-        if known:
+        if len({shape for shape, _ in known}) >= LEAST_SHAPES:
             shapes, both = zip(*known, strict=True)
             difference = mean_with_interval(shapes, [other - mine for other, mine in both])
             _, digits, more = MEASURES[measure]
