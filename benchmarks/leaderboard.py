@@ -47,7 +47,7 @@ PARTS = {  # of pages, by the version of the benchmark
     "v2": (
         *("things-short", "things-leaderboard", "things-losses", "things-unclear", "things-topologies"),
         *("things-errors", "things-hooks", "things-reach", "things-families", "things-families-hooks"),
-        *("things-failures", "things-runs", "things-repeat", "things-repeat-meshes"),
+        *("things-failures", "things-runs", "things-repeat"),
     ),
 }
 REPEATED = {"repeat": "things", "repeat-meshes": "meshes"}
