@@ -113,7 +113,11 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
                 if builtin.is_layer(key, value) and not self.mesh_id_exists(value):
                     raise InvalidParameterError(f"{key} = {value}: there is no such layer")
         super().clear_filter_script()
-        return super().apply_filter(name, **params)
+        here = os.getcwd()
+        try:
+            return super().apply_filter(name, **params)
+        finally:
+            os.chdir(here)  # when Poisson's fails, it stays in a temporary folder that it has removed
 
     def _last_call(self) -> Call:
         """The filter of MeshLab's that ran last as MeshLab writes it, which alone knows how."""

@@ -1,6 +1,7 @@
 """MeshSet: MeshLab's filters and ours in one session and in one script."""
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -175,8 +176,10 @@ def test_a_filter_that_fails_names_file_line_and_filter(meshes, tmp_path):
     poisson = '<FilterScript>\n<filter name="Surface Reconstruction: Screened Poisson"/>\n</FilterScript>'
     (tmp_path / "s.mlx").write_text(poisson)
     meshes.load_filter_script(tmp_path / "s.mlx")
+    before = Path.cwd()
     with pytest.raises(ScriptError, match=r"correct per vertex normals\. E\.g\. it is necessary that your ALL the"):
         meshes.apply_filter_script()
+    assert Path.cwd() == before
     (tmp_path / "s.mlx").write_text('<FilterScript>\n<filter name="Generate One Rings (GLSkeleton)"/>\n</FilterScript>')
     few = PlainLayers(Layer.of(np.eye(3)))
     with pytest.raises(ScriptError, match=r"s.mlx, line 2: filter 'Generate One Rings \(GLSkeleton\)': .*8 distinct"):
