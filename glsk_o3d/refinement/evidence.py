@@ -133,15 +133,15 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
     is known of the surface. In the result a point that had a vertex has that of the nearest point of the sample.
     """
     rows, m = skeleton.supporting_points, len(skeleton.vertices)
-    enough = REFINED_POINTS / max(1 - skeleton.report.noise, TINY)
-    if len(rows) <= enough:
+    clean = 1 - skeleton.report.noise
+    if len(rows) * clean <= REFINED_POINTS:
         return step(skeleton)
     rows = rows[morton_order(skeleton.points[rows])]
     vertex = skeleton.vertex_of_point[rows]
     order, count = np.argsort(vertex, kind="stable"), np.bincount(vertex, minlength=m)
     place = np.empty_like(order)  # among the points of its vertex
     place[order] = np.arange(len(rows)) - np.repeat(np.cumsum(count) - count, count)
-    most = max(enough / np.count_nonzero(count), 2 * VERTEX_POINTS)
+    most = max(REFINED_POINTS / clean / np.count_nonzero(count), 2 * VERTEX_POINTS)
     every = np.ceil(count / most).astype(int)
     rows = rows[place % every[vertex] == 0]
     points, vertex = skeleton.points[rows], skeleton.vertex_of_point[rows]
