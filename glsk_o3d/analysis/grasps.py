@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InvalidParameterError, SkeletonWarning
 from ..interop.clouds import cloud_points
+from ..numerics.groups import group_rank
 from ..numerics.polylines import arc_lengths
 from ..parameters import check_number
 from ..report import outside
@@ -171,11 +172,7 @@ def _in_rounds(place, quality):
     """The order in which grasps are listed: the best of each place, then the second best of each, and so on; in each
     round the best first."""
     best = np.argsort(-quality, kind="stable")
-    grouped = best[np.argsort(place[best], kind="stable")]
-    _, first, count = np.unique(place[grouped], return_index=True, return_counts=True)
-    rank = np.empty(len(place), int)
-    rank[grouped] = np.arange(len(place)) - np.repeat(first, count)
-    return best[np.argsort(rank[best], kind="stable")]
+    return best[np.argsort(group_rank(place[best], place.max(initial=-1) + 1), kind="stable")]
 
 
 def _sorted_out(reasons):

@@ -50,6 +50,14 @@ def group_sum(values: np.ndarray, group: np.ndarray, n: int, weight: np.ndarray 
     return total.reshape(n, *values.shape[1:])
 
 
+def group_rank(group: np.ndarray, n: int) -> np.ndarray:
+    """Position of every row among those of its group 0 .. n-1, in their order, (m,) int array."""
+    order, count = np.argsort(group, kind="stable"), np.bincount(group, minlength=n)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(group)) - np.repeat(np.cumsum(count) - count, count)
+    return rank
+
+
 def component_labels(n: int, edges: np.ndarray) -> np.ndarray:
     """Connected component of every node, (n,) int array, numbered from 0; edges (E, 2) int array."""
     return connected_components(coo_matrix((np.ones(len(edges)), edges.T), shape=(n, n)), directed=False)[1]

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .groups import group_rank
 from .vectors import TINY, dot, norm
 
 POLYLINE_CHUNK = 2**20  # speed: pairs of a point and an edge at a time: memory stays flat
@@ -57,11 +58,9 @@ NEAREST_TIE = 1e-9  # derived: of roundings, which must not choose between the e
 def incident_edges(edges: np.ndarray, m: int) -> np.ndarray:
     """Edges at every vertex, (m, most) int array, filled up with -1."""
     vertex, edge = edges.ravel(), np.repeat(np.arange(len(edges)), 2)
-    order = np.argsort(vertex, kind="stable")
-    vertex, edge = vertex[order], edge[order]
-    degree = np.bincount(vertex, minlength=m)
-    table = np.full((m, max(degree.max(initial=0), 2)), -1)
-    table[vertex, np.arange(len(vertex)) - np.repeat(np.cumsum(degree) - degree, degree)] = edge
+    rank = group_rank(vertex, m)
+    table = np.full((m, max(rank.max(initial=0) + 1, 2)), -1)
+    table[vertex, rank] = edge
     return table
 
 

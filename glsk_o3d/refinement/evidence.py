@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..numerics.diffusion import Diffusion
+from ..numerics.groups import group_rank
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
 from ..numerics.polylines import incident_edges, nearest_on_edges
@@ -138,12 +139,10 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
         return step(skeleton)
     rows = rows[morton_order(skeleton.points[rows])]
     vertex = skeleton.vertex_of_point[rows]
-    order, count = np.argsort(vertex, kind="stable"), np.bincount(vertex, minlength=m)
-    place = np.empty_like(order)  # among the points of its vertex
-    place[order] = np.arange(len(rows)) - np.repeat(np.cumsum(count) - count, count)
+    count = np.bincount(vertex, minlength=m)
     most = max(REFINED_POINTS / clean / np.count_nonzero(count), 2 * VERTEX_POINTS)
     every = np.ceil(count / most).astype(int)
-    rows = rows[place % every[vertex] == 0]
+    rows = rows[group_rank(vertex, m) % every[vertex] == 0]
     points, vertex = skeleton.points[rows], skeleton.vertex_of_point[rows]
     made = step(replace(skeleton, points=points, normals=skeleton.normals[rows], vertex_of_point=vertex))
     owned = np.flatnonzero(skeleton.vertex_of_point >= 0)
