@@ -45,7 +45,7 @@ QUESTIONS = {
         "spur pruned",
         "limb",
         False,
-        {"constant": -5.3, "protrusion": 3.0, "web": -4.7, "confidence": 4.0, "roundness": 2.5},
+        {"constant": -5.4, "protrusion": 4.3, "confidence": 2.5, "roundness": 2.3},
     ),
     "air": Question(
         "the branch at ({}) crosses air",

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..decisions import QUESTIONS, Decision
-from ..numerics.polylines import arc_lengths, relative_distance
-from ..numerics.vectors import TINY
+from ..numerics.neighbourhoods import plane_axes
+from ..numerics.polylines import arc_lengths, place_at, relative_distance
+from ..numerics.vectors import TINY, unit
 from ..skeleton import Skeleton
 from .evidence import Evidence
 from .limbs import Limbs
@@ -19,6 +20,12 @@ from .sections import VertexPoints, measure_sections
 SPUR_POINTS = 128  # speed: of a branch that are enough to say how far it reaches
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
 FAR_OUT = 20.0  # fitted: half widths beyond which a protrusion says no more
+LEAST_OUT = 0.3  # fitted: half widths below which a protrusion says no more
+BESIDE = 2.0  # fitted: half widths from the curve to where nothing is beside a limb
+OUTER_PLACES = np.linspace(
+    1 / 3, 1, 5
+)  # measured: of the length: three places in the outer half, with those before and after
+ACROSS = 16  # measured: across a branch; eight are enough for flat parts, but depend on how they are turned
 
 
 def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
@@ -61,8 +68,8 @@ def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, di
     """What speaks for every branch that leaves a junction and has an end: its leaf, and facts.
 
     The facts are: how far its points (all but a tenth) stand out of the surface around the other limbs, over its own
-    half width, as a logarithm; how far along it the surface goes over to others; its mean confidence; and how round the
-    part is at the junction.
+    half width, as a logarithm, less the share of this that the object is beside it, too; its mean confidence; and how
+    round the part is at the junction.
     """
     return ((twig.tip, twig.facts) for twig in _twigs(skeleton, evidence))
 
@@ -82,31 +89,30 @@ class _Twig(NamedTuple):
 
 
 def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
-    limbs, bonds = Limbs(skeleton, joined=True), evidence.bonds(skeleton)
+    limbs, degree = Limbs(skeleton, joined=True), skeleton.degree
+    paths = enumerate(branch[::-1] if degree[branch[0]] == 1 else branch for branch in limbs.branches)
+    found = [(k, path) for k, path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1]
+    if not found:
+        return
     cloud, sections = VertexPoints(skeleton), measure_sections(skeleton)
-    count = cloud.mass
-    wide = sections.half_width
+    count, wide = cloud.mass, sections.half_width
     roundness = np.nan_to_num(sections.half_thickness / np.maximum(wide, TINY))
-    confidence, degree = np.nan_to_num(skeleton.confidence), skeleton.degree
+    confidence = np.nan_to_num(skeleton.confidence)
     ending = np.zeros(len(degree), bool)
     for branch in limbs.branches:
         if 1 in degree[branch[[0, -1]]]:
             ending[branch] = degree[branch] < 3
-    for k, branch in enumerate(limbs.branches):
-        path = branch[::-1] if degree[branch[0]] == 1 else branch
-        junction, tip = path[[0, -1]].tolist()
-        if degree[tip] != 1 or degree[junction] < 3:
-            continue
-        body = branch[branch != junction]
-        share = count[body] / count[body].sum()
-        half = float(share @ wide[body])
+    share = [count[path[1:]] / count[path[1:]].sum() for _, path in found]
+    half = np.array([weights @ wide[path[1:]] for weights, (_, path) in zip(share, found, strict=True)])
+    beside = _beside(evidence, [skeleton.vertices[path] for _, path in found], half)
+    for i, (k, path) in enumerate(found):
+        junction, body, tip = int(path[0]), path[1:], int(path[-1])
         own = cloud.members.of(body)
         points = cloud.points[own[:: len(own) // SPUR_POINTS + 1]]
-        out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * half)
+        out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * half[i])
         facts = dict(
-            protrusion=float(np.log(out / max(half, TINY) + 0.3)),
-            web=_web(skeleton.vertices, path, *bonds),
-            confidence=float(share @ confidence[body]),
+            protrusion=float(np.log(out / max(half[i], TINY) + LEAST_OUT) * (1 - beside[i])),
+            confidence=float(share[i] @ confidence[body]),
             roundness=float(roundness[junction]),
         )
         yield _Twig(junction, body, tip, facts)
@@ -130,17 +136,23 @@ def _with_forks(skeleton: Skeleton, twigs: list[_Twig]) -> list[_Twig]:
     return found
 
 
-def _web(vertices: np.ndarray, path: np.ndarray, pairs: np.ndarray, weight: np.ndarray) -> float:
-    """Mean share of the way from its junction to its end at which a branch has bonds with others.
+def _beside(evidence: Evidence, paths: list[np.ndarray], half: np.ndarray) -> np.ndarray:
+    """How much of the object is beside the outer half of each branch, (b,): of a limb 0, of a strand in a flat part 1.
 
-    Of a limb it is little, since the surface closes around it; of a strand in a flat part one half.
+    At a place of the curve it is the largest winding number, from 0 to 1, at two half widths across the branch; of
+    three places the mean counts. `paths` are the curves, (p, 3) float arrays, and `half` (b,) the half widths.
     """
-    along, share = arc_lengths(vertices[path]), np.full(len(vertices), np.nan)
-    share[path[1:]] = along[1:] / max(along[-1], TINY)
-    shares = share[pairs]
-    # those with the junction itself say nothing
-    out = (np.isfinite(shares).sum(axis=1) == 1) & (pairs != path[0]).all(axis=1)
-    return float(weight[out] @ np.nansum(shares[out], axis=1) / max(weight[out].sum(), TINY))
+    curves = [(path, arc_lengths(path)) for path in paths]
+    places = np.reshape(
+        [place_at(path, along, along[-1] * OUTER_PLACES) for path, along in curves], (-1, len(OUTER_PLACES), 3)
+    )
+    turn = np.linspace(0, 2 * np.pi, ACROSS, endpoint=False)
+    across = plane_axes(unit((places[:, 2:] - places[:, :-2]).reshape(-1, 3))) @ [np.cos(turn), np.sin(turn)]
+    away = BESIDE * half[:, None, None, None] * across.reshape(len(paths), -1, 3, ACROSS)
+    beside = (places[:, 1:-1, :, None] + away).swapaxes(2, 3)
+    winding = evidence.winding(beside.reshape(-1, 3)).reshape(beside.shape[:-1])
+    inside: np.ndarray = np.clip(winding.max(axis=2), 0, 1).mean(axis=1)
+    return inside
 
 
 def _standing_out(limbs: Limbs, k: int, junction: int, points: np.ndarray, ending: np.ndarray) -> float:
