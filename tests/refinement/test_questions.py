@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Report, skeletonize
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
+from glsk_o3d.numerics.winding import AREA_NEIGHBOURS, point_areas
+from glsk_o3d.refinement.evidence import Evidence
+from glsk_o3d.refinement.spurs import _beside
 from glsk_o3d.samples.capsules import union_sample
 
 X, Y, Z = np.eye(3)
@@ -26,6 +30,11 @@ def assert_unchanged(skeleton, raw):
     np.testing.assert_allclose(skeleton.vertices, raw.vertices, atol=1e-12)
     np.testing.assert_array_equal(skeleton.edges, raw.edges)
     np.testing.assert_array_equal(skeleton.vertex_of_point, raw.vertex_of_point)
+
+
+def evidence_of(points, normals):
+    _, neighbours = nearest_neighbours(points, AREA_NEIGHBOURS + 1)
+    return Evidence(np.arange(len(points)), points, neighbours, normals, point_areas(points, neighbours))
 
 
 # ---- loops
@@ -86,6 +95,20 @@ def test_an_object_of_many_parts_keeps_them():
 
 
 # ---- limbs
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]])
+def test_the_object_is_beside_a_strand_and_nothing_beside_a_limb(turn):
+    x, y = (grid.ravel() for grid in np.mgrid[-2:2:0.08, -1:1:0.08])
+    plate = np.concatenate([np.column_stack([x, y, np.full(len(x), z)]) for z in (-0.1, 0.1)])
+    out = np.repeat([-Z, Z], len(x), axis=0)
+    strand = np.array([[0, t, 0] for t in (0, 0.2, 0.8)])
+    assert _beside(evidence_of(plate @ turn, out @ turn), [strand @ turn], np.array([0.3])) > 0.65  # it has no rim
+    along, t = (grid.ravel() for grid in np.mgrid[-2:2:0.08, 0 : 2 * np.pi : 0.26])
+    tube = np.column_stack([along, 0.3 * np.cos(t), 0.3 * np.sin(t)])
+    out = np.column_stack([np.zeros(len(t)), np.cos(t), np.sin(t)])
+    limb = np.array([[0, 0, 0], [1.5, 0, 0.0]])
+    assert _beside(evidence_of(tube @ turn, out @ turn), [limb @ turn], np.array([0.3])) < 0.05
 
 
 def twig(piped, reach, tubes=None):
