@@ -22,9 +22,7 @@ SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
 FAR_OUT = 20.0  # fitted: half widths beyond which a protrusion says no more
 LEAST_OUT = 0.3  # fitted: half widths below which a protrusion says no more
 BESIDE = 2.0  # fitted: half widths from the curve to where nothing is beside a limb
-OUTER_PLACES = np.linspace(
-    1 / 3, 1, 5
-)  # measured: of the length: three places in the outer half, with those before and after
+OUTER_PLACES = np.linspace(1 / 3, 1, 5)  # measured: of the length; each but the first and last is asked
 ACROSS = 16  # measured: across a branch; eight are enough for flat parts, but depend on how they are turned
 
 
@@ -105,14 +103,14 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
     share = [count[path[1:]] / count[path[1:]].sum() for _, path in found]
     half = np.array([weights @ wide[path[1:]] for weights, (_, path) in zip(share, found, strict=True)])
     beside = _beside(evidence, [skeleton.vertices[path] for _, path in found], half)
-    for i, (k, path) in enumerate(found):
+    for (k, path), weights, own_half, shared in zip(found, share, half, beside, strict=True):
         junction, body, tip = int(path[0]), path[1:], int(path[-1])
         own = cloud.members.of(body)
         points = cloud.points[own[:: len(own) // SPUR_POINTS + 1]]
-        out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * half[i])
+        out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * own_half)
         facts = dict(
-            protrusion=float(np.log(out / max(half[i], TINY) + LEAST_OUT) * (1 - beside[i])),
-            confidence=float(share[i] @ confidence[body]),
+            protrusion=float(np.log(out / max(own_half, TINY) + LEAST_OUT) * (1 - shared)),
+            confidence=float(weights @ confidence[body]),
             roundness=float(roundness[junction]),
         )
         yield _Twig(junction, body, tip, facts)
@@ -142,10 +140,8 @@ def _beside(evidence: Evidence, paths: list[np.ndarray], half: np.ndarray) -> np
     At a place of the curve it is the largest winding number, from 0 to 1, at two half widths across the branch; of
     three places the mean counts. `paths` are the curves, (p, 3) float arrays, and `half` (b,) the half widths.
     """
-    curves = [(path, arc_lengths(path)) for path in paths]
-    places = np.reshape(
-        [place_at(path, along, along[-1] * OUTER_PLACES) for path, along in curves], (-1, len(OUTER_PLACES), 3)
-    )
+    along = map(arc_lengths, paths)
+    places = np.array([place_at(path, s, s[-1] * OUTER_PLACES) for path, s in zip(paths, along, strict=True)])
     turn = np.linspace(0, 2 * np.pi, ACROSS, endpoint=False)
     across = plane_axes(unit((places[:, 2:] - places[:, :-2]).reshape(-1, 3))) @ [np.cos(turn), np.sin(turn)]
     away = BESIDE * half[:, None, None, None] * across.reshape(len(paths), -1, 3, ACROSS)
