@@ -14,8 +14,8 @@ from .numerics.rings import Rings
 from .numerics.solver import SolveError, solve_contraction
 from .numerics.vectors import PAIRS, TINY
 from .parameters import documented, parameter
-from .pipeline import Filter, Watch
-from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord, Report
+from .pipeline import Filter, Watch, with_filters
+from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord
 from .state import Contraction
 from .stopping import ExplainedScore, StopRule
 
@@ -115,7 +115,9 @@ class Contractor(Filter[Contraction]):
             reason = self.stop(state.report.iterations)
             if reason is None and reducer is not None:
                 n = len(state)
-                state = _within(reducer(state), state.report)
+                done = state.report
+                state = reducer(state)  # which is no stage of its own in the report
+                state = replace(state, report=with_filters(state.report, done))
                 if len(state) == n:
                     reducer = None  # as in the published code, which gives up after a pass without a merge
                 state = _amend(state, n_merged=n - len(state), seconds=time.perf_counter() - start)
@@ -199,12 +201,6 @@ def explained_score(points: np.ndarray) -> float:
     offset = points - points.mean(axis=0)
     spread = np.linalg.eigvalsh(offset.T @ offset)  # Wen (13)
     return float((spread.sum() + spread[-1]) / (2 * spread.sum()))  # Wen (14)
-
-
-def _within(state: Contraction, report: Report) -> Contraction:
-    """The state of a reducer that ran inside the contractor: no stage of its own in the report."""
-    kept = replace(state.report, stages=report.stages, recipe=report.recipe, seconds=report.seconds)
-    return replace(state, report=kept)
 
 
 def _record(state: Contraction, **facts: Any) -> Contraction:

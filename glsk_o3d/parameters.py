@@ -74,12 +74,17 @@ def documented(cls: _Class) -> _Class:
         lines += [f"{field.name} : {kind}{unit}, default {field.default!r}", f"    {facts['doc']}"]
     if lines:
         text = inspect.cleandoc(cls.__doc__ or "")
-        if cls.__module__.startswith(f"{__package__}."):
+        if is_own(cls):
             page = f"docs/filters/{cls.__module__.rpartition('.')[2]}.md"
             prose, *rest = re.split(r"(?=\n\n\w[\w ]*\n-{3,}\n)", text, maxsplit=1)
             text = f"{prose}\n\nEvery option, and when to touch it: {page}.{''.join(rest)}"
         cls.__doc__ = f"{text}\n\nParameters\n----------\n" + "\n".join(lines) + "\n"
     return cls
+
+
+def is_own(cls: type) -> bool:
+    """Whether a class is of this package, not of a plugin."""
+    return cls.__module__.startswith(f"{__package__}.")
 
 
 NONE, UNWRITTEN, FROM = "none", "unwritten", "from"
@@ -117,7 +122,7 @@ class Parameters:
             ``"unwritten"``, which names it.
         """
         cls = type(self)
-        origin = {} if cls.__module__.startswith(f"{__package__}.") else {FROM: cls.__module__}
+        origin = {} if is_own(cls) else {FROM: cls.__module__}
         names = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]
         return {self.kind: cls.__name__, **origin, **{name: _plain(getattr(self, name)) for name in names}}
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import InvalidParameterError, RecipeError, SkeletonWarning
 from ..interop.clouds import Cloud
-from ..pipeline import Pipeline, after, with_stage
-from ..report import Report, outside
+from ..pipeline import Pipeline, recipe_of
+from ..report import outside
 from ..skeleton import Skeleton
 from .recipe import from_recipe
 
@@ -84,10 +84,10 @@ def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -
     first = max((i for i, stage in enumerate(pipeline.stages) if stage.produces is Cloud), default=-1) + 1
     again = Pipeline(*pipeline.stages[first:])(skeleton.points, **callbacks)
     if first:
-        ahead = Report()
-        for stage in pipeline.stages[:first]:
-            ahead = with_stage(ahead, stage, 0.0)
-        again = dataclasses.replace(again, report=after(again.report, ahead))
+        skipped, report = pipeline.stages[:first], again.report
+        recipe = recipe_of(*(stage.table() for stage in skipped), *report.recipe["pipeline"])
+        report = dataclasses.replace(report, recipe=recipe, stages=(*map(repr, skipped), *report.stages))
+        again = dataclasses.replace(again, report=report)
     if not identical(again, skeleton):
         then, now = skeleton.report.versions, again.report.versions
         others = [f"{name} {then.get(name)} instead of {now[name]}" for name in now if then.get(name) != now[name]]

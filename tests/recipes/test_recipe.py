@@ -38,7 +38,7 @@ from glsk_o3d import (
     skeletonize,
 )
 from glsk_o3d.io.formats.fields import ARRAYS
-from glsk_o3d.pipeline import Filter, after, recipe_of, with_stage
+from glsk_o3d.pipeline import Filter, recipe_of, with_filters, with_stage
 from glsk_o3d.recipes import from_recipe, to_recipe
 from glsk_o3d.recipes.catalogue import BUILTIN
 from glsk_o3d.report import Report
@@ -430,13 +430,13 @@ def test_a_report_with_a_malformed_recipe(recipe):
         Report.from_dict({"recipe": recipe})
 
 
-def test_reports_ahead_add_up():
-    ahead = with_stage(Report(), RingBuilder(), 1.0)
-    report = after(with_stage(with_stage(Report(n_input=3), RingBuilder(k=9), 0.5), Refiner(), 0.25), ahead)
+def test_filters_in_a_report_add_up():
+    report = with_stage(with_stage(Report(n_input=3), RingBuilder(), 1.0), RingBuilder(k=9), 0.5)
+    report = with_filters(Report(n_input=4), with_stage(report, Refiner(), 0.25))
     assert report.stages == tuple(map(repr, (RingBuilder(), RingBuilder(k=9), Refiner())))
     assert report.seconds == {"RingBuilder": 1.5, "Refiner": 0.25}
     assert report.recipe == recipe_of(*(stage.table() for stage in (RingBuilder(), RingBuilder(k=9), Refiner())))
-    assert report.n_input == 3
+    assert report.n_input == 4
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
