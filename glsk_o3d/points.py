@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from .errors import StageError
 from .interop.clouds import cloud_counts, cloud_points, to_point_cloud
-from .numerics.frame import Frame, finite_points, to_working_frame
+from .numerics.frame import Frame, not_finite, to_working_frame
 from .numerics.grid_sampling import sample_cloud
 from .numerics.neighbourhoods import principal, sphericity
 from .report import Report
@@ -153,7 +153,9 @@ class Points(Representatives):
         InvalidCloudError as of `RingBuilder`.
         """
         points = cloud_points(cloud)
-        finite = finite_points(points, drop_invalid)
+        finite = np.isfinite(points).all(axis=1)
+        if not (drop_invalid or finite.all()):
+            raise not_finite(int((~finite).sum()), len(points), int(finite.argmin()))
         counts, n, dropped = cloud_counts(cloud, finite)
         given = points if finite.all() else points[finite]
         kept, position, counts = sample_cloud(given, size(n), counts)

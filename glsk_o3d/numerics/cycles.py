@@ -1,12 +1,16 @@
 """Cycles of a graph embedded in space, and how wide they open."""
 
 from collections.abc import Iterator
+from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from .vectors import TINY, dot
+
+Chain: TypeAlias = tuple[float, list[int]]
+"""The length of a path and its vertices."""
 
 
 def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[np.ndarray]:
@@ -16,22 +20,14 @@ def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[
     count as one edge, and trees that hang on the graph are cut off first: the cost depends on the junctions in the
     cyclic part alone.
     """
-    chains, chain_lengths = _cyclic_chains(n, edges, lengths)
-    if not chains:
-        return []
-    cycles = []
-    plain = []
-    for chain, length in zip(chains, chain_lengths, strict=True):
-        if chain[0] == chain[-1]:
-            cycles.append((length, chain[:-1]))
-        else:
-            plain.append((length, chain))
-    cycles += _horton(plain)
+    chains = _cyclic_chains(n, edges, lengths)
+    cycles = [(length, chain[:-1]) for length, chain in chains if chain[0] == chain[-1]]
+    cycles += _horton([(length, chain) for length, chain in chains if chain[0] != chain[-1]])
     return [np.array(vertices) for _, vertices in sorted(cycles, key=lambda cycle: cycle[0])]
 
 
-def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> tuple[list[list[int]], list[float]]:
-    """Paths between junctions of the cyclic part: vertex lists and lengths. A ring of its own starts anywhere."""
+def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[Chain]:
+    """Paths between junctions of the cyclic part. A ring of its own starts anywhere."""
     around = [{} for _ in range(n)]
     for (a, b), length in zip(edges.tolist(), lengths.tolist(), strict=True):
         around[a][b] = around[b][a] = length
@@ -43,7 +39,7 @@ def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> tuple[list
             if len(around[u]) == 1:
                 leaves.append(u)
         around[v] = {}
-    chains, total = [], []
+    chains = []
     degree = [len(links) for links in around]
     for start in sorted((v for v in range(n) if degree[v]), key=lambda v: degree[v] == 2):
         for step in list(around[start]):
@@ -58,13 +54,12 @@ def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> tuple[list
                 if ahead == start or degree[ahead] > 2:
                     break
                 here, ahead = ahead, next(iter(around[ahead]))
-            chains.append(chain)
-            total.append(length)
-    return chains, total
+            chains.append((length, chain))
+    return chains
 
 
-def _horton(chains: list[tuple[float, list[int]]]) -> list[tuple[float, list[int]]]:
-    """Minimum cycle basis of the multigraph of chains between different junctions: [(length, vertices)]."""
+def _horton(chains: list[Chain]) -> list[Chain]:
+    """Minimum cycle basis of the multigraph of chains between different junctions."""
     if not chains:
         return []
     junctions = sorted({v for _, chain in chains for v in (chain[0], chain[-1])})

@@ -72,8 +72,6 @@ COLOUR = '<Param type="RichColor" name="color1" r="{}" g="1" b="{}" a="{}"/>'
         (_script("", '<filter name="Generate Curve Skeletons"/>'), 4, "no filter .* 'Generate Curve Skeleton .GLSkel"),
         (_of(THEIRS, "RichInt KNearst 32"), 4, "no parameter is called 'KNearst': did you mean 'knearest'"),
         (_of(OURS, "RichAbsPerc conector_radius 2%"), 4, "no parameter is called .* did you mean 'connector_radius'"),
-        (_of(OURS, "RichString refiner_root z"), 4, "no parameter .* 'refiner_root': it is Tracer's"),
-        (_of(OURS, "RichInt contractor_reduce_above 5"), 4, "no parameter .*_reduce_above': it is gone, leave it out"),
         (_of(THEIRS, NEIGHBOURS, NEIGHBOURS), 5, "parameter 'KNearest' is given twice"),
         (_of(THEIRS, NEIGHBOURS, NEIGHBOURS.replace("KN", "kn")), 5, "parameter 'knearest' is given twice"),
         # wrong
