@@ -165,7 +165,7 @@ def problem_with(value: Any, facts: Any) -> str | None:
         return f"must be one of {listed}"
     if kind == "point":
         words = f"{listed} or " if choices else ""
-        return None if isinstance(value, str) and _point(value) else f"must be {words}a point such as '0.5,0,2'"
+        return None if isinstance(value, str) and resolve_point(value) else f"must be {words}a point such as '0.5,0,2'"
     if kind in ("reducer", "stop"):
         usable = callable(value) and not isinstance(value, type)
         return None if usable else f"must be a {kind}: an instance, not a class or a name"
@@ -206,20 +206,13 @@ def _problem_with_number(value: Any, whole: bool, facts: Any) -> str | None:
     return f"must be at most {high}" if high is not None and number > high else None
 
 
-def _point(text: str) -> tuple[float, ...] | None:
+def resolve_point(text: str) -> tuple[float, ...] | None:
+    """A point (x, y, z) written as ``"x,y,z"``; None if it is none."""
     try:
         numbers = tuple(map(float, text.split(",")))
     except ValueError:
         return None
     return numbers if len(numbers) == 3 and all(abs(number) <= LARGEST for number in numbers) else None
-
-
-def resolve_point(text: str) -> tuple[float, ...]:
-    """A point (x, y, z) written as ``"x,y,z"``."""
-    numbers = _point(text)
-    if numbers is None:
-        raise InvalidParameterError(f"point {text!r}: must be three numbers such as '0.5,0,2'")
-    return numbers
 
 
 def _percent(text: str) -> float | None:

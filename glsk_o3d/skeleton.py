@@ -226,19 +226,24 @@ class Skeleton:
         ------
         InvalidParameterError, MissingPackageError
         """
-        try:
-            paint = np.asarray(color, float)
-        except (TypeError, ValueError):
-            paint = np.empty(0)
-        if paint.shape != (3,) or not ((paint >= 0) & (paint <= 1)).all():
-            words = "must be three numbers from 0 to 1; glsk_o3d.to_line_set takes words, too"
-            raise InvalidParameterError(f"color = {color!r}: {words}")
+        paint = as_color(color, "must be three numbers from 0 to 1; glsk_o3d.to_line_set takes words, too")
         o3d = import_open3d()
         lines = o3d.geometry.LineSet()
         lines.points = o3d.utility.Vector3dVector(np.ascontiguousarray(self.vertices))
         lines.lines = o3d.utility.Vector2iVector(np.ascontiguousarray(self.edges, np.int32))
         lines.paint_uniform_color(paint)
         return lines
+
+
+def as_color(color: Any, words: str) -> np.ndarray:
+    """Three numbers from 0 to 1, (3,) float array; InvalidParameterError with these words for anything else."""
+    try:
+        paint = np.asarray(color, float)
+    except (TypeError, ValueError):
+        paint = np.empty(0)
+    if paint.shape != (3,) or not ((paint >= 0) & (paint <= 1)).all():
+        raise InvalidParameterError(f"color = {color!r}: {words}")
+    return paint
 
 
 def _complete(skeleton: Skeleton) -> None:

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from .cores import threads
 from .eigen import principal_parts
-from .vectors import PAIRS, TINY, dot, unit
+from .vectors import PAIRS, dot, unit
 
 THREAD_POINTS = 4096  # speed: points whose neighbours are worth a thread
 SCATTER_CHUNK = 4096  # speed: rows at a time: the (3, rows, k) work array then stays in the cache
@@ -105,12 +105,6 @@ def principal(points: np.ndarray, neighbours: np.ndarray) -> tuple[np.ndarray, n
     """Principal components of every neighbourhood: sums of squares, (n, 3) ascending, and unit normals (n, 3)."""
     values, normals = principal_parts(scatter(points, neighbours))
     return np.maximum(values.T, 0), normals
-
-
-def sphericity(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """Least over largest principal spread, smoothed by the median, (n,): 0 on a plane or a line, 1 in a ball."""
-    ratio = spread[:, 0] / np.maximum(spread[:, 2], TINY)
-    return row_medians(ratio.take(neighbours))
 
 
 def uprightness(points: np.ndarray, normals: np.ndarray, p: np.ndarray, q: np.ndarray) -> np.ndarray:
