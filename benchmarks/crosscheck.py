@@ -23,8 +23,8 @@ from glsk_o3d.analysis import compare
 from glsk_o3d.crosscheck import cross_check, save_crosscheck_picture
 from glsk_o3d.crosscheck.agreement import VERDICTS
 from glsk_o3d.crosscheck.mesh import ball_pivoting, curvature_normals, mesh_areas, mesh_laplacian, ring_areas
+from glsk_o3d.crosscheck.mesh_rings import umbrellas
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
-from glsk_o3d.numerics.mesh_rings import umbrellas
 
 EVERY = "clean_1024,clean_4096,density_4096,holes_4096,scan2_4096,noise1_4096,noise2_4096,outliers_4096"
 GOOD = dict(error=0.4, inside=0.9, completeness=0.9)  # and the right topology: a skeleton that deserves trust

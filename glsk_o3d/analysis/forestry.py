@@ -11,11 +11,11 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import pdist
 
 from ..errors import InvalidParameterError, SkeletonWarning
-from ..numerics.circles import CircleFit, fit_circle
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import AXES, TINY, along_axis, norm
 from ..numerics.vectors import unit as directions
 from ..skeleton import Skeleton
+from .circles import CircleFit, fit_circle
 from .trees import OUTSIDE, Cylinders, cylinders, metres
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems

@@ -10,9 +10,9 @@ from ..analysis.curves import distances
 from ..interop.packages import require
 from ..numerics.cotangent import cotangent_laplacian
 from ..numerics.groups import component_labels
-from ..numerics.mesh_rings import border_lengths, common_share, sides, umbrellas
 from ..report import REFUSED
 from .mesh import COVERED_SHARE, INVENTED_DISTANCE, curvature_normals, mesh_areas, mesh_laplacian, ring_areas, spacing
+from .mesh_rings import border_lengths, common_share, sides, umbrellas
 
 # All fitted.
 FLAT_LAPLACIAN = 1e-3  # of the ring's size: smaller Laplacian coordinates have no direction

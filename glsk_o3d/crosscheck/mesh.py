@@ -18,13 +18,13 @@ from ..io.meshes import mesh_arrays
 from ..lpr_reducer import LPRReducer
 from ..numerics.cotangent import WEIGHT_CAP
 from ..numerics.frame import MIN_POINTS
-from ..numerics.mesh_rings import clean_faces, mesh_rings, umbrellas
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import dot
 from ..pipeline import Pipeline, with_stage
 from ..refiner import Refiner
 from ..report import Report
 from ..state import at_rest
+from .mesh_rings import clean_faces, mesh_rings, umbrellas
 
 BALL_RADII = (1.0, 2.0, 4.0)  # fitted: of the rolling balls, in spacings
 POISSON_DEPTHS = (5, 9)  # measured: of the octree; below 5 Open3D makes the same mesh, and complains

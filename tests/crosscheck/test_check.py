@@ -23,8 +23,8 @@ from glsk_o3d import (
 from glsk_o3d.crosscheck import cross_check
 from glsk_o3d.crosscheck.agreement import compare_rows, compare_skeletons, mesh_fit
 from glsk_o3d.crosscheck.mesh import spacing
+from glsk_o3d.crosscheck.mesh_rings import border_lengths
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
-from glsk_o3d.numerics.mesh_rings import border_lengths
 
 SPIKY = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 

@@ -20,8 +20,8 @@ from glsk_o3d.crosscheck.mesh import (
     ring_areas,
     spacing,
 )
+from glsk_o3d.crosscheck.mesh_rings import common_share, umbrellas
 from glsk_o3d.numerics.cotangent import WEIGHT_CAP, cotangent_laplacian
-from glsk_o3d.numerics.mesh_rings import common_share, umbrellas
 from glsk_o3d.numerics.rings import Rings
 from glsk_o3d.samples import sheet, torus, tube
 

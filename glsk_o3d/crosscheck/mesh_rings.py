@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from .groups import component_labels
-from .rings import Rings
+from ..numerics.groups import component_labels
+from ..numerics.rings import Rings
 
 
 def clean_faces(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
