@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from .errors import InvalidParameterError, brief
 from .interop.packages import import_open3d, require
 from .numerics.groups import component_labels
+from .numerics.paths import maximal_paths
 from .numerics.radii import supporting_points
 from .numerics.vectors import norm
 from .parameters import shown
@@ -176,23 +176,7 @@ class Skeleton:
 
         A loop without a junction starts and ends at the same vertex. A vertex without edges is no branch.
         """
-        neighbours: list[list[int]] = [[] for _ in self.vertices]
-        for a, b in self.edges.tolist():
-            neighbours[a].append(b)
-            neighbours[b].append(a)
-        left, paths = set(map(tuple, self.edges.tolist())), []
-        ends = np.flatnonzero((self.degree > 0) & (self.degree != 2)).tolist()
-        for start in ends + np.flatnonzero(self.degree == 2).tolist():
-            for step in neighbours[start]:
-                if (min(start, step), max(start, step)) not in left:
-                    continue
-                path = [start, step]
-                while path[-1] != start and len(neighbours[path[-1]]) == 2:
-                    before, (one, other) = path[-2], neighbours[path[-1]]
-                    path.append(other if one == before else one)
-                left.difference_update((min(edge), max(edge)) for edge in pairwise(path))
-                paths.append(np.array(path))
-        return tuple(paths)
+        return tuple(np.array(vertices) for vertices, _ in maximal_paths(len(self.vertices), self.edges))
 
     def to_networkx(self) -> networkx.Graph:
         """The graph with the attributes of every vertex.

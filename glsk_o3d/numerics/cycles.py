@@ -7,6 +7,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from .paths import maximal_paths
 from .vectors import TINY, dot
 
 Chain: TypeAlias = tuple[float, list[int]]
@@ -28,34 +29,14 @@ def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[
 
 def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[Chain]:
     """Paths between junctions of the cyclic part. A ring of its own starts anywhere."""
-    around = [{} for _ in range(n)]
-    for (a, b), length in zip(edges.tolist(), lengths.tolist(), strict=True):
-        around[a][b] = around[b][a] = length
-    leaves = [v for v in range(n) if len(around[v]) == 1]
-    while leaves:
-        v = leaves.pop()
-        for u in around[v]:
-            del around[u][v]
-            if len(around[u]) == 1:
-                leaves.append(u)
-        around[v] = {}
-    chains = []
-    degree = [len(links) for links in around]
-    for start in sorted((v for v in range(n) if degree[v]), key=lambda v: degree[v] == 2):
-        for step in list(around[start]):
-            if step not in around[start]:
-                continue  # walked from its other end
-            chain, length = [start], 0.0
-            here, ahead = start, step
-            while True:
-                length += around[here].pop(ahead)
-                del around[ahead][here]
-                chain.append(ahead)
-                if ahead == start or degree[ahead] > 2:
-                    break
-                here, ahead = ahead, next(iter(around[ahead]))
-            chains.append((length, chain))
-    return chains
+    while True:
+        paths = maximal_paths(n, edges)
+        degree = np.bincount(edges.ravel(), minlength=n)
+        cyclic = [(vertices, path) for vertices, path in paths if degree[[vertices[0], vertices[-1]]].min() > 1]
+        if len(cyclic) == len(paths):
+            return [(float(np.cumsum(lengths[path])[-1]), vertices) for vertices, path in paths]
+        left = np.sort(np.concatenate([np.empty(0, int), *(path for _, path in cyclic)]))
+        edges, lengths = edges[left], lengths[left]
 
 
 def _horton(chains: list[Chain]) -> list[Chain]:
