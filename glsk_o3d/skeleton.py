@@ -267,14 +267,8 @@ def _check_values(skeleton: Skeleton) -> None:
     _check_range(skeleton, "edges", 0, m - 1, there)
     _refuse(skeleton, "edges", skeleton.edges[:, 0] == skeleton.edges[:, 1], "joins a vertex with itself")
     _check_range(skeleton, "vertex_of_point", -1, m - 1, there)
-    _check_range(
-        skeleton,
-        "points",
-        -FARTHEST_PLACE,
-        FARTHEST_PLACE,
-        f"{finite}, as vertex_of_point gives it a vertex",
-        lambda points: (owner < 0)[:, None],
-    )
+    owned = f"{finite}, as vertex_of_point gives it a vertex"
+    _check_range(skeleton, "points", -FARTHEST_PLACE, FARTHEST_PLACE, owned, lambda points: (owner < 0)[:, None])
     _check_range(skeleton, "normals", -UNIT, UNIT, "must be unit vectors, or NaN", unless=np.isnan)
     for name in OF_VERTICES:
         most = 1.0 if name in ("confidence", "support") else FARTHEST_PLACE
