@@ -111,7 +111,7 @@ class Contractor(Filter[Contraction]):
                 state, facts = self._solve(state, laplacian)
             except SolveError as problem:
                 return _finished(state, f"solve {len(state.report.iterations) + 1} {REFUSED}: {problem}")
-            state = _recorded(state, **facts, seconds=time.perf_counter() - start)
+            state = _record(state, **facts, seconds=time.perf_counter() - start)
             reason = self.stop(state.report.iterations)
             if reason is None and reducer is not None:
                 n, state = len(state), _reduced(state, reducer, start)
@@ -197,7 +197,7 @@ def explained_score(points: np.ndarray) -> float:
     return float((spread.sum() + spread[-1]) / (2 * spread.sum()))  # Wen (14)
 
 
-def _recorded(state: Contraction, **facts: Any) -> Contraction:
+def _record(state: Contraction, **facts: Any) -> Contraction:
     """A state with the record of its last solve in the report."""
     done, explained = state.report.iterations, explained_score(state.positions)
     before, n_before = (done[-1].explained, done[-1].n_points) if done else (explained_score(state.cloud), len(state))

@@ -208,8 +208,10 @@ def remove_redundant_points(
     name, tensor = open3d_class(cloud)
     if name == "TriangleMesh":
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
-    contractor = Contractor(reducer=reducer or LPRReducer(), max_iterations=int(passes), stop=lambda iterations: None)
-    kept = np.sort(((rings or RingBuilder()) | contractor)(cloud).point_of_survivor)
+    rings = RingBuilder() if rings is None else rings
+    reducer = LPRReducer() if reducer is None else reducer
+    contraction = Contractor(reducer=reducer, max_iterations=int(passes), stop=lambda iterations: None)
+    kept = np.sort((rings | contraction)(cloud).point_of_survivor)
     if name == "PointCloud" and not tensor:
         return cloud.select_by_index(kept), kept.tolist()
     if tensor:
