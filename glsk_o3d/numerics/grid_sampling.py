@@ -51,37 +51,32 @@ class Grid(NamedTuple):
         return morton_codes(np.clip(points, self.low, self.high), cells, self.corner, self.extent)
 
 
-class Reach(NamedTuple):
-    """How far a cloud reaches, told by its points in any number of blocks, whatever their order."""
+def _reach(blocks: Iterable[np.ndarray]) -> tuple[int, np.ndarray, np.ndarray]:
+    """The number of points in some blocks, their least and largest coordinates (2, 3), and some of them (s, 3).
 
-    n: int  # points
-    ends: np.ndarray  # (2, 3) least and largest coordinates
-    some: np.ndarray  # (s, 3) of the points, chosen by chance
+    These are chosen by chance, but the same whatever the order of the points and the size of the blocks.
+    """
+    n, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
+    some, mixed, share = np.empty((0, 3)), np.empty(0, np.uint64), np.uint64(0)
+    for points in blocks:
+        n, low, high = n + len(points), np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+        numbers = _mixed(points)
+        few = numbers & share == 0
+        some, mixed = np.concatenate([some, points[few]]), np.concatenate([mixed, numbers[few]])
+        while len(some) > TAIL_POINTS and share < ALL_BITS:  # those that one more bit chooses
+            share = share << np.uint64(1) | np.uint64(1)
+            few = mixed & share == 0
+            some, mixed = some[few], mixed[few]
+    return n, np.stack([low, high]), some
 
-    @classmethod
-    def of(cls, blocks: Iterable[np.ndarray]) -> Reach:
-        """The reach of the points in some blocks, (m, 3) float arrays, none of them empty."""
-        n, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
-        some, mixed, share = np.empty((0, 3)), np.empty(0, np.uint64), np.uint64(0)
-        for points in blocks:
-            n, low, high = n + len(points), np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
-            numbers = _mixed(points)
-            few = numbers & share == 0
-            some, mixed = np.concatenate([some, points[few]]), np.concatenate([mixed, numbers[few]])
-            while len(some) > TAIL_POINTS and share < ALL_BITS:  # those that one more bit chooses
-                share = share << np.uint64(1) | np.uint64(1)
-                few = mixed & share == 0
-                some, mixed = some[few], mixed[few]
-        return cls(n, np.stack([low, high]), some)
 
-    def grid(self) -> Grid:
-        """A grid around the points, see `check_extent`: a few far off do not decide how wide its cells are."""
-        check_extent(self.ends, self.n)
-        some = self.some if len(self.some) else self.ends  # nothing but copies
-        low, high = np.quantile(some, [GRID_TAIL, 1 - GRID_TAIL], axis=0)
-        low, high = 2 * low - high, 2 * high - low
-        corner, top = np.clip(self.ends, low, high)
-        return Grid(low, high, corner, float((top - corner).max()))
+def _grid(n: int, ends: np.ndarray, some: np.ndarray) -> Grid:
+    """A grid around n points, see `_reach` and `check_extent`: a few far off do not decide how wide its cells are."""
+    check_extent(ends, n)
+    low, high = np.quantile(some if len(some) else ends, [GRID_TAIL, 1 - GRID_TAIL], axis=0)  # ends: nothing but copies
+    low, high = 2 * low - high, 2 * high - low
+    corner, top = np.clip(ends, low, high)
+    return Grid(low, high, corner, float((top - corner).max()))
 
 
 def _mixed(points: np.ndarray) -> np.ndarray:
@@ -93,20 +88,15 @@ def _mixed(points: np.ndarray) -> np.ndarray:
     return mixed ^ mixed >> np.uint64(29)
 
 
-def occupied_cells(codes: np.ndarray, bits: int, n: int) -> list[int]:
-    """Numbers of occupied cells of grids each twice as fine as the one before, from one cell to at least n, or to all.
+def cells_along(codes: np.ndarray, bits: int, n: int) -> float:
+    """How many cells a grid must have along its longest side for about n to be occupied; `FINEST_CELLS` if none has n.
 
-    `codes` are sorted Morton codes of the occupied cells of the finest grid, with so many `bits` per axis; they may
-    repeat.
+    It lies between two grids of which one is twice as fine. `codes` are sorted Morton codes of the occupied cells of
+    the finest grid, with so many `bits` per axis; they may repeat.
     """
-    counts = [1]
+    counts = [1]  # of occupied cells, from one cell on
     while counts[-1] < n and len(counts) <= bits:
         counts.append(1 + np.count_nonzero(np.diff(codes >> np.uint64(3 * (bits - len(counts))))))
-    return counts
-
-
-def cells_along(counts: list[int], n: int) -> float:
-    """How many cells a grid must have along its longest side for about n to be occupied, by `occupied_cells`."""
     if len(counts) == 1:
         return 1.0
     if counts[-1] < n:
@@ -117,13 +107,13 @@ def cells_along(counts: list[int], n: int) -> float:
 
 def sample_grid(points: np.ndarray, n: int) -> Sample:
     """Keep of every cell of a cubic grid with about n occupied cells the point nearest to the mean of its points."""
-    grid = Reach.of([points]).grid()
+    grid = _grid(*_reach([points]))
     code = grid.codes(points, FINEST_CELLS)
     order = sort_within(points, code, np.argsort(code, kind="stable"))
-    counts = occupied_cells(code[order], MORTON_BITS, n)
-    if counts[-1] < n:
+    cells = cells_along(code[order], MORTON_BITS, n)
+    if cells == FINEST_CELLS:
         return everybody(points)
-    code = grid.codes(points, cells_along(counts, n))[order]
+    code = grid.codes(points, cells)[order]
     again = np.argsort(code, kind="stable")
     order, code = order[again], code[again]
     begin = _begins(code)
@@ -162,11 +152,11 @@ def sample_blocks(blocks: Blocks, size: Callable[[int], int]) -> tuple[np.ndarra
     the means of the cells, and the points nearest to them; a small one twice. Copies of a point count, unlike those in
     memory.
     """
-    reach = Reach.of(blocks())
-    n = size(reach.n)
-    if reach.n <= 2 * n:
-        return np.concatenate([np.empty((0, 3)), *blocks()]), np.ones(reach.n, int)
-    grid = reach.grid()
+    total, ends, some = _reach(blocks())
+    n = size(total)
+    if total <= 2 * n:
+        return np.concatenate([np.empty((0, 3)), *blocks()]), np.ones(total, int)
+    grid = _grid(total, ends, some)
     cells = _fineness(blocks, grid, n)
     codes, counts, means = _means(blocks, grid, cells)
     return _nearest(blocks, grid, cells, codes, means), counts
@@ -182,7 +172,7 @@ def _fineness(blocks: Blocks, grid: Grid, n: int) -> float:
         while len(codes) > CELLS_KEPT * n:
             codes, bits = codes >> np.uint64(3), bits - 1
             codes = codes[_begins(codes)]
-    return cells_along(occupied_cells(codes, bits, n), n)
+    return cells_along(codes, bits, n)
 
 
 def _means(blocks: Blocks, grid: Grid, cells: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
