@@ -10,9 +10,10 @@ from scipy.sparse import csr_matrix
 
 from .numerics.cotangent import cotangent_laplacian
 from .numerics.eigen import largest_eigenvalue
+from .numerics.neighbourhoods import wide_covariances
 from .numerics.rings import Rings
 from .numerics.solver import SolveError, solve_contraction
-from .numerics.vectors import PAIRS, TINY
+from .numerics.vectors import TINY
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch, with_filters
 from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord
@@ -179,12 +180,8 @@ def explained_variance(points: np.ndarray, rings: Rings) -> np.ndarray:
     The moments of a point are averaged with those of its ring, twice, and count as much as four neighbours. Rings cost
     a third of what asking for the nearest points costs, and are as good.
     """
-    moments = np.stack([*points.T, *(points[:, i] * points[:, j] for i, j in PAIRS)], axis=1)
     own = (OWN_WEIGHT / (OWN_WEIGHT + rings.sizes))[:, None]
-    for _ in range(2):
-        moments = own * moments + (1 - own) * rings.mean_over(moments)
-    mean, square = moments[:, :3].T, moments[:, 3:].T
-    spread = square - [mean[i] * mean[j] for i, j in PAIRS]
+    spread, square = wide_covariances(points, lambda values: own * values + (1 - own) * rings.mean_over(values), 2)
     total = spread[0] + spread[3] + spread[5]
     rounding = 1e-12 * (square[0] + square[3] + square[5])  # of the differences: what is less has no direction
     return np.where(total > rounding, largest_eigenvalue(spread) / np.maximum(total, TINY), 0)

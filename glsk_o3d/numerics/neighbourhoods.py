@@ -1,5 +1,6 @@
 """Nearest neighbours and how they are spread."""
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
@@ -105,6 +106,21 @@ def principal(points: np.ndarray, neighbours: np.ndarray) -> tuple[np.ndarray, n
     """Principal components of every neighbourhood: sums of squares, (n, 3) ascending, and unit normals (n, 3)."""
     values, normals = principal_parts(scatter(points, neighbours))
     return np.maximum(values.T, 0), normals
+
+
+def wide_covariances(
+    points: np.ndarray, average: Callable[[np.ndarray], np.ndarray], times: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariances of wider surroundings: what `average` makes of the first and second moments, again and again.
+
+    It takes (n, c) float arrays to means over the surroundings of each point. Two (6, n) float arrays as of `scatter`:
+    the covariances, and the means of the squares and products that they are the difference of.
+    """
+    moments = np.stack([*points.T, *(points[:, i] * points[:, j] for i, j in PAIRS)], axis=1)
+    for _ in range(times):
+        moments = average(moments)
+    mean, square = moments[:, :3].T, moments[:, 3:].T
+    return square - [mean[i] * mean[j] for i, j in PAIRS], square
 
 
 def uprightness(points: np.ndarray, normals: np.ndarray, p: np.ndarray, q: np.ndarray) -> np.ndarray:
