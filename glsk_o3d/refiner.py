@@ -80,7 +80,7 @@ class Refiner(Filter[Skeleton]):
     )
     spacing: float = parameter(0.5, "Longest edge over the local radius, by subdivision; 0 leaves the edges.", low=0)
     recentre: int = parameter(
-        3, "Passes that fit the curve to the axis of the surface; 0 leaves it.", unit="passes", low=0
+        1, "Passes that fit the curve to the axis of the surface; 0 leaves it.", unit="passes", low=0
     )
 
     def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
@@ -94,6 +94,7 @@ class Refiner(Filter[Skeleton]):
         if len(skeleton.edges) and len(skeleton.supporting_points) and (asks or self.recentre):
             skeleton = self._decide(skeleton, surface)
         if self.recentre and len(skeleton.vertices):
+            skeleton = fit_axis(skeleton, 1, surface, settle=True)
             size = binary_size(skeleton)  # fourth powers of lengths must not overflow
             skeleton = scaled(regrow_ends(move_junctions(scaled(skeleton, 1 / size))), size)
         return measured(skeleton)

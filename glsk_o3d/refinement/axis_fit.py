@@ -24,6 +24,8 @@ FIT_DIFFUSION = 0.6  # fitted: length over which the places of points are smooth
 FIT_WIDEST = 10.0  # fitted: half width over the spacing of the vertices, at most: those in one place have none
 FIT_STAY = 0.1  # fitted: weight of staying where it was, per point
 FIT_CENTROID = 0.5  # fitted: weight of the points themselves where their normals say nothing
+# derived: share of the squared normals of a quarter of a tube that stand across the others: of less, they do not say
+FIT_OPEN = (1 - 2 / np.pi) / 2  # how deep behind them the axis is; of half a tube it is .5
 FIT_WALK = 3  # measured: vertices by which a point may move along the curve in a pass
 # derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
 FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
@@ -48,21 +50,30 @@ def pull_back_detached(skeleton: Skeleton) -> Skeleton:
     return replace(skeleton, vertices=skeleton.vertices + back[:, None] * mean)
 
 
-def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = None) -> Skeleton:
+def fit_axis(
+    skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = None, settle: bool = False
+) -> Skeleton:
     r"""Move the vertices to the axis of the surface; measure how well the points say where it is, and how far it is.
 
     The plane through a point p of a limb, spanned by its normal n and the tangent t of the axis, contains the axis:
     with b = n x t and the place x(p) of the curve that p belongs to, b (x(p) - p) = 0. On a flat section the same sum
     of squares is least at the middle of the width. Each pass minimises, over all vertices at once,
 
-    .. math:: \sum_p (b \cdot (x(p) - p))^2 + \mu d |(x(p) - p)_\perp|^2
+    .. math:: \sum_p (b \cdot (x(p) - p))^2 + (x(p) - p)^T K (x(p) - p)
         + \sum_v c (\lambda |x_v - chord|^2 + \epsilon |x_v - old|^2 + ((x_v - old) \cdot t)^2)
 
     with c points at a vertex, and :math:`\lambda = (w / h)^4` with the half width w and the spacing h of the vertices,
-    so that the curve does not bend within a half width. The doubt d, from 0 to 1, is the share of the distance from the
-    curve that the normals do not explain: noise as wide as the part, whose points say more than their normals. The axis
-    of half a tube is off the centroid of its points, so the first pass takes the normals alone. The nearest place of a
-    wiggly curve has its wiggle: it is smoothed on the surface by .6 half widths, and x(p) is the place nearest to that.
+    so that the curve does not bend within a half width. The nearest place of a wiggly curve has its wiggle: it is
+    smoothed on the surface by .6 half widths, and x(p) is the place nearest to that.
+
+    K is 0, since the axis of half a tube is off the centroid of its points, but where it is to `settle` the curve:
+
+    .. math:: K = \mu d I_\perp + \max(1 - a / a_0, 0)\, e e^T
+
+    The doubt d, from 0 to 1, is the share of the distance from the curve that the normals do not explain: noise as wide
+    as the part, whose points say more than their normals. Of a leaf seen from one side the normals hardly differ, and
+    meet far behind it: e is the direction most of them have, a the share of their squares across it, and a_0 that of a
+    quarter of a tube.
 
     The confidence is (1 - d) c / (c + 8), where c counts over the vertex and its neighbours. The radii are those of
     circles with the area of the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to
@@ -81,7 +92,7 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     near = _nearest(x, ends, edges_at[vertex], p, n, p, skeleton.radii)
     if passes:
         smooth = _smoother(surface or SurfaceGraph.of(skeleton), points, p)
-    for step in range(passes):
+    for _ in range(passes):
         edge, t = nearest_on_edges(x, ends, edges_at[vertex], p)
         place = x[ends[edge, 0]] + t[:, None] * (x[ends[edge, 1]] - x[ends[edge, 0]])
         place = smooth(place, FIT_DIFFUSION * near.width[vertex])
@@ -89,8 +100,8 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
             edge, t = nearest_on_edges(x, ends, edges_at[vertex], place)
             vertex = ends[edge, (t > 0.5).astype(int)]
         near = _nearest(x, ends, edges_at[vertex], p, n, place, skeleton.radii)
-        pull = FIT_CENTROID * (near.share * near.doubt[ends[near.edge]]).sum(axis=1) if step else np.zeros(len(p))
-        x = _solve(x, near, p, pull, pattern)
+        pull = _pull(near) if settle else np.zeros((m, 3, 3))
+        x = _solve(x, near, p, pull[ends].mean(axis=1), pattern)
         # normals that mean nothing may meet anywhere
         x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low, high), x)
     if passes:
@@ -153,6 +164,7 @@ class _Nearest(NamedTuple):
     support: np.ndarray  # points at every vertex and its neighbours
     sections: Sections  # at every vertex
     width: np.ndarray  # half of the section's, at every vertex
+    faces: np.ndarray  # (m, 6) different entries of the sum of n n^T, at every vertex and its neighbours
 
 
 def _nearest(
@@ -189,7 +201,16 @@ def _nearest(
     # normals of a sheet as thin as its points are apart say nothing of its width, and there is nothing but doubt
     spread = _spread_width(at[:, 15:] / np.maximum(support, TINY)[:, None])
     width = sections.half_width + doubt * np.maximum(spread - sections.half_width, 0)
-    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width)
+    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, at[:, 3:9])
+
+
+def _pull(near: _Nearest) -> np.ndarray:
+    """K of `fit_axis` at every vertex, (m, 3, 3)."""
+    share, axes = np.linalg.eigh(near.faces[:, FULL])
+    across = share[:, 1] / np.maximum(share[:, 1:].sum(axis=1), TINY)
+    face = np.maximum(1 - across / FIT_OPEN, 0)[:, None] * axes[:, :, 2]
+    pull: np.ndarray = FIT_CENTROID * near.doubt[:, None, None] * np.eye(3) + face[:, :, None] * axes[:, None, :, 2]
+    return pull
 
 
 def _spread_width(moments: np.ndarray) -> np.ndarray:
@@ -203,21 +224,22 @@ def _spread_width(moments: np.ndarray) -> np.ndarray:
 
 
 def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pull: np.ndarray, pattern: _Pattern) -> np.ndarray:
-    """The minimum of the energy in `fit_axis`: one sparse, symmetric, positive definite system."""
+    """The minimum of the energy in `fit_axis`, with K of every edge: one sparse, symmetric, positive definite system."""
     ends, inner, beside = pattern.ends, pattern.inner, pattern.beside
     m, e = len(x), len(ends)
     along = near.tangent[:, :, None] * near.tangent[:, None]
     upright = np.eye(3) - along
-    # Of every point b b^T by its six different entries, and the pull, once for each pair of ends of its edge; and what
-    # they say of its place, and that it is there, once for each end.
-    matrix = np.column_stack([near.across[:, ROWS] * near.across[:, COLUMNS], pull])
-    target = dot(near.across, p)[:, None] * near.across
-    target = np.column_stack([target, pull[:, None] * p, np.ones(len(p))])
+    pull = upright @ pull @ upright
+    # Of every point b b^T by its six different entries, and that it is there, once for each pair of ends of its edge;
+    # and what they say of its place, and where and that it is there, once for each end.
+    here = np.ones(len(p))
+    matrix = np.column_stack([near.across[:, ROWS] * near.across[:, COLUMNS], here])
+    target = np.column_stack([dot(near.across, p)[:, None] * near.across, p, here])
     share, pairs = near.share, near.share[:, [0, 0, 1]] * near.share[:, [0, 1, 1]]
     at_pairs = group_sum(matrix, near.edge[:, None] + e * np.arange(3), 3 * e, pairs)
     at_ends = group_sum(target, near.edge[:, None] + e * np.arange(2), 2 * e, share)
-    at_edges = at_pairs[:, FULL].reshape(3, e, 3, 3) + at_pairs[:, 6].reshape(3, e, 1, 1) * upright
-    wanted = at_ends[:, :3] + np.einsum("eij,ej->ei", np.tile(upright, (2, 1, 1)), at_ends[:, 3:6])
+    at_edges = at_pairs[:, FULL].reshape(3, e, 3, 3) + at_pairs[:, 6].reshape(3, e, 1, 1) * pull
+    wanted = at_ends[:, :3] + np.einsum("eij,ej->ei", np.tile(pull, (2, 1, 1)), at_ends[:, 3:6])
     facts = np.column_stack([wanted, at_ends[:, 6], np.tile(along.reshape(e, 9), (2, 1))])
     facts = group_sum(facts, ends.T.ravel(), m)
     right, count = facts[:, :3], facts[:, 3]
