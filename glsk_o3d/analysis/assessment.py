@@ -1,6 +1,6 @@
 """How a skeleton lies in its cloud, without knowing the truth."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,13 +9,13 @@ from scipy.spatial.distance import cdist
 
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
+from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..numerics.frame import check_extent
 from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.neighbourhoods import nearest_neighbours, plane_axes
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import dot, norm, unit
 from ..skeleton import Skeleton
-from .loops import opening_cycles
 
 CLUSTER_NEIGHBOURS = 16  # fitted: of each point, in the graph whose components are the clusters of a cloud
 MIN_SECTION_POINTS = 6  # fitted: below which a place counts as outside
@@ -26,22 +26,6 @@ POINTS_PER_SECTION, MOST_SECTIONS = 24, 1000  # fitted: points on average, and s
 FAR_FROM_SECTION = 3.0
 # derived: least variance of an outline across itself over that along it: arcs below about 130 degrees have less
 MIN_ARC_VARIANCE = 0.1
-
-
-@dataclass(frozen=True)
-class LoopWidth:
-    """How wide a loop of a skeleton opens: the radius of the largest circle inside it, and of the tube that makes it.
-
-    The latter is the median over its vertices of the nearest cross-section's.
-    """
-
-    opening: float
-    tube_radius: float
-
-    @property
-    def wider(self) -> bool:
-        """Whether it opens wider than its tube, as every true loop does."""
-        return self.opening > self.tube_radius
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +51,9 @@ class Assessment:
         tube (1 without loops).
     components, clusters : int
         Connected parts of the skeleton, and of the cloud when every point is joined to its 15 nearest.
-    loops : tuple of LoopWidth
-        A minimum cycle basis of the skeleton, shortest first. `opening` is the radius of the largest circle inside a
-        loop in the cloud's units, `tube_radius` that of the tube that makes it, and `wider` whether it opens wider.
+    loops, wide_loops : int
+        Loops of a minimum cycle basis of the skeleton; those that open wider than their tube: the largest circle inside
+        has a larger radius than the median of the nearest cross-sections.
     edge_centredness : (E,) float array
         max(0, 1 - d / r) of the cross-section nearest to the middle of each edge, NaN in the empty ball of a junction.
         Not part of `as_dict`.
@@ -90,18 +74,13 @@ class Assessment:
     topology: float
     components: int
     clusters: int
-    loops: tuple[LoopWidth, ...]
+    loops: int
+    wide_loops: int
     edge_centredness: np.ndarray = field(repr=False)
 
-    @property
-    def wide_loops(self) -> int:
-        """Loops that open wider than their tube."""
-        return sum(loop.wider for loop in self.loops)
-
     def as_dict(self) -> dict[str, Any]:
-        """The numbers, as JSON holds them; `loops` is a list of dicts with `opening`, `tube_radius` and `wider`."""
-        shown = {name: value for name, value in vars(self).items() if name != "edge_centredness"}
-        return {**shown, "loops": [{**asdict(loop), "wider": loop.wider} for loop in self.loops]}
+        """The numbers, as JSON holds them."""
+        return {name: value for name, value in vars(self).items() if name != "edge_centredness"}
 
 
 def assess(skeleton: Skeleton, points: Any) -> Assessment:
@@ -158,18 +137,19 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     bounded = found & (sections.open_angles < OPEN_ANGLE)
     nearest = cKDTree(sections.places[found])
     radius = radii[nearest.query(skeleton.vertices)[1]]
-    loops = tuple(LoopWidth(opening, float(np.median(radius[cycle]))) for cycle, opening in opening_cycles(skeleton))
+    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+    wide = sum(inscribed_circle(skeleton.vertices[cycle])[1] > np.median(radius[cycle]) for cycle in cycles)
     components = skeleton.n_components
     agreement = min(components, clusters) / max(components, clusters)
-    wide = sum(loop.wider for loop in loops) / len(loops) if loops else 1.0
     return Assessment(
         centredness=float(np.average(centred, weights=sections.lengths[found])),
         boundedness=float(np.average(bounded[counted], weights=sections.lengths[counted])),
         smoothness=max(0.0, 1 - _turning(skeleton, radius) / (np.pi * skeleton.length)),
-        topology=agreement * wide,
+        topology=float(agreement * (wide / len(cycles) if cycles else 1)),
         components=components,
         clusters=clusters,
-        loops=loops,
+        loops=len(cycles),
+        wide_loops=int(wide),
         edge_centredness=np.where(_at_junctions(skeleton, middles, cloud), np.nan, centred[nearest.query(middles)[1]]),
     )
 
