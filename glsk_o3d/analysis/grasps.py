@@ -104,9 +104,7 @@ def grasp_candidates(
     if gripper.max_opening > UNLIKELY_OPENING * np.linalg.norm(np.ptp(middle, axis=0)):
         many = f"more than {UNLIKELY_OPENING:g} times as wide as the object is long"
         warnings.warn(f"the gripper opens {many}: are the units the same?", SkeletonWarning, stacklevel=outside())
-    place, branch, width, quality, left_out, looked_at = _fitting(
-        skeleton, gripper, clearance, spacing, min_confidence
-    )
+    place, branch, width, quality, left_out, looked_at = _fitting(skeleton, gripper, clearance, spacing, min_confidence)
     position, axis = place[:, :3], place[:, 3:6]
     approach = _directions_around(axis, -direction, around)
     ways = Ways(position, axis, approach, np.cross(axis[:, None], approach))

@@ -127,10 +127,7 @@ def _rows(assessment: Assessment | None, comparison: Comparison | None) -> Itera
         parts = f"{assessment.components}", f"{assessment.clusters}"
         yield "parts", *parts, "components; the cloud has as many as best"
         wide = f"{assessment.wide_loops} open wider than their tube; missing ones show with --truth"
-        yield "loops", f"{len(assessment.loops)}", "", wide
-        for i, loop in enumerate(assessment.loops, 1):
-            ratio = f"{loop.opening / loop.tube_radius:.2f}" if loop.tube_radius > 0 else "inf"
-            yield f"  loop {i}", ratio, "> 1", f"opening {loop.opening:.4g}, tube radius {loop.tube_radius:.4g}"
+        yield "loops", f"{assessment.loops}", "", wide
     if comparison is not None:
         yield "", "", "", ""
         yield from _numbers(comparison)
