@@ -10,7 +10,7 @@ from ..analysis.curves import distances
 from ..interop.packages import require
 from ..numerics.cotangent import cotangent_laplacian
 from ..numerics.groups import component_labels
-from ..numerics.mesh_rings import border_lengths, common_share, umbrellas
+from ..numerics.mesh_rings import border_lengths, common_share, spokes, umbrellas
 from ..report import REFUSED
 from .mesh import COVERED_SHARE, INVENTED_DISTANCE, curvature_normals, mesh_areas, mesh_laplacian, ring_areas, spacing
 
@@ -140,22 +140,15 @@ def mesh_fit(state, vertices, faces):
 
 def _genus(faces):
     """Holes that pass through a mesh, by its Euler characteristic with a disc in each border; None if it has none."""
-    corner = np.arange(faces.size).reshape(-1, 3)
-    ends = np.concatenate([corner[:, side] for side in ([0, 1], [1, 2], [2, 0])])
-    ends = np.take_along_axis(ends, np.argsort(faces.ravel()[ends], axis=1), axis=1)  # from the lower vertex
-    edge, sides = np.unique(faces.ravel()[ends], axis=0, return_inverse=True, return_counts=True)[1:]
-    edge = edge.ravel()
+    vertex, other, sides, fan = spokes(int(faces.max(initial=-1)) + 1, faces)
     if sides.max(initial=0) > 2:
         return None
-    by_edge = np.argsort(edge, kind="stable")
-    pairs = by_edge[sides[edge[by_edge]] == 2].reshape(-1, 2)
-    # corners in one fan around a vertex are one: where fans touch in a vertex alone, the surface does not hang together
-    fan = component_labels(faces.size, ends[pairs].transpose(0, 2, 1).reshape(-1, 2))
-    n_vertices = int(fan.max(initial=-1)) + 1
-    n_pieces = len(np.unique(component_labels(n_vertices, fan[ends])))
-    rim = fan[ends[sides[edge] == 1]]
-    n_borders = len(np.unique(component_labels(n_vertices, rim)[rim]))
-    return (2 * n_pieces - n_borders - (n_vertices - len(sides) + len(faces))) // 2
+    # each fan is a vertex: where fans touch in a vertex alone, the surface does not hang together
+    edges = np.column_stack([fan, fan[np.lexsort((vertex, other))]])
+    n, rim = int(fan.max(initial=-1)) + 1, edges[sides == 1]
+    n_pieces = len(np.unique(component_labels(n, edges)))
+    n_borders = len(np.unique(component_labels(n, rim)[rim]))
+    return (2 * n_pieces - n_borders - (n - len(edges) // 2 + len(faces))) // 2
 
 
 def _on_mesh(points, vertices, faces, values):

@@ -1,4 +1,4 @@
-"""Meshes of clouds, reconstructed by Open3D or given; their Laplacian by libigl; the skeleton they contract to."""
+"""Meshes of clouds, reconstructed by Open3D; their Laplacian by libigl; the skeleton they contract to."""
 
 import time
 import warnings
@@ -188,14 +188,7 @@ def orient_normals(points: np.ndarray, normals: np.ndarray, edges: np.ndarray) -
     roots = np.empty(part.max() + 1, int)
     order = np.argsort(dot(outward, outward), kind="stable")
     roots[part[order]] = order  # the last one written, the farthest, stays
-    turned = _sign(normals[tree.row], normals[tree.col]) < 0
-    tree = coo_array(
-        (np.where(turned, 1.0, 2.0), (tree.row, tree.col)), shape=(n, n)
-    )  # odd: over an odd number of turns
+    tree.data = np.where(dot(normals[tree.row], normals[tree.col]) < 0, 1.0, 2.0)  # so ways over odd turns are odd
     steps, _, root = dijkstra(tree, directed=False, indices=roots, min_only=True, return_predecessors=True)
-    sign = np.where(steps % 2, -1.0, 1.0) * _sign(normals, outward)[root]
-    return normals * sign[:, None]
-
-
-def _sign(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.where(dot(a, b) < 0, -1.0, 1.0)
+    turned = (steps % 2 == 1) ^ (dot(normals, outward) < 0)[root]
+    return np.where(turned[:, None], -normals, normals)
