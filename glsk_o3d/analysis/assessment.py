@@ -57,15 +57,6 @@ class Assessment:
     edge_centredness : (E,) float array
         max(0, 1 - d / r) of the cross-section nearest to the middle of each edge, NaN in the empty ball of a junction.
         Not part of `as_dict`.
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> points = torus(2000).points
-    >>> found = assess(skeletonize(points), points)
-    >>> found.centredness > 0.8, found.topology
-    (True, 1.0)
     """
 
     centredness: float

@@ -61,14 +61,6 @@ class BranchTable(Rows, row="branch"):
         The first row of the axis of the branch. At a junction the thickest and straightest of the branches with much
         growth beyond them continues the axis. Centrifugal (Gravelius) order: 0 for axes at the root, and one more for
         each axis that grows from another.
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import y_junction
-    >>> table = branch_table(skeletonize(y_junction(2000).points))
-    >>> len(table), list(table)[0]["kind"], table.length.shape
-    (3, 'tip', (3,))
     """
 
     kind: np.ndarray

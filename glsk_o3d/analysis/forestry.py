@@ -57,14 +57,6 @@ class TreeMeasures:
         The foot of the stem in the cloud's units, the axis that points up, and the metres of one unit.
     doubts : tuple of str
         The warnings about implausible results.
-
-    Examples
-    --------
-    >>> from glsk_o3d import pipelines
-    >>> from glsk_o3d.samples import y_junction
-    >>> measures = tree_measures(pipelines.tree()(y_junction(2000).points))
-    >>> len(measures.volume), measures.height > 0.5
-    (2, True)
     """
 
     height: float

@@ -114,15 +114,6 @@ class GraspCandidates(Rows, row="grasp"):
         Number of examined places along the skeleton.
     left_out : dict of str to int
         Numbers of rejected places, and of rejected approaches to the others, by the first reason.
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.analysis import grasp_candidates
-    >>> from glsk_o3d.samples import tube
-    >>> best = grasp_candidates(skeletonize(tube(1000).points), 0.4)[:3]
-    >>> best.poses.shape, best.seen
-    ((3, 4, 4), array([3, 3, 3]))
     """
 
     position: np.ndarray

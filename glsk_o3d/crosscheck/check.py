@@ -45,12 +45,6 @@ class CrossCheck:
     vertices : (V, 3) float64 array
         The mesh. If it has the cloud's own points, they are denoised.
     faces : (F, 3) int64 array
-
-    Examples
-    --------
-    >>> from glsk_o3d.samples import torus
-    >>> cross_check(torus(1000).points).doubtful.shape
-    (1000,)
     """
 
     verdict: str
