@@ -1,7 +1,6 @@
 """The branches of a skeleton, measured one by one: a row of measures for each."""
 
 import heapq
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,12 +18,11 @@ from .segmentation import branch_of_point
 # fitted: radii from a junction between which a branch has its direction; nearer, parts blend
 HEADING_SPAN = (1.0, 3.0)
 FAIR_SHARE = 0.3  # fitted: of the greatest growth length at a junction; on conifers, and plants with long leaves
-PRINTED_COLUMNS = {
-    **dict(branch="d", kind="s", parent="d", level="d", axis="d", order="d", length=".4g", mean_radius=".3g"),
-    **dict(start_radius=".3g", end_radius=".3g", tortuosity=".2f", angle=".1f", points="d"),
-    **dict(confidence=".2f", support=".2f"),
-}
-"""The columns that people read, each with its format."""
+PRINTED_COLUMNS = (
+    *("branch", "kind", "parent", "level", "axis", "order", "length", "mean_radius", "start_radius", "end_radius"),
+    *("tortuosity", "angle", "points", "confidence", "support"),
+)
+"""The columns that people read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,16 +85,17 @@ class BranchTable(Rows, row="branch"):
         return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
 
     def printed(self) -> dict[str, list[str]]:
-        """The main columns, with a dash for unknown values, and the support only if known."""
-        columns = self._columns()
+        """The main columns in four digits, with a dash for unknown values, and the support only if known."""
+        columns = {name: values for name, values in self._columns().items() if name in PRINTED_COLUMNS}
         if not np.isfinite(self.support).any():
             del columns["support"]
 
-        def cell(name, value):
-            unknown = math.isnan(value) if isinstance(value, float) else name == "parent" and value < 0
-            return "-" if unknown else format(value, PRINTED_COLUMNS[name])
+        def cell(value):
+            if isinstance(value, float):
+                return "-" if np.isnan(value) else f"{value:.4g}"
+            return str(value)
 
-        return {name: [cell(name, value) for value in columns[name]] for name in PRINTED_COLUMNS if name in columns}
+        return {name: list(map(cell, values)) for name, values in columns.items()}
 
     def __str__(self):
         columns = [[name, *cells] for name, cells in self.printed().items()]

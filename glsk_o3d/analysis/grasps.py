@@ -203,9 +203,8 @@ def _places_on(skeleton, path, spacing):
     here = sample(at)
     reach = np.where(here[:, 3] > 0, here[:, 3], step)
     if closed:
-        before, behind = at - np.minimum(reach, length / 4), at + np.minimum(reach, length / 4)
-    else:
-        before, behind = np.maximum(at - reach, 0), np.minimum(at + reach, length)
+        reach = np.minimum(reach, length / 4)
+    before, behind = np.clip([at - reach, at + reach], *((-np.inf, np.inf) if closed else (0, length)))
     chord = sample(behind) - sample(before)
     size = np.linalg.norm(chord[:, :3], axis=1, keepdims=True)
     axis = np.divide(chord[:, :3], size, out=np.full((count, 3), np.nan), where=size > 0)
