@@ -15,7 +15,6 @@ from glsk_o3d import (
     Refiner,
     RingBuilder,
     Sampler,
-    read_cloud,
     samples,
     skeletonize,
 )
@@ -276,8 +275,3 @@ def test_clouds_without_a_surface():
 def test_useless_pipelines(ring, pipeline):
     with pytest.raises(InvalidParameterError, match=r"pipeline|lead from a cloud"):
         cross_check(ring.points, pipeline=pipeline)
-
-
-def test_a_real_scan(shared_dir):
-    found = cross_check(read_cloud(shared_dir / "data" / "simplejoint.ply"))
-    assert (found.verdict, found.skeletons.loops) == ("agrees", (0, 0))
