@@ -14,7 +14,6 @@ from ..numerics.frame import check_extent
 from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.neighbourhoods import nearest_neighbours, plane_axes
 from ..numerics.polylines import arc_lengths, place_at
-from ..numerics.vectors import dot, norm, unit
 from ..skeleton import Skeleton
 
 CLUSTER_NEIGHBOURS = 16  # fitted: of each point, in the graph whose components are the clusters of a cloud
@@ -30,7 +29,7 @@ MIN_ARC_VARIANCE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """How well a skeleton fits its cloud: four measures without units, from 0 to 1. 1 is best.
+    """How well a skeleton fits its cloud: three measures without units, from 0 to 1. 1 is best.
 
     They need no truth, so they miss some errors: parts of the cloud without a branch, and missing loops, cost little
     or nothing. Noise and one-sided scans cost something even on the true axis. So compare skeletons of one cloud.
@@ -44,8 +43,6 @@ class Assessment:
         section's radius.
     boundedness : float
         Share of the length from which the cross-section is seen in more than a third of all directions.
-    smoothness : float
-        1 minus the turn of the curve per radius of length, in half turns; at least 0.
     topology : float
         min(components, clusters) / max(components, clusters), times the share of the loops that open wider than their
         tube (1 without loops).
@@ -61,7 +58,6 @@ class Assessment:
 
     centredness: float
     boundedness: float
-    smoothness: float
     topology: float
     components: int
     clusters: int
@@ -102,8 +98,8 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     >>> straight = tube(2000)
     >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), ())
     >>> found = assess(axis, straight.points)
-    >>> found.boundedness, found.smoothness, found.topology
-    (1.0, 1.0, 1.0)
+    >>> found.boundedness, found.topology
+    (1.0, 1.0)
     """
     cloud = cloud_points(points)
     cloud = np.unique(cloud[np.isfinite(cloud).all(axis=1)], axis=0)
@@ -135,7 +131,6 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     return Assessment(
         centredness=float(np.average(centred, weights=sections.lengths[found])),
         boundedness=float(np.average(bounded[counted], weights=sections.lengths[counted])),
-        smoothness=max(0.0, 1 - _turning(skeleton, radius) / (np.pi * skeleton.length)),
         topology=float(agreement * (wide / len(cycles) if cycles else 1)),
         components=components,
         clusters=clusters,
@@ -160,20 +155,6 @@ def _at_junctions(skeleton, places, cloud):
     junctions = skeleton.vertices[skeleton.junctions]
     clearance = cKDTree(cloud).query(junctions)[0]
     return (cdist(places, junctions) < clearance).any(axis=1)
-
-
-def _turning(skeleton, radius):
-    """Sum over the vertices with two edges of the angle between these, times the radius there."""
-    inner = np.flatnonzero(skeleton.degree == 2)
-    ends = np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
-    ends = ends[skeleton.degree[ends[:, 0]] == 2]
-    onward = ends[np.argsort(ends[:, 0], kind="stable"), 1].reshape(-1, 2)
-    before, after = (skeleton.vertices[onward] - skeleton.vertices[inner, None]).swapaxes(0, 1)
-    # between the one edge and the other turned back; the arctangent is exact also near 0, where the arccosine is not
-    straight = (before == 0).all(axis=1) | (after == 0).all(axis=1)
-    before, after = unit(before), unit(after)
-    angle = np.arctan2(norm(np.cross(before, after)), -dot(before, after))
-    return float((np.where(straight, 0, angle) * radius[inner]).sum())
 
 
 class Sections(NamedTuple):

@@ -37,14 +37,6 @@ class Truth:
     InvalidParameterError
         There are no nodes, shapes do not fit, a number is not finite, a radius is not positive, or an edge names a
         missing node.
-
-    Examples
-    --------
-    >>> from glsk_o3d.samples import torus
-    >>> ring = torus(1000)
-    >>> truth = Truth(ring.nodes, ring.edges, ring.radii)
-    >>> len(truth.nodes) == len(ring.nodes)
-    True
     """
 
     nodes: np.ndarray

@@ -151,7 +151,6 @@ def _fitting(skeleton, gripper, clearance, spacing, min_confidence):
     reasons = {
         "unknown radius": np.isnan(width),
         "too wide": width + clearance > gripper.max_opening,
-        "too thin": width <= gripper.min_opening,
         "uncertain": ~(confidence >= min_confidence) if min_confidence > 0 else np.zeros(len(width), bool),
     }
     some, left_out = _sorted_out(reasons)

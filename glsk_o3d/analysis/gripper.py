@@ -33,8 +33,6 @@ class Gripper:
     ----------
     max_opening : float
         Widest opening between the jaws.
-    min_opening : float
-        Least opening; thinner parts cannot be held.
     finger, palm : (3,) tuples of float
         Extents along the closing direction, along the part, and along the approach: of a finger, from the palm to its
         tip, and of what is behind the fingers.
@@ -44,8 +42,7 @@ class Gripper:
     Raises
     ------
     InvalidParameterError
-        A length is no finite number, not positive, or the jaws close wider than they open, or the palm would be past
-        the axis.
+        A length is no finite number, not positive, or the palm would be past the axis.
 
     Examples
     --------
@@ -54,7 +51,6 @@ class Gripper:
     """
 
     max_opening: float
-    min_opening: float = 0.0
     finger: Any = None
     palm: Any = None
     reach: Any = None
@@ -64,7 +60,6 @@ class Gripper:
         finger = _sides("finger", self.finger, FINGER_PER_OPENING, opening)
         reach = opening * REACH_PER_OPENING if self.reach is None else self.reach
         object.__setattr__(self, "max_opening", opening)
-        object.__setattr__(self, "min_opening", check_number("min_opening", self.min_opening, low=0, high=opening))
         object.__setattr__(self, "finger", finger)
         object.__setattr__(self, "palm", _sides("palm", self.palm, PALM_PER_OPENING, opening))
         object.__setattr__(self, "reach", check_number("reach", reach, low=0, high=finger[2]))

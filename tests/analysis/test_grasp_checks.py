@@ -301,7 +301,6 @@ def test_a_gripper_in_proportion():
     [
         (dict(max_opening="wide"), "max_opening = 'wide'"),
         (dict(max_opening=True), "max_opening"),
-        (dict(max_opening=1.0, min_opening=1.5), "min_opening = 1.5: .* at most 1.0"),
         (dict(max_opening=1.0, finger=(1, 2)), r"finger = \(1, 2\): must be three lengths"),
         (dict(max_opening=1.0, palm=(1, 0, 1)), "a side of palm = 0: .* above 0"),
         (dict(max_opening=1.0, finger=(1, 1, 1), reach=1.5), "reach = 1.5: .* at most 1.0"),
