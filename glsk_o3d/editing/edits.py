@@ -42,12 +42,11 @@ def largest_component(skeleton: Skeleton) -> Skeleton:
     length = np.bincount(part[skeleton.edges[:, 0]], skeleton.edge_lengths, skeleton.n_components)
     stays = part == length.argmax()
     index = np.where(stays, np.cumsum(stays) - 1, -1)
-    vertex = skeleton.vertex_of_point
     return replace(
         skeleton,
         **some_vertices(skeleton, stays),
         edges=index[skeleton.edges[stays[skeleton.edges[:, 0]]]],
-        vertex_of_point=np.append(index, -1)[vertex],
+        vertex_of_point=np.append(index, -1)[skeleton.vertex_of_point],
     )
 
 
@@ -154,7 +153,7 @@ def prune(skeleton: Skeleton, *, length: float = 0.0, order: int | None = None) 
     check_number("order", order, "int?", low=0)
     if order is not None:
         skeleton = _without_orders(skeleton, order)
-    while len(ends := _short_ends(skeleton, length)):
+    while ends := _short_ends(skeleton, length):
         group = np.arange(len(skeleton.vertices))
         for path in ends:
             group[path] = path[0]
