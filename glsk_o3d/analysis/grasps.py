@@ -244,8 +244,7 @@ def _check(skeleton, clearance, around, spacing, min_confidence):
     if min_confidence != 0 and np.isnan(skeleton.confidence).all():
         raise InvalidParameterError("this skeleton has no confidence, perhaps due to its file: give min_confidence=0")
     check_number("clearance", clearance, low=0)
-    if spacing is not None:
-        check_number("spacing", spacing, low=0, open_low=True)
+    check_number("spacing", spacing, "float?", low=0, open_low=True)
     check_number("min_confidence", min_confidence, low=0, high=1)
     check_number("around", around, "int", low=1)
 
