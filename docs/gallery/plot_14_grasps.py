@@ -93,19 +93,16 @@ figure = plt.figure(figsize=(9, 4.2), layout="constrained")
 for column, (grasps, color) in enumerate(((blind[:15], "#c0504d"), (safe[:15], "#3b6ea5"))):
     axes = figure.add_subplot(1, 2, column + 1, projection="3d")
     glsk.plot_skeleton(skeleton, axes, cloud=around, view=(40, -75))
-    tip = grasps.position + grasps.depth[:, None] * grasps.approach
-    base = tip - gripper.finger[2] * grasps.approach
-    side = grasps.opening[:, None] / 2 * grasps.closing
-    forks = np.stack([tip + side, base + side, base - side, tip - side], axis=1)
+    lines = grasps.to_line_set()
+    ends = np.asarray(lines.points)[np.asarray(lines.lines)]
     axes.add_collection(
-        Line3DCollection(forks, colors=color, linewidths=1.2, zorder=3, clip_on=False)
+        Line3DCollection(ends, colors=color, linewidths=1.2, zorder=3, clip_on=False)
     )
 plt.show()
 
 # %%
-# Left, the best 15 by the skeleton alone; right, of those that touch nothing else: forks from the palm to the tips.
-# For a robot they are poses in JSON. ``glsk grasps mug.json --opening 0.08 --plane 0,0,1,0 --cone -z,95`` writes them,
-# too.
+# Left, the best 15 by the skeleton alone; right, of those that touch nothing else: forks from palm to fingertips. For a
+# robot they are poses in JSON. ``glsk grasps mug.json --opening 0.08 --plane 0,0,1,0 --cone -z,95`` writes them, too.
 
 with TemporaryDirectory() as folder:
     safe[:20].to_json(Path(folder, "grasps.json"))

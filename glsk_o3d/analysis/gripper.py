@@ -1,4 +1,4 @@
-"""A gripper with parallel jaws, and grasps for it: as arrays, as frames, and in files."""
+"""A gripper with parallel jaws, and grasps for it: as arrays, as frames, drawn, and in files."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InvalidParameterError
 from ..interop.atomic import write_json
+from ..interop.packages import import_open3d
 from ..parameters import check_number
 from .rows import Rows
 
@@ -144,6 +145,23 @@ class GraspCandidates(Rows, row="grasp"):
         for column, vectors in enumerate((self.closing, self.axis, self.approach, self.position)):
             poses[:, :3, column] = vectors
         return poses
+
+    def to_line_set(self):
+        """Each gripper as a fork of four lines, an ``open3d.geometry.LineSet``.
+
+        Two are the fingers, from tip to palm, with the opening between them, one joins them, one is as long as the palm
+        is deep.
+        """
+        o3d, hand = import_open3d(), self.gripper
+        side, tip = self.opening[:, None] / 2 * self.closing, self.depth[:, None] * self.approach
+        base = tip - hand.finger[2] * self.approach
+        fork = [side + tip, side + base, -side + base, -side + tip, base, base - hand.palm[2] * self.approach]
+        ends = (self.position + np.array(fork)).transpose(1, 0, 2).reshape(-1, 3)
+        lines = np.array([[0, 1], [1, 2], [2, 3], [4, 5]]) + len(fork) * np.arange(len(self))[:, None, None]
+        drawn = o3d.geometry.LineSet()
+        drawn.points = o3d.utility.Vector3dVector(ends)
+        drawn.lines = o3d.utility.Vector2iVector(lines.reshape(-1, 2).astype(np.int32))
+        return drawn
 
     def to_json(self, path: str | os.PathLike) -> None:
         """Write candidates, poses, gripper and `left_out`; an unknown confidence is null."""

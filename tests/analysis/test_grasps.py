@@ -209,6 +209,21 @@ def test_some_of_them():
         grasps[len(grasps)]
 
 
+def test_lines_of_the_gripper():
+    grasps = grasp_candidates(SAUROPOD, 0.2, around=2)
+    lines = grasps.to_line_set()
+    points = np.asarray(lines.points).reshape(-1, 6, 3)
+    assert len(points) == len(grasps)
+    tips = points[:, [0, 3]]
+    tip = grasps.position + grasps.depth[:, None] * grasps.approach
+    np.testing.assert_allclose(tips.mean(axis=1), tip, atol=1e-12)
+    np.testing.assert_allclose(tips[:, 0] - tips[:, 1], grasps.opening[:, None] * grasps.closing, atol=1e-12)
+    np.testing.assert_allclose(points[:, 4], tip - grasps.gripper.finger[2] * grasps.approach, atol=1e-12)
+    assert np.asarray(lines.lines).shape == (4 * len(grasps), 2)
+    ends = np.asarray(lines.points)[np.asarray(lines.lines)]
+    assert np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).min() > 0.4 * grasps.opening.min()
+
+
 def test_files(tmp_path):
     grasps = grasp_candidates(replace(SAUROPOD, confidence=()), 0.2, min_confidence=0)
     rows = list(grasps)
