@@ -64,17 +64,13 @@ _EDITS: dict[str, Callable[..., Any]] = {
     "generate_skeleton_without_loops": editing.cut_loops,
     "generate_rerooted_skeleton": editing.reroot,
     "generate_pruned_skeleton": editing.prune,
-    "generate_smoothed_skeleton": editing.smooth,
     "generate_simplified_skeleton": editing.simplify,
 }
 _ROOT = "Where the tree grows from: the lowest vertex along an axis, the thickest end, a vertex, or a point."
 _EDIT_PARAMETERS = {
     "length": facts_of("Least length of a branch that ends, from junction to tip.", "length", low=0),
-    "radius": facts_of("Least mean radius of a branch that ends.", "length", low=0),
     "order": facts_of("Highest order of branches that stays: 0 for the stem alone.", "int?", low=0),
-    "passes": facts_of("How often; more passes make longer waves disappear.", "int", low=0),
-    "tolerance": facts_of("How far a dropped vertex may be from the simpler curve.", "length?", low=0),
-    "n": facts_of("How many vertices to keep, in place of a tolerance.", "int?", low=1),
+    "tolerance": facts_of("How far a dropped vertex may be from the simpler curve.", "length", low=0),
 }
 
 

@@ -148,8 +148,8 @@ def test_a_script_replays_bit_for_bit_between_meshlabs_filters(tmp_path):
     session.generate_pruned_skeleton_glsk(length="5%", order=3)
     session.generate_rerooted_skeleton_glsk(root="thickest", layer=3)
     session.generate_copy_of_current_mesh()
-    session.generate_smoothed_skeleton_glsk(passes=3)
-    session.generate_simplified_skeleton_glsk(n=np.int64(12), layer=np.int64(2))
+    session.generate_largest_skeleton_component_glsk()
+    session.generate_simplified_skeleton_glsk(tolerance=np.float64(0.05), layer=np.int64(2))
     session.generate_segmented_cloud_glsk(layer=4)
     session.delete_current_mesh()
     session.generate_reduced_cloud_glsk(phi=1000, layer=1)
@@ -159,7 +159,7 @@ def test_a_script_replays_bit_for_bit_between_meshlabs_filters(tmp_path):
     session.generate_one_rings_glsk(k=9)
     session.create_sphere(subdiv=1)
     again = repeated(session, scans, tmp_path / "replay.mlx")
-    assert session.mesh(8).vertex_number() == 12
+    assert 3 < session.mesh(8).vertex_number() < session.mesh(2).vertex_number()
     assert [(mesh.id(), mesh.label()) for mesh in again] == [(mesh.id(), mesh.label()) for mesh in session]
     for a, b in zip(session, again, strict=True):
         for matrix in ("vertex_matrix", "edge_matrix", "face_matrix", "vertex_scalar_array", "vertex_color_matrix"):
