@@ -91,10 +91,7 @@ class Layer:
     def of_mesh(cls, mesh: Any) -> Layer:
         """A ``pymeshlab.Mesh`` as its matrix shows it; what nobody has set, zeros or white, is left out."""
         normals, scalars, colors = mesh.vertex_normal_matrix(), mesh.vertex_scalar_array(), mesh.vertex_color_matrix()
-        # normals keep their lengths, and stay normal where the matrix is no rotation
-        turned = normals @ np.linalg.pinv(mesh.transform_matrix()[:3, :3])
-        before, after = (np.linalg.norm(vectors, axis=1, keepdims=True) for vectors in (normals, turned))
-        turned *= np.divide(before, after, out=np.ones_like(after), where=after > 0)
+        turned = normals @ np.linalg.pinv(mesh.transform_matrix()[:3, :3])  # stay normal if it is no rotation
         return cls(
             mesh.transformed_vertex_matrix(),
             faces=mesh.face_matrix() if mesh.face_number() else None,

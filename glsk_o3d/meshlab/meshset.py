@@ -5,13 +5,11 @@ import re
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, GlskError, InvalidCloudError, InvalidParameterError, did_you_mean
-from ..interop.atomic import write_atomically
+from ..errors import FileFormatError, GlskError, InvalidCloudError, InvalidParameterError, did_you_mean, in_words
 from ..interop.packages import require
 from ..io.paths import SCAN_ENDINGS, existing_file
 from ..io.skeletons import FORMATS, holds_skeleton
@@ -138,11 +136,6 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         return [*pymeshlab.filter_list(), *verbs()]
 
     @staticmethod
-    def print_filter_list() -> None:
-        """Print the names of all filters, MeshLab's and ours."""
-        print("\n".join(MeshSet.filter_list()))
-
-    @staticmethod
     def print_filter_parameter_list(filter_name: str) -> None:
         """Print the parameters of a filter: name, type and default; of ours also limits and meaning."""
         verb = verbs().get(_known(filter_name))
@@ -153,14 +146,6 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         defaults = verb.values({})
         for name, slot in verb.slots.items():
             print(slot.listing(defaults.get(name, "as the pipeline has it")))
-
-    @staticmethod
-    def search(word: str) -> None:
-        """Print the filters, MeshLab's and ours, whose names or descriptions have a word."""
-        for verb in verbs().values():
-            if all(part in f"{verb.name} {verb.title} {verb.doc}".lower() for part in word.lower().split()):
-                print(f"{verb.name} : {verb.doc}")
-        pymeshlab.search(word)
 
     def load_filter_script(self, filter_script_name: str | os.PathLike, *, any_filter: bool = False) -> None:
         """Make a script file the current script. It is checked and not run; ScriptError names faults.
@@ -231,13 +216,13 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         FileNotFoundError or FileFormatError without points. `load_new_mesh` also has colours of faces and textures.
         """
         path = existing_file(path)
+        if path.suffix.lower() in SCAN_ENDINGS or holds_skeleton(path):
+            self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)
+            return
         try:
-            if path.suffix.lower() in SCAN_ENDINGS or holds_skeleton(path):
-                self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)
-            else:
-                self.load_new_mesh(str(path))
+            self.load_new_mesh(str(path))
         except pymeshlab.PyMeshLabException as error:
-            raise FileFormatError(f"{path}: MeshLab cannot read it: {' '.join(str(error).split())}") from error
+            raise FileFormatError(f"{path}: MeshLab cannot read it: {in_words(error)}") from error
         if not self.current_mesh().vertex_number():
             raise FileFormatError(f"{path}: no points could be read")
 
@@ -253,18 +238,11 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             super().save_current_mesh(os.fspath(file_name), *args, **kwargs)
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write the current layer as ``glsk run`` does, complete or not at all: by MeshLab if it has faces.
+        """Write the current layer as ``glsk run`` does, complete or not at all. Options are those of `save_skeleton`.
 
-        Options are those of `save_skeleton`. FileFormatError for an unknown ending.
+        FileFormatError for an unknown ending.
         """
-        layer = self.layer()
-        if layer.faces is None or Path(path).suffix.lower() in (".pcd", ".xyz"):  # which hold no faces
-            layer.save(path, **options)
-            return
-        try:
-            write_atomically(path, lambda temporary: super(MeshSet, self).save_current_mesh(str(temporary)))
-        except pymeshlab.PyMeshLabException as error:
-            raise FileFormatError(f"{path}: MeshLab cannot write it: {' '.join(str(error).split())}") from error
+        self.layer().save(path, **options)
 
     def clear(self) -> None:
         """Remove all layers. The current script stays."""

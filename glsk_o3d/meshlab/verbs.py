@@ -4,6 +4,7 @@ import dataclasses
 import inspect
 import re
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -18,7 +19,7 @@ from ..io.colors import shades
 from ..io.formats.graphs import graph_skeleton
 from ..lpr_reducer import LPRReducer
 from ..numerics.vectors import AXES
-from ..parameters import Parameters, parameter, problem_with, resolve_length
+from ..parameters import Parameters, parameter, problem_with, resolve_length, shown
 from ..pipeline import Filter, Pipeline, parts
 from ..pipelines import default
 from ..recipes.catalogue import catalogue, known_pipelines, named_pipeline, serves
@@ -26,20 +27,18 @@ from ..skeleton import Skeleton
 from ..state import Contraction
 from ..thinner import Thinner
 from .layers import Layer
-from .script import BOOL, FLOAT, LENGTH, Param
+from .script import Param
 
 PARTS = ("reducer", "stop")
 OF_FRAME = " of the frame"
 """What follows a percentage that is as everywhere else in this package, of the box that the Sampler's `frame` names."""
-_SLOT_TYPES = {
-    "bool": ("bool", BOOL),
-    "int": ("int", ("RichInt",)),
-    "float": ("float", FLOAT),
-    "length": ("PercentageValue", LENGTH),
-    "choice": ("str", ("RichString", "RichEnum")),
-    "root": ("str", ("RichString", "RichInt", "RichPosition")),
+_TYPES = {
+    "bool": ("bool", "RichBool"),
+    "int": ("int", "RichInt"),
+    "float": ("float", "RichFloat"),
+    "length": ("PercentageValue", "RichAbsPerc"),
 }
-"""What listings call the types of parameters, and those of scripts, of which the first is written; others are words."""
+"""What listings and scripts call the types of parameters; others are words."""
 
 
 def facts_of(doc: str, type: str, choices: tuple[str, ...] = (), low: float | None = None) -> Mapping[str, Any]:
@@ -106,15 +105,6 @@ class Slot:
             words = [name for name in serving if name != self.option.partition(".")[0]]
         return (*words, *["none"] * self.facts["type"].endswith("?"))
 
-    @property
-    def types(self) -> tuple[str, ...]:
-        """The types that it may have in a script; the first is written."""
-        if self.name == "layer":
-            return ("RichMesh", "RichInt")
-        _, types = _SLOT_TYPES.get(self.kind, ("str", ("RichString",)))
-        worded = self.kind == "length" or self.words
-        return (*types, "RichString") if worded and "RichString" not in types else types
-
     def checked(self, value: Any) -> Any:
         """The value as the filter takes it, reducers and rules made from their names; ValueError if it is wrong."""
         if isinstance(value, np.generic):
@@ -125,9 +115,7 @@ class Slot:
             return None
         if self.kind == "length" and self.option and isinstance(value, str):  # filters alone know the frame
             value = value.removesuffix(OF_FRAME)
-        if self.kind == "choice" and type(value) is int:
-            if not 0 <= value < len(self.words):
-                raise ValueError(f"must be one of {', '.join(map(repr, self.words))}, or its number from 0")
+        if self.kind == "choice" and type(value) is int and 0 <= value < len(self.words):
             value = self.words[value]
         if self.kind in PARTS and isinstance(value, str):
             if value not in self.words:
@@ -136,10 +124,8 @@ class Slot:
         if self.kind == "root" and str(value).isdecimal():
             return int(value)
         wrong = problem_with(value, self.facts)
-        if wrong and self.kind == "root":
-            wrong += ", or the number of a vertex"
         if wrong:
-            raise ValueError(wrong)
+            raise ValueError(wrong + ", or the number of a vertex" * (self.kind == "root"))
         return value
 
     def is_of_box(self, value: Any) -> bool:
@@ -148,8 +134,18 @@ class Slot:
 
     def read(self, param: Param) -> Any:
         """The value of a parameter in a script, checked but not resolved; ValueError if it is wrong."""
-        value = param.value(self.types)
-        self.checked(value)
+        value: Any = param.text
+        if self.kind == "bool":
+            value = {"true": True, "false": False}.get(value.lower(), value)
+        elif self.kind != "root":
+            for number in (int, float) if self.kind in ("float", "length") else (int,):
+                with suppress(ValueError):
+                    value = number(param.text)
+                    break
+        try:
+            self.checked(value)
+        except ValueError as error:
+            raise ValueError(f"{error}, not {shown(value)}") from None
         return value
 
     def written(self, value: Any) -> Param:
@@ -157,12 +153,14 @@ class Slot:
         if isinstance(value, Parameters | None):
             value = "none" if value is None else type(value).__name__
         text = str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else repr(value)
+        _, type_ = _TYPES.get(self.kind, ("str", "RichString"))
         worded = isinstance(value, str) and not self.is_of_box(value)
-        return Param(self.name, "RichString" if worded else self.types[0], {"value": text})
+        kind = "RichMesh" if self.name == "layer" else "RichString" if worded else type_
+        return Param(self.name, kind, {"value": text})
 
     def listing(self, default: Any) -> str:
         """Two lines as MeshLab prints them, with limits and meaning."""
-        kind, _ = _SLOT_TYPES.get(self.kind, ("str", ()))
+        kind, _ = _TYPES.get(self.kind, ("str", ""))
         limits = {"above" if self.facts["open_low"] else "min": self.facts["low"], "max": self.facts["high"]}
         limits = {key: limit for key, limit in limits.items() if limit is not None}
         said = f" [{'; '.join(f'{key}: {limit:g}' for key, limit in limits.items())}]" if limits else ""
