@@ -27,9 +27,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
     """``pymeshlab.MeshSet`` with the filters of this package added.
 
     Our filters are called like MeshLab's, by name or as methods, and can be mixed with them in filter scripts. Each
-    makes a new current layer: a skeleton has vertices, edges, and the radii as vertex scalars. A filter continues from
-    the layer of an earlier one of ours if its vertices and edges are unchanged. On any other layer the vertices are the
-    cloud, and the earlier steps run with their defaults.
+    makes a new current layer: a skeleton has vertices, edges, and the radii as vertex scalars.
 
     A length is ``pymeshlab.PercentageValue`` or a string such as ``"2%"``, of the diagonal of the layer's bounding box
     as in MeshLab; or ``pymeshlab.PureValue`` or a float, in the units of the cloud. Defaults refer to the box of
@@ -51,7 +49,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
     def __init__(self, *args: Any, **kwargs: Any):
         super().__init__(*args, **kwargs)
         self._script: list[Step] = []
-        self._flows: dict[int, Layer] = {}  # what our filters made, by the number of the layer
+        self._made: dict[int, Layer] = {}  # what our filters made, by the number of the layer
 
     def apply_filter(self, filter_name: str, **params: Any) -> dict[str, Any]:
         """Apply a filter of MeshLab's or ours to the current layer.
@@ -70,10 +68,8 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
 
         Raises
         ------
-        InvalidParameterError
-            There is no such filter; or one of ours was given an unknown parameter or a wrong value.
-        InvalidCloudError
-            The layer cannot be skeletonised.
+        InvalidParameterError, InvalidCloudError
+            There is no such filter; or one of ours cannot be run so, or not on this layer.
         pymeshlab.PyMeshLabException
             A filter of MeshLab's failed.
         """
@@ -101,8 +97,8 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         assert step.verb is not None
         layer = step.verb.run(self.layer(step.values.get("layer", -1)), step.values, on_iteration)
         self.add_mesh(layer.to_pymeshlab(), layer.label)
-        self._flows = {number: known for number, known in self._flows.items() if self.mesh_id_exists(number)}
-        self._flows[self.current_mesh_id()] = layer
+        self._made = {number: known for number, known in self._made.items() if self.mesh_id_exists(number)}
+        self._made[self.current_mesh_id()] = layer
         return {"layer": self.current_mesh_id(), **layer.summary()}
 
     def _run_theirs(self, name: str, params: dict[str, Any]) -> dict[str, Any]:
@@ -124,12 +120,6 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             super().save_filter_script(file)
             return read_script(file)[0]
 
-    def filter_parameter_values(self, filter_name: str, **params: Any) -> dict[str, Any]:
-        """The parameters that `apply_filter` would use: the given ones, and defaults."""
-        if filter_name in verbs():
-            return verbs()[filter_name].values(_plain_lengths(params))
-        return super().filter_parameter_values(filter_name, **params)
-
     @staticmethod
     def filter_list() -> list[str]:
         """The names of all filters, MeshLab's and ours."""
@@ -143,9 +133,8 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             pymeshlab.print_filter_parameter_list(filter_name)
             return
         print(f"{filter_name} filter - list of parameter names:")
-        defaults = verb.values({})
-        for name, slot in verb.slots.items():
-            print(slot.listing(defaults.get(name, "as the pipeline has it")))
+        for slot in verb.slots.values():
+            print(slot.listing())
 
     def load_filter_script(self, filter_script_name: str | os.PathLike, *, any_filter: bool = False) -> None:
         """Make a script file the current script. It is checked and not run; ScriptError names faults.
@@ -192,13 +181,13 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         number = self.current_mesh_id() if number == -1 else number
         if not self.mesh_id_exists(number):
             raise InvalidParameterError(f"layer = {number}: there is no such layer")
-        layer, known = Layer.of_mesh(self.mesh(number)), self._flows.get(number)
+        layer, known = Layer.of_mesh(self.mesh(number)), self._made.get(number)
         if known is None or not known.shows(layer):
             return layer
-        flow, scalars = known.flow, self.mesh(number).vertex_scalar_array()
-        if isinstance(flow, Skeleton) and not np.array_equal(scalars, flow.radii, equal_nan=True):
-            flow = replace(flow, radii=scalars, half_width=scalars, half_thickness=scalars)
-        return replace(layer, edges=known.edges, flow=flow, source=known.source)
+        skeleton, scalars = known.skeleton, self.mesh(number).vertex_scalar_array()
+        if skeleton is not None and not np.array_equal(scalars, skeleton.radii, equal_nan=True):
+            skeleton = replace(skeleton, radii=scalars, half_width=scalars, half_thickness=scalars)
+        return replace(layer, edges=known.edges, skeleton=skeleton, source=known.source)
 
     def current_skeleton(self) -> Skeleton:
         """The skeleton in the current layer; its radii are the layer's scalars. InvalidCloudError if it has no edges.
@@ -247,7 +236,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
     def clear(self) -> None:
         """Remove all layers. The current script stays."""
         super().clear()
-        self._flows = {}
+        self._made = {}
 
 
 def _known(name: Any) -> str:

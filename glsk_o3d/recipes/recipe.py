@@ -4,7 +4,6 @@ import dataclasses
 import json
 import os
 import sys
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+_KEYS = ("glsk_o3d", "pipeline", "extends", "set")
 RECIPE_ENDINGS = (".json", ".toml")
 """Files that hold recipes."""
 
@@ -53,36 +53,8 @@ def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
     """
     pipeline.check()
     recipe = recipe_of(*(stage.table() for stage in pipeline.stages))
-    for i, stage in enumerate(pipeline.stages):
-        _refuse_unknown(stage, f"pipeline[{i}]")
-    _refuse_gaps(recipe)
+    from_recipe(recipe)  # refuses what it could not make again
     return recipe
-
-
-def _refuse_gaps(value: Any, path: str = "") -> None:
-    """Raise RecipeError, with its path, for what a recipe says that it could not hold."""
-    if isinstance(value, dict) and UNWRITTEN in value:
-        raise RecipeError(f"{path}: a recipe cannot hold it: {value[UNWRITTEN]}")
-    if isinstance(value, dict):
-        for key, item in value.items():
-            _refuse_gaps(item, f"{path}.{key}" if path else str(key))
-    elif isinstance(value, list):
-        for i, item in enumerate(value):
-            _refuse_gaps(item, f"{path}[{i}]")
-
-
-def _refuse_unknown(part: Parameters, path: str) -> None:
-    """Raise RecipeError if a filter or rule, or one inside it, is none that a recipe could name."""
-    cls = type(part)
-    if find(cls.__name__) is not cls:
-        name = f"{cls.__module__}.{cls.__qualname__}"
-        raise RecipeError(
-            f"{path}: a recipe cannot hold it: {name} is not among the filters and rules of 'glsk filters'"
-        )
-    for field in dataclasses.fields(part):  # type: ignore[arg-type]
-        value = getattr(part, field.name)
-        if isinstance(value, Parameters):
-            _refuse_unknown(value, f"{path}.{field.name}")
 
 
 def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
@@ -158,21 +130,13 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     data = Path(path).read_bytes()
     try:
         text = data.decode("utf-8-sig")
-        recipe = json.loads(text, object_pairs_hook=_table) if ending == ".json" else tomllib.loads(text)
+        recipe = json.loads(text) if ending == ".json" else tomllib.loads(text)
     except Exception as error:  # whatever a parser raises on a hostile file
         raise RecipeError(f"{os.fspath(path)}: not valid {ending[1:].upper()}: {error}") from error
     try:
         return from_recipe(recipe)
     except (RecipeError, RecursionError) as error:
         raise RecipeError(f"{os.fspath(path)}: {error}") from None
-
-
-def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A table of JSON, in which no key may stand twice."""
-    often = Counter(key for key, _ in pairs)
-    if len(often) < len(pairs):
-        raise ValueError(f"the key {often.most_common(1)[0][0]!r} appears twice in one table")
-    return dict(pairs)
 
 
 def from_recipe(recipe: dict[str, Any]) -> Pipeline:
@@ -201,7 +165,6 @@ def from_recipe(recipe: dict[str, Any]) -> Pipeline:
     20
     """
     _check_head(recipe)
-    _refuse_gaps(recipe)
     if "extends" in recipe:
         return _extended(recipe["extends"], recipe.get("set", {}))
     stages = recipe["pipeline"]
@@ -216,21 +179,14 @@ def _check_head(recipe: Any) -> None:
     example = f'{{"glsk_o3d": {{"version": {RECIPE_VERSION}}}, "pipeline": [...]}}'
     if not isinstance(recipe, dict):
         raise RecipeError(f"a recipe is a table such as {example}, not {shown(recipe)}")
-    head = recipe.get("glsk_o3d")
-    if not isinstance(head, dict) or "version" not in head:
+    version = recipe["glsk_o3d"].get("version") if isinstance(recipe.get("glsk_o3d"), dict) else None
+    if version is None:
         raise RecipeError(f"glsk_o3d.version: is missing; a recipe is a table such as {example}")
-    version = head["version"]
-    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
-        raise RecipeError(f"glsk_o3d.version: must be {RECIPE_VERSION}, not {shown(version)}")
-    if version > RECIPE_VERSION:
-        raise RecipeError(f"glsk_o3d.version: is {version} and this release reads {RECIPE_VERSION}: update glsk-o3d")
-    for path, table, known in (
-        ("glsk_o3d.", head, ("version",)),
-        ("", recipe, ("glsk_o3d", "pipeline", "extends", "set")),
-    ):
-        for key in table:
-            if key not in known:
-                raise RecipeError(f"{path}{brief(key)}: {did_you_mean(str(key), known, 'key of this table')}")
+    if version != RECIPE_VERSION:
+        raise RecipeError(f"glsk_o3d.version: is {shown(version)}; this release reads {RECIPE_VERSION}: update glsk-o3d")
+    for key in recipe:
+        if key not in _KEYS:
+            raise RecipeError(f"{brief(key)}: {did_you_mean(str(key), _KEYS, 'key of this table')}")
     if ("pipeline" in recipe) == ("extends" in recipe):
         both = "has both" if "pipeline" in recipe else "lacks both"
         raise RecipeError(f"a recipe has either 'pipeline' or 'extends', and this one {both}")
@@ -257,6 +213,8 @@ def _extended(name: Any, changes: Any) -> Pipeline:
 def _part(table: Any, path: str, role: str) -> Parameters:
     """A filter, reducer or rule from its table."""
     kind = "rule" if role == "stop" else "filter"
+    if isinstance(table, dict) and UNWRITTEN in table:
+        raise RecipeError(f"{path}: a recipe cannot hold it: {table[UNWRITTEN]}")
     if not isinstance(table, dict) or kind not in table:
         raise RecipeError(f'{path}: must be a table such as {{"{kind}": NAME, ...}}, not {shown(table)}')
     name = table[kind]

@@ -1,26 +1,22 @@
 """Runs repeated from the recipe in their report."""
 
 import dataclasses
-import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from ..errors import InvalidParameterError, RecipeError, SkeletonWarning
+from ..errors import InvalidParameterError, RecipeError
 from ..interop.clouds import Cloud
-from ..pipeline import Pipeline, after, with_stage
-from ..report import Report, outside
+from ..pipeline import Pipeline
 from ..skeleton import Skeleton
 from .recipe import from_recipe
 
 
 def identical(skeleton: Skeleton, other: Skeleton) -> bool:
     """Whether two skeletons have the same vertices, edges and radii, to the last bit."""
-    return all(
-        np.array_equal(getattr(skeleton, name), getattr(other, name), equal_nan=name == "radii")
-        for name in ("vertices", "edges", "radii")
-    )
+    pairs = [(getattr(skeleton, name), getattr(other, name)) for name in ("vertices", "edges", "radii")]
+    return all(np.array_equal(one, two, equal_nan=True) for one, two in pairs)
 
 
 def is_of_sample(skeleton: Skeleton) -> bool:
@@ -29,7 +25,7 @@ def is_of_sample(skeleton: Skeleton) -> bool:
 
 
 def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -> Skeleton:
-    """Make a skeleton again with the recipe in its report.
+    """Make a skeleton again with the recipe in its report: on the same machine with the same releases bit for bit.
 
     Parameters
     ----------
@@ -48,12 +44,7 @@ def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -
     Raises
     ------
     RecipeError
-        There is no recipe, or not a complete one; the message says what is missing.
-
-    Warns
-    -----
-    SkeletonWarning
-        The result on the skeleton's own points differs from it: other releases computed it.
+        There is no recipe, or not a complete one, or not all points; the message says what is missing.
 
     Examples
     --------
@@ -65,9 +56,7 @@ def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -
     """
     recipe = skeleton.report.recipe
     if not recipe:
-        raise RecipeError(
-            "it holds no recipe: .json and .npz results of glsk-o3d have one, but not those of old releases"
-        )
+        raise RecipeError("it holds no recipe: results of glsk-o3d as .json and .npz have one")
     pipeline = from_recipe(recipe)
     try:
         pipeline.check_complete()
@@ -75,25 +64,8 @@ def rerun(skeleton: Skeleton, cloud: Any = None, **callbacks: Callable | None) -
         raise RecipeError(f"pipeline: {error}") from None
     if cloud is not None:
         return pipeline(cloud, **callbacks)
-    if not len(skeleton.points):
-        raise RecipeError("it holds no points: give the scan")
-    if is_of_sample(skeleton):
-        raise RecipeError(
-            "it holds a sample of a large cloud without the number of points that each represents: give the scan"
-        )
+    if not len(skeleton.points) or is_of_sample(skeleton):
+        raise RecipeError("it does not hold all points, but none or a sample: give the scan")
     first = max((i for i, stage in enumerate(pipeline.stages) if stage.produces is Cloud), default=-1) + 1
     again = Pipeline(*pipeline.stages[first:])(skeleton.points, **callbacks)
-    if first:
-        ahead = Report()
-        for stage in pipeline.stages[:first]:
-            ahead = with_stage(ahead, stage, 0.0)
-        again = dataclasses.replace(again, report=after(again.report, ahead))
-    if not identical(again, skeleton):
-        then, now = skeleton.report.versions, again.report.versions
-        others = [f"{name} {then.get(name)} instead of {now[name]}" for name in now if then.get(name) != now[name]]
-        warnings.warn(
-            f"the rerun differs from the result, which was made with {', '.join(others) or 'the same releases'}",
-            SkeletonWarning,
-            stacklevel=outside(),
-        )
-    return again
+    return dataclasses.replace(again, report=dataclasses.replace(again.report, recipe=recipe))

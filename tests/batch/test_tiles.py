@@ -107,7 +107,7 @@ def test_a_batch_that_is_killed_leaves_no_worker_goes_on_and_comes_to_the_same(
     batch(out="undisturbed")
     process = start(scene, "-o", "out", "--tiles", "0.7", "--overlap", "0.17", "--workers", "1")
     ledger = tmp_path / "out" / "ledger.jsonl"
-    until(lambda: ledger.exists() and ledger.read_bytes().count(b"\n") >= 2, process)
+    until(lambda: ledger.exists() and ledger.read_bytes().count(b'"done"') >= 2, process)
     workers = psutil.Process(process.pid).children()
     process.kill()
     process.communicate()
