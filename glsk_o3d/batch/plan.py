@@ -52,6 +52,11 @@ class Plan:
         The ledger in the folder.
     left_out : dict of str to str
         Skipped files in the folders, with the reason.
+
+    Examples
+    --------
+    >>> plan = plan_batch("scans", "skeletons", recursive=True)  # doctest: +SKIP
+    >>> [(task.source, task.why) for task in plan.todo]  # doctest: +SKIP
     """
 
     out_dir: Path

@@ -44,6 +44,11 @@ class BatchResult:
     seconds : float
         Wall time from the first cloud.
     ledger : Path
+
+    Examples
+    --------
+    >>> BatchResult({}, done=3, skipped=0, failed=1, seconds=2.0, ledger=Path("ledger.jsonl")).rate
+    2.0
     """
 
     rows: dict[str, Row]

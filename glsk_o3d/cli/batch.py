@@ -23,7 +23,7 @@ def batch(
     inputs: Annotated[
         list[str],
         argument(
-            "DIR|GLOB|LIST|SCAN...", "Folders, glob patterns in quotes, lists (.txt, a path per line), and scans."
+            "DIR|LIST|SCAN...", "Folders, lists (.txt, a path per line), and scans."
         ),
     ],
     output: Annotated[Path, output_option("FOLDER", "For the skeletons and the ledger; made if needed.")],

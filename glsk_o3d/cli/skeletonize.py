@@ -148,7 +148,7 @@ def rerun(
     """Repeat the run that made a result.
 
     It is run with the recipe that the result holds. On the points of the result the skeleton is the same to the last
-    bit; where other releases make it differ, there is a warning. Without outputs it only says whether it is the same.
+    bit, unless other releases made it. Without outputs it only says whether it is the same.
     'glsk skeletonize --recipe' runs recipes from files of their own.
     """
     from .. import ContractionRecorder, RecipeError, from_recipe, read_cloud, read_skeleton

@@ -2,9 +2,9 @@
 
 import dataclasses
 import sys
-import threading
 import warnings
 from contextlib import redirect_stdout
+from importlib.metadata import EntryPoint
 from typing import Any
 
 from ..errors import PluginWarning
@@ -23,7 +23,6 @@ class _Unfit(Exception):
 
 
 _found: dict[str, dict[str, Any]] = {}
-_lock = threading.RLock()
 
 
 def plugins(group: str) -> dict[str, Any]:
@@ -31,44 +30,38 @@ def plugins(group: str) -> dict[str, Any]:
 
     A PluginWarning says once of each that is broken what is wrong; it is left out, and the others are not.
     """
-    builtin, check = (BUILTIN, _check_filter) if group == FILTER_GROUP else (PIPELINES, _check_pipeline)
-    with _lock:
-        if group not in _found:
-            found = _found[group] = {}  # already there for plugins that themselves ask for plugins
+    if group not in _found:
+        found = _found[group] = {}  # already there for plugins that themselves ask for plugins
+        problems: list[str] = []
+        for distribution, entry in entry_points(group, problems):
             try:
-                problems = _load(group, builtin, check, found)
-            except BaseException:  # interrupted: next time from the start
-                del _found[group]
+                found[entry.name] = _load(entry, group, found)
+            except KeyboardInterrupt:
+                del _found[group]  # next time from the start
                 raise
-            for problem in problems:
-                warnings.warn(problem, PluginWarning, stacklevel=outside())
-        return _found[group]
+            except BaseException as error:  # whatever code of others raises; some is no Exception
+                cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
+                problems.append(f"plugin {entry.name!r} ({entry.value}) of {distribution} left out: {cause}")
+        for problem in problems:
+            warnings.warn(problem, PluginWarning, stacklevel=outside())
+    return _found[group]
 
 
 def forget_plugins() -> None:
     """Search for plugins again at the next use, after one was installed into a running process."""
-    with _lock:
-        _found.clear()
+    _found.clear()
 
 
-def _load(group, builtin, check, found):
-    """Fill `found` with plugins; gives what is wrong with the others."""
-    problems: list[str] = []
-    for distribution, entry in entry_points(group, problems):
-        try:
-            if entry.name in builtin or entry.name in found:
-                owner = "the built-in one" if entry.name in builtin else "one of another plugin"
-                raise _Unfit(f"the name is that of {owner}")
-            with redirect_stdout(sys.stderr):  # where there are results of commands, nothing else may be
-                plugin = entry.load()
-                check(entry.name, plugin)
-            found[entry.name] = plugin
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # whatever code of others raises; some is no Exception
-            cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
-            problems.append(f"plugin {entry.name!r} ({entry.value}) of {distribution} left out: {cause}")
-    return problems
+def _load(entry: EntryPoint, group: str, found: dict[str, Any]) -> Any:
+    """What an entry point names; _Unfit, or whatever its code raises, if it cannot be used."""
+    builtin: Any = BUILTIN if group == FILTER_GROUP else PIPELINES
+    if entry.name in builtin or entry.name in found:
+        owner = "the built-in one" if entry.name in builtin else "one of another plugin"
+        raise _Unfit(f"the name is that of {owner}")
+    with redirect_stdout(sys.stderr):  # where there are results of commands, nothing else may be
+        plugin = entry.load()
+        (_check_filter if group == FILTER_GROUP else _check_pipeline)(entry.name, plugin)
+    return plugin
 
 
 def _check_filter(name: str, cls: Any) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import tomli_w
 
-from ..errors import InvalidParameterError, RecipeError, brief, did_you_mean
+from ..errors import InvalidParameterError, RecipeError, did_you_mean
 from ..interop.atomic import write_atomically
 from ..parameters import FROM, NONE, UNWRITTEN, Parameters, problem_with, shown
 from ..pipeline import RECIPE_VERSION, Pipeline, recipe_of
@@ -89,7 +89,6 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
 
 
 def _ending(path: str | os.PathLike) -> str:
-    """The ending of a recipe's file name; RecipeError for another one."""
     ending = Path(path).suffix.lower()
     if ending not in RECIPE_ENDINGS:
         raise RecipeError(f"{os.fspath(path)}: unknown ending; recipes are {' or '.join(RECIPE_ENDINGS)} files")
@@ -120,13 +119,11 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder, "mine.json")
-    ...     _ = path.write_text('{"glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {"k": 12}}}')
-    ...     load_recipe(path).stages[4].k
-    12
+    ...     _ = path.write_text('{"glsk_o3d": {"version": 1}, "extends": "cao2010"}')
+    ...     print(load_recipe(path).stages[-2])
+    Connector(radius='1%', thickness=0.6, links='all')
     """
     ending = _ending(path)
-    if os.path.exists(path) and not os.path.isfile(path):
-        raise RecipeError(f"{os.fspath(path)}: is a folder, a pipe or a device, not a file")
     data = Path(path).read_bytes()
     try:
         text = data.decode("utf-8-sig")
@@ -183,10 +180,12 @@ def _check_head(recipe: Any) -> None:
     if version is None:
         raise RecipeError(f"glsk_o3d.version: is missing; a recipe is a table such as {example}")
     if version != RECIPE_VERSION:
-        raise RecipeError(f"glsk_o3d.version: is {shown(version)}; this release reads {RECIPE_VERSION}: update glsk-o3d")
+        raise RecipeError(
+            f"glsk_o3d.version: is {shown(version)}; this release reads {RECIPE_VERSION}: update glsk-o3d"
+        )
     for key in recipe:
         if key not in _KEYS:
-            raise RecipeError(f"{brief(key)}: {did_you_mean(str(key), _KEYS, 'key of this table')}")
+            raise RecipeError(f"{key}: {did_you_mean(str(key), _KEYS, 'key of this table')}")
     if ("pipeline" in recipe) == ("extends" in recipe):
         both = "has both" if "pipeline" in recipe else "lacks both"
         raise RecipeError(f"a recipe has either 'pipeline' or 'extends', and this one {both}")
@@ -205,7 +204,7 @@ def _extended(name: Any, changes: Any) -> Pipeline:
     for owner, values in changes.items():
         cls = find(owner)
         if cls is None:
-            raise RecipeError(f"set.{brief(owner)}: {did_you_mean(str(owner), catalogue(), 'filter or rule')}")
+            raise RecipeError(f"set.{owner}: {did_you_mean(str(owner), catalogue(), 'filter or rule')}")
         read |= {f"{owner}.{field}": value for field, value in _values(cls, values, f"set.{owner}").items()}
     return _valid(lambda: pipeline.with_options(read), "set")
 
@@ -239,7 +238,7 @@ def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
     for name, value in table.items():
         if name not in fields:
             hint = did_you_mean(str(name), fields, f"parameter of {cls.__name__}")
-            raise RecipeError(f"{path}.{brief(name)}: {hint}")
+            raise RecipeError(f"{path}.{name}: {hint}")
         facts = fields[name]
         kind = facts["type"]
         if kind.endswith("?") and value == NONE and NONE not in facts["choices"]:
