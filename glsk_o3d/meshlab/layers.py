@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import write_atomically
 from ..interop.clouds import cloud_points
-from ..interop.packages import import_open3d, require
+from ..interop.packages import require
 from ..io.formats import ply
 from ..io.formats.graphs import graph_skeleton
 from ..io.paths import existing_file
@@ -22,7 +22,7 @@ from ..io.scans import read_scan
 from ..io.skeletons import holds_skeleton, read_skeleton, save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
 
-LAYER_ENDINGS = {"points": (".ply", ".xyz"), "mesh": (".ply", ".obj", ".off", ".stl")}
+LAYER_ENDINGS = {"points": (".ply", ".xyz"), "mesh": (".ply",)}
 """What layers without edges are written as."""
 
 
@@ -69,9 +69,10 @@ class Layer:
         scan = read_scan(path)
         points, normals, faces, colors = scan.positions, scan.normals, scan.triangles, scan.colors
         if path.suffix.lower() == ".stl":
-            mesh = _open3d_mesh(points, faces, normals)
-            mesh.remove_duplicated_vertices()
-            points, normals, faces = map(np.array, (mesh.vertices, mesh.vertex_normals, mesh.triangles))
+            _, first, same = np.unique(points, axis=0, return_index=True, return_inverse=True)
+            kept = np.sort(first)
+            points, faces = points[kept], np.searchsorted(kept, first[same.ravel()])[faces]
+            normals = None if normals is None else normals[kept]
         return cls(
             points,
             faces=faces if len(faces) else None,
@@ -162,18 +163,17 @@ class Layer:
     def save(self, path: str | os.PathLike, **options: Any) -> None:
         """Write the layer, complete or not at all: a skeleton by `save_skeleton`, which has the options.
 
-        Others by their endings: ``.ply`` with everything, the scalars as ``quality`` as MeshLab has it, or ``.xyz``; a
-        mesh also as ``.obj``, ``.off`` or ``.stl``.
+        Others as ``.ply`` with everything, the scalars as ``quality`` as MeshLab has it, or their vertices as ``.xyz``.
         """
         path = Path(path)
         if self.is_skeleton:
             save_skeleton(self.to_skeleton(), path, **options)
             return
         check_ending(path, "points" if self.faces is None else "points or mesh")
-        if path.suffix.lower() == ".xyz":
-            write_atomically(path, lambda temporary: np.savetxt(temporary, self.vertices, fmt="%.17g"))
-        else:
-            write_atomically(path, self._write_ply if path.suffix.lower() == ".ply" else self._write_mesh)
+        as_text = path.suffix.lower() == ".xyz"
+        write_atomically(
+            path, lambda file: np.savetxt(file, self.vertices, "%.17g") if as_text else self._write_ply(file)
+        )
 
     def _write_ply(self, path: Path) -> None:
         columns = dict(zip("xyz", self.vertices.T.astype(float), strict=True))
@@ -191,28 +191,6 @@ class Layer:
             said = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
         header = ply.header_of(vertices.dtype, len(vertices), more=said)
         path.write_bytes(header + vertices.tobytes() + faces.tobytes())
-
-    def _write_mesh(self, path: Path) -> None:
-        mesh = _open3d_mesh(self.vertices, self.faces, self.normals)
-        mesh.vertex_colors = _vectors(None if self.colors is None else self.colors[:, :3])
-        if path.suffix.lower() == ".stl":
-            mesh.compute_triangle_normals()
-        if not import_open3d().io.write_triangle_mesh(str(path), mesh):
-            raise FileFormatError(f"{path}: Open3D cannot write it")
-
-
-def _vectors(array):
-    """Rows of three, or none, as Open3D holds them."""
-    rows = np.empty((0, 3)) if array is None else np.ascontiguousarray(array, float)
-    return import_open3d().utility.Vector3dVector(rows)
-
-
-def _open3d_mesh(points, faces, normals):
-    o3d = import_open3d()
-    triangles = o3d.utility.Vector3iVector(np.ascontiguousarray(faces, np.int32))
-    mesh = o3d.geometry.TriangleMesh(_vectors(points), triangles)
-    mesh.vertex_normals = _vectors(normals)
-    return mesh
 
 
 def check_ending(path: Path, what: str) -> None:

@@ -47,8 +47,7 @@ def read_script(path: str | os.PathLike) -> list[Call]:
     """The filters of a script, at least one. Whether they exist is not asked here.
 
     FileNotFoundError, or FileFormatError for a folder, a device, or an empty or huge file. ScriptError, with the line,
-    for what is not XML, for elements other than those of a script, and for what scripts never need and attacks do:
-    entities, and a DOCTYPE with declarations or a reference.
+    for what is not XML, for elements other than those of a script, and for entities, which attacks need.
     """
     path = existing_file(path)
     if path.stat().st_size > MOST_BYTES:
@@ -59,12 +58,8 @@ def read_script(path: str | os.PathLike) -> list[Call]:
     def wrong(message: object, line: int | None = None) -> ScriptError:
         return ScriptError(f"{path}, line {line or parser.CurrentLineNumber}: {message}")
 
-    def doctype(name, system, public, has_declarations):
-        if has_declarations or system or public:
-            raise wrong(
-                "the DOCTYPE declares entities or refers to a file, which is refused: it may only be "
-                "<!DOCTYPE FilterScript>"
-            )
+    def entity(name, *_):
+        raise wrong(f"the DOCTYPE declares the entity {brief(name)!r}, which is refused")
 
     def start(element, attributes):
         nonlocal depth
@@ -86,7 +81,7 @@ def read_script(path: str | os.PathLike) -> list[Call]:
         nonlocal depth
         depth -= 1
 
-    parser.StartDoctypeDeclHandler, parser.StartElementHandler, parser.EndElementHandler = doctype, start, end
+    parser.EntityDeclHandler, parser.StartElementHandler, parser.EndElementHandler = entity, start, end
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:

@@ -25,7 +25,7 @@ from .script import Param
 PARTS = ("reducer", "stop")
 OF_FRAME = " of the frame"
 """What follows a percentage that is as everywhere else in this package, of the box that the Sampler's `frame` names."""
-_TYPES = {
+_KINDS = {
     "bool": ("bool", "RichBool"),
     "int": ("int", "RichInt"),
     "float": ("float", "RichFloat"),
@@ -132,14 +132,14 @@ class Slot:
         if isinstance(value, Parameters | None):
             value = "none" if value is None else type(value).__name__
         text = str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else repr(value)
-        _, type_ = _TYPES.get(self.kind, ("str", "RichString"))
+        _, type_ = _KINDS.get(self.kind, ("str", "RichString"))
         worded = isinstance(value, str) and not self.is_of_box(value)
         kind = "RichMesh" if self.name == "layer" else "RichString" if worded else type_
         return Param(self.name, kind, {"value": text})
 
     def listing(self) -> str:
         """Two lines as MeshLab prints them, with limits and meaning."""
-        kind, _ = _TYPES.get(self.kind, ("str", ""))
+        kind, _ = _KINDS.get(self.kind, ("str", ""))
         limits = {"above" if self.facts["open_low"] else "min": self.facts["low"], "max": self.facts["high"]}
         said = [f"{key}: {limit:g}" for key, limit in limits.items() if limit is not None]
         words = f"{' or str' * (kind != 'str')} ({', '.join(self.words)})" if self.words else ""

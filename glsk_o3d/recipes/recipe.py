@@ -21,7 +21,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-_KEYS = ("glsk_o3d", "pipeline", "extends", "set")
+RECIPE_KEYS = ("glsk_o3d", "pipeline", "extends", "set")
 RECIPE_ENDINGS = (".json", ".toml")
 """Files that hold recipes."""
 
@@ -184,8 +184,8 @@ def _check_head(recipe: Any) -> None:
             f"glsk_o3d.version: is {shown(version)}; this release reads {RECIPE_VERSION}: update glsk-o3d"
         )
     for key in recipe:
-        if key not in _KEYS:
-            raise RecipeError(f"{key}: {did_you_mean(str(key), _KEYS, 'key of this table')}")
+        if key not in RECIPE_KEYS:
+            raise RecipeError(f"{key}: {did_you_mean(str(key), RECIPE_KEYS, 'key of this table')}")
     if ("pipeline" in recipe) == ("extends" in recipe):
         both = "has both" if "pipeline" in recipe else "lacks both"
         raise RecipeError(f"a recipe has either 'pipeline' or 'extends', and this one {both}")

@@ -54,8 +54,3 @@ def test_sizes(sizes, message):
         checked_sizes(*sizes)
     assert checked_sizes(4, None) == (4, 0.5)  # an eighth
     assert checked_sizes(np.float32(4), np.int64(1)) == (4.0, 1.0)
-
-
-def test_a_point_far_off_is_named():
-    with pytest.raises(InvalidParameterError, match=r"the points span 1e\+12 x 1 x 1: remove far ones"):
-        Grid.over(np.zeros(3), np.array([1e12, 1, 1]), 0.5, 0.1)

@@ -248,27 +248,6 @@ def tiled(sample, low, size, overlap):
     return join_tiles({tile: skeletonize(points[rows]) for tile, rows in grid.parted(points)}, grid)
 
 
-def test_a_capsule_through_three_tiles_is_one_chain():
-    sample = samples.tube(6000, length=2.0, radius=0.05)
-    joined, seams = tiled(sample, sample.points.min(axis=0), 0.72, 0.18)
-    assert (structure(joined), seams.joined, seams.unmatched) == ((1, 0, 2), 2, 0)
-    assert joined.length == pytest.approx(2.0, abs=0.5 * 0.05)  # both tips together by half a radius, as of the whole
-    off = np.linalg.norm(joined.vertices[np.abs(joined.vertices[:, 0]) < 0.9, 1:], axis=1)
-    assert off.max() < 0.1 * 0.05
-
-
-@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
-def test_an_overlap_that_is_far_too_small_is_told():
-    sample = samples.torus(4000, ring_radius=0.6, radius=0.05)
-    low = sample.points.min(axis=0)
-    joined, seams = tiled(sample, low, 1.2, 0.01)
-    assert joined.n_loops == 0  # it is lost, and that is what is to be told
-    grid = Grid.over(low, sample.points.max(axis=0), 1.2, 0.01)
-    (message,) = seams.messages(grid)
-    assert "thicker than the overlap" in message
-    assert seams.thickest == pytest.approx(0.05, rel=0.1)
-
-
 def test_a_fork_exactly_on_a_seam():
     sample = samples.y_junction(8000)
     fork = sample.nodes[np.bincount(sample.edges.ravel()) == 3][0]

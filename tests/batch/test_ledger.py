@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -100,14 +99,3 @@ def test_the_lock_dies_with_its_owner(tmp_path):
     owner.communicate()
     with locked(tmp_path):
         pass
-
-
-def test_an_error_names_the_ledger(tmp_path, monkeypatch):
-    ledger = Ledger(tmp_path)
-
-    def full(self, *arguments, **options):
-        raise OSError(27, "File too large")
-
-    monkeypatch.setattr(Path, "open", full)
-    with pytest.raises(OSError, match=r"cannot be written: File too large: '.*ledger\.jsonl'"):
-        ledger.add({"name": "a"})

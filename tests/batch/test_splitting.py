@@ -7,7 +7,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from glsk_o3d import FileFormatError, InvalidCloudError, InvalidParameterError
+from glsk_o3d import FileFormatError, InvalidCloudError
 from glsk_o3d.batch import splitting
 from glsk_o3d.batch.grid import tile_of
 from glsk_o3d.batch.ledger import file_hash
@@ -161,9 +161,3 @@ def test_labels(split, table):
     assert (found.labels, found.points, found.dropped) == (("1.5",), 12, 6)
     found = split(table(corners, [1.0, 1e300, -2.2250738585072014e-308] * 4), **LABELS)
     assert found.labels == ("-2.2250738585072014e-308", "1", "1e+300")
-
-
-def test_tiles_without_number_are_refused(scene, split, monkeypatch):
-    monkeypatch.setattr(splitting, "MOST_PARTS", 100)
-    with pytest.raises(InvalidParameterError, match=r"has \d+ parts or more: give larger tiles"):
-        split(scene, tiles=0.2, overlap=0.025)

@@ -66,7 +66,7 @@ def test_another_scan_and_its_recipe_from_a_file(invoke, scans, tmp_path, made):
 def test_refused_before_anything_runs(refused, scans, tmp_path, made, no_run, monkeypatch):
     save_skeleton(made, "s.ply")
     data = json.loads((tmp_path / "s.json").read_text())
-    data["report"]["recipe"]["pipeline"][1]["reducer"] = {"unwritten": "a function"}
+    data["report"]["recipe"]["pipeline"][5]["reducer"] = {"unwritten": "a function"}
     (tmp_path / "gap.json").write_text(json.dumps(data))
     data["report"]["recipe"]["pipeline"] = [{"filter": "Slab"}]
     (tmp_path / "gone.json").write_text(json.dumps(data))
@@ -81,7 +81,7 @@ def test_refused_before_anything_runs(refused, scans, tmp_path, made, no_run, mo
         (1, "rerun none.json", "none.json: no such file"),
         (1, "rerun s.json none.ply", "none.ply: no such file"),
         (1, "rerun s.ply", "s.ply: cannot be repeated: it holds no recipe"),
-        (1, "rerun gap.json", "gap.json: cannot be repeated: pipeline[1].reducer: a recipe cannot"),
+        (1, "rerun gap.json", "gap.json: cannot be repeated: pipeline[5].reducer: a recipe cannot"),
         (1, "rerun gone.json", "gone.json: cannot be repeated: pipeline[0].filter: no filter is"),
         (2, "skeletonize SCAN --recipe r.toml --save-recipe ./r.toml -o a.ply", "is an input"),
         (2, "skeletonize SCAN --save-recipe a.json -o a.json", "a.json: is named twice"),

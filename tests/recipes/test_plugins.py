@@ -58,12 +58,6 @@ def test_are_merged_with_the_built_in_ones():
     assert [type(stage).__name__ for stage in named_pipeline("coarse").stages][::5] == ["Voxel", "RadiusFloor"]
 
 
-def test_are_not_there_without_it():
-    assert "Voxel" not in catalogue()
-    with pytest.raises(InvalidParameterError, match="'coarse'"):
-        named_pipeline("coarse")
-
-
 @pytest.mark.usefixtures("example")
 def test_on_the_command_line_and_in_a_script(tmp_path, monkeypatch):
     from glsk_o3d.cli.main import app
@@ -273,14 +267,6 @@ def test_names_that_are_taken(install, name, owner):
     assert catalogue()[name] is before
 
 
-def test_names_of_pipelines_that_are_taken(install):
-    code = HEAD + "cao2010 = pipelines.default"
-    install("glsk-usurper", "1", code, "[glsk_o3d.pipelines]\ncao2010 = glsk_usurper:cao2010\n")
-    assert named_pipeline("cao2010") == glsk.pipelines.cao2010()  # not even looked for
-    assert only_warning(known_pipelines).endswith(" left out: the name is that of the built-in one")
-    assert known_pipelines() == PIPELINES
-
-
 @pytest.mark.usefixtures("example")
 @pytest.mark.parametrize(
     "entries",
@@ -298,15 +284,6 @@ def test_a_distribution_found_twice_is_one(example, tmp_path, monkeypatch):
     forget_plugins()
     assert {"Voxel", "RadiusFloor", "SolveCount"} <= catalogue().keys()
     assert "coarse" in known_pipelines()  # a second one would be a warning, which is an error here
-
-
-@pytest.mark.usefixtures("example")
-def test_an_interrupt_leaves_nothing_half_done(install):
-    folder = install("zz-slow", "1", "raise KeyboardInterrupt", "[glsk_o3d.filters]\nThing = zz_slow:Thing\n")
-    with pytest.raises(KeyboardInterrupt):
-        catalogue()
-    (folder / "zz_slow.py").write_text(HEAD + FROZEN.format("Filter", "_run = print", ""))
-    assert {"Voxel", "Thing"} <= catalogue().keys()
 
 
 def test_a_plugin_that_asks_for_plugins(install):

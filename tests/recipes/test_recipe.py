@@ -36,10 +36,9 @@ from glsk_o3d import (
     skeletonize,
 )
 from glsk_o3d.io.formats.fields import ARRAYS
-from glsk_o3d.pipeline import Filter, after, recipe_of, with_stage
+from glsk_o3d.pipeline import Filter, recipe_of
 from glsk_o3d.recipes import from_recipe, to_recipe
 from glsk_o3d.recipes.catalogue import BUILTIN
-from glsk_o3d.report import Report
 
 POINTS = samples.y_junction(n=500).points
 HEAD = {"glsk_o3d": {"version": 1}}
@@ -115,15 +114,6 @@ def test_what_a_recipe_looks_like():
     assert contractor["reducer"] == "none"
     assert contractor["stop"] == {"rule": "RingSizeRatio", "threshold": 0.5}
     assert connector["radius"] == "3%"
-
-
-def test_values_of_other_types_are_written_as_plain_ones():
-    pipeline = Pipeline(
-        Sampler(size=np.int64(2000), frame=np.str_("box")), OutlierRemover(outlier_factor=np.float32(2.5))
-    )
-    recipe = to_recipe(pipeline)
-    assert {type(value) for table in recipe["pipeline"] for value in table.values()} == {str, int, float, bool}
-    assert from_recipe(json.loads(json.dumps(recipe))) == pipeline
 
 
 def test_what_is_left_out_has_its_default():
@@ -248,11 +238,6 @@ def test_files_that_are_no_recipes(tmp_path, name, content, words):
     path.write_bytes(content)
     with pytest.raises(RecipeError, match=f"^{re.escape(str(path))}: .*{words}"):
         load_recipe(path)
-
-
-def test_a_byte_order_mark_is_no_mistake(tmp_path):
-    (tmp_path / "r.json").write_bytes(b"\xef\xbb\xbf" + json.dumps({**HEAD, "extends": "default"}).encode())
-    assert load_recipe(tmp_path / "r.json") == pipelines.default()
 
 
 def test_files_that_are_not_there(tmp_path):
@@ -382,13 +367,6 @@ def test_a_run_that_the_caller_stopped_cannot_be_repeated():
     assert whole.report.recipe == to_recipe(pipeline)
 
 
-def test_progress_of_a_rerun():
-    skeleton, told, begun = skeletonize(POINTS), [], []
-    rerun(skeleton, on_iteration=told.append, on_stage=begun.append)
-    assert len(told) == len(skeleton.report.iterations)
-    assert tuple(begun) == pipelines.default().stages
-
-
 def test_old_results_load_but_have_no_recipe(tmp_path):
     save_skeleton(skeletonize(POINTS), tmp_path / "s.json")
     data = json.loads((tmp_path / "s.json").read_text())
@@ -412,30 +390,3 @@ def test_results_without_their_points():
         rerun(skeleton)
     other = samples.torus(n=400).points
     np.testing.assert_array_equal(rerun(skeleton, other).vertices, skeletonize(other).vertices)
-
-
-@pytest.mark.parametrize("recipe", [5, [], "x", {"pipeline": {}}])
-def test_a_report_with_a_malformed_recipe(recipe):
-    with pytest.raises(ValueError, match="recipe"):
-        Report.from_dict({"recipe": recipe})
-
-
-def test_reports_ahead_add_up():
-    ahead = with_stage(Report(), RingBuilder(), 1.0)
-    report = after(with_stage(with_stage(Report(n_input=3), RingBuilder(k=9), 0.5), Refiner(), 0.25), ahead)
-    assert report.stages == tuple(map(repr, (RingBuilder(), RingBuilder(k=9), Refiner())))
-    assert report.seconds == {"RingBuilder": 1.5, "Refiner": 0.25}
-    assert report.recipe == recipe_of(*(stage.table() for stage in (RingBuilder(), RingBuilder(k=9), Refiner())))
-    assert report.n_input == 3
-
-
-@pytest.mark.parametrize("place", [(), ("set",), ("set", "RingBuilder")])
-def test_an_unknown_name_is_not_repeated_at_length(place):
-    recipe = {**HEAD, "glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {}}}
-    table = recipe
-    for key in place:
-        table = table[key]
-    table["long" * 10_000] = {}
-    with pytest.raises(RecipeError, match="longlong") as refused:
-        from_recipe(recipe)
-    assert len(str(refused.value)) < 1500
