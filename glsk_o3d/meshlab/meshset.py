@@ -18,7 +18,7 @@ from . import builtin
 from .layers import Layer
 from .script import Call, read_script, script_text, write_script
 from .steps import Step, read_steps, step
-from .verbs import verbs
+from .verbs import Verb, verbs
 
 pymeshlab = require("pymeshlab")
 
@@ -127,14 +127,12 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
 
     @staticmethod
     def print_filter_parameter_list(filter_name: str) -> None:
-        """Print the parameters of a filter: name, type and default; of ours also limits and meaning."""
+        """Print the parameters of a filter: of MeshLab's name, type and default, of ours what they mean."""
         verb = verbs().get(_known(filter_name))
         if verb is None:
             pymeshlab.print_filter_parameter_list(filter_name)
-            return
-        print(f"{filter_name} filter - list of parameter names:")
-        for slot in verb.slots.values():
-            print(slot.listing())
+        else:
+            print(verb.help)
 
     def load_filter_script(self, filter_script_name: str | os.PathLike, *, any_filter: bool = False) -> None:
         """Make a script file the current script. It is checked and not run; ScriptError names faults.
@@ -257,14 +255,13 @@ def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
     return {name: plain(value) for name, value in params.items()}
 
 
-def _method(name: str, doc: str) -> Callable[..., dict[str, Any]]:
+def _method(verb: Verb) -> Callable[..., dict[str, Any]]:
     def apply(self, **params):
-        return self.apply_filter(name, **params)
+        return self.apply_filter(verb.name, **params)
 
-    apply.__name__, apply.__qualname__ = name, f"MeshSet.{name}"
-    apply.__doc__ = f"{doc}\n\nParameters: see ``MeshSet.print_filter_parameter_list({name!r})``.\n"
+    apply.__name__, apply.__qualname__, apply.__doc__ = verb.name, f"MeshSet.{verb.name}", verb.help
     return apply
 
 
 for _verb in verbs().values():
-    setattr(MeshSet, _verb.name, _method(_verb.name, _verb.doc))
+    setattr(MeshSet, _verb.name, _method(_verb))

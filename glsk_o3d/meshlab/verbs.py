@@ -25,13 +25,8 @@ from .script import Param
 PARTS = ("reducer", "stop")
 OF_FRAME = " of the frame"
 """What follows a percentage that is as everywhere else in this package, of the box that the Sampler's `frame` names."""
-_KINDS = {
-    "bool": ("bool", "RichBool"),
-    "int": ("int", "RichInt"),
-    "float": ("float", "RichFloat"),
-    "length": ("PercentageValue", "RichAbsPerc"),
-}
-"""What listings and scripts call the types of parameters; others are words."""
+RICH_TYPES = {"bool": "RichBool", "int": "RichInt", "float": "RichFloat", "length": "RichAbsPerc"}
+"""What scripts call the types of parameters; others are words, RichString."""
 
 
 def facts_of(doc: str, type: str, choices: tuple[str, ...] = (), low: float | None = None) -> Mapping[str, Any]:
@@ -132,19 +127,9 @@ class Slot:
         if isinstance(value, Parameters | None):
             value = "none" if value is None else type(value).__name__
         text = str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else repr(value)
-        _, type_ = _KINDS.get(self.kind, ("str", "RichString"))
         worded = isinstance(value, str) and not self.is_of_box(value)
-        kind = "RichMesh" if self.name == "layer" else "RichString" if worded else type_
-        return Param(self.name, kind, {"value": text})
-
-    def listing(self) -> str:
-        """Two lines as MeshLab prints them, with limits and meaning."""
-        kind, _ = _KINDS.get(self.kind, ("str", ""))
-        limits = {"above" if self.facts["open_low"] else "min": self.facts["low"], "max": self.facts["high"]}
-        said = [f"{key}: {limit:g}" for key, limit in limits.items() if limit is not None]
-        words = f"{' or str' * (kind != 'str')} ({', '.join(self.words)})" if self.words else ""
-        default = "as the pipeline has it" if self.option else self.default
-        return f"\t{self.name} : {kind}{words} = {default} [{'; '.join(said)}]\n\t\t{self.facts['doc']}"
+        kind = "RichMesh" if self.name == "layer" else RICH_TYPES.get(self.kind, "RichString")
+        return Param(self.name, "RichString" if worded else kind, {"value": text})
 
 
 def _plain(value: Any) -> Any:
@@ -163,6 +148,12 @@ class Verb:
     doc: str
     slots: dict[str, Slot]
     makes: str  # what the result may be, as `check_ending` has it
+
+    @property
+    def help(self) -> str:
+        """What it does, and what its parameters mean."""
+        meanings = [f"{name} : {slot.facts['doc']}" for name, slot in self.slots.items()]
+        return "\n".join([self.doc, "", *meanings])
 
     def checked(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The given parameters as they are taken; InvalidParameterError for a name or a value that is wrong."""

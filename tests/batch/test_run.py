@@ -224,12 +224,6 @@ class TestRefusals:
         with pytest.raises(InvalidParameterError, match=r"a\.ply: is an input"):
             plan_batch([scans / "a.ply", scans / "b.ply"], scans)
 
-    def test_a_plan_writes_nothing(self, scans, tmp_path):
-        plan = plan_batch(scans, tmp_path / "out", formats=["ply", ".JSON", "json"], preview=True)
-        assert plan.tasks[0].outputs == ("a.ply", "a.json", "a.png")
-        assert (plan.skipped, len(plan.parameters)) == (0, 64)
-        assert not (tmp_path / "out").exists()
-
 
 @pytest.mark.parametrize("link", ["sub", "sub/s.ply", "ledger.jsonl", "ledger.csv", "recipe.json", ".ledger.lock"])
 def test_no_link_leads_out_of_the_output_folder(write, tmp_path, link):

@@ -8,10 +8,9 @@ import sys
 import psutil  # comes with distributed
 import pytest
 
-from glsk_o3d import BatchError
 from glsk_o3d.batch import run_batch
 from glsk_o3d.batch.run import WORKER_DIED
-from glsk_o3d.batch.workers import GivenWorkers, LocalWorkers
+from glsk_o3d.batch.workers import LocalWorkers
 
 
 def test_workers_compute_in_one_thread_and_ignore_ctrl_c(monkeypatch):
@@ -53,15 +52,6 @@ def test_a_script_without_a_guard_blames_no_scan(tmp_path, write):
     assert run.returncode == 1
     assert "BatchError: worker processes die before they begin; stderr may say why" in run.stderr
     assert "failed" not in (tmp_path / "out" / "ledger.jsonl").read_text()
-
-
-def test_an_executor_that_is_gone():
-    class Gone:
-        def submit(self, *_):
-            raise RuntimeError("shut down")
-
-    with pytest.raises(BatchError, match="takes no more work: shut down"):
-        GivenWorkers(Gone()).submit(print)
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import sys
 import warnings
-from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from glsk_o3d import (
     Contraction,
     InvalidCloudError,
     InvalidParameterError,
-    IterationRecord,
     Pipeline,
     PluginWarning,
     RecipeError,
@@ -86,36 +84,6 @@ def test_on_the_command_line_and_in_a_script(tmp_path, monkeypatch):
 
 
 # ---- what a filter may do
-
-
-@dataclass(frozen=True, kw_only=True)
-class Gather(Filter):
-    """Move points to the middle, again and again."""
-
-    consumes = Contraction
-
-    def _run(self, state, watch):
-        for i in range(5):
-            record = IterationRecord(i + 1, len(state), 0, 0, 0.5, 0.1, 1.0, 1.0, 0.0, 0.0)
-            report = replace(state.report, iterations=(*state.report.iterations, record))
-            state = replace(state, previous=state.positions, positions=0.9 * state.positions, report=report)
-            if watch is not None and watch(state) is False:
-                break
-        return state
-
-    def check(self):
-        pass
-
-
-def test_a_filter_that_iterates():
-    records, states = [], []
-    built = glsk.RingBuilder()(POINTS)
-    whole = Gather()(built, on_iteration=records.append, on_state=states.append)
-    assert [record.iteration for record in records] == [1, 2, 3, 4, 5]
-    assert tuple(records) == whole.report.iterations
-    assert [state.report.iterations[-1] for state in states] == records
-    assert len(Gather()(built, on_iteration=lambda record: record.iteration < 3).report.iterations) == 3
-    np.testing.assert_array_equal(Gather()(built).positions, states[-1].positions)
 
 
 @pytest.fixture

@@ -17,7 +17,6 @@ from glsk_o3d import (
     Contractor,
     Denoiser,
     ExplainedScore,
-    InvalidParameterError,
     LPRReducer,
     OutlierRemover,
     Pipeline,
@@ -38,7 +37,6 @@ from glsk_o3d import (
 from glsk_o3d.io.formats.fields import ARRAYS
 from glsk_o3d.pipeline import Filter, recipe_of
 from glsk_o3d.recipes import from_recipe, to_recipe
-from glsk_o3d.recipes.catalogue import BUILTIN
 
 POINTS = samples.y_junction(n=500).points
 HEAD = {"glsk_o3d": {"version": 1}}
@@ -90,12 +88,6 @@ def test_every_parameter_of_every_filter_survives(made):
         assert repr(again) == repr(pipeline)  # 3 is not 3.0
 
 
-def test_the_round_trip_is_over_everything():
-    """So that a new filter is not forgotten above."""
-    kinds = [*pipelines.default().stages, LPRReducer()]
-    assert {*BUILTIN} == {*(type(each).__name__ for each in kinds), *RULES}
-
-
 @pytest.mark.parametrize("ending", ["json", "toml", "JSON"])
 def test_files(tmp_path, ending):
     path = tmp_path / f"räcipe.{ending}"
@@ -127,24 +119,15 @@ def test_what_is_left_out_has_its_default():
 # ---- a named pipeline with changes
 
 
-def test_extends(tmp_path):
-    text = """
-        extends = "default"
-        glsk_o3d.version = 1
-        [set.RingSizeRatio]
-        threshold = 0.5
-        [set.Contractor]
-        stop.rule = "RingSizeRatio"
-        max_iterations = 7
-        [set.LPRReducer]
-        phi = 3e5
-        [set.Connector]
-        radius = "4%"
-    """
-    (tmp_path / "r.toml").write_text(text)
+def test_extends():
+    changes = {
+        "RingSizeRatio": {"threshold": 0.5},
+        "Contractor": {"stop": {"rule": "RingSizeRatio"}, "max_iterations": 7},
+    }
+    found = from_recipe(changed(**changes, LPRReducer={"phi": 3e5}, Connector={"radius": "4%"}))
     *rings, _, _, refiner, tracer = pipelines.default().stages
     contractor = Contractor(reducer=LPRReducer(phi=3e5), stop=RingSizeRatio(0.5), max_iterations=7)
-    assert load_recipe(tmp_path / "r.toml") == Pipeline(*rings) | contractor | Connector(radius="4%") | refiner | tracer
+    assert found == Pipeline(*rings) | contractor | Connector(radius="4%") | refiner | tracer
     for name, make in pipelines.PIPELINES.items():
         assert from_recipe({**HEAD, "extends": name}) == make()
 
@@ -180,30 +163,24 @@ WRONG = [  # where it is wrong, the words that help, and the recipe
     ("pipeline[0].kk", "'k'", one("RingBuilder", kk=20)),
     ("pipeline[0].frame", "'spread', 'box'", one("Sampler", frame=["box"])),
     ("pipeline[0].reduce_above", "it is gone, leave it out", one("Contractor", reduce_above=500)),
-    ("pipeline[0].min_support", "it is gone, leave it out", one("Connector", min_support=0.1)),
     ("pipeline[0].root", "it is Tracer's, a filter of its own behind the Refiner", one("Refiner", root="z")),
-    ("pipeline[0].surface", "it is Tracer's, a filter of its own behind the Refiner", one("Refiner", surface=0)),
     (
         "pipeline[0].thin_to",
         "it is Thinner's, a filter of its own ahead of the RingBuilder",
         one("RingBuilder", thin_to=9),
     ),
-    ("pipeline[0].radius", "100%", one("Connector", radius="200%")),
-    ("pipeline[0].outlier_factor", "nan", one("OutlierRemover", outlier_factor=float("nan"))),
     ("pipeline[0].reducer.phi", "above 0", one("Contractor", reducer={"filter": "LPRReducer", "phi": -1})),
     (
         "pipeline[0].reducer.filter",
         "there are Contractor, LPRReducer",
         one("Contractor", reducer={"filter": "Refiner"}),
     ),
-    ("pipeline[0].stop", '{"rule": NAME, ...}', one("Contractor", stop={"filter": "RingSizeRatio"})),
     ("pipeline[0].stop.rule", "'RingSizeRatio'", one("Contractor", stop={"rule": "RingRatio"})),
     ("pipeline", "RingBuilder | Contractor | Connector | Refiner", with_stages(*[{"filter": "Connector"}] * 2)),
     ("pipeline[0].reducer", "a function", one("Contractor", reducer={"unwritten": "a function"})),
     ("extends", "default, tree, wen2024, cao2010", {**HEAD, "extends": "best"}),
     ("set", "'extends'", {**with_stages(GOOD), "set": {}}),
     ("set.Connecter", "'Connector'", changed(Connecter={"radius": 1})),
-    ("set.Connector.radios", "'radius'", changed(Connector={"radios": 1})),
     ("set", "LPRReducer.phi: ", {**HEAD, "extends": "cao2010", "set": {"LPRReducer": {"phi": 1}}}),
 ]
 
@@ -302,12 +279,6 @@ def test_a_class_of_another_module_is_named_with_it():
         to_recipe(Pipeline(namesake()))
 
 
-def test_a_wrong_parameter_is_not_written(tmp_path):
-    with pytest.raises(InvalidParameterError, match=r"RingBuilder\.k"):
-        save_recipe(Pipeline(RingBuilder(k=1)), tmp_path / "r.json")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_the_documentation(root, install):
     text = (root / "docs" / "recipes.md").read_text()
     written = [json.loads(block) for block in re.findall(r"```json\n(.*?)```", text, re.DOTALL)]
@@ -345,15 +316,6 @@ def test_results_repeat_to_the_last_bit(tmp_path, name, ending):
         for field in ARRAYS:
             np.testing.assert_array_equal(getattr(again, field), getattr(skeleton, field))
         assert again.report.recipe == skeleton.report.recipe
-
-
-def test_results_composed_by_hand_have_the_same_recipe():
-    pipeline = RingBuilder() | Contractor(max_iterations=1) | LPRReducer() | Contractor() | Connector() | Refiner()
-    by_hand = POINTS
-    for stage in pipeline.stages:
-        by_hand = stage(by_hand)
-    assert by_hand.report.recipe == pipeline(POINTS).report.recipe == to_recipe(pipeline)
-    np.testing.assert_array_equal(rerun(by_hand).vertices, by_hand.vertices)
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
