@@ -101,7 +101,7 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     Parameters
     ----------
     path : path-like
-        JSON or TOML, by the ending.
+        JSON or TOML, by the ending; or the JSON of a result, which holds the recipe that made it.
 
     Returns
     -------
@@ -130,6 +130,8 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
         recipe = json.loads(text) if ending == ".json" else tomllib.loads(text)
     except Exception as error:  # whatever a parser raises on a hostile file
         raise RecipeError(f"{os.fspath(path)}: not valid {ending[1:].upper()}: {error}") from error
+    if isinstance(recipe, dict) and isinstance(recipe.get("report"), dict):
+        recipe = recipe["report"].get("recipe")
     try:
         return from_recipe(recipe)
     except (RecipeError, RecursionError) as error:

@@ -22,7 +22,6 @@ from glsk_o3d import (
     Skeleton,
     StageError,
     samples,
-    save_skeleton,
     skeletonize,
 )
 from glsk_o3d.meshlab.verbs import verbs
@@ -103,14 +102,6 @@ def test_a_filter_of_clouds_gives_a_cloud_and_the_pipeline_tells_of_it(coarse, a
     assert list(coarse.report.seconds) == ["Voxel", *by_hand.report.seconds]
     assert coarse.report.recipe == to_recipe(named_pipeline("coarse"))
     assert by_hand.report.recipe["pipeline"] == coarse.report.recipe["pipeline"][1:]
-
-
-def test_a_rerun_does_not_thin_the_thinned_points_again(coarse, tmp_path):
-    save_skeleton(coarse, tmp_path / "s.npz")
-    read = glsk.read_skeleton(tmp_path / "s.npz")
-    for again in (glsk.rerun(read, POINTS), glsk.rerun(glsk.rerun(read))):
-        np.testing.assert_array_equal(again.vertices, coarse.vertices)
-        assert again.report.recipe == coarse.report.recipe
 
 
 def test_filters_of_clouds_stand_in_front_and_in_a_row(example):

@@ -28,7 +28,6 @@ from glsk_o3d import (
     Thinner,
     load_recipe,
     pipelines,
-    rerun,
     samples,
     save_recipe,
     save_skeleton,
@@ -262,7 +261,7 @@ def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, place, name, key
     table = recipe["pipeline"][1]
     assert key in (table[place.split(".")[1]] if "." in place else table)
     with pytest.raises(RecipeError, match=rf"^{re.escape(place)}.*{name}"):
-        rerun(skeleton)
+        from_recipe(recipe)
 
 
 def test_a_class_of_another_module_is_named_with_it():
@@ -298,6 +297,10 @@ def test_the_documentation(root, install):
 # ---- what a report holds, and rerun
 
 
+def repeated(skeleton, cloud):
+    return from_recipe(skeleton.report.recipe)(cloud)
+
+
 @pytest.mark.parametrize(
     ("name", "ending"), [("default", "json"), ("tree", "npz"), ("wen2024", "json"), ("cao2010", "npz")]
 )
@@ -312,7 +315,7 @@ def test_results_repeat_to_the_last_bit(tmp_path, name, ending):
     save_skeleton(skeleton, tmp_path / f"s.{ending}")
     read = glsk.read_skeleton(tmp_path / f"s.{ending}")
     assert read.report.recipe == skeleton.report.recipe
-    for again in (rerun(read), rerun(rerun(skeleton), points)):
+    for again in (repeated(read, read.points), repeated(repeated(skeleton, skeleton.points), points)):
         for field in ARRAYS:
             np.testing.assert_array_equal(getattr(again, field), getattr(skeleton, field))
         assert again.report.recipe == skeleton.report.recipe
@@ -324,31 +327,18 @@ def test_a_run_that_the_caller_stopped_cannot_be_repeated():
     stopped = skeletonize(POINTS, pipeline, on_iteration=lambda record: record.iteration < 3)
     assert [("unwritten" in stage) for stage in stopped.report.recipe["pipeline"]] == [False, False, True, True]
     with pytest.raises(RecipeError, match=r"^pipeline\[2\]: .*solve 3"):
-        rerun(stopped)
+        from_recipe(stopped.report.recipe)
     whole = skeletonize(POINTS, pipeline, on_iteration=lambda record: None)
     assert whole.report.recipe == to_recipe(pipeline)
 
 
-def test_old_results_load_but_have_no_recipe(tmp_path):
-    save_skeleton(skeletonize(POINTS), tmp_path / "s.json")
-    data = json.loads((tmp_path / "s.json").read_text())
+def test_a_result_is_a_recipe_too_but_not_an_old_one(tmp_path):
+    path = tmp_path / "s.json"
+    save_skeleton(skeletonize(POINTS, k=20), path)
+    assert load_recipe(path) == pipelines.default().with_options(k=20)
+    data = json.loads(path.read_text())
     del data["report"]["recipe"]
-    (tmp_path / "old.json").write_text(json.dumps(data))
-    old = glsk.read_skeleton(tmp_path / "old.json")
-    assert old.report.stages
-    assert old.report.recipe == {}
-    with pytest.raises(RecipeError):
-        rerun(old)
-    save_skeleton(old, tmp_path / "s.ply")
-    read = glsk.read_skeleton(tmp_path / "s.ply")
-    for begun in (read, Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(read)):
-        with pytest.raises(RecipeError):
-            rerun(begun)
-
-
-def test_results_without_their_points():
-    skeleton = dataclasses.replace(skeletonize(POINTS), points=None, vertex_of_point=None, normals=None)
-    with pytest.raises(RecipeError, match="scan"):
-        rerun(skeleton)
-    other = samples.torus(n=400).points
-    np.testing.assert_array_equal(rerun(skeleton, other).vertices, skeletonize(other).vertices)
+    path.write_text(json.dumps(data))
+    assert glsk.read_skeleton(path).report.stages
+    with pytest.raises(RecipeError, match=r"s\.json: a recipe is a table such as"):
+        load_recipe(path)
