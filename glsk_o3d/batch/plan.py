@@ -156,8 +156,8 @@ def plan_batch(
     recipe, endings, cut = to_recipe(chosen), _endings(formats, preview), _cut(chosen, where, by, tiles, overlap)
     if where is not None:
         parsed(where)
-    whole: dict[str, Any] = {"recipe": recipe, "cut_loops": cut_loops, "where": where, "cut": cut and asdict(cut)}
-    parameters = hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()
+    settings: dict[str, Any] = {"recipe": recipe, "cut_loops": cut_loops, "where": where, "cut": cut and asdict(cut)}
+    parameters = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
     out = Path(os.path.abspath(out_dir))
     ledger = Ledger(out)
     given = [inputs] if isinstance(inputs, str | os.PathLike) else inputs
@@ -170,11 +170,12 @@ def plan_batch(
         tasks = _apart(tasks, left_out, cut, endings, split)
         _refuse_to_replace(tasks, ledger, found)
     with ThreadPoolExecutor() as pool:  # a hash takes as long as reading the file
-        reasons = pool.map(lambda task: "asked for" if force else _why(task, ledger, parameters), tasks)
-        tasks = [replace(task, why=why) for task, why in zip(tasks, reasons, strict=True)]
-    to_do = {task.name for task in tasks if task.why != UP_TO_DATE}
-    undone = [task.why == UP_TO_DATE and not to_do.isdisjoint(task.needs) for task in tasks]
-    tasks = [replace(task, why="tiles to do") if due else task for task, due in zip(tasks, undone, strict=True)]
+        whys = pool.map(lambda task: "asked for" if force else _why(task, ledger, parameters), tasks)
+        reasons = dict(zip((task.name for task in tasks), whys, strict=True))
+    for task in tasks:
+        if reasons[task.name] == UP_TO_DATE and any(reasons[tile] != UP_TO_DATE for tile in task.needs):
+            reasons[task.name] = "tiles to do"
+    tasks = [replace(task, why=reasons[task.name]) for task in tasks]
     return Plan(out, recipe, parameters, tuple(tasks), ledger, left_out)
 
 

@@ -201,20 +201,14 @@ def print_iterations(records: Sequence[IterationRecord], *, err: bool = False) -
         print_table(iteration_rows(records), list(ITERATION_COLUMNS), err=err)
 
 
-def _tell(
-    skeleton: Skeleton,
-    seconds: float,
-    written: Sequence[Path],
-    problems: Sequence[str],
-    more: Mapping[str, Any] | None = None,
-) -> None:
-    """Print the summary of a run, with `more` facts, and the files written; then OSError if there were problems."""
+def _tell(skeleton: Skeleton, seconds: float, written: Sequence[Path], problems: Sequence[str]) -> None:
+    """Print the summary of a run, and the files written; then OSError if there were problems."""
     from ..analysis.summary import summary
 
     report = skeleton.report
     if flags.verbose:
         print_iterations(report.iterations, err=True)
-    facts = {**summary(skeleton, seconds), **(more or {})}
+    facts = summary(skeleton, seconds)
     supported = {"unsupported": list(map(asdict, report.unsupported))} if report.n_draws else {}
     whole = {**facts, **supported, "warnings": list(report.warnings), "files": list(map(str, written))}
     tell(whole, lambda: print_rows(_shown(facts, report)), written, problems)

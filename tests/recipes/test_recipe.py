@@ -1,4 +1,4 @@
-"""Recipes: round trips, what is refused and how, what a report holds, and rerun."""
+"""Recipes: round trips, what is refused and how, what a report holds."""
 
 import dataclasses
 import json
@@ -294,7 +294,7 @@ def test_the_documentation(root, install):
     assert skeletonize(points, "slab").report.n_input == (np.abs(points[:, 2] - 0.5) <= 0.5).sum() > 0
 
 
-# ---- what a report holds, and rerun
+# ---- what a report holds
 
 
 def repeated(skeleton, cloud):
