@@ -21,7 +21,6 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-RECIPE_KEYS = ("glsk_o3d", "pipeline", "extends", "set")
 RECIPE_ENDINGS = (".json", ".toml")
 """Files that hold recipes."""
 
@@ -68,10 +67,8 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
 
     Raises
     ------
-    InvalidParameterError, RecipeError
-        See `to_recipe`; or the ending is unknown.
-    OSError
-        The file cannot be written.
+    InvalidParameterError, RecipeError, OSError
+        See `to_recipe`; or the ending is unknown, or the file cannot be written.
 
     Examples
     --------
@@ -109,10 +106,8 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
 
     Raises
     ------
-    OSError
-        The file cannot be read.
-    RecipeError
-        The file is no valid recipe; the message names the file and the place in it.
+    RecipeError, OSError
+        The file is no valid recipe, or cannot be read; the message names the file and the place in it.
 
     Examples
     --------
@@ -185,14 +180,12 @@ def _check_head(recipe: Any) -> None:
         raise RecipeError(
             f"glsk_o3d.version: is {shown(version)}; this release reads {RECIPE_VERSION}: update glsk-o3d"
         )
+    keys = ("glsk_o3d", "extends", "set") if "extends" in recipe else ("glsk_o3d", "pipeline")
     for key in recipe:
-        if key not in RECIPE_KEYS:
-            raise RecipeError(f"{key}: {did_you_mean(str(key), RECIPE_KEYS, 'key of this table')}")
-    if ("pipeline" in recipe) == ("extends" in recipe):
-        both = "has both" if "pipeline" in recipe else "lacks both"
-        raise RecipeError(f"a recipe has either 'pipeline' or 'extends', and this one {both}")
-    if "set" in recipe and "extends" not in recipe:
-        raise RecipeError("set: changes the pipeline that 'extends' names, and there is no 'extends'")
+        if key not in keys:
+            raise RecipeError(f"{key}: {did_you_mean(str(key), keys, 'key of this table')}")
+    if not {"pipeline", "extends"} & set(recipe):
+        raise RecipeError("a recipe has either 'pipeline' or 'extends', and this one lacks both")
 
 
 def _extended(name: Any, changes: Any) -> Pipeline:
@@ -214,8 +207,7 @@ def _extended(name: Any, changes: Any) -> Pipeline:
 def _part(table: Any, path: str, role: str) -> Parameters:
     """A filter, reducer or rule from its table."""
     kind = "rule" if role == "stop" else "filter"
-    if isinstance(table, dict) and UNWRITTEN in table:
-        raise RecipeError(f"{path}: a recipe cannot hold it: {table[UNWRITTEN]}")
+    _refuse_gap(table, path)
     if not isinstance(table, dict) or kind not in table:
         raise RecipeError(f'{path}: must be a table such as {{"{kind}": NAME, ...}}, not {shown(table)}')
     name = table[kind]
@@ -231,6 +223,11 @@ def _part(table: Any, path: str, role: str) -> Parameters:
     return _valid(lambda: cls(**values), path)
 
 
+def _refuse_gap(value: Any, path: str) -> None:
+    if isinstance(value, dict) and UNWRITTEN in value:
+        raise RecipeError(f"{path}: a recipe cannot hold it: {value[UNWRITTEN]}")
+
+
 def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
     """Parameters of a class, each checked."""
     if not isinstance(table, dict):
@@ -241,6 +238,7 @@ def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
         if name not in fields:
             hint = did_you_mean(str(name), fields, f"parameter of {cls.__name__}")
             raise RecipeError(f"{path}.{name}: {hint}")
+        _refuse_gap(value, f"{path}.{name}")
         facts = fields[name]
         kind = facts["type"]
         if kind.endswith("?") and value == NONE and NONE not in facts["choices"]:

@@ -154,7 +154,7 @@ WRONG = [  # where it is wrong, the words that help, and the recipe
     ("", "not [{'filter': 'RingBuilder'}]", [GOOD]),
     ("piepline", "'pipeline'", {**HEAD, "piepline": [GOOD]}),
     ("", "lacks both", HEAD),
-    ("", "has both", {**with_stages(GOOD), "extends": "default"}),
+    ("pipeline", "there are glsk_o3d, extends, set", {**with_stages(GOOD), "extends": "default"}),
     ("pipeline", "[]", with_stages()),
     ("pipeline[1]", '{"filter": NAME, ...}', with_stages(GOOD, "Contractor")),
     ("pipeline[1].filter", "'Contractor'", with_stages(GOOD, {"filter": "Contracter"})),
@@ -178,7 +178,7 @@ WRONG = [  # where it is wrong, the words that help, and the recipe
     ("pipeline", "RingBuilder | Contractor | Connector | Refiner", with_stages(*[{"filter": "Connector"}] * 2)),
     ("pipeline[0].reducer", "a function", one("Contractor", reducer={"unwritten": "a function"})),
     ("extends", "default, tree, wen2024, cao2010", {**HEAD, "extends": "best"}),
-    ("set", "'extends'", {**with_stages(GOOD), "set": {}}),
+    ("set", "there are glsk_o3d, pipeline", {**with_stages(GOOD), "set": {}}),
     ("set.Connecter", "'Connector'", changed(Connecter={"radius": 1})),
     ("set", "LPRReducer.phi: ", {**HEAD, "extends": "cao2010", "set": {"LPRReducer": {"phi": 1}}}),
 ]
