@@ -48,7 +48,6 @@ NAMES = {
     },
     "recipes": {
         "Writing and reading": ("save_recipe", "load_recipe", "to_recipe", "from_recipe"),
-        "The same result again": ("rerun",),
     },
     "io": {
         "As Open3D's and pymeshlab's": ("to_line_set", "to_tensor_line_set", "to_tubes", "to_pymeshlab", "annotate"),
