@@ -21,15 +21,12 @@ def edit(
     root: Annotated[Any, root_option("Number vertices from a root outwards, and count orders from there")] = None,
     prune_order: Annotated[int | None, option("N", "Drop branches of a higher order than this.", min=0)] = None,
     prune_length: Annotated[float, option("LENGTH", "Drop shorter branches that end.", min=0)] = 0,
-    prune_radius: Annotated[float, option("RADIUS", "Drop thinner branches that end.", min=0)] = 0,
-    smooth: Annotated[int, option("PASSES", "Smooth the branches.", min=0, max=10**6)] = 0,
     tolerance: Annotated[
         float | None,
         option("TOLERANCE", "Drop vertices as long as the curve moves by no more than this.", "--simplify", min=0),
     ] = None,
-    vertices: Annotated[int | None, option("N", "Keep so many vertices, if the graph allows.", min=1)] = None,
 ) -> None:
-    """Shorten, thin out, smooth or reroot a skeleton.
+    """Shorten, thin out or reroot a skeleton.
 
     What is asked for is done in the order of the options. Lengths are in the units of the file. Orders count from the
     root, the stem is 0.
@@ -51,15 +48,12 @@ def edit(
     if root is not None:
         edited = editing.reroot(edited, root)
         done.append(f"grows from ({coordinates(edited.vertices[0])})")
-    if prune_order is not None or prune_length or prune_radius:
+    if prune_order is not None or prune_length:
         n_ends = len(edited.leaves)
-        edited = editing.prune(edited, length=prune_length, radius=prune_radius, order=prune_order)
+        edited = editing.prune(edited, length=prune_length, order=prune_order)
         done.append(f"pruned {n_ends - len(edited.leaves)} of {n_ends} ends")
-    if smooth:
-        edited = editing.smooth(edited, passes=smooth)
-        done.append(f"smoothed in {smooth} pass{'es' * (smooth > 1)}")
-    if tolerance is not None or vertices is not None:
-        n_vertices, edited = len(edited.vertices), editing.simplify(edited, tolerance=tolerance, n=vertices)
+    if tolerance is not None:
+        n_vertices, edited = len(edited.vertices), editing.simplify(edited, tolerance=tolerance)
         done.append(f"kept {len(edited.vertices)} of {n_vertices} vertices")
     written, problems = write_each(skeleton_writers(edited, output))
     counts = {"before": structure(before), "after": structure(edited)}

@@ -23,7 +23,6 @@ _BLACK_MEANS = "around a junction, not measured"
 _MEASURES = {  # measure: (best, what it is), as the table shows them
     "centredness": ("1", "1 - offset from the section's middle, in radii"),
     "boundedness": ("1", "share of the length inside the cloud"),
-    "smoothness": ("1", "1 - half turns per radius travelled"),
     "topology": ("1", "parts as in the cloud, no false loops"),
     "error": ("0", "distance from the true axis, in true radii"),
     "inside": ("1", "share of it within a radius of the axis"),
@@ -49,8 +48,8 @@ def evaluate(
 ) -> None:
     """Measure how good a skeleton is.
 
-    From the cloud alone: is it centred, inside, smooth, in as many parts, and without false loops. With a truth also:
-    how far is it from the true axis.
+    From the cloud alone: is it centred, inside, in as many parts, and without false loops. With a truth also: how far
+    is it from the true axis.
     """
     from .. import read_cloud, read_skeleton, read_truth, save_assessment
     from ..interop.atomic import write_json
@@ -127,10 +126,7 @@ def _rows(assessment: Assessment | None, comparison: Comparison | None) -> Itera
         parts = f"{assessment.components}", f"{assessment.clusters}"
         yield "parts", *parts, "components; the cloud has as many as best"
         wide = f"{assessment.wide_loops} open wider than their tube; missing ones show with --truth"
-        yield "loops", f"{len(assessment.loops)}", "", wide
-        for i, loop in enumerate(assessment.loops, 1):
-            ratio = f"{loop.opening / loop.tube_radius:.2f}" if loop.tube_radius > 0 else "inf"
-            yield f"  loop {i}", ratio, "> 1", f"opening {loop.opening:.4g}, tube radius {loop.tube_radius:.4g}"
+        yield "loops", f"{assessment.loops}", "", wide
     if comparison is not None:
         yield "", "", "", ""
         yield from _numbers(comparison)

@@ -13,7 +13,7 @@ from .reporting import WrongUsage
 if TYPE_CHECKING:
     from ..analysis import GraspCandidates
 
-GRASP_ENDINGS = (".json", ".csv", ".ply")
+GRASP_ENDINGS = (".json", ".csv")
 HEADS = ("x", "y", "z", "approach x", "approach y", "approach z", "opening", "quality", "seen", "branch")
 
 
@@ -24,7 +24,6 @@ def grasps(
     scene: Annotated[list[Path] | None, option("FILE", "Points of what else is there; may be repeated.")] = None,
     plane: Annotated[list[str] | None, option("A,B,C,D", "A table, ax + by + cz + d = 0; may be repeated.")] = None,
     cone: Annotated[str | None, option("DIRECTION,DEGREES", "Come in no farther from this, such as -z,60.")] = None,
-    up: Annotated[str | None, option("DIRECTION", "What is up: z, or x,y,z. Else against the cone, or z.")] = None,
     clearance: Annotated[
         float | None, option("LENGTH", "Half on each side; by default a tenth of the opening.")
     ] = None,
@@ -32,12 +31,9 @@ def grasps(
     palm: Annotated[str | None, option("EXTENT,WIDTH,DEPTH", "Of the hand behind the fingers; else the same.")] = None,
     around: Annotated[int, option("N", "Directions around each place.", min=1)] = 8,
     spacing: Annotated[float | None, option("LENGTH", "Of the places; by default the radius of the branch.")] = None,
-    margin: Annotated[float, option("RADII", "From the ends of a branch.")] = 1.0,
     min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.5,
     count: Annotated[int, option("N", "How many to show and write, of each place its best first.", "-n", min=1)] = 20,
-    output: Annotated[
-        list[Path] | None, output_option("FILE", "json, csv, or ply to look at; may be repeated.")
-    ] = None,
+    output: Annotated[list[Path] | None, output_option("FILE", "json or csv; may be repeated.")] = None,
 ) -> None:
     """Find where a gripper with two jaws can take an object.
 
@@ -48,7 +44,7 @@ def grasps(
     from .. import read_cloud, read_skeleton
     from ..analysis import Gripper, grasp_candidates
 
-    files = [(path, GRASP_ENDINGS, "grasps are JSON, CSV or PLY") for path in output or []]
+    files = [(path, GRASP_ENDINGS, "grasps are JSON or CSV") for path in output or []]
     check_outputs(files, skeleton, cloud, *(scene or []))
     planes = [_numbers("--plane", text, 4) for text in plane or []]
     gripper = Gripper(
@@ -64,14 +60,12 @@ def grasps(
         clearance=clearance,
         around=around,
         spacing=spacing,
-        margin=margin,
         min_confidence=min_confidence,
         cone=None if cone is None else _cone(cone),
-        up=None if up is None else _direction("--up", up),
     )
     best = found[:count]
     for path in output or []:
-        {".json": best.to_json, ".csv": best.to_csv, ".ply": best.to_ply}[path.suffix.lower()](path)
+        {".json": best.to_json, ".csv": best.to_csv}[path.suffix.lower()](path)
     facts = {"skeleton": str(skeleton), "found": len(found), **best.as_dict()}
     tell(facts, lambda: _print(best, len(found)), output or [])
 
@@ -86,19 +80,17 @@ def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
     return values
 
 
-def _direction(option: str, text: str) -> tuple[float, ...]:
-    """An axis with or without a minus, or three numbers."""
-    name = text.strip().lower()
-    if name.removeprefix("-") in ("x", "y", "z"):
-        return tuple((-1.0 if name[0] == "-" else 1.0) * (axis == name[-1]) for axis in "xyz")
-    return _numbers(option, text, 3)
-
-
 def _cone(text: str) -> tuple[tuple[float, ...], float]:
+    """An axis with or without a minus, or three numbers; and degrees."""
     direction, comma, degrees = text.rpartition(",")
     if not comma:
         raise WrongUsage(f"--cone {text}: write a direction and degrees, such as -z,60")
-    return _direction("--cone", direction), _numbers("--cone", degrees, 1)[0]
+    name = direction.strip().lower()
+    if name.removeprefix("-") in ("x", "y", "z"):
+        way = tuple((-1.0 if name[0] == "-" else 1.0) * (axis == name[-1]) for axis in "xyz")
+    else:
+        way = _numbers("--cone", direction, 3)
+    return way, _numbers("--cone", degrees, 1)[0]
 
 
 def _print(best: GraspCandidates, found: int) -> None:

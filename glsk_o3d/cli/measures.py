@@ -18,8 +18,6 @@ UNITS = {
     "height": "m",
     "stem_diameter": "m",
     "crown_base": "m",
-    "crown_width": "m",
-    "crown_area": "m2",
     "volume": "m3",
     "traced": "of the length",
 }
@@ -71,9 +69,9 @@ def tree(
     up: Annotated[str | None, option("AXIS", "What points up, x to -z; else as it was grown, or z.")] = None,
     unit: Annotated[str, option("UNIT", "One unit of the file: m, cm, mm, in or ft, or its metres.")] = "m",
 ) -> None:
-    """Measure a tree: height, stem, crown, volume by order.
+    """Measure a tree: height, stem, length and volume by order.
 
-    Length and surface, too. Orders count from the stem, 0. Volume is that of parts with a surface: where there was
+    Orders count from the stem, 0. Volume is that of parts with a surface: where there was
     none, radii are the scatter of the points. What is hardly as it should be is said on stderr, and in JSON as doubts.
     JSON and npz files say where the tree grows from, and keep the points that the stem's diameter is measured on. All
     is in metres if --unit says what a unit of the file is; only a csv file of cylinders is in the units of the file.
@@ -105,10 +103,10 @@ def _print(measures: TreeMeasures) -> None:
         value = sum(measures.volume) if name == "volume" else getattr(measures, name)
         known = f"{value:.4g} {unit}" + (f" ({more[name]})" if name in more else "")
         echo(f"{name.replace('_', ' ')}: {known if math.isfinite(value) else f'not known: {_why_not(name, measures)}'}")
-    columns = measures.length, measures.area, measures.volume
+    columns = measures.length, measures.volume
     names = [*map(str, range(len(measures.length))), "all"]
     numbers = [[f"{value:.4g}" for value in (*column, sum(column))] for column in columns]
-    print_table(list(zip(names, *numbers, strict=True)), ("order", "length m", "area m2", "volume m3"))
+    print_table(list(zip(names, *numbers, strict=True)), ("order", "length m", "volume m3"))
 
 
 def _why_not(name: str, measures: TreeMeasures) -> str:

@@ -1,4 +1,4 @@
-"""``glsk skeletonize``, ``glsk rerun`` and ``glsk demo``: from a cloud to a skeleton."""
+"""``glsk skeletonize`` and ``glsk demo``: from a cloud to a skeleton."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typer import Option
 
 from . import options
 from .console import echo, flags, print_rows, print_table, progress, say
-from .options import argument, option, output_option
+from .options import option, output_option
 from .outputs import check_outputs, skeleton_files, skeleton_writers, tell, write_each
 from .reporting import WrongUsage, load_open3d
 
@@ -137,47 +137,6 @@ def _labelled(skeleton: Skeleton, cloud: Any) -> Any:
     return labelled
 
 
-def rerun(
-    result: Annotated[Path, argument("RESULT", "A skeleton that 'glsk skeletonize' wrote as json or npz.")],
-    scan: Annotated[Path | None, argument("SCAN", "Another cloud to run it on, instead of its points.")] = None,
-    output: options.Output = None,
-    preview: options.Preview = None,
-    report: options.ReportPage = None,
-    cut_loops: options.CutLoops = False,
-) -> None:
-    """Repeat the run that made a result.
-
-    It is run with the recipe that the result holds. On the points of the result the skeleton is the same to the last
-    bit; where other releases make it differ, there is a warning. Without outputs it only says whether it is the same.
-    'glsk skeletonize --recipe' runs recipes from files of their own.
-    """
-    from .. import ContractionRecorder, RecipeError, from_recipe, read_cloud, read_skeleton
-    from .. import rerun as run_again
-    from ..io.streaming import sample_for
-    from ..recipes.rerun import identical, is_of_sample
-
-    check_outputs(skeleton_files(output, preview, report), scan, result)
-    recorder = ContractionRecorder() if report is not None else None
-    with progress(not flags.quiet and not flags.verbose) as update:
-        update(f"reading {result.name}")
-        load_open3d()
-        made, cloud = read_skeleton(result), None
-        try:
-            if scan is not None and is_of_sample(made):
-                cloud = sample_for(from_recipe(made.report.recipe), scan, stream=True)
-            elif scan is not None:
-                cloud = read_cloud(scan)
-            skeleton, seconds = _run(partial(run_again, made), cloud, update, recorder)
-        except RecipeError as error:
-            raise RecipeError(f"{result}: cannot be repeated: {error}") from error
-        title = (scan or result).name
-        writers = skeleton_writers(
-            skeleton, output, preview, report, title=title, cut_loops=cut_loops, recorder=recorder
-        )
-        written, problems = write_each(writers, update)
-    _tell(skeleton, seconds, written, problems, {"identical": identical(skeleton, made)})
-
-
 def demo(
     folder: Annotated[Path, output_option("FOLDER", "Made if it is not there.")] = Path("demo"),
     points: Annotated[int, option("N", "How many points the scan has.", "--points", "-n", min=8, max=10**9)] = 8192,
@@ -242,20 +201,14 @@ def print_iterations(records: Sequence[IterationRecord], *, err: bool = False) -
         print_table(iteration_rows(records), list(ITERATION_COLUMNS), err=err)
 
 
-def _tell(
-    skeleton: Skeleton,
-    seconds: float,
-    written: Sequence[Path],
-    problems: Sequence[str],
-    more: Mapping[str, Any] | None = None,
-) -> None:
-    """Print the summary of a run, with `more` facts, and the files written; then OSError if there were problems."""
+def _tell(skeleton: Skeleton, seconds: float, written: Sequence[Path], problems: Sequence[str]) -> None:
+    """Print the summary of a run, and the files written; then OSError if there were problems."""
     from ..analysis.summary import summary
 
     report = skeleton.report
     if flags.verbose:
         print_iterations(report.iterations, err=True)
-    facts = {**summary(skeleton, seconds), **(more or {})}
+    facts = summary(skeleton, seconds)
     supported = {"unsupported": list(map(asdict, report.unsupported))} if report.n_draws else {}
     whole = {**facts, **supported, "warnings": list(report.warnings), "files": list(map(str, written))}
     tell(whole, lambda: print_rows(_shown(facts, report)), written, problems)

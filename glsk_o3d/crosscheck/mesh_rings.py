@@ -29,17 +29,24 @@ def corners(faces: np.ndarray) -> np.ndarray:
     return corner
 
 
+def spokes(n: int, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Each edge of a mesh of `clean_faces` from both ends: that end, the other, its triangles, its fan: (2 e,) arrays.
+
+    Spokes of a vertex are in one fan if triangles lead from one to the other.
+    """
+    corner = corners(faces)
+    ends = np.concatenate([corner[:, [0, 1]], corner[:, [0, 2]]])
+    spoke, row, count = np.unique(ends @ [n, 1], return_inverse=True, return_counts=True)
+    return spoke // n, spoke % n, count, component_labels(len(spoke), row.reshape(2, -1).T)
+
+
 def umbrellas(n: int, faces: np.ndarray) -> np.ndarray:
     """Vertices whose triangles make one closed umbrella, (n,) bool array: neither border nor fan of fans nor bare.
 
     The faces, (f, 3) int array, are as from `clean_faces`.
     """
-    corner = corners(faces)
-    spokes = np.concatenate([corner[:, [0, 1]], corner[:, [0, 2]]])
-    spoke, row, count = np.unique(spokes @ [n, 1], return_inverse=True, return_counts=True)
-    vertex = spoke // n
+    vertex, _, count, fan = spokes(n, faces)
     odd = np.bincount(vertex, count != 2, n) > 0
-    fan = component_labels(len(spoke), row.reshape(2, -1).T)
     vertex_of_fan = np.unique(np.column_stack([vertex, fan]), axis=0)[:, 0]
     return ~odd & (np.bincount(vertex_of_fan, minlength=n) == 1)
 

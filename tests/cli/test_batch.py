@@ -146,8 +146,9 @@ def test_one_skeleton_per_tree_of_a_plot_and_one_of_a_scene_in_tiles(invoke, tmp
     assert told["left_out"] == {str(tmp_path / "in" / "README.md"): "no cloud by its ending, .md"}
     assert read_skeleton("out/plot-9.ply").vertices[:, 0].min() > 5
     words = ["batch", "in/plot.csv", "-o", "tiles", "--tiles", "3", "--overlap", "0.5", "--json"]
+    told = json.loads(invoke(*words).stdout)
+    assert told["failed"] == 0
     plan = json.loads(invoke(*words, "--dry-run").stdout)
     assert plan["tasks"][0]["input"] == f"{tmp_path}/in/plot.csv tile 0-0-0"
-    told = json.loads(invoke(*words).stdout)
-    assert (told["done"], told["failed"]) == (plan["todo"], 0)
+    assert (plan["todo"], plan["skipped"]) == (0, told["done"])
     assert read_skeleton("tiles/plot.ply").n_loops == 3

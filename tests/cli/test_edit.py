@@ -24,21 +24,21 @@ def file(tmp_path):
 
 
 def test_edits_one_after_the_other(invoke, file, tmp_path):
-    words = ["--largest", "--cut-loops", "--root", "x", "--prune-length", "0.5", "--smooth", "2", "--vertices", "5"]
+    words = ["--largest", "--cut-loops", "--root", "x", "--prune-length", "0.5", "--simplify", "0.6"]
     result = invoke("edit", file, "-o", "new.swc", "-o", "new.json", *words)
     assert result.exit_code == 0, result.output
-    done = ["kept one of 2 components", "cut a loop at (", "grows from (-1, ", "pruned 1 of ", "smoothed in 2 passes"]
-    done += ["kept 5 of 14 vertices", "vertices 17 -> 5, edges 16 -> 4, components 2 -> 1, loops 1 -> 0, "]
+    done = ["kept one of 2 components", "cut a loop at (", "grows from (-1, ", "pruned 1 of "]
+    done += ["kept 6 of 14 vertices", "vertices 17 -> 6, edges 16 -> 5, components 2 -> 1, loops 1 -> 0, "]
     done.append("wrote new.swc")
     lines = result.stdout.splitlines()
     assert all(line.startswith(start) for line, start in zip(lines, done, strict=False))
     new = read_skeleton(tmp_path / "new.json")
     told = json.loads(invoke("edit", file, "-o", "again.json", *words, "--json").stdout)
-    assert told["done"] == lines[:6]
-    assert [told[when]["vertices"] for when in ("before", "after")] == [17, 5]
+    assert told["done"] == lines[:5]
+    assert [told[when]["vertices"] for when in ("before", "after")] == [17, 6]
     assert told["files"] == ["again.json"]
     assert invoke("edit", file, "-o", "same.ply").stdout == "all counts are as before\nwrote same.ply\n"
-    assert (new.n_components, new.n_loops, len(new.vertices)) == (1, 0, 5)
+    assert (new.n_components, new.n_loops, len(new.vertices)) == (1, 0, 6)
     assert read_skeleton(tmp_path / "new.swc").length == pytest.approx(new.length)
     result = invoke("edit", file, "-o", "new.ply", "--simplify", 10, "-q")
     assert (result.exit_code, result.output) == (0, "")

@@ -37,7 +37,7 @@ def test_without_a_truth(invoke, scans, tmp_path, ring, moved):
     assert report["assessment"] == assess(moved, ring.points).as_dict()
     assert report["truth"] is report["comparison"] is None
     assert f"centredness {report['assessment']['centredness']:.4f} " in " ".join(run.stdout.split())
-    assert f"opening {report['assessment']['loops'][0]['opening']:.4g}" in run.stdout
+    assert "loops 1 1 open wider than their tube" in " ".join(run.stdout.split())
     assert "completeness" not in run.stdout
     assert run.stdout.endswith("wrote r.json\nwrote p.png\n")
     assert imread(tmp_path / "p.png").shape[:2] == (760, 1800)

@@ -73,7 +73,7 @@ def test_nothing_of_a_file_or_its_name_reaches_the_terminal(invoke, tmp_path, mo
         ["skeletonize", "s.xyz", "--set", "RingBuilder.k={}"],
         ["skeletonize", "s.xyz", "--set", "Refiner.root={}"],
         ["demo", "-o", "out", "--points", "{}"],
-        ["edit", "k.json", "-o", "o.json", "--smooth", "{}"],
+        ["edit", "k.json", "-o", "o.json", "--prune-order", "{}"],
         ["branches", "k.json", "--root", "{}"],
     ],
 )

@@ -87,7 +87,7 @@ def test_grasps_keep_above_a_table_and_in_a_cone(ros, cloud, expected, rows):
     table, where = [0.0, 0.0, 1.0, 0.25], [0.0, 1.0, -1.0]
     node = ros.node(opening=0.6, plane=table, approach=where, approach_angle=50.0)
     node.on_cloud(cloud)
-    grasps = grasp_candidates(expected, 0.6, obstacles=table, cone=(where, 50))
+    grasps = grasp_candidates(expected, 0.6, obstacles=[table], cone=(where, 50))
     assert (
         8 < len(grasps) < len(grasp_candidates(expected, 0.6, cone=(where, 50))) < len(grasp_candidates(expected, 0.6))
     )
