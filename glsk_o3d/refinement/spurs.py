@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..decisions import QUESTIONS, Decision
-from ..numerics.neighbourhoods import plane_axes
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
-from ..numerics.vectors import TINY, unit
+from ..numerics.vectors import TINY, norm, unit
 from ..skeleton import Skeleton
 from .evidence import Evidence
 from .limbs import Limbs
@@ -102,11 +101,12 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
             ending[branch] = degree[branch] < 3
     share = [count[path[1:]] / count[path[1:]].sum() for _, path in found]
     half = np.array([weights @ wide[path[1:]] for weights, (_, path) in zip(share, found, strict=True)])
-    beside = _beside(evidence, [skeleton.vertices[path] for _, path in found], half)
+    beside = _beside(evidence, skeleton.vertices, sections.across, [path for _, path in found], half)
     for (k, path), weights, own_half, shared in zip(found, share, half, beside, strict=True):
         junction, body, tip = int(path[0]), path[1:], int(path[-1])
-        own = cloud.members.of(body)
-        points = cloud.points[own[:: len(own) // SPUR_POINTS + 1]]
+        own = cloud.points[cloud.members.of(body)]
+        # by how far they are, and not as they come, which depends on how the object is turned
+        points = own[np.argsort(norm(own - skeleton.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
         out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * own_half)
         facts = dict(
             protrusion=float(np.log(out / max(own_half, TINY) + LEAST_OUT) * (1 - shared)),
@@ -134,20 +134,27 @@ def _with_forks(skeleton: Skeleton, twigs: list[_Twig]) -> list[_Twig]:
     return found
 
 
-def _beside(evidence: Evidence, paths: list[np.ndarray], half: np.ndarray) -> np.ndarray:
+def _beside(
+    evidence: Evidence, vertices: np.ndarray, width: np.ndarray, paths: list[np.ndarray], half: np.ndarray
+) -> np.ndarray:
     """How much of the object is beside the outer half of each branch, (b,): of a limb 0, of a strand in a flat part 1.
 
     At a place of the curve it is the largest winding number, from 0 to 1, at two half widths across the branch; of
-    three places the mean counts. `paths` are the curves, (p, 3) float arrays, and `half` (b,) the half widths.
+    three places the mean counts. `paths` are branches, as numbers of `vertices` (m, 3), whose sections are widest in
+    the directions `width` (m, 3); and `half` (b,) the half widths.
     """
-    along = map(arc_lengths, paths)
-    places = np.array([place_at(path, s, s[-1] * OUTER_PLACES) for path, s in zip(paths, along, strict=True)])
-    turn = np.linspace(0, 2 * np.pi, ACROSS, endpoint=False)
-    across = plane_axes(unit((places[:, 2:] - places[:, :-2]).reshape(-1, 3))) @ [np.cos(turn), np.sin(turn)]
-    away = BESIDE * half[:, None, None, None] * across.reshape(len(paths), -1, 3, ACROSS)
-    beside = (places[:, 1:-1, :, None] + away).swapaxes(2, 3)
+    along = [arc_lengths(vertices[path]) for path in paths]
+    places = np.array([place_at(vertices[path], s, s[-1] * OUTER_PLACES) for path, s in zip(paths, along, strict=True)])
+    near = [path[np.searchsorted(s, s[-1] * OUTER_PLACES[1:-1])] for path, s in zip(paths, along, strict=True)]
+    # the first direction is the section's, so that the others turn with the object
+    tangent = unit((places[:, 2:] - places[:, :-2]).reshape(-1, 3))
+    second = unit(np.cross(tangent, width[np.concatenate(near)]))
+    turn = np.linspace(0, 2 * np.pi, ACROSS, endpoint=False)[:, None, None]
+    across = np.cos(turn) * np.cross(second, tangent) + np.sin(turn) * second
+    away = BESIDE * half[:, None, None] * across.reshape(ACROSS, len(paths), -1, 3)
+    beside = places[:, 1:-1] + away
     winding = evidence.winding(beside.reshape(-1, 3)).reshape(beside.shape[:-1])
-    inside: np.ndarray = np.clip(winding.max(axis=2), 0, 1).mean(axis=1)
+    inside: np.ndarray = np.clip(winding.max(axis=0), 0, 1).mean(axis=1)
     return inside
 
 
