@@ -42,7 +42,8 @@ class LPRReducer(Filter[Contraction]):
     -----
     As in the published code, the Laplacian coordinates are those before the solve, :math:`s_i - \psi' s_i(0)` is at
     least 1e-4, and V2 lacks the factor :math:`W_H`. As in the paper, the curvature term compares with the point's own
-    Laplacian coordinate. Where that lies in the tangent plane, the ring is projected on the tangent plane instead.
+    Laplacian coordinate. Where that lies in the tangent plane, or is nothing beside the ring, the ring is projected on the
+    tangent plane instead.
 
     References
     ----------
@@ -136,7 +137,9 @@ def combine_rings(state: Contraction, representatives: np.ndarray, swallowed: np
     normals = state.normals[state.survivors[representatives]]
     delta = state.laplacian_coordinates[representatives]
     length = norm(delta)[:, None]
-    along = np.abs(dot(delta, normals))[:, None] > IN_PLANE_SINE * length
+    # of a flat ring they are nothing but rounding, and lead anywhere
+    enough = IN_PLANE_SINE * np.maximum(length, state.ring_size[representatives, None])
+    along = np.abs(dot(delta, normals))[:, None] > enough
     direction = np.where(along, np.divide(delta, length, out=np.zeros_like(delta), where=along), normals)
     return star_rings(state.cloud[state.survivors], representatives, union, plane_axes(direction))
 
